@@ -1,0 +1,67 @@
+"""Write docs/parameters.md from antennate.params; with --check, only say whether it is true."""
+
+import inspect
+import sys
+from pathlib import Path
+
+from antennate import params
+
+PAGE = Path(__file__).with_suffix(".md")
+HEAD = """\
+# Parameters
+
+Every physical number of the project: its default, its unit, what it means and where it comes from.
+A source begins with `paper` (arXiv:2603.07795), `datasheet`, `measured`, `fitted` or `assumed`.
+This page is generated: change `src/antennate/params.py`, then run `python docs/parameters.py`.
+"""
+
+
+def groups() -> list[type[params.Params]]:
+    """Return the public parameter classes in the order of the source."""
+    return [
+        group
+        for name, group in vars(params).items()
+        if inspect.isclass(group)
+        and issubclass(group, params.Params)
+        and group is not params.Params
+        and not name.startswith("_")
+    ]
+
+
+def table(group: type[params.Params]) -> str:
+    """Return one section: what the class says of itself, and a row for each number in it."""
+    rows = [
+        f"## {group.__name__}",
+        "",
+        inspect.getdoc(group) or "",
+        "",
+        "| name | default | unit | meaning | source |",
+        "|---|---|---|---|---|",
+    ]
+    for name, field in group.model_fields.items():
+        default = field.get_default(call_default_factory=True)
+        if isinstance(default, params.Params):  # its numbers have a table of their own
+            kind = type(default).__name__
+            rows.append(f"| `{name}` | [{kind}](#{kind.lower()}) | | {field.description or ''} | |")
+            continue
+        extra = field.json_schema_extra
+        assert isinstance(extra, dict), f"{group.__name__}.{name} has no unit and no source"
+        value = f"{default:.6g}" if isinstance(default, float) else default
+        cells = [f"`{name}`", f"`{value}`", *(extra[k] for k in ("unit", "meaning", "source"))]
+        rows.append("| " + " | ".join(str(cell).replace("|", "\\|") for cell in cells) + " |")
+    return "\n".join(rows) + "\n"
+
+
+def main() -> int:
+    """Write the page, or compare it; return the exit status."""
+    page = "\n".join([HEAD, *(table(group) for group in groups())])
+    if "--check" not in sys.argv[1:]:
+        PAGE.write_text(page, encoding="utf-8")
+    elif not PAGE.exists() or PAGE.read_text(encoding="utf-8") != page:
+        print("docs/parameters.md is out of date: run `python docs/parameters.py`", file=sys.stderr)
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

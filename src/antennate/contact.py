@@ -1,0 +1,42 @@
+"""Bending level to contact, per side: CONTACT at theta, FREE again a little below, UNKNOWN for NaN."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from antennate.params import RuleParams
+from antennate.records import Bools, Contact, Floats, Ints
+
+
+def classify(params: RuleParams, b: Floats, before: Ints) -> Ints:
+    """Contact of each side.
+
+    Args:
+        params: Threshold and hysteresis.
+        b: Bending levels, shape (B, 2); NaN where nothing can be said.
+        before: Contact at the tick before, shape (B, 2).
+
+    Returns:
+        One `Contact` a side, shape (B, 2).
+    """
+    touching = before == Contact.CONTACT
+    bound = params.threshold - params.hysteresis * touching
+    state = np.where(b >= bound, int(Contact.CONTACT), int(Contact.FREE))
+    return np.where(np.isnan(b), int(Contact.UNKNOWN), state)
+
+
+class ContactState:
+    """Contact with its memory of the tick before."""
+
+    def __init__(self, params: RuleParams, batch: int) -> None:
+        self._params = params
+        self._state: Ints = np.full((batch, 2), int(Contact.FREE))
+
+    def reset(self, rows: Ints | Bools) -> None:
+        """Some rows start free."""
+        self._state[rows] = Contact.FREE
+
+    def step(self, b: Floats) -> Ints:
+        """Contact for bending levels b, shape (B, 2)."""
+        self._state = classify(self._params, b, self._state)
+        return self._state

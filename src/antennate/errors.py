@@ -1,0 +1,37 @@
+"""The error tree: everything that antennate raises on purpose descends from AntennateError."""
+
+from __future__ import annotations
+
+
+class AntennateError(Exception):
+    """Base of all errors of this package; its text is one line fit to be shown to a user."""
+
+
+class BadInputError(AntennateError, ValueError):
+    """Something a user supplied cannot be used: a file, a flag, a value, a folder."""
+
+
+class ConfigError(BadInputError):
+    """A configuration is not acceptable: unknown key, wrong type, value out of bounds."""
+
+
+class ArenaError(BadInputError):
+    """An arena cannot be built as described, or the robot does not fit into it."""
+
+
+class OutputError(BadInputError):
+    """A result cannot be written where the user asked for it."""
+
+
+class SimulationError(AntennateError):
+    """The physics of one world became invalid.
+
+    Attributes:
+        step: Physics step at which it was noticed.
+        reason: What was found.
+    """
+
+    def __init__(self, step: int, reason: str) -> None:
+        super().__init__(f"simulation invalid at physics step {step}: {reason}")
+        self.step = step
+        self.reason = reason

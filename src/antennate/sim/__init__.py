@@ -1,0 +1,1 @@
+"""The simulated world: parts built as MjSpec, compiled once, stepped fast."""

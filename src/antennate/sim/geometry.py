@@ -1,0 +1,87 @@
+"""The plan of a tunnel: centre line, walls and lining as plain arrays, seen from above.
+
+The centre line starts at the origin along +x. Walls are the centre line moved sideways, mitred at the
+turns; at a turn the outer wall may be rounded.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from antennate.params import TunnelParams
+from antennate.records import Floats
+
+
+def centre_line(params: TunnelParams) -> Floats:
+    """Corner points of the centre line [m], shape (segments + 1, 2)."""
+    heading = 0.0
+    points = [np.zeros(2)]
+    for length, turn in zip(params.segments, (*params.turns_deg, 0.0), strict=True):
+        points.append(points[-1] + length * np.array([math.cos(heading), math.sin(heading)]))
+        heading += math.radians(turn)
+    return np.array(points)
+
+
+def offset_line(points: Floats, distance: float, corner_radius: float = 0.0) -> Floats:
+    """The polyline moved sideways by `distance` [m], positive to the left, shape (n, 2).
+
+    Corners are mitred; where the moved line is the outer one it is rounded by `corner_radius` [m].
+    """
+    along = np.diff(points, axis=0)
+    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    normal = np.stack([-along[:, 1], along[:, 0]], axis=1)
+    moved = [points[0] + distance * normal[0]]
+    for i in range(1, len(points) - 1):
+        before, after = normal[i - 1], normal[i]
+        mitre = points[i] + distance * (before + after) / (1.0 + before @ after)
+        turn = math.atan2(np.cross(along[i - 1], along[i]), along[i - 1] @ along[i])
+        if turn * distance < 0 and corner_radius > 0:
+            moved.extend(_fillet(mitre, along[i - 1], along[i], turn, corner_radius))
+        else:
+            moved.append(mitre)
+    moved.append(points[-1] + distance * normal[-1])
+    return np.array(moved)
+
+
+def _fillet(corner: Floats, into: Floats, out: Floats, turn: float, radius: float) -> list[Floats]:
+    """Points of an arc of `radius` that touches both lines at a corner."""
+    back = radius * math.tan(abs(turn) / 2)
+    start = corner - back * into
+    side = math.copysign(1.0, turn) * np.array([-into[1], into[0]])
+    centre = start + radius * side
+    angles = np.linspace(0.0, turn, max(3, math.ceil(abs(turn) / 0.2) + 1))
+    spoke = start - centre
+    cos, sin = np.cos(angles), np.sin(angles)
+    return [
+        centre + np.array([c * spoke[0] - s * spoke[1], s * spoke[0] + c * spoke[1]])
+        for c, s in zip(cos, sin, strict=True)
+    ]
+
+
+def resample(points: Floats, spacing: Floats) -> Floats:
+    """Points along a polyline at growing arc lengths `spacing` [m], shape (n, 2); those past its end drop out."""
+    step = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    arc = np.concatenate([[0.0], np.cumsum(step)])
+    spacing = spacing[spacing <= arc[-1]]
+    return np.stack([np.interp(spacing, arc, points[:, k]) for k in range(2)], axis=1)
+
+
+def progress(points: Floats, where: Floats) -> float:
+    """Arc length along the centre line of the point nearest to `where` [m]; past either end it extends straight."""
+    best, best_distance, done = 0.0, math.inf, 0.0
+    last = len(points) - 2
+    for i in range(len(points) - 1):
+        along = points[i + 1] - points[i]
+        length = math.hypot(along[0], along[1])
+        s = float((where - points[i]) @ along) / length
+        low = -math.inf if i == 0 else 0.0
+        high = math.inf if i == last else length
+        s = min(max(s, low), high)
+        gap = where - points[i] - along * (s / length)
+        distance = math.hypot(gap[0], gap[1])
+        if distance < best_distance:
+            best, best_distance = done + s, distance
+        done += length
+    return best

@@ -1,0 +1,189 @@
+"""One compiled world: names become indices once, then it steps.
+
+A world never hides trouble: commands are checked before they reach the engine, the engine's silent
+reset is off, and every warning it counts, a clock that stands still and any state out of bounds end
+the world with a `SimulationError`.
+"""
+
+from __future__ import annotations
+
+import math
+
+import mujoco
+import numpy as np
+
+from antennate.anatomy import (
+    ANTENNA_BASE,
+    ANTENNA_HINGES,
+    ANTENNA_PREFIXES,
+    LEGS,
+    LINKS,
+    YAW_JOINTS,
+)
+from antennate.errors import SimulationError
+from antennate.params import PhysicsParams, RobotParams
+from antennate.records import Floats, Ints
+from antennate.sim import arena, layers, robot
+
+PREFIX = "robot/"
+_SPEED_LIMIT = 1e3
+"""No coordinate of a sound world moves faster [m/s or rad/s]."""
+_HEIGHT_LIMIT = 0.3
+"""A head above or below this left the world [m]."""
+
+
+def new_spec(physics: PhysicsParams) -> mujoco.MjSpec:
+    """An empty spec with the project's numerics: implicitfast, Newton, elliptic cones, sleeping islands."""
+    spec = mujoco.MjSpec()
+    spec.compiler.degree = False
+    option = spec.option
+    option.timestep = physics.timestep
+    option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    option.solver = mujoco.mjtSolver.mjSOL_NEWTON
+    option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
+    option.impratio = physics.impratio
+    option.iterations = 100
+    option.tolerance = 1e-8
+    option.sleep_tolerance = physics.sleep_tolerance
+    option.enableflags |= int(mujoco.mjtEnableBit.mjENBL_SLEEP)
+    option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
+    return spec
+
+
+def compile_world(
+    physics: PhysicsParams, params: RobotParams, tunnel: arena.Tunnel | None = None
+) -> mujoco.MjModel:
+    """Robot on a floor, inside a tunnel if one is given; the head starts over the origin."""
+    spec = new_spec(physics)
+    arena.add_floor(spec)
+    if tunnel is not None:
+        arena.add_tunnel(spec, tunnel)
+    frame = spec.worldbody.add_frame(pos=[0, 0, robot.axle_height(params)])
+    spec.attach(robot.build(params), frame=frame, prefix=PREFIX)
+    spec.body(PREFIX + LINKS[0]).add_freejoint(name=PREFIX + "root")
+    for geom in spec.geoms:
+        geom.solref[0] = physics.contact_time
+        geom.solimp[:3] = [0.95, 0.99, 0.0005]
+    return spec.compile()
+
+
+class World:
+    """One model with its state, and the robot's parts by index.
+
+    Attributes:
+        model: The compiled model; `data` its state.
+        t: Time since the world was made [s].
+    """
+
+    def __init__(self, model: mujoco.MjModel, sensed_hinges: int) -> None:
+        self.model = model
+        self.data = mujoco.MjData(model)
+        self._yaw = self._addresses([PREFIX + n for n in YAW_JOINTS])
+        self._leg = self._addresses([PREFIX + n for n in LEGS])
+        hinges = [PREFIX + p + h for p in ANTENNA_PREFIXES for h in ANTENNA_HINGES[:sensed_hinges]]
+        self._flex = self._addresses(hinges).reshape(2, sensed_hinges)
+        bases = [p + ANTENNA_BASE for p in ANTENNA_PREFIXES]
+        names = [PREFIX + n for n in (*YAW_JOINTS, *LEGS, *bases)]
+        self._drive: Ints = np.array([model.actuator(n).id for n in names])
+        self._root: int = model.joint(PREFIX + "root").qposadr[0]
+        self._links: Ints = np.array([model.body(PREFIX + n).id for n in LINKS])
+        bodies = range(model.nbody)
+        self._cylinders: Ints = np.array([b for b in bodies if model.body(b).name.startswith("cylinder")], dtype=int)
+        self._leg_geoms: Ints = np.array([model.geom(PREFIX + n).id for n in LEGS])
+        self._obstacle = model.geom_contype == layers.OBSTACLE
+        owner = model.body_rootid[model.geom_bodyid]
+        self._robot = owner == model.body(PREFIX + LINKS[0]).id
+        self._steps = 0
+
+    def _addresses(self, joints: list[str]) -> Ints:
+        return np.array([self.model.joint(n).qposadr[0] for n in joints])
+
+    @property
+    def t(self) -> float:
+        """Time since the world was made [s]."""
+        return float(self.data.time)
+
+    def place(self, x: float, y: float, heading: float, yaw: Floats, leg: Floats) -> None:
+        """Put the head at (x, y) [m] with a heading [rad] and the joints at yaw (5,) and leg (6, 2) [rad]."""
+        q = self.data.qpos
+        q[self._root : self._root + 2] = x, y
+        q[self._root + 3 : self._root + 7] = math.cos(heading / 2), 0.0, 0.0, math.sin(heading / 2)
+        q[self._yaw] = yaw
+        q[self._leg] = leg.ravel()
+        mujoco.mj_forward(self.model, self.data)
+
+    def command(self, drive: Floats) -> None:
+        """Set all joint targets: 5 yaws, 12 legs, 2 antenna bases [rad], shape (19,).
+
+        Raises:
+            SimulationError: A target is not finite; nothing is set then.
+        """
+        if not math.isfinite(drive.sum()):
+            bad = int(np.flatnonzero(~np.isfinite(drive))[0])
+            raise SimulationError(
+                self._steps, f"target of actuator {self.model.actuator(self._drive[bad]).name} is {drive[bad]}"
+            )
+        self.data.ctrl[self._drive] = drive
+
+    def step(self, count: int) -> None:
+        """Advance by `count` physics steps.
+
+        Raises:
+            SimulationError: The engine warned, time stood still, or the state left all bounds.
+        """
+        before = self.data.time
+        mujoco.mj_step(self.model, self.data, count)
+        self._steps += count
+        self._check(before)
+
+    def _check(self, before: float) -> None:
+        data = self.data
+        speed = float(abs(data.qvel).max())
+        height = float(self.head[2])
+        if data.warning.number.any():
+            found = [n for n, count in zip(_WARNINGS, data.warning.number, strict=True) if count]
+            raise SimulationError(self._steps, f"engine warning {', '.join(found)}")
+        if not data.time > before:
+            raise SimulationError(self._steps, f"time stood still at {data.time:.6g} s")
+        if not speed < _SPEED_LIMIT:
+            raise SimulationError(self._steps, f"a coordinate moves at {speed:.3g} m/s or rad/s")
+        if not 0.0 < height < _HEIGHT_LIMIT:
+            raise SimulationError(self._steps, f"the head is at a height of {height:.3g} m")
+
+    def flex(self) -> Floats:
+        """Summed hinge angles under each film, left and right [rad], shape (2,); positive towards the tail."""
+        return self.data.qpos[self._flex].sum(axis=1)
+
+    @property
+    def head(self) -> Floats:
+        """Position of the head link [m], shape (3,), a view of the state."""
+        return self.data.qpos[self._root : self._root + 3]
+
+    @property
+    def heading(self) -> float:
+        """Yaw of the head link [rad], within (-pi, pi]."""
+        w, x, y, z = self.data.qpos[self._root + 3 : self._root + 7]
+        return math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+
+    def links(self) -> Floats:
+        """Plan positions of the six links, head first [m], shape (6, 2)."""
+        return self.data.xpos[self._links, :2]
+
+    def cylinders(self) -> Floats:
+        """Plan positions of all cylinders [m], shape (m, 2)."""
+        return self.data.xpos[self._cylinders, :2]
+
+    def obstacle_force(self) -> float:
+        """Sum of the normal forces between the robot and obstacles [N], of the last physics step."""
+        contact = self.data.contact
+        kind = self._obstacle[contact.geom]
+        pushing = (kind[:, 0] != kind[:, 1]) & (self._robot[contact.geom].any(axis=1))
+        address = contact.efc_address[pushing]
+        return float(self.data.efc_force[address[address >= 0]].sum())
+
+    def set_leg_friction(self, friction: Floats) -> None:
+        """Give every leg its own sliding friction, shape (12,)."""
+        self.model.geom_friction[self._leg_geoms, 0] = friction
+
+
+_WARNINGS = tuple(name.removeprefix("mjWARN_") for name in list(mujoco.mjtWarning.__members__)[:-1])
