@@ -13,7 +13,7 @@ from antennate.records import Bools, Floats, Ints
 
 
 def bending_level(params: ConditioningParams, counts: Floats) -> Floats:
-    """Sigmoid calibration, b = 1 / (1 + exp(-s k (x - x0))), x the normalised reading, s its polarity.
+    """Sigmoid calibration, b = 1 / (1 + exp(-s k (x - x0))), s the polarity of the reading x.
 
     Args:
         params: Slope k, midpoint x0, polarity and normalisation.
@@ -25,6 +25,12 @@ def bending_level(params: ConditioningParams, counts: Floats) -> Floats:
     x = (counts - params.counts_low) / (params.counts_high - params.counts_low)
     z = np.clip(params.polarity * params.slope * (x - params.midpoint), -700.0, 700.0)
     return 1.0 / (1.0 + np.exp(-z))
+
+
+def deflection(params: ConditioningParams, counts: Floats) -> Floats:
+    """Normalised reading from the straight antenna on: 0 straight, 1 fully bent, same shape."""
+    x = (counts - params.counts_low) / (params.counts_high - params.counts_low)
+    return x if params.polarity > 0 else 1.0 - x
 
 
 class RunningMean:

@@ -1,4 +1,4 @@
-"""Bending level to contact, per side: CONTACT at theta, FREE again a little below, UNKNOWN for NaN."""
+"""Bending level to contact, per side: CONTACT at theta, FREE somewhat below, UNKNOWN for NaN."""
 
 from __future__ import annotations
 

@@ -35,3 +35,7 @@ class SimulationError(AntennateError):
         super().__init__(f"simulation invalid at physics step {step}: {reason}")
         self.step = step
         self.reason = reason
+
+
+class WorkerError(AntennateError):
+    """A worker process failed or died; finished trials are kept."""

@@ -1,6 +1,7 @@
 """Maneuver and phase to joint targets.
 
-The body carries the serpenoid wave of the paper, alpha_j = A sin(2 pi xi j / 5 - P + delta) + offset
+The body carries the serpenoid wave of the paper, alpha_j = A sin(2 pi xi j / 5 - P + delta) +
+offset
 with P the gait phase: as P grows the crest travels from head to tail and the robot advances. Leg i
 turns with P - 2 pi xi i / 6, the right one half a turn later. The lead delta of the body over the
 legs decides the speed: it is best where the feet are down on the side towards which the body bends.
@@ -59,17 +60,15 @@ class Gait:
         self.phase[rows] = phase
         self.offset[rows] = 0.0
 
-    def step(self, maneuver: Ints, steer: Floats | None = None) -> Pose:
+    def step(self, maneuver: Ints, turn_offset: Floats | float | None = None) -> Pose:
         """Advance one control period and return the targets.
 
         Args:
             maneuver: One `Maneuver` a row, shape (B,). HOLD keeps the pose.
-            steer: Yaw offset for rows that do not turn [rad], shape (B,); zero if absent.
+            turn_offset: Yaw offset of the turns [rad], the gait's own if absent.
         """
-        wanted = _STEER[maneuver] * self.params.turn_offset
-        if steer is not None:
-            wanted = wanted + steer
-        change = np.clip(wanted - self.offset, -self._slew, self._slew)
+        size = self.params.turn_offset if turn_offset is None else turn_offset
+        change = np.clip(_STEER[maneuver] * size - self.offset, -self._slew, self._slew)
         self.offset += np.where(maneuver == Maneuver.HOLD, 0.0, change)
         self.phase += _DIRECTION[maneuver] * self._advance
         return targets(self.params, self.phase, self.offset)

@@ -25,7 +25,9 @@ def decide(params: RuleParams, contact: Ints, b: Floats) -> Ints:
     """
     touch = contact == Contact.CONTACT
     difference = b[:, LEFT] - b[:, RIGHT]
-    blocked = touch.all(axis=1) & (b >= params.strong).all(axis=1) & (np.abs(difference) < params.similar)
+    blocked = (
+        touch.all(axis=1) & (b >= params.strong).all(axis=1) & (np.abs(difference) < params.similar)
+    )
     lean = np.where(touch.all(axis=1), difference, touch[:, LEFT] * 1.0 - touch[:, RIGHT])
     turn = np.where(lean >= 0, int(Maneuver.TURN_R), int(Maneuver.TURN_L))
     chosen = np.where(touch.any(axis=1), turn, int(Maneuver.FORWARD))
@@ -46,7 +48,7 @@ class Hold:
         self.until[rows] = -np.inf
 
     def step(self, t: Floats, wanted: Ints, duration: Floats | float) -> Ints:
-        """The maneuver in force at times t [s], shape (B,); a new one is kept for `duration` [s]."""
+        """The maneuver in force at t [s], shape (B,); a new one is kept for `duration` [s]."""
         stop = wanted == Maneuver.HOLD
         held = (t < self.until) & (self.current != Maneuver.HOLD) & ~stop
         chosen = np.where(held, self.current, wanted)

@@ -13,7 +13,7 @@ from antennate.params import AntennaParams, SensorParams
 from antennate.sim import layers
 
 _BASE_STIFFNESS = 2.0
-"""Position gain of the base servo [N·m/rad]: a hundred times the stiffest spring, so it stays put."""
+"""Position gain of the base servo [N·m/rad]: a hundred times the stiffest spring."""
 
 
 def build(params: AntennaParams, sensor: SensorParams) -> mujoco.MjSpec:
@@ -28,7 +28,9 @@ def build(params: AntennaParams, sensor: SensorParams) -> mujoco.MjSpec:
         damping=0.05 * _BASE_STIFFNESS,
         armature=1e-4,
     )
-    servo = spec.add_actuator(name=ANTENNA_BASE, trntype=mujoco.mjtTrn.mjTRN_JOINT, target=ANTENNA_BASE)
+    servo = spec.add_actuator(
+        name=ANTENNA_BASE, trntype=mujoco.mjtTrn.mjTRN_JOINT, target=ANTENNA_BASE
+    )
     servo.set_to_position(kp=_BASE_STIFFNESS)
 
     stiffness = params.hinge_stiffness(sensor.covered_hinges(params))
@@ -58,6 +60,10 @@ def build(params: AntennaParams, sensor: SensorParams) -> mujoco.MjSpec:
         )
         where = [params.link_length, 0.0, 0.0]
     base.add_geom(
-        type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[params.radius, 0, 0], mass=1e-3, contype=0, conaffinity=0
+        type=mujoco.mjtGeom.mjGEOM_SPHERE,
+        size=[params.radius, 0, 0],
+        mass=1e-3,
+        contype=0,
+        conaffinity=0,
     )
     return spec

@@ -1,8 +1,9 @@
 """Arenas as parts: a floor, walls, and cylinders that stand on the floor and can be pushed.
 
 A cylinder slides and spins under one foot contact of four dimensions: with the elliptic cone its
-limit surface is the ellipsoid usual for a sliding patch, isotropic in the plane. Above the floor it is
-a vertical capsule whose straight part covers the robot's height, which collides like a cylinder there.
+limit surface is the ellipsoid usual for a sliding patch, isotropic in the plane. Above the floor it
+is a vertical capsule whose straight part covers the robot's height, which collides like a cylinder
+there.
 """
 
 from __future__ import annotations
@@ -49,7 +50,8 @@ def draw_tunnel(params: TunnelParams, robot: RobotParams, rng: np.random.Generat
     """
     if params.free_width < robot.width:
         raise ArenaError(
-            f"tunnel.free_width must be at least the robot's width of {robot.width} m, got {params.free_width} m"
+            f"tunnel.free_width must be at least the robot's width of {robot.width} m, got "
+            f"{params.free_width} m"
         )
     mirrored = bool(rng.random() < 0.5) if params.mirror == "random" else params.mirror == "always"
     centre = geometry.centre_line(params)
@@ -66,13 +68,19 @@ def draw_tunnel(params: TunnelParams, robot: RobotParams, rng: np.random.Generat
 
 
 def _place_cylinders(
-    params: TunnelParams, robot: RobotParams, centre: Floats, walls: tuple[Floats, Floats], rng: np.random.Generator
+    params: TunnelParams,
+    robot: RobotParams,
+    centre: Floats,
+    walls: tuple[Floats, Floats],
+    rng: np.random.Generator,
 ) -> Floats:
     placed: list[Floats] = []
     diameter = 2 * params.cylinder.radius + _SETTLE_GAP
     reach = params.free_width / 2 + params.cylinder.radius - _SETTLE_GAP
     for distance in (reach, -reach):
-        line = geometry.offset_line(centre, distance, max(0.0, params.corner_radius - params.cylinder.radius))
+        line = geometry.offset_line(
+            centre, distance, max(0.0, params.corner_radius - params.cylinder.radius)
+        )
         gaps = diameter + rng.uniform(0.0, 2.0 * params.lining_gap, size=1000)
         start = rng.uniform(0.0, diameter)
         for point in geometry.resample(line, start + np.cumsum(gaps)):
@@ -91,7 +99,8 @@ def _place_cylinders(
     if len(placed) < wanted:
         raise ArenaError(
             f"tunnel.strewn asks for {params.strewn} cylinders in the corridor, only "
-            f"{params.strewn - wanted + len(placed)} find room; widen or lengthen the tunnel, or strew fewer"
+            f"{params.strewn - wanted + len(placed)} find room; widen or lengthen the tunnel, or "
+            "strew fewer"
         )
     return np.array(placed).reshape(-1, 2)
 
@@ -116,12 +125,21 @@ def add_tunnel(spec: mujoco.MjSpec, tunnel: Tunnel) -> None:
     friction = tunnel.params.cylinder.contact_friction
     for side, line in zip("lr", tunnel.walls, strict=True):
         for i in range(len(line) - 1):
-            _add_wall(spec, f"wall_{side}{i}", line[i], line[i + 1], 1.0 if side == "l" else -1.0, friction)
+            _add_wall(
+                spec,
+                f"wall_{side}{i}",
+                line[i],
+                line[i + 1],
+                1.0 if side == "l" else -1.0,
+                friction,
+            )
     for i, where in enumerate(tunnel.cylinders):
         _add_cylinder(spec, f"cylinder{i}", where, tunnel.params.cylinder)
 
 
-def _add_wall(spec: mujoco.MjSpec, name: str, start: Floats, end: Floats, out: float, friction: float) -> None:
+def _add_wall(
+    spec: mujoco.MjSpec, name: str, start: Floats, end: Floats, out: float, friction: float
+) -> None:
     along = end - start
     length = float(np.linalg.norm(along))
     normal = out * np.array([-along[1], along[0]]) / length

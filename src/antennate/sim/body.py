@@ -18,7 +18,7 @@ _NOISE_BLOCK = 1024
 
 
 class Disturbance:
-    """What chance does to one trial: sensor noise, slipping legs, and joints mounted off their zero."""
+    """What chance does to one trial: sensor noise, slipping legs, joints off their zero."""
 
     def __init__(
         self,

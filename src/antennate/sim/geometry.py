@@ -1,7 +1,7 @@
 """The plan of a tunnel: centre line, walls and lining as plain arrays, seen from above.
 
-The centre line starts at the origin along +x. Walls are the centre line moved sideways, mitred at the
-turns; at a turn the outer wall may be rounded.
+The centre line starts at the origin along +x. Walls are the centre line moved sideways, mitred at
+the turns; at a turn the outer wall may be rounded.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ def _fillet(corner: Floats, into: Floats, out: Floats, turn: float, radius: floa
 
 
 def resample(points: Floats, spacing: Floats) -> Floats:
-    """Points along a polyline at growing arc lengths `spacing` [m], shape (n, 2); those past its end drop out."""
+    """Points at growing arc lengths `spacing` [m] along a polyline, up to its end, shape (n, 2)."""
     step = np.linalg.norm(np.diff(points, axis=0), axis=1)
     arc = np.concatenate([[0.0], np.cumsum(step)])
     spacing = spacing[spacing <= arc[-1]]
@@ -69,7 +69,7 @@ def resample(points: Floats, spacing: Floats) -> Floats:
 
 
 def progress(points: Floats, where: Floats) -> float:
-    """Arc length along the centre line of the point nearest to `where` [m]; past either end it extends straight."""
+    """Arc length of the centre line's nearest point [m]; the line goes on straight past its ends."""
     best, best_distance, done = 0.0, math.inf, 0.0
     last = len(points) - 2
     for i in range(len(points) - 1):

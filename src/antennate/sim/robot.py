@@ -1,8 +1,8 @@
-"""The robot as a part: six links, five yaw and five locked pitch joints, twelve O-legs, two antennae.
+"""The robot as a part: six links, five yaw and five locked pitch joints, twelve O-legs, antennae.
 
 The head (link 0) carries the free joint and looks along +x; every further link hangs behind the one
-before. A link is a spine along x and a cross-beam along y that houses the two leg servos; an O-leg is
-a crowned ring whose centre sits off its axle.
+before. A link is a spine along x and a cross-beam along y that houses the two leg servos; an O-leg
+is a crowned ring whose centre sits off its axle.
 """
 
 from __future__ import annotations
@@ -14,7 +14,6 @@ import mujoco
 from antennate.anatomy import (
     ANTENNA_PREFIXES,
     LEGS,
-    LINK_COUNT,
     LINKS,
     PITCH_JOINTS,
     SIDE_SIGN,
@@ -54,7 +53,9 @@ def _add_servo(spec: mujoco.MjSpec, joint: str, servo: ServoParams) -> None:
     actuator.forcerange = [-servo.stall_torque, servo.stall_torque]
 
 
-def _add_link_joints(spec: mujoco.MjSpec, link: mujoco.MjsBody, i: int, params: RobotParams) -> None:
+def _add_link_joints(
+    spec: mujoco.MjSpec, link: mujoco.MjsBody, i: int, params: RobotParams
+) -> None:
     hinge_at = [params.link_pitch / 2, 0.0, 0.0]
     link.add_joint(
         name=YAW_JOINTS[i - 1],

@@ -33,7 +33,7 @@ _HEIGHT_LIMIT = 0.3
 
 
 def new_spec(physics: PhysicsParams) -> mujoco.MjSpec:
-    """An empty spec with the project's numerics: implicitfast, Newton, elliptic cones, sleeping islands."""
+    """An empty spec with our numerics: implicitfast, Newton, elliptic cones, sleeping islands."""
     spec = mujoco.MjSpec()
     spec.compiler.degree = False
     option = spec.option
@@ -88,7 +88,9 @@ class World:
         self._root: int = model.joint(PREFIX + "root").qposadr[0]
         self._links: Ints = np.array([model.body(PREFIX + n).id for n in LINKS])
         bodies = range(model.nbody)
-        self._cylinders: Ints = np.array([b for b in bodies if model.body(b).name.startswith("cylinder")], dtype=int)
+        self._cylinders: Ints = np.array(
+            [b for b in bodies if model.body(b).name.startswith("cylinder")], dtype=int
+        )
         self._leg_geoms: Ints = np.array([model.geom(PREFIX + n).id for n in LEGS])
         self._obstacle = model.geom_contype == layers.OBSTACLE
         owner = model.body_rootid[model.geom_bodyid]
@@ -104,7 +106,7 @@ class World:
         return float(self.data.time)
 
     def place(self, x: float, y: float, heading: float, yaw: Floats, leg: Floats) -> None:
-        """Put the head at (x, y) [m] with a heading [rad] and the joints at yaw (5,) and leg (6, 2) [rad]."""
+        """Put the head at x, y [m] with a heading [rad], joints at yaw (5,), leg (6, 2) [rad]."""
         q = self.data.qpos
         q[self._root : self._root + 2] = x, y
         q[self._root + 3 : self._root + 7] = math.cos(heading / 2), 0.0, 0.0, math.sin(heading / 2)
@@ -121,7 +123,8 @@ class World:
         if not math.isfinite(drive.sum()):
             bad = int(np.flatnonzero(~np.isfinite(drive))[0])
             raise SimulationError(
-                self._steps, f"target of actuator {self.model.actuator(self._drive[bad]).name} is {drive[bad]}"
+                self._steps,
+                f"target of actuator {self.model.actuator(self._drive[bad]).name} is {drive[bad]}",
             )
         self.data.ctrl[self._drive] = drive
 
@@ -151,7 +154,7 @@ class World:
             raise SimulationError(self._steps, f"the head is at a height of {height:.3g} m")
 
     def flex(self) -> Floats:
-        """Summed hinge angles under each film, left and right [rad], shape (2,); positive towards the tail."""
+        """Summed hinge angles under each film [rad], shape (2,); positive towards the tail."""
         return self.data.qpos[self._flex].sum(axis=1)
 
     @property
@@ -174,7 +177,7 @@ class World:
         return self.data.xpos[self._cylinders, :2]
 
     def obstacle_force(self) -> float:
-        """Sum of the normal forces between the robot and obstacles [N], of the last physics step."""
+        """Sum of the normal forces between robot and obstacles [N] in the last physics step."""
         contact = self.data.contact
         kind = self._obstacle[contact.geom]
         pushing = (kind[:, 0] != kind[:, 1]) & (self._robot[contact.geom].any(axis=1))

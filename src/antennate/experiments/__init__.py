@@ -1,0 +1,1 @@
+"""One file per experiment: what varies, what is measured, what it returns."""

@@ -1,0 +1,1 @@
+"""Running many trials and saying what came out."""

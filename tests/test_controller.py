@@ -1,0 +1,154 @@
+"""The composed mind: it holds on bad readings, its rows are independent, and it has no favoured side."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from antennate.controller import ARMS, Arm, Controller
+from antennate.errors import ConfigError
+from antennate.params import ControllerParams
+from antennate.records import AntennaFrame, Maneuver
+
+PARAMS = ControllerParams()
+PERIOD = PARAMS.period
+STRAIGHT, BENT = 1872.0, 1399.0
+SWAP = np.array([Maneuver.FORWARD, Maneuver.TURN_R, Maneuver.TURN_L, Maneuver.REVERSE, Maneuver.HOLD])
+
+
+def pressed(ticks: int, left: float, right: float, rng: np.random.Generator) -> np.ndarray:
+    """Counts of a robot that walks on the spot against something, shape (ticks, 2)."""
+    phase = 2 * math.pi * PARAMS.gait.frequency * PERIOD * np.arange(ticks)
+    bend = np.stack([left * (1 + 0.4 * np.sin(phase)), right * (1 + 0.4 * np.cos(phase))], axis=1)
+    return np.rint(STRAIGHT - (STRAIGHT - BENT) * bend + rng.normal(0, 2.5, bend.shape))
+
+
+def streams(ticks: int, rows: int) -> np.ndarray:
+    """Counts unlike one another: pressed, jumping, and with gaps, shape (ticks, rows, 2)."""
+    rng = np.random.default_rng(7)
+    counts = np.stack([pressed(ticks, 0.3 + 0.1 * k, 0.9 - 0.1 * k, rng) for k in range(rows)], axis=1)
+    jumps = rng.uniform(BENT, STRAIGHT, (ticks // 50 + 1, 2)).round().repeat(50, axis=0)
+    counts[:, 1] = jumps[:ticks]
+    counts[ticks // 2 : ticks // 2 + 5, 2, 0] = np.nan
+    return counts
+
+
+def run(arm: Arm, counts: np.ndarray, phase: float = 0.0) -> dict[str, np.ndarray]:
+    """All that a fresh controller says to counts of shape (ticks, B, 2)."""
+    batch = counts.shape[1]
+    mind = Controller(PARAMS, arm, batch)
+    mind.reset(np.arange(batch), phase)
+    said: dict[str, list[np.ndarray]] = {"b": [], "maneuver": [], "yaw": [], "leg": []}
+    for i, reading in enumerate(counts):
+        pose = mind.step(AntennaFrame(t=np.full(batch, i * PERIOD), counts=reading))
+        for name, value in (("b", mind.b), ("maneuver", mind.maneuver), ("yaw", pose.yaw), ("leg", pose.leg)):
+            said[name].append(value.copy())
+    return {name: np.array(values) for name, values in said.items()}
+
+
+def test_an_arm_that_does_not_exist_is_refused_with_the_valid_ones() -> None:
+    with pytest.raises(ConfigError, match=r"open, paper, closed, got 'clsoed'"):
+        Controller(PARAMS, "clsoed")  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("arm", ARMS)
+def test_a_robot_that_touches_nothing_walks_forward(arm: Arm) -> None:
+    said = run(arm, np.full((800, 1, 2), STRAIGHT))
+    assert (said["maneuver"] == Maneuver.FORWARD).all()
+
+
+def test_the_open_arm_walks_on_whatever_it_touches() -> None:
+    assert (run("open", np.full((300, 1, 2), BENT))["maneuver"] == Maneuver.FORWARD).all()
+
+
+@pytest.mark.parametrize(
+    ("bend", "expected"),
+    [((1, 0), Maneuver.TURN_R), ((0, 1), Maneuver.TURN_L), ((1, 1), Maneuver.REVERSE)],
+)
+def test_the_paper_arm_answers_touch_at_once(bend: tuple[int, int], expected: Maneuver) -> None:
+    counts = STRAIGHT - (STRAIGHT - BENT) * np.array(bend, dtype=float)
+    said = run("paper", np.tile(counts, (200, 1, 1)))
+    assert (said["maneuver"] == expected).all()
+
+
+@pytest.mark.parametrize(("left", "right", "away"), [(0.9, 0.3, Maneuver.TURN_R), (0.3, 0.9, Maneuver.TURN_L)])
+def test_the_closed_arm_backs_off_and_turns_away_when_readings_repeat(
+    left: float, right: float, away: Maneuver
+) -> None:
+    counts = pressed(1500, left, right, np.random.default_rng(1))[:, None]
+    maneuvers = run("closed", counts)["maneuver"][:, 0]
+    order = maneuvers[np.flatnonzero(np.diff(maneuvers, prepend=-1))]
+    assert order[:3].tolist() == [Maneuver.FORWARD, Maneuver.REVERSE, away]
+
+
+@pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
+@pytest.mark.parametrize("side", [0, 1])
+@pytest.mark.parametrize("arm", ARMS)
+def test_a_reading_that_is_no_number_stops_the_robot_at_once(arm: Arm, side: int, bad: float) -> None:
+    counts = np.full((60, 1, 2), STRAIGHT)
+    counts[20:, 0, side] = bad
+    said = run(arm, counts)
+    assert (said["maneuver"][20:] == Maneuver.HOLD).all()
+    assert (said["leg"][20:] == said["leg"][19]).all()
+    assert (said["yaw"][20:] == said["yaw"][19]).all()
+
+
+@pytest.mark.parametrize("arm", ARMS)
+def test_a_robot_walks_again_once_the_window_has_passed_a_gap(arm: Arm) -> None:
+    counts = np.full((60, 1, 2), STRAIGHT)
+    counts[20, 0, 0] = np.nan
+    holding = run(arm, counts)["maneuver"][:, 0] == Maneuver.HOLD
+    assert np.flatnonzero(holding).tolist() == list(range(20, 30))  # T_avg is ten samples
+
+
+@pytest.mark.parametrize("arm", ARMS)
+def test_a_row_says_the_same_alone_and_in_a_batch_of_seven(arm: Arm) -> None:
+    counts = streams(1500, 7)
+    together = run(arm, counts)
+    for row in range(7):
+        alone = run(arm, counts[:, row : row + 1])
+        for name, values in alone.items():
+            assert np.array_equal(values[:, 0], together[name][:, row], equal_nan=True), (name, row)
+
+
+def test_the_streams_of_the_batch_test_make_the_arms_act() -> None:
+    counts = streams(1500, 7)
+    assert set(np.unique(run("closed", counts)["maneuver"])) == set(Maneuver)
+    assert set(np.unique(run("paper", counts)["maneuver"])) == set(Maneuver)
+
+
+@pytest.mark.parametrize("arm", ARMS)
+def test_swapping_the_antennae_swaps_the_turns_and_mirrors_the_gait(arm: Arm) -> None:
+    counts = streams(1500, 5)
+    here = run(arm, counts)
+    there = run(arm, counts[:, :, ::-1], phase=math.pi)
+    assert (there["maneuver"] == SWAP[here["maneuver"]]).all()
+    assert there["yaw"] == pytest.approx(-here["yaw"], abs=1e-9)
+
+
+@pytest.mark.parametrize("arm", ARMS)
+def test_a_row_that_is_reset_says_what_a_new_controller_says(arm: Arm) -> None:
+    counts = streams(900, 2)
+    mind = Controller(PARAMS, arm, 2)
+    mind.reset(np.arange(2))
+    for i in range(777):  # any number that leaves the rings mid-way
+        mind.step(AntennaFrame(t=np.full(2, i * PERIOD), counts=np.full((2, 2), 100.0 + i)))
+    mind.reset(np.array([0]))
+    fresh = run(arm, counts)
+    for i in range(900):
+        pose = mind.step(AntennaFrame(t=np.full(2, i * PERIOD), counts=counts[i]))
+        assert mind.maneuver[0] == fresh["maneuver"][i, 0]
+        assert np.array_equal(pose.yaw[0], fresh["yaw"][i, 0])
+
+
+@pytest.mark.parametrize("frequency", [1, 5, 20, 50])
+def test_a_contact_that_chatters_starts_at_most_one_maneuver_per_hold_time(frequency: int) -> None:
+    duration, hold_time = 20.0, PARAMS.rule.hold_time
+    counts = np.full((round(duration / PERIOD), 1, 2), STRAIGHT)
+    high = (2 * frequency * np.arange(len(counts)) // round(1 / PERIOD)) % 2 == 0
+    counts[high, 0, 0] = BENT
+    maneuver = run("paper", counts)["maneuver"][:, 0]
+    starts = np.count_nonzero((np.diff(maneuver, prepend=0) != 0) & (maneuver != Maneuver.FORWARD))
+    assert starts <= duration / hold_time + 1

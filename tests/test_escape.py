@@ -1,0 +1,93 @@
+"""Backing off and turning: order, times, sides."""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+
+from antennate.escape import Escape
+from antennate.params import EscapeParams
+from antennate.records import Maneuver
+
+PERIOD = 1 / 64
+PARAMS = EscapeParams(reverse_time=1.0, turn_time=2.0, turn_offset=0.5, retry_time=12.0, memory_time=4.0)
+FORWARD, TURN_L, TURN_R = Maneuver.FORWARD, Maneuver.TURN_L, Maneuver.TURN_R
+REVERSE, HOLD = Maneuver.REVERSE, Maneuver.HOLD
+TOUCHED_LEFT, TOUCHED_RIGHT = (0.9, 0.2), (0.2, 0.9)
+
+
+def episodes(b: tuple[float, float], stuck_at: tuple[float, ...], until: float) -> list[tuple[Maneuver, float]]:
+    """Maneuvers and how long each lasted [s], for a robot found stuck at the given times [s]."""
+    escape = Escape(PARAMS, 1, PERIOD)
+    said = []
+    for i in range(round(until / PERIOD)):
+        t = i * PERIOD
+        said.append(Maneuver(int(escape.step(np.array([t]), np.array([b]), np.array([t in stuck_at]))[0])))
+    return [(m, len(list(run)) * PERIOD) for m, run in itertools.groupby(said)]
+
+
+@pytest.mark.parametrize(("b", "away"), [(TOUCHED_LEFT, TURN_R), (TOUCHED_RIGHT, TURN_L)])
+def test_it_backs_off_turns_away_from_the_touched_side_and_walks(
+    b: tuple[float, float], away: Maneuver
+) -> None:
+    said = episodes(b, (2.0,), 10.0)
+    assert said == [(FORWARD, 2.0), (REVERSE, 1.0), (away, 2.0), (FORWARD, 5.0)]
+
+
+@pytest.mark.parametrize(("b", "first", "second"), [(TOUCHED_LEFT, TURN_R, TURN_L), (TOUCHED_RIGHT, TURN_L, TURN_R)])
+def test_stuck_again_soon_it_turns_the_other_way_and_twice_as_long(
+    b: tuple[float, float], first: Maneuver, second: Maneuver
+) -> None:
+    said = episodes(b, (2.0, 8.0, 20.0), 26.0)
+    turns = [(m, d) for m, d in said if m in (TURN_L, TURN_R)]
+    assert turns == [(first, 2.0), (second, 4.0), (first, 4.0)]
+
+
+def test_stuck_again_much_later_it_starts_anew() -> None:
+    said = episodes(TOUCHED_LEFT, (2.0, 18.0), 24.0)
+    assert [(m, d) for m, d in said if m in (TURN_L, TURN_R)] == [(TURN_R, 2.0), (TURN_R, 2.0)]
+
+
+def test_stuck_during_an_escape_changes_nothing() -> None:
+    assert episodes(TOUCHED_LEFT, (2.0, 2.5, 4.0), 9.0) == episodes(TOUCHED_LEFT, (2.0,), 9.0)
+
+
+def test_without_being_stuck_it_walks_for_ever() -> None:
+    assert episodes((1.0, 1.0), (), 30.0) == [(FORWARD, 30.0)]
+
+
+def test_the_memory_of_touch_is_a_first_order_lag() -> None:
+    escape = Escape(PARAMS, 1, PERIOD)
+    for i in range(4 * 64):
+        escape.step(np.array([i * PERIOD]), np.array([[1.0, 0.5]]), np.array([False]))
+    assert escape.touch[0] == pytest.approx([1 - math.exp(-1), (1 - math.exp(-1)) / 2], rel=0.01)
+
+
+def test_the_memory_of_touch_is_frozen_while_escaping() -> None:
+    escape = Escape(PARAMS, 1, PERIOD)
+    escape.step(np.zeros(1), np.array([TOUCHED_LEFT]), np.array([True]))
+    before = escape.touch.tolist()
+    escape.step(np.full(1, PERIOD), np.array([TOUCHED_RIGHT]), np.array([False]))
+    assert escape.touch.tolist() == before
+
+
+@pytest.mark.parametrize("b", [(math.nan, 0.5), (0.5, math.nan), (math.nan, math.nan)])
+def test_a_side_that_cannot_be_trusted_makes_it_hold_and_resume(b: tuple[float, float]) -> None:
+    escape = Escape(PARAMS, 1, PERIOD)
+    good, no = np.array([TOUCHED_LEFT]), np.array([False])
+    assert escape.step(np.zeros(1), good, np.array([True]))[0] == REVERSE
+    assert escape.step(np.full(1, 0.1), np.array([b]), no)[0] == HOLD
+    assert escape.step(np.full(1, 0.2), good, no)[0] == REVERSE
+
+
+def test_a_row_that_is_reset_answers_like_a_new_one() -> None:
+    used, new = Escape(PARAMS, 1, PERIOD), Escape(PARAMS, 1, PERIOD)
+    for i in range(400):
+        used.step(np.array([i * PERIOD]), np.array([TOUCHED_RIGHT]), np.array([i in (64, 300)]))
+    used.reset(np.array([0]))
+    for i in range(400):
+        step = (np.array([i * PERIOD]), np.array([TOUCHED_LEFT]), np.array([i == 64]))
+        assert used.step(*step) == new.step(*step)

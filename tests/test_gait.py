@@ -1,0 +1,128 @@
+"""The serpenoid wave and the legs: hand-computed poses, continuity, time reversal, steering."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from antennate.gait import Gait, targets
+from antennate.params import GaitParams
+from antennate.records import Maneuver, Pose
+
+PARAMS = GaitParams(
+    frequency=0.5,
+    wave_number=1.0,
+    amplitude=math.radians(25),
+    body_phase=math.radians(200),
+    turn_offset=0.35,
+    offset_rate=1.5,
+)
+PERIOD = 0.01
+
+
+def pose_at(phase: float, offset: float = 0.0, params: GaitParams = PARAMS) -> Pose:
+    return targets(params, np.array([phase]), np.array([offset]))
+
+
+def walk(gait: Gait, maneuvers: list[Maneuver]) -> tuple[np.ndarray, np.ndarray]:
+    """Yaw (n, 5) and leg (n, 6, 2) of one robot that is given these maneuvers."""
+    poses = [gait.step(np.array([m])) for m in maneuvers]
+    return np.array([p.yaw[0] for p in poses]), np.array([p.leg[0] for p in poses])
+
+
+def test_the_body_wave_agrees_with_hand_computed_angles() -> None:
+    # joint j at phase 0: 25 deg * sin(72 deg * j + 200 deg), e.g. j=1: 25 * sin 272 deg
+    expected = [-24.98477, -6.88955, 20.72681, 19.69945, -8.55050]
+    assert np.degrees(pose_at(0.0).yaw[0]) == pytest.approx(expected, abs=1e-4)
+
+
+def test_the_crest_travels_from_head_to_tail() -> None:
+    quarter = pose_at(2 * math.pi / 5).yaw[0]
+    assert quarter[1:] == pytest.approx(pose_at(0.0).yaw[0][:4])
+
+
+def test_each_leg_lags_the_one_before_by_a_sixth_of_a_wave() -> None:
+    lag = -np.diff(pose_at(1.0).leg[0], axis=0)
+    assert lag == pytest.approx(np.full((5, 2), math.pi / 3))
+
+
+def test_left_and_right_legs_are_half_a_turn_apart() -> None:
+    leg = pose_at(1.0).leg[0]
+    assert leg[:, 1] - leg[:, 0] == pytest.approx(np.full(6, math.pi))
+
+
+def test_the_first_left_leg_turns_with_the_phase() -> None:
+    assert pose_at(12.5).leg[0, 0, 0] == pytest.approx(12.5)
+
+
+def test_the_offset_adds_to_every_joint_and_to_no_leg() -> None:
+    straight, bent = pose_at(0.4), pose_at(0.4, offset=0.1)
+    assert bent.yaw - straight.yaw == pytest.approx(np.full((1, 5), 0.1))
+    assert (bent.leg == straight.leg).all()
+
+
+def test_half_a_cycle_and_the_opposite_offset_mirror_the_pose() -> None:
+    here, there = pose_at(0.7, 0.2), pose_at(0.7 + math.pi, -0.2)
+    assert there.yaw == pytest.approx(-here.yaw)
+    assert np.cos(there.leg) == pytest.approx(np.cos(here.leg[:, :, ::-1]))
+    assert np.sin(there.leg) == pytest.approx(np.sin(here.leg[:, :, ::-1]))
+
+
+def test_one_cycle_takes_one_over_the_frequency() -> None:
+    gait = Gait(PARAMS, 1, PERIOD)
+    walk(gait, [Maneuver.FORWARD] * 200)
+    assert gait.phase == pytest.approx([2 * math.pi])
+
+
+def test_reverse_retraces_the_poses_backwards() -> None:
+    gait = Gait(PARAMS, 1, PERIOD)
+    yaw, leg = walk(gait, [Maneuver.FORWARD] * 150)
+    yaw_back, leg_back = walk(gait, [Maneuver.REVERSE] * 149)
+    assert yaw_back == pytest.approx(yaw[-2::-1], abs=1e-9)
+    assert leg_back == pytest.approx(leg[-2::-1], abs=1e-9)
+
+
+def test_hold_keeps_the_pose() -> None:
+    gait = Gait(PARAMS, 1, PERIOD)
+    yaw, leg = walk(gait, [Maneuver.TURN_L] * 7 + [Maneuver.HOLD] * 20)
+    assert (yaw[6:] == yaw[6]).all()
+    assert (leg[6:] == leg[6]).all()
+
+
+@given(st.lists(st.tuples(st.sampled_from(list(Maneuver)), st.integers(1, 40)), max_size=12))
+def test_no_target_jumps_however_the_maneuvers_switch(plan: list[tuple[Maneuver, int]]) -> None:
+    gait = Gait(PARAMS, 1, PERIOD)
+    yaw, leg = walk(gait, [Maneuver.FORWARD] + [m for m, n in plan for _ in range(n)])
+    turn = 2 * math.pi * 0.5 * PERIOD
+    assert abs(np.diff(yaw, axis=0)).max(initial=0) <= math.radians(25) * turn + 1.5 * PERIOD + 1e-9
+    assert abs(np.diff(leg, axis=0)).max(initial=0) <= turn + 1e-9
+
+
+@pytest.mark.parametrize(("maneuver", "sign"), [(Maneuver.TURN_L, -1), (Maneuver.TURN_R, 1)])
+def test_the_offset_ramps_at_its_rate_and_stays_at_its_size(maneuver: Maneuver, sign: int) -> None:
+    gait = Gait(PARAMS, 1, PERIOD)
+    walk(gait, [maneuver] * 10)
+    assert gait.offset == pytest.approx([sign * 0.15])
+    walk(gait, [maneuver] * 40)
+    assert gait.offset == pytest.approx([sign * 0.35])
+    walk(gait, [Maneuver.FORWARD] * 40)
+    assert gait.offset == pytest.approx([0.0])
+
+
+def test_a_turn_may_be_tighter_than_the_gaits_own() -> None:
+    gait = Gait(PARAMS, 1, PERIOD)
+    for _ in range(100):
+        gait.step(np.array([Maneuver.TURN_R]), 0.52)
+    assert gait.offset == pytest.approx([0.52])
+
+
+def test_reset_starts_its_rows_at_a_phase_and_straight() -> None:
+    gait = Gait(PARAMS, 2, PERIOD)
+    gait.step(np.array([Maneuver.TURN_R, Maneuver.TURN_R]))
+    gait.reset(np.array([1]), 2.0)
+    assert gait.phase.tolist() == [pytest.approx(0.01 * math.pi), 2.0]
+    assert gait.offset.tolist() == [pytest.approx(0.015), 0.0]

@@ -1,0 +1,145 @@
+"""Every number has a unit, a source and bounds; derived numbers agree with the paper's table."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+from pydantic import ValidationError
+
+from antennate.params import (
+    AntennaParams,
+    ConditioningParams,
+    ControllerParams,
+    GaitParams,
+    Params,
+    PhysicsParams,
+    RobotParams,
+    SensorParams,
+    ServoParams,
+    TunnelParams,
+)
+
+SOURCES = ("paper", "datasheet", "measured", "fitted", "assumed")
+
+
+def groups() -> list[type[Params]]:
+    return sorted(Params.__subclasses__(), key=lambda cls: cls.__name__)
+
+
+def is_group(annotation: object) -> bool:
+    return isinstance(annotation, type) and issubclass(annotation, Params)
+
+
+def fields() -> list[tuple[type[Params], str]]:
+    return [
+        (cls, name)
+        for cls in groups()
+        for name, field in cls.model_fields.items()
+        if not is_group(field.annotation)
+    ]
+
+
+def numeric() -> list[tuple[type[Params], str, object]]:
+    """Every field that holds a float or floats, with its default."""
+    found = []
+    for cls, name in fields():
+        default = cls.model_fields[name].default
+        sample = default[0] if isinstance(default, tuple) else default
+        if isinstance(sample, int | float) and not isinstance(sample, bool):
+            found.append((cls, name, default))
+    return found
+
+
+def spoiled(default: object, bad: float) -> object:
+    """The default with its numbers replaced by a bad one."""
+    return tuple(bad for _ in default) if isinstance(default, tuple) else bad
+
+
+@pytest.mark.parametrize(("cls", "name"), fields())
+def test_every_field_has_a_unit_and_a_source_of_a_known_kind(cls: type[Params], name: str) -> None:
+    extra = cls.model_fields[name].json_schema_extra
+    assert isinstance(extra, dict)
+    assert str(extra["unit"]).strip()
+    kind, _, why = str(extra["source"]).partition(":")
+    assert kind in SOURCES
+    assert why.strip()
+
+
+def test_the_walk_over_all_groups_finds_the_known_ones() -> None:
+    assert {AntennaParams, GaitParams, PhysicsParams, RobotParams, ControllerParams} <= set(groups())
+
+
+@pytest.mark.parametrize("cls", groups())
+def test_an_unknown_key_is_refused(cls: type[Params]) -> None:
+    with pytest.raises(ValidationError, match="no_such_number"):
+        cls.model_validate({"no_such_number": 1.0})
+
+
+@pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf, -1e9])
+@pytest.mark.parametrize(("cls", "name", "default"), numeric())
+def test_nan_infinity_and_absurdly_negative_numbers_are_refused(
+    cls: type[Params], name: str, default: object, bad: float
+) -> None:
+    with pytest.raises(ValidationError):
+        cls.model_validate({name: spoiled(default, bad)})
+
+
+def test_numbers_cannot_be_changed_after_they_are_made() -> None:
+    with pytest.raises(ValidationError):
+        GaitParams().frequency = 0.7  # type: ignore[misc]
+
+
+@pytest.mark.parametrize("timestep", [1e-300, 0.0, 1.0])
+def test_a_physics_step_that_cannot_work_is_refused(timestep: float) -> None:
+    with pytest.raises(ValidationError):
+        PhysicsParams(timestep=timestep)
+
+
+def test_spring_stiffness_is_the_papers_table_in_si() -> None:
+    springs = AntennaParams().spring_stiffness()
+    expected = [0.01570, 0.00785, 0.00785, 0.00523, 0.00523, 0.00523]
+    assert springs == pytest.approx(expected, rel=1e-3)
+
+
+def test_spring_stiffness_rounds_to_the_papers_table_per_degree() -> None:
+    per_degree = [k * 1e3 * math.pi / 180 for k in AntennaParams().spring_stiffness()]
+    assert [round(k, 3) for k in per_degree] == [0.274, 0.137, 0.137, 0.091, 0.091, 0.091]
+
+
+def test_the_film_adds_its_stiffness_to_covered_hinges_only() -> None:
+    params = AntennaParams()
+    added = [h - s for h, s in zip(params.hinge_stiffness(2), params.spring_stiffness(), strict=True)]
+    film = 0.048e-3 * 180 / math.pi
+    assert added == pytest.approx([film, film, 0, 0, 0, 0], abs=1e-12)
+
+
+@pytest.mark.parametrize(("length", "hinges"), [(0.12, 5), (0.06, 6), (0.24, 3), (0.4, 2)])
+def test_the_film_covers_the_hinges_it_reaches(length: float, hinges: int) -> None:
+    # 95.3 mm of film over hinges at multiples of a sixth of the antenna's length, the first at zero
+    assert SensorParams().covered_hinges(AntennaParams(length=length)) == hinges
+
+
+def test_the_servo_follows_its_datasheet() -> None:
+    servo = ServoParams()
+    assert servo.no_load_speed == pytest.approx(6.81, abs=0.005)
+    assert servo.damping == pytest.approx(1.7 / 6.81, rel=1e-3)
+
+
+def test_a_robot_lighter_than_its_legs_is_refused() -> None:
+    with pytest.raises(ValidationError, match="mass must leave more than 10 g a link"):
+        RobotParams(mass=0.305)
+
+
+def test_calibration_counts_in_the_wrong_order_are_refused() -> None:
+    with pytest.raises(ValidationError, match="counts_high must exceed counts_low"):
+        ConditioningParams(counts_low=1900.0, counts_high=1899.5)
+
+
+def test_a_tunnel_needs_one_turn_between_every_two_pieces() -> None:
+    with pytest.raises(ValidationError, match="expected 2, got 1"):
+        TunnelParams(segments=(1.0, 1.0, 1.0), turns_deg=(90.0,))
+
+
+def test_the_control_period_is_ten_milliseconds() -> None:
+    assert ControllerParams().period == pytest.approx(0.01)

@@ -1,0 +1,107 @@
+"""Stuck: pressed, and feeling the same cycle again and again."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from antennate.params import RepetitionParams
+from antennate.repetition import RepetitionDetector
+
+PERIOD, FREQUENCY = 0.01, 0.5
+CYCLE = 200
+PARAMS = RepetitionParams(change=0.08, pressure=0.2, averaging_cycles=0.67, settling_cycles=1.6)
+
+Signal = Callable[[float], tuple[float, float]]
+
+
+def periodic(cycle: float) -> tuple[float, float]:
+    return 0.5 + 0.3 * math.sin(2 * math.pi * cycle), 0.1
+
+
+def alternating(cycle: float) -> tuple[float, float]:
+    """Half as fast as the gait: every cycle is the opposite of the one before."""
+    return 0.5 + 0.3 * math.sin(math.pi * cycle), 0.1
+
+
+def free(cycle: float) -> tuple[float, float]:
+    return 0.1 * math.sin(2 * math.pi * cycle), 0.05
+
+
+def detector(batch: int = 1) -> RepetitionDetector:
+    found = RepetitionDetector(PARAMS, batch, PERIOD, FREQUENCY)
+    found.reset(np.arange(batch))
+    return found
+
+
+def stuck(signal: Signal, cycles: float, walking: Callable[[float], bool] = lambda _: True) -> list[bool]:
+    """Whether one row is stuck at each tick."""
+    found = detector()
+    times = np.arange(round(cycles * CYCLE)) / CYCLE
+    return [bool(found.step(np.array([signal(c)]), np.array([walking(c)]))[0]) for c in times]
+
+
+def test_a_pressed_reading_that_repeats_is_stuck_after_the_settling_time() -> None:
+    said = stuck(periodic, 6)
+    assert not any(said[: int(1.6 * CYCLE)])
+    assert all(said[4 * CYCLE :])
+
+
+def test_either_antenna_alone_is_enough_to_be_pressed() -> None:
+    assert stuck(lambda c: periodic(c)[::-1], 6)[-1]
+
+
+def test_a_pressed_reading_that_is_new_in_every_cycle_is_not_stuck() -> None:
+    assert not any(stuck(alternating, 12))
+
+
+def test_one_side_that_feels_something_new_is_enough_to_go_on() -> None:
+    assert not any(stuck(lambda c: (periodic(c)[0], alternating(c)[0]), 12))
+
+
+def test_antennae_that_swing_in_free_air_are_not_stuck() -> None:
+    assert not any(stuck(free, 12))
+
+
+def test_a_robot_that_does_not_walk_is_not_stuck() -> None:
+    assert not any(stuck(periodic, 6, walking=lambda _: False))
+
+
+def test_walking_anew_starts_the_settling_time_anew() -> None:
+    said = stuck(periodic, 10, walking=lambda c: not 5.0 <= c < 5.02)
+    assert said[5 * CYCLE - 1]
+    assert not any(said[5 * CYCLE : int(6.6 * CYCLE)])
+    assert said[-1]
+
+
+def test_a_missing_reading_does_not_last() -> None:
+    found = detector()
+    for i in range(6 * CYCLE):
+        bend = np.full((1, 2), np.nan) if i == 10 else np.array([periodic(i / CYCLE)])
+        said = found.step(bend, np.array([i != 10]))
+    assert said[0]
+    assert np.isfinite(found.change).all()
+
+
+def test_the_mean_change_follows_a_first_order_lag() -> None:
+    # a step of height 1 held for ever differs from the cycle before for one cycle, then no more
+    found = detector()
+    for _ in range(3 * CYCLE):
+        found.step(np.zeros((1, 2)), np.array([True]))
+    for _ in range(CYCLE):
+        found.step(np.ones((1, 2)), np.array([True]))
+    assert found.change[0] == pytest.approx(np.full(2, 1 - math.exp(-1 / 0.67)), abs=0.02)
+
+
+def test_a_row_that_is_reset_answers_like_a_new_one() -> None:
+    used, new = detector(), detector()
+    for i in range(3 * CYCLE):
+        used.step(np.full((1, 2), 3.0 + i), np.array([True]))
+    used.reset(np.array([0]))
+    for i in range(3 * CYCLE):
+        sample = np.array([periodic(i / CYCLE)])
+        assert (used.step(sample, np.array([True])) == new.step(sample, np.array([True]))).all()
+        assert used.pressure.tolist() == new.pressure.tolist()
