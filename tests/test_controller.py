@@ -1,4 +1,4 @@
-"""The composed mind: it holds on bad readings, its rows are independent, and it has no favoured side."""
+"""The composed mind: holds on bad readings, keeps rows apart, favours no side."""
 
 from __future__ import annotations
 
@@ -15,7 +15,9 @@ from antennate.records import AntennaFrame, Maneuver
 PARAMS = ControllerParams()
 PERIOD = PARAMS.period
 STRAIGHT, BENT = 1872.0, 1399.0
-SWAP = np.array([Maneuver.FORWARD, Maneuver.TURN_R, Maneuver.TURN_L, Maneuver.REVERSE, Maneuver.HOLD])
+SWAP = np.array(
+    [Maneuver.FORWARD, Maneuver.TURN_R, Maneuver.TURN_L, Maneuver.REVERSE, Maneuver.HOLD]
+)
 
 
 def pressed(ticks: int, left: float, right: float, rng: np.random.Generator) -> np.ndarray:
@@ -26,12 +28,16 @@ def pressed(ticks: int, left: float, right: float, rng: np.random.Generator) -> 
 
 
 def streams(ticks: int, rows: int) -> np.ndarray:
-    """Counts unlike one another: pressed, jumping, and with gaps, shape (ticks, rows, 2)."""
+    """Counts unlike one another: pressed, jumping, with a gap, blocked; shape (ticks, rows, 2)."""
     rng = np.random.default_rng(7)
-    counts = np.stack([pressed(ticks, 0.3 + 0.1 * k, 0.9 - 0.1 * k, rng) for k in range(rows)], axis=1)
+    counts = np.stack(
+        [pressed(ticks, 0.3 + 0.1 * k, 0.9 - 0.1 * k, rng) for k in range(rows)], axis=1
+    )
     jumps = rng.uniform(BENT, STRAIGHT, (ticks // 50 + 1, 2)).round().repeat(50, axis=0)
     counts[:, 1] = jumps[:ticks]
-    counts[ticks // 2 : ticks // 2 + 5, 2, 0] = np.nan
+    if rows > 3:
+        counts[ticks // 2 : ticks // 2 + 5, 2, 0] = np.nan
+        counts[:100, 3] = BENT - rng.integers(0, 40, (100, 2))
     return counts
 
 
@@ -43,7 +49,12 @@ def run(arm: Arm, counts: np.ndarray, phase: float = 0.0) -> dict[str, np.ndarra
     said: dict[str, list[np.ndarray]] = {"b": [], "maneuver": [], "yaw": [], "leg": []}
     for i, reading in enumerate(counts):
         pose = mind.step(AntennaFrame(t=np.full(batch, i * PERIOD), counts=reading))
-        for name, value in (("b", mind.b), ("maneuver", mind.maneuver), ("yaw", pose.yaw), ("leg", pose.leg)):
+        for name, value in (
+            ("b", mind.b),
+            ("maneuver", mind.maneuver),
+            ("yaw", pose.yaw),
+            ("leg", pose.leg),
+        ):
             said[name].append(value.copy())
     return {name: np.array(values) for name, values in said.items()}
 
@@ -73,7 +84,9 @@ def test_the_paper_arm_answers_touch_at_once(bend: tuple[int, int], expected: Ma
     assert (said["maneuver"] == expected).all()
 
 
-@pytest.mark.parametrize(("left", "right", "away"), [(0.9, 0.3, Maneuver.TURN_R), (0.3, 0.9, Maneuver.TURN_L)])
+@pytest.mark.parametrize(
+    ("left", "right", "away"), [(0.9, 0.3, Maneuver.TURN_R), (0.3, 0.9, Maneuver.TURN_L)]
+)
 def test_the_closed_arm_backs_off_and_turns_away_when_readings_repeat(
     left: float, right: float, away: Maneuver
 ) -> None:
@@ -86,7 +99,9 @@ def test_the_closed_arm_backs_off_and_turns_away_when_readings_repeat(
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
 @pytest.mark.parametrize("side", [0, 1])
 @pytest.mark.parametrize("arm", ARMS)
-def test_a_reading_that_is_no_number_stops_the_robot_at_once(arm: Arm, side: int, bad: float) -> None:
+def test_a_reading_that_is_no_number_stops_the_robot_at_once(
+    arm: Arm, side: int, bad: float
+) -> None:
     counts = np.full((60, 1, 2), STRAIGHT)
     counts[20:, 0, side] = bad
     said = run(arm, counts)

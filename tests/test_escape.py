@@ -13,19 +13,25 @@ from antennate.params import EscapeParams
 from antennate.records import Maneuver
 
 PERIOD = 1 / 64
-PARAMS = EscapeParams(reverse_time=1.0, turn_time=2.0, turn_offset=0.5, retry_time=12.0, memory_time=4.0)
+PARAMS = EscapeParams(
+    reverse_time=1.0, turn_time=2.0, turn_offset=0.5, retry_time=12.0, memory_time=4.0
+)
 FORWARD, TURN_L, TURN_R = Maneuver.FORWARD, Maneuver.TURN_L, Maneuver.TURN_R
 REVERSE, HOLD = Maneuver.REVERSE, Maneuver.HOLD
 TOUCHED_LEFT, TOUCHED_RIGHT = (0.9, 0.2), (0.2, 0.9)
 
 
-def episodes(b: tuple[float, float], stuck_at: tuple[float, ...], until: float) -> list[tuple[Maneuver, float]]:
+def episodes(
+    b: tuple[float, float], stuck_at: tuple[float, ...], until: float
+) -> list[tuple[Maneuver, float]]:
     """Maneuvers and how long each lasted [s], for a robot found stuck at the given times [s]."""
     escape = Escape(PARAMS, 1, PERIOD)
     said = []
     for i in range(round(until / PERIOD)):
         t = i * PERIOD
-        said.append(Maneuver(int(escape.step(np.array([t]), np.array([b]), np.array([t in stuck_at]))[0])))
+        said.append(
+            Maneuver(int(escape.step(np.array([t]), np.array([b]), np.array([t in stuck_at]))[0]))
+        )
     return [(m, len(list(run)) * PERIOD) for m, run in itertools.groupby(said)]
 
 
@@ -37,7 +43,9 @@ def test_it_backs_off_turns_away_from_the_touched_side_and_walks(
     assert said == [(FORWARD, 2.0), (REVERSE, 1.0), (away, 2.0), (FORWARD, 5.0)]
 
 
-@pytest.mark.parametrize(("b", "first", "second"), [(TOUCHED_LEFT, TURN_R, TURN_L), (TOUCHED_RIGHT, TURN_L, TURN_R)])
+@pytest.mark.parametrize(
+    ("b", "first", "second"), [(TOUCHED_LEFT, TURN_R, TURN_L), (TOUCHED_RIGHT, TURN_L, TURN_R)]
+)
 def test_stuck_again_soon_it_turns_the_other_way_and_twice_as_long(
     b: tuple[float, float], first: Maneuver, second: Maneuver
 ) -> None:

@@ -35,8 +35,8 @@ def walk(gait: Gait, maneuvers: list[Maneuver]) -> tuple[np.ndarray, np.ndarray]
 
 
 def test_the_body_wave_agrees_with_hand_computed_angles() -> None:
-    # joint j at phase 0: 25 deg * sin(72 deg * j + 200 deg), e.g. j=1: 25 * sin 272 deg
-    expected = [-24.98477, -6.88955, 20.72681, 19.69945, -8.55050]
+    # joint j at phase 0: 25 deg * sin(72 deg * j + 200 deg), so of 272, 344, 56, 128 and 200 deg
+    expected = [-24.98477, -6.89093, 20.72594, 19.70027, -8.55050]
     assert np.degrees(pose_at(0.0).yaw[0]) == pytest.approx(expected, abs=1e-4)
 
 

@@ -67,7 +67,9 @@ def test_every_field_has_a_unit_and_a_source_of_a_known_kind(cls: type[Params], 
 
 
 def test_the_walk_over_all_groups_finds_the_known_ones() -> None:
-    assert {AntennaParams, GaitParams, PhysicsParams, RobotParams, ControllerParams} <= set(groups())
+    assert {AntennaParams, GaitParams, PhysicsParams, RobotParams, ControllerParams} <= set(
+        groups()
+    )
 
 
 @pytest.mark.parametrize("cls", groups())
@@ -109,7 +111,9 @@ def test_spring_stiffness_rounds_to_the_papers_table_per_degree() -> None:
 
 def test_the_film_adds_its_stiffness_to_covered_hinges_only() -> None:
     params = AntennaParams()
-    added = [h - s for h, s in zip(params.hinge_stiffness(2), params.spring_stiffness(), strict=True)]
+    added = [
+        h - s for h, s in zip(params.hinge_stiffness(2), params.spring_stiffness(), strict=True)
+    ]
     film = 0.048e-3 * 180 / math.pi
     assert added == pytest.approx([film, film, 0, 0, 0, 0], abs=1e-12)
 

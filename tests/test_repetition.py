@@ -37,7 +37,9 @@ def detector(batch: int = 1) -> RepetitionDetector:
     return found
 
 
-def stuck(signal: Signal, cycles: float, walking: Callable[[float], bool] = lambda _: True) -> list[bool]:
+def stuck(
+    signal: Signal, cycles: float, walking: Callable[[float], bool] = lambda _: True
+) -> list[bool]:
     """Whether one row is stuck at each tick."""
     found = detector()
     times = np.arange(round(cycles * CYCLE)) / CYCLE

@@ -1,6 +1,6 @@
 """Counts to the bending level b in [0, 1]: a running mean over T_avg, then one sigmoid.
 
-A sample that is NaN makes its side NaN until the window has passed it: a side that cannot be
+A sample that is not finite makes its side NaN until the window has passed it: a side that cannot be
 trusted says so, and contact.py turns that into UNKNOWN.
 """
 
@@ -49,7 +49,7 @@ class RunningMean:
 
     def step(self, counts: Floats) -> Floats:
         """Take one reading, shape (B, 2) [counts], and return the mean, same shape."""
-        self._ring[self._next] = counts
+        self._ring[self._next] = np.where(np.isfinite(counts), counts, np.nan)
         self._next = (self._next + 1) % self.length
         self._seen = np.minimum(self._seen + 1, self.length)
         return self._ring.sum(axis=0) / self._seen[:, None]

@@ -9,7 +9,7 @@ properties, computed here and never typed.
 from __future__ import annotations
 
 import math
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
@@ -32,6 +32,8 @@ def number(default: Any, unit: str, source: str, meaning: str, **bounds: Any) ->
     )
 
 
+_Coils = Annotated[int, Field(gt=0)]
+
 N_MM_PER_DEG = 1e-3 * 180.0 / math.pi
 """One N·mm/deg in N·m/rad."""
 
@@ -39,7 +41,7 @@ N_MM_PER_DEG = 1e-3 * 180.0 / math.pi
 class AntennaParams(Params):
     """One antenna: a chain of six torsion springs with a film sensor along its base."""
 
-    active_coils: tuple[int, int, int, int, int, int] = number(
+    active_coils: tuple[_Coils, _Coils, _Coils, _Coils, _Coils, _Coils] = number(
         (3, 6, 6, 9, 9, 9),
         "1",
         "paper: one spring of 3, two of 6 and three of 9 active coils, stiff base to soft tip",
@@ -76,6 +78,9 @@ class AntennaParams(Params):
         "assumed: unpublished; steel coil and printed holder",
         "mass of one link",
         gt=0,
+    )
+    base_mass: float = number(
+        0.001, "kg", "assumed: printed horn", "mass that turns with the base servo", gt=0
     )
     damping_time: float = number(
         0.04,
@@ -312,7 +317,7 @@ class RobotParams(Params):
     @property
     def link_mass(self) -> float:
         """Mass of one link without its legs [kg]."""
-        antennae = 2 * ANTENNA_LINK_COUNT * self.antenna.link_mass
+        antennae = 2 * (ANTENNA_LINK_COUNT * self.antenna.link_mass + self.antenna.base_mass)
         return (self.mass - 2 * LINK_COUNT * self.leg_mass - antennae) / LINK_COUNT
 
     @model_validator(mode="after")

@@ -29,10 +29,16 @@ class RepetitionDetector:
         self._next = 0
         self._gain = 1.0 / (params.averaging_cycles * self._length)
         self._walked: Ints = np.zeros(batch, dtype=np.int64)
-        self.change: Floats = np.zeros((batch, 2))
+        self.change: Floats = np.ones((batch, 2))
         self.pressure: Floats = np.zeros((batch, 2))
 
     def reset(self, rows: Ints | Bools) -> None:
+        """Some rows forget everything."""
+        self._cycle[:, rows] = 0.0
+        self.pressure[rows] = 0.0
+        self._restart(rows)
+
+    def _restart(self, rows: Ints | Bools) -> None:
         """Some rows begin to walk: nothing has repeated yet."""
         self._walked[rows] = 0
         self.change[rows] = 1.0
@@ -47,7 +53,7 @@ class RepetitionDetector:
         Returns:
             Rows that walk, are pressed, and whose readings repeat, shape (B,).
         """
-        self.reset(~walking)
+        self._restart(~walking)
         sample = np.nan_to_num(deflection)
         before = self._cycle[self._next]
         change = np.abs(sample - before)

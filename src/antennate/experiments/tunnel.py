@@ -90,7 +90,9 @@ class TunnelOutcome:
     def result(self) -> dict[str, Any]:
         """The content of result.json."""
         config = self.config
-        by_arm = {a: [r for r in self.rows if r.arm == a] for a in config.arms}
+        by_arm: dict[Arm, list[TrialResult]] = {
+            a: [r for r in self.rows if r.arm == a] for a in config.arms
+        }
         return {
             "schema": SCHEMA,
             "command": "tunnel",
@@ -208,7 +210,9 @@ def run(
         list(range(first, min(first + size, config.trials)))
         for first in range(0, config.trials, size)
     ]
-    tasks = [(config, arm, chunk) for arm in config.arms for chunk in chunks]
+    tasks: list[tuple[TunnelConfig, Arm, list[int]]] = [
+        (config, arm, chunk) for arm in config.arms for chunk in chunks
+    ]
     found: list[tuple[TrialResult, TrialPath]] = []
 
     def take(item: tuple[TrialResult, TrialPath]) -> None:

@@ -62,7 +62,7 @@ def build(params: AntennaParams, sensor: SensorParams) -> mujoco.MjSpec:
     base.add_geom(
         type=mujoco.mjtGeom.mjGEOM_SPHERE,
         size=[params.radius, 0, 0],
-        mass=1e-3,
+        mass=params.base_mass,
         contype=0,
         conaffinity=0,
     )

@@ -150,7 +150,7 @@ def _add_wall(
         type=mujoco.mjtGeom.mjGEOM_BOX,
         pos=[middle[0], middle[1], _WALL_HEIGHT / 2],
         quat=[math.cos(half), 0, 0, math.sin(half)],
-        size=[length / 2 + _WALL_HALF_THICKNESS, _WALL_HALF_THICKNESS, _WALL_HEIGHT / 2],
+        size=[length / 2, _WALL_HALF_THICKNESS, _WALL_HEIGHT / 2],
         friction=[friction, 0, 0],
         condim=3,
         contype=layers.OBSTACLE,

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from antennate import sensor
-from antennate.errors import SimulationError
+from antennate.errors import ConfigError, SimulationError
 from antennate.params import SensorParams, VariationParams
 from antennate.records import AntennaFrame, Floats, Pose
 from antennate.sim.world import World
@@ -70,6 +70,9 @@ class SimBody:
         params: Sensor chain of every row.
         period: Control period [s]; a whole number of physics steps.
         timestep: Physics step [s].
+
+    Raises:
+        ConfigError: The period is not a whole number of physics steps.
     """
 
     def __init__(self, batch: int, params: SensorParams, period: float, timestep: float) -> None:
@@ -77,6 +80,11 @@ class SimBody:
         self._params = params
         self._period = period
         self._substeps = round(period / timestep)
+        if abs(self._substeps * timestep - period) > 1e-9:
+            raise ConfigError(
+                f"the control period must be a whole number of physics steps of {timestep:g} s, "
+                f"got {period:g} s"
+            )
         self._ticks = 0
         self._flex: Floats = np.zeros((batch, 2))
         self._noise: Floats = np.zeros((batch, 2))

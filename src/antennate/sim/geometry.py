@@ -36,9 +36,10 @@ def offset_line(points: Floats, distance: float, corner_radius: float = 0.0) -> 
     for i in range(1, len(points) - 1):
         before, after = normal[i - 1], normal[i]
         mitre = points[i] + distance * (before + after) / (1.0 + before @ after)
-        turn = math.atan2(np.cross(along[i - 1], along[i]), along[i - 1] @ along[i])
+        into, out = along[i - 1], along[i]
+        turn = math.atan2(into[0] * out[1] - into[1] * out[0], into @ out)
         if turn * distance < 0 and corner_radius > 0:
-            moved.extend(_fillet(mitre, along[i - 1], along[i], turn, corner_radius))
+            moved.extend(_fillet(mitre, into, out, turn, corner_radius))
         else:
             moved.append(mitre)
     moved.append(points[-1] + distance * normal[-1])

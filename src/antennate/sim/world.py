@@ -18,6 +18,7 @@ from antennate.anatomy import (
     ANTENNA_PREFIXES,
     LEGS,
     LINKS,
+    PITCH_JOINTS,
     YAW_JOINTS,
 )
 from antennate.errors import SimulationError
@@ -25,9 +26,16 @@ from antennate.params import PhysicsParams, RobotParams
 from antennate.records import Floats, Ints
 from antennate.sim import arena, layers, robot
 
+mujoco.set_mju_user_warning(lambda message: None)
+"""The engine prints its warnings and writes them to a file; we read its counters instead."""
+
 PREFIX = "robot/"
 _SPEED_LIMIT = 1e3
 """No coordinate of a sound world moves faster [m/s or rad/s]."""
+_DISTANCE_LIMIT = 100.0
+"""A head farther than this from the origin left the world [m]."""
+_ANGLE_LIMIT = 6.3
+"""Yaw, pitch and antenna joints cannot turn farther [rad]; legs turn without end."""
 _HEIGHT_LIMIT = 0.3
 """A head above or below this left the world [m]."""
 
@@ -82,6 +90,9 @@ class World:
         self._leg = self._addresses([PREFIX + n for n in LEGS])
         hinges = [PREFIX + p + h for p in ANTENNA_PREFIXES for h in ANTENNA_HINGES[:sensed_hinges]]
         self._flex = self._addresses(hinges).reshape(2, sensed_hinges)
+        bent = [PREFIX + p + h for p in ANTENNA_PREFIXES for h in ANTENNA_HINGES]
+        pitch = [PREFIX + n for n in PITCH_JOINTS]
+        self._bounded = np.concatenate([self._yaw, self._addresses([*pitch, *bent])])
         bases = [p + ANTENNA_BASE for p in ANTENNA_PREFIXES]
         names = [PREFIX + n for n in (*YAW_JOINTS, *LEGS, *bases)]
         self._drive: Ints = np.array([model.actuator(n).id for n in names])
@@ -120,7 +131,7 @@ class World:
         Raises:
             SimulationError: A target is not finite; nothing is set then.
         """
-        if not math.isfinite(drive.sum()):
+        if not np.isfinite(drive).all():
             bad = int(np.flatnonzero(~np.isfinite(drive))[0])
             raise SimulationError(
                 self._steps,
@@ -135,8 +146,11 @@ class World:
             SimulationError: The engine warned, time stood still, or the state left all bounds.
         """
         before = self.data.time
-        mujoco.mj_step(self.model, self.data, count)
         self._steps += count
+        try:
+            mujoco.mj_step(self.model, self.data, count)
+        except mujoco.FatalError as error:
+            raise SimulationError(self._steps, str(error).splitlines()[0]) from error
         self._check(before)
 
     def _check(self, before: float) -> None:
@@ -146,6 +160,12 @@ class World:
         if data.warning.number.any():
             found = [n for n, count in zip(_WARNINGS, data.warning.number, strict=True) if count]
             raise SimulationError(self._steps, f"engine warning {', '.join(found)}")
+        far = float(abs(self.head[:2]).max())
+        if not far < _DISTANCE_LIMIT:
+            raise SimulationError(self._steps, f"the head is {far:.3g} m away")
+        bend = float(abs(data.qpos[self._bounded]).max())
+        if not bend < _ANGLE_LIMIT:
+            raise SimulationError(self._steps, f"a joint is at {bend:.3g} rad")
         if not data.time > before:
             raise SimulationError(self._steps, f"time stood still at {data.time:.6g} s")
         if not speed < _SPEED_LIMIT:

@@ -57,5 +57,6 @@ def compare(first_ok: Bools, second_ok: Bools, first_t: Floats, second_t: Floats
     mean, low, high = mean95(difference)
     rank = 1.0
     if np.any(difference != 0):
-        _, rank = stats.wilcoxon(difference, zero_method="zsplit", method="asymptotic")
-    return PairedTest(only_first, only_second, mcnemar, mean, (low, high), float(rank))
+        test = stats.wilcoxon(difference, zero_method="zsplit", method="asymptotic")
+        rank = float(np.asarray(test)[1])
+    return PairedTest(only_first, only_second, mcnemar, mean, (low, high), rank)

@@ -1,0 +1,101 @@
+"""Everything that docs/science/tunnel.md reports, run again: `python docs/science/study.py PART`.
+
+Parts: `evaluation` (three arms, 100 fresh trials each), `ablation` (one change at a time) and `map`
+(success over corner angle and corridor width). Each writes docs/science/PART.json; the figures of the
+map are drawn from it. Results do not depend on the number of workers.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+from antennate.experiments.tunnel import TunnelConfig, run
+from antennate.figures.map import success_map
+from antennate.trials.pool import core_count
+
+HERE = Path(__file__).parent
+EVALUATION_SEED = 20261121
+"""Never used while anything was chosen."""
+ABLATION_SEED = 4242
+MAP_SEED = 777
+
+ABLATIONS: dict[str, dict[str, Any]] = {
+    "closed": {},
+    "stuck = both strong and similar (the paper's REVERSE)": {"escape": {"trigger": "contact"}},
+    "first turn always right, no memory of touch": {"escape": {"first_turn": "right"}},
+    "no alternation: every turn is a first turn": {"escape": {"alternate": False}},
+    "turns at the gait's own offset": {"escape": {"turn_offset": 0.349}},
+}
+FILM_ONE_WAY = {"robot": {"sensor": {"directions": "one"}}}
+
+ANGLES_DEG = (60.0, 75.0, 90.0, 105.0)
+WIDTHS_M = (0.32, 0.40, 0.50)
+
+
+def _config(trials: int, seed: int, arms: tuple[str, ...], **rest: Any) -> TunnelConfig:
+    return TunnelConfig.model_validate({"trials": trials, "seed": seed, "arms": arms, **rest})
+
+
+def _arms(config: TunnelConfig, workers: int, name: str) -> dict[str, Any]:
+    result = run(config, workers)
+    print(f"{name}: done", file=sys.stderr)
+    return result.result()
+
+
+def evaluation(trials: int, workers: int) -> dict[str, Any]:
+    """The three arms as they are, on fresh trials."""
+    return _arms(
+        _config(trials, EVALUATION_SEED, ("open", "paper", "closed")), workers, "evaluation"
+    )
+
+
+def ablation(trials: int, workers: int) -> dict[str, Any]:
+    """The closed arm with one part taken away at a time."""
+    out = {}
+    for name, change in ABLATIONS.items():
+        config = _config(trials, ABLATION_SEED, ("closed",), controller=change)
+        out[name] = _arms(config, workers, name)["arms"]["closed"]
+    config = _config(trials, ABLATION_SEED, ("paper", "closed"), **FILM_ONE_WAY)
+    one_way = _arms(config, workers, "film")["arms"]
+    out["closed, film that sees one direction"] = one_way["closed"]
+    out["paper, film that sees one direction"] = one_way["paper"]
+    return out
+
+
+def success_grid(trials: int, workers: int) -> dict[str, Any]:
+    """Open and closed over corner angle and free width."""
+    cells = []
+    for angle in ANGLES_DEG:
+        for width in WIDTHS_M:
+            tunnel = {"turns_deg": (angle,), "free_width": width}
+            config = _config(trials, MAP_SEED, ("open", "closed"), tunnel=tunnel)
+            arms = _arms(config, workers, f"{angle:g} deg, {width:g} m")["arms"]
+            cells.append({"turn_deg": angle, "free_width_m": width, "arms": arms})
+    return {"trials": trials, "cells": cells}
+
+
+def main() -> None:
+    """Run one part and write it beside this file."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("part", choices=("evaluation", "ablation", "map"))
+    parser.add_argument("--trials", type=int, default=None)
+    parser.add_argument("--workers", type=int, default=core_count())
+    options = parser.parse_args()
+    function, usual = {
+        "evaluation": (evaluation, 100),
+        "ablation": (ablation, 60),
+        "map": (success_grid, 20),
+    }[options.part]
+    result = function(options.trials or usual, options.workers)
+    (HERE / f"{options.part}.json").write_text(json.dumps(result, indent=1) + "\n")
+    if options.part == "map":
+        figure = success_map(result["cells"], ("open", "closed"))
+        figure.savefig(HERE / "map.svg")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,87 @@
+"""The door: the only place that talks to people.
+
+`antennate COMMAND ...` ends with 0 when done, 2 on bad input and 130 when interrupted. Bad input is
+answered with one line on stderr. What a command needs is imported when it runs.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Sequence
+
+from antennate import __version__
+
+OK, BAD_INPUT, INTERRUPTED = 0, 2, 130
+
+COMMANDS = {
+    "tunnel": "walk robots through a corridor of loose cylinders, with and without touch",
+    "gait": "walk on a flat floor: speed, turning and cost of the gait",
+}
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run one command.
+
+    Args:
+        argv: Words after the program's name; those of this process by default.
+
+    Returns:
+        The exit code.
+    """
+    words = list(sys.argv[1:] if argv is None else argv)
+    if not words or words[0] in ("-h", "--help"):
+        sys.stdout.write(_usage())
+        return OK if words else BAD_INPUT
+    if words[0] == "--version":
+        sys.stdout.write(f"antennate {__version__}\n")
+        return OK
+    try:
+        return _run(words[0], words[1:])
+    except KeyboardInterrupt:
+        sys.stderr.write(f"antennate {words[0]}: interrupted\n")
+        return INTERRUPTED
+    except BrokenPipeError:  # whoever read stdout has gone; nothing more can be said there
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return OK
+
+
+def _run(command: str, argv: list[str]) -> int:
+    from antennate.cli.messages import nearest, one_line
+    from antennate.errors import AntennateError, BadInputError
+
+    name = "antennate"
+    try:
+        if command not in COMMANDS:
+            raise BadInputError(
+                f"expected a command, {' or '.join(COMMANDS)}{nearest(command, COMMANDS)}, found {command}"
+            )
+        name = f"antennate {command}"
+        if command == "tunnel":
+            from antennate.cli import tunnel
+
+            return tunnel.command(argv)
+        from antennate.cli import gait
+
+        return gait.command(argv)
+    except AntennateError as error:
+        sys.stderr.write(f"{name}: error: {one_line(str(error))}\n")
+        return BAD_INPUT
+
+
+def _usage() -> str:
+    width = max(len(name) for name in COMMANDS)
+    return "\n".join(
+        [
+            "usage: antennate COMMAND [OPTIONS]",
+            "",
+            "Simulate and study a pair of tactile antennae on a many-legged robot.",
+            "",
+            "commands:",
+            *(f"  {name:<{width}}  {what}" for name, what in COMMANDS.items()),
+            "",
+            "`antennate COMMAND --help` lists every option with its unit and default;",
+            "`antennate --version` prints the version.",
+            "",
+        ]
+    )

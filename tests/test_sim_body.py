@@ -1,0 +1,168 @@
+"""Worlds behind the wall: rows are independent, failures and empty rows read NaN."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from antennate.controller import Controller
+from antennate.loop import run_loop
+from antennate.params import ControllerParams, PhysicsParams, RobotParams, VariationParams
+from antennate.records import AntennaFrame, Maneuver, Pose
+from antennate.sim.body import Disturbance, SimBody
+from antennate.sim.world import PREFIX, World, compile_world
+
+ROBOT, MIND = RobotParams(), ControllerParams()
+PERIOD = MIND.period
+QUIET = VariationParams(joint_bias=0.0, slip_log_sd=0.0)
+
+
+@pytest.fixture(autouse=True)
+def _engine_log_goes_away(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+def chance(seed: int, variation: VariationParams | None = None) -> Disturbance:
+    rng = np.random.default_rng(seed)
+    return Disturbance(
+        rng, variation or VariationParams(), ROBOT.sensor, ROBOT.leg_friction, PERIOD
+    )
+
+
+def body_of(*seeds: int | None) -> SimBody:
+    """A batch on flat floors, one row a seed, empty where there is none."""
+    body = SimBody(len(seeds), ROBOT.sensor, PERIOD, PhysicsParams().timestep)
+    for row, seed in enumerate(seeds):
+        if seed is not None:
+            body.load(row, World(compile_world(PhysicsParams(), ROBOT), 5), chance(seed))
+    return body
+
+
+def run(body: SimBody, batch: int, ticks: int, spoil_at: int | None = None) -> list[AntennaFrame]:
+    """Frames of some ticks; at one tick the world of row 0 is broken."""
+    mind, frames = Controller(MIND, "closed", batch), []
+
+    def go_on(frame: AntennaFrame, pose: Pose) -> bool:
+        frames.append(frame)
+        if len(frames) == spoil_at:
+            body.world(0).data.qvel[0] = math.nan
+        return len(frames) < ticks
+
+    run_loop(body, mind, PERIOD, go_on)
+    return frames
+
+
+def counts(frames: list[AntennaFrame], row: int) -> np.ndarray:
+    return np.array([f.counts[row] for f in frames])
+
+
+def test_rows_say_the_same_alone_and_together() -> None:
+    together = run(body_of(1, 2, 3), 3, 60)
+    for row, seed in enumerate((1, 2, 3)):
+        assert np.array_equal(counts(run(body_of(seed), 1, 60), 0), counts(together, row))
+
+
+def test_rows_of_different_seeds_differ() -> None:
+    frames = run(body_of(1, 2), 2, 60)
+    assert not np.array_equal(counts(frames, 0), counts(frames, 1))
+
+
+def test_a_row_that_fails_reads_nan_and_the_others_go_on_as_if_alone() -> None:
+    body = body_of(1, 2)
+    frames = run(body, 2, 60, spoil_at=20)
+    assert np.isfinite(counts(frames[:20], 0)).all()
+    assert np.isnan(counts(frames[20:], 0)).all()
+    assert np.array_equal(counts(frames, 1), counts(run(body_of(2), 1, 60), 0))
+    failure = body.failure(0)
+    assert failure is not None
+    assert failure.step == 100
+    assert body.failure(1) is None
+
+
+def test_an_empty_row_reads_nan_and_makes_the_mind_hold() -> None:
+    body, mind = body_of(1, None), Controller(MIND, "closed", 2)
+    frame = body.read()
+    mind.step(frame)
+    assert np.isnan(frame.counts[1]).all()
+    assert np.isnan(frame.t[1])
+    assert mind.maneuver.tolist() == [Maneuver.FORWARD, Maneuver.HOLD]
+
+
+def test_a_row_can_be_emptied_and_filled_again() -> None:
+    body = body_of(1)
+    body.unload(0)
+    assert np.isnan(body.read().counts).all()
+    body.load(0, World(compile_world(PhysicsParams(), ROBOT), 5), chance(1))
+    assert np.array_equal(body.read().counts, body_of(1).read().counts)
+
+
+def test_the_world_of_an_empty_row_is_refused() -> None:
+    with pytest.raises(IndexError, match="row 1 holds no world"):
+        body_of(1, None).world(1)
+
+
+def test_a_world_that_was_never_commanded_does_not_move_on() -> None:
+    body = body_of(1)
+    body.sleep_until(0.1)
+    assert body.world(0).t == 0.0
+    assert body.now() == pytest.approx(0.1)
+
+
+def test_sleeping_is_what_steps_the_physics() -> None:
+    body = body_of(1)
+    run(body, 1, 31)
+    assert body.now() == pytest.approx(0.3)
+    assert body.world(0).t == pytest.approx(0.3)
+
+
+def test_a_command_that_is_no_number_fails_its_row_only() -> None:
+    body = body_of(1, 2)
+    body.read()
+    yaw = np.zeros((2, 5))
+    yaw[0, 2] = math.nan
+    body.write(Pose(yaw=yaw, leg=np.zeros((2, 6, 2)), antenna=np.zeros((2, 2))))
+    assert "yaw3" in str(body.failure(0))
+    assert body.failure(1) is None
+    assert np.isnan(body.read().counts).tolist() == [[True, True], [False, False]]
+
+
+def test_straight_antennae_read_the_divider_at_ten_kiloohms() -> None:
+    readings = []
+    body = SimBody(1, ROBOT.sensor, PERIOD, PhysicsParams().timestep)
+    for seed in range(50):
+        body.load(0, World(compile_world(PhysicsParams(), ROBOT), 5), chance(seed))
+        readings.append(body.read().counts[0])
+    assert np.mean(readings) == pytest.approx(1872, abs=1.0)
+    assert np.std(readings) == pytest.approx(2.5, rel=0.3)
+
+
+def test_flex_and_pose_reach_the_frame_and_the_joints_in_their_order() -> None:
+    world = World(compile_world(PhysicsParams(), ROBOT), 5)
+    body = SimBody(1, ROBOT.sensor, PERIOD, PhysicsParams().timestep)
+    body.load(0, world, chance(0, QUIET))
+    world.data.joint(PREFIX + "antenna_l_hinge0").qpos[0] = math.pi / 4
+    left, right = body.read().counts[0]
+    assert left < 1700 < right
+    leg = np.arange(12.0).reshape(1, 6, 2)
+    body.write(Pose(yaw=np.full((1, 5), 0.1), leg=leg, antenna=np.array([[0.2, 0.3]])))
+    drive = world.data.actuator
+    assert drive(PREFIX + "yaw4").ctrl[0] == pytest.approx(0.1)
+    assert drive(PREFIX + "leg_l3").ctrl[0] == 6.0
+    assert drive(PREFIX + "leg_r3").ctrl[0] == 7.0
+    assert drive(PREFIX + "antenna_r_base").ctrl[0] == pytest.approx(0.3)
+
+
+def test_chance_draws_joint_zeros_and_leg_slip_of_the_spread_it_is_given() -> None:
+    draws = [chance(seed) for seed in range(200)]
+    assert np.std([d.joint_bias for d in draws]) == pytest.approx(0.02, rel=0.1)
+    slip = np.array([d.leg_friction(0) for d in draws])
+    assert np.std(np.log(slip / 0.6)) == pytest.approx(0.3, rel=0.1)
+
+
+def test_leg_slip_is_drawn_anew_after_its_time_only() -> None:
+    draw = chance(0)
+    drawn = [tick for tick in range(600) if draw.leg_friction(tick) is not None]
+    assert drawn == [0, 250, 500]
