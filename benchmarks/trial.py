@@ -32,7 +32,7 @@ from antennate.experiments.tunnel import TunnelConfig
 from antennate.gait import Gait
 from antennate.loop import run_loop
 from antennate.params import TunnelParams
-from antennate.records import AntennaFrame, Floats, Maneuver, Pose
+from antennate.records import AntennaFrame, Floats, Ints, Maneuver, Pose
 from antennate.sim import arena, geometry
 from antennate.sim.body import SimBody
 from antennate.sim.world import World, compile_world
@@ -164,7 +164,7 @@ class Pacing:
         return self._gait.step(np.array([int(Maneuver.REVERSE if back else Maneuver.FORWARD)]))
 
 
-def long_tunnel(config: TunnelConfig) -> tuple[arena.Tunnel, Floats]:
+def long_tunnel(config: TunnelConfig) -> tuple[arena.Tunnel, Ints]:
     """A tunnel with cylinders enough, and their order from the start."""
     segments = (1.0,) * 10
     turns = (90.0, -90.0) * 4 + (90.0,)
@@ -206,7 +206,7 @@ def measure_growth(config: TunnelConfig, seconds: float, repetitions: int) -> di
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     parser.add_argument("--trials", type=int, default=12, help="trials of the closed arm")
     parser.add_argument("--seconds", type=float, default=20.0, help="longest trial [s]")

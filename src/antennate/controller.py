@@ -74,6 +74,7 @@ class _ClosedRule:
 
     def __init__(self, params: ControllerParams, batch: int) -> None:
         self.turn_offset = params.escape.turn_offset
+        self._params = params
         self._detector = RepetitionDetector(
             params.repetition, batch, params.period, params.gait.frequency
         )
@@ -86,7 +87,10 @@ class _ClosedRule:
     def step(self, t: Floats, b: Floats, contact: Ints, bend: Floats) -> Ints:
         walking = (self._escape.maneuver == Maneuver.FORWARD) & ~np.isnan(b).any(axis=1)
         stuck = self._detector.step(bend, walking)
-        return self._escape.step(t, b, stuck)
+        if self._params.escape.trigger == "contact":
+            stuck = decide(self._params.rule, contact, b) == Maneuver.REVERSE
+        pressed = (bend > self._params.repetition.pressure).any(axis=1)
+        return self._escape.step(t, b, stuck, pressed)
 
 
 class Controller:

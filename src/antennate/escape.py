@@ -1,9 +1,13 @@
 """What to do when stuck: back off, turn to one side, and to the other if that fails.
 
-The first turn goes away from the side that was touched more while walking. If the robot is stuck
-again soon after, it turns the other way and twice as far, so that it now points as far to that side
-of its first course as it had pointed to this one. Alternating like this, it searches both sides and
-never turns round.
+The first turn goes away from the side that was touched more while walking, before it got stuck: what
+it feels since then says little about where the passage goes on. If the robot is stuck again soon
+after, it turns the other way and twice as far, so that it now points as far to that side
+of its first course as it had pointed to this one: alternating like this, it searches both sides.
+
+A wrong turn can still lead back out of a passage. Whoever has turned and then touches nothing at
+all
+for a while has lost the walls: the robot turns round, back to where it last felt them.
 """
 
 from __future__ import annotations
@@ -26,21 +30,29 @@ class Escape:
         self._ended: Floats = np.full(batch, -np.inf)
         self._right: Bools = np.zeros(batch, dtype=bool)
         self._again: Bools = np.zeros(batch, dtype=bool)
+        self._turned: Bools = np.zeros(batch, dtype=bool)
+        self._felt: Floats = np.zeros(batch)
+        delay = max(1, round(params.memory_delay / period))
+        self._past: Floats = np.zeros((delay, batch, 2))
+        self._ticks = 0
         self.touch: Floats = np.zeros((batch, 2))
 
     def reset(self, rows: Ints | Bools) -> None:
         """Some rows begin anew, walking, with no memory."""
         self.maneuver[rows] = Maneuver.FORWARD
         self._ended[rows] = -np.inf
+        self._turned[rows] = False
+        self._past[:, rows] = 0.0
         self.touch[rows] = 0.0
 
-    def step(self, t: Floats, b: Floats, stuck: Bools) -> Ints:
+    def step(self, t: Floats, b: Floats, stuck: Bools, pressed: Bools) -> Ints:
         """The maneuver of every row.
 
         Args:
             t: Time [s], shape (B,).
             b: Bending levels, shape (B, 2); a row with NaN answers HOLD and keeps its state.
             stuck: Rows found stuck, shape (B,).
+            pressed: Rows that feel anything at all, shape (B,).
 
         Returns:
             One `Maneuver` a row, shape (B,).
@@ -48,23 +60,50 @@ class Escape:
         known = ~np.isnan(b).any(axis=1)
         walking = known & (self.maneuver == Maneuver.FORWARD)
         self.touch += np.where(walking[:, None], b - self.touch, 0.0) * self._memory_gain
+        before = self._remember()
+        self._felt = np.where(walking & ~pressed, self._felt, t)
         over = known & ~walking & (t >= self._until)
         backed = over & (self.maneuver == Maneuver.REVERSE)
         self._to(over & ~backed, int(Maneuver.FORWARD), t)
-        turn = np.where(self._right, int(Maneuver.TURN_R), int(Maneuver.TURN_L))
-        length = self._params.turn_time * np.where(self._again, 2.0, 1.0)
-        self._to(backed, turn, t + length)
-        self._ended = np.where(backed, t + length, self._ended)
-        self._begin(walking & stuck, t)
+        self._turn(backed, t)
+        self._back_off(walking & stuck, before, t)
+        self._return(walking & self._turned & (t - self._felt > self._params.lost_time), t)
         return np.where(known, self.maneuver, int(Maneuver.HOLD))
 
     def _to(self, rows: Bools, maneuver: Ints | int, until: Floats) -> None:
         self.maneuver = np.where(rows, maneuver, self.maneuver)
         self._until = np.where(rows, until, self._until)
 
-    def _begin(self, rows: Bools, t: Floats) -> None:
-        again = t - self._ended < self._params.retry_time
-        away = self.touch[:, LEFT] >= self.touch[:, RIGHT]
+    def _remember(self) -> Floats:
+        """Keep the memory of touch, and return what it was memory_delay ago."""
+        at = self._ticks % len(self._past)
+        self._ticks += 1
+        before = self._past[at].copy()
+        self._past[at] = self.touch
+        return before
+
+    def _back_off(self, rows: Bools, touch: Floats, t: Floats) -> None:
+        params = self._params
+        again = (t - self._ended < params.retry_time) & params.alternate
+        away = touch[:, LEFT] >= touch[:, RIGHT]
+        if params.first_turn == "right":
+            away = np.ones_like(away)
         self._right = np.where(rows, np.where(again, ~self._right, away), self._right)
         self._again = np.where(rows, again, self._again)
-        self._to(rows, int(Maneuver.REVERSE), t + self._params.reverse_time)
+        self._to(rows, int(Maneuver.REVERSE), t + params.reverse_time)
+
+    def _turn(self, rows: Bools, t: Floats) -> None:
+        until = t + self._params.turn_time * np.where(self._again, 2.0, 1.0)
+        self._to(rows, _turn_to(self._right), until)
+        self._ended = np.where(rows, until, self._ended)
+        self._turned |= rows
+
+    def _return(self, rows: Bools, t: Floats) -> None:
+        """Turn round, unwinding the last turn, and remember it no longer."""
+        self._to(rows, _turn_to(~self._right), t + self._params.return_time)
+        self._ended = np.where(rows, -np.inf, self._ended)
+        self._turned &= ~rows
+
+
+def _turn_to(right: Bools) -> Ints:
+    return np.where(right, int(Maneuver.TURN_R), int(Maneuver.TURN_L))

@@ -2,7 +2,7 @@
 
 A walking robot that gets on meets something new in every cycle, so its antennae read something new.
 A robot that walks on the spot feels the same cycle again and again. The measure is the mean over a
-cycle of |y(t) - y(t - T)|, T the gait period and y the deflection of an antenna (0 straight, 1
+window of |y(t) - y(t - T)|, T the gait period and y the deflection of an antenna (0 straight, 1
 fully bent). Where it stays small while an antenna is pressed, the robot is stuck. In free air it is
 small too, but nothing is pressed.
 
@@ -24,24 +24,20 @@ class RepetitionDetector:
         self, params: RepetitionParams, batch: int, period: float, frequency: float
     ) -> None:
         self._params = params
-        self._length = max(1, round(1.0 / (frequency * period)))
-        self._cycle: Floats = np.zeros((self._length, batch, 2))
-        self._next = 0
-        self._gain = 1.0 / (params.averaging_cycles * self._length)
+        cycle = max(1, round(1.0 / (frequency * period)))
+        window = max(1, round(params.window_cycles * cycle))
+        self._needed = cycle + window
+        self._last: Floats = np.zeros((cycle, batch, 2))
+        self._change: Floats = np.zeros((window, batch, 2))
+        self._press: Floats = np.zeros((window, batch, 2))
+        self._ticks = 0
         self._walked: Ints = np.zeros(batch, dtype=np.int64)
-        self.change: Floats = np.ones((batch, 2))
-        self.pressure: Floats = np.zeros((batch, 2))
 
     def reset(self, rows: Ints | Bools) -> None:
         """Some rows forget everything."""
-        self._cycle[:, rows] = 0.0
-        self.pressure[rows] = 0.0
-        self._restart(rows)
-
-    def _restart(self, rows: Ints | Bools) -> None:
-        """Some rows begin to walk: nothing has repeated yet."""
+        for memory in (self._last, self._change, self._press):
+            memory[:, rows] = 0.0
         self._walked[rows] = 0
-        self.change[rows] = 1.0
 
     def step(self, deflection: Floats, walking: Bools) -> Bools:
         """Take one sample and say which rows are stuck.
@@ -51,19 +47,16 @@ class RepetitionDetector:
             walking: Rows whose gait runs forward undisturbed, shape (B,).
 
         Returns:
-            Rows that walk, are pressed, and whose readings repeat, shape (B,).
+            Rows that walk, are pressed, and whose readings repeat, shape (B,). Only samples taken
+            while walking are compared, so nothing repeats before a cycle and a window are over.
         """
-        self._restart(~walking)
         sample = np.nan_to_num(deflection)
-        before = self._cycle[self._next]
-        change = np.abs(sample - before)
-        self._cycle[self._next] = sample
-        self._next = (self._next + 1) % self._length
-        self.change += (change - self.change) * self._gain
-        self.pressure += (np.abs(sample) - self.pressure) * self._gain
-        self._walked += walking
-        return (
-            (self._walked > self._params.settling_cycles * self._length)
-            & (self.change < self._params.change).all(axis=1)
-            & (self.pressure > self._params.pressure).any(axis=1)
-        )
+        in_cycle, in_window = self._ticks % len(self._last), self._ticks % len(self._change)
+        self._change[in_window] = np.abs(sample - self._last[in_cycle])
+        self._press[in_window] = np.abs(sample)
+        self._last[in_cycle] = sample
+        self._ticks += 1
+        self._walked = np.where(walking, self._walked + 1, 0)
+        repeats = (self._change.mean(axis=0) < self._params.change).all(axis=1)
+        pressed = (self._press.mean(axis=0) > self._params.pressure).any(axis=1)
+        return (self._walked >= self._needed) & repeats & pressed

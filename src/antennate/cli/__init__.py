@@ -53,9 +53,8 @@ def _run(command: str, argv: list[str]) -> int:
     name = "antennate"
     try:
         if command not in COMMANDS:
-            raise BadInputError(
-                f"expected a command, {' or '.join(COMMANDS)}{nearest(command, COMMANDS)}, found {command}"
-            )
+            known = " or ".join(COMMANDS) + nearest(command, COMMANDS)
+            raise BadInputError(f"expected a command, {known}, found {command}")
         name = f"antennate {command}"
         if command == "tunnel":
             from antennate.cli import tunnel

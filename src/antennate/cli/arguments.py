@@ -1,7 +1,7 @@
 """From words and a TOML file to a valid configuration and the options of a run.
 
-tyro makes one flag of every parameter but builds nothing: the values come back as plain dicts and are
-checked once, by the model itself. The file must be valid on its own; flags override it.
+tyro makes one flag of every parameter but builds nothing: the values come back as plain dicts and
+are checked once, by the model itself. The file must be valid on its own; flags override it.
 """
 
 from __future__ import annotations
@@ -150,7 +150,7 @@ def read_file(path: Path, model: type[Config]) -> Config:
         raise ConfigError(f"{path}: {describe(error, model, dotted)}") from None
 
 
-def _words(command: str, description: str, default: Config, argv: Sequence[str]) -> _Call[Any]:
+def _words(command: str, description: str, default: Params, argv: Sequence[str]) -> _Call[Any]:
     with _refusals():
         call, unknown = tyro.cli(
             _Call[type(default)],
@@ -183,9 +183,9 @@ def _refusals() -> Iterator[None]:
 def _unbox(box: str) -> str:
     """The message in one of tyro's boxes, as `flag: expected ..., found ...` where it is known."""
     plain = re.sub(r"\x1b\[[0-9;]*m", "", box)
-    lines = [line.strip(" │") for line in plain.splitlines() if not re.match(r"\s*[╭╰]", line)]
-    sections = " ".join(lines).split("──")
-    message = " ".join(sections[0].split())
+    lines = [line.strip(" │|") for line in plain.splitlines()[1:-1]]
+    ruled = "\n".join("" if re.fullmatch("[─-]+", line) else line for line in lines)
+    message = one_line(ruled.split("\n\n")[0])
     if match := re.match(
         r"invalid choice '(.*)' for argument '(.*)'\. Expected one of (.*)\.", message
     ):
@@ -196,9 +196,7 @@ def _unbox(box: str) -> str:
             f"{match[1]}: expected {match[2]} value{'s' if match[2] != '1' else ''}, found too few"
         )
     if match := re.match(r"Error parsing (\S+): (.*)", message):
-        kind = re.search(
-            rf"Argument helptext:\s+{re.escape(match[1])} (\[?[A-Z]+)", " ".join(lines)
-        )
+        kind = re.search(rf"^{re.escape(match[1])} (\[?[A-Z]+)", ruled, re.MULTILINE)
         found = re.search(r"\[.*\]|'.*'$", match[2].split(" into ")[0])
         if kind and found:
             return f"{match[1]}: expected {kind[1].strip('[')}, found {one_line(found[0])}"

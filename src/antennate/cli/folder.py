@@ -1,7 +1,8 @@
 """The run directory: everything about one run in one place, and nothing half written.
 
-Files are replaced whole. While a run goes on, finished trials are appended to `trials.partial.jsonl`; a
-folder that holds this file or a result belongs to another run and is left alone unless told otherwise.
+Files are written whole. While a run goes on, finished trials are appended to
+`trials.partial.jsonl`. A folder that holds any file of a run belongs to another one and is left
+alone unless told otherwise; then those files go first, so that nothing old stands beside the new.
 """
 
 from __future__ import annotations
@@ -29,7 +30,14 @@ from antennate.errors import OutputError
 from antennate.params import Params
 
 RESULT, TABLE, PARTIAL = "result.json", "trials.csv", "trials.partial.jsonl"
-CONFIG, VERSIONS, COMMAND, FIGURES = "config.toml", "versions.json", "command.txt", "figures"
+CONFIG, VERSIONS, COMMAND = "config.toml", "versions.json", "command.txt"
+DRAWINGS = tuple(
+    f"figures/{name}.{suffix}"
+    for name in ("trajectories", "summary", "gait")
+    for suffix in ("svg", "png")
+)
+_NAMES = (RESULT, PARTIAL, TABLE, CONFIG, VERSIONS, COMMAND, *DRAWINGS)
+"""Every file that a run may write."""
 _CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f]+")
 
 
@@ -40,10 +48,10 @@ class RunFolder:
         path: Where it is.
     """
 
-    def __init__(self, path: Path, created: list[Path]) -> None:
+    def __init__(self, path: Path, created: list[Path], partial: IO[str]) -> None:
         self.path = path
         self._created = created
-        self._partial: IO[str] | None = None
+        self._partial = partial
         self._kept = False
 
     @classmethod
@@ -57,8 +65,7 @@ class RunFolder:
         with _writing(path):
             missing = [p for p in (path, *path.parents) if not p.exists()]
             path.mkdir(parents=True, exist_ok=out is not None)
-            run = cls(path, missing)
-            held = [name for name in (RESULT, PARTIAL) if (path / name).exists()]
+            held = [name for name in _NAMES if os.path.lexists(path / name)]
             if held and not overwrite:
                 raise OutputError(
                     f"--out: expected a folder without a run, found {path / held[0]}; "
@@ -66,18 +73,16 @@ class RunFolder:
                 )
             for name in held:
                 (path / name).unlink()
-            run._partial = (path / PARTIAL).open("x", encoding="utf-8")
-        return run
+            return cls(path, missing, (path / PARTIAL).open("x", encoding="utf-8"))
 
     def describe(self, command: str, argv: Sequence[str], config: Params) -> None:
         """Write what is known before the run: configuration, versions and command."""
         self.write(CONFIG, to_toml(config))
-        self.write(VERSIONS, _json(_versions()))
+        self.write(VERSIONS, to_json(_versions()))
         self.write(COMMAND, shlex.join(["antennate", command, *argv]) + "\n")
 
     def append(self, row: Any) -> None:
         """Keep one finished trial, a dataclass, at once."""
-        assert self._partial is not None
         with _writing(self.path / PARTIAL):
             self._partial.write(json.dumps(strict(asdict(row))) + "\n")
             self._partial.flush()
@@ -87,7 +92,7 @@ class RunFolder:
         """Write the result and, if there are rows, their table; then drop the partial file."""
         if rows:
             self.write(TABLE, to_csv(asdict(row) for row in rows))
-        self.write(RESULT, _json(result))
+        self.write(RESULT, to_json(result))
         self._kept = True
         self._drop_partial()
 
@@ -108,10 +113,9 @@ class RunFolder:
                 fresh.unlink(missing_ok=True)
 
     def _drop_partial(self) -> None:
-        if self._partial is not None:
-            self._partial.close()
-            with _writing(self.path / PARTIAL):
-                (self.path / PARTIAL).unlink(missing_ok=True)
+        self._partial.close()
+        with _writing(self.path / PARTIAL):
+            (self.path / PARTIAL).unlink(missing_ok=True)
 
     def __enter__(self) -> RunFolder:
         return self
@@ -123,19 +127,18 @@ class RunFolder:
         trace: TracebackType | None,
     ) -> None:
         if self._kept:
-            if self._partial is not None:
-                self._partial.close()
+            self._partial.close()
             return
         with contextlib.suppress(OSError, OutputError):
             self._drop_partial()
-            for name in (CONFIG, VERSIONS, COMMAND):
+            for name in (CONFIG, VERSIONS, COMMAND) if self._created else ():
                 (self.path / name).unlink(missing_ok=True)
             for path in self._created:
                 path.rmdir()
 
 
 def to_csv(rows: Iterable[Mapping[str, Any]]) -> str:
-    """A table with a header; text that a spreadsheet would run as a formula gets a quote in front."""
+    """A table with a header; text that a spreadsheet would take for a formula gets a quote."""
     rows = list(rows)
     file = io.StringIO()
     writer = csv.writer(file, lineterminator="\n")
@@ -161,13 +164,9 @@ def strict(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def _json(value: Any) -> str:
+def to_json(value: Any) -> str:
+    """Strict JSON, indented, as result.json holds it."""
     return json.dumps(strict(value), indent=2, allow_nan=False) + "\n"
-
-
-def to_json(result: Mapping[str, Any]) -> str:
-    """The text of result.json."""
-    return _json(result)
 
 
 def _versions() -> dict[str, str]:
@@ -193,5 +192,5 @@ def _writing(path: Path) -> Iterator[None]:
         yield
     except OSError as error:
         raise OutputError(
-            f"--out: expected a place to write {path}, found: {error.strerror or error}"
+            f"--out: expected to write {path}, found: {error.strerror or error}"
         ) from None

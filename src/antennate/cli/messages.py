@@ -61,7 +61,7 @@ def flag(path: tuple[int | str, ...]) -> str:
 def describe(
     error: ValidationError, model: type[BaseModel], where: Callable[[tuple[int | str, ...]], str]
 ) -> str:
-    """The first fault pydantic found, with its place as `where` names it, and how many more there are."""
+    """The first fault pydantic found, placed by `where`, and how many more there are."""
     faults = error.errors(include_url=False)
     first = faults[0]
     kind, path, context = first["type"], first["loc"], first.get("ctx", {})
@@ -72,8 +72,8 @@ def describe(
     if kind == "extra_forbidden":
         key, group = str(path[-1]), dotted(path[:-1])
         known = _keys(model, path[:-1])
-        of = f" of {group}" if group else ""
-        return f"{where(path)}: expected a known key{of}{nearest(key, known)}, found {shown(key)}{more}"
+        what = f"a known key{f' of {group}' if group else ''}{nearest(key, known)}"
+        return f"{where(path)}: expected {what}, found {shown(key)}{more}"
     found = "none" if kind == "missing" else shown(first["input"])
     return (
         f"{where(path)}: expected {_expected(kind, context) or first['msg']}, found {found}{more}"

@@ -18,24 +18,22 @@ _LINES = 10
 
 
 @contextlib.contextmanager
-def progress(what: str, total: int) -> Iterator[Callable[[], None]]:
-    """Yield a function to call after each of `total` steps."""
+def progress(what: str) -> Iterator[Callable[[int, int], None]]:
+    """Yield a function to call after each step with how many of how many are done."""
     console = Console(file=sys.stderr)
     if not console.is_terminal:
-        yield _plain(what, total)
+        yield _plain(what)
         return
     columns = (TextColumn(what), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     with Progress(*columns, console=console, transient=True) as bar:
-        task = bar.add_task(what, total=total)
-        yield lambda: bar.advance(task)
+        task = bar.add_task(what, total=None)
+        yield lambda done, total: bar.update(task, completed=done, total=total)
 
 
-def _plain(what: str, total: int) -> Callable[[], None]:
-    start, done = time.monotonic(), 0
+def _plain(what: str) -> Callable[[int, int], None]:
+    start = time.monotonic()
 
-    def step() -> None:
-        nonlocal done
-        done += 1
+    def step(done: int, total: int) -> None:
         if done * _LINES // total > (done - 1) * _LINES // total:
             seconds = time.monotonic() - start
             sys.stderr.write(f"{what}: {done} of {total} after {seconds:.0f} s\n")

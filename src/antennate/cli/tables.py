@@ -9,8 +9,9 @@ from typing import Any
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
-NONE = "–"
+NONE = "-"
 Cell = Callable[[Mapping[str, Any]], str]
 
 
@@ -38,7 +39,7 @@ def show(
     for name in columns:
         table.add_column(name, justify="right", overflow="fold")
     for measure, cell in rows:
-        table.add_row(measure, *(cell(column) for column in columns.values()))
+        table.add_row(Text(measure), *(Text(cell(column)) for column in columns.values()))
     console = Console(file=sys.stdout, highlight=False)
     console.print(table)
-    console.print(note, soft_wrap=not console.is_terminal)
+    console.print(Text(note), soft_wrap=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import sys
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -15,9 +16,10 @@ from antennate.experiments import tunnel
 from antennate.experiments.judge import TrialPath, TrialResult
 
 DESCRIPTION = """\
-Walk robots through a corridor of loose cylinders. The arms differ in one decision: `open` walks forward
-whatever it feels, `paper` follows the published table, `closed` escapes when its readings repeat.
-All arms meet the same tunnels, starts and disturbances. A trial succeeds when the head passes the exit."""
+Walk robots through a corridor of loose cylinders. The arms differ in one decision: `open` walks
+forward whatever it feels, `paper` follows the published table, `closed` escapes when its readings
+repeat. All arms meet the same tunnels, starts and disturbances. A trial succeeds when the head
+passes the exit."""
 SHOWN_TRIALS = 5
 """Trials drawn in the figure of trajectories."""
 
@@ -46,21 +48,20 @@ def command(argv: Sequence[str]) -> int:
         if not options.no_figures:
             _draw(outcome, folder)
         if outcome.interrupted:
-            total = config.trials * len(config.arms)
-            sys.stderr.write(
-                f"antennate tunnel: interrupted: kept {len(outcome.rows)} finished trials of {total}\n"
-            )
+            kept = f"{len(outcome.rows)} of {config.trials * len(config.arms)} trials"
+            sys.stderr.write(f"antennate tunnel: interrupted: kept {kept}, all that had ended\n")
         sys.stderr.write(f"written to {folder.path}\n")
     return INTERRUPTED if outcome.interrupted else OK
 
 
 def _run(config: tunnel.TunnelConfig, options: Options, folder: RunFolder) -> tunnel.TunnelOutcome:
     total = config.trials * len(config.arms)
-    with progress("trials", total) as step, terminate_as_interrupt():
+    done = itertools.count(1)
+    with progress("trials") as step, terminate_as_interrupt():
 
         def keep(row: TrialResult, path: TrialPath) -> None:
             folder.append(row)
-            step()
+            step(next(done), total)
 
         return tunnel.run(config, options.worker_count, keep)
 
@@ -72,7 +73,9 @@ def _draw(outcome: tunnel.TunnelOutcome, folder: RunFolder) -> None:
     config = outcome.config
     trials = range(min(SHOWN_TRIALS, config.trials))
     figures = {
-        "trajectories": trajectories(outcome.paths, config.arms, outcome.rows, trials),
+        "trajectories": trajectories(
+            outcome.paths, config.arms, outcome.rows, trials, config.tunnel.cylinder.radius
+        ),
         "summary": summary(outcome.result()["arms"], outcome.rows, config.time_limit),
     }
     for name, figure in figures.items():
@@ -89,15 +92,16 @@ def show_result(result: Mapping[str, Any]) -> None:
         "Arms",
         arms,
         _ARM_ROWS,
-        f"{many} trials an arm, seed {result['seed']}. A failure counts as the time limit, {limit:g} s; "
-        "invalid trials\nare counted and left out of all other rows. Intervals of means are bootstrapped.\n",
+        f"{many} trials an arm, seed {result['seed']}. A failure counts as the time limit, "
+        f"{limit:g} s; invalid trials\nare left out of all rows below theirs. Intervals of means "
+        "are bootstrapped.\n",
     )
     if result["paired"]:
         show(
             "Pairs, trial by trial",
             result["paired"],
             _PAIR_ROWS,
-            "McNemar's test is exact, Wilcoxon's is on times restricted to the limit; both two-sided.\n",
+            "McNemar's test is exact; Wilcoxon's takes failures as the limit; both two-sided.\n",
         )
 
 

@@ -175,7 +175,7 @@ def walk_flat(config: GaitStudyConfig, name: str, gait: GaitParams, maneuver: Ma
         if failure is not None:
             raise failure
         ticks.append((world.t, world.links(), _positive_power(world)))
-        return world.t < end
+        return world.t < end - period / 2
 
     run_loop(body, _Fixed(gait, maneuver, period), period, go_on)
     links = np.array([tick[1] for tick in ticks])

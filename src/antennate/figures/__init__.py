@@ -1,0 +1,1 @@
+"""One function per figure: plain data goes in, a figure comes out."""

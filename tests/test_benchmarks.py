@@ -1,0 +1,49 @@
+"""The benchmarks measure what they say."""
+
+import importlib.util
+import sys
+from pathlib import Path
+
+import pytest
+
+from antennate.experiments.tunnel import TunnelConfig
+from antennate.params import TunnelParams
+
+FOLDER = Path(__file__).parents[1] / "benchmarks"
+
+
+@pytest.fixture(scope="module")
+def trial():
+    if not FOLDER.is_dir():
+        pytest.skip("benchmarks are not part of this copy")
+    spec = importlib.util.spec_from_file_location("benchmark_trial", FOLDER / "trial.py")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_replay_ends_on_the_same_bits(trial):
+    config = TunnelConfig(time_limit=1.0)
+    tapes, ended = trial.record(config, 2)
+    assert [len(tape.ticks) for tape in tapes] == [100, 100]
+    assert tapes[0].ticks[0][0] is not None, "legs draw their friction at the first tick"
+    worlds = [start.world for start in trial.prepare(config, 2)]
+    trial.replay(tapes, worlds)
+    trial.check_same(worlds, ended)
+
+
+def test_a_replay_that_differs_is_refused(trial):
+    config = TunnelConfig(time_limit=0.2, tunnel=TunnelParams(strewn=0))
+    tapes, ended = trial.record(config, 1)
+    tapes[0].ticks.pop()
+    worlds = [start.world for start in trial.prepare(config, 1)]
+    trial.replay(tapes, worlds)
+    with pytest.raises(SystemExit, match="qpos differs"):
+        trial.check_same(worlds, ended)
+
+
+def test_long_tunnel_has_cylinders_enough(trial):
+    drawn, order = trial.long_tunnel(TunnelConfig())
+    assert sorted(order) == list(range(len(drawn.cylinders)))
+    assert len(order) >= max(trial.COUNTS)

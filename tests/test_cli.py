@@ -1,0 +1,447 @@
+"""The door: exit codes, errors in one line, and what a run leaves behind."""
+
+import csv
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import antennate
+from antennate.cli import main
+from antennate.cli.arguments import read_file
+from antennate.cli.folder import strict, to_csv
+from antennate.cli.messages import one_line
+from antennate.cli.toml import to_toml
+from antennate.errors import ConfigError
+from antennate.experiments.gait import GaitStudyConfig
+from antennate.experiments.tunnel import TunnelConfig
+from antennate.sim.world import World
+
+SMALL = ["tunnel", "--trials", "1", "--arms", "open", "--time-limit", "1", "--workers", "1"]
+QUICK = [*SMALL, "--no-figures"]
+
+
+@pytest.fixture(autouse=True)
+def _elsewhere(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "80")
+
+
+def table(run: Path) -> list[dict[str, str]]:
+    """The rows of trials.csv."""
+    with (run / "trials.csv").open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def child(code: str, *argv: str, **options) -> subprocess.Popen:
+    """A Python of its own that finds this package."""
+    source = str(Path(antennate.__file__).resolve().parents[1])
+    words = [sys.executable, "-c", code, *argv]
+    environment = {**os.environ, "PYTHONPATH": source}
+    return subprocess.Popen(words, env=environment, text=True, **options)
+
+
+def refusal(capsys, *argv: str) -> str:
+    """The one line with which a command refuses."""
+    assert main(argv) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err.endswith("\n")
+    assert err.count("\n") == 1, err
+    assert "Traceback" not in err
+    return err.strip()
+
+
+def test_version_and_help(capsys):
+    assert main(["--version"]) == 0
+    assert capsys.readouterr().out == f"antennate {antennate.__version__}\n"
+    assert main(["--help"]) == 0
+    assert "tunnel" in capsys.readouterr().out
+    with pytest.raises(SystemExit) as end:
+        main(["tunnel", "--help"])
+    assert end.value.code == 0
+
+
+def test_help_shows_every_flag_with_unit_and_default(capsys):
+    with pytest.raises(SystemExit):
+        main(["tunnel", "--help"])
+    text = " ".join(capsys.readouterr().out.replace("│", " ").split())
+    assert (
+        "--tunnel.free-width FLOAT widest free width between the linings [m] (default: 0.4)" in text
+    )
+    flags = re.findall(r"[| ]--[a-z][a-z.-]* [A-Z{[]", text)
+    assert text.count("(default:") >= len(flags) > 80
+    for name in ("--controller.gait.frequency", "--robot.antenna.length", "--trials", "--out"):
+        assert f"{name} " in text
+
+
+def test_the_door_opens_without_heavy_imports():
+    code = (
+        "import sys, antennate.cli as c; c.main(['--help']); "
+        "heavy = {'mujoco', 'matplotlib', 'scipy', 'numpy', 'pydantic', 'rich', 'tyro'}; "
+        "assert not heavy & set(sys.modules), heavy & set(sys.modules)"
+    )
+    door = child(code, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    _, err = door.communicate(timeout=60)
+    assert door.returncode == 0, err
+
+
+@pytest.mark.parametrize(
+    ("argv", "parts"),
+    [
+        (["tunel"], ["antennate: error:", "did you mean tunnel?", "found tunel"]),
+        (["tunnel", "--trails", "3"], ["did you mean --trials?", "found '--trails'"]),
+        (["tunnel", "--tunnel.free_widht=1"], ["did you mean --tunnel.free-width?"]),
+        (["tunnel", "stray"], ["expected flags only", "'stray'"]),
+        (["tunnel", "--trials", "many"], ["--trials: expected INT, found 'many'"]),
+        (["tunnel", "--trials"], ["--trials: expected 1 value"]),
+        (["tunnel", "--trials", "0"], ["--trials: expected a number of at least 1, found 0"]),
+        (["tunnel", "--arms", "zigzag"], ["--arms: expected one of open, paper, closed"]),
+        (["tunnel", "--arms", "open", "open"], ["arms must differ"]),
+        (["tunnel", "--workers", "0"], ["--workers: expected at least 1, found 0"]),
+        (
+            ["tunnel", "--tunnel.free-width", "-0.4"],
+            ["antennate tunnel: error: --tunnel.free-width: expected a number above 0, found -0.4"],
+        ),
+        (["tunnel", "--tunnel.free-width", "nan"], ["expected a finite number, found nan"]),
+        (["tunnel", "--tunnel.free-width", "0.1"], ["at least robot.width, 0.2 m, got 0.1 m"]),
+        (["tunnel", "--tunnel.strewn", "300"], ["tunnel.strewn asks for 300"]),
+        (["tunnel", "--controller.rate", "333"], ["whole fraction of the physics rate"]),
+        (["tunnel", "--config", "missing.toml"], ["found missing.toml: No such file"]),
+        (["tunnel", "--config", "."], ["--config: expected a readable file"]),
+        (["gait", "--cycles", "x"], ["antennate gait: error: --cycles: expected INT"]),
+        (["gait", "--tunnel.free-width", "1"], ["expected a known flag"]),
+    ],
+)
+def test_bad_words(capsys, tmp_path, argv, parts):
+    line = refusal(capsys, *argv)
+    for part in parts:
+        assert part in line
+    assert list(tmp_path.iterdir()) == []  # a refused command leaves nothing behind
+
+
+@pytest.mark.parametrize(
+    ("text", "parts"),
+    [
+        (
+            "[tunnel]\nfree_widht = 0.5",
+            [
+                "c.toml: tunnel.free_widht: expected a known key of tunnel",
+                "did you mean free_width?",
+            ],
+        ),
+        ("trials = 3\ntrials = 4", ["c.toml: expected TOML, found: Cannot overwrite a value"]),
+        ("trials = = 3", ["c.toml: expected TOML", "line 1"]),
+        ("trials = '3'", ["c.toml: trials: expected a whole number, found '3'"]),
+        ("trials = 3.0", ["c.toml: trials: expected a whole number, found 3.0"]),
+        ("trials = true", ["c.toml: trials: expected a whole number, found True"]),
+        ("tunnel.free_width = -1", ["c.toml: tunnel.free_width: expected a number above 0"]),
+        ("tunnel.free_width = nan", ["tunnel.free_width: expected a finite number, found nan"]),
+        ("tunnel.free_width = 1e999", ["tunnel.free_width: expected a finite number, found inf"]),
+        ("tunnel.free_width = 1979-05-27", ["tunnel.free_width: expected a number"]),
+        ("tunnel = 3", ["tunnel: expected a table, found 3"]),
+        ("tunnel.segments = [1.0, 'x']", ["tunnel.segments[1]: expected a number, found 'x'"]),
+        ("arms = []", ["arms: expected at least 1 value"]),
+        ("robot.antenna.active_coils = [3, 6]", ["active_coils[2]: expected a value"]),
+        ('"a\\u001b[31m\\nb" = 1', ["expected a known key"]),
+        ("a = " + "[" * 200_000, ["nested too deeply"]),
+        ("a." * 400_000 + "a = 1", ["line 1: expected at most 100 dots"]),
+        ("#" * 1_000_001, ["expected at most 1000000 bytes"]),
+        (b"\xff\xfe", ["expected UTF-8 text, found byte 0xff at 0"]),
+    ],
+)
+def test_bad_files(capsys, tmp_path, text, parts):
+    (tmp_path / "c.toml").write_bytes(text if isinstance(text, bytes) else text.encode())
+    start = time.monotonic()
+    line = refusal(capsys, "tunnel", "--config", "c.toml")
+    assert time.monotonic() - start < 2.0
+    for part in parts:
+        assert part in line
+    assert line.isprintable()
+
+
+def test_bad_folders(capsys, tmp_path):
+    (tmp_path / "file").write_text("mine")
+    assert "expected to write file, found: File exists" in refusal(capsys, *QUICK, "--out", "file")
+    assert "Not a directory" in refusal(capsys, *QUICK, "--out", "file/sub")
+    assert (tmp_path / "file").read_text() == "mine"
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "config.toml").write_text("trials = 1\n")
+    line = refusal(capsys, *QUICK, "--out", "mine")
+    assert "found mine/config.toml; choose another or give --overwrite" in line
+    assert [p.name for p in (tmp_path / "mine").iterdir()] == ["config.toml"]
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")
+def test_a_folder_without_permission(capsys, tmp_path):
+    (tmp_path / "closed").mkdir(mode=0o500)
+    assert "Permission denied" in refusal(capsys, *QUICK, "--out", "closed")
+
+
+def test_a_full_disk_is_one_line_and_keeps_what_was_there(capsys, tmp_path, monkeypatch):
+    assert main([*QUICK, "--out", "run"]) == 0
+    capsys.readouterr()
+    before = (tmp_path / "run" / "result.json").read_bytes()
+
+    def full(*args):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", full)
+    assert "No space left on device" in refusal(capsys, *QUICK, "--out", "other")
+    assert not (tmp_path / "other").exists()
+    assert (tmp_path / "run" / "result.json").read_bytes() == before
+
+
+def test_a_run_leaves_a_folder_that_explains_itself(capsys, tmp_path):
+    assert main([*SMALL, "--seed", "5", "--out", "deep/run"]) == 0
+    out, err = capsys.readouterr()
+    assert err.endswith("written to deep/run\n")
+    assert "1 trials an arm, seed 5" in out
+    assert "A failure counts as the time limit, 1 s" in out
+    assert max(map(len, out.splitlines())) <= 100
+    run = tmp_path / "deep" / "run"
+    assert sorted(str(p.relative_to(run)) for p in run.rglob("*.*")) == [
+        "command.txt",
+        "config.toml",
+        "figures/summary.png",
+        "figures/summary.svg",
+        "figures/trajectories.png",
+        "figures/trajectories.svg",
+        "result.json",
+        "trials.csv",
+        "versions.json",
+    ]
+    assert (run / "command.txt").read_text() == (
+        f"antennate {' '.join(SMALL)} --seed 5 --out deep/run\n"
+    )
+    versions = json.loads((run / "versions.json").read_text())
+    assert versions["antennate"] == antennate.__version__
+    assert versions["numpy"] == np.__version__
+    [row] = table(run)
+    assert (row["arm"], row["trial"], row["status"], row["time_s"]) == (
+        "open",
+        "0",
+        "timeout",
+        "1.0",
+    )
+
+
+def test_default_folders_are_numbered(capsys, tmp_path):
+    for n in (1, 2):
+        assert main(QUICK) == 0
+        assert capsys.readouterr().err.endswith(f"written to runs/tunnel-{n}\n")
+    assert sorted(p.name for p in (tmp_path / "runs").iterdir()) == ["tunnel-1", "tunnel-2"]
+
+
+def test_json_is_strict_and_keeps_its_contract(capsys, tmp_path):
+    def refuse(name):
+        raise AssertionError(f"{name} is no JSON")
+
+    assert main([*QUICK, "--arms", "open", "closed", "--json", "--out", "run"]) == 0
+    text = capsys.readouterr().out
+    assert text == (tmp_path / "run" / "result.json").read_text()
+    result = json.loads(text, parse_constant=refuse)
+    assert (result["schema"], result["command"], result["seed"]) == (1, "tunnel", 0)
+    assert result["interrupted"] is False
+    assert list(result["arms"]) == ["open", "closed"]
+    assert {
+        "trials",
+        "successes",
+        "timeouts",
+        "left",
+        "invalid",
+        "wilson95",
+        "speed_m_s",
+        "time_over_successes_s",
+        "progress_per_time_m_s",
+        "restricted_mean_time_s",
+        "restricted_mean_time_95",
+        "stuck",
+        "recovered",
+        "share",
+        "force_mean_n",
+        "force_max_n",
+    } <= result["arms"]["open"].keys()
+    assert result["arms"]["open"]["speed_m_s"] is None  # nobody gets out within a second
+    assert list(result["paired"]) == ["open-closed"]
+    assert {"trials", "only_first", "only_second", "mcnemar_p", "wilcoxon_p"} <= result["paired"][
+        "open-closed"
+    ].keys()
+
+
+@pytest.mark.parametrize("config", [TunnelConfig(), GaitStudyConfig()])
+def test_config_survives_the_round_trip(tmp_path, config):
+    path = tmp_path / "c.toml"
+    path.write_text(to_toml(config), encoding="utf-8")
+    assert read_file(path, type(config)) == config
+    assert tomllib.loads(to_toml(config)) == json.loads(config.model_dump_json())
+
+
+def test_flags_override_the_file_and_the_run_says_so(capsys, tmp_path):
+    (tmp_path / "c.toml").write_text("seed = 3\ntime_limit = 1\n[tunnel]\nturns_deg = [60.0]\n")
+    words = ["--config", "c.toml", "--seed", "4", "--out", "run", "--tunnel.mirror", "never"]
+    assert main(["tunnel", *words, "--trials", "1", "--no-figures", "--workers", "1"]) == 0
+    config = read_file(tmp_path / "run" / "config.toml", TunnelConfig)
+    assert (config.seed, config.time_limit, config.trials) == (4, 1.0, 1)
+    assert (config.tunnel.turns_deg, config.tunnel.mirror) == ((60.0,), "never")
+    assert main(["tunnel", "--config", "run/config.toml", "--out", "again", "--no-figures"]) == 0
+    for name in ("result.json", "trials.csv", "config.toml"):
+        ours, theirs = (tmp_path / run / name for run in ("run", "again"))
+        assert ours.read_bytes() == theirs.read_bytes()
+
+
+def test_overwrite_leaves_nothing_old(capsys, tmp_path):
+    assert main([*SMALL, "--out", "run"]) == 0
+    (tmp_path / "run" / "notes.txt").write_text("mine")
+    assert main([*QUICK, "--seed", "1", "--out", "run", "--overwrite"]) == 0
+    assert json.loads((tmp_path / "run" / "result.json").read_text())["seed"] == 1
+    assert not list((tmp_path / "run" / "figures").iterdir())
+    assert (tmp_path / "run" / "notes.txt").read_text() == "mine"
+
+
+def test_an_unfinished_run_is_not_overwritten(capsys, tmp_path):
+    (tmp_path / "run").mkdir()
+    (tmp_path / "run" / "trials.partial.jsonl").write_text("{}\n")
+    assert "trials.partial.jsonl" in refusal(capsys, *QUICK, "--out", "run")
+
+
+def test_one_and_two_workers_write_the_same_bytes(capsys, tmp_path):
+    for workers in ("1", "2"):
+        words = ["--trials", "2", "--time-limit", "2", "--arms", "open", "closed", "--no-figures"]
+        assert main(["tunnel", *words, "--workers", workers, "--out", workers]) == 0
+    for name in ("trials.csv", "result.json", "config.toml"):
+        assert (tmp_path / "1" / name).read_bytes() == (tmp_path / "2" / name).read_bytes()
+
+
+def test_an_invalid_trial_is_a_row_and_no_success(capsys, tmp_path, monkeypatch):
+    sound = World.step
+
+    def blow_up(self, count):
+        if self.t > 0.5:
+            self.data.qvel[:] = 1e12
+        sound(self, count)
+
+    monkeypatch.setattr(World, "step", blow_up)
+    assert main([*SMALL, "--trials", "2", "--out", "run"]) == 0
+    assert "invalid" in capsys.readouterr().out
+    arm = json.loads((tmp_path / "run" / "result.json").read_text())["arms"]["open"]
+    assert (arm["trials"], arm["invalid"], arm["successes"]) == (2, 2, 0)
+    assert arm["restricted_mean_time_s"] is None
+    rows = table(tmp_path / "run")
+    assert [row["status"] for row in rows] == ["invalid", "invalid"]
+    assert all("physics step" in row["reason"] for row in rows)
+
+
+def test_interrupted_in_the_middle_keeps_the_finished_trials(capsys, tmp_path, monkeypatch):
+    from antennate.cli.folder import RunFolder
+
+    kept = RunFolder.append
+    seen = []
+
+    def append(self, row):
+        kept(self, row)
+        seen.append(json.loads((self.path / "trials.partial.jsonl").read_text().splitlines()[-1]))
+        if len(seen) == 2:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(RunFolder, "append", append)
+    assert main([*SMALL, "--trials", "30", "--out", "run"]) == 130
+    out, err = capsys.readouterr()
+    assert "interrupted: kept 2 of 30 trials" in err
+    assert "trials" in out
+    rows = table(tmp_path / "run")
+    assert sorted(int(row["trial"]) for row in rows) == sorted(row["trial"] for row in seen)
+    assert json.loads((tmp_path / "run" / "result.json").read_text())["interrupted"] is True
+    assert not (tmp_path / "run" / "trials.partial.jsonl").exists()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("workers", ["1", "2"])
+def test_a_signal_ends_the_run_and_keeps_its_trials(tmp_path, number, workers):
+    code = (
+        "import signal, sys; from antennate.cli import main; "
+        "signal.signal(signal.SIGINT, signal.default_int_handler); sys.exit(main(sys.argv[1:]))"
+    )
+    words = ["tunnel", "--trials", "5000", "--out", "run", "--no-figures", "--workers", workers]
+    partial = tmp_path / "run" / "trials.partial.jsonl"
+    with child(code, *words, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE) as run:
+        try:
+            deadline = time.monotonic() + 60
+            while not (partial.exists() and partial.read_text().count("\n") >= 2):
+                assert time.monotonic() < deadline
+                time.sleep(0.2)
+            run.send_signal(number)
+            _, err = run.communicate(timeout=30)
+        finally:
+            run.kill()
+    assert run.returncode == 130
+    assert "Traceback" not in err
+    result = json.loads((tmp_path / "run" / "result.json").read_text())
+    assert result["interrupted"] is True
+    rows = table(tmp_path / "run")
+    assert len(rows) == sum(arm["trials"] for arm in result["arms"].values()) >= 2
+
+
+def test_gait_runs_and_writes_its_result(capsys, tmp_path):
+    words = ["gait", "--cycles", "2", "--settling-cycles", "0", "--sweep-points", "2"]
+    assert main([*words, "--workers", "1", "--out", "run"]) == 0
+    assert "lead of 200 deg" in capsys.readouterr().out
+    result = json.loads((tmp_path / "run" / "result.json").read_text())
+    assert (result["schema"], result["command"]) == (1, "gait")
+    assert list(result["maneuvers"]) == ["forward", "turn_l", "turn_r", "reverse"]
+    assert sorted(p.name for p in (tmp_path / "run" / "figures").iterdir()) == [
+        "gait.png",
+        "gait.svg",
+    ]
+
+
+def test_gait_interrupted_leaves_nothing(capsys, tmp_path, monkeypatch):
+    from antennate.experiments import gait
+
+    def interrupted(*args):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(gait, "run", interrupted)
+    assert main(["gait"]) == 130
+    assert "interrupted" in capsys.readouterr().err
+    assert not (tmp_path / "runs" / "gait-1").exists()
+
+
+def test_table_cells_cannot_become_formulas_and_numbers_stay_numbers():
+    rows = [{"name": text, "x": -1.5} for text in ("=1+1", "+1", "-1", "@a", "a\x1b[2Jb\r\n", "ok")]
+    lines = to_csv(rows).splitlines()
+    assert lines[0] == "name,x"
+    assert [line.split(",")[0] for line in lines[1:]] == [
+        "'=1+1",
+        "'+1",
+        "'-1",
+        "'@a",
+        "a [2Jb ",
+        "ok",
+    ]
+    assert all(line.endswith(",-1.5") for line in lines[1:])
+
+
+def test_strict_json_has_no_nan():
+    value = {"a": (1.0, float("nan")), "b": [float("inf"), {"c": -float("inf")}], "d": "nan"}
+    assert strict(value) == {"a": [1.0, None], "b": [None, {"c": None}], "d": "nan"}
+
+
+def test_messages_hold_no_control_characters():
+    assert one_line("a\x1b[31m\n b\x00\x9bc") == "a [31m b c"
+
+
+def test_reading_stops_at_the_limit():
+    if not Path("/dev/zero").exists():
+        pytest.skip("needs /dev/zero")
+    with pytest.raises(ConfigError, match="at most 1000000 bytes"):
+        read_file(Path("/dev/zero"), TunnelConfig)

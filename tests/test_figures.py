@@ -1,0 +1,190 @@
+"""Figures: what they show, their units, and bytes that repeat."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from antennate.anatomy import LINK_COUNT
+from antennate.controller import ARMS
+from antennate.figures import gait, style, tunnel
+from antennate.records import Maneuver
+
+LIMIT = 50.0
+WALLS = (np.array([[0.0, 0.3], [2.0, 0.3]]), np.array([[0.0, -0.3], [2.0, -0.3]]))
+
+
+@dataclass
+class Row:
+    arm: str
+    trial: int
+    status: str
+    time_s: float
+
+
+@dataclass
+class Path:
+    head: np.ndarray
+    maneuver: np.ndarray
+    walls: tuple[np.ndarray, np.ndarray]
+    cylinders: np.ndarray
+    links: np.ndarray
+
+
+def path(end: float, samples: int = 40) -> Path:
+    """A straight course along x, through all maneuvers one after the other."""
+    x = np.linspace(0.0, end, samples)
+    stood = np.array([[0.5, 0.2], [1.0, -0.2]])
+    return Path(
+        head=np.stack([x, 0.1 * np.sin(5 * x)], axis=1),
+        maneuver=np.arange(samples) * len(Maneuver) // max(samples, 1),
+        walls=WALLS,
+        cylinders=np.stack([stood, stood + 0.05]),
+        links=np.stack([end - 0.1 * np.arange(LINK_COUNT), np.zeros(LINK_COUNT)], axis=1),
+    )
+
+
+def rows() -> list[Row]:
+    verdicts = [("success", 10.0), ("success", 20.0), ("timeout", LIMIT), ("left", LIMIT)]
+    return [Row(arm, k, *verdict) for arm in ARMS for k, verdict in enumerate(verdicts)]
+
+
+def arms() -> dict[str, dict]:
+    one = {
+        "trials": 4,
+        "invalid": 0,
+        "successes": 2,
+        "wilson95": (0.15, 0.85),
+        "restricted_mean_time_s": 32.5,
+        "restricted_mean_time_95": (12.5, 50.0),
+    }
+    return dict.fromkeys(ARMS, one)
+
+
+def trajectories():
+    found = rows()
+    paths = {(row.arm, row.trial): path(2.0) for row in found}
+    paths["open", 3] = path(-40.0)  # far out of the entrance
+    return tunnel.trajectories(paths, ARMS, found, range(4), 0.07)
+
+
+def walk_result() -> dict:
+    row = {"speed_m_s": 0.2, "yaw_deg_per_cycle": 0.0}
+    return {
+        "frequency_hz": 0.5,
+        "maneuvers": {m.name.lower(): row for m in list(Maneuver)[:4]},
+        "wave_off": {"speed_m_s": 0.12},
+        "phase_sweep": [
+            {"body_phase_rad": a, "speed_m_s": 0.1 - 0.1 * np.cos(a)} for a in range(6)
+        ],
+        "chosen_body_phase_rad": -2.5,
+    }
+
+
+@dataclass
+class Walk:
+    centre: np.ndarray
+
+
+def study():
+    walks = {m.name.lower(): Walk(path(2.0 * (m + 1)).head) for m in list(Maneuver)[:4]}
+    return gait.study(walk_result(), walks)
+
+
+def summary():
+    return tunnel.summary(arms(), rows(), LIMIT)
+
+
+@pytest.mark.parametrize("draw", [trajectories, summary, study])
+def test_the_same_data_give_the_same_bytes(draw):
+    first, second = style.render(draw()), style.render(draw())
+    assert first == second
+    assert first["png"].startswith(b"\x89PNG")
+    assert b"<dc:date>" not in first["svg"]
+
+
+def test_rendering_twice_changes_nothing():
+    figure = summary()
+    assert style.render(figure) == style.render(figure)
+
+
+def test_rendering_leaves_the_users_settings_alone():
+    import matplotlib as mpl
+
+    before = dict(mpl.rcParams)
+    style.render(summary())
+    assert dict(mpl.rcParams) == before
+
+
+def test_axes_have_units():
+    labels = [axis.get_xlabel() for axis in summary().axes] + [summary().axes[1].get_ylabel()]
+    labels += [
+        f(axis) for axis in study().axes for f in (type(axis).get_xlabel, type(axis).get_ylabel)
+    ]
+    panels = trajectories().axes
+    labels += [panels[-1].get_xlabel(), panels[0].get_ylabel()]
+    assert all(label.endswith(("[m]", "[s]", "[%]", "[m/s]", "[deg]")) for label in labels), labels
+
+
+def test_trajectories_are_a_grid_with_the_verdict_of_each_trial():
+    figure = trajectories()
+    titles = [panel.get_title(loc="left") for panel in figure.axes]
+    assert len(titles) == len(ARMS) * 4
+    assert titles[:4] == [
+        "trial 0: out after 10.0 s",
+        "trial 1: out after 20.0 s",
+        "trial 2: out of time, 50 s",
+        "trial 3: left by the entrance",
+    ]
+    assert len(figure.legends) == 1
+
+
+def test_robots_far_outside_do_not_stretch_the_panels():
+    style.render(figure := trajectories())
+    for panel in figure.axes:
+        assert panel.get_xlim() == pytest.approx((-0.3, 2.3))
+        assert panel.get_ylim() == pytest.approx((-0.6, 0.6))
+        assert panel.get_aspect() == 1.0
+
+
+def test_every_maneuver_has_its_own_colour_on_the_course():
+    panel = trajectories().axes[0]
+    drawn = {line.get_color() for line in panel.lines}
+    assert set(style.MANEUVER_COLOURS.values()) <= drawn
+    assert len(set(style.MANEUVER_COLOURS.values())) == len(Maneuver)
+    assert set(ARMS) == set(style.ARM_COLOURS) == set(style.ARM_LINES)
+
+
+def test_trials_without_a_course_leave_an_empty_panel():
+    nothing = Path(
+        np.zeros((0, 2)), np.zeros(0), WALLS, np.zeros((2, 0, 2)), np.full((6, 2), np.nan)
+    )
+    figure = tunnel.trajectories(
+        {("open", 0): nothing}, ("open",), [Row("open", 0, "invalid", LIMIT)], range(2), 0.07
+    )
+    style.render(figure)
+    assert [p.get_title(loc="left") for p in figure.axes] == [
+        "trial 0: invalid",
+        "trial 1: not run",
+    ]
+
+
+def test_curve_drops_at_exits_and_failures_stay():
+    curve = summary().axes[1].lines[0]
+    x, y = curve.get_data()
+    assert list(x) == [0.0, 10.0, 20.0, LIMIT]
+    assert list(y) == [1.0, 0.75, 0.5, 0.5]
+    assert curve.get_drawstyle() == "steps-post"
+
+
+def test_an_arm_without_a_valid_trial_is_left_blank():
+    empty = {**arms()["open"], "invalid": 4, "successes": 0, "restricted_mean_time_s": None}
+    figure = tunnel.summary({"open": empty}, [Row("open", 0, "invalid", LIMIT)], LIMIT)
+    style.render(figure)
+    assert figure.axes[0].get_yticklabels()[0].get_text() == "open\nn = 0"
+
+
+def test_the_chosen_lead_is_marked_within_one_turn():
+    marked = study().axes[0].lines[2]
+    assert list(marked.get_xdata()) == pytest.approx([np.degrees(-2.5) + 360.0])
+    assert list(marked.get_ydata()) == [0.2]
