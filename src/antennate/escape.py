@@ -1,13 +1,12 @@
 """What to do when stuck: back off, turn to one side, and to the other if that fails.
 
-The first turn goes away from the side that was touched more while walking, before it got stuck: what
-it feels since then says little about where the passage goes on. If the robot is stuck again soon
-after, it turns the other way and twice as far, so that it now points as far to that side
-of its first course as it had pointed to this one: alternating like this, it searches both sides.
+The first turn goes away from the side that was touched more while walking, before it got stuck:
+what it feels since then says little about where the passage goes on. If the robot is stuck again
+soon after, it turns the other way and twice as far, so that it now points as far to that side of
+its first course as it had pointed to this one: alternating like this, it searches both sides.
 
 A wrong turn can still lead back out of a passage. Whoever has turned and then touches nothing at
-all
-for a while has lost the walls: the robot turns round, back to where it last felt them.
+all for a while has lost the walls: the robot turns round, back to where it last felt them.
 """
 
 from __future__ import annotations
@@ -75,12 +74,13 @@ class Escape:
         self._until = np.where(rows, until, self._until)
 
     def _remember(self) -> Floats:
-        """Keep the memory of touch, and return what it was memory_delay ago."""
+        """Keep the memory of touch; return it as it was memory_delay ago, or as it is if younger."""
         at = self._ticks % len(self._past)
         self._ticks += 1
         before = self._past[at].copy()
         self._past[at] = self.touch
-        return before
+        young = (before == 0.0).all(axis=1, keepdims=True)
+        return np.where(young, self.touch, before)
 
     def _back_off(self, rows: Bools, touch: Floats, t: Floats) -> None:
         params = self._params
@@ -93,7 +93,7 @@ class Escape:
         self._to(rows, int(Maneuver.REVERSE), t + params.reverse_time)
 
     def _turn(self, rows: Bools, t: Floats) -> None:
-        until = t + self._params.turn_time * np.where(self._again, 2.0, 1.0)
+        until = t + self._params.turn_time * np.where(self._again, self._params.second_turn, 1.0)
         self._to(rows, _turn_to(self._right), until)
         self._ended = np.where(rows, until, self._ended)
         self._turned |= rows

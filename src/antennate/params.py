@@ -726,6 +726,14 @@ class EscapeParams(Params):
         "assumed: searching both sides",
         "whether a second turn goes the other way and twice as far",
     )
+    second_turn: float = number(
+        2.0,
+        "1",
+        "assumed: once back to the first course and once beyond it",
+        "length of a turn the other way, in first turns",
+        gt=0,
+        le=5,
+    )
     retry_time: float = number(
         12.0,
         "s",

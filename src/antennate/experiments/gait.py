@@ -34,7 +34,7 @@ class GaitStudyConfig(Params):
     cycles: int = number(
         4,
         "1",
-        "measured: antennate gait, eight cycles give the same speed to 0.3 %",
+        "measured: antennate gait, six cycles give the same speeds to 0.3 %",
         "gait cycles measured",
         ge=2,
         le=100,
@@ -42,7 +42,7 @@ class GaitStudyConfig(Params):
     settling_cycles: int = number(
         2,
         "1",
-        "measured: antennate gait, the speed then changes by under 1 % from cycle to cycle",
+        "measured: antennate gait, speeds then change by 1 % from cycle to cycle",
         "gait cycles before measuring",
         ge=0,
         le=100,

@@ -23,8 +23,8 @@ STUCK_GAIN = 0.02
 """Gain of progress that counts as getting on [m]."""
 STUCK_TIME = 5.0
 """Time without such a gain after which the robot is stuck [s]."""
-LEFT_BEHIND = -0.8
-"""Progress at which the robot has left through the entrance [m]: its length and more behind it."""
+LEFT_BEHIND = 0.8
+"""Distance behind the entrance at which the robot has left [m]: its length and more."""
 _EVERY = 10
 """Ticks between two looks: 10 Hz at the usual rate."""
 
@@ -34,7 +34,8 @@ class TrialResult:
     """One row of the table.
 
     Attributes:
-        status: success (the head passed the exit), timeout, left (through the entrance) or invalid.
+        status: success (the head passed the exit), timeout, left (out through the entrance) or
+            invalid.
         time_s: Time to exit [s]; the limit for every failure.
         progress_m: Where the head ended, along the centre line, within [0, length] [m].
         stuck: Episodes of being stuck; `recovered` of them ended by getting on.
@@ -116,9 +117,16 @@ class Judge:
         self._note_progress(progress, t)
         if progress >= self.tunnel.params.length:
             return "success"
-        if progress <= LEFT_BEHIND:
+        if self._has_left(np.array([x, y]), progress):
             return "left"
         return "timeout" if t >= self.time_limit else None
+
+    def _has_left(self, head: Floats, progress: float) -> bool:
+        """Far behind the entrance, or beside the tunnel; so nobody reaches the exit from outside."""
+        if progress < 0.0:
+            return float(np.hypot(*head)) >= LEFT_BEHIND
+        left, right = self.tunnel.walls
+        return not geometry.contains(np.concatenate([left, right[::-1]]), head)
 
     def _note_progress(self, progress: float, t: float) -> None:
         if progress > self._best + STUCK_GAIN:

@@ -70,7 +70,7 @@ def resample(points: Floats, spacing: Floats) -> Floats:
 
 
 def progress(points: Floats, where: Floats) -> float:
-    """Arc length of the centre line's nearest point [m]; the line goes on straight past its ends."""
+    """Arc length of the centre line's nearest point [m]; it goes on straight past its ends."""
     best, best_distance, done = 0.0, math.inf, 0.0
     last = len(points) - 2
     for i in range(len(points) - 1):
@@ -86,3 +86,13 @@ def progress(points: Floats, where: Floats) -> float:
             best, best_distance = done + s, distance
         done += length
     return best
+
+
+def contains(polygon: Floats, where: Floats) -> bool:
+    """Whether a point lies inside a closed polygon of corners (n, 2), by counting crossings."""
+    x, y = float(where[0]), float(where[1])
+    start, end = polygon, np.roll(polygon, -1, axis=0)
+    across = (start[:, 1] > y) != (end[:, 1] > y)
+    rise = np.where(across, end[:, 1] - start[:, 1], 1.0)
+    at = start[:, 0] + (y - start[:, 1]) / rise * (end[:, 0] - start[:, 0])
+    return bool((across & (x < at)).sum() % 2)

@@ -11,6 +11,7 @@ import multiprocessing
 import os
 import queue
 import signal
+import threading
 from collections.abc import Callable, Sequence
 from multiprocessing.process import BaseProcess
 from typing import Any, TypeVar
@@ -64,9 +65,8 @@ def run_tasks(
         context.Process(target=_work, args=(function, todo, done), daemon=True)
         for _ in range(count)
     ]
-    for process in crew:
-        process.start()
     try:
+        _start(crew)
         _collect(crew, done, on_result)
     except KeyboardInterrupt:
         while not done.empty():
@@ -76,7 +76,23 @@ def run_tasks(
         raise
     finally:
         for process in crew:
-            process.terminate()
+            if process.pid is not None:
+                process.terminate()
+        todo.cancel_join_thread()
+
+
+def _start(crew: list[BaseProcess]) -> None:
+    """Start all workers deaf to Ctrl-C, which they inherit, so that none dies half begun."""
+    if threading.current_thread() is not threading.main_thread():
+        for process in crew:
+            process.start()
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        for process in crew:
+            process.start()
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def _work(function: Callable[[Any, Emit], None], todo: Any, done: Any) -> None:
