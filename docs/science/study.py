@@ -1,8 +1,8 @@
 """Everything that docs/science/tunnel.md reports, run again: `python docs/science/study.py PART`.
 
 Parts: `evaluation` (three arms, 100 fresh trials each), `ablation` (one change at a time) and `map`
-(success over corner angle and corridor width). Each writes docs/science/PART.json; the figures of the
-map are drawn from it. Results do not depend on the number of workers.
+(success over corner angle and corridor width). Each writes docs/science/PART.json; the figures of
+the map are drawn from it. Results do not depend on the number of workers.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from typing import Any
 
 from antennate.experiments.tunnel import TunnelConfig, run
 from antennate.figures.map import success_map
+from antennate.figures.style import render
 from antennate.trials.pool import core_count
 
 HERE = Path(__file__).parent
@@ -93,8 +94,8 @@ def main() -> None:
     result = function(options.trials or usual, options.workers)
     (HERE / f"{options.part}.json").write_text(json.dumps(result, indent=1) + "\n")
     if options.part == "map":
-        figure = success_map(result["cells"], ("open", "closed"))
-        figure.savefig(HERE / "map.svg")
+        files = render(success_map(result["cells"], ("open", "closed")))
+        (HERE / "map.png").write_bytes(files["png"])
 
 
 if __name__ == "__main__":

@@ -23,7 +23,9 @@ def bending_level(params: ConditioningParams, counts: Floats) -> Floats:
         b in [0, 1], same shape.
     """
     x = (counts - params.counts_low) / (params.counts_high - params.counts_low)
-    z = np.clip(params.polarity * params.slope * (x - params.midpoint), -700.0, 700.0)
+    z = np.minimum(
+        np.maximum(params.polarity * params.slope * (x - params.midpoint), -700.0), 700.0
+    )
     return 1.0 / (1.0 + np.exp(-z))
 
 

@@ -7,6 +7,9 @@ import numpy as np
 from antennate.params import RuleParams
 from antennate.records import Bools, Contact, Floats, Ints
 
+_FREE, _CONTACT, _UNKNOWN = int(Contact.FREE), int(Contact.CONTACT), int(Contact.UNKNOWN)
+"""As plain integers: comparing an array with an enum costs four times as much."""
+
 
 def classify(params: RuleParams, b: Floats, before: Ints) -> Ints:
     """Contact of each side.
@@ -19,10 +22,10 @@ def classify(params: RuleParams, b: Floats, before: Ints) -> Ints:
     Returns:
         One `Contact` a side, shape (B, 2).
     """
-    touching = before == Contact.CONTACT
+    touching = before == _CONTACT
     bound = params.threshold - params.hysteresis * touching
-    state = np.where(b >= bound, int(Contact.CONTACT), int(Contact.FREE))
-    return np.where(np.isnan(b), int(Contact.UNKNOWN), state)
+    state = np.where(b >= bound, _CONTACT, _FREE)
+    return np.where(np.isnan(b), _UNKNOWN, state)
 
 
 class ContactState:

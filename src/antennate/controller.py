@@ -85,7 +85,7 @@ class _ClosedRule:
         self._escape.reset(rows)
 
     def step(self, t: Floats, b: Floats, contact: Ints, bend: Floats) -> Ints:
-        walking = (self._escape.maneuver == Maneuver.FORWARD) & ~np.isnan(b).any(axis=1)
+        walking = (self._escape.maneuver == int(Maneuver.FORWARD)) & ~np.isnan(b).any(axis=1)
         stuck = self._detector.step(bend, walking)
         if self._params.escape.trigger == "contact":
             stuck = decide(self._params.rule, contact, b) == Maneuver.REVERSE

@@ -57,16 +57,21 @@ class Escape:
             One `Maneuver` a row, shape (B,).
         """
         known = ~np.isnan(b).any(axis=1)
-        walking = known & (self.maneuver == Maneuver.FORWARD)
+        walking = known & (self.maneuver == int(Maneuver.FORWARD))
         self.touch += np.where(walking[:, None], b - self.touch, 0.0) * self._memory_gain
         before = self._remember()
         self._felt = np.where(walking & ~pressed, self._felt, t)
         over = known & ~walking & (t >= self._until)
-        backed = over & (self.maneuver == Maneuver.REVERSE)
-        self._to(over & ~backed, int(Maneuver.FORWARD), t)
-        self._turn(backed, t)
-        self._back_off(walking & stuck, before, t)
-        self._return(walking & self._turned & (t - self._felt > self._params.lost_time), t)
+        if over.any():
+            backed = over & (self.maneuver == int(Maneuver.REVERSE))
+            self._to(over & ~backed, int(Maneuver.FORWARD), t)
+            self._turn(backed, t)
+        stuck = walking & stuck
+        if stuck.any():
+            self._back_off(stuck, before, t)
+        lost = walking & self._turned & (t - self._felt > self._params.lost_time)
+        if lost.any():
+            self._return(lost, t)
         return np.where(known, self.maneuver, int(Maneuver.HOLD))
 
     def _to(self, rows: Bools, maneuver: Ints | int, until: Floats) -> None:
@@ -74,7 +79,7 @@ class Escape:
         self._until = np.where(rows, until, self._until)
 
     def _remember(self) -> Floats:
-        """Keep the memory of touch; return it as it was memory_delay ago, or as it is if younger."""
+        """Keep the memory of touch; return that of memory_delay ago, if it reaches so far."""
         at = self._ticks % len(self._past)
         self._ticks += 1
         before = self._past[at].copy()

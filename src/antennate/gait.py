@@ -13,17 +13,29 @@ the front one, so the head points right of the tail.
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 
 import numpy as np
 
 from antennate.anatomy import LINK_COUNT, YAW_COUNT
 from antennate.params import GaitParams
-from antennate.records import Bools, Floats, Ints, Maneuver, Pose
+from antennate.records import Bools, Floats, Ints, Pose
 
 _DIRECTION = np.array([1.0, 1.0, 1.0, -1.0, 0.0])
 """Sense in which the phase runs in each maneuver: REVERSE runs body and legs backwards."""
 _STEER = np.array([0.0, -1.0, 1.0, 0.0, 0.0])
 """Sign of the yaw offset in each maneuver."""
+_STEERS = np.array([1.0, 1.0, 1.0, 1.0, 0.0])
+"""Whether the offset moves in each maneuver."""
+_SIDES = np.array([0.0, math.pi])
+
+
+@lru_cache
+def _lags(wave_number: float, body_phase: float) -> tuple[Floats, Floats]:
+    """Phase of each yaw joint and lag of each link [rad], shapes (5,) and (6,)."""
+    lag = 2.0 * math.pi * wave_number
+    joints = lag * np.arange(1, YAW_COUNT + 1) / YAW_COUNT + body_phase
+    return joints, lag * np.arange(LINK_COUNT) / LINK_COUNT
 
 
 def targets(params: GaitParams, phase: Floats, offset: Floats) -> Pose:
@@ -37,11 +49,9 @@ def targets(params: GaitParams, phase: Floats, offset: Floats) -> Pose:
     Returns:
         The pose, antenna bases at their mounting angle.
     """
-    lag = 2.0 * math.pi * params.wave_number
-    joints = lag * np.arange(1, YAW_COUNT + 1) / YAW_COUNT + params.body_phase
+    joints, links = _lags(params.wave_number, params.body_phase)
     yaw = params.amplitude * np.sin(joints - phase[:, None]) + offset[:, None]
-    links = lag * np.arange(LINK_COUNT) / LINK_COUNT
-    leg = (phase[:, None] - links)[:, :, None] + np.array([0.0, math.pi])
+    leg = (phase[:, None] - links)[:, :, None] + _SIDES
     return Pose(yaw=yaw, leg=leg, antenna=np.zeros((phase.shape[0], 2)))
 
 
@@ -68,7 +78,8 @@ class Gait:
             turn_offset: Yaw offset of the turns [rad], the gait's own if absent.
         """
         size = self.params.turn_offset if turn_offset is None else turn_offset
-        change = np.clip(_STEER[maneuver] * size - self.offset, -self._slew, self._slew)
-        self.offset += np.where(maneuver == Maneuver.HOLD, 0.0, change)
+        change = _STEER[maneuver] * size - self.offset
+        change = np.minimum(np.maximum(change, -self._slew), self._slew)
+        self.offset += change * _STEERS[maneuver]
         self.phase += _DIRECTION[maneuver] * self._advance
         return targets(self.params, self.phase, self.offset)

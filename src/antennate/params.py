@@ -369,7 +369,7 @@ class GaitParams(Params):
     turn_offset: float = number(
         math.radians(20.0),
         "rad",
-        "assumed: unpublished; about 36 deg of yaw a cycle",
+        "assumed: unpublished; antennate gait measures 66 deg of yaw a cycle",
         "yaw offset while turning",
         ge=0,
         le=1.0,
@@ -701,10 +701,20 @@ class EscapeParams(Params):
         "what counts as stuck: repeated readings, or the paper's both strong and similar",
     )
     reverse_time: float = number(
-        1.8, "s", "assumed: a third of the body length or more", "time to back off", gt=0, le=30
+        2.2,
+        "s",
+        "fitted: study of the closed arm on 60 tuning tunnels; two thirds of the body length",
+        "time to back off",
+        gt=0,
+        le=30,
     )
     turn_time: float = number(
-        2.2, "s", "assumed: about 75 deg at the offset below", "time of the first turn", gt=0, le=30
+        1.3,
+        "s",
+        "fitted: study of the closed arm on 60 tuning tunnels; about 60 deg at the offset below",
+        "time of the first turn",
+        gt=0,
+        le=30,
     )
     turn_offset: float = number(
         0.52,
@@ -763,7 +773,7 @@ class EscapeParams(Params):
         le=3600,
     )
     return_time: float = number(
-        5.0, "s", "assumed: about 180 deg at the offset above", "time to turn round", gt=0, le=60
+        3.8, "s", "assumed: about 180 deg at the offset above", "time to turn round", gt=0, le=60
     )
 
 

@@ -50,13 +50,16 @@ class RepetitionDetector:
             Rows that walk, are pressed, and whose readings repeat, shape (B,). Only samples taken
             while walking are compared, so nothing repeats before a cycle and a window are over.
         """
-        sample = np.nan_to_num(deflection)
+        sample = np.where(np.isnan(deflection), 0.0, deflection)
         in_cycle, in_window = self._ticks % len(self._last), self._ticks % len(self._change)
         self._change[in_window] = np.abs(sample - self._last[in_cycle])
         self._press[in_window] = np.abs(sample)
         self._last[in_cycle] = sample
         self._ticks += 1
         self._walked = np.where(walking, self._walked + 1, 0)
-        repeats = (self._change.mean(axis=0) < self._params.change).all(axis=1)
-        pressed = (self._press.mean(axis=0) > self._params.pressure).any(axis=1)
-        return (self._walked >= self._needed) & repeats & pressed
+        ready = self._walked >= self._needed
+        if not ready.any():
+            return ready
+        repeats = self._change.mean(axis=0).max(axis=1) < self._params.change
+        pressed = self._press.mean(axis=0).max(axis=1) > self._params.pressure
+        return ready & repeats & pressed

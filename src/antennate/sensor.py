@@ -25,4 +25,4 @@ def voltage(params: SensorParams, flex: Floats) -> Floats:
 def counts(params: SensorParams, flex: Floats, noise: Floats | float = 0.0) -> Floats:
     """ADC reading [counts] for flex [rad]; noise [counts] is added before rounding and clipping."""
     exact = (voltage(params, flex) - params.adc_offset) / params.adc_gain
-    return np.clip(np.rint(exact + noise), 0, FULL_SCALE)
+    return np.minimum(np.maximum(np.rint(exact + noise), 0.0), FULL_SCALE)

@@ -122,7 +122,7 @@ class Judge:
         return "timeout" if t >= self.time_limit else None
 
     def _has_left(self, head: Floats, progress: float) -> bool:
-        """Far behind the entrance, or beside the tunnel; so nobody reaches the exit from outside."""
+        """Far behind the entrance, or beside the tunnel: nobody reaches the exit from outside."""
         if progress < 0.0:
             return float(np.hypot(*head)) >= LEFT_BEHIND
         left, right = self.tunnel.walls

@@ -107,6 +107,9 @@ class World:
         owner = model.body_rootid[model.geom_bodyid]
         self._robot = owner == model.body(PREFIX + LINKS[0]).id
         self._steps = 0
+        data = self.data
+        self._qpos, self._qvel, self._ctrl = data.qpos, data.qvel, data.ctrl
+        self._warnings = data.warning.number
 
     def _addresses(self, joints: list[str]) -> Ints:
         return np.array([self.model.joint(n).qposadr[0] for n in joints])
@@ -137,7 +140,7 @@ class World:
                 self._steps,
                 f"target of actuator {self.model.actuator(self._drive[bad]).name} is {drive[bad]}",
             )
-        self.data.ctrl[self._drive] = drive
+        self._ctrl[self._drive] = drive
 
     def step(self, count: int) -> None:
         """Advance by `count` physics steps.
@@ -154,6 +157,22 @@ class World:
         self._check(before)
 
     def _check(self, before: float) -> None:
+        x, y, height = self.head.tolist()
+        bent, speed = self._qpos[self._bounded], self._qvel
+        sound = (
+            abs(x) < _DISTANCE_LIMIT
+            and abs(y) < _DISTANCE_LIMIT
+            and 0.0 < height < _HEIGHT_LIMIT
+            and self.data.time > before
+            and bent.dot(bent) < _ANGLE_LIMIT**2  # no entry is larger than the norm
+            and speed.dot(speed) < _SPEED_LIMIT**2
+            and not self._warnings.any()
+        )
+        if not sound:
+            self._explain(before)
+
+    def _explain(self, before: float) -> None:
+        """Look closely at a state that may be unsound."""
         data = self.data
         speed = float(abs(data.qvel).max())
         height = float(self.head[2])
@@ -175,12 +194,12 @@ class World:
 
     def flex(self) -> Floats:
         """Summed hinge angles under each film [rad], shape (2,); positive towards the tail."""
-        return self.data.qpos[self._flex].sum(axis=1)
+        return self._qpos[self._flex].sum(axis=1)
 
     @property
     def head(self) -> Floats:
         """Position of the head link [m], shape (3,), a view of the state."""
-        return self.data.qpos[self._root : self._root + 3]
+        return self._qpos[self._root : self._root + 3]
 
     @property
     def heading(self) -> float:
