@@ -89,7 +89,7 @@ class _ClosedRule:
         stuck = self._detector.step(bend, walking)
         if self._params.escape.trigger == "contact":
             stuck = decide(self._params.rule, contact, b) == Maneuver.REVERSE
-        pressed = (bend > self._params.repetition.pressure).any(axis=1)
+        pressed: Bools = np.any(bend > self._params.repetition.pressure, axis=1)
         return self._escape.step(t, b, stuck, pressed)
 
 

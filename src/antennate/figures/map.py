@@ -6,6 +6,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
 from antennate.figures.style import INK, canvas, styled
@@ -24,7 +26,7 @@ def success_map(cells: Sequence[Mapping[str, Any]], arms: Sequence[str]) -> Figu
     widths = sorted({cell["free_width_m"] for cell in cells})
     figure = canvas(1.4 + 3.4 * len(arms), 1.2 + 0.75 * len(angles))
     axes = np.atleast_1d(np.array(figure.subplots(1, len(arms), sharey=True)))
-    image = None
+    scale = ScalarMappable(Normalize(0.0, 1.0), "cividis")
     for panel, arm in zip(axes, arms, strict=True):
         share = np.full((len(angles), len(widths)), np.nan)
         for cell in cells:
@@ -41,12 +43,12 @@ def success_map(cells: Sequence[Mapping[str, Any]], arms: Sequence[str]) -> Figu
                 fontsize=8,
                 color="white" if share[row, column] < 0.6 else INK,
             )
-        image = panel.imshow(share, origin="lower", vmin=0, vmax=1, cmap="cividis", aspect="auto")
+        panel.imshow(share, origin="lower", norm=scale.norm, cmap=scale.cmap, aspect="auto")
         panel.set_title(arm)
         panel.grid(visible=False)
         panel.set_xticks(range(len(widths)), [f"{w:.2f}" for w in widths])
         panel.set_yticks(range(len(angles)), [f"{a:.0f}" for a in angles])
         panel.set_xlabel("free width [m]")
     axes[0].set_ylabel("corner angle [deg]")
-    figure.colorbar(image, ax=list(axes), label="share of successes", shrink=0.9)
+    figure.colorbar(scale, ax=list(axes), label="share of successes", shrink=0.9)
     return figure
