@@ -105,6 +105,11 @@ def show_result(result: Mapping[str, Any]) -> None:
         )
 
 
+def _of_both(pair: Any, which: int) -> str:
+    times = pair["both_time_s"]
+    return number(times[which] if times else None, ".1f")
+
+
 def _share(name: str) -> Cell:
     def cell(arm: Mapping[str, Any]) -> str:
         share = arm["share"][name]
@@ -140,6 +145,9 @@ _PAIR_ROWS: list[tuple[str, Cell]] = [
     ("trials valid in both", lambda pair: str(pair["trials"])),
     ("only the first succeeded", lambda pair: str(pair["only_first"])),
     ("only the second", lambda pair: str(pair["only_second"])),
+    ("both succeeded", lambda pair: str(pair["both"])),
+    ("  time of the first there [s]", lambda pair: _of_both(pair, 0)),
+    ("  time of the second there [s]", lambda pair: _of_both(pair, 1)),
     ("McNemar p", lambda pair: number(pair["mcnemar_p"], ".3g")),
     ("time, first - second [s]", lambda pair: number(pair["time_difference_s"], "+.1f")),
     ("  95 % [s]", lambda pair: span(pair["time_difference_95"], "+.1f")),

@@ -37,6 +37,8 @@ class PairedTest:
         mcnemar_p: Exact two-sided McNemar test on those.
         time_difference_s: Mean of restricted time, first minus second [s], with its 95 % interval.
         wilcoxon_p: Two-sided signed-rank test on restricted times.
+        both: Seeds on which both succeeded; `both_time_s` are the mean times of the first and the
+            second arm on those [s], None without any.
     """
 
     only_first: int
@@ -45,6 +47,8 @@ class PairedTest:
     time_difference_s: float
     time_difference_95: tuple[float, float]
     wilcoxon_p: float
+    both: int
+    both_time_s: tuple[float, float] | None
 
 
 def compare(first_ok: Bools, second_ok: Bools, first_t: Floats, second_t: Floats) -> PairedTest:
@@ -59,4 +63,8 @@ def compare(first_ok: Bools, second_ok: Bools, first_t: Floats, second_t: Floats
     if np.any(difference != 0):
         test = stats.wilcoxon(difference, zero_method="zsplit", method="asymptotic")
         rank = float(np.asarray(test)[1])
-    return PairedTest(only_first, only_second, mcnemar, mean, (low, high), rank)
+    both = first_ok & second_ok
+    times = (float(first_t[both].mean()), float(second_t[both].mean())) if both.any() else None
+    return PairedTest(
+        only_first, only_second, mcnemar, mean, (low, high), rank, int(both.sum()), times
+    )

@@ -1,0 +1,42 @@
+"""Tasks over processes: all results, whatever the workers, and a clear word when one dies."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from antennate.errors import WorkerError
+from antennate.trials.pool import core_count, run_tasks
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_every_result_arrives_once(workers: int) -> None:
+    found: list[int] = []
+    run_tasks(divmod_task, [(7, 2), (9, 4), (5, 5)], workers, found.append)
+    assert sorted(found) == [0, 1, 1, 1, 2, 3]
+
+
+def test_a_failing_task_is_named() -> None:
+    with pytest.raises(WorkerError, match="ZeroDivisionError"):
+        run_tasks(divmod_task, [(1, 0), (2, 0)], 2, lambda result: None)
+
+
+def test_a_worker_that_dies_is_noticed() -> None:
+    with pytest.raises(WorkerError, match="ended with code 3"):
+        run_tasks(die, [1, 2], 2, lambda result: None)
+
+
+def test_there_is_at_least_one_core() -> None:
+    assert core_count() >= 1
+
+
+def divmod_task(task: tuple[int, int], emit: Callable[[Any], None]) -> None:
+    for part in divmod(*task):
+        emit(part)
+
+
+def die(task: int, emit: Callable[[Any], None]) -> None:
+    os._exit(3)

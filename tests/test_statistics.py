@@ -1,0 +1,45 @@
+"""Intervals and paired tests against published figures and hand counts."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from antennate.trials import statistics
+
+
+@pytest.mark.parametrize(
+    ("successes", "trials", "low", "high"), [(10, 10, 0.72, 1.0), (6, 10, 0.31, 0.83)]
+)
+def test_wilson_intervals_of_the_papers_counts(
+    successes: int, trials: int, low: float, high: float
+) -> None:
+    assert statistics.wilson95(successes, trials) == pytest.approx((low, high), abs=0.005)
+
+
+def test_no_trials_say_nothing() -> None:
+    assert statistics.wilson95(0, 0) == (0.0, 1.0)
+    assert all(np.isnan(statistics.mean95(np.array([]))))
+
+
+def test_a_bootstrap_interval_is_about_two_standard_errors_wide() -> None:
+    values = np.random.default_rng(1).normal(5.0, 2.0, 400)
+    mean, low, high = statistics.mean95(values)
+    assert mean == pytest.approx(values.mean())
+    assert high - low == pytest.approx(2 * 1.96 * values.std() / 20, rel=0.1)
+
+
+def test_mcnemar_counts_the_trials_on_which_the_arms_differ() -> None:
+    first = np.array([True] * 6 + [False] * 4)
+    second = np.array([True] * 10)
+    found = statistics.compare(first, second, np.where(first, 10.0, 100.0), np.full(10, 20.0))
+    assert (found.only_first, found.only_second, found.both) == (0, 4, 6)
+    assert found.mcnemar_p == pytest.approx(2 * 0.5**4)
+    assert found.both_time_s == (10.0, 20.0)
+    assert found.time_difference_s == pytest.approx((6 * -10 + 4 * 80) / 10)
+
+
+def test_equal_arms_do_not_differ() -> None:
+    same = np.array([True, False])
+    found = statistics.compare(same, same, np.array([5.0, 9.0]), np.array([5.0, 9.0]))
+    assert (found.mcnemar_p, found.wilcoxon_p, found.time_difference_s) == (1.0, 1.0, 0.0)
