@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable
-from typing import Any
-
 import pytest
+from pool_tasks import die, divmod_task
 
 from antennate.errors import WorkerError
 from antennate.trials.pool import core_count, run_tasks
@@ -31,12 +28,3 @@ def test_a_worker_that_dies_is_noticed() -> None:
 
 def test_there_is_at_least_one_core() -> None:
     assert core_count() >= 1
-
-
-def divmod_task(task: tuple[int, int], emit: Callable[[Any], None]) -> None:
-    for part in divmod(*task):
-        emit(part)
-
-
-def die(task: int, emit: Callable[[Any], None]) -> None:
-    os._exit(3)
