@@ -24,7 +24,10 @@ SOURCES = ("paper", "datasheet", "measured", "fitted", "assumed")
 
 
 def groups() -> list[type[Params]]:
-    return sorted(Params.__subclasses__(), key=lambda cls: cls.__name__)
+    found = list(Params.__subclasses__())
+    for cls in found:
+        found.extend(cls.__subclasses__())
+    return sorted(found, key=lambda cls: cls.__name__)
 
 
 def is_group(annotation: object) -> bool:

@@ -6,6 +6,7 @@ answered with one line on stderr. What a command needs is imported when it runs.
 
 from __future__ import annotations
 
+import importlib
 import os
 import sys
 from collections.abc import Sequence
@@ -53,16 +54,10 @@ def _run(command: str, argv: list[str]) -> int:
     name = "antennate"
     try:
         if command not in COMMANDS:
-            known = " or ".join(COMMANDS) + nearest(command, COMMANDS)
-            raise BadInputError(f"expected a command, {known}, found {command}")
+            known = ", ".join(COMMANDS) + nearest(command, COMMANDS)
+            raise BadInputError(f"expected a command ({known}), found {command}")
         name = f"antennate {command}"
-        if command == "tunnel":
-            from antennate.cli import tunnel
-
-            return tunnel.command(argv)
-        from antennate.cli import gait
-
-        return gait.command(argv)
+        return importlib.import_module(f"antennate.cli.{command}").command(argv)
     except AntennateError as error:
         sys.stderr.write(f"{name}: error: {one_line(str(error))}\n")
         return BAD_INPUT

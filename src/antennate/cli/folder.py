@@ -25,6 +25,7 @@ from types import TracebackType
 from typing import IO, Any
 
 from antennate import __version__
+from antennate.cli import COMMANDS
 from antennate.cli.toml import to_toml
 from antennate.errors import OutputError
 from antennate.params import Params
@@ -33,7 +34,7 @@ RESULT, TABLE, PARTIAL = "result.json", "trials.csv", "trials.partial.jsonl"
 CONFIG, VERSIONS, COMMAND = "config.toml", "versions.json", "command.txt"
 DRAWINGS = tuple(
     f"figures/{name}.{suffix}"
-    for name in ("trajectories", "summary", "gait")
+    for name in ("trajectories", "summary", *COMMANDS)
     for suffix in ("svg", "png")
 )
 _NAMES = (RESULT, PARTIAL, TABLE, CONFIG, VERSIONS, COMMAND, *DRAWINGS)

@@ -3,54 +3,19 @@
 from __future__ import annotations
 
 import math
-import sys
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
 
-from antennate.cli import OK
-from antennate.cli.arguments import parse
-from antennate.cli.folder import RunFolder, to_json
-from antennate.cli.progress import progress, terminate_as_interrupt
+from antennate.cli.study import Study
 from antennate.cli.tables import Cell, number, show
 from antennate.experiments import gait
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 DESCRIPTION = """\
 Walk on a flat floor: each of the four maneuvers, the legs without the body wave, and FORWARD once
 for every lead of the body wave over the legs."""
-
-
-def command(argv: Sequence[str]) -> int:
-    """Run the command and return its exit code.
-
-    Raises:
-        BadInputError: Something given cannot be used.
-        SimulationError: The physics became invalid.
-        WorkerError: A worker died.
-    """
-    config, options = parse("gait", DESCRIPTION, gait.GaitStudyConfig, argv)
-    with RunFolder.open("gait", options.out, options.overwrite) as folder:
-        folder.describe("gait", argv, config)
-        with progress("walks") as step, terminate_as_interrupt():
-            outcome = gait.run(config, options.worker_count, step)
-        result = outcome.result()
-        folder.finish(result, [])
-        if options.json:
-            sys.stdout.write(to_json(result))
-        else:
-            show_result(result)
-        if not options.no_figures:
-            _draw(outcome, folder)
-        sys.stderr.write(f"written to {folder.path}\n")
-    return OK
-
-
-def _draw(outcome: gait.GaitOutcome, folder: RunFolder) -> None:
-    from antennate.figures import style
-    from antennate.figures.gait import study
-
-    figure = study(outcome.result(), outcome.maneuvers)
-    for suffix, data in style.render(figure).items():
-        folder.write(f"figures/gait.{suffix}", data)
 
 
 def show_result(result: Mapping[str, Any]) -> None:
@@ -76,3 +41,22 @@ _ROWS: list[tuple[str, Cell]] = [
     ("yaw a cycle [deg]", lambda row: number(row["yaw_deg_per_cycle"], "+.1f")),
     ("cost of transport", lambda row: number(row["cost_of_transport"], ".3f")),
 ]
+
+
+def _draw(outcome: gait.GaitOutcome) -> Mapping[str, Figure]:
+    from antennate.figures.gait import study
+
+    return {"gait": study(outcome.result(), outcome.maneuvers)}
+
+
+STUDY = Study(
+    name="gait",
+    description=DESCRIPTION,
+    model=gait.GaitStudyConfig,
+    run=lambda config, workers, on_step, on_row: gait.run(config, workers, on_step),
+    result=gait.GaitOutcome.result,
+    show=show_result,
+    draw=_draw,
+    parts="walks",
+)
+command = STUDY.command

@@ -1,0 +1,47 @@
+"""Every physical number of the system: its value, its unit, and where it comes from.
+
+Each class groups the numbers of one part as a frozen model: unknown keys, non-finite numbers and
+values out of bounds are refused. A source begins with one of `paper` (arXiv:2603.07795),
+`datasheet`, `measured`, `fitted` (by which command) or `assumed` (why). Derived numbers are
+properties, computed here and never typed.
+"""
+
+from antennate.params.antenna import N_MM_PER_DEG, AntennaParams, SensorParams
+from antennate.params.base import Params, number
+from antennate.params.mind import (
+    ConditioningParams,
+    ControllerParams,
+    EscapeParams,
+    GaitParams,
+    RepetitionParams,
+    RuleParams,
+)
+from antennate.params.robot import RobotParams, ServoParams
+from antennate.params.scene import (
+    BenchPhysicsParams,
+    CylinderParams,
+    PhysicsParams,
+    TunnelParams,
+    VariationParams,
+)
+
+__all__ = [
+    "N_MM_PER_DEG",
+    "AntennaParams",
+    "BenchPhysicsParams",
+    "ConditioningParams",
+    "ControllerParams",
+    "CylinderParams",
+    "EscapeParams",
+    "GaitParams",
+    "Params",
+    "PhysicsParams",
+    "RepetitionParams",
+    "RobotParams",
+    "RuleParams",
+    "SensorParams",
+    "ServoParams",
+    "TunnelParams",
+    "VariationParams",
+    "number",
+]

@@ -1,0 +1,231 @@
+"""The test bench: one antenna on a carriage that moves in a plane, before fixed obstacles.
+
+Everything happens in the x-y plane. The carriage is a heavy body on two slides, driven by position
+servos with velocity feed-forward; the antenna's base servo turns on it. Gravity acts in the plane,
+or not at all.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from antennate.anatomy import ANTENNA_BASE, ANTENNA_HINGES
+from antennate.errors import SimulationError
+from antennate.params import AntennaParams, PhysicsParams, SensorParams
+from antennate.records import Floats, Ints
+from antennate.sim import antenna as antenna_part
+from antennate.sim import layers
+from antennate.sim.world import new_spec
+
+PREFIX = "antenna/"
+_SLIDES = ("carriage_x", "carriage_y")
+_CARRIAGE_MASS = 1.0
+"""A thousand antenna links [kg]: what the antenna feels does not move it."""
+_STIFFNESS, _DAMPING = 1e4, 200.0
+"""Gains of the slides' servos [N/m], [N·s/m]: critically damped, 10 micrometres per 0.1 N."""
+_SPEED_LIMIT = 1e4
+"""No coordinate of a sound bench moves faster [m/s or rad/s]."""
+_ANGLE_LIMIT = 6.3
+"""No hinge of a sound bench turns farther [rad]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Ball:
+    """A fixed sphere at x, y [m] with its radius [m]."""
+
+    x: float
+    y: float
+    radius: float
+
+
+@dataclass(frozen=True, slots=True)
+class Bar:
+    """A fixed capsule from (x0, y0) to (x1, y1) [m] with its radius [m]."""
+
+    x0: float
+    y0: float
+    x1: float
+    y1: float
+    radius: float
+
+
+def compile_bench(
+    physics: PhysicsParams,
+    antenna: AntennaParams,
+    sensor: SensorParams,
+    obstacles: Sequence[Ball | Bar] = (),
+    gravity: tuple[float, float] = (0.0, 0.0),
+) -> mujoco.MjModel:
+    """The bench with its antenna along +x, its base over the origin.
+
+    Args:
+        physics: Numerics; contacts take `contact_time`.
+        antenna: The antenna; its friction holds against every obstacle.
+        sensor: Decides which hinges the film stiffens.
+        obstacles: What stands there.
+        gravity: Gravity in the plane [m/s²].
+    """
+    spec = new_spec(physics)
+    spec.option.gravity = [*gravity, 0.0]
+    spec.option.tolerance = 1e-10
+    for obstacle in obstacles:
+        _add(spec, obstacle)
+    carriage = spec.worldbody.add_body(name="carriage")
+    carriage.gravcomp = 1.0
+    carriage.mass = _CARRIAGE_MASS
+    carriage.inertia = [1e-3, 1e-3, 1e-3]
+    carriage.explicitinertial = True
+    for name, axis in zip(_SLIDES, ([1, 0, 0], [0, 1, 0]), strict=True):
+        carriage.add_joint(name=name, type=mujoco.mjtJoint.mjJNT_SLIDE, axis=axis)
+        servo = spec.add_actuator(name=name, trntype=mujoco.mjtTrn.mjTRN_JOINT, target=name)
+        servo.set_to_position(kp=_STIFFNESS)
+        follow = spec.add_actuator(
+            name=f"{name}_speed", trntype=mujoco.mjtTrn.mjTRN_JOINT, target=name
+        )
+        follow.set_to_velocity(kv=_DAMPING)
+    frame = carriage.add_frame()
+    spec.attach(antenna_part.build(antenna, sensor), frame=frame, prefix=PREFIX)
+    for geom in spec.geoms:
+        geom.solref[0] = physics.contact_time
+        geom.solimp[:3] = [0.95, 0.99, 0.0005]
+    return spec.compile()
+
+
+def _add(spec: mujoco.MjSpec, obstacle: Ball | Bar) -> None:
+    look = {
+        "friction": [0, 0, 0],  # the larger of two counts: the antenna's
+        "condim": 3,
+        "contype": layers.OBSTACLE,
+        "conaffinity": layers.ANTENNA,
+    }
+    if isinstance(obstacle, Ball):
+        spec.worldbody.add_geom(
+            type=mujoco.mjtGeom.mjGEOM_SPHERE,
+            pos=[obstacle.x, obstacle.y, 0],
+            size=[obstacle.radius, 0, 0],
+            **look,
+        )
+        return
+    spec.worldbody.add_geom(
+        type=mujoco.mjtGeom.mjGEOM_CAPSULE,
+        fromto=[obstacle.x0, obstacle.y0, 0, obstacle.x1, obstacle.y1, 0],
+        size=[obstacle.radius, 0, 0],
+        **look,
+    )
+
+
+class Bench:
+    """One compiled bench with its state.
+
+    Attributes:
+        model: The compiled model; `data` its state.
+    """
+
+    def __init__(self, model: mujoco.MjModel, sensed_hinges: int) -> None:
+        self.model = model
+        self.data = mujoco.MjData(model)
+        names = [PREFIX + name for name in ANTENNA_HINGES]
+        self._slides = self._addresses(_SLIDES)
+        self._base = self._addresses([PREFIX + ANTENNA_BASE])
+        self._hinges = self._addresses(names)
+        self._sensed = sensed_hinges
+        self._links: Ints = np.array([model.body(name).id for name in names])
+        self._end = 2.0 * float(model.geom(names[-1]).pos[0])
+        self._controls: Ints = np.array(
+            [
+                model.actuator(name).id
+                for name in (*_SLIDES, *(f"{s}_speed" for s in _SLIDES), PREFIX + ANTENNA_BASE)
+            ]
+        )
+        self._steps = 0
+
+    def _addresses(self, joints: Sequence[str]) -> Ints:
+        return np.array([self.model.joint(name).qposadr[0] for name in joints])
+
+    @property
+    def t(self) -> float:
+        """Time since the bench was made [s]."""
+        return float(self.data.time)
+
+    def place(self, x: float, y: float, base: float) -> None:
+        """Put the carriage at x, y [m] and turn the base [rad], all at rest and straight."""
+        self.data.qpos[self._slides] = x, y
+        self.data.qpos[self._base] = base
+        self.command(x, y, 0.0, 0.0, base)
+        mujoco.mj_forward(self.model, self.data)
+
+    def command(self, x: float, y: float, speed_x: float, speed_y: float, base: float) -> None:
+        """Set the carriage's target [m], its speed there [m/s] and the base angle [rad]."""
+        self.data.ctrl[self._controls] = x, y, speed_x, speed_y, base
+
+    def step(self, count: int = 1) -> None:
+        """Advance by `count` physics steps.
+
+        Raises:
+            SimulationError: A command is not finite, the engine warned, time stood still, or the
+                state left all bounds.
+        """
+        if not np.isfinite(self.data.ctrl).all():
+            raise SimulationError(self._steps, "a command of the bench is not finite")
+        before = self.data.time
+        self._steps += count
+        try:
+            mujoco.mj_step(self.model, self.data, count)
+        except mujoco.FatalError as error:
+            raise SimulationError(self._steps, str(error).splitlines()[0]) from error
+        bend, speed = self.hinges(), self.data.qvel
+        if self.data.warning.number.any() or not self.data.time > before:
+            raise SimulationError(self._steps, "engine warning")
+        if not abs(bend).max() < _ANGLE_LIMIT or not abs(speed).max() < _SPEED_LIMIT:
+            raise SimulationError(
+                self._steps,
+                f"a hinge is at {abs(bend).max():.3g} rad, a coordinate moves at "
+                f"{abs(speed).max():.3g} m/s or rad/s",
+            )
+
+    def hinges(self) -> Floats:
+        """Angles of the six hinges [rad], shape (6,)."""
+        return self.data.qpos[self._hinges]
+
+    def flex(self) -> float:
+        """Summed hinge angles under the film [rad]."""
+        return float(self.hinges()[: self._sensed].sum())
+
+    def base_angle(self) -> float:
+        """Angle of the antenna's base [rad]."""
+        return float(self.data.qpos[self._base][0])
+
+    def carriage(self) -> Floats:
+        """Position of the carriage [m], shape (2,)."""
+        return self.data.qpos[self._slides]
+
+    def joints(self) -> Floats:
+        """Positions of the six hinges and the tip [m], shape (7, 2)."""
+        tip = self._end * self.data.xmat[self._links[-1]].reshape(3, 3)[:2, 0]
+        origins = self.data.xpos[self._links, :2]
+        return np.vstack([origins, origins[-1] + tip])
+
+    def tip(self) -> Floats:
+        """Position of the tip [m], shape (2,)."""
+        return self.joints()[-1]
+
+    def contact_force(self) -> Floats:
+        """Force of all obstacles on the antenna in the last physics step [N], shape (2,)."""
+        data = self.data
+        total = np.zeros(2)
+        wrench = np.zeros(6)
+        for i in range(data.ncon):
+            mujoco.mj_contactForce(self.model, data, i, wrench)
+            force = data.contact.frame[i].reshape(3, 3).T @ wrench[:3]
+            on_second = self.model.geom_contype[data.contact.geom[i, 1]] == layers.ANTENNA
+            total += force[:2] if on_second else -force[:2]
+        return total
+
+    def touching(self) -> bool:
+        """Whether any obstacle presses on the antenna in the last physics step."""
+        address = self.data.contact.efc_address
+        return bool((self.data.efc_force[address[address >= 0]] > 0).any())
