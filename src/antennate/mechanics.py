@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from antennate.params import AntennaParams, SensorParams
-from antennate.records import Bools, Floats
+from antennate.records import Bools, Floats, Ints
 
 PROFILES: dict[str, tuple[float, ...] | None] = {
     "stiff": (3, 3, 3, 3, 3, 3),
@@ -107,7 +107,7 @@ def equilibrium(chain: Chain, place: Floats, force: Floats, follower: bool = Fal
     if not ((place > 0) & (place <= chain.length * (1 + 1e-12))).all():
         raise ValueError(f"expected places above 0 and up to {chain.length:g} m, found {place}")
     arms = np.clip(place[:, None] - chain.starts, 0.0, chain.lengths)
-    loaded = (arms > 0).sum(axis=1) - 1
+    loaded: Ints = np.count_nonzero(arms, axis=1) - 1
     angles = np.zeros((len(place), len(chain.lengths)))
     residual = angles
     for share in np.arange(1, _LOAD_STEPS + 1) / _LOAD_STEPS:
@@ -119,14 +119,14 @@ def equilibrium(chain: Chain, place: Floats, force: Floats, follower: bool = Fal
             if (abs(residual) < _TOLERANCE * chain.stiffness).all():
                 break
     residual, slope = _balance(chain, arms, loaded, force, angles, follower)
-    solved = (abs(residual) < 100 * _TOLERANCE * chain.stiffness).all(axis=1)
+    solved = np.all(abs(residual) < 100 * _TOLERANCE * chain.stiffness, axis=1)
     symmetric = (slope + slope.swapaxes(1, 2)) / 2
     stable = np.linalg.eigvalsh(symmetric)[:, 0] > 0
     return Rest(angles, _turned(force, angles, loaded) if follower else force, solved, stable)
 
 
 def _balance(
-    chain: Chain, arms: Floats, loaded: Floats, force: Floats, angles: Floats, follower: bool
+    chain: Chain, arms: Floats, loaded: Ints, force: Floats, angles: Floats, follower: bool
 ) -> tuple[Floats, Floats]:
     """Residual k q - F.dp/dq, shape (m, n), and its derivative, shape (m, n, n)."""
     world = _turned(force, angles, loaded) if follower else force
@@ -157,9 +157,9 @@ def _from_here(values: Floats) -> Floats:
     return np.cumsum(values[:, ::-1], axis=1)[:, ::-1]
 
 
-def _turned(force: Floats, angles: Floats, loaded: Floats) -> Floats:
+def _turned(force: Floats, angles: Floats, loaded: Ints) -> Floats:
     """Loads given in the frame of their links, in the frame of the base."""
-    heading = np.take_along_axis(np.cumsum(angles, axis=1), loaded[:, None], axis=1)[:, 0]
+    heading = np.cumsum(angles, axis=1)[np.arange(len(loaded)), loaded]
     c, s = np.cos(heading), np.sin(heading)
     return np.stack([c * force[:, 0] - s * force[:, 1], s * force[:, 0] + c * force[:, 1]], axis=1)
 

@@ -18,6 +18,9 @@ OK, BAD_INPUT, INTERRUPTED = 0, 2, 130
 COMMANDS = {
     "tunnel": "walk robots through a corridor of loose cylinders, with and without touch",
     "gait": "walk on a flat floor: speed, turning and cost of the gait",
+    "springs": "torsion springs: stiffness from wire and coils, and back",
+    "taper": "stiffness along a tapering antenna, and the ladder of springs that follows it",
+    "sensor": "flex to counts: curve, hysteresis, creep, noise and the best divider",
 }
 
 

@@ -37,7 +37,7 @@ def show(
     table = Table(title=title, title_justify="left", box=SIMPLE_HEAD, pad_edge=False)
     table.add_column("", overflow="fold")
     for name in columns:
-        table.add_column(name, justify="right", overflow="fold")
+        table.add_column(Text(name), justify="right", overflow="fold")
     for measure, cell in rows:
         table.add_row(Text(measure), *(Text(cell(column)) for column in columns.values()))
     console = Console(file=sys.stdout, highlight=False)

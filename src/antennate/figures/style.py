@@ -41,6 +41,9 @@ ARM_COLOURS = {"open": "#8C8C8C", "paper": "#CC79A7", "closed": "#332288"}
 ARM_LINES = {"open": (0, (4, 1.5)), "paper": (0, (4, 1.5, 1, 1.5)), "closed": "solid"}
 """A second mark beside the colour, for print in grey."""
 
+SERIES = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#D55E00", "#56B4E9", "#332288")
+"""For whatever has no colour of its own; after Okabe and Ito."""
+
 _RC: dict[Any, Any] = {
     "figure.dpi": 100,
     "savefig.dpi": 200,
@@ -80,6 +83,11 @@ def styled(draw: Callable[P, R]) -> Callable[P, R]:
             return draw(*args, **kwargs)
 
     return inside
+
+
+def series(count: int) -> list[str]:
+    """As many colours, the first ones first; they repeat after seven."""
+    return [SERIES[i % len(SERIES)] for i in range(count)]
 
 
 def canvas(width: float, height: float) -> Figure:

@@ -6,7 +6,7 @@ values out of bounds are refused. A source begins with one of `paper` (arXiv:260
 properties, computed here and never typed.
 """
 
-from antennate.params.antenna import N_MM_PER_DEG, AntennaParams, SensorParams
+from antennate.params.antenna import N_MM_PER_DEG, AntennaParams
 from antennate.params.base import Params, number
 from antennate.params.mind import (
     ConditioningParams,
@@ -24,6 +24,8 @@ from antennate.params.scene import (
     TunnelParams,
     VariationParams,
 )
+from antennate.params.sensor import SensorParams
+from antennate.params.spring import SpringParams, TaperParams
 
 __all__ = [
     "N_MM_PER_DEG",
@@ -41,6 +43,8 @@ __all__ = [
     "RuleParams",
     "SensorParams",
     "ServoParams",
+    "SpringParams",
+    "TaperParams",
     "TunnelParams",
     "VariationParams",
     "number",

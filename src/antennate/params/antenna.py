@@ -1,9 +1,9 @@
-"""One antenna on the bench: springs, film, divider and converter."""
+"""One antenna: a chain of springs with a film along its base."""
 
 from __future__ import annotations
 
 import math
-from typing import Annotated, Literal
+from typing import Annotated
 
 from pydantic import Field
 
@@ -111,65 +111,3 @@ class AntennaParams(Params):
         film = self.film_stiffness_n_mm_per_deg * N_MM_PER_DEG
         springs = self.spring_stiffness()
         return tuple(k + film * (i < covered) for i, k in enumerate(springs))
-
-
-class SensorParams(Params):
-    """Flex film, voltage divider and the ESP32's converter."""
-
-    active_length: float = number(
-        0.0953, "m", "datasheet: Spectra Symbol FS-L-0095-103, active length", "sensed length", gt=0
-    )
-    flat_resistance: float = number(
-        10e3,
-        "Ohm",
-        "datasheet: Spectra Symbol FS-L-0095-103, flat 10 kOhm",
-        "resistance unbent",
-        gt=0,
-    )
-    bend_gain: float = number(
-        1.2 / math.pi,
-        "1/rad",
-        "datasheet: at least doubled at 180 deg (FS-L-0095-103); 2.2 assumed",
-        "relative rise of resistance per radian of flex",
-        gt=0,
-    )
-    directions: Literal["both", "one"] = number(
-        "both",
-        "1",
-        "assumed: the paper's ZD10-100 is sold as a pressure strip, which answers bending either "
-        "way",
-        "whether the film sees bending towards the tail only (one) or either way",
-    )
-    divider_resistance: float = number(
-        10e3,
-        "Ohm",
-        "assumed: the value makers pair with this film",
-        "fixed resistor to ground",
-        gt=0,
-    )
-    supply: float = number(3.3, "V", "datasheet: ESP32 supply", "voltage over the divider", gt=0)
-    adc_gain: float = number(
-        0.8056e-3, "V", "datasheet: ESP-IDF line fit at 11 dB, Vref 1.1 V", "volts per count", gt=0
-    )
-    adc_offset: float = number(
-        0.142,
-        "V",
-        "datasheet: ESP-IDF line fit at 11 dB, Vref 1.1 V",
-        "voltage that reads zero",
-        ge=0,
-    )
-    noise_counts: float = number(
-        2.5,
-        "counts",
-        "assumed: 8 counts a sample; averaging 16 leaves 2-3 as part of it is correlated",
-        "standard deviation of one reading",
-        ge=0,
-    )
-    rate: float = number(
-        100.0, "Hz", "paper: about 100 Hz over serial", "readings per second", gt=0, le=1000
-    )
-
-    def covered_hinges(self, antenna: AntennaParams) -> int:
-        """Number of hinges, from the base, that lie under the film."""
-        pitch = antenna.link_length
-        return min(ANTENNA_LINK_COUNT, math.ceil(self.active_length / pitch - 1e-9))

@@ -7,8 +7,9 @@ import math
 from pydantic import model_validator
 
 from antennate.anatomy import ANTENNA_LINK_COUNT, LINK_COUNT
-from antennate.params.antenna import AntennaParams, SensorParams
+from antennate.params.antenna import AntennaParams
 from antennate.params.base import Params, number
+from antennate.params.sensor import SensorParams
 
 
 class ServoParams(Params):

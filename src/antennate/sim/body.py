@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from antennate import sensor
 from antennate.errors import ConfigError, SimulationError
 from antennate.params import SensorParams, VariationParams
 from antennate.records import AntennaFrame, Floats, Pose
+from antennate.sensor import SensorChain, reading_noise
 from antennate.sim.world import World
 
 _NOISE_BLOCK = 1024
@@ -29,7 +29,7 @@ class Disturbance:
         period: float,
     ) -> None:
         self._rng = rng
-        self._sd = params.noise_counts
+        self._params = params
         self._variation = variation
         self._friction = leg_friction
         self._slip_ticks = max(1, round(variation.slip_time / period))
@@ -40,7 +40,7 @@ class Disturbance:
         """Reading noise of one tick [counts], shape (2,)."""
         at = tick % _NOISE_BLOCK
         if at == 0:
-            self._noise = self._rng.normal(0.0, self._sd, (_NOISE_BLOCK, 2))
+            self._noise = reading_noise(self._params, self._rng, (_NOISE_BLOCK, 2))
         return self._noise[at]
 
     def leg_friction(self, tick: int) -> Floats | None:
@@ -77,7 +77,7 @@ class SimBody:
 
     def __init__(self, batch: int, params: SensorParams, period: float, timestep: float) -> None:
         self._rows: list[_Row | None] = [None] * batch
-        self._params = params
+        self._sensors = SensorChain(params, (batch, 2), period)
         self._period = period
         self._substeps = round(period / timestep)
         if abs(self._substeps * timestep - period) > 1e-9:
@@ -98,6 +98,7 @@ class SimBody:
     def load(self, row: int, world: World, chance: Disturbance) -> None:
         """Put a fresh world into a row."""
         self._rows[row] = _Row(world, chance)
+        self._sensors.reset(row)
         self._missing[row] = False
 
     def unload(self, row: int) -> None:
@@ -129,7 +130,7 @@ class SimBody:
                 t[i] = row.world.t
                 self._flex[i] = row.world.flex()
                 self._noise[i] = row.chance.noise(row.tick)
-        counts = sensor.counts(self._params, self._flex, self._noise)
+        counts = self._sensors.step(self._flex, self._noise)
         counts[self._missing] = np.nan
         return AntennaFrame(t=t, counts=counts)
 

@@ -1,0 +1,150 @@
+"""Wire, coils and the animal's taper."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from antennate.params.base import Params, number
+
+
+@dataclass(frozen=True, slots=True)
+class Wire:
+    """A spring wire; tensile strength is `strength` / d^`exponent`, d in mm.
+
+    Attributes:
+        modulus: Young's modulus [Pa].
+        strength: Tensile strength of a wire of 1 mm [Pa].
+        exponent: How it falls with the diameter.
+        yield_share: Yield stress in bending over tensile strength.
+        thinnest: Smallest diameter of the data [m]; `thickest` the largest.
+    """
+
+    modulus: float
+    strength: float
+    exponent: float
+    yield_share: float
+    thinnest: float
+    thickest: float
+
+
+WIRES = {
+    "stainless_302": Wire(193e9, 1867e6, 0.146, 0.61, 0.3e-3, 2.5e-3),
+    "music_wire": Wire(203e9, 2211e6, 0.145, 0.78, 0.1e-3, 6.5e-3),
+    "hard_drawn": Wire(198e9, 1783e6, 0.190, 0.78, 0.7e-3, 12.7e-3),
+    "phosphor_bronze": Wire(103e9, 1000e6, 0.0, 0.61, 0.1e-3, 0.6e-3),
+}
+"""Shigley, Mechanical Engineering Design, 9th edition, tables 10-4 and 10-5; the yield shares are
+those of torsion springs, section 10-12."""
+
+RATE_FACTOR = 10.8
+"""Rate per turn = E d^4 / (10.8 D N): spring makers' figure; 10.186 = 64 / 2 pi follows from beam
+theory, the rest is friction between coils and curvature of the wire."""
+
+STOCK_WIRES_MM = (
+    *(0.20, 0.22, 0.25, 0.28, 0.30, 0.32, 0.36, 0.40, 0.45, 0.50, 0.55, 0.60, 0.65, 0.70),
+    *(0.75, 0.80, 0.85, 0.90, 0.95, 1.00),
+)
+"""Wire diameters that makers stock [mm]: the usual metric series."""
+
+_Positive = Annotated[float, Field(gt=0)]
+
+
+class SpringParams(Params):
+    """Torsion springs of one wire and one coil diameter, and how new ones may be wound."""
+
+    wire: Literal["stainless_302", "music_wire", "hard_drawn", "phosphor_bronze"] = number(
+        "stainless_302", "1", "assumed: unpublished; a wire that does not rust", "kind of wire"
+    )
+    modulus_pa: float | None = number(
+        None, "Pa", "assumed: that of the kind of wire", "Young's modulus if it is known better"
+    )
+    wire_mm: float = number(
+        0.50,
+        "mm",
+        "assumed: unpublished; stock wire that gives the paper's table at a spring index of 7.5",
+        "wire diameter",
+        gt=0.01,
+        le=10,
+    )
+    coil_mm: float = number(
+        3.77,
+        "mm",
+        "assumed: unpublished; follows from the wire and 0.274 N·mm/deg at three coils",
+        "mean coil diameter",
+        gt=0.05,
+        le=200,
+    )
+    active_coils: tuple[_Positive, ...] = number(
+        (3.0, 6.0, 9.0),
+        "1",
+        "paper: table of springs",
+        "active coils of each spring",
+        min_length=1,
+        max_length=50,
+    )
+    wanted_n_mm_per_deg: tuple[_Positive, ...] = number(
+        (0.274, 0.137, 0.091),
+        "N·mm/deg",
+        "paper: table of springs",
+        "stiffnesses that a new set is wound for",
+        min_length=1,
+        max_length=50,
+    )
+    index_limits: tuple[_Positive, _Positive] = number(
+        (4.0, 12.0),
+        "1",
+        "datasheet: makers' usual range of coil over wire diameter",
+        "smallest and largest spring index",
+    )
+    coil_limits: tuple[_Positive, _Positive] = number(
+        (2.0, 12.0),
+        "1",
+        "assumed: fewer give no clean rate, more grow longer than a link",
+        "fewest and most active coils",
+    )
+    coil_step: float = number(
+        0.25, "1", "datasheet: legs are bent at quarter turns", "step of active coils", gt=0, le=1
+    )
+    mandrel_step_mm: float = number(
+        0.1, "mm", "assumed: drill rod", "step of inner coil diameters", gt=0.001, le=5
+    )
+    angle_deg: float = number(
+        30.0, "deg", "paper: no spring bends farther", "angle a spring must bear", gt=0, le=720
+    )
+
+
+class TaperParams(Params):
+    """A tapering antenna as a row of segments, and the ladder of springs that follows it."""
+
+    segments: int = number(
+        14, "1", "paper: segments of the model of the animal", "number of segments", ge=2, le=1000
+    )
+    base_mm: float = number(
+        1.5, "mm", "paper: Scolopendra's antenna", "diameter at the base", gt=0, le=100
+    )
+    tip_mm: float = number(
+        0.2, "mm", "paper: Scolopendra's antenna", "diameter at the tip", gt=0, le=100
+    )
+    law: Literal["linear", "geometric"] = number(
+        "linear",
+        "1",
+        "assumed: unpublished; the paper gives both ends",
+        "how diameters fall from base to tip",
+    )
+    ladder: tuple[_Positive, ...] = number(
+        (3.0, 6.0, 6.0, 9.0, 9.0, 9.0),
+        "1",
+        "paper: the robot's springs",
+        "active coils of the ladder, base to tip",
+        min_length=2,
+        max_length=50,
+    )
+    coil_limits: tuple[int, int] = number(
+        (3, 30),
+        "1",
+        "assumed: fewest of the paper's springs, and what fits a link when wound of thin wire",
+        "fewest and most coils of a suggested ladder",
+    )

@@ -1,0 +1,136 @@
+"""The law of torsion springs, both ways: from wire and coils to stiffness, and back.
+
+    rate per turn = E d^4 / (10.8 D N)
+
+with wire diameter d, mean coil diameter D and N active coils. "Per turn" matters: read per radian,
+springs come out 2 pi times too stiff, read per degree 360 times. Stress at the inside of the coil
+is K_i 32 M / (pi d^3), K_i = (4 C^2 - C - 1) / (4 C (C - 1)), C = D / d (Shigley, section 10-12).
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from antennate.params import SpringParams
+from antennate.params.spring import RATE_FACTOR, STOCK_WIRES_MM, WIRES
+
+
+def stiffness(modulus: float, wire: float, coil: float, coils: float) -> float:
+    """Stiffness [N·m/rad] from E [Pa], wire and mean coil diameter [m] and active coils."""
+    return modulus * wire**4 / (RATE_FACTOR * coil * coils) / (2.0 * math.pi)
+
+
+def coil_diameter(modulus: float, wire: float, coils: float, wanted: float) -> float:
+    """Mean coil diameter [m] that gives a wanted stiffness [N·m/rad]."""
+    return modulus * wire**4 / (RATE_FACTOR * coils * wanted) / (2.0 * math.pi)
+
+
+def modulus_of(params: SpringParams) -> float:
+    """Young's modulus of the wire in use [Pa]."""
+    return WIRES[params.wire].modulus if params.modulus_pa is None else params.modulus_pa
+
+
+def yield_stress(params: SpringParams, wire: float) -> float:
+    """Stress at which a wire of this diameter [m] yields in bending [Pa]."""
+    kind = WIRES[params.wire]
+    return kind.yield_share * kind.strength / (1e3 * wire) ** kind.exponent
+
+
+def inner_stress(torque: float, wire: float, coil: float) -> float:
+    """Bending stress at the inside of the coil [Pa] under a torque [N·m]; diameters in m."""
+    index = coil / wire
+    factor = (4 * index**2 - index - 1) / (4 * index * (index - 1))
+    return factor * 32.0 * torque / (math.pi * wire**3)
+
+
+def yield_angle(params: SpringParams, wire: float, coil: float, coils: float) -> float:
+    """Angle [rad] at which a spring of these diameters [m] begins to yield."""
+    per_radian = inner_stress(stiffness(modulus_of(params), wire, coil, coils), wire, coil)
+    return yield_stress(params, wire) / per_radian
+
+
+@dataclass(frozen=True, slots=True)
+class Winding:
+    """One wire and one mandrel that give a whole set of springs.
+
+    Attributes:
+        wire: Wire diameter [m].
+        coil: Mean coil diameter [m].
+        coils: Active coils of each spring.
+        stiffness: What they then have [N·m/rad].
+        error: Largest relative error of these.
+        yield_angle: Smallest angle at which one of them yields [rad].
+        length: Longest coil body, closely wound [m].
+    """
+
+    wire: float
+    coil: float
+    coils: tuple[float, ...]
+    stiffness: tuple[float, ...]
+    error: float
+    yield_angle: float
+    length: float
+
+    @property
+    def index(self) -> float:
+        """Spring index."""
+        return self.coil / self.wire
+
+
+def windings(params: SpringParams, wanted: tuple[float, ...]) -> list[Winding]:
+    """Sets of springs from stock wire that come near the wanted stiffnesses [N·m/rad].
+
+    Every stock wire meets every mandrel within the index limits; coils are rounded to what can be
+    wound. Of each wire the set with the smallest error is kept that bears the angle; sets whose
+    coils leave their limits are not wound.
+
+    Returns:
+        The best of each wire, the smallest error first.
+    """
+    best: dict[float, Winding] = {}
+    for wire, coil in _stock(params):
+        found = _wind(params, wire, coil, wanted)
+        if found is None or found.yield_angle < math.radians(params.angle_deg):
+            continue
+        if wire not in best or found.error < best[wire].error:
+            best[wire] = found
+    return sorted(best.values(), key=lambda winding: (winding.error, winding.wire))
+
+
+def _stock(params: SpringParams) -> Iterator[tuple[float, float]]:
+    """Wire and mean coil diameters to be had [m]."""
+    kind, step = WIRES[params.wire], 1e-3 * params.mandrel_step_mm
+    low, high = params.index_limits
+    for wire in (1e-3 * mm for mm in STOCK_WIRES_MM):
+        if not kind.thinnest <= wire * (1 + 1e-9) <= kind.thickest * (1 + 2e-9):
+            continue
+        first = math.ceil((low - 1) * wire / step - 1e-9)
+        for n in itertools.count(max(first, 1)):
+            coil = n * step + wire
+            if coil > high * wire * (1 + 1e-9):
+                break
+            yield wire, coil
+
+
+def _wind(
+    params: SpringParams, wire: float, coil: float, wanted: tuple[float, ...]
+) -> Winding | None:
+    modulus, step = modulus_of(params), params.coil_step
+    one = stiffness(modulus, wire, coil, 1.0)
+    coils = tuple(max(1, round(one / k / step)) * step for k in wanted)
+    low, high = params.coil_limits
+    if min(coils) < low or max(coils) > high:
+        return None
+    got = tuple(one / n for n in coils)
+    return Winding(
+        wire=wire,
+        coil=coil,
+        coils=coils,
+        stiffness=got,
+        error=max(abs(g / k - 1) for g, k in zip(got, wanted, strict=True)),
+        yield_angle=min(yield_angle(params, wire, coil, n) for n in coils),
+        length=(max(coils) + 1) * wire,
+    )
