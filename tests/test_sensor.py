@@ -50,3 +50,104 @@ def test_a_film_of_one_direction_ignores_bends_towards_the_head() -> None:
 def test_a_film_of_both_directions_sees_both_alike() -> None:
     tail, head = sensor.counts(SensorParams(directions="both"), np.array([1.0, -1.0]))
     assert head == tail
+
+
+def test_the_transfer_curve_passes_the_makers_table() -> None:
+    """Readings above 2880 at a reference of 1.1 V (ESP-IDF), and one measured chip within 2.5 %."""
+    volts, readings = sensor.transfer_curve(SensorParams())
+    at = np.interp([3264, 3648, 4032], readings, volts)
+    assert at == pytest.approx([2.718, 2.932, 3.107], abs=1e-3)
+    chip = np.interp([2.462, 1.641, 0.819], volts, readings)
+    assert chip == pytest.approx([2811, 1814, 823], rel=0.03)
+    assert (np.diff(volts) > 0).all()
+
+
+def test_there_is_a_dead_zone_below_and_an_end_above() -> None:
+    low = SensorParams(divider_resistance=400.0)  # 0.127 V
+    assert sensor.counts(low, np.array([0.0])).tolist() == [0.0]
+    high = SensorParams(divider_resistance=1e6)  # 3.27 V
+    assert sensor.counts(high, np.array([0.0])).tolist() == [4095.0]
+
+
+@pytest.mark.parametrize("reference", [1.0, 1.2])
+def test_a_higher_reference_reads_less(reference: float) -> None:
+    here = sensor.counts(SensorParams(reference=reference), np.zeros(1))
+    usual = sensor.counts(SensorParams(), np.zeros(1))
+    assert np.sign(usual - here) == np.sign(reference - 1.1)
+
+
+def test_a_pressure_film_reads_more_when_bent() -> None:
+    params = SensorParams(kind="fsr")
+    read = sensor.counts(params, np.radians([0.0, 30.0, 60.0, 90.0]))
+    assert (np.diff(read) > 0).all()
+    assert sensor.resistance(params, np.array([0.0, math.pi / 2])) == pytest.approx([10e6, 5e3])
+
+
+def test_without_memory_the_chain_is_the_static_curve() -> None:
+    params = SensorParams(hysteresis=0, creep=(0, 0))
+    flex = np.random.default_rng(0).uniform(-2, 2, (50, 3, 2))
+    chain = sensor.SensorChain(params, (3, 2), 0.01)
+    for row in flex:
+        assert (chain.step(row) == sensor.counts(params, row)).all()
+
+
+def test_the_loop_is_as_wide_as_declared() -> None:
+    params = SensorParams(hysteresis=0.1, creep=(0, 0))
+    chain = sensor.SensorChain(params, (), 0.01)
+    up = np.linspace(0, math.pi / 2, 1001)
+    there = np.array([float(chain.felt(x)) for x in up])
+    back = np.array([float(chain.felt(x)) for x in up[::-1]])[::-1]
+    assert back[500] - there[500] == pytest.approx(0.1 * math.pi / 2, rel=1e-6)
+    assert (back >= there - 1e-12).all()
+
+
+def test_hysteresis_does_not_depend_on_pace() -> None:
+    params = SensorParams(creep=(0, 0))
+    ends = []
+    for count in (11, 1001):
+        chain = sensor.SensorChain(params, (), 0.01)
+        path = np.concatenate([np.linspace(0, 1, count), np.linspace(1, 0.3, count)])
+        ends.append([float(chain.felt(x)) for x in path][-1])
+    assert ends[0] == pytest.approx(ends[1], rel=1e-12)
+
+
+def test_a_held_bend_creeps_by_the_declared_share() -> None:
+    params = SensorParams(hysteresis=0, creep=(0.03, 0.02), creep_time=(0.3, 10.0))
+    chain = sensor.SensorChain(params, (), 0.01)
+    felt = np.array([float(chain.felt(np.array(1.0))) for _ in range(10_000)])
+    assert felt[0] == pytest.approx(0.95, abs=2e-3)
+    assert felt[30] == pytest.approx(0.95 + 0.03 * (1 - math.exp(-1)), abs=2e-3)
+    assert felt[-1] == pytest.approx(1.0, abs=1e-4)
+
+
+def test_a_row_that_forgets_starts_anew_and_leaves_the_others_alone() -> None:
+    params = SensorParams()
+    chain, fresh = (sensor.SensorChain(params, (2, 2), 0.01) for _ in range(2))
+    for _ in range(100):
+        chain.step(np.full((2, 2), 1.5))
+    chain.reset(0)
+    straight, expected = chain.step(np.zeros((2, 2))), fresh.step(np.zeros((2, 2)))
+    assert (straight[0] == expected[0]).all()
+    assert (straight[1] < expected[1]).all()
+
+
+def test_averaging_leaves_the_common_noise() -> None:
+    rng = np.random.default_rng(0)
+    params = SensorParams(outlier_share=0)
+    assert sensor.reading_noise(params, rng, (200_000,)).std() == pytest.approx(2.5, rel=0.01)
+    single = SensorParams(oversampling=1, common_noise_counts=0, outlier_share=0.01)
+    noise = sensor.reading_noise(single, rng, (200_000,))
+    assert noise.std() == pytest.approx(math.sqrt(64 + 0.01 * 1600), rel=0.01)
+
+
+def test_the_best_divider_is_near_the_geometric_mean() -> None:
+    """Closed form: sqrt(R_straight R_bent) spreads the voltage farthest."""
+    candidates = np.geomspace(1e3, 1e5, 401)
+    best, spread = sensor.best_divider(SensorParams(), math.pi, candidates)
+    assert best == pytest.approx(math.sqrt(10e3 * 22e3), rel=0.1)  # whole counts: flat top
+    assert spread.max() == spread[np.argmin(abs(candidates - best))]
+
+
+def test_creep_beyond_all_measure_is_refused() -> None:
+    with pytest.raises(ValueError, match="creep must be"):
+        SensorParams(creep=(0.6, 0.5))

@@ -92,11 +92,8 @@ def run(config: TaperConfig) -> TaperOutcome:
         BadInputError: The file of diameters cannot be used, or limits are the wrong way round.
     """
     fewest, most = config.coil_limits
-    if not 1 <= fewest < most <= 1000:
-        raise ConfigError(
-            f"coil_limits: expected two whole numbers from 1 to 1000, the smaller first, found "
-            f"{fewest} and {most}"
-        )
+    if fewest >= most:
+        raise ConfigError(f"coil_limits: expected the smaller first, found {fewest} and {most}")
     if config.diameters is None:
         diameter = taper.diameters(config)
     else:

@@ -46,7 +46,7 @@ def _draw_torque(panel: Axes, result: Mapping[str, Any]) -> None:
     )
     panel.set_xlim(0, end)
     panel.set_ylim(0)
-    panel.legend(title="stiffness [N·mm/deg]", loc="upper left")
+    panel.legend(title="stiffness [N·mm/deg]", loc="lower right")
 
 
 def _draw_windings(panel: Axes, result: Mapping[str, Any]) -> None:

@@ -50,6 +50,7 @@ STOCK_WIRES_MM = (
 """Wire diameters that makers stock [mm]: the usual metric series."""
 
 _Positive = Annotated[float, Field(gt=0)]
+_Coils = Annotated[int, Field(ge=1, le=1000)]
 
 
 class SpringParams(Params):
@@ -142,7 +143,7 @@ class TaperParams(Params):
         min_length=2,
         max_length=50,
     )
-    coil_limits: tuple[int, int] = number(
+    coil_limits: tuple[_Coils, _Coils] = number(
         (3, 30),
         "1",
         "assumed: fewest of the paper's springs, and what fits a link when wound of thin wire",

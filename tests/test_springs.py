@@ -1,0 +1,93 @@
+"""The law of torsion springs: the paper's table, other figures of it, and the way back."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from antennate import springs
+from antennate.errors import ConfigError
+from antennate.experiments.springs import run
+from antennate.params import N_MM_PER_DEG, SpringParams
+
+E = 193e9
+
+
+@pytest.mark.parametrize(("coils", "printed"), [(3, 0.274), (6, 0.137), (9, 0.091)])
+def test_the_papers_table_within_its_rounding(coils: int, printed: float) -> None:
+    rows = run(SpringParams()).result()["springs"]
+    row = next(row for row in rows if row["active_coils"] == coils)
+    assert row["stiffness_n_mm_per_deg"] == pytest.approx(printed, abs=6e-4)
+    assert row["stiffness_n_m_per_rad"] == pytest.approx(printed * 0.0573, rel=5e-3)
+
+
+@pytest.mark.parametrize(
+    ("modulus", "wire", "coil"),
+    [
+        (E, 0.40, 1.55),
+        (E, 0.45, 2.48),
+        (E, 0.50, 3.77),
+        (E, 0.55, 5.53),
+        (E, 0.60, 7.83),
+        (206e9, 0.50, 4.03),
+    ],
+)
+def test_other_wires_that_give_the_same_stiffness(modulus: float, wire: float, coil: float) -> None:
+    k = springs.stiffness(modulus, 1e-3 * wire, 1e-3 * coil, 3)
+    assert k / N_MM_PER_DEG == pytest.approx(0.274, rel=5e-3)
+
+
+def test_beam_theory_is_six_percent_stiffer() -> None:
+    """E I / L of the uncoiled wire: 64 instead of 10.8 x 2 pi."""
+    d, coil, coils = 0.5e-3, 4e-3, 5
+    beam = E * math.pi * d**4 / 64 / (math.pi * coil * coils)
+    assert beam / springs.stiffness(E, d, coil, coils) == pytest.approx(10.8 / 10.186, rel=1e-4)
+
+
+def test_the_way_back_returns() -> None:
+    coil = springs.coil_diameter(E, 0.5e-3, 6, 0.0079)
+    assert springs.stiffness(E, 0.5e-3, coil, 6) == pytest.approx(0.0079, rel=1e-12)
+
+
+def test_a_straight_wire_yields_at_its_surface() -> None:
+    """Stress E d theta / (2 L), up to curvature, which vanishes for large coils."""
+    config = SpringParams(wire="music_wire")
+    d, coil, coils = 1e-3, 0.2, 4
+    angle = springs.yield_angle(config, d, coil, coils)
+    length = math.pi * coil * coils
+    strain_stress = 203e9 * d * angle / (2 * length) * 10.186 / 10.8
+    assert strain_stress == pytest.approx(0.78 * 2211e6, rel=5e-3)
+
+
+def test_wound_sets_keep_all_limits_and_their_own_law() -> None:
+    outcome = run(SpringParams())
+    assert outcome.windings
+    for row in outcome.result()["windings"]:
+        assert 4 - 1e-9 <= row["spring_index"] <= 12 + 1e-9
+        assert row["yield_angle_deg"] >= 30
+        assert all(2 <= n <= 12 and n * 4 == int(n * 4) for n in row["active_coils"])
+        for n, k in zip(row["active_coils"], row["stiffness_n_mm_per_deg"], strict=True):
+            d, coil = row["wire_mm"], row["coil_mm"]
+            assert k == pytest.approx(193e3 * d**4 / (3888 * coil * n), rel=1e-3)
+    errors = [row["largest_error"] for row in outcome.result()["windings"]]
+    assert errors == sorted(errors)
+
+
+def test_a_mandrel_is_smaller_than_its_coil_by_the_wire() -> None:
+    row = run(SpringParams()).result()["windings"][0]
+    assert row["coil_mm"] - row["mandrel_mm"] == pytest.approx(row["wire_mm"])
+
+
+@pytest.mark.parametrize(
+    ("bad", "word"),
+    [
+        ({"coil_mm": 1.0}, "coil_mm: expected 4 to 12 wire diameters"),
+        ({"coil_mm": 10.0}, "coil_mm: expected"),
+        ({"index_limits": (12.0, 4.0)}, "index_limits: expected the smaller first"),
+        ({"coil_limits": (9.0, 9.0)}, "coil_limits: expected the smaller first"),
+    ],
+)
+def test_what_cannot_be_wound_is_refused(bad: dict[str, object], word: str) -> None:
+    with pytest.raises(ConfigError, match=word):
+        run(SpringParams.model_validate(bad))

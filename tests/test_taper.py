@@ -1,0 +1,98 @@
+"""The taper: proxies of the animal, harmonic stretches, and ladders."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from antennate import taper
+from antennate.errors import BadInputError, ConfigError
+from antennate.experiments.taper import TaperConfig, run
+from antennate.params import TaperParams
+
+LINEAR = (
+    *(1, 0.759, 0.564, 0.410, 0.289, 0.198, 0.130, 0.0809, 0.0474, 0.0256, 0.0123, 0.00506),
+    *(0.00160, 0.000316),
+)
+GEOMETRIC = (
+    *(1, 0.538, 0.289, 0.156, 0.084, 0.045, 0.024, 0.013, 0.0070, 0.0038, 0.0020, 0.0011),
+    *(0.00059, 0.00032),
+)
+
+
+@pytest.mark.parametrize(("law", "expected"), [("linear", LINEAR), ("geometric", GEOMETRIC)])
+def test_proxies_of_fourteen_segments(law: str, expected: tuple[float, ...]) -> None:
+    config = TaperParams.model_validate({"law": law})
+    assert taper.proxy(taper.diameters(config)) == pytest.approx(expected, rel=0.05)
+
+
+def test_the_animal_falls_a_thousandfold_and_the_robot_threefold() -> None:
+    result = run(TaperConfig()).result()
+    assert result["base_over_tip"] == pytest.approx(3164, abs=1)
+    assert result["ladder"]["base_over_tip"] == pytest.approx(3)
+
+
+def test_a_round_section_of_one_millimetre() -> None:
+    assert taper.second_moment(np.array([1e-3]))[0] == pytest.approx(4.909e-14, rel=1e-3)
+
+
+def test_springs_in_a_row_give_as_much_as_the_segments_they_stand_for() -> None:
+    values = np.random.default_rng(0).uniform(0.1, 1.0, 14)
+    for bins in (1, 2, 6, 7, 14):
+        give = (1 / taper.binned(values, bins)).sum() * 14 / bins
+        assert give == pytest.approx((1 / values).sum())
+    assert taper.binned(values, 14) == pytest.approx(values)
+
+
+def test_a_uniform_antenna_gets_a_uniform_ladder() -> None:
+    assert taper.follow(np.ones(6), 3, 9).tolist() == [3] * 6
+
+
+def test_a_taper_within_the_limits_is_followed_exactly() -> None:
+    assert taper.follow(np.array([1, 1 / 2, 1 / 3, 1 / 10]), 2, 40).tolist() == [2, 4, 6, 20]
+
+
+def test_a_steeper_taper_ends_at_the_limits() -> None:
+    coils = taper.follow(np.array([1.0, 1e-3]), 3, 30)
+    assert coils.tolist() == [3, 30]
+
+
+def test_the_suggested_ladder_is_nearer_than_the_papers() -> None:
+    result = run(TaperConfig()).result()
+    assert result["suggested"]["distance_decades"] < result["ladder"]["distance_decades"]
+
+
+def test_measured_diameters_replace_the_law(tmp_path: Path) -> None:
+    file = tmp_path / "antenna.csv"
+    file.write_text("segment,diameter_mm\n1,2.0\n2,1.0\n3,0.5\n")
+    result = run(TaperConfig(diameters=str(file), ladder=(3, 6, 9))).result()
+    assert [row["proxy"] for row in result["segments"]] == [1, 1 / 16, 1 / 256]
+
+
+@pytest.mark.parametrize(
+    ("text", "word"),
+    [
+        ("", "row 1: expected a header with diameter_mm"),
+        ("diameter_m\n1\n", "row 1: expected a header"),
+        ("diameter_mm\n1.5\n", "at least 2 rows"),
+        ("diameter_mm\n1.5\nwide\n", "row 3: expected a diameter above 0.*'wide'"),
+        ("diameter_mm\n1.5\n-1\n", "row 3"),
+        ("diameter_mm\n1.5\nnan\n", "row 3"),
+        ("diameter_mm\n1500\n1\n", "row 2.*up to 100 mm"),
+        ("a,diameter_mm\n1,1.5\n2\n", "row 3"),
+    ],
+)
+def test_bad_files_name_the_row(tmp_path: Path, text: str, word: str) -> None:
+    file = tmp_path / "antenna.csv"
+    file.write_text(text)
+    with pytest.raises(BadInputError, match=word):
+        run(TaperConfig(diameters=str(file)))
+
+
+def test_a_missing_file_and_swapped_limits_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(BadInputError, match="expected a readable file"):
+        run(TaperConfig(diameters=str(tmp_path / "none.csv")))
+    with pytest.raises(ConfigError, match="the smaller first"):
+        run(TaperConfig(coil_limits=(9, 3)))
