@@ -1,10 +1,13 @@
 """Write docs/parameters.md from antennate.params; with --check, only say whether it is true."""
 
+import importlib
 import inspect
+import pkgutil
 import sys
 from pathlib import Path
+from types import ModuleType
 
-from antennate import params
+from antennate import experiments, params
 
 PAGE = Path(__file__).with_suffix(".md")
 HEAD = """\
@@ -14,18 +17,31 @@ Every physical number of the project: its default, its unit, what it means and w
 A source begins with `paper` (arXiv:2603.07795), `datasheet`, `measured`, `fitted` or `assumed`.
 This page is generated: change `src/antennate/params.py`, then run `python docs/parameters.py`.
 """
+COMMANDS = """\
+# Parameters of commands
+
+The top level of each command's flags and configuration file; groups link to the tables above.
+"""
 
 
-def groups() -> list[type[params.Params]]:
-    """Return the public parameter classes in the order of the source."""
+def groups(module: ModuleType) -> list[type[params.Params]]:
+    """Return the parameter classes that a module defines, in the order of the source."""
     return [
         group
-        for name, group in vars(params).items()
+        for name, group in vars(module).items()
         if inspect.isclass(group)
         and issubclass(group, params.Params)
         and group is not params.Params
+        and group.__module__.startswith(module.__name__)
         and not name.startswith("_")
     ]
+
+
+def commands() -> list[type[params.Params]]:
+    """Return the classes that hold the top level of a command's parameters."""
+    names = sorted(module.name for module in pkgutil.iter_modules(experiments.__path__))
+    modules = [importlib.import_module(f"{experiments.__name__}.{name}") for name in names]
+    return [group for module in modules for group in groups(module)]
 
 
 def table(group: type[params.Params]) -> str:
@@ -54,7 +70,8 @@ def table(group: type[params.Params]) -> str:
 
 def main() -> int:
     """Write the page, or compare it; return the exit status."""
-    page = "\n".join([HEAD, *(table(group) for group in groups())])
+    parts = [table(group) for group in groups(params)]
+    page = "\n".join([HEAD, *parts, COMMANDS, *(table(group) for group in commands())])
     if "--check" not in sys.argv[1:]:
         PAGE.write_text(page, encoding="utf-8")
     elif not PAGE.exists() or PAGE.read_text(encoding="utf-8") != page:
