@@ -8,6 +8,7 @@ properties, computed here and never typed.
 
 from antennate.params.antenna import N_MM_PER_DEG, AntennaParams
 from antennate.params.base import Params, number
+from antennate.params.bench import BenchVariationParams, WallParams
 from antennate.params.mind import (
     ConditioningParams,
     ControllerParams,
@@ -31,6 +32,7 @@ __all__ = [
     "N_MM_PER_DEG",
     "AntennaParams",
     "BenchPhysicsParams",
+    "BenchVariationParams",
     "ConditioningParams",
     "ControllerParams",
     "CylinderParams",
@@ -47,5 +49,6 @@ __all__ = [
     "TaperParams",
     "TunnelParams",
     "VariationParams",
+    "WallParams",
     "number",
 ]

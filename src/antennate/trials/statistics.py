@@ -29,6 +29,29 @@ def mean95(values: Floats, seed: int = 0) -> tuple[float, float, float]:
 
 
 @dataclass(frozen=True, slots=True)
+class Discordance:
+    """Two arms on the same trials, by success alone.
+
+    Attributes:
+        only_first: Trials on which only the first arm succeeded; `only_second` likewise.
+        mcnemar_p: Exact two-sided McNemar test on those.
+    """
+
+    only_first: int
+    only_second: int
+    mcnemar_p: float
+
+
+def mcnemar(ok: Bools) -> Discordance:
+    """Compare the successes of two arms trial by trial, shape (n, 2)."""
+    first, second = ok[:, 0], ok[:, 1]
+    only_first, only_second = int((first & ~second).sum()), int((second & ~first).sum())
+    discordant = only_first + only_second
+    p = float(stats.binomtest(only_first, discordant).pvalue) if discordant else 1.0
+    return Discordance(only_first, only_second, p)
+
+
+@dataclass(frozen=True, slots=True)
 class PairedTest:
     """Two arms on the same seeds.
 
@@ -53,10 +76,7 @@ class PairedTest:
 
 def compare(first_ok: Bools, second_ok: Bools, first_t: Floats, second_t: Floats) -> PairedTest:
     """Compare two arms trial by trial; arrays of shape (n,), times restricted to the limit [s]."""
-    only_first = int((first_ok & ~second_ok).sum())
-    only_second = int((second_ok & ~first_ok).sum())
-    discordant = only_first + only_second
-    mcnemar = float(stats.binomtest(only_first, discordant).pvalue) if discordant else 1.0
+    success = mcnemar(np.stack([first_ok, second_ok], axis=1))
     difference = first_t - second_t
     mean, low, high = mean95(difference)
     rank = 1.0
@@ -66,5 +86,6 @@ def compare(first_ok: Bools, second_ok: Bools, first_t: Floats, second_t: Floats
     both = first_ok & second_ok
     times = (float(first_t[both].mean()), float(second_t[both].mean())) if both.any() else None
     return PairedTest(
-        only_first, only_second, mcnemar, mean, (low, high), rank, int(both.sum()), times
+        *(success.only_first, success.only_second, success.mcnemar_p),
+        *(mean, (low, high), rank, int(both.sum()), times),
     )

@@ -1,0 +1,390 @@
+"""The boulder wall: which antenna passes a line of small spheres, which jams, which slips.
+
+Everything is defined before any run. The base comes in along the wall's normal until the straight
+antenna would reach behind the crests by the overlap, then moves along the wall. A trial *jams* if
+the tip advances less than `jam_advance` over some `jam_travel` of the base, *slips* if no sphere is
+touched for longer than `slip_time`, and succeeds if it does neither over the whole travel. The same
+is counted once more without the `start`. A trial that does both counts as a jam.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from typing import Any, Literal
+
+import numpy as np
+from pydantic import model_validator
+
+from antennate.errors import SimulationError
+from antennate.mechanics import PROFILES, with_profile
+from antennate.params import (
+    AntennaParams,
+    BenchPhysicsParams,
+    BenchVariationParams,
+    Params,
+    SensorParams,
+    WallParams,
+)
+from antennate.params.base import number
+from antennate.records import Floats
+from antennate.sim.bench import Ball, Bench, compile_bench
+from antennate.trials import statistics
+from antennate.trials.pool import run_tasks
+
+Profile = Literal["stiff", "descending", "compliant", "matched_uniform", "ascending"]
+Fate = Literal["success", "jam", "slip", "invalid"]
+REFERENCE: Profile = "descending"
+"""The arm that all others are compared with."""
+_COMMAND_PERIOD = 0.002
+"""Time between commands to the carriage [s]."""
+_SAMPLES = 5
+"""Commands to a sample."""
+_CLEAR = 0.002
+"""Distance between tip and crests before the approach [m]."""
+_SETTLE = 0.5
+"""Time to come to rest under gravity before the approach [s]."""
+_GRAVITY = 9.81
+
+
+class WallConfig(Params):
+    """Everything that decides the outcome of `antennate wall`."""
+
+    trials: int = number(
+        20, "1", "paper: 20 trials a profile", "trials of every arm", ge=1, le=10000
+    )
+    seed: int = number(1, "1", "assumed: any", "seed of all chance", ge=0)
+    arms: tuple[Profile, ...] = number(
+        tuple(PROFILES),
+        "1",
+        "paper: stiff, descending, compliant; assumed: two controls it lacks",
+        "profiles to run",
+        min_length=1,
+    )
+    wall: WallParams = WallParams()
+    antenna: AntennaParams = AntennaParams()
+    sensor: SensorParams = SensorParams()
+    variation: BenchVariationParams = BenchVariationParams()
+    physics: BenchPhysicsParams = BenchPhysicsParams()
+
+    @model_validator(mode="after")
+    def _sound(self) -> WallConfig:
+        if len(set(self.arms)) != len(self.arms):
+            raise ValueError(f"arms must differ, got {', '.join(self.arms)}")
+        reach = self.antenna.length * math.sin(self.wall.base_angle)
+        if self.wall.overlap + self.variation.overlap >= reach / 2:
+            raise ValueError(
+                f"wall.overlap must stay below half of the antenna's reach, {reach / 2:.4g} m, got "
+                f"{self.wall.overlap:g} m"
+            )
+        if self.wall.travel <= max(self.wall.start + self.wall.jam_travel, self.wall.jam_travel):
+            raise ValueError(
+                f"wall.travel must exceed start and jam_travel together, "
+                f"{self.wall.start + self.wall.jam_travel:g} m, got {self.wall.travel:g} m"
+            )
+        ratio = _COMMAND_PERIOD / self.physics.timestep
+        if abs(ratio - round(ratio)) > 1e-6 or round(ratio) < 1:
+            raise ValueError(
+                f"physics.timestep must divide {_COMMAND_PERIOD:g} s, got {self.physics.timestep:g}"
+            )
+        return self
+
+
+@dataclass(frozen=True, slots=True)
+class WallTrial:
+    """What became of one trial.
+
+    Attributes:
+        arm: Its profile; `trial` its number, which decides all chance.
+        fate: Over the whole travel; `fate_after_start` without the start.
+        least_advance_mm: Smallest advance of the tip over any `jam_travel` of the base.
+        longest_gap_s: Longest time without touch after the first one.
+        touched: Share of samples that touch.
+        force_mean_n: Mean contact force [N]; `force_max_n` the largest.
+        flex_max_deg: Largest flex under the film.
+        reason: Why it is invalid.
+    """
+
+    arm: str
+    trial: int
+    fate: Fate
+    fate_after_start: Fate
+    least_advance_mm: float
+    longest_gap_s: float
+    touched: float
+    force_mean_n: float
+    force_max_n: float
+    flex_max_deg: float
+    reason: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Traverse:
+    """Samples of one passage.
+
+    Attributes:
+        base: Travel of the base [m], shape (n,).
+        tip: Advance of the tip along the wall since the travel began [m], shape (n,).
+        touching: Whether a sphere is touched, shape (n,).
+        force: Contact force [N], shape (n,).
+        flex: Flex under the film [rad], shape (n,).
+        hinges: Hinge angles [rad], shape (n, 6).
+        shapes: Hinges and tip in the plane [m] at every tenth of the travel, shape (11, 7, 2).
+    """
+
+    base: Floats
+    tip: Floats
+    touching: Floats
+    force: Floats
+    flex: Floats
+    hinges: Floats
+    shapes: Floats
+
+
+@dataclass(frozen=True)
+class WallOutcome:
+    """All trials of a run.
+
+    Attributes:
+        config: What was run.
+        rows: Sorted by arm and trial.
+        examples: The first trial of every arm.
+    """
+
+    config: WallConfig
+    rows: list[WallTrial]
+    examples: dict[str, Traverse]
+
+    def result(self) -> dict[str, Any]:
+        """The content of result.json."""
+        by_arm = {a: [r for r in self.rows if r.arm == a] for a in self.config.arms}
+        return {
+            "schema": 1,
+            "command": "wall",
+            "seed": self.config.seed,
+            "gravity": self.config.wall.gravity,
+            "start_m": self.config.wall.start,
+            "arms": {arm: _summary(rows) for arm, rows in by_arm.items()},
+            "paired": _paired(by_arm),
+        }
+
+
+def _summary(rows: list[WallTrial]) -> dict[str, Any]:
+    valid = [r for r in rows if r.fate != "invalid"]
+    return {
+        **_counts([r.fate for r in rows]),
+        "after_start": _counts([r.fate_after_start for r in rows]),
+        "least_advance_mm": _median([r.least_advance_mm for r in valid]),
+        "longest_gap_s": _median([r.longest_gap_s for r in valid]),
+        "touched": _median([r.touched for r in valid]),
+        "force_mean_n": _median([r.force_mean_n for r in valid]),
+        "force_max_n": max((r.force_max_n for r in valid), default=None),
+        "flex_max_deg": max((r.flex_max_deg for r in valid), default=None),
+    }
+
+
+def _counts(fates: list[Fate]) -> dict[str, Any]:
+    successes, invalid = fates.count("success"), fates.count("invalid")
+    return {
+        "trials": len(fates),
+        "successes": successes,
+        "jams": fates.count("jam"),
+        "slips": fates.count("slip"),
+        "invalid": invalid,
+        "wilson95": statistics.wilson95(successes, len(fates) - invalid),
+    }
+
+
+def _median(values: list[float]) -> float | None:
+    return float(np.median(values)) if values else None
+
+
+def _paired(by_arm: dict[Profile, list[WallTrial]]) -> dict[str, Any]:
+    """The reference against every other arm, on trials valid in both, with both counts."""
+    if REFERENCE not in by_arm:
+        return {}
+    tests = {}
+    for other, theirs in by_arm.items():
+        pairs = [
+            (a, b)
+            for a, b in zip(by_arm[REFERENCE], theirs, strict=True)
+            if "invalid" not in (a.fate, b.fate)
+        ]
+        if other != REFERENCE and pairs:
+            whole = [(a.fate == "success", b.fate == "success") for a, b in pairs]
+            late = [
+                (a.fate_after_start == "success", b.fate_after_start == "success") for a, b in pairs
+            ]
+            tests[f"{REFERENCE}-{other}"] = {
+                "trials": len(pairs),
+                **asdict(statistics.mcnemar(np.array(whole))),
+                "after_start": asdict(statistics.mcnemar(np.array(late))),
+            }
+    return tests
+
+
+def passage(config: WallConfig, arm: Profile, trial: int) -> Traverse:
+    """Move one antenna along the wall.
+
+    Raises:
+        SimulationError: The physics became invalid.
+    """
+    rng = np.random.default_rng([config.seed, trial])
+    wall, variation = config.wall, config.variation
+    factors = np.exp(rng.normal(0.0, variation.stiffness, 6))
+    friction = max(0.0, config.antenna.friction + rng.normal(0.0, variation.friction))
+    angle = wall.base_angle + rng.uniform(-1, 1) * variation.base_angle
+    overlap = wall.overlap + rng.uniform(-1, 1) * variation.overlap
+    phase = rng.uniform(0.0, 1.0) * wall.sphere_diameter
+    antenna = with_profile(config.antenna, config.sensor, arm)
+    antenna = antenna.model_copy(update={"friction": min(friction, 2.0)})
+    bench = _bench(config, antenna, angle, phase, factors)
+    crest = antenna.length * math.sin(angle) + antenna.radius + _CLEAR
+    return _drive(config, bench, math.pi / 2 - angle, overlap + _CLEAR, crest)
+
+
+def _bench(
+    config: WallConfig, antenna: AntennaParams, angle: float, phase: float, factors: Floats
+) -> Bench:
+    """Bench with spheres all along the way, their crests clear of the tip at first."""
+    wall, pitch = config.wall, config.wall.sphere_diameter
+    x = antenna.length * math.sin(angle) + antenna.radius + _CLEAR + pitch / 2
+    below = -2 * pitch - max(0.0, -antenna.length * math.cos(angle))
+    above = wall.travel + 1.2 * antenna.length
+    heights = np.arange(below + phase, above, pitch)
+    balls = [Ball(x, float(y), pitch / 2) for y in heights]
+    pull = {"down": -_GRAVITY, "up": _GRAVITY, "off": 0.0}[wall.gravity]
+    model = compile_bench(config.physics, antenna, config.sensor, balls, (0.0, pull))
+    for i, factor in enumerate(factors):
+        joint = model.joint(f"antenna/hinge{i}")
+        joint.stiffness *= factor
+    return Bench(model, config.sensor.covered_hinges(antenna))
+
+
+def _drive(
+    config: WallConfig, bench: Bench, base: float, approach: float, crest: float
+) -> Traverse:
+    wall = config.wall
+    bench.place(0.0, 0.0, base)
+    bench.step(round(_SETTLE / config.physics.timestep))
+    substeps = round(_COMMAND_PERIOD / config.physics.timestep)
+    for x in _ramp(approach, wall.speed):
+        bench.command(x, 0.0, wall.speed, 0.0, base)
+        bench.step(substeps)
+    begin = bench.tip()[1]
+    path = _ramp(wall.travel, wall.speed)
+    rows, hinges, shapes = [], [], []
+    marks = {round(i * (len(path) - 1) / 10) for i in range(11)}
+    for i, y in enumerate(path):
+        bench.command(approach, y, 0.0, wall.speed, base)
+        bench.step(substeps)
+        if i in marks:
+            shapes.append(bench.joints())
+        if i % _SAMPLES == 0:
+            force = float(np.hypot(*bench.contact_force()))
+            tip = bench.tip()[1] - begin
+            rows.append((y, tip, bench.touching(), force, bench.flex()))
+            hinges.append(bench.hinges().copy())
+    return Traverse(*np.array(rows, float).T, np.array(hinges), np.array(shapes) - [crest, 0.0])
+
+
+def _ramp(length: float, speed: float) -> list[float]:
+    count = max(1, math.ceil(length / (speed * _COMMAND_PERIOD) - 1e-9))
+    return (length * np.arange(1, count + 1) / count).tolist()
+
+
+def judge(config: WallConfig, arm: Profile, trial: int, seen: Traverse) -> WallTrial:
+    """What became of a passage, by the definitions above."""
+    wall, period = config.wall, _COMMAND_PERIOD * _SAMPLES
+    advance = least_advance(seen.base, seen.tip, wall.jam_travel)
+    gap = longest_gap(seen.touching, period)
+    late = seen.base > wall.start
+    after = _fate(
+        wall,
+        least_advance(seen.base[late], seen.tip[late], wall.jam_travel),
+        longest_gap(seen.touching[late], period, True),
+    )
+    return WallTrial(
+        arm=arm,
+        trial=trial,
+        fate=_fate(wall, advance, gap),
+        fate_after_start=after,
+        least_advance_mm=1e3 * advance,
+        longest_gap_s=gap,
+        touched=float(seen.touching.mean()),
+        force_mean_n=float(seen.force.mean()),
+        force_max_n=float(seen.force.max()),
+        flex_max_deg=math.degrees(abs(seen.flex).max()),
+    )
+
+
+def least_advance(base: Floats, tip: Floats, travel: float) -> float:
+    """Smallest advance of the tip over any such travel of the base; all in m, shapes (n,)."""
+    ends = np.searchsorted(base, base + travel - 1e-9)
+    begins = np.flatnonzero(ends < len(base))
+    return float((tip[ends[begins]] - tip[begins]).min())
+
+
+def longest_gap(touching: Floats, period: float, from_start: bool = False) -> float:
+    """Longest time without touch [s], after the first touch or from the start on."""
+    free = np.flatnonzero(np.concatenate([[from_start], touching > 0, [True]]))
+    if len(free) == 1 and not from_start:
+        return len(touching) * period  # never touched at all
+    return float((np.diff(free) - 1).max(initial=0)) * period
+
+
+def _fate(wall: WallParams, advance: float, gap: float) -> Fate:
+    if advance < wall.jam_advance:
+        return "jam"
+    return "slip" if gap > wall.slip_time else "success"
+
+
+def _run_task(
+    task: tuple[WallConfig, Profile, int], emit: Callable[[tuple[WallTrial, Traverse | None]], None]
+) -> None:
+    config, arm, trial = task
+    try:
+        seen = passage(config, arm, trial)
+    except SimulationError as error:
+        none = [math.nan] * 6
+        row = WallTrial(arm, trial, "invalid", "invalid", *none, reason=str(error))
+        emit((row, None))
+        return
+    emit((judge(config, arm, trial, seen), seen if trial == 0 else None))
+
+
+def run(
+    config: WallConfig,
+    workers: int = 1,
+    on_step: Callable[[int, int], None] = lambda done, total: None,
+    on_row: Callable[[WallTrial], None] = lambda row: None,
+) -> WallOutcome:
+    """Run all trials of all arms.
+
+    Args:
+        config: What to run.
+        workers: Processes to use; the outcome does not depend on it.
+        on_step: Called after every trial with how many of how many are done.
+        on_row: Called with every trial, in no particular order.
+
+    Raises:
+        WorkerError: A worker process died.
+    """
+    tasks: list[tuple[WallConfig, Profile, int]] = [
+        (config, arm, trial) for trial in range(config.trials) for arm in config.arms
+    ]
+    rows: list[WallTrial] = []
+    examples: dict[str, Traverse] = {}
+
+    def take(item: tuple[WallTrial, Traverse | None]) -> None:
+        row, seen = item
+        rows.append(row)
+        if seen is not None:
+            examples[row.arm] = seen
+        on_row(row)
+        on_step(len(rows), len(tasks))
+
+    run_tasks(_run_task, tasks, workers, take)
+    rows.sort(key=lambda row: (config.arms.index(row.arm), row.trial))
+    return WallOutcome(config, rows, examples)
