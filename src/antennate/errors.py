@@ -39,3 +39,7 @@ class SimulationError(AntennateError):
 
 class WorkerError(AntennateError):
     """A worker process failed or died; finished trials are kept."""
+
+
+class CalibrationError(BadInputError):
+    """A recording or a calibration file cannot be used."""

@@ -20,6 +20,7 @@ COMMANDS = {
     "gait": "walk on a flat floor: speed, turning and cost of the gait",
     "springs": "torsion springs: stiffness from wire and coils, and back",
     "taper": "stiffness along a tapering antenna, and the ladder of springs that follows it",
+    "calibrate": "readings to bend: fit a recording, or push a simulated antenna",
     "wall": "pass a line of boulders with five antennae: success, jam or slip",
     "sensor": "flex to counts: curve, hysteresis, creep, noise and the best divider",
 }

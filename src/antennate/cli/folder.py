@@ -37,7 +37,8 @@ DRAWINGS = tuple(
     for name in ("trajectories", "summary", "passages", *COMMANDS)
     for suffix in ("svg", "png")
 )
-_NAMES = (RESULT, PARTIAL, TABLE, CONFIG, VERSIONS, COMMAND, *DRAWINGS)
+FILES = ("calibration.json", "conditioning.toml", "recording.csv")
+_NAMES = (RESULT, PARTIAL, TABLE, CONFIG, VERSIONS, COMMAND, *FILES, *DRAWINGS)
 """Every file that a run may write."""
 _CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f]+")
 

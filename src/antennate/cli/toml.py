@@ -23,6 +23,8 @@ def _lines(group: Params, path: tuple[str, ...]) -> Iterator[str]:
         value = getattr(group, name)
         if isinstance(value, Params):
             groups.append((name, value))
+        elif value is None:
+            yield f"# {name} is not set: {field.description}"
         else:
             yield f"{name} = {_value(value)}  # {field.description}"
     for name, value in groups:

@@ -23,15 +23,15 @@ def show_result(result: Mapping[str, Any]) -> None:
     start = 1e3 * result["start_m"]
     show(
         "Arms",
-        result["arms"],
+        {name.replace("_", " "): arm for name, arm in result["arms"].items()},
         _ARM_ROWS,
         f"Seed {result['seed']}, gravity {result['gravity']}. `after` leaves out the first "
         f"{start:g} mm of travel.\nMedians over trials; invalid trials are left out of them.\n",
     )
     if result["paired"]:
         show(
-            "Pairs, trial by trial",
-            result["paired"],
+            f"{wall.REFERENCE} (first) against each, trial by trial",
+            {name.split("-")[1].replace("_", " "): p for name, p in result["paired"].items()},
             _PAIR_ROWS,
             "McNemar's test, exact, two-sided.\n",
         )

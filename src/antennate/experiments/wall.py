@@ -158,7 +158,9 @@ class WallOutcome:
 
     def result(self) -> dict[str, Any]:
         """The content of result.json."""
-        by_arm = {a: [r for r in self.rows if r.arm == a] for a in self.config.arms}
+        by_arm: dict[Profile, list[WallTrial]] = {
+            a: [r for r in self.rows if r.arm == a] for a in self.config.arms
+        }
         return {
             "schema": 1,
             "command": "wall",
@@ -286,7 +288,9 @@ def _drive(
             tip = bench.tip()[1] - begin
             rows.append((y, tip, bench.touching(), force, bench.flex()))
             hinges.append(bench.hinges().copy())
-    return Traverse(*np.array(rows, float).T, np.array(hinges), np.array(shapes) - [crest, 0.0])
+    base_y, tip_y, touching, forces, flex = np.array(rows, float).T
+    from_crest = np.array(shapes) - [crest, 0.0]
+    return Traverse(base_y, tip_y, touching, forces, flex, np.array(hinges), from_crest)
 
 
 def _ramp(length: float, speed: float) -> list[float]:

@@ -1,4 +1,4 @@
-"""Figures of `antennate wall`: what became of each arm, how tips advance, and the map of a study."""
+"""Figures of `antennate wall`: what became of each arm, how tips advance, and a map."""
 
 from __future__ import annotations
 

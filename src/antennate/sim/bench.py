@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -23,6 +24,7 @@ from antennate.sim.world import new_spec
 
 PREFIX = "antenna/"
 _SLIDES = ("carriage_x", "carriage_y")
+_PROBE = ("probe_x", "probe_y")
 _CARRIAGE_MASS = 1.0
 """A thousand antenna links [kg]: what the antenna feels does not move it."""
 _STIFFNESS, _DAMPING = 1e4, 200.0
@@ -59,6 +61,7 @@ def compile_bench(
     sensor: SensorParams,
     obstacles: Sequence[Ball | Bar] = (),
     gravity: tuple[float, float] = (0.0, 0.0),
+    probe_radius: float | None = None,
 ) -> mujoco.MjModel:
     """The bench with its antenna along +x, its base over the origin.
 
@@ -68,25 +71,18 @@ def compile_bench(
         sensor: Decides which hinges the film stiffens.
         obstacles: What stands there.
         gravity: Gravity in the plane [m/s²].
+        probe_radius: Radius of a rod that moves on slides of its own [m]; none without.
     """
     spec = new_spec(physics)
     spec.option.gravity = [*gravity, 0.0]
     spec.option.tolerance = 1e-10
     for obstacle in obstacles:
         _add(spec, obstacle)
-    carriage = spec.worldbody.add_body(name="carriage")
-    carriage.gravcomp = 1.0
-    carriage.mass = _CARRIAGE_MASS
-    carriage.inertia = [1e-3, 1e-3, 1e-3]
-    carriage.explicitinertial = True
-    for name, axis in zip(_SLIDES, ([1, 0, 0], [0, 1, 0]), strict=True):
-        carriage.add_joint(name=name, type=mujoco.mjtJoint.mjJNT_SLIDE, axis=axis)
-        servo = spec.add_actuator(name=name, trntype=mujoco.mjtTrn.mjTRN_JOINT, target=name)
-        servo.set_to_position(kp=_STIFFNESS)
-        follow = spec.add_actuator(
-            name=f"{name}_speed", trntype=mujoco.mjtTrn.mjTRN_JOINT, target=name
+    carriage = _slider(spec, "carriage", _SLIDES)
+    if probe_radius is not None:
+        _slider(spec, "probe", _PROBE).add_geom(
+            type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[probe_radius, 0, 0], **_OBSTACLE
         )
-        follow.set_to_velocity(kv=_DAMPING)
     frame = carriage.add_frame()
     spec.attach(antenna_part.build(antenna, sensor), frame=frame, prefix=PREFIX)
     for geom in spec.geoms:
@@ -95,26 +91,44 @@ def compile_bench(
     return spec.compile()
 
 
+_OBSTACLE: dict[str, Any] = {
+    "friction": [0, 0, 0],  # the larger of two counts: the antenna's
+    "condim": 3,
+    "contype": layers.OBSTACLE,
+    "conaffinity": layers.ANTENNA,
+}
+
+
+def _slider(spec: mujoco.MjSpec, name: str, slides: tuple[str, str]) -> mujoco.MjsBody:
+    """A heavy body on two slides with servos, untouched by gravity."""
+    body = spec.worldbody.add_body(name=name)
+    body.gravcomp = 1.0
+    body.mass = _CARRIAGE_MASS
+    body.inertia = [1e-3, 1e-3, 1e-3]
+    body.explicitinertial = True
+    for slide, axis in zip(slides, ([1, 0, 0], [0, 1, 0]), strict=True):
+        body.add_joint(name=slide, type=mujoco.mjtJoint.mjJNT_SLIDE, axis=axis)
+        hinge = mujoco.mjtTrn.mjTRN_JOINT
+        spec.add_actuator(name=slide, trntype=hinge, target=slide).set_to_position(kp=_STIFFNESS)
+        follow = spec.add_actuator(name=f"{slide}_speed", trntype=hinge, target=slide)
+        follow.set_to_velocity(kv=_DAMPING)
+    return body
+
+
 def _add(spec: mujoco.MjSpec, obstacle: Ball | Bar) -> None:
-    look = {
-        "friction": [0, 0, 0],  # the larger of two counts: the antenna's
-        "condim": 3,
-        "contype": layers.OBSTACLE,
-        "conaffinity": layers.ANTENNA,
-    }
     if isinstance(obstacle, Ball):
         spec.worldbody.add_geom(
             type=mujoco.mjtGeom.mjGEOM_SPHERE,
             pos=[obstacle.x, obstacle.y, 0],
             size=[obstacle.radius, 0, 0],
-            **look,
+            **_OBSTACLE,
         )
         return
     spec.worldbody.add_geom(
         type=mujoco.mjtGeom.mjGEOM_CAPSULE,
         fromto=[obstacle.x0, obstacle.y0, 0, obstacle.x1, obstacle.y1, 0],
         size=[obstacle.radius, 0, 0],
-        **look,
+        **_OBSTACLE,
     )
 
 
@@ -135,13 +149,15 @@ class Bench:
         self._sensed = sensed_hinges
         self._links: Ints = np.array([model.body(name).id for name in names])
         self._end = 2.0 * float(model.geom(names[-1]).pos[0])
-        self._controls: Ints = np.array(
-            [
-                model.actuator(name).id
-                for name in (*_SLIDES, *(f"{s}_speed" for s in _SLIDES), PREFIX + ANTENNA_BASE)
-            ]
-        )
+        self._controls = self._actuators(*_SLIDES, PREFIX + ANTENNA_BASE)
+        has_probe = any(model.body(i).name == "probe" for i in range(model.nbody))
+        self._probe = self._addresses(_PROBE) if has_probe else None
+        self._probe_controls = self._actuators(*_PROBE) if has_probe else None
         self._steps = 0
+
+    def _actuators(self, x: str, y: str, *others: str) -> Ints:
+        names = (x, y, f"{x}_speed", f"{y}_speed", *others)
+        return np.array([self.model.actuator(name).id for name in names])
 
     def _addresses(self, joints: Sequence[str]) -> Ints:
         return np.array([self.model.joint(name).qposadr[0] for name in joints])
@@ -161,6 +177,20 @@ class Bench:
     def command(self, x: float, y: float, speed_x: float, speed_y: float, base: float) -> None:
         """Set the carriage's target [m], its speed there [m/s] and the base angle [rad]."""
         self.data.ctrl[self._controls] = x, y, speed_x, speed_y, base
+
+    def place_probe(self, x: float, y: float) -> None:
+        """Put the probe at x, y [m], at rest."""
+        self.data.qpos[self._probe] = x, y
+        self.command_probe(x, y, 0.0, 0.0)
+        mujoco.mj_forward(self.model, self.data)
+
+    def command_probe(self, x: float, y: float, speed_x: float, speed_y: float) -> None:
+        """Set the probe's target [m] and its speed there [m/s]."""
+        self.data.ctrl[self._probe_controls] = x, y, speed_x, speed_y
+
+    def probe(self) -> Floats:
+        """Position of the probe [m], shape (2,)."""
+        return self.data.qpos[self._probe]
 
     def step(self, count: int = 1) -> None:
         """Advance by `count` physics steps.

@@ -1,0 +1,263 @@
+"""Calibration: known truths come back, files hold what was found, bad data are refused by row."""
+
+from __future__ import annotations
+
+import csv
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from antennate import calibration
+from antennate.calibration import Calibration, Samples
+from antennate.cli import main
+from antennate.errors import CalibrationError, OutputError
+from antennate.experiments.calibrate import CalibrateConfig, RigParams, averaged, run
+from antennate.experiments.recording import Recording, RecordingParams, read, write
+from antennate.records import Floats
+
+LOW, HIGH = 1300.0, 1900.0
+HASH = "0" * 64
+DATA = Path(__file__).parents[2] / "shared" / "data"
+
+
+def simulated(
+    slope: float, midpoint: float, sign: int, seed: int, noise: float = 2.5, pushes: int = 30
+) -> Samples:
+    """Counts that a sigmoid of x = (counts - LOW) / (HIGH - LOW) turns into the true bend."""
+    rng = np.random.default_rng(seed)
+    bend = np.tile(np.linspace(0.01, 0.99, 60), pushes)
+    x = midpoint + sign * np.log(bend / (1 - bend)) / slope
+    counts = np.rint(LOW + x * (HIGH - LOW) + rng.normal(0, noise, len(bend)))
+    n = len(bend)
+    trial = np.repeat(np.arange(pushes), 60)
+    return Samples(counts, bend, trial, np.full(n, np.nan), np.arange(2, n + 2))
+
+
+def fit(samples: Samples, **rest: object) -> Calibration:
+    return calibration.fit(samples, "left-1", HASH, **{"draws": 20, **rest})  # pyright: ignore[reportArgumentType]
+
+
+@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("sign", [-1, 1])
+def test_a_known_truth_comes_back(seed: int, sign: int) -> None:
+    """Midpoint within 1 %, slope within 5 %, in counts, whatever the normalisation."""
+    slope, midpoint = 18.3, 0.45
+    found = fit(simulated(slope, midpoint, sign, seed))
+    span = found.counts_high - found.counts_low
+    assert found.polarity == sign
+    true = LOW + midpoint * (HIGH - LOW)
+    assert found.counts_low + found.midpoint * span == pytest.approx(true, rel=0.01)
+    assert found.slope / span == pytest.approx(slope / (HIGH - LOW), rel=0.05)
+    assert found.r2 > 0.98
+
+
+def test_intervals_hold_the_truth_about_as_often_as_they_say() -> None:
+    """95 % intervals of the midpoint over 20 data sets: 19 expected, 15 is beyond four sigma."""
+    hits = 0
+    for seed in range(20):
+        found = fit(simulated(12.0, 0.5, 1, 100 + seed, noise=8.0, pushes=12), draws=60)
+        low, high = found.midpoint_95
+        span = found.counts_high - found.counts_low
+        true = (LOW + 0.5 * (HIGH - LOW) - found.counts_low) / span
+        hits += low <= true <= high
+    assert hits >= 15
+
+
+def test_a_line_is_preferred_where_it_is_true() -> None:
+    rng = np.random.default_rng(0)
+    bend = np.tile(np.linspace(0, 1, 50), 10)
+    counts = np.rint(1800 - 400 * bend + rng.normal(0, 3, 500))
+    trial = np.repeat(np.arange(10), 50)
+    found = fit(Samples(counts, bend, trial, np.full(500, 0.1), np.arange(500) + 2))
+    assert "line" in found.better_than_sigmoid
+    assert found.cross_validated_rmse["line"] == pytest.approx(3 / 400, rel=0.1)
+
+
+def test_a_sigmoid_is_not_beaten_by_a_line_where_it_is_true() -> None:
+    assert "line" not in fit(simulated(10.0, 0.5, -1, 3)).better_than_sigmoid
+
+
+def test_the_controller_gets_the_same_curve() -> None:
+    samples = simulated(14.0, 0.4, -1, 1)
+    found = fit(samples)
+    level = calibration.level(found, samples.counts)
+    assert np.sqrt(np.mean((level - samples.bend) ** 2)) == pytest.approx(found.rmse, rel=1e-9)
+
+
+def test_a_saved_file_is_read_back_and_never_replaced_unasked(tmp_path: Path) -> None:
+    found, path = fit(simulated(14.0, 0.4, -1, 1)), tmp_path / "left.json"
+    calibration.save(found, path)
+    assert calibration.load(path) == found
+    other = found.model_copy(update={"slope": 1.0})
+    with pytest.raises(OutputError, match="expected no such file"):
+        calibration.save(other, path)
+    assert calibration.load(path) == found
+    calibration.save(other, path, overwrite=True)
+    assert calibration.load(path).slope == 1.0
+    assert [file.name for file in tmp_path.iterdir()] == ["left.json"]
+
+
+@pytest.mark.parametrize(
+    ("change", "word"),
+    [
+        ({"slope": 0.0}, "slope"),
+        ({"slope": 1e9}, "slope"),
+        ({"polarity": 0}, "polarity"),
+        ({"counts_low": 1900.0, "counts_high": 1900.0}, "counts_high"),
+        ({"counts_high": 5000.0}, "counts_high"),
+        ({"schema_version": 2}, "schema_version"),
+        ({"threshold": 1.5}, "threshold"),
+        ({"sensor_id": "../left"}, "sensor_id"),
+        ({"extra": 1}, "extra"),
+        ({"midpoint": "0.3"}, "midpoint"),
+    ],
+)
+def test_a_bad_file_is_refused_with_its_field(
+    tmp_path: Path, change: dict[str, object], word: str
+) -> None:
+    content = fit(simulated(14.0, 0.4, -1, 1)).model_dump(mode="json") | change
+    path = tmp_path / "bad.json"
+    path.write_text(json.dumps(content))
+    with pytest.raises(CalibrationError, match=word):
+        calibration.load(path)
+
+
+@pytest.mark.parametrize("text", ["", "{", "[]", '{"slope": NaN}', '{"slope": 1e999}', "\x00"])
+def test_what_is_no_calibration_is_refused(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "bad.json"
+    path.write_text(text)
+    with pytest.raises(CalibrationError):
+        calibration.load(path)
+
+
+def table(counts: Floats, bend: Floats) -> str:
+    lines = [
+        f"{0.01 * i:.2f},{c:g},{b:.6f}" for i, (c, b) in enumerate(zip(counts, bend, strict=True))
+    ]
+    return "\n".join(["time,counts,bend", *lines]) + "\n"
+
+
+BEND = np.linspace(0, 1, 100)
+GOOD = 1800 - 400 * BEND
+
+
+def spoiled(row: int, cell: str) -> str:
+    lines = table(GOOD, BEND).splitlines()
+    lines[row - 1] = cell
+    return "\n".join(lines) + "\n"
+
+
+BAD = {
+    "non-monotonic": (table(1800 - 400 * np.sin(3 * BEND), BEND), r"row \d+.*non-monotonic.*film"),
+    "constant": (table(np.full(100, 1500.0), BEND), r"row 2.*constant.*wiring"),
+    "saturated": (table(np.where(BEND > 0.5, 0, GOOD), BEND), r"row 52.*saturated.*resistor"),
+    "nan": (spoiled(7, "0.05,nan,0.05"), r"row 7.*finite.*delete the row"),
+    "word": (spoiled(9, "0.07,wet,0.07"), r"row 9.*'wet'"),
+    "volts": (table(GOOD / 4095 * 3.3, BEND), r"row 2.*volts"),
+    "beyond 12 bits": (spoiled(5, "0.03,5000,0.03"), r"row 5.*0 to 4095"),
+    "degrees as a share": (table(GOOD, 90 * BEND), r"row 4.*bend-unit"),
+    "truncated": (table(GOOD, BEND)[:-5], r"row 101.*truncated"),
+    "short row": (spoiled(101, "0.99,1400"), r"row 101.*expected 3 cells, found 2.*truncated"),
+    "time goes back": (spoiled(50, "0.01,1600,0.5"), r"row 50.*time to rise"),
+    "milliseconds as seconds": (
+        "time,counts,bend\n" + "".join(f"{20 * i},{GOOD[i]},{BEND[i]}\n" for i in range(100)),
+        r"row 3.*time-unit",
+    ),
+    "too few": (table(GOOD[:5], BEND[:5]), r"row 6.*at least 20 readings"),
+    "no bend": (table(GOOD, np.full(100, 0.5)), r"row 2.*a tenth of the full"),
+    "no column": (table(GOOD, BEND).replace("counts", "adc"), r"row 1.*column counts.*time, adc"),
+    "twice": (
+        table(GOOD, BEND).replace("time,counts,bend", "time,counts,bend,bend"),
+        r"row 1.*one column bend",
+    ),
+    "no sense": (
+        table(1500 + 30 * np.random.default_rng(0).normal(size=100), BEND),
+        r"row \d+.*non-monotonic|explains",
+    ),
+    "empty": ("", r"row 1.*expected a"),
+}
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_a_bad_recording_is_refused_in_one_line_and_nothing_is_written(
+    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text, word = BAD[name]
+    file, out = tmp_path / "bad.csv", tmp_path / "out"
+    file.write_text(text)
+    assert main(["calibrate", "--recording", str(file), "--out", str(out)]) == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1
+    assert re.search(word, said), said
+    assert not out.exists()
+
+
+def test_a_recording_with_units_is_what_it_says(tmp_path: Path) -> None:
+    file = tmp_path / "r.csv"
+    rows = [f"{10 * i},{1800 - 4 * i},{0.9 * i}" for i in range(100)]
+    file.write_text("\n".join(["ms,adc,angle", *rows]) + "\n")
+    columns = RecordingParams(
+        time_column="ms",
+        time_unit="ms",
+        counts_column="adc",
+        bend_column="angle",
+        bend_unit="deg",
+        bend_zero=0.0,
+        bend_full=90.0,
+    )
+    found = read(file, columns)
+    assert found.t[50] == pytest.approx(0.5)
+    assert found.samples.bend[50] == pytest.approx(0.5)
+    assert found.samples.row[0] == 2
+
+
+def test_averaging_takes_the_mean_of_the_last_readings_of_a_push() -> None:
+    counts = np.array([1.0, 2.0, 3.0, 10.0, 20.0])
+    trial = np.array([0, 0, 0, 1, 1])
+    s = Samples(counts, counts, trial, counts, trial)
+    t = np.array([0.0, 0.01, 0.02, 0.0, 0.01])
+    assert averaged(Recording(t, s, ""), 0.02).samples.counts.tolist() == [1, 1.5, 2.5, 10, 15]
+
+
+RIG = CalibrateConfig(rig=RigParams(pushes=2), draws=20)
+
+
+def test_the_rig_gives_the_same_on_one_and_two_workers_and_from_its_own_recording(
+    tmp_path: Path,
+) -> None:
+    one, two = run(RIG, 1), run(RIG, 2)
+    assert one.result() == two.result()
+    file = tmp_path / "recording.csv"
+    file.write_text(write(one.raw))
+    again = run(RIG.model_copy(update={"recording": str(file)}))
+    assert again.calibration == one.calibration
+
+
+def test_the_rig_sees_readings_fall_as_the_rod_goes_in() -> None:
+    found = run(RIG)
+    assert found.calibration.polarity == -1
+    assert {speed.speed_m_s for speed in found.calibration.speeds} == {0.05, 0.10, 0.15}
+    fsr = RIG.model_dump()
+    fsr["sensor"]["kind"] = "fsr"
+    assert run(CalibrateConfig.model_validate(fsr)).calibration.polarity == 1
+
+
+@pytest.mark.skipif(not (DATA / "flex_static_12bit").exists(), reason="recordings not present")
+def test_a_real_flex_sensor_in_static_holds(tmp_path: Path) -> None:
+    """SOURCE.md of the recording: slope 129.8, midpoint 0.0640 in x = counts / 4095, sign +."""
+    source = next((DATA / "flex_static_12bit" / "derived").glob("*.csv"))
+    with source.open() as file:
+        rows = list(csv.DictReader(file))
+    counts = np.array([float(r["adc12_if_3v3"]) for r in rows])
+    angle = np.array([float(r["angle_deg"]) for r in rows])
+    trial = np.unique(angle, return_inverse=True)[1]
+    samples = Samples(
+        counts, angle / 90.0, trial, np.full(len(angle), np.nan), np.arange(len(angle))
+    )
+    found = fit(samples, full_scale=True)
+    assert found.polarity == 1
+    assert found.midpoint == pytest.approx(0.0640, rel=0.02)
+    assert found.slope == pytest.approx(129.8, rel=0.1)
