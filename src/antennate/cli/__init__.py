@@ -18,6 +18,8 @@ OK, BAD_INPUT, INTERRUPTED = 0, 2, 130
 COMMANDS = {
     "tunnel": "walk robots through a corridor of loose cylinders, with and without touch",
     "gait": "walk on a flat floor: speed, turning and cost of the gait",
+    "force": "how much of a contact's force the flex tells, with and without knowing the place",
+    "sweep": "sweep an antenna beside walls: its shapes, and the distances that active touch tells",
 }
 
 
