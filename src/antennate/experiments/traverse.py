@@ -73,7 +73,7 @@ def drag(
     last = math.inf
     try:
         while bench.t < end and bench.t - last < _LOST:
-            bench.command(0.0, -_way(bench.t, speed), 0.0, -_speed(bench.t, speed), 0.0)
+            bench.command(0.0, -way(bench.t, speed), 0.0, -speed_at(bench.t, speed), 0.0)
             force = _mean_force(bench, steps)
             if abs(bench.hinges()).max() > limit:
                 break
@@ -81,7 +81,8 @@ def drag(
                 last = bench.t
                 rows.append((bench.flex(), force, _place(bench.joints(), post), last))
     except SimulationError as error:
-        return Traverse(*np.zeros((4, 0)), reason=str(error))
+        none = np.zeros(0)
+        return Traverse(none, none, none, none, str(error))
     flex, pressed, place, t = np.array(rows).reshape(-1, 4).T
     return Traverse(flex, pressed, place, t - t[:1])
 
@@ -99,12 +100,13 @@ def _mean_force(bench: Bench, steps: int) -> float:
     return float(np.linalg.norm(total / steps))
 
 
-def _speed(t: float, speed: float) -> float:
+def speed_at(t: float, speed: float) -> float:
+    """Speed of a base that comes up to `speed` without a jerk [m/s]."""
     return speed * min(t / _RISE, 1.0)
 
 
-def _way(t: float, speed: float) -> float:
-    """Integral of the speed above."""
+def way(t: float, speed: float) -> float:
+    """Way of such a base [m]: the integral of its speed."""
     return speed * (t * t / (2 * _RISE) if t < _RISE else t - _RISE / 2)
 
 

@@ -91,9 +91,7 @@ def _scatter(
     panel.scatter(
         np.degrees(points.scalars["flex"][within]),
         points.force[within],
-        c=points.place[within],
-        norm=scale.norm,
-        cmap=scale.cmap,
+        c=scale.to_rgba(points.place[within]),
         s=7,
         linewidths=0,
         rasterized=True,

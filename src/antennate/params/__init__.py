@@ -24,6 +24,7 @@ from antennate.params.scene import (
     TunnelParams,
     VariationParams,
 )
+from antennate.params.sweep import ShapeParams, SweepParams
 
 __all__ = [
     "N_MM_PER_DEG",
@@ -41,6 +42,8 @@ __all__ = [
     "RuleParams",
     "SensorParams",
     "ServoParams",
+    "ShapeParams",
+    "SweepParams",
     "TunnelParams",
     "VariationParams",
     "number",
