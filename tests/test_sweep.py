@@ -15,6 +15,7 @@ from antennate.params import (
     AntennaParams,
     BenchPhysicsParams,
     ConditioningParams,
+    EstimateParams,
     SensorParams,
     ShapeParams,
     SweepParams,
@@ -29,7 +30,7 @@ SMALL = sweep.SweepConfig(
     centres=(math.radians(47),),
     amplitudes=(math.radians(30),),
     sweeps=1,
-    estimate=estimates.EstimateParams(trials=6),
+    estimate=EstimateParams(trials=6),
     sweep=SweepParams(frequency=2.0),
 )
 
@@ -169,7 +170,7 @@ def test_a_gap_is_both_distances_and_the_space_between_the_bases():
 def setting(frequency=2.0):
     return estimates.Setting(
         0,
-        estimates.EstimateParams(),
+        EstimateParams(),
         SweepParams(frequency=frequency),
         SHAPE,
         ConditioningParams(),

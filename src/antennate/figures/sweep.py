@@ -43,7 +43,7 @@ def study(result: Mapping[str, Any]) -> Figure:
         result: The content of result.json; the map of its `profile`, or of the first, is drawn.
     """
     figure = style.canvas(10.0, 8.2)
-    upper, lower = figure.subfigures(2, 1, height_ratios=(1.35, 1))
+    upper, lower = np.array(figure.subfigures(2, 1, height_ratios=(1.35, 1)))
     name = (
         result["profile"] if result["profile"] in result["shapes"] else next(iter(result["shapes"]))
     )

@@ -24,7 +24,7 @@ from antennate.params.scene import (
     TunnelParams,
     VariationParams,
 )
-from antennate.params.sweep import ShapeParams, SweepParams
+from antennate.params.sweep import EstimateParams, ShapeParams, SweepParams
 
 __all__ = [
     "N_MM_PER_DEG",
@@ -34,6 +34,7 @@ __all__ = [
     "ControllerParams",
     "CylinderParams",
     "EscapeParams",
+    "EstimateParams",
     "GaitParams",
     "Params",
     "PhysicsParams",

@@ -64,3 +64,70 @@ class ShapeParams(Params):
         gt=0,
         le=0.01,
     )
+
+
+class EstimateParams(Params):
+    """Trials of the estimates, and what differs between them."""
+
+    trials: int = number(
+        60,
+        "1",
+        "assumed: three times the paper's 20",
+        "trials to calibrate, and as many to judge, in every condition",
+        ge=6,
+        le=100000,
+    )
+    distance: tuple[float, float] = number(
+        (0.4, 0.9),
+        "1",
+        "assumed: within reach of the default sweep",
+        "range of wall distances, over the length of the antenna",
+    )
+    centre_range: float = number(
+        math.radians(10.0),
+        "rad",
+        "assumed: the body yaws by so much while it walks",
+        "half range of the centre where the sweep is varied",
+        ge=0,
+        le=1,
+    )
+    amplitude_range: float = number(
+        math.radians(10.0),
+        "rad",
+        "assumed: a third of the default",
+        "half range of the amplitude where the sweep is varied",
+        ge=0,
+        le=1,
+    )
+    tilt_range: float = number(
+        0.15,
+        "rad",
+        "assumed: as the start's heading in the tunnel, placed by hand",
+        "half range of the walls' angle where they are tilted",
+        ge=0,
+        le=1,
+    )
+    base_zero: float = number(
+        0.02,
+        "rad",
+        "assumed: a horn mounted by hand, about 1 deg",
+        "standard deviation of the base's zero",
+        ge=0,
+        le=0.3,
+    )
+    gain: float = number(
+        0.05,
+        "1",
+        "assumed: film strips repeat within 10 %, taken as two standard deviations",
+        "standard deviation of the film's gain from trial to trial, where there is sensor noise",
+        ge=0,
+        le=1,
+    )
+    friction: float = number(
+        1.0 / 3.0,
+        "1",
+        "assumed: walls differ",
+        "half range of the friction, over the antenna's",
+        ge=0,
+        le=1,
+    )
