@@ -23,6 +23,8 @@ COMMANDS = {
     "calibrate": "readings to bend: fit a recording, or push a simulated antenna",
     "wall": "pass a line of boulders with five antennae: success, jam or slip",
     "sensor": "flex to counts: curve, hysteresis, creep, noise and the best divider",
+    "force": "how much of a contact's force the flex tells, with and without knowing the place",
+    "sweep": "sweep an antenna beside walls: its shapes, and the distances that active touch tells",
 }
 
 

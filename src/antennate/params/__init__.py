@@ -27,6 +27,7 @@ from antennate.params.scene import (
 )
 from antennate.params.sensor import SensorParams
 from antennate.params.spring import SpringParams, TaperParams
+from antennate.params.sweep import EstimateParams, ShapeParams, SweepParams
 
 __all__ = [
     "N_MM_PER_DEG",
@@ -37,6 +38,7 @@ __all__ = [
     "ControllerParams",
     "CylinderParams",
     "EscapeParams",
+    "EstimateParams",
     "GaitParams",
     "Params",
     "PhysicsParams",
@@ -45,7 +47,9 @@ __all__ = [
     "RuleParams",
     "SensorParams",
     "ServoParams",
+    "ShapeParams",
     "SpringParams",
+    "SweepParams",
     "TaperParams",
     "TunnelParams",
     "VariationParams",

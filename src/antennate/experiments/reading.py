@@ -1,0 +1,56 @@
+"""The sensor chain as the studies of the bench use it: flex to counts and b, and back to flex."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from antennate import sensor as film
+from antennate.conditioning import bending_level
+from antennate.params import ConditioningParams, SensorParams
+from antennate.records import Floats
+
+
+def counts(sensor: SensorParams, flex: Floats, rng: np.random.Generator | None) -> Floats:
+    """Readings [counts] of flex held for long [rad], same shape; without a generator, no noise."""
+    return film.counts(sensor, flex, _noise(sensor, rng, np.shape(flex)))
+
+
+def recorded(sensor: SensorParams, flex: Floats, rng: np.random.Generator | None) -> Floats:
+    """Readings [counts] of a film that remembers, for its flex over time [rad], shape (n,)."""
+    chain = film.SensorChain(sensor, (), 1.0 / sensor.rate)
+    noise = np.broadcast_to(_noise(sensor, rng, flex.shape), flex.shape)
+    return np.array([float(chain.step(f, n)) for f, n in zip(flex, noise, strict=True)])
+
+
+def _noise(
+    sensor: SensorParams, rng: np.random.Generator | None, shape: tuple[int, ...]
+) -> Floats | float:
+    return 0.0 if rng is None else film.reading_noise(sensor, rng, shape)
+
+
+def averaged(conditioning: ConditioningParams, values: Floats, rate: float) -> Floats:
+    """Running mean over the last T_avg of one record, shape (n,), at `rate` [Hz].
+
+    While the window fills it is the mean of what there is.
+    """
+    length = max(1, round(conditioning.averaging_time * rate))
+    total = np.concatenate([[0.0], np.cumsum(values)])
+    end = np.arange(1, len(values) + 1)
+    start = np.maximum(end - length, 0)
+    return (total[end] - total[start]) / (end - start)
+
+
+def level(conditioning: ConditioningParams, counts: Floats) -> Floats:
+    """Bending level b in [0, 1] of averaged readings [counts], same shape."""
+    return bending_level(conditioning, counts)
+
+
+def flex_of(sensor: SensorParams, counts: Floats) -> Floats:
+    """Size of the flex [rad] that gives these readings without noise, same shape, never below 0.
+
+    The reading does not tell the side of the bend: its sign has to be known from elsewhere.
+    """
+    volts, readings = film.transfer_curve(sensor)
+    voltage = np.interp(counts, readings, volts)
+    resistance = sensor.divider_resistance * (sensor.supply / voltage - 1.0)
+    return np.maximum((resistance / sensor.flat_resistance - 1.0) / sensor.bend_gain, 0.0)

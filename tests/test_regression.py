@@ -1,0 +1,74 @@
+"""Monotone curves and the variance they explain, against known truth."""
+
+import numpy as np
+import pytest
+
+from antennate.trials.regression import Curve, by_group, explained
+
+
+def test_curve_through_rising_points_is_the_points():
+    x = np.array([3.0, 1.0, 2.0])
+    curve = Curve.through(x, x**2)
+    np.testing.assert_allclose(curve(np.array([1.0, 1.5, 2.0, 3.0])), [1.0, 2.5, 4.0, 9.0])
+    np.testing.assert_allclose(curve(np.array([-5.0, 50.0])), [1.0, 9.0])
+
+
+def test_curve_through_falling_points_is_their_mean():
+    curve = Curve.through(np.array([1.0, 2.0, 3.0]), np.array([5.0, 4.0, 0.0]))
+    np.testing.assert_allclose(curve(np.array([1.0, 2.7])), [3.0, 3.0])
+
+
+def test_points_of_equal_x_weigh_by_their_number():
+    """Pool the two blocks by hand: (1 + 1 + 1 + 0) / 4."""
+    curve = Curve.through(np.array([1.0, 1.0, 1.0, 2.0]), np.array([1.0, 1.0, 1.0, 0.0]))
+    np.testing.assert_allclose(curve(np.array([1.0, 2.0])), 0.75)
+
+
+def test_truth_explains_all_and_the_mean_nothing():
+    truth = np.array([1.0, 2.0, 4.0, 9.0])
+    groups = np.arange(4)
+    assert explained(truth, truth, groups).r2 == pytest.approx(1.0)
+    mean = explained(truth, np.full(4, 4.0), groups)
+    assert mean.r2 == pytest.approx(0.0)
+    assert mean.rmse == pytest.approx(np.std(truth))
+    assert explained(truth, np.full(4, 9.0), groups).r2 < 0
+
+
+def test_noise_of_known_size_leaves_its_share_and_the_interval_holds_it():
+    """y = x + e with variances 1 and 1/4: a prediction by x explains 4/5."""
+    rng = np.random.default_rng(3)
+    held = 0
+    for _ in range(40):
+        x = rng.normal(size=400)
+        found = explained(x + 0.5 * rng.normal(size=400), x, np.arange(400))
+        low, high = found.r2_95
+        held += low <= 0.8 <= high
+    assert held >= 33  # P(X < 33) is under 1 % at 95 % coverage
+    assert found.n == 400
+
+
+def test_points_of_one_trial_are_not_counted_as_many():
+    rng = np.random.default_rng(5)
+    x, e = rng.normal(size=(2, 20))
+    truth, guess = np.repeat(x + e, 50), np.repeat(x, 50)
+    trials = np.repeat(np.arange(20), 50)
+    widths = [
+        np.subtract(*explained(truth, guess, groups).r2_95[::-1])
+        for groups in (trials, np.arange(1000))
+    ]
+    assert widths[0] > 4 * widths[1]  # sqrt(50) with many trials
+
+
+def test_groups_have_their_own_curves_and_unknown_groups_none():
+    x, y, group = np.array([0.0, 1.0, 0.0, 1.0]), np.array([0.0, 1.0, 5.0, 3.0]), [0, 0, 1, 1]
+    at = np.array([0.5, 0.5, 0.5])
+    guess = by_group((x, y, np.array(group)), at, np.array([0, 1, 2]))
+    np.testing.assert_allclose(guess, [0.5, 4.0, np.nan])
+    falling = by_group((x, y, np.array(group)), at, np.array([0, 1, 2]), falling=True)
+    np.testing.assert_allclose(falling, [0.5, 4.0, np.nan])
+
+
+def test_nothing_to_predict_explains_nothing():
+    found = explained(np.zeros(0), np.zeros(0), np.zeros(0, np.int64))
+    assert found.n == 0
+    assert np.isnan(found.r2)
