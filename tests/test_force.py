@@ -11,7 +11,7 @@ from pydantic import ValidationError
 
 from antennate.cli import main
 from antennate.errors import SimulationError
-from antennate.experiments import force, loads, reading, traverse
+from antennate.experiments import force, loads, post_traverse, reading
 from antennate.mechanics import Chain, equilibrium, shape, uniform_beam, with_profile
 from antennate.params import (
     AntennaParams,
@@ -89,8 +89,9 @@ def test_the_reading_falls_and_b_rises_with_the_force():
 def test_flex_comes_back_from_counts_within_their_resolution():
     flex = np.linspace(0.0, 2.0, 50)
     back = reading.flex_of(SENSOR, reading.counts(SENSOR, flex, None))
-    steepest = SENSOR.supply * SENSOR.bend_gain / (2 + 2 * SENSOR.bend_gain) ** 2
-    np.testing.assert_allclose(back, flex, atol=0.5 * SENSOR.adc_gain / steepest)
+    flattest = SENSOR.supply * SENSOR.bend_gain / (2 + 2 * SENSOR.bend_gain) ** 2
+    half_a_count = 0.5 * 3.3 / 4096
+    np.testing.assert_allclose(back, flex, atol=half_a_count / flattest)
 
 
 def test_running_mean_of_a_record_is_over_the_last_readings():
@@ -105,7 +106,7 @@ def test_slow_smooth_traverse_is_the_statics():
     The hinges relax in 40 ms, so flex lags: a hinge's torque is k (q + 0.04 s dq/dt).
     """
     antenna = AntennaParams(friction=0.0)
-    one = traverse.drag(
+    one = post_traverse.drag(
         BenchPhysicsParams(), antenna, SENSOR, 0.8, 0.05, 0.003, math.radians(30), 100.0
     )
     settled = (one.age > 0.3) & (one.place < 0.99)

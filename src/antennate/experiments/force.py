@@ -22,7 +22,7 @@ from antennate.experiments.loads import (
     static_loads,
     traverse_points,
 )
-from antennate.experiments.traverse import Traverse, drag
+from antennate.experiments.post_traverse import Traverse, drag
 from antennate.mechanics import Chain, equilibrium, with_profile
 from antennate.params import AntennaParams
 from antennate.records import Floats, Ints

@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import model_validator
 
 from antennate.experiments import reading
-from antennate.experiments.traverse import Traverse
+from antennate.experiments.post_traverse import Traverse
 from antennate.mechanics import PROFILES, Chain, equilibrium, with_profile
 from antennate.params import (
     AntennaParams,

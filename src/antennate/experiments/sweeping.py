@@ -14,7 +14,7 @@ from enum import IntEnum
 import numpy as np
 
 from antennate.errors import SimulationError
-from antennate.experiments.traverse import speed_at, way
+from antennate.experiments.post_traverse import speed_at, way
 from antennate.params import (
     AntennaParams,
     BenchPhysicsParams,
