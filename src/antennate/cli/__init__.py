@@ -18,6 +18,7 @@ OK, BAD_INPUT, INTERRUPTED = 0, 2, 130
 COMMANDS = {
     "tunnel": "walk robots through a corridor of loose cylinders, with and without touch",
     "gait": "walk on a flat floor: speed, turning and cost of the gait",
+    "touch": "move an antenna along walls: sensed contact against true contact",
 }
 
 

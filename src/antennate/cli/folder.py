@@ -34,7 +34,7 @@ RESULT, TABLE, PARTIAL = "result.json", "trials.csv", "trials.partial.jsonl"
 CONFIG, VERSIONS, COMMAND = "config.toml", "versions.json", "command.txt"
 DRAWINGS = tuple(
     f"figures/{name}.{suffix}"
-    for name in ("trajectories", "summary", *COMMANDS)
+    for name in ("trajectories", "summary", "touch_roc", "touch_trace", *COMMANDS)
     for suffix in ("svg", "png")
 )
 _NAMES = (RESULT, PARTIAL, TABLE, CONFIG, VERSIONS, COMMAND, *DRAWINGS)

@@ -78,13 +78,13 @@ def build(walls: TouchWallsParams, kind: WallKind, site: Site, x: float) -> list
     if kind == "boulders":
         radius = walls.boulders.radius
         return [Ball(x + float(cx), float(cy), radius) for cx, cy in lines[0]]
-    back = np.array([x, BAR_RADIUS])
-    return [
-        Bar(*(map(float, (*start, *end))), BAR_RADIUS)
-        for line in lines
-        for start, end in zip(line[:-1] + back, line[1:] + back, strict=True)
-        if (start != end).any()
-    ]
+    bars: list[Ball | Bar] = []
+    for line in lines:
+        back = line + np.array([x, BAR_RADIUS])
+        for (x0, y0), (x1, y1) in zip(back[:-1].tolist(), back[1:].tolist(), strict=True):
+            if (x0, y0) != (x1, y1):
+                bars.append(Bar(x0, y0, x1, y1, BAR_RADIUS))
+    return bars
 
 
 def _ramp(site: Site, distance: float, entry_deg: float) -> float:
@@ -149,7 +149,7 @@ def _gapped(walls: TouchWallsParams, site: Site) -> list[Floats]:
         )
     half = Site(site.near, site.clear, site.top, side, site.phase)
     first = _between("gap", half, gap.entry_deg, [])
-    return [first, first + [side + gap.width, 0.0]]
+    return [first, first + np.array([side + gap.width, 0.0])]
 
 
 def _cornered(walls: TouchWallsParams, site: Site) -> Floats:
