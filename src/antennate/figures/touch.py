@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
+from matplotlib.ticker import MultipleLocator
 
 from antennate.figures import style
 from antennate.records import Bools, Floats
@@ -21,6 +22,7 @@ PROFILE_LOOKS = {
     "ascending": ("#E69F00", "v", (0, (6, 1, 1, 1, 1, 1))),
 }
 """Colour, marker and line of each profile: apart in grey, too."""
+_TRUE, _SENSED = "#0072B2", "#D55E00"
 _SHAPES = 14
 """Shapes of the antenna drawn along a wall."""
 
@@ -203,10 +205,7 @@ def _draw_latency(panel: Axes, result: Mapping[str, Any], key: str) -> None:
                 linestyle="",
             )
     low, high = min(counts, default=0), max(counts, default=0)
-    panel.set_title(
-        f"{key.capitalize()}, found contacts (n = {low} to {high}): median, 95 %; bar: 90th "
-        "percentile"
-    )
+    panel.set_title(f"Median, 95 %, and 90th percentile (bar), n = {low} to {high} contacts")
     panel.set_ylabel(f"{key} latency [ms]")
     bottom, top = panel.get_ylim()
     panel.set_ylim(min(0.0, bottom), max(1.05 * top, 10.0))
@@ -248,7 +247,8 @@ def curves(result: Mapping[str, Any]) -> Figure:
         title=f"ROC over theta, all walls and speeds, n = {ticks:,} ticks",
     )
     roc.set_aspect("equal")
-    roc.legend(loc="lower right", fontsize=8, title=f"filled: default theta {theta:g}")
+    if roc.get_legend_handles_labels()[0]:
+        roc.legend(loc="lower right", fontsize=8, title=f"filled: default theta {theta:g}")
     return figure
 
 
@@ -266,7 +266,7 @@ def _draw_curve(
     roc.plot([100, *wrong, 0], [100, *right, 0], color=colour, linestyle=line, label=label)
     own = found["default"]
     at = (100 * own["false_positive_rate"], 100 * own["true_positive_rate"])
-    roc.plot(*at, color=colour, marker=marker, markersize=8, linestyle="", zorder=4)
+    roc.plot(*at, color=colour, marker=marker, markersize=6, linestyle="", zorder=4)
     over.plot([p["theta"] for p in points], [p["f1"] for p in points], color=colour, linestyle=line)
     best = found["best_f1"]
     over.plot(
@@ -287,49 +287,55 @@ def trace(example: Trace) -> Figure:
     )
     flex.plot(t, one.course.flex, color=style.INK, linewidth=1.3)
     flex.set_ylabel("flex [rad]")
-    level.plot(t, example.b, color=style.INK, linewidth=1.3)
-    for bound, name in (
-        (example.threshold, "contact from here"),
-        (example.threshold - example.hysteresis, "free below"),
-    ):
-        level.axhline(bound, color="#D55E00", linewidth=0.9, linestyle=(0, (4, 2)))
-        level.annotate(
-            name,
-            (0.0, bound),
-            (0, 2 if bound == example.threshold else -2),
-            textcoords="offset points",
-            va="bottom" if bound == example.threshold else "top",
-            fontsize=7,
-            color="#D55E00",
-        )
-    level.set(ylim=(-0.05, 1.05), ylabel="b, 0 to 1")
-    for row, (states, colour) in enumerate(
-        ((example.verdict.alarm, "#D55E00"), (example.verdict.truth, "#0072B2"))
-    ):
-        state.fill_between(t, row + 0.1, row + 0.9, where=states.tolist(), color=colour, step="mid")
-    state.set(ylim=(0, 2), xlabel="time [s]")
-    state.set_yticks([0.5, 1.5], ["sensed", "true"])
-    state.grid(visible=False, axis="y")
-    for panel in (flex, level, state):
+    _draw_level(level, example)
+    _draw_states(state, example)
+    for panel in (flex, level):
         panel.set_xlim(t[0], t[-1])
+        panel.tick_params(labelbottom=False)
         panel.fill_between(
             t,
             0,
             1,
             where=example.verdict.truth.tolist(),
-            color="#0072B2",
+            color=_TRUE,
             alpha=0.08,
             transform=panel.get_xaxis_transform(),
             linewidth=0,
             step="mid",
         )
-    for panel in (flex, level):
-        panel.tick_params(labelbottom=False)
     return figure
 
 
+def _draw_level(panel: Axes, example: Trace) -> None:
+    panel.plot(example.t, example.b, color=style.INK, linewidth=1.3)
+    bounds = (
+        (example.threshold, 2, "bottom", "contact from here"),
+        (example.threshold - example.hysteresis, -2, "top", "free below"),
+    )
+    for bound, lift, side, name in bounds:
+        panel.axhline(bound, color=_SENSED, linewidth=0.9, linestyle=(0, (4, 2)))
+        panel.annotate(
+            name,
+            (0.0, bound),
+            (4, lift),
+            textcoords="offset points",
+            va=side,
+            fontsize=7,
+            color=_SENSED,
+        )
+    panel.set(ylim=(-0.05, 1.05), ylabel="b, 0 to 1")
+
+
+def _draw_states(panel: Axes, example: Trace) -> None:
+    t, verdict = example.t, example.verdict
+    for row, (states, colour) in enumerate(((verdict.alarm, _SENSED), (verdict.truth, _TRUE))):
+        panel.fill_between(t, row + 0.1, row + 0.9, where=states.tolist(), color=colour, step="mid")
+    panel.set(xlim=(t[0], t[-1]), ylim=(0, 2), xlabel="time [s]")
+    panel.set_yticks([0.5, 1.5], ["sensed", "true"])
+    panel.grid(visible=False, axis="y")
+
+
 def _draw_plan(panel: Axes, one: _Traverse) -> None:
-    ends = max(float(line[:, 1].max()) for line in one.outline)
     for line in one.outline:
         if one.wall == "boulders":
             panel.plot(*line.T, color=style.MUTED, marker="o", markersize=3, linestyle="")
@@ -342,5 +348,6 @@ def _draw_plan(panel: Axes, one: _Traverse) -> None:
         panel.add_collection(LineCollection(list(shown), colors=colour, linewidths=1.3))
         panel.plot(*shown[:, 0].T, color=style.INK, marker="o", markersize=3, linestyle="")
     panel.set_aspect("equal", adjustable="datalim")
-    panel.set(ylim=(-0.01, ends + 0.005), xlabel="x [m]", ylabel="y [m]")
+    panel.set(xlabel="x [m]", ylabel="y [m]")
+    panel.yaxis.set_major_locator(MultipleLocator(0.05))
     panel.margins(0.02)
