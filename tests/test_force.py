@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
+from antennate import sensor
 from antennate.cli import main
 from antennate.errors import SimulationError
 from antennate.experiments import force, loads, post_traverse, reading
@@ -88,7 +89,7 @@ def test_the_reading_falls_and_b_rises_with_the_force():
 
 def test_flex_comes_back_from_counts_within_their_resolution():
     flex = np.linspace(0.0, 2.0, 50)
-    back = reading.flex_of(SENSOR, reading.counts(SENSOR, flex, None))
+    back = reading.flex_of(SENSOR, sensor.counts(SENSOR, flex))
     flattest = SENSOR.supply * SENSOR.bend_gain / (2 + 2 * SENSOR.bend_gain) ** 2
     half_a_count = 0.5 * 3.3 / 4096
     np.testing.assert_allclose(back, flex, atol=half_a_count / flattest)
@@ -123,10 +124,10 @@ def test_slow_smooth_traverse_is_the_statics():
 
 
 def test_a_traverse_that_blows_up_is_invalid_and_enters_nothing(monkeypatch):
-    def burst(self, count=1):
+    def burst(self, count):
         raise SimulationError(7, "engine warning")
 
-    monkeypatch.setattr(Bench, "step", burst)
+    monkeypatch.setattr(Bench, "press", burst)
     outcome = force.run(SMALL.model_copy(update={"profiles": ("stiff",)}))
     assert [row.status for row in outcome.rows] == ["invalid"] * 4
     assert "step 7: engine warning" in outcome.rows[0].reason

@@ -32,10 +32,9 @@ from antennate.params import Params
 
 RESULT, TABLE, PARTIAL = "result.json", "trials.csv", "trials.partial.jsonl"
 CONFIG, VERSIONS, COMMAND = "config.toml", "versions.json", "command.txt"
+_MORE = ("trajectories", "summary", "passages", "touch_roc", "touch_trace")
 DRAWINGS = tuple(
-    f"figures/{name}.{suffix}"
-    for name in ("trajectories", "summary", "passages", *COMMANDS)
-    for suffix in ("svg", "png")
+    f"figures/{name}.{suffix}" for name in (*_MORE, *COMMANDS) for suffix in ("svg", "png")
 )
 FILES = ("calibration.json", "conditioning.toml", "recording.csv")
 _NAMES = (RESULT, PARTIAL, TABLE, CONFIG, VERSIONS, COMMAND, *FILES, *DRAWINGS)

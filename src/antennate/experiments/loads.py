@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 from pydantic import model_validator
 
+from antennate import sensor as film
 from antennate.experiments import reading
 from antennate.experiments.post_traverse import Traverse
 from antennate.mechanics import PROFILES, Chain, equilibrium, with_profile
@@ -158,7 +159,8 @@ def static_loads(config: ForceConfig, profile: str, friction: float) -> tuple[Po
     covered = config.sensor.covered_hinges(antenna)
     flex = rest.angles[:, :covered].sum(axis=1)
     window = max(1, round(config.conditioning.averaging_time * config.sensor.rate))
-    repeated = reading.counts(config.sensor, np.tile(flex, (window, 1)), rng)
+    noise = film.reading_noise(config.sensor, rng, (window, len(flex)))
+    repeated = film.counts(config.sensor, flex, noise)
     points = Points(
         {
             "flex": flex[good],
@@ -179,7 +181,8 @@ def traverse_points(config: ForceConfig, traverses: list[Traverse]) -> Points:
     counts, levels = [np.zeros(0)], [np.zeros(0)]
     for k, one in enumerate(traverses):
         rng = np.random.default_rng([config.seed, 2, k])
-        counts.append(reading.recorded(config.sensor, one.flex, rng))
+        noise = reading.noise(config.sensor, rng, len(one.flex))
+        counts.append(reading.recorded(config.sensor, one.flex, noise))
         mean = reading.averaged(config.conditioning, counts[-1], config.sensor.rate)
         levels.append(reading.level(config.conditioning, mean))
     trial = np.repeat(np.arange(len(traverses)), [len(one.flex) for one in traverses])

@@ -74,7 +74,7 @@ def drag(
     try:
         while bench.t < end and bench.t - last < _LOST:
             bench.command(0.0, -way(bench.t, speed), 0.0, -speed_at(bench.t, speed), 0.0)
-            force = _mean_force(bench, steps)
+            force = float(np.linalg.norm(bench.press(steps)))
             if abs(bench.hinges()).max() > limit:
                 break
             if force > 0.0:
@@ -85,19 +85,6 @@ def drag(
         return Traverse(none, none, none, none, str(error))
     flex, pressed, place, t = np.array(rows).reshape(-1, 4).T
     return Traverse(flex, pressed, place, t - t[:1])
-
-
-def _mean_force(bench: Bench, steps: int) -> float:
-    """Advance and return the size of the mean contact force on the way [N].
-
-    Light links on a hard post chatter: the force of one step says little, its mean over a sample
-    does not depend on the timestep.
-    """
-    total = np.zeros(2)
-    for _ in range(steps):
-        bench.step()
-        total += bench.contact_force()
-    return float(np.linalg.norm(total / steps))
 
 
 def speed_at(t: float, speed: float) -> float:

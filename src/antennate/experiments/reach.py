@@ -129,7 +129,8 @@ def feel(
     until = trace.t <= outward
     flex, base = np.maximum(-trace.flex, 0.0), trace.base + base_zero
     if rng is not None:
-        counts = reading.recorded(sensor, (1.0 + gain_error) * trace.flex, rng)
+        noise = reading.noise(sensor, rng, len(trace.flex))
+        counts = reading.recorded(sensor, (1.0 + gain_error) * trace.flex, noise)
         flex = reading.flex_of(sensor, reading.averaged(conditioning, counts, sensor.rate))
         base = reading.averaged(conditioning, base, sensor.rate)
     flex, base = flex[until], base[until]

@@ -1,4 +1,4 @@
-"""The sensor chain as the studies of the bench use it: flex to counts and b, and back to flex."""
+"""Records of the sensor as the studies of the bench use them: to counts and b, and back to flex."""
 
 from __future__ import annotations
 
@@ -10,22 +10,22 @@ from antennate.params import ConditioningParams, SensorParams
 from antennate.records import Floats
 
 
-def counts(sensor: SensorParams, flex: Floats, rng: np.random.Generator | None) -> Floats:
-    """Readings [counts] of flex held for long [rad], same shape; without a generator, no noise."""
-    return film.counts(sensor, flex, _noise(sensor, rng, np.shape(flex)))
+def noise(sensor: SensorParams, rng: np.random.Generator, count: int) -> Floats:
+    """Noise of one record [counts], shape (count,)."""
+    return film.reading_noise(sensor, rng, (count,))
 
 
-def recorded(sensor: SensorParams, flex: Floats, rng: np.random.Generator | None) -> Floats:
-    """Readings [counts] of a film that remembers, for its flex over time [rad], shape (n,)."""
-    chain = film.SensorChain(sensor, (), 1.0 / sensor.rate)
-    noise = np.broadcast_to(_noise(sensor, rng, flex.shape), flex.shape)
-    return np.array([float(chain.step(f, n)) for f, n in zip(flex, noise, strict=True)])
+def recorded(sensor: SensorParams, flex: Floats, noise: Floats) -> Floats:
+    """Readings [counts] of films that remember, for their flex over time [rad].
 
-
-def _noise(
-    sensor: SensorParams, rng: np.random.Generator | None, shape: tuple[int, ...]
-) -> Floats | float:
-    return 0.0 if rng is None else film.reading_noise(sensor, rng, shape)
+    Args:
+        sensor: The chain; its rate is that of the rows.
+        flex: Shape (n,) or (n, B).
+        noise: Added before rounding [counts], same shape.
+    """
+    chain = film.SensorChain(sensor, flex.shape[1:], 1.0 / sensor.rate)
+    found = [chain.step(f, n) for f, n in zip(flex, noise, strict=True)]
+    return np.array(found).reshape(flex.shape)
 
 
 def averaged(conditioning: ConditioningParams, values: Floats, rate: float) -> Floats:

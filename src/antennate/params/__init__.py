@@ -28,18 +28,31 @@ from antennate.params.scene import (
 from antennate.params.sensor import SensorParams
 from antennate.params.spring import SpringParams, TaperParams
 from antennate.params.sweep import EstimateParams, ShapeParams, SweepParams
+from antennate.params.touch import (
+    BouldersWallParams,
+    CornerWallParams,
+    FlatWallParams,
+    GapWallParams,
+    SinusoidalWallParams,
+    StepWallParams,
+    TouchWallsParams,
+)
 
 __all__ = [
     "N_MM_PER_DEG",
     "AntennaParams",
     "BenchPhysicsParams",
     "BenchVariationParams",
+    "BouldersWallParams",
     "ConditioningParams",
     "ControllerParams",
+    "CornerWallParams",
     "CylinderParams",
     "EscapeParams",
     "EstimateParams",
+    "FlatWallParams",
     "GaitParams",
+    "GapWallParams",
     "Params",
     "PhysicsParams",
     "RepetitionParams",
@@ -48,9 +61,12 @@ __all__ = [
     "SensorParams",
     "ServoParams",
     "ShapeParams",
+    "SinusoidalWallParams",
     "SpringParams",
+    "StepWallParams",
     "SweepParams",
     "TaperParams",
+    "TouchWallsParams",
     "TunnelParams",
     "VariationParams",
     "WallParams",

@@ -1,0 +1,387 @@
+"""Touching walls: counting against cases done by hand, walls against geometry, the study whole."""
+
+import dataclasses
+import json
+import math
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+from scipy import stats
+
+from antennate import mechanics
+from antennate.cli import main
+from antennate.cli.folder import to_csv, to_json
+from antennate.errors import SimulationError
+from antennate.experiments import reading, sensing, touch, wall_traverse
+from antennate.experiments.episodes import match, merged, runs
+from antennate.experiments.sensing import Judgement, Verdict
+from antennate.experiments.touch import TouchConfig
+from antennate.experiments.touch_measures import Pool, roc
+from antennate.figures import style
+from antennate.figures import touch as figures
+from antennate.params import (
+    AntennaParams,
+    BenchPhysicsParams,
+    ConditioningParams,
+    RuleParams,
+    SensorParams,
+    TouchWallsParams,
+)
+from antennate.sim import touch_wall
+from antennate.sim.bench import Ball, Bar, Bench, compile_bench
+
+SMALL = TouchConfig(
+    trials=2,
+    walls=("step",),
+    speeds=(0.15, 0.3),
+    profiles=("descending", "stiff"),
+    averaging_times=(0.02, 0.3),
+    wall_length=0.2,
+    free_length=0.05,
+)
+
+
+def states(text: str) -> np.ndarray:
+    """`..##.` as a state over time."""
+    return np.array([c == "#" for c in text])
+
+
+@pytest.fixture(scope="module")
+def outcome():
+    return touch.run(SMALL)
+
+
+def test_runs_and_merging_by_hand():
+    assert runs(states("##..#.")).tolist() == [[0, 2], [4, 5]]
+    assert runs(states("")).tolist() == []
+    np.testing.assert_array_equal(merged(states("#..#...#."), 3), states("####...#."))
+    np.testing.assert_array_equal(merged(states("#..#."), 0), states("#..#."))
+
+
+@pytest.mark.parametrize(
+    ("truth", "alarm", "found", "carried", "false", "onset", "release"),
+    [
+        ("..####....", "....####..", [True], 0, 0, [2], [2]),
+        ("..####....", "..........", [False], 0, 0, [], []),
+        ("..........", "...##.....", [], 0, 1, [], []),
+        ("..##......", "......##..", [False], 0, 1, [], []),  # beyond the grace
+        ("..##......", ".....##...", [True], 0, 0, [3], [3]),  # within it
+        ("..##..##..", "...######.", [True, True], 1, 0, [1], [1]),  # one alarm for two
+        ("..######..", "...#.##...", [True], 0, 0, [1], [-1]),  # first begin, last end
+        ("..########", "...#######", [True], 0, 0, [1], []),  # no end in sight
+        ("....##....", ".#####....", [True], 1, 0, [], [0]),
+    ],
+)
+def test_matches_by_hand(truth, alarm, found, carried, false, onset, release):
+    m = match(states(truth), states(alarm), grace=2)
+    assert m.found.tolist() == found
+    assert (m.carried, m.false) == (carried, false)
+    assert (m.onset.tolist(), m.release.tolist()) == (onset, release)
+    assert m.alarms == len(runs(states(alarm)))
+
+
+def verdict(trial, truth, alarm, level, grace=2) -> Verdict:
+    truth, alarm, level = states(truth), states(alarm), np.array(level, float)
+    return Verdict(
+        "flat", 0.1, "stiff", trial, 2.0, truth, alarm, level, level, match(truth, alarm, grace)
+    )
+
+
+def test_measures_by_hand():
+    first = verdict(0, ".###..#.", "..##...#", [0, 1, 5, 6, 0, 0, 2, 1], grace=0)
+    second = verdict(1, "....", "..#.", [0, 0, 3, 0])
+    found = Pool([first, second], trials=2, rate=100.0).measure([first, second])
+    # ticks: 2 hits, 2 wrong, 2 lost; the second alarm comes too late for the second contact
+    assert found["f1"] == pytest.approx(4 / 8)
+    assert found["precision"] == found["recall"] == pytest.approx(0.5)
+    assert (found["contacts"], found["missed"], found["alarms"], found["false"]) == (2, 1, 3, 2)
+    assert found["missed_per_m"] == pytest.approx(1 / 4)
+    assert found["false_per_m"] == pytest.approx(2 / 4)
+    assert found["onset"]["median_ms"] == pytest.approx(10.0)
+    assert found["onset"]["median_mm"] == pytest.approx(1.0)
+    assert found["release"]["median_ms"] == pytest.approx(0.0)
+    assert found["missed_flex_rad"] == pytest.approx(2.0)
+    touching, free = [1, 5, 6, 2], [0, 0, 0, 1, 0, 0, 3, 0]
+    pairs = [(a > b) + (a == b) / 2 for a in touching for b in free]
+    assert found["auc"] == pytest.approx(np.mean(pairs))
+
+
+def test_the_area_agrees_with_mann_and_whitney_and_chance_is_a_half():
+    rng = np.random.default_rng(5)
+    group = []
+    for trial in range(4):
+        truth = rng.random(2000) < 0.3
+        level = truth * 1.0 + rng.standard_normal(2000)
+        none = match(truth, ~truth, 0)
+        group.append(Verdict("flat", 0.1, "stiff", trial, 1.0, truth, ~truth, level, level, none))
+    found = Pool(group, 4, 100.0).measure(group)
+    truth, level = (np.concatenate([getattr(v, k) for v in group]) for k in ("truth", "level"))
+    exact = stats.mannwhitneyu(level[truth], level[~truth]).statistic
+    exact /= truth.sum() * (~truth).sum()
+    assert found["auc"] == pytest.approx(exact, abs=0.002)
+    # two normal scores one standard deviation apart
+    assert found["auc"] == pytest.approx(stats.norm.cdf(1 / math.sqrt(2)), abs=0.02)
+    assert found["auc_95"][0] < exact < found["auc_95"][1]
+    assert roc(group, 0.5)["auc_random"] == pytest.approx(0.5, abs=0.02)
+    assert found["f1"] == 0.0
+
+
+def test_a_perfect_alarm_is_perfect_and_the_curve_goes_from_corner_to_corner():
+    one = verdict(0, "..####..", "..####..", [-9, -9, 9, 9, 9, 9, -9, -9])
+    found = Pool([one], 1, 100.0).measure([one])
+    assert [found[k] for k in ("f1", "precision", "recall", "auc")] == [1.0] * 4
+    assert found["f1_95"] is None  # one trial says nothing about others
+    curve = roc([one], 0.5)
+    assert curve["default"]["true_positive_rate"] == 1.0
+    assert curve["default"]["false_positive_rate"] == 0.0
+    assert curve["curve"][0]["false_positive_rate"] == 1.0
+    assert curve["curve"][-1]["true_positive_rate"] == 0.0
+    assert curve["f1_always_contact"] == pytest.approx(2 / 3)
+
+
+def test_nothing_valid_gives_numbers_that_do_not_exist():
+    found = Pool([], 3, 100.0).measure([])
+    assert found["f1"] is found["auc"] is found["missed_per_m"] is found["f1_95"] is None
+    assert found["onset"]["n"] == 0
+    assert roc([], 0.5)["default"]["f1"] is None
+
+
+def test_the_mind_answers_a_step_of_flex_when_the_mean_has_crossed():
+    """Ten samples in the mean; b is one half at counts of 1543.3, between 1872 and 1399."""
+    conditioning, sensor = ConditioningParams(), SensorParams(hysteresis=0.0, creep=(0.0, 0.0))
+    flex = np.where(np.arange(100) >= 50, math.pi / 2, 0.0)[:, None]
+    counts = reading.recorded(sensor, flex, np.zeros((100, 1)))
+    sensed = sensing.sense(conditioning, RuleParams(), counts, 0.01)
+    midpoint = 1399.0 + 0.305 * 473.0
+    samples = math.ceil(10 * (1872.0 - midpoint) / (1872.0 - 1399.0))
+    assert runs(sensed.alarm[:, 0]).tolist() == [[50 + samples - 1, 100]]
+
+
+def test_truth_merges_short_gaps_of_strong_presses():
+    rule = Judgement(force=0.1, merge=3, grace=0)
+    force = np.array([0.0, 0.2, 0.05, 0.1, 0.2, 0.0])
+    np.testing.assert_array_equal(sensing.true_state(rule, force), states(".####."))
+
+
+def sited(overlap=0.02, length=0.4):
+    return wall_traverse.site(AntennaParams(), overlap, length, 0.25)
+
+
+@pytest.mark.parametrize("kind", touch_wall.WALLS)
+def test_walls_stand_where_they_should(kind):
+    site, walls = sited(), TouchWallsParams()
+    reach = 0.12 * math.sin(math.radians(47.0))
+    assert site.near == pytest.approx(reach - 0.02)
+    obstacles = touch_wall.build(walls, kind, site, x=1.0)
+    lowest = min((o.y if isinstance(o, Ball) else min(o.y0, o.y1)) - o.radius for o in obstacles)
+    nearer = {"sinusoidal": 0.005, "corner": 0.02}.get(kind, 0.0)
+    assert lowest == pytest.approx(site.near - nearer, abs=2e-4)
+    along = [o.x if isinstance(o, Ball) else o.x0 for o in obstacles]
+    assert min(along) >= 1.0
+    assert max(along) <= 1.4
+    if kind == "boulders":
+        assert {round(d, 9) for d in np.diff(along)} == {0.00635}
+    if kind == "gap":
+        free = [o for o in obstacles if isinstance(o, Bar) and 1.101 < (o.x0 + o.x1) / 2 < 1.299]
+        assert free == []
+
+
+@pytest.mark.parametrize(
+    ("changes", "text"),
+    [
+        ({"overlap": 0.2}, "overlap: expected overlap and spread of at most"),
+        ({"overlap": 0.01}, "overlap_spread: expected less than overlap"),
+        ({"wall": {"gap": {"width": 0.39}}}, "wall.gap.width: expected at most 0.36 m"),
+        ({"wall": {"corner": {"rise": 0.07}}}, "before the wall corner"),
+        ({"wall_length": 0.1, "walls": ("flat",)}, "wall.flat: expected at least 0.02 m"),
+        ({"walls": ("boulders",), "wall": {"boulders": {"pitch": 0.4}}}, "room for two spheres"),
+        ({"speeds": (0.1, 0.1)}, "speeds must differ"),
+        ({"sensor": {"rate": 300.0}}, "sensor.rate must be a whole fraction"),
+        ({"trials": 10000}, "trials: expected at most 10,000,000 ticks"),
+    ],
+)
+def test_walls_that_cannot_be_are_refused(changes, text):
+    with pytest.raises(ValidationError, match=text):
+        TouchConfig(**changes)
+
+
+def test_profiles_are_those_of_mechanics():
+    everything = TouchConfig(profiles=tuple(mechanics.PROFILES))
+    assert len(everything.profiles) == 5
+
+
+def test_arms_meet_the_same_draws_and_springs_follow_them():
+    config = TouchConfig()
+    plans = [touch.plan(config, "gap", s, p, 3) for s in (0.05, 0.15) for p in config.profiles]
+    assert len({(p.site, p.wall_start) for p in plans}) == 1
+    assert touch.plan(config, "gap", 0.05, "stiff", 4).site != plans[0].site
+    other = config.model_copy(update={"seed": 1})
+    assert touch.plan(other, "gap", 0.05, "stiff", 3).site != plans[0].site
+    factors = touch.draw(config, 3).springs
+    nominal = mechanics.with_profile(config.antenna, config.sensor, "descending")
+    ratio = np.array(plans[1].antenna.spring_stiffness()) / nominal.spring_stiffness()
+    np.testing.assert_allclose(ratio, factors)
+    assert (abs(factors - 1) <= 0.1).all()
+    overlaps = [touch.draw(config, t).overlap for t in range(200)]
+    assert 0.005 <= min(overlaps) < 0.007
+    assert 0.033 < max(overlaps) <= 0.035
+
+
+def test_a_steady_press_has_the_force_of_the_springs():
+    """At rest against a smooth ball each spring's torque is the moment of the mean force."""
+    antenna, sensor = AntennaParams(friction=0.0), SensorParams()
+    bench = Bench(compile_bench(BenchPhysicsParams(), antenna, sensor, [Ball(0.11, 0.02, 0.01)]), 5)
+    bench.place(0.0, 0.0, 0.0)
+    for i in range(400):
+        bench.command(0.0, 0.02 * min(1.0, i / 200), 0.0, 0.0, 0.0)
+        bench.step(10)
+    force = np.mean([bench.press(20) for _ in range(50)], axis=0)
+    joints, angles = bench.joints(), bench.hinges().copy()
+    k = antenna.hinge_stiffness(sensor.covered_hinges(antenna))
+    normal = force / np.linalg.norm(force)
+    contact = np.array([0.11, 0.02]) + 0.01 * normal
+    arm = contact - joints[:4]
+    moment = arm[:, 0] * force[1] - arm[:, 1] * force[0]
+    assert abs(angles[0]) > 0.02
+    np.testing.assert_allclose(moment, np.array(k[:4]) * angles[:4], rtol=0.02, atol=2e-6)
+
+
+def test_pressing_steps_like_stepping():
+    antenna, sensor = AntennaParams(), SensorParams()
+    model = compile_bench(BenchPhysicsParams(), antenna, sensor, [Ball(0.1, 0.01, 0.01)])
+    one, two = Bench(model, 5), Bench(model, 5)
+    for bench in (one, two):
+        bench.place(0.0, 0.0, 0.0)
+        bench.command(0.0, 0.002, 0.0, 0.0, 0.0)
+    one.step(60)
+    two.press(60)
+    np.testing.assert_array_equal(one.hinges(), two.hinges())
+    two.command(math.nan, 0.0, 0.0, 0.0, 0.0)
+    with pytest.raises(SimulationError, match="not finite"):
+        two.press(1)
+
+
+def test_free_before_and_after_and_pressed_between(outcome):
+    for one in outcome.traverses:
+        force, x = one.course.force, one.course.x
+        assert one.course.reason == ""
+        assert x[0] == pytest.approx(0.0, abs=1e-3)
+        assert x[-1] >= SMALL.travel - 1e-3
+        assert (np.diff(x) > 0).all()
+        lead = 0.12 * math.cos(math.radians(47.0))
+        pressed = x[force > SMALL.contact_force]
+        # no press before the tip can be there, none after the wall has passed the longest arm
+        start = min(line[:, 0].min() for line in one.outline)
+        assert start - lead - 0.01 < pressed.min()
+        assert pressed.max() < start + SMALL.wall_length + 0.12 + 0.01
+    assert [len(one.course.joints) > 0 for one in outcome.traverses] == [True, False] * 4
+
+
+def test_the_study_counts_what_it_ran(outcome):
+    result, rows = outcome.result(), outcome.rows()
+    assert json.loads(to_json(result))["command"] == "touch"
+    assert len(rows) == len(outcome.traverses) == 8
+    for name, measured in result["profiles"].items():
+        mine = [row for row in rows if row.profile == name]
+        assert measured["traverses"] == len(mine)
+        for key in ("contacts", "missed", "alarms", "false"):
+            assert measured[key] == sum(getattr(row, key) for row in mine)
+        low, high = measured["f1_95"]
+        assert 0.0 <= low <= measured["f1"] <= high <= 1.0
+        assert (
+            measured["onset"]["n"] + measured["carried"] + measured["missed"]
+            == (measured["contacts"])
+        )
+    # a blunt wall bends the antenna far back: felt, and half an averaging time late at its end
+    whole = result["profiles"]["descending"]
+    assert whole["f1"] > 2 * whole["contact_share"] / (1 + whole["contact_share"])
+    short, long = result["averaging"]
+    added = long["release"]["median_ms"] - short["release"]["median_ms"]
+    assert 0.0 < added < 1000 * (0.3 - 0.02)
+    assert result["truths"][0]["f1"] == pytest.approx(
+        sum(2 * (v.truth & v.alarm).sum() for v in outcome.verdicts)
+        / sum(v.truth.sum() + v.alarm.sum() for v in outcome.verdicts)
+    )
+
+
+def test_the_force_that_is_needed_bends_the_film_that_far(outcome):
+    needed = outcome.result()["needed"]
+    # b is one half where the divider reads the midpoint: solve the divider for the flex
+    volts = 0.142 + 0.8056e-3 * (1399.0 + 0.305 * 473.0)
+    flex = ((3.3 * 1e4 / volts - 1e4) / 1e4 - 1.0) * math.pi / 1.2
+    assert needed["flex_rad"] == pytest.approx(flex, abs=0.01)  # one count is 4 mrad
+    antenna = mechanics.with_profile(AntennaParams(), SensorParams(), "stiff")
+    chain = mechanics.Chain.of(antenna, SensorParams())
+    load = np.array([[0.0, needed["tip_force_n"]["stiff"]]])
+    bent = mechanics.equilibrium(chain, np.array([0.12]), load, follower=True).angles[0, :5]
+    assert bent.sum() == pytest.approx(needed["flex_rad"], rel=1e-3)
+
+
+def test_the_same_bytes_on_one_and_two_workers(outcome):
+    other = touch.run(SMALL, workers=2)
+    assert to_json(other.result()) == to_json(outcome.result())
+    rows = [to_csv(dataclasses.asdict(r) for r in o.rows()) for o in (outcome, other)]
+    assert rows[0] == rows[1]
+
+
+def test_a_traverse_that_breaks_is_a_row_with_its_reason(monkeypatch):
+    def broken(self, count):
+        raise SimulationError(7, "engine warning")
+
+    monkeypatch.setattr(Bench, "press", broken)
+    config = SMALL.model_copy(update={"trials": 1, "speeds": (0.3,)})
+    found = touch.run(config)
+    assert found.result()["invalid"] == 2
+    assert found.result()["profiles"]["stiff"]["f1"] is None
+    assert found.example() is None
+    assert [row.status for row in found.rows()] == ["invalid"] * 2
+    assert "engine warning" in found.rows()[0].reason
+    for figure in (figures.measures(found.result()), figures.curves(found.result())):
+        style.render(figure)
+
+
+def test_figures_have_units_and_repeat(outcome):
+    def drawn():
+        result = outcome.result()
+        return [figures.trace(outcome.example()), figures.measures(result), figures.curves(result)]
+
+    first, second = drawn(), drawn()
+    assert style.render(first[0]) == style.render(second[0])
+    labels = [axis.get_ylabel() for figure in first for axis in figure.axes]
+    known = ("[ms]", "[%]", "[m]", "[rad]", "0 to 1")
+    assert all(label.endswith(known) for label in labels if label), labels
+
+
+def test_the_command(capsys, tmp_path, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    monkeypatch.chdir(tmp_path)
+    words = "touch --trials 1 --walls flat --speeds 0.3 --profiles stiff --workers 1 --out run"
+    assert main(words.split()) == 0
+    out, err = capsys.readouterr()
+    assert "onset latency [ms]" in out
+    assert max(map(len, out.splitlines())) <= 100
+    assert "written to run" in err
+    names = {path.name for path in (tmp_path / "run" / "figures").iterdir()}
+    assert {"touch.svg", "touch_roc.png", "touch_trace.svg"} <= names
+    assert (tmp_path / "run" / "trials.csv").read_text().startswith("wall,speed_m_s,profile,trial")
+
+
+@pytest.mark.parametrize(
+    ("words", "text"),
+    [
+        ("--walls cliff", "--walls: expected one of flat, sinusoidal, boulders, step, gap, corner"),
+        ("--wall.boulders.pitch -0.01", "--wall.boulders.pitch: expected a number of at least"),
+        ("--overlap 0.13", "overlap: expected overlap and spread of at most"),
+        ("--speeds 0", "expected a number of at least 0.002, found 0"),
+        ("--profiles soft", "--profiles: expected one of stiff"),
+    ],
+)
+def test_bad_words_are_one_line(capsys, tmp_path, monkeypatch, words, text):
+    monkeypatch.chdir(tmp_path)
+    assert main(["touch", *words.split()]) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err.count("\n") == 1
+    assert text in err
+    assert list(tmp_path.iterdir()) == []
