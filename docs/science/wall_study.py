@@ -25,7 +25,7 @@ from antennate.trials.pool import core_count
 HERE = Path(__file__).parent
 MASSES_G = (0.5, 0.8, 1.0, 1.5)
 OVERLAPS_MM = (4.0, 8.0, 12.0)
-ANGLES_DEG = (50.0, 70.0, 90.0, 110.0)
+ANGLES_DEG = (50.0, 70.0, 90.0, 110.0, 130.0)
 GRAVITIES = ("down", "off")
 MAP_SEED, FRESH_SEED = 11, 20261121
 """The second was used for nothing before the cells were chosen."""

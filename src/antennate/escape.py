@@ -2,8 +2,8 @@
 
 The first turn goes away from the side that was touched more while walking, before it got stuck:
 what it feels since then says little about where the passage goes on. If the robot is stuck again
-soon after, it turns the other way and twice as far, so that it now points as far to that side of
-its first course as it had pointed to this one: alternating like this, it searches both sides.
+soon after, it turns the other way and farther, past its first course: alternating like this, it
+searches both sides.
 
 A wrong turn can still lead back out of a passage. Whoever has turned and then touches nothing at
 all for a while has lost the walls: the robot turns round, back to where it last felt them.

@@ -232,7 +232,7 @@ class EscapeParams(Params):
         True,
         "1",
         "assumed: searching both sides",
-        "whether a second turn goes the other way and twice as far",
+        "whether a second turn goes the other way, second_turn times as far",
     )
     second_turn: float = number(
         1.5,
