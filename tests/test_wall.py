@@ -1,0 +1,181 @@
+"""The boulder wall: definitions of jam and slip on made passages, and the command."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from antennate.cli import main
+from antennate.errors import SimulationError
+from antennate.experiments import wall
+from antennate.experiments.wall import (
+    Traverse,
+    WallConfig,
+    judge,
+    least_advance,
+    longest_gap,
+    passage,
+    run,
+)
+
+PERIOD = 0.01
+SHORT = {"wall": {"travel": 0.03, "start": 0.005, "speed": 0.02}, "trials": 2}
+STILL = {"stiffness": 0.0, "friction": 0.0, "base_angle": 0.0, "overlap": 0.0}
+
+
+def passed(tip_mm: list[float], touching: list[bool]) -> Traverse:
+    """A passage whose base moves 1 mm a sample."""
+    n = len(tip_mm)
+    zero = np.zeros(n)
+    base = 1e-3 * np.arange(1, n + 1)
+    touch = np.array(touching, float)
+    return Traverse(
+        base, 1e-3 * np.array(tip_mm), touch, zero, zero, np.zeros((n, 6)), np.zeros((11, 7, 2))
+    )
+
+
+def fate(tip_mm: list[float], touching: list[bool], **rest: float) -> tuple[str, str]:
+    wall_params = {"travel": 0.1, "start": 0.04, **rest}
+    row = judge(
+        WallConfig.model_validate({"wall": wall_params}), "stiff", 0, passed(tip_mm, touching)
+    )
+    return row.fate, row.fate_after_start
+
+
+def test_least_advance_is_over_windows_of_the_travel() -> None:
+    base = np.array([0.0, 0.01, 0.02, 0.03, 0.04])
+    tip = np.array([0.0, 0.01, 0.011, 0.012, 0.03])
+    assert least_advance(base, tip, 0.02) == pytest.approx(0.002)
+    assert least_advance(base, tip, 0.04) == pytest.approx(0.03)
+
+
+@pytest.mark.parametrize(
+    ("touching", "from_start", "samples"),
+    [
+        ("..##..#...", False, 3),
+        ("..##..#...", True, 3),
+        ("....##..##", False, 2),
+        ("....##..##", True, 4),
+        ("..........", False, 10),
+        ("##########", False, 0),
+    ],
+)
+def test_longest_gap_counts_from_the_first_touch(
+    touching: str, from_start: bool, samples: int
+) -> None:
+    touch = np.array([c == "#" for c in touching], float)
+    assert longest_gap(touch, PERIOD, from_start) == pytest.approx(samples * PERIOD)
+
+
+def test_a_tip_that_follows_and_touches_succeeds() -> None:
+    assert fate(list(range(100)), [True] * 100) == ("success", "success")
+
+
+def test_a_tip_that_stands_for_over_19_mm_jams_and_early_jams_are_told_apart() -> None:
+    early = [0.0] * 25 + [float(i) for i in range(75)]
+    late = [float(i) for i in range(60)] + [60.0] * 25 + [60.0 + i for i in range(15)]
+    short = [float(i) for i in range(60)] + [60.0] * 18 + [60.0 + i for i in range(1, 23)]
+    assert fate(early, [True] * 100) == ("jam", "success")
+    assert fate(late, [True] * 100) == ("jam", "jam")
+    assert fate(short, [True] * 100) == ("success", "success")
+
+
+def test_contact_lost_for_over_800_ms_is_a_slip_and_a_jam_counts_before_it() -> None:
+    tip = [float(i) for i in range(200)]
+    lost = [True] * 90 + [False] * 85 + [True] * 25
+    found = [True] * 90 + [False] * 79 + [True] * 31
+    assert fate(tip, lost, travel=0.2) == ("slip", "slip")
+    assert fate(tip, found, travel=0.2) == ("success", "success")
+    assert fate([0.0] * 200, lost, travel=0.2) == ("jam", "jam")
+
+
+def test_uniform_chains_take_the_same_shapes_and_forces_scale() -> None:
+    """No second force scale: no gravity, no film, no variation. Stiff is 3 times compliant."""
+    config = WallConfig.model_validate(
+        {
+            **SHORT,
+            "wall": {**SHORT["wall"], "gravity": "off", "speed": 0.004},
+            "variation": STILL,
+            "antenna": {"film_stiffness_n_mm_per_deg": 0.0},
+        }
+    )
+    stiff, soft = (passage(config, arm, 0) for arm in ("stiff", "compliant"))
+    assert np.degrees(abs(stiff.flex).max()) > 5.0
+    assert np.median(np.degrees(abs(stiff.hinges - soft.hinges))) < 0.3
+    both = (stiff.force > 0) & (soft.force > 0)
+    assert np.median(stiff.force[both]) / np.median(soft.force[both]) == pytest.approx(3.0, rel=0.2)
+
+
+def test_trials_share_their_chance_across_arms_and_differ_among_each_other() -> None:
+    config = WallConfig.model_validate(SHORT)
+    one, again, other = (
+        passage(config, "descending", 0),
+        passage(config, "descending", 0),
+        passage(config, "descending", 1),
+    )
+    np.testing.assert_array_equal(one.tip, again.tip)
+    assert abs(one.tip - other.tip).max() > 1e-5
+
+
+def test_same_table_on_one_and_two_workers() -> None:
+    config = WallConfig.model_validate({**SHORT, "arms": ["stiff", "descending"]})
+    one, two = run(config, 1), run(config, 2)
+    assert one.rows == two.rows
+    assert one.result() == two.result()
+    assert [(r.arm, r.trial) for r in one.rows] == [
+        ("stiff", 0),
+        ("stiff", 1),
+        ("descending", 0),
+        ("descending", 1),
+    ]
+
+
+def test_trouble_in_the_physics_is_an_invalid_trial(monkeypatch: pytest.MonkeyPatch) -> None:
+    sound = wall.passage
+
+    def burst(config: WallConfig, arm: wall.Profile, trial: int) -> Traverse:
+        if trial == 1:
+            raise SimulationError(7, "engine warning")
+        return sound(config, arm, trial)
+
+    monkeypatch.setattr(wall, "passage", burst)
+    outcome = run(WallConfig.model_validate({**SHORT, "arms": ["stiff", "descending"]}))
+    summary = outcome.result()["arms"]["stiff"]
+    assert (summary["trials"], summary["invalid"]) == (2, 1)
+    assert summary["successes"] + summary["jams"] + summary["slips"] == 1
+    assert "engine warning" in outcome.rows[1].reason
+    assert outcome.result()["paired"]["descending-stiff"]["trials"] == 1
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"arms": ["stiff", "stiff"]}, "arms must differ"),
+        ({"wall": {"overlap": 0.09}}, "overlap must stay below"),
+        ({"wall": {"travel": 0.05}}, "travel must exceed"),
+        ({"physics": {"timestep": 0.0007, "contact_time": 0.0014}}, "timestep must divide"),
+    ],
+)
+def test_impossible_walls_are_refused(change: dict[str, object], said: str) -> None:
+    with pytest.raises(ValidationError, match=said):
+        WallConfig.model_validate(change)
+
+
+def test_command_writes_its_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "run"
+    flags = ["--wall.travel", "0.03", "--wall.start", "0.005", "--wall.speed", "0.02"]
+    flags += ["--trials", "1", "--arms", "descending", "--workers", "1", "--out", str(out)]
+    code = main(["wall", "--json", *flags])
+    assert code == 0
+    result = json.loads(capsys.readouterr().out)
+    assert result == json.loads((out / "result.json").read_text())
+    arm = result["arms"]["descending"]
+    assert arm["trials"] == 1
+    assert arm["successes"] + arm["jams"] + arm["slips"] == 1
+    ends = (0.2065, 1.0) if arm["successes"] else (0.0, 0.7935)  # Wilson's for one trial
+    assert arm["wilson95"] == pytest.approx(ends, abs=1e-4)
+    assert (out / "figures" / "wall.png").stat().st_size > 10_000
