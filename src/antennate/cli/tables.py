@@ -33,11 +33,14 @@ def show(
     rows: Sequence[tuple[str, Cell]],
     note: str,
 ) -> None:
-    """Print a table on stdout: one column per name, one row per measure, and a note under it."""
+    """Print a table on stdout: one column per name, one row per measure, and a note under it.
+
+    Names break at underscores, which are shown as spaces.
+    """
     table = Table(title=title, title_justify="left", box=SIMPLE_HEAD, pad_edge=False)
     table.add_column("", overflow="fold")
     for name in columns:
-        table.add_column(Text(name), justify="right", overflow="fold")
+        table.add_column(Text(name.replace("_", " ")), justify="right", overflow="fold")
     for measure, cell in rows:
         table.add_row(Text(measure), *(Text(cell(column)) for column in columns.values()))
     console = Console(file=sys.stdout, highlight=False)

@@ -71,11 +71,11 @@ def study(result: Mapping[str, Any]) -> Figure:
         panel.axhline(published, color=style.INK, linewidth=1, linestyle=(0, (4, 2)))
         panel.annotate(
             f"CITRAS {published:g} %{note}",
-            (1, published),
-            (-2, 2),
-            xycoords=("axes fraction", "data"),
+            (2.5, published),
+            (0, -2),
             textcoords="offset points",
-            ha="right",
+            ha="center",
+            va="top",
             fontsize=8,
         )
     panels[0].set_ylabel("mean absolute error [%]")

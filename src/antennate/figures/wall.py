@@ -102,43 +102,54 @@ def passages(examples: Mapping[str, Traverse]) -> Figure:
 
 @style.styled
 def fate_map(cells: Sequence[Mapping[str, Any]]) -> Figure:
-    """Successes after the start over link mass and overlap; a row for each angle and gravity.
+    """Successes after the start, a column for each arm.
+
+    Over link mass and overlap with a row for each angle and gravity; if all masses are equal, over
+    angle and overlap with a row for each gravity.
 
     Args:
         cells: Cells with `link_mass_g`, `overlap_mm`, `base_angle_deg`, `gravity` and `arms`.
     """
     arms = list(cells[0]["arms"])
-    rows = sorted({(cell["gravity"], cell["base_angle_deg"]) for cell in cells})
+    one_mass = len({cell["link_mass_g"] for cell in cells}) == 1
+    across, label = ("base_angle_deg", "base angle [deg]") if one_mass else _MASS
+    apart = ("gravity",) if one_mass else ("gravity", "base_angle_deg")
+    rows = sorted({tuple(cell[key] for key in apart) for cell in cells})
     figure = style.canvas(2.1 * len(arms) + 1.2, 1.55 * len(rows) + 0.6)
     panels = figure.subplots(len(rows), len(arms), squeeze=False, sharex=True, sharey=True)
     image = None
-    for (gravity, angle), line in zip(rows, panels, strict=True):
-        held = [c for c in cells if (c["gravity"], c["base_angle_deg"]) == (gravity, angle)]
+    for row, line in zip(rows, panels, strict=True):
+        held = [cell for cell in cells if tuple(cell[key] for key in apart) == row]
         for arm, panel in zip(arms, line, strict=True):
-            image = _draw_map(panel, held, arm)
-        line[0].set_ylabel(f"{angle:g} deg, {gravity}\noverlap [mm]")
+            image = _draw_map(panel, held, arm, across)
+        place = ", ".join([f"gravity {row[0]}", *(f"{angle:g} deg" for angle in row[1:])])
+        line[0].set_ylabel(f"{place}\noverlap [mm]")
     for arm, panel in zip(arms, panels[0], strict=True):
-        panel.set_title(arm)
+        panel.set_title(arm.replace("_", " "))
     for panel in panels[-1]:
-        panel.set_xlabel("link mass [g]")
+        panel.set_xlabel(label)
     if image is not None:
-        figure.colorbar(image, ax=panels, label="share of successes after the start", shrink=0.4)
+        name = "share of successes\nafter the start"
+        figure.colorbar(image, ax=panels, label=name, shrink=0.8 if one_mass else 0.3)
     return figure
 
 
-def _draw_map(panel: Axes, cells: Sequence[Mapping[str, Any]], arm: str) -> Any:
-    masses = sorted({cell["link_mass_g"] for cell in cells})
+_MASS = ("link_mass_g", "link mass [g]")
+
+
+def _draw_map(panel: Axes, cells: Sequence[Mapping[str, Any]], arm: str, across: str) -> Any:
+    columns = sorted({cell[across] for cell in cells})
     overlaps = sorted({cell["overlap_mm"] for cell in cells})
-    grid = np.full((len(overlaps), len(masses)), np.nan)
+    grid = np.full((len(overlaps), len(columns)), np.nan)
     for cell in cells:
         counts = cell["arms"][arm]["after_start"]
-        at = overlaps.index(cell["overlap_mm"]), masses.index(cell["link_mass_g"])
+        at = overlaps.index(cell["overlap_mm"]), columns.index(cell[across])
         grid[at] = counts["successes"] / counts["trials"]
         mark = f"{counts['successes']}/{counts['jams']}/{counts['slips']}"
         ink = "white" if grid[at] < 0.6 else style.INK
         panel.text(at[1], at[0], mark, ha="center", va="center", fontsize=6, color=ink)
     image = panel.imshow(grid, origin="lower", cmap="cividis", vmin=0, vmax=1, aspect="auto")
-    panel.set_xticks(range(len(masses)), [f"{m:g}" for m in masses])
+    panel.set_xticks(range(len(columns)), [f"{value:g}" for value in columns])
     panel.set_yticks(range(len(overlaps)), [f"{o:g}" for o in overlaps])
     panel.grid(visible=False)
     return image
