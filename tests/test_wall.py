@@ -12,14 +12,13 @@ from pydantic import ValidationError
 from antennate.cli import main
 from antennate.errors import SimulationError
 from antennate.experiments import wall
-from antennate.experiments.wall import (
+from antennate.experiments.wall import WallConfig, passage, run
+from antennate.experiments.wall_verdict import (
     Traverse,
-    WallConfig,
     judge,
     least_advance,
     longest_gap,
-    passage,
-    run,
+    longest_stick,
 )
 
 PERIOD = 0.01
@@ -39,10 +38,8 @@ def passed(tip_mm: list[float], touching: list[bool]) -> Traverse:
 
 
 def fate(tip_mm: list[float], touching: list[bool], **rest: float) -> tuple[str, str]:
-    wall_params = {"travel": 0.1, "start": 0.04, **rest}
-    row = judge(
-        WallConfig.model_validate({"wall": wall_params}), "stiff", 0, passed(tip_mm, touching)
-    )
+    config = WallConfig.model_validate({"wall": {"travel": 0.1, "start": 0.04, **rest}})
+    row = judge(config.wall, "stiff", 0, passed(tip_mm, touching))
     return row.fate, row.fate_after_start
 
 
@@ -51,6 +48,14 @@ def test_least_advance_is_over_windows_of_the_travel() -> None:
     tip = np.array([0.0, 0.01, 0.011, 0.012, 0.03])
     assert least_advance(base, tip, 0.02) == pytest.approx(0.002)
     assert least_advance(base, tip, 0.04) == pytest.approx(0.03)
+
+
+def test_longest_stick_ends_where_the_tip_has_got_ahead() -> None:
+    base = 1e-3 * np.arange(10)
+    tip = 1e-3 * np.array([0.0, 1.0, 2.0, 2.1, 1.5, 2.2, 4.0, 5.0, 6.0, 7.0])
+    assert longest_stick(base, tip, 1e-3) == pytest.approx(0.004)  # 2 mm to 6 mm
+    assert longest_stick(base, np.zeros(10), 1e-3) == pytest.approx(0.009)
+    assert longest_stick(base, 2 * base, 1e-3) == pytest.approx(0.001)
 
 
 @pytest.mark.parametrize(

@@ -1,9 +1,10 @@
 """Everything that docs/science/wall.md reports: `python docs/science/wall_study.py PART`.
 
 Parts: `map` (link mass, overlap, base angle and gravity, all five arms), `window` (finer, where the
-map tells arms apart), `cells` (the best cells of both on fresh seeds), `scaling` (stiff against
-compliant without a second force scale) and `convergence` (half the timestep). Each writes
-docs/science/wall_PART.json; `map` and `window` a picture as well.
+map tells arms apart), `cells` (the best cells of both on fresh seeds), `sticks` (how long a tip
+stays behind, over the base angle), `scaling` (stiff against compliant without a second force scale)
+and `convergence` (half the timestep). Each writes docs/science/wall_PART.json; `map`, `window` and
+`sticks` a picture as well.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ import numpy as np
 from antennate.experiments.wall import WallConfig, passage, run
 from antennate.figures.style import render
 from antennate.figures.wall import fate_map
+from antennate.figures.wall import sticks as stick_lines
 from antennate.trials.pool import core_count
 
 HERE = Path(__file__).parent
@@ -32,6 +34,8 @@ GRAVITIES = ("down", "off")
 WINDOW_MASS_G = 0.8
 WINDOW_OVERLAPS_MM = (3.0, 4.0, 6.0, 8.0)
 WINDOW_ANGLES_DEG = (47.0, 50.0, 53.0, 56.0, 59.0, 62.0)
+STICK_ANGLES_DEG = (41.0, 44.0, 47.0, 50.0, 53.0, 56.0, 59.0, 65.0, 70.0)
+STICK_TRIALS = 8
 MAP_SEED, FRESH_SEED = 11, 20261121
 """The second was used for nothing before the cells were chosen."""
 MAP_TRIALS, FRESH_TRIALS = 4, 40
@@ -129,6 +133,27 @@ def best_cells(workers: int) -> dict[str, Any]:
     return out
 
 
+def sticks(workers: int) -> dict[str, Any]:
+    """Longest sticks over the base angle, at the default mass, overlap and gravity."""
+    rows = []
+    for angle in STICK_ANGLES_DEG:
+        wall = {"base_angle": math.radians(angle)}
+        config = WallConfig.model_validate(
+            {"wall": wall, "trials": STICK_TRIALS, "seed": FRESH_SEED}
+        )
+        outcome = run(config, workers)
+        rows += [
+            {
+                "base_angle_deg": angle,
+                "arm": arm,
+                "sticks_mm": [r.longest_stick_mm for r in outcome.rows if r.arm == arm],
+            }
+            for arm in config.arms
+        ]
+        print(angle, file=sys.stderr)
+    return {"trials": STICK_TRIALS, "seed": FRESH_SEED, "rows": rows}
+
+
 def scaling(workers: int) -> dict[str, Any]:
     """Difference of the hinge angles of stiff and compliant over a whole passage."""
     out = {}
@@ -143,12 +168,12 @@ def scaling(workers: int) -> dict[str, Any]:
         )
         stiff, soft = (passage(config, arm, 0) for arm in ("stiff", "compliant"))
         apart = np.degrees(abs(stiff.hinges - soft.hinges))
-        force = stiff.force[stiff.touching & soft.touching > 0]
+        both = (stiff.touching > 0) & (soft.touching > 0)
         out[gravity] = {
             "median_deg": float(np.median(apart)),
             "percentile_90_deg": float(np.percentile(apart, 90)),
-            "force_ratio": float(np.median(stiff.force) / np.median(soft.force)),
-            "samples": len(force),
+            "force_ratio": float(np.median(stiff.force[both]) / np.median(soft.force[both])),
+            "samples": int(both.sum()),
         }
     return out
 
@@ -177,6 +202,7 @@ PARTS = {
     "map": whole_map,
     "window": window,
     "cells": best_cells,
+    "sticks": sticks,
     "scaling": scaling,
     "convergence": convergence,
 }
@@ -193,6 +219,10 @@ def main() -> None:
     if options.part in ("map", "window"):
         picture = render(fate_map(result["cells"]))["png"]
         (HERE / f"wall_{options.part}.png").write_bytes(picture)
+    if options.part == "sticks":
+        limit = 1e3 * WallConfig().wall.jam_travel
+        picture = render(stick_lines(result["rows"], limit))["png"]
+        (HERE / "wall_sticks.png").write_bytes(picture)
 
 
 if __name__ == "__main__":

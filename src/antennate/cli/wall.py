@@ -23,7 +23,7 @@ def show_result(result: Mapping[str, Any]) -> None:
     start = 1e3 * result["start_m"]
     show(
         "Arms",
-        {name.replace("_", " "): arm for name, arm in result["arms"].items()},
+        result["arms"],
         _ARM_ROWS,
         f"Seed {result['seed']}, gravity {result['gravity']}. `after` leaves out the first "
         f"{start:g} mm of travel.\nMedians over trials; invalid trials are left out of them.\n",
@@ -31,7 +31,7 @@ def show_result(result: Mapping[str, Any]) -> None:
     if result["paired"]:
         show(
             f"{wall.REFERENCE} (first) against each, trial by trial",
-            {name.split("-")[1].replace("_", " "): p for name, p in result["paired"].items()},
+            {name.split("-")[1]: p for name, p in result["paired"].items()},
             _PAIR_ROWS,
             "McNemar's test, exact, two-sided.\n",
         )
@@ -49,6 +49,7 @@ _ARM_ROWS: list[tuple[str, Cell]] = [
     ("jams after", lambda arm: str(arm["after_start"]["jams"])),
     ("slips after", lambda arm: str(arm["after_start"]["slips"])),
     ("least advance [mm]", lambda arm: number(arm["least_advance_mm"], ".2f")),
+    ("longest stick [mm]", lambda arm: number(arm["longest_stick_mm"], ".1f")),
     ("longest gap [s]", lambda arm: number(arm["longest_gap_s"], ".2f")),
     ("force, mean [N]", lambda arm: number(arm["force_mean_n"], ".3f")),
     ("force, largest [N]", lambda arm: number(arm["force_max_n"], ".2f")),

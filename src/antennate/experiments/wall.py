@@ -18,6 +18,7 @@ import numpy as np
 from pydantic import model_validator
 
 from antennate.errors import SimulationError
+from antennate.experiments.wall_verdict import SAMPLE_PERIOD, Fate, Traverse, WallTrial, judge
 from antennate.mechanics import PROFILES, with_profile
 from antennate.params import (
     AntennaParams,
@@ -34,12 +35,11 @@ from antennate.trials import statistics
 from antennate.trials.pool import run_tasks
 
 Profile = Literal["stiff", "descending", "compliant", "matched_uniform", "ascending"]
-Fate = Literal["success", "jam", "slip", "invalid"]
 REFERENCE: Profile = "descending"
 """The arm that all others are compared with."""
 _COMMAND_PERIOD = 0.002
 """Time between commands to the carriage [s]."""
-_SAMPLES = 5
+_SAMPLES = round(SAMPLE_PERIOD / _COMMAND_PERIOD)
 """Commands to a sample."""
 _CLEAR = 0.002
 """Distance between tip and crests before the approach [m]."""
@@ -91,57 +91,6 @@ class WallConfig(Params):
         return self
 
 
-@dataclass(frozen=True, slots=True)
-class WallTrial:
-    """What became of one trial.
-
-    Attributes:
-        arm: Its profile; `trial` its number, which decides all chance.
-        fate: Over the whole travel; `fate_after_start` without the start.
-        least_advance_mm: Smallest advance of the tip over any `jam_travel` of the base.
-        longest_gap_s: Longest time without touch after the first one.
-        touched: Share of samples that touch.
-        force_mean_n: Mean contact force [N]; `force_max_n` the largest.
-        flex_max_deg: Largest flex under the film.
-        reason: Why it is invalid.
-    """
-
-    arm: str
-    trial: int
-    fate: Fate
-    fate_after_start: Fate
-    least_advance_mm: float
-    longest_gap_s: float
-    touched: float
-    force_mean_n: float
-    force_max_n: float
-    flex_max_deg: float
-    reason: str = ""
-
-
-@dataclass(frozen=True, slots=True)
-class Traverse:
-    """Samples of one passage.
-
-    Attributes:
-        base: Travel of the base [m], shape (n,).
-        tip: Advance of the tip along the wall since the travel began [m], shape (n,).
-        touching: Whether a sphere is touched, shape (n,).
-        force: Contact force [N], shape (n,).
-        flex: Flex under the film [rad], shape (n,).
-        hinges: Hinge angles [rad], shape (n, 6).
-        shapes: Hinges and tip in the plane [m] at every tenth of the travel, shape (11, 7, 2).
-    """
-
-    base: Floats
-    tip: Floats
-    touching: Floats
-    force: Floats
-    flex: Floats
-    hinges: Floats
-    shapes: Floats
-
-
 @dataclass(frozen=True)
 class WallOutcome:
     """All trials of a run.
@@ -178,6 +127,7 @@ def _summary(rows: list[WallTrial]) -> dict[str, Any]:
         **_counts([r.fate for r in rows]),
         "after_start": _counts([r.fate_after_start for r in rows]),
         "least_advance_mm": _median([r.least_advance_mm for r in valid]),
+        "longest_stick_mm": _median([r.longest_stick_mm for r in valid]),
         "longest_gap_s": _median([r.longest_gap_s for r in valid]),
         "touched": _median([r.touched for r in valid]),
         "force_mean_n": _median([r.force_mean_n for r in valid]),
@@ -298,52 +248,6 @@ def _ramp(length: float, speed: float) -> list[float]:
     return (length * np.arange(1, count + 1) / count).tolist()
 
 
-def judge(config: WallConfig, arm: Profile, trial: int, seen: Traverse) -> WallTrial:
-    """What became of a passage, by the definitions above."""
-    wall, period = config.wall, _COMMAND_PERIOD * _SAMPLES
-    advance = least_advance(seen.base, seen.tip, wall.jam_travel)
-    gap = longest_gap(seen.touching, period)
-    late = seen.base > wall.start
-    after = _fate(
-        wall,
-        least_advance(seen.base[late], seen.tip[late], wall.jam_travel),
-        longest_gap(seen.touching[late], period, True),
-    )
-    return WallTrial(
-        arm=arm,
-        trial=trial,
-        fate=_fate(wall, advance, gap),
-        fate_after_start=after,
-        least_advance_mm=1e3 * advance,
-        longest_gap_s=gap,
-        touched=float(seen.touching.mean()),
-        force_mean_n=float(seen.force.mean()),
-        force_max_n=float(seen.force.max()),
-        flex_max_deg=math.degrees(abs(seen.flex).max()),
-    )
-
-
-def least_advance(base: Floats, tip: Floats, travel: float) -> float:
-    """Smallest advance of the tip over any such travel of the base; all in m, shapes (n,)."""
-    ends = np.searchsorted(base, base + travel - 1e-9)
-    begins = np.flatnonzero(ends < len(base))
-    return float((tip[ends[begins]] - tip[begins]).min())
-
-
-def longest_gap(touching: Floats, period: float, from_start: bool = False) -> float:
-    """Longest time without touch [s], after the first touch or from the start on."""
-    free = np.flatnonzero(np.concatenate([[from_start], touching > 0, [True]]))
-    if len(free) == 1 and not from_start:
-        return len(touching) * period  # never touched at all
-    return float((np.diff(free) - 1).max(initial=0)) * period
-
-
-def _fate(wall: WallParams, advance: float, gap: float) -> Fate:
-    if advance < wall.jam_advance:
-        return "jam"
-    return "slip" if gap > wall.slip_time else "success"
-
-
 def _run_task(
     task: tuple[WallConfig, Profile, int], emit: Callable[[tuple[WallTrial, Traverse | None]], None]
 ) -> None:
@@ -351,11 +255,11 @@ def _run_task(
     try:
         seen = passage(config, arm, trial)
     except SimulationError as error:
-        none = [math.nan] * 6
+        none = [math.nan] * 7
         row = WallTrial(arm, trial, "invalid", "invalid", *none, reason=str(error))
         emit((row, None))
         return
-    emit((judge(config, arm, trial, seen), seen if trial == 0 else None))
+    emit((judge(config.wall, arm, trial, seen), seen if trial == 0 else None))
 
 
 def run(

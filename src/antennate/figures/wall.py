@@ -84,7 +84,7 @@ def passages(examples: Mapping[str, Traverse]) -> Figure:
     ):
         above.plot(1e3 * seen.base, 1e3 * seen.tip, color=colour)
         above.plot([0, 1e3 * seen.base[-1]], [0, 1e3 * seen.base[-1]], color=style.FAINT, zorder=0)
-        above.set(title=arm, xlabel="travel of the base [mm]")
+        above.set(title=arm.replace("_", " "), xlabel="travel of the base [mm]")
         for shape in seen.shapes:
             below.plot(*(1e3 * shape.T), color=colour, linewidth=1.0)
         below.axvline(0, color=style.MUTED, linewidth=1.0)
@@ -97,6 +97,46 @@ def passages(examples: Mapping[str, Traverse]) -> Figure:
         high = max(panel.get_ylim()[1] for panel in row)
         for panel in row:
             panel.set_ylim(low, high)
+    return figure
+
+
+@style.styled
+def sticks(rows: Sequence[Mapping[str, Any]], limit_mm: float) -> Figure:
+    """Longest stick of each arm over the base angle: median and range of its trials.
+
+    Args:
+        rows: `base_angle_deg`, `arm`, and `sticks_mm`, one for each trial.
+        limit_mm: Travel from which a stick counts as a jam [mm].
+    """
+    figure = style.canvas(7.0, 4.2)
+    panel = figure.subplots()
+    arms = list(dict.fromkeys(row["arm"] for row in rows))
+    for k, (arm, colour) in enumerate(zip(arms, style.series(len(arms)), strict=True)):
+        held = [row for row in rows if row["arm"] == arm]
+        middle = np.array([np.median(row["sticks_mm"]) for row in held])
+        below = middle - np.array([min(row["sticks_mm"]) for row in held])
+        above = np.array([max(row["sticks_mm"]) for row in held]) - middle
+        angles = np.array([row["base_angle_deg"] for row in held]) + 0.25 * (k - 2)
+        name = arm.replace("_", " ")
+        panel.errorbar(angles, middle, [below, above], marker="o", color=colour, label=name)
+    panel.axhline(limit_mm, color=style.INK, linewidth=1, linestyle=(0, (4, 2)))
+    panel.annotate(
+        "a jam from here on",
+        (1, limit_mm),
+        (-2, 2),
+        xycoords=("axes fraction", "data"),
+        textcoords="offset points",
+        ha="right",
+        fontsize=8,
+    )
+    trials = len(rows[0]["sticks_mm"])
+    panel.set(
+        xlabel="base angle [deg]",
+        ylabel="longest stick [mm]",
+        title=f"Median and range of {trials} trials a point",
+        yscale="log",
+    )
+    panel.legend()
     return figure
 
 

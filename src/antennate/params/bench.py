@@ -24,9 +24,9 @@ class WallParams(Params):
         le=2,
     )
     base_angle: float = number(
-        math.radians(70.0),
+        math.radians(53.0),
         "rad",
-        "assumed: unpublished; the tip leads, as on the robot",
+        "fitted: unpublished; where the profiles differ most (docs/science/wall_study.py window)",
         "angle of the antenna from the direction of travel; a right angle faces the wall",
         gt=0.17,
         lt=2.9,
