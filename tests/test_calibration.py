@@ -261,3 +261,33 @@ def test_a_real_flex_sensor_in_static_holds(tmp_path: Path) -> None:
     assert found.polarity == 1
     assert found.midpoint == pytest.approx(0.0640, rel=0.02)
     assert found.slope == pytest.approx(129.8, rel=0.1)
+
+
+@pytest.mark.skipif(not (DATA / "whisker_straingauge_bend").exists(), reason="no recordings")
+def test_a_real_strain_gauge_is_served_better_by_a_line() -> None:
+    """A strain gauge answers bending in proportion; counts are its millivolts times 400."""
+    source = DATA / "whisker_straingauge_bend" / "derived" / "inc50_plateaus.csv"
+    with source.open() as file:
+        rows = list(csv.DictReader(file))
+    counts = 400.0 * np.array([float(r["ch1_mV"]) for r in rows])
+    bend = np.array([float(r["tip_lever_mm_inferred"]) for r in rows])
+    repeat = np.array([int(r["rep"]) for r in rows])
+    n = len(rows)
+    found = fit(Samples(counts, bend / bend.max(), repeat, np.full(n, np.nan), np.arange(n)))
+    assert "line" in found.better_than_sigmoid
+    assert found.cross_validated_rmse["line"] < 0.03
+
+
+@pytest.mark.skipif(not (DATA / "flex_textile_mocap").exists(), reason="no recordings")
+def test_a_real_textile_film_is_explained_as_far_as_it_correlates() -> None:
+    """No curve of one reading explains much more than the correlation: R² near r²."""
+    source = DATA / "flex_textile_mocap" / "derived" / "rotacionzAll.csv"
+    with source.open() as file:
+        rows = list(csv.DictReader(file))
+    volts = np.array([float(r["A11"]) for r in rows])
+    angle = np.array([float(r["angBrazoX"]) for r in rows])
+    n = len(rows)
+    bend = (angle - angle.min()) / np.ptp(angle)
+    counts = np.round(volts / 5.0 * 4095)
+    found = fit(Samples(counts, bend, np.arange(n) // 500, np.full(n, np.nan), np.arange(n)))
+    assert found.r2 == pytest.approx(np.corrcoef(volts, angle)[0, 1] ** 2, abs=0.05)
