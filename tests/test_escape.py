@@ -18,6 +18,7 @@ PARAMS = EscapeParams(
     reverse_time=1.0,
     turn_time=2.0,
     turn_offset=0.5,
+    second_turn=1.5,
     retry_time=12.0,
     memory_time=4.0,
     memory_delay=0.5,
@@ -62,12 +63,12 @@ def test_it_backs_off_turns_away_from_the_touched_side_and_walks(
 @pytest.mark.parametrize(
     ("b", "first", "second"), [(TOUCHED_LEFT, TURN_R, TURN_L), (TOUCHED_RIGHT, TURN_L, TURN_R)]
 )
-def test_stuck_again_soon_it_turns_the_other_way_and_twice_as_long(
+def test_stuck_again_soon_it_turns_the_other_way_and_half_as_far_again(
     b: tuple[float, float], first: Maneuver, second: Maneuver
 ) -> None:
     said = episodes(b, (2.0, 8.0, 20.0), 26.0)
     turns = [(m, d) for m, d in said if m in (TURN_L, TURN_R)]
-    assert turns == [(first, 2.0), (second, 4.0), (first, 4.0)]
+    assert turns == [(first, 2.0), (second, 3.0), (first, 3.0)]
 
 
 def test_stuck_again_much_later_it_starts_anew() -> None:

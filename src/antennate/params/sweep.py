@@ -3,8 +3,13 @@
 from __future__ import annotations
 
 import math
+from typing import Annotated
+
+from pydantic import Field
 
 from antennate.params.base import Params, number
+
+_Place = Annotated[float, Field(gt=0, le=1)]
 
 
 class SweepParams(Params):
@@ -77,7 +82,7 @@ class EstimateParams(Params):
         ge=6,
         le=100000,
     )
-    distance: tuple[float, float] = number(
+    distance: tuple[_Place, _Place] = number(
         (0.4, 0.9),
         "1",
         "assumed: within reach of the default sweep",
