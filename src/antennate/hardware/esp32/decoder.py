@@ -15,6 +15,7 @@ from antennate.hardware.esp32.wire import Frame, Refused, parse
 LONGEST = 128
 """Bytes between delimiters that are held; from here on they cannot be a frame."""
 SHORTEST = 2 + frame.CRC_SIZE + 1
+"""Version, kind, CRC and one byte of COBS."""
 TEXT_KEPT = 512
 """Bytes of text held until they are taken."""
 
@@ -184,6 +185,4 @@ class FrameDecoder:
 
 def _intact(content: bytes | bytearray) -> bool:
     end = len(content) - frame.CRC_SIZE
-    if end < 0:
-        return False
     return crc32(content[:end]) == int.from_bytes(content[end:], "little")

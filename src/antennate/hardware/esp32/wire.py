@@ -77,9 +77,7 @@ Frame = Hello | Sample | Refused
 
 
 def parse(body: bytes | bytearray) -> Frame:
-    """Record of an intact body (without CRC); Refused says what was expected and what was found."""
-    if len(body) < 2:
-        return Refused(f"a frame has a version and a kind, found {len(body)} bytes")
+    """Record of an intact body of at least two bytes, without its CRC; Refused says why not."""
     version, kind = body[0], body[1]
     if version != frame.PROTOCOL:
         return Refused(
