@@ -24,7 +24,7 @@ SETTLE_TIME = 0.05
 SETTLE_FALL = 0.005
 """A fall of the lowest difference that begins the settling anew [s]."""
 EARLY = 0.02
-"""How much earlier than believed possible a sample may arrive [s]."""
+"""How much earlier than believed possible a sample may arrive; after a lie also how much later [s]."""
 RETIRED_BOOTS = 8
 
 _SEQ = 1 << 32
@@ -191,9 +191,10 @@ class DeviceClock:
             return Verdict.FROZEN
         if step >= self._modulus // 2:
             return Verdict.BACK
-        impossible = now - 1e-6 * (newest.elapsed_us + step) < (
-            self._floor - EARLY - DRIFT * 1e-6 * step
-        )
+        late = now - 1e-6 * (newest.elapsed_us + step) - self._floor
+        if self._doubts and late > EARLY + DRIFT * 1e-6 * step:
+            return Verdict.BACK
+        impossible = late < -EARLY - DRIFT * 1e-6 * step
         numbers = self._number() - newest.seq
         return Verdict.AHEAD if impossible and step > self._longest_step(numbers) else Verdict.USED
 
