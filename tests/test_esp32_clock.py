@@ -135,7 +135,7 @@ def test_E6_ages_are_right_under_drift_and_jitter(drift: float) -> None:
     [
         (lambda n: 100 * PERIOD, Verdict.FROZEN),
         (lambda n: n * PERIOD - 1_000_000, Verdict.BACK),
-        (lambda n: n * PERIOD - 90_000, Verdict.BACK),
+        (lambda n: n * PERIOD - 93_000, Verdict.BACK),
         (lambda n: n * PERIOD - 400_000_000, Verdict.BACK),
         (lambda n: n * PERIOD + 3_600_000_000, Verdict.AHEAD),
         (lambda n: n * PERIOD + 200_000, Verdict.AHEAD),

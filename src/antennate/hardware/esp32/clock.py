@@ -24,7 +24,7 @@ SETTLE_TIME = 0.05
 SETTLE_FALL = 0.005
 """A fall of the lowest difference that begins the settling anew [s]."""
 EARLY = 0.02
-"""How much earlier than believed possible a sample may arrive; after a lie also how much later [s]."""
+"""How much earlier than expected a sample may arrive; after a lie, also how much later [s]."""
 RETIRED_BOOTS = 8
 
 _SEQ = 1 << 32
