@@ -189,15 +189,34 @@ def test_L10_old_samples_of_a_burst_are_known_to_be_old(stall: float) -> None:
         assert clock.age(end) == pytest.approx(end - n * 0.01 - 0.001, abs=0.005)
 
 
-def test_L10_a_burst_at_the_start_is_not_believed_to_be_fresh() -> None:
-    """Ages are unknown until samples arrive at the board's own pace."""
+@pytest.mark.parametrize("spread", [0.0, 0.1, 0.5])
+@pytest.mark.parametrize("rate", [100, 1000])
+def test_L10_a_burst_at_the_start_is_not_believed_to_be_fresh(rate: int, spread: float) -> None:
+    """A backlog of 2 s that drains at once or in a while: ages are right or not known."""
     clock = ready()
-    for n in range(200):
-        clock.take(sample(n, n * PERIOD), 2.0)
-        assert clock.age(2.0) == math.inf
-    for n in range(200, 220):
-        clock.take(sample(n, n * PERIOD), n * 0.01 + 0.001)
-    assert clock.age(2.191) == pytest.approx(0, abs=0.005)
+    told = 0
+    for n in range(4 * rate):
+        taken = n / rate
+        now = max(taken, 2.0 + spread * taken / (2.0 + spread)) + 0.001
+        clock.take(sample(n, round(taken * 1e6)), now)
+        age = clock.age(now)
+        assert age == math.inf or age == pytest.approx(now - taken - 0.001, abs=0.01)
+        told += age < math.inf
+    assert told > rate
+
+
+def test_L9_ages_are_believed_after_ten_samples_and_50_ms() -> None:
+    clock = ready()
+    steady(clock, 0, 9)
+    assert clock.age(0.081) == math.inf
+    steady(clock, 9, 1)
+    assert clock.age(0.091) == pytest.approx(0, abs=1e-9)
+    clock = ready()
+    for n in range(50):
+        clock.take(sample(n, n * 1000), n * 0.001)
+        assert clock.age(n * 0.001) == math.inf
+    clock.take(sample(50, 50_000), 0.05)
+    assert clock.age(0.05) == pytest.approx(0, abs=1e-9)
 
 
 def test_a_silent_board_ages() -> None:

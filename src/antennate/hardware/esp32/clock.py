@@ -20,9 +20,9 @@ DRIFT = 500e-6
 """Most by which the clocks run apart [s/s]."""
 SETTLE_SAMPLES = 10
 SETTLE_TIME = 0.05
-"""Samples and time [s] without a lower difference after which ages are believed."""
+"""Samples and time [s] that a new lowest difference must last until ages are believed."""
 SETTLE_FALL = 0.005
-"""A fall of the lowest difference that begins the settling anew [s]."""
+"""How far it may fall meanwhile [s]; a backlog that drains makes it fall faster."""
 EARLY = 0.02
 """How much earlier than expected a sample may arrive; after a lie, also how much later [s]."""
 RETIRED_BOOTS = 8
@@ -129,8 +129,8 @@ class DeviceClock:
         self._period = 0.0
         self._arrived = 0.0
         self._floor = 0.0
-        self._steady = 0
-        self._calm_since = 0.0
+        self._settled = False
+        self._calm = (0.0, 0.0, 0)
         self._doubt: tuple[int, int] = (0, 0)
         self._doubts = 0
 
@@ -159,9 +159,7 @@ class DeviceClock:
     def age(self, now: float) -> float:
         """Time since the newest usable sample was taken [s]; inf if that is not known."""
         newest = self.newest
-        if newest is None or self._steady < SETTLE_SAMPLES:
-            return math.inf
-        if self._arrived - self._calm_since < SETTLE_TIME:
+        if newest is None or not self._settled:
             return math.inf
         return max(0.0, now - self._floor - 1e-6 * newest.elapsed_us)
 
@@ -218,19 +216,25 @@ class DeviceClock:
     def _rebase(self, sample: Sample, now: float) -> None:
         """Begin a new time base with a sample of unknown age."""
         self.epoch += 1
-        self._floor = self._calm_since = now
-        self._steady = 0
+        self._floor = now
+        self._settled = False
+        self._calm = (now, now, 0)
         self._follow(sample, 0, 0, now)
 
     def _follow(self, sample: Sample, elapsed_us: int, step: int, now: float) -> None:
         difference = now - 1e-6 * elapsed_us
-        risen = self._floor + DRIFT * 1e-6 * step
-        if difference < risen - SETTLE_FALL:
-            self._calm_since = now
-            self._steady = 0
-        self._floor = min(difference, risen)
-        self._steady += 1
+        self._floor = min(difference, self._floor + DRIFT * 1e-6 * step)
         self._arrived = now
+        if not self._settled:
+            self._settle(now)
         self._doubts = 0
         t = self._floor + 1e-6 * elapsed_us
         self.newest = Timed(sample, self.epoch, self._number(), elapsed_us, t)
+
+    def _settle(self, now: float) -> None:
+        """Believe ages once the lowest difference has stopped falling."""
+        since, floor, samples = self._calm
+        if self._floor < floor - SETTLE_FALL:
+            since, floor, samples = now, self._floor, 0
+        self._calm = (since, floor, samples + 1)
+        self._settled = samples + 1 >= SETTLE_SAMPLES and now - since >= SETTLE_TIME
