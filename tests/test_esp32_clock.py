@@ -162,14 +162,18 @@ def test_E7_lies_of_the_boards_clock(lie, verdict: Verdict) -> None:
         assert clock.age(130 * 0.01 + 0.001) < STALE
 
 
-def test_E7_a_single_lie_does_no_harm() -> None:
+def test_E7_single_lies_do_no_harm() -> None:
+    """Twenty of them begin no new time base, and later delays are no lies."""
     clock = ready()
-    steady(clock, 0, 50)
-    assert clock.take(sample(50, 0), 0.501) is Verdict.BACK
-    steady(clock, 51, 50)
+    for n in range(0, 1000, 50):
+        steady(clock, n, 49)
+        assert clock.take(sample(n + 49, n * PERIOD), n * 0.01 + 0.491) is Verdict.BACK
+    steady(clock, 1000, 50)
+    assert clock.take(sample(1050, 1050 * PERIOD), 10.54) is Verdict.USED
     assert clock.newest is not None
-    assert clock.newest.elapsed_us == 100 * PERIOD
+    assert clock.newest.elapsed_us == 1050 * PERIOD
     assert clock.epoch == 1
+    assert clock.age(10.54) == pytest.approx(0.039, abs=1e-3)
 
 
 def test_E7_ticks_beyond_the_declared_modulus_are_refused() -> None:

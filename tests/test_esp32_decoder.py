@@ -28,10 +28,9 @@ def closed(counters: Counters, held: int) -> bool:
     return counters.accounted + held == counters.received
 
 
-@pytest.mark.parametrize("rate", [1e-5, 1e-4, 1e-3, 1e-2])
-def test_L1_random_bit_errors(rate: float) -> None:
-    """All intact frames and no false one, in order, at every bit error rate."""
-    samples = [made(i) for i in range(20_000)]
+def noisy(rate: float, count: int) -> None:
+    """All intact frames and no false one, in order."""
+    samples = [made(i) for i in range(count)]
     sent = frames_of(samples)
     arrived = with_bit_errors(sent, rate, np.random.default_rng(7))
     intact = np.all(arrived == sent, axis=1)
@@ -42,6 +41,17 @@ def test_L1_random_bit_errors(rate: float) -> None:
     assert decoder.counters.good == len(delivered)
     assert decoder.counters.received == sent.size
     assert closed(decoder.counters, decoder.held)
+
+
+@pytest.mark.parametrize("rate", [1e-5, 1e-4, 1e-3, 1e-2])
+def test_L1_random_bit_errors(rate: float) -> None:
+    noisy(rate, 20_000)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("rate", [1e-5, 1e-4, 1e-3, 1e-2])
+def test_L1_random_bit_errors_in_a_million_frames(rate: float) -> None:
+    noisy(rate, 1_000_000)
 
 
 @pytest.mark.parametrize("rate", [1e-3, 1e-2])
