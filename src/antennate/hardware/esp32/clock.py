@@ -16,7 +16,7 @@ from enum import Enum, auto
 
 from antennate.hardware.esp32.wire import Hello, Reset, Sample
 
-DRIFT = 500e-6
+DRIFT = 300e-6
 """Most by which the clocks run apart [s/s]."""
 SETTLE_SAMPLES = 10
 SETTLE_TIME = 0.05
