@@ -16,8 +16,8 @@ from enum import Enum, auto
 
 from antennate.hardware.esp32.wire import Hello, Reset, Sample
 
-DRIFT = 300e-6
-"""Most by which the clocks run apart [s/s]."""
+DRIFT = 250e-6
+"""Most by which the clocks run apart [s/s], assumed: two crystals within 200 ppm, and a margin."""
 SETTLE_SAMPLES = 10
 SETTLE_TIME = 0.05
 """Samples and time [s] that a new lowest difference must last until ages are believed."""
