@@ -248,8 +248,9 @@ class Bus:
     # the wire
 
     def _time_for(self, span: Span, count: int, end: float) -> bool:
-        request = self.timing.wire(OVERHEAD + 3 + count)
-        return self._clock() + request + self.timing.answer(span.length + span.spare) <= end
+        """A first answer would come before the end, unless servos or adapter are slow."""
+        wire = self.timing.wire(2 * OVERHEAD + 3 + count + span.length + span.spare)
+        return self._clock() + wire + 0.5 * self.timing.gap <= end
 
     def _send(self, request: bytes, end: float) -> bool:
         """Send once the bus is known to be quiet; False if it was not by `end`."""
