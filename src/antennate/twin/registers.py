@@ -11,6 +11,7 @@ import math
 
 from antennate.hardware.dynamixel.packets import StatusError
 from antennate.hardware.dynamixel.tables import (
+    EXTENDED_MODE,
     GOALS,
     POSITION_UNIT,
     VELOCITY_UNIT,
@@ -21,8 +22,6 @@ from antennate.hardware.dynamixel.tables import (
 
 BOOT_TIME = 0.25
 """Time after a reboot in which a servo hears nothing [s]; assumed."""
-EXTENDED = 4
-"""Operating mode: position over many turns."""
 
 _POSITION_MODES = (3, 4, 5)
 _VELOCITY_MODE = 1
@@ -83,6 +82,11 @@ class Servo:
     def torque(self) -> bool:
         """It holds or moves."""
         return self.get("torque_enable") == 1
+
+    def place(self, position: float) -> None:
+        """Somebody turns the shaft [ticks]."""
+        self._position = position
+        self.set("present_position", round(position))
 
     def fail(self, bits: int) -> None:
         """A hardware error: latched until a reboot; torque goes if Shutdown says so."""
@@ -159,7 +163,7 @@ class Servo:
             self.set(goal, self.get(limit))
         if "goal_current" in self.table.registers:
             self.set("goal_current", self.get("current_limit"))
-        if self.get("operating_mode") != EXTENDED:
+        if self.get("operating_mode") != EXTENDED_MODE:
             self._position %= _TICKS
         self.set("goal_position", round(self._position))
         self.set("present_input_voltage", self.get("min_voltage_limit") + _VOLTS_MARGIN)
@@ -182,7 +186,7 @@ class Servo:
         return StatusError.NONE if least <= value <= most else StatusError.DATA_LIMIT
 
     def _limits(self, name: str) -> tuple[float, float]:
-        if name == "goal_position" and self.get("operating_mode") != EXTENDED:
+        if name == "goal_position" and self.get("operating_mode") != EXTENDED_MODE:
             return self.get("min_position_limit"), self.get("max_position_limit")
         limits = {
             "goal_velocity": "velocity_limit",

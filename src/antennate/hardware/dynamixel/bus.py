@@ -14,7 +14,7 @@ Time is monotonic and comes from outside; nothing is kept that an exception coul
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from antennate.hardware.dynamixel import packets
@@ -30,6 +30,8 @@ PING_DATA = 3
 FAST_TRIES = 3
 """Fast reads without any answer, but answers to a slow one, after which fast ones are given up."""
 
+ALONE = 2
+"""Misses in a row after which a servo no longer holds up the others."""
 BUSY = 0.010
 """How long goals wait for a quiet bus [s]."""
 
@@ -75,7 +77,7 @@ class Bus:
         self._fast = fast
         self._fast_failures = 0
         self._doubts = Doubts(self.timing.doubt, clock)
-        self._suspects: dict[int, None] = {}
+        self._missed: dict[int, int] = {}
         self._calm = False
         self._last_byte = self._sent = clock()
 
@@ -93,7 +95,7 @@ class Bus:
     def read_all(self, ids: Sequence[int], span: Span, budget: float = 0.010) -> dict[int, Answer]:
         """Read the same span of several servos.
 
-        Servos that were silent when last asked are asked alone, after the others.
+        Servos that were silent twice in a row are asked alone, after the others.
 
         Args:
             ids: The servos.
@@ -105,15 +107,15 @@ class Bus:
         """
         end = self._clock() + budget
         answers: dict[int, Answer] = dict.fromkeys(ids, SILENT)
-        alone = [servo for servo in self._suspects if servo in ids]
-        left = [servo for servo in ids if servo not in self._suspects]
+        alone = [servo for servo, n in self._missed.items() if n >= ALONE and servo in ids]
+        left = [servo for servo in ids if servo not in alone]
         fast, dumb = self._fast, False
         while left and self._time_for(span, len(left), end):
             got = (self._read_fast if fast else self._read_chain)(left, span, end)
             dumb = self._judge_fast(fast, dumb, bool(got))
             answers |= got
             left, fast = [servo for servo in left if servo not in got], False
-            self._suspects |= dict.fromkeys(left[:1])
+            self._note(got, left[:1])
             alone += left[:1]
             left = left[1:]
         for servo in alone:
@@ -171,9 +173,7 @@ class Bus:
             return SILENT
         request = packets.read(servo, span.address, length)
         found = cut(self._exchange(request, [servo], length, end), span.length)
-        self._suspects.pop(servo, None)
-        if not found:
-            self._suspects[servo] = None
+        self._note(found, [] if found else [servo])
         return found.get(servo, SILENT)
 
     def _read_chain(self, ids: Sequence[int], span: Span, end: float) -> dict[int, Answer]:
@@ -211,6 +211,7 @@ class Bus:
         if not self._send(request, end):
             return {}
         parser, good, stale = Parser(), dict[int, Answer](), 0
+        twice: set[int] = set()
         wait = self._sent - self._clock() + self.timing.answer(length)
         while len(good) < len(ids) and (part := self._listen(wait, end)):
             wait = self.timing.answer(length)
@@ -218,8 +219,10 @@ class Bus:
                 status = _fitting(packet, length, doubtful)
                 if status and status.id in ids and status.id not in good:
                     good[status.id] = answer(status)
-                else:
-                    stale += 1
+                    continue
+                stale += 1
+                twice |= {status.id} if status else set()
+        good = {servo: said for servo, said in good.items() if servo not in twice}
         self.tally.stale += stale
         self.tally.bad_crc += parser.counters.bad_crc
         self._finish(
@@ -234,6 +237,12 @@ class Bus:
         missed = len(ids) - len(good)
         self.tally.misses += missed
         self._calm = clean and not missed
+
+    def _note(self, good: Iterable[int], silent: Iterable[int]) -> None:
+        for servo in good:
+            self._missed.pop(servo, None)
+        for servo in silent:
+            self._missed[servo] = self._missed.pop(servo, 0) + 1
 
     def _judge_fast(self, fast: bool, dumb: bool, answered: bool) -> bool:
         if fast:

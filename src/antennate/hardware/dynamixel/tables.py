@@ -82,6 +82,9 @@ class Table:
         return self.registers[name]
 
 
+EXTENDED_MODE = 4
+"""Operating mode: position over many turns."""
+
 VELOCITY_UNIT = 0.229 * 2.0 * math.pi / 60.0
 """One count of a velocity [rad/s]."""
 POSITION_UNIT = 2.0 * math.pi / 4096
