@@ -1,8 +1,9 @@
 """One DYNAMIXEL servo as a register machine: what it stores, refuses and does. Time is an argument.
 
 It moves to its goal at a limited speed and without inertia. Where the manuals are silent the worse
-case is assumed: torque on keeps an old goal (https://github.com/pollen-robotics/reachy_mini/issues/1136),
-a read that touches an undefined byte is refused as a whole, and a restart takes a quarter second.
+case is assumed: torque on keeps an old goal, as reported in
+https://github.com/pollen-robotics/reachy_mini/issues/1136; a tripped bus watchdog takes nothing but
+0; a read that touches an undefined byte is refused as a whole; a restart takes a quarter second.
 """
 
 from __future__ import annotations
@@ -175,7 +176,8 @@ class Servo:
     def _refuses(self, register: Register, value: int) -> StatusError:
         if register.eeprom and self.torque:
             return StatusError.ACCESS
-        if register.name in GOALS and self.get("bus_watchdog") == _TRIPPED:
+        locked = register.name in GOALS or (register.name == "bus_watchdog" and value != 0)
+        if locked and self.get("bus_watchdog") == _TRIPPED:
             return StatusError.DATA_RANGE
         low, high = register.low, register.high
         if (low is not None and value < low) or (high is not None and value > high):
