@@ -1,1 +1,1 @@
-"""The real world: bytes from the board, bytes to the servos."""
+"""The real world: servos on a bus, bytes in and out. With the twin the only place for `serial`."""
