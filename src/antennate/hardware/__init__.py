@@ -1,1 +1,4 @@
-"""The real world: servos on a bus, bytes in and out. With the twin the only place for `serial`."""
+"""The real world: bytes from the antenna board, bytes to and from the servos.
+
+With the twin the only place for `serial`.
+"""

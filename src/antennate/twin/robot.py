@@ -1,0 +1,139 @@
+"""The simulated robot behind real bytes: a bus of 19 servos and the stream of an antenna board.
+
+Time is an argument. Servos do not move by themselves: every control period the physics takes their
+goals and gives back their positions. Physics begins when the first servo has torque; until then the
+robot stands and the board repeats its first reading.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from antennate.anatomy import YAW_COUNT
+from antennate.errors import SimulationError
+from antennate.hardware.dynamixel.tables import EXTENDED_MODE, XC430_W240, XL330_M288, Table
+from antennate.hardware.esp32 import frame
+from antennate.hardware.joints import Joints
+from antennate.params.layout import LayoutParams
+from antennate.sim.body import SimBody
+from antennate.twin.bus import ServoBus
+from antennate.twin.registers import Servo
+
+GREETING_PERIOD = 1.0
+"""Time between greetings of the board [s]."""
+_DEVICE = b"twin\0\0\0\0"
+_ROUNDING = 1e-9
+
+
+class DrivenServo(Servo):
+    """A servo whose shaft the physics moves."""
+
+    def goal(self) -> float:
+        """Where it pulls to [ticks]; where it is, without torque or after a stop."""
+        return (
+            float(self.get("goal_position")) if self.torque and not self._stopped else self.position
+        )
+
+    def _speed(self) -> float:
+        return 0.0
+
+
+class TwinRobot:
+    """One robot in row 0 of a simulated body, served as bytes.
+
+    Args:
+        body: Holds one world.
+        layout: Ids, directions and zeros of the servos.
+        period: Control period of the board and the physics [s].
+        boot_id: Random number of the board's boot.
+
+    Attributes:
+        bus: The servos on their wire.
+        t: Time up to which everything has happened [s].
+        board_silent: The board says nothing.
+    """
+
+    def __init__(self, body: SimBody, layout: LayoutParams, period: float, boot_id: int) -> None:
+        self._body = body
+        self._joints = Joints(layout)
+        self._period = period
+        self._encoder = frame.SampleEncoder(boot_id)
+        self._boot_id = boot_id
+        self._stream = bytearray()
+        self._buffer = bytearray(frame.SAMPLE_FRAME_SIZE)
+        self._ticks = self._walked = 0
+        self.t = 0.0
+        self.board_silent = False
+        self.servos = [_servo(i, servo) for i, servo in enumerate(layout.ids)]
+        self.bus = ServoBus(self.servos, layout.baud)
+        self._show()
+        self._counts = body.read().counts[0]
+        self._say()
+
+    @property
+    def failure(self) -> SimulationError | None:
+        """What ended the physics, if anything did."""
+        return self._body.failure(0)
+
+    def advance(self, t: float) -> None:
+        """Let everything happen until t."""
+        while (self._ticks + 1) * self._period <= t + _ROUNDING:
+            self._ticks += 1
+            self.bus.advance(self._ticks * self._period)
+            if self._walked or any(servo.torque for servo in self.servos):
+                self._walk()
+            self._say()
+        self.bus.advance(t)
+        self.t = max(self.t, t)
+
+    def take(self) -> bytes:
+        """What the board has sent since the last call."""
+        data, self._stream = bytes(self._stream), bytearray()
+        return data
+
+    def _walk(self) -> None:
+        goals = np.array([servo.goal() for servo in self.servos])
+        self._body.write(self._joints.pose(goals))
+        self._walked += 1
+        self._body.clock.sleep_until(self._walked * self._period)
+        self._show()
+        self._counts = self._body.read().counts[0]
+
+    def _show(self) -> None:
+        """Let the servos know where their shafts are."""
+        shafts = self._joints.positions(self._body.world(0).drives())
+        for servo, ticks in zip(self.servos, shafts.tolist(), strict=True):
+            servo.place(ticks)
+
+    def _say(self) -> None:
+        """One sample of the board, and a greeting now and then."""
+        if self.board_silent:
+            return
+        if self._ticks % round(GREETING_PERIOD / self._period) == 0:
+            settings = frame.config_hash(round(1 / self._period), 15, 34, 35)
+            reset, rate = frame.RESET_POWER_ON, round(1 / self._period)
+            self._stream += frame.encode_hello(self._boot_id, reset, settings, _DEVICE, rate)
+        left, right = (0 if math.isnan(c) else int(c) for c in self._counts)
+        flags = _rail(left, frame.FLAG_LEFT_RAIL) | _rail(right, frame.FLAG_RIGHT_RAIL)
+        ticks = round(1e6 * self._ticks * self._period) & frame.TICK_MASK
+        size = self._encoder.encode_sample_into(
+            self._buffer, self._ticks, ticks, left, right, flags, 0
+        )
+        self._stream += self._buffer[:size]
+
+
+def _rail(counts: int, flag: int) -> int:
+    return flag if counts in (0, frame.FULL_SCALE) else 0
+
+
+def _servo(place: int, servo: int) -> DrivenServo:
+    """A servo as the robot needs it: legs in extended mode, antennae of the small model."""
+    table: Table = XC430_W240 if place < YAW_COUNT + 12 else XL330_M288
+    made = DrivenServo(table, servo)
+    if YAW_COUNT <= place < YAW_COUNT + 12:
+        made.set("operating_mode", EXTENDED_MODE)
+    made.set("return_delay_time", 0)
+    made.set("baud_rate", 3)
+    return made
