@@ -185,6 +185,25 @@ def test_B4_a_late_refusal_does_not_refuse_the_next_read() -> None:
     assert rig.bus.read(3, POSITION) == Value((300).to_bytes(4, "little"), alert=False)
 
 
+@pytest.mark.parametrize("seed", range(8))
+def test_B3_B4_whatever_happens_no_value_is_wrong_and_no_cycle_late(seed: int) -> None:
+    """Random faults of random servos, late by up to 60 ms; each cycle has its own positions."""
+    rng = np.random.default_rng(seed)
+    rig = Rig(fast=bool(seed % 2), loss=0.01)
+    kinds = [f for f in Fault if f is not Fault.WRONG_ID]
+    for cycle in range(60):
+        for i in IDS:
+            rig.servo(i).place(1000 * i + cycle)
+        if rng.random() < 0.3:
+            kind = kinds[rng.integers(len(kinds))]
+            count = None if kind is Fault.SILENT else 1
+            trouble = Trouble(kind, float(rng.uniform(0.0, 0.06)), count)
+            rig.twin.trouble = {int(rng.integers(1, 20)): trouble}
+        answers, took = rig.cycle()
+        assert took <= LIMIT
+        assert positions(answers).items() <= {i: 1000 * i + cycle for i in IDS}.items()
+
+
 class Boom(Exception):
     """Something that is no error of the port."""
 
