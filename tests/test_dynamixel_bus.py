@@ -76,6 +76,17 @@ def test_B2_a_lost_answer_in_a_hundred_is_asked_for_again_in_time() -> None:
     assert misses / (600 * 19) < 0.01
 
 
+@pytest.mark.parametrize("fast", [True, False])
+def test_B2_an_answer_spoiled_once_is_there_in_the_same_cycle(fast: bool) -> None:
+    for hurt in IDS:
+        rig = Rig(fast)
+        rig.cycle()
+        rig.twin.trouble[hurt] = Trouble(Fault.BAD_CRC, count=1)
+        answers, took = rig.cycle()
+        assert positions(answers) == TRUE
+        assert took <= LIMIT
+
+
 def test_B2_one_in_twenty_lost_gives_no_wrong_value() -> None:
     rig = Rig(loss=0.05)
     for _ in range(200):
@@ -157,11 +168,40 @@ def test_B4_without_spare_bytes_a_servo_in_doubt_is_not_asked() -> None:
 
 
 def test_B4_a_late_confirmation_does_not_confirm_the_next_write() -> None:
+    """The second answer is slow itself, so that the first one would be there before it."""
     rig = Rig()
-    rig.twin.trouble[3] = Trouble(Fault.LATE, 0.050, count=1)
+    rig.twin.trouble[3] = Trouble(Fault.LATE, 0.003, count=1)
     assert rig.bus.write(3, 116, bytes(4)) == SILENT
+    rig.twin.trouble[3] = Trouble(Fault.LATE, 0.0015, count=1)
     answer = rig.bus.write(3, 116, (99_999).to_bytes(4, "little"))
     assert answer == Refused(StatusError.DATA_LIMIT, alert=False)
+
+
+def test_B4_a_late_refusal_does_not_refuse_the_next_read() -> None:
+    rig = Rig()
+    rig.twin.trouble[3] = Trouble(Fault.LATE, 0.003, count=1)
+    assert rig.bus.read(3, Span(66, 1)) == SILENT
+    rig.twin.trouble[3] = Trouble(Fault.LATE, 0.0015, count=1)
+    assert rig.bus.read(3, POSITION) == Value((300).to_bytes(4, "little"), alert=False)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_B3_B4_whatever_happens_no_value_is_wrong_and_no_cycle_late(seed: int) -> None:
+    """Random faults of random servos, late by up to 60 ms; each cycle has its own positions."""
+    rng = np.random.default_rng(seed)
+    rig = Rig(fast=bool(seed % 2), loss=0.01)
+    kinds = [f for f in Fault if f is not Fault.WRONG_ID]
+    for cycle in range(60):
+        for i in IDS:
+            rig.servo(i).place(1000 * i + cycle)
+        if rng.random() < 0.3:
+            kind = kinds[rng.integers(len(kinds))]
+            count = None if kind is Fault.SILENT else 1
+            trouble = Trouble(kind, float(rng.uniform(0.0, 0.06)), count)
+            rig.twin.trouble = {int(rng.integers(1, 20)): trouble}
+        answers, took = rig.cycle()
+        assert took <= LIMIT
+        assert positions(answers).items() <= {i: 1000 * i + cycle for i in IDS}.items()
 
 
 class Boom(Exception):

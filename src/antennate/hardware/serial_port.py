@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Generator
 from contextlib import contextmanager
 
 import serial
@@ -58,7 +58,7 @@ class SerialPort:
             self._line.close()
 
     @contextmanager
-    def _mapped(self, what: str) -> Iterator[None]:
+    def _mapped(self, what: str) -> Generator[None]:
         try:
             yield
         except (OSError, TypeError, ValueError) as error:

@@ -95,7 +95,8 @@ class Bus:
     def read_all(self, ids: Sequence[int], span: Span, budget: float = 0.010) -> dict[int, Answer]:
         """Read the same span of several servos.
 
-        Servos that were silent twice in a row are asked alone, after the others.
+        A servo at which the chain stops is asked again at its end; one that was silent twice in a
+        row is asked alone, after the others.
 
         Args:
             ids: The servos.
@@ -108,7 +109,7 @@ class Bus:
         end = self._clock() + budget
         answers: dict[int, Answer] = dict.fromkeys(ids, SILENT)
         alone = [servo for servo, n in self._missed.items() if n >= ALONE and servo in ids]
-        left = [servo for servo in ids if servo not in alone]
+        left = sorted(set(ids) - set(alone), key=lambda servo: (servo in self._missed, servo))
         fast, dumb = self._fast, False
         while left and self._time_for(span, len(left), end):
             got = (self._read_fast if fast else self._read_chain)(left, span, end)
@@ -116,8 +117,8 @@ class Bus:
             answers |= got
             left, fast = [servo for servo in left if servo not in got], False
             self._note(got, left[:1])
-            alone += left[:1]
-            left = left[1:]
+            again = [servo for servo in left[:1] if self._missed[servo] < ALONE]
+            left = left[1:] + again
         for servo in alone:
             if self._time_for(span, 1, end):
                 answers[servo] = self._read_one(servo, span, end)

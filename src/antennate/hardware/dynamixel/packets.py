@@ -230,24 +230,27 @@ def fast_reply(asked: int, answers: Sequence[Status], length: int) -> list[bytes
 
 
 def split_fast_reply(received: bytes, ids: Sequence[int], length: int) -> list[Status]:
-    """Answers in what came after a fast sync read, as far as each is proven by its CRC.
+    """Answers in what came after a fast sync read, each proven by its CRC.
 
-    The chain of answers stops at a servo that is silent; what came before it is good.
+    The chain of answers stops at a servo that is silent. A part that is lost or damaged on the way
+    costs itself and at most the next one: the CRC at the end of a part is also where the CRC of the
+    next one starts, so each is checked from the CRC before it.
     """
     start = received.find(_fast_header(len(ids), length))
     if start < 0:
         return []
     answers: list[Status] = []
-    crc, at, begin = 0, start, start + 8
-    for servo in ids:
+    left = list(ids)
+    first = start + 8
+    crc = crc16(received[start:first])
+    for begin in range(first, len(received) - length - 3, length + 4):
         end = begin + 2 + length
-        if len(received) < end + 2 or received[begin + 1] != servo:
-            break
-        crc = crc16(received[at:end], crc)
-        if crc != int.from_bytes(received[end : end + 2], "little"):
-            break
-        answers.append(_status(servo, received[begin], received[begin + 2 : end]))
-        at, begin = end, end + 2
+        told, crc = received[end : end + 2], crc16(received[begin:end], crc)
+        servo = received[begin + 1]
+        if told == crc.to_bytes(2, "little") and servo in left:
+            answers.append(_status(servo, received[begin], received[begin + 2 : end]))
+            left = left[left.index(servo) + 1 :]
+        crc = crc16(told, int.from_bytes(told, "little"))
     return answers
 
 
