@@ -9,7 +9,7 @@ import pytest
 from pydantic import ValidationError
 
 from antennate.experiments.tunnel import TunnelConfig
-from antennate.experiments.twin_trial import Decisions, on_twin, simulated
+from antennate.experiments.twin import Decisions, on_twin, simulated
 from antennate.hardware.joints import Joints, PoseError
 from antennate.params.layout import LayoutParams
 from antennate.records import Maneuver, Pose
@@ -40,7 +40,7 @@ def test_a_quarter_turn_is_1024_ticks_from_the_middle_and_directions_count() -> 
     ("change", "said"),
     [
         ({"yaw": {"ids": (1, 2)}}, "yaw.ids must have 5 entries, got 2"),
-        ({"antennae": {**LAYOUT.antennae.model_dump(), "ids": (1, 31)}}, "ids must differ, got 1"),
+        ({"antennae": {**LAYOUT.antennae.model_dump(), "ids": (1, 19)}}, "ids must differ, got 1"),
         ({"yaw": {**LAYOUT.yaw.model_dump(), "zeros": (2048,) * 4 + (100,)}}, "quarter turn"),
     ],
 )
@@ -67,7 +67,7 @@ def test_ticks_and_back_lose_half_a_tick_at_most(layout: LayoutParams) -> None:
 def test_B14_a_goal_that_is_not_finite_or_too_far_is_refused_as_a_whole(bad: float) -> None:
     sent = pose()
     sent.leg[0, 3, 1] = bad
-    with pytest.raises(PoseError, match="servo 18"):
+    with pytest.raises(PoseError, match="servo 13"):
         Joints(LAYOUT).ticks(sent)
 
 

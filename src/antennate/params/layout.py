@@ -16,7 +16,7 @@ TICKS_A_TURN = 4096
 """Datasheet of both models: 4096 pulses a revolution."""
 _STRAIGHT = 2048
 _QUARTER = 1024
-_FIRST_LEG, _FIRST_ANTENNA = 11, 31
+_FIRST_LEG, _FIRST_ANTENNA = YAW_COUNT + 1, YAW_COUNT + len(LEGS) + 1
 
 
 class JointsParams(Params):

@@ -23,6 +23,8 @@ from antennate.twin.registers import Servo
 
 GREETING_PERIOD = 1.0
 """Time between greetings of the board [s]."""
+BOOT_TICKS = 50
+"""Samples that a starting board does not send."""
 _DEVICE = b"twin\0\0\0\0"
 _ROUNDING = 1e-9
 
@@ -63,7 +65,8 @@ class TwinRobot:
         self._boot_id = boot_id
         self._stream = bytearray()
         self._buffer = bytearray(frame.SAMPLE_FRAME_SIZE)
-        self._ticks = self._walked = 0
+        self._ticks = self._walked = self._booted = 0
+        self._broken = [False, False]
         self.t = 0.0
         self.board_silent = False
         self.servos = [_servo(i, servo) for i, servo in enumerate(layout.ids)]
@@ -88,10 +91,27 @@ class TwinRobot:
         self.bus.advance(t)
         self.t = max(self.t, t)
 
+    def next_time(self) -> float:
+        """When something happens next without anybody asking [s]."""
+        due = self.bus.next_time()
+        tick = (self._ticks + 1) * self._period
+        return tick if due is None else min(due, tick)
+
     def take(self) -> bytes:
         """What the board has sent since the last call."""
         data, self._stream = bytes(self._stream), bytearray()
         return data
+
+    def break_board(self, what: str) -> None:
+        """Let the board fall silent, start anew after BOOT_TICKS, or lose an antenna's wire."""
+        if what == "silent":
+            self.board_silent = True
+        elif what == "reset":
+            self._boot_id = (self._boot_id * 1_103_515_245 + 12_345) & 0xFFFFFFFF
+            self._encoder = frame.SampleEncoder(self._boot_id)
+            self._booted = self._ticks + BOOT_TICKS
+        else:
+            self._broken[what == "open_right"] = True
 
     def _walk(self) -> None:
         goals = np.array([servo.goal() for servo in self.servos])
@@ -109,18 +129,21 @@ class TwinRobot:
 
     def _say(self) -> None:
         """One sample of the board, and a greeting now and then."""
-        if self.board_silent:
+        since = self._ticks - self._booted
+        if self.board_silent or since < 0:
             return
-        if self._ticks % round(GREETING_PERIOD / self._period) == 0:
+        if since % round(GREETING_PERIOD / self._period) == 0:
             settings = frame.config_hash(round(1 / self._period), 15, 34, 35)
-            reset, rate = frame.RESET_POWER_ON, round(1 / self._period)
+            reset = frame.RESET_HARD if self._booted else frame.RESET_POWER_ON
+            rate = round(1 / self._period)
             self._stream += frame.encode_hello(self._boot_id, reset, settings, _DEVICE, rate)
-        left, right = (0 if math.isnan(c) else int(c) for c in self._counts)
-        flags = _rail(left, frame.FLAG_LEFT_RAIL) | _rail(right, frame.FLAG_RIGHT_RAIL)
-        ticks = round(1e6 * self._ticks * self._period) & frame.TICK_MASK
-        size = self._encoder.encode_sample_into(
-            self._buffer, self._ticks, ticks, left, right, flags, 0
+        left, right = (
+            0 if broken or math.isnan(counts) else int(counts)
+            for counts, broken in zip(self._counts, self._broken, strict=True)
         )
+        flags = _rail(left, frame.FLAG_LEFT_RAIL) | _rail(right, frame.FLAG_RIGHT_RAIL)
+        ticks = round(1e6 * since * self._period) & frame.TICK_MASK
+        size = self._encoder.encode_sample_into(self._buffer, since, ticks, left, right, flags, 0)
         self._stream += self._buffer[:size]
 
 

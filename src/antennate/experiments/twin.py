@@ -20,6 +20,7 @@ from antennate.hardware.dynamixel import bringup
 from antennate.hardware.dynamixel.bus import Bus
 from antennate.hardware.joints import Joints
 from antennate.loop import run_loop
+from antennate.params import Params, number
 from antennate.params.layout import LayoutParams
 from antennate.records import AntennaFrame, Pose
 from antennate.sim.body import SimBody
@@ -45,6 +46,29 @@ class Decisions:
     maneuvers: list[int]
     counts: list[tuple[float, float]]
     status: str
+
+
+class TwinConfig(Params):
+    """The robot and its world that `antennate twin` serves."""
+
+    trial: int = number(0, "1", "assumed: the first", "trial of the world's seed", ge=0)
+    duration: float | None = number(
+        None, "s", "assumed: until it is stopped", "time to serve", gt=0
+    )
+    fault: tuple[str, ...] = number(
+        (), "1", "assumed: nothing is broken", "faults, such as servo:7=silent@3s"
+    )
+    layout: LayoutParams = LayoutParams()
+    world: TunnelConfig = TunnelConfig()
+
+
+def build(config: TwinConfig) -> TwinRobot:
+    """The robot at the start of a tunnel."""
+    world, start = config.world, prepare(config.world, config.trial)
+    period = world.controller.period
+    body = SimBody(1, world.robot.sensor, period, world.physics.timestep)
+    body.load(0, start.world, start.chance)
+    return TwinRobot(body, config.layout, period, boot_id=config.trial + 1)
 
 
 class _Rounded:
