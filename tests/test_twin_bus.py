@@ -9,10 +9,10 @@ from functools import partial
 from typing import Any
 
 import pytest
-from servo_rig import IDS, MODELS, MOTION, Rig, positions, servos
+from servo_rig import IDS, MODELS, Rig, positions, servos
 
 from antennate.hardware.dynamixel import packets
-from antennate.hardware.dynamixel.answers import Timing, Value
+from antennate.hardware.dynamixel.answers import MOTION, Timing, Value
 from antennate.hardware.dynamixel.bus import Bus
 from antennate.hardware.dynamixel.packets import Instruction, Status, StatusError
 from antennate.hardware.dynamixel.parser import Parser

@@ -57,6 +57,13 @@ class Span:
     spare: int = 0
 
 
+MOTION = Span(126, 10, spare=12)
+"""Load or current (2 bytes), velocity (4) and position (4) of both models; up to 147 all is
+defined, so that more may be read."""
+POSITION = Span(132, 4, spare=12)
+"""The position of both models."""
+
+
 @dataclass(frozen=True, slots=True)
 class Timing:
     """What the bus may take.
