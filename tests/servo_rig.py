@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from antennate.hardware.dynamixel.answers import Answer, Span, Value
+from antennate.hardware.dynamixel.answers import MOTION, Answer, Span, Value
 from antennate.hardware.dynamixel.bus import Bus
 from antennate.hardware.dynamixel.tables import XC430_W240, XL330_M288
 from antennate.twin.bus import ServoBus
@@ -11,9 +11,6 @@ from antennate.twin.registers import Servo
 
 IDS = list(range(1, 20))
 MODELS = {i: (XC430_W240 if i <= 17 else XL330_M288).model for i in IDS}
-MOTION = Span(126, 10, spare=12)
-"""Load, velocity and position; after them only more that may be read."""
-POSITION = Span(132, 4, spare=12)
 
 
 def servos() -> list[Servo]:

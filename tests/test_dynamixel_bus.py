@@ -6,10 +6,19 @@ import time
 
 import numpy as np
 import pytest
-from servo_rig import IDS, MODELS, MOTION, POSITION, Rig, positions
+from servo_rig import IDS, MODELS, Rig, positions
 
 from antennate.hardware.dynamixel import bringup
-from antennate.hardware.dynamixel.answers import SILENT, Refused, Silent, Span, Timing, Value
+from antennate.hardware.dynamixel.answers import (
+    MOTION,
+    POSITION,
+    SILENT,
+    Refused,
+    Silent,
+    Span,
+    Timing,
+    Value,
+)
 from antennate.hardware.dynamixel.bringup import BringUpError
 from antennate.hardware.dynamixel.bus import Bus
 from antennate.hardware.dynamixel.packets import StatusError

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import pytest
-from servo_rig import IDS, MODELS, MOTION, Rig, positions, servos
+from servo_rig import IDS, MODELS, Rig, positions, servos
 
 from antennate.hardware.dynamixel import packets
-from antennate.hardware.dynamixel.answers import Timing, Value
+from antennate.hardware.dynamixel.answers import MOTION, Timing, Value
 from antennate.hardware.dynamixel.bus import Bus
 from antennate.hardware.dynamixel.packets import Instruction, Status, StatusError
 from antennate.hardware.dynamixel.parser import Parser
@@ -418,3 +420,27 @@ def test_L12_a_line_that_goes_away_is_a_port_error() -> None:
     with pytest.raises(PortError):
         bus.read_all(IDS, MOTION)
     port.close()
+
+
+def test_B7_a_killed_program_leaves_a_robot_that_stops(server: PtyServer) -> None:
+    """Servos slow enough to be on their way for seconds; 120 ms after the last packet all stand."""
+    pytest.importorskip("serial")
+    with server.lock:
+        for servo in server.bus.servos:
+            servo.set("profile_velocity", 10)
+    client = Path(__file__).with_name("bus_client.py")
+    command = [sys.executable, str(client), server.path]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as program:
+        assert program.stdout is not None
+        for _ in range(10):
+            assert program.stdout.readline() == "cycle\n"
+        program.kill()
+    time.sleep(0.15)
+    with server.lock:
+        last = max(servo.last_heard for servo in server.bus.servos)
+        server.bus.advance(last + 0.12)
+        assert {servo.get("bus_watchdog") for servo in server.bus.servos} == {-1}
+        stopped = [servo.position for servo in server.bus.servos]
+        server.bus.advance(last + 10.0)
+        assert [servo.position for servo in server.bus.servos] == stopped
+        assert all(100 * i < p < 4000 for i, p in zip(IDS, stopped, strict=True))

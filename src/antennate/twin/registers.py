@@ -80,6 +80,11 @@ class Servo:
         return self._position
 
     @property
+    def last_heard(self) -> float:
+        """When an instruction packet last fed its bus watchdog [s]."""
+        return self._heard
+
+    @property
     def torque(self) -> bool:
         """It holds or moves."""
         return self.get("torque_enable") == 1

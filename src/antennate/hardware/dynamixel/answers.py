@@ -57,6 +57,13 @@ class Span:
     spare: int = 0
 
 
+MOTION = Span(126, 10, spare=12)
+"""Load or current (2 bytes), velocity (4) and position (4) of both models; up to 147 all is
+defined, so that more may be read."""
+POSITION = Span(132, 4, spare=12)
+"""The position of both models."""
+
+
 @dataclass(frozen=True, slots=True)
 class Timing:
     """What the bus may take.
@@ -81,6 +88,23 @@ class Timing:
     def answer(self, length: int) -> float:
         """Longest time to an answer with so many bytes of data, or between two [s]."""
         return self.wire(OVERHEAD + length) + self.gap
+
+
+@dataclass(slots=True)
+class Tally:
+    """What the bus has seen.
+
+    Attributes:
+        misses: Requests to one servo without a right answer.
+        stale: Answers that were right but not to the request, and were thrown away.
+        bad_crc: Packets with a wrong CRC.
+        drained: Bytes thrown away before a request.
+    """
+
+    misses: int = 0
+    stale: int = 0
+    bad_crc: int = 0
+    drained: int = 0
 
 
 def answer(status: Status) -> Answer:

@@ -15,10 +15,17 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
 
 from antennate.hardware.dynamixel import packets
-from antennate.hardware.dynamixel.answers import SILENT, Answer, Span, Timing, answer, cut
+from antennate.hardware.dynamixel.answers import (
+    SILENT,
+    Answer,
+    Span,
+    Tally,
+    Timing,
+    answer,
+    cut,
+)
 from antennate.hardware.dynamixel.doubts import Doubts
 from antennate.hardware.dynamixel.packets import HEADER, OVERHEAD, Packet, Status, StatusError
 from antennate.hardware.dynamixel.parser import Parser
@@ -34,23 +41,6 @@ ALONE = 2
 """Misses in a row after which a servo no longer holds up the others."""
 BUSY = 0.010
 """How long goals wait for a quiet bus [s]."""
-
-
-@dataclass(slots=True)
-class Tally:
-    """What the bus has seen.
-
-    Attributes:
-        misses: Requests to one servo without a right answer.
-        stale: Answers that were right but not to the request, and were thrown away.
-        bad_crc: Packets with a wrong CRC.
-        drained: Bytes thrown away before a request.
-    """
-
-    misses: int = 0
-    stale: int = 0
-    bad_crc: int = 0
-    drained: int = 0
 
 
 class Bus:
