@@ -68,7 +68,7 @@ def build(config: TwinConfig) -> TwinRobot:
     period = world.controller.period
     body = SimBody(1, world.robot.sensor, period, world.physics.timestep)
     body.load(0, start.world, start.chance)
-    return TwinRobot(body, config.layout, period, boot_id=config.trial + 1)
+    return TwinRobot(body, config.layout, period, boot_id=config.trial + 1, standing_noise=True)
 
 
 class _Rounded:

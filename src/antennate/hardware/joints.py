@@ -52,6 +52,11 @@ class Joints:
             )
         return np.rint(exact).astype(np.int64)
 
+    def align(self, ticks: Ints, pose: Pose) -> None:
+        """Count whole turns of legs so that a pose is nearest to where they stand [ticks]."""
+        away = (ticks - self.ticks(pose))[YAW_COUNT:-2]
+        self._zero[YAW_COUNT:-2] += TICKS_A_TURN * np.rint(away / TICKS_A_TURN)
+
     def positions(self, angles: Floats) -> Floats:
         """Positions, not rounded [ticks], of joint angles [rad], both of shape (19,)."""
         return np.asarray(self._zero + self._sign * angles / _STEP)

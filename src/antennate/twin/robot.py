@@ -25,6 +25,8 @@ GREETING_PERIOD = 1.0
 """Time between greetings of the board [s]."""
 BOOT_TICKS = 50
 """Samples that a starting board does not send."""
+_STANDING_NOISE = 2.5
+"""Noise of a resting film [counts], as while walking."""
 _DEVICE = b"twin\0\0\0\0"
 _ROUNDING = 1e-9
 
@@ -50,6 +52,7 @@ class TwinRobot:
         layout: Ids, directions and zeros of the servos.
         period: Control period of the board and the physics [s].
         boot_id: Random number of the board's boot.
+        standing_noise: Whether readings are noisy before the physics begins, as a real film's are.
 
     Attributes:
         bus: The servos on their wire.
@@ -57,7 +60,14 @@ class TwinRobot:
         board_silent: The board says nothing.
     """
 
-    def __init__(self, body: SimBody, layout: LayoutParams, period: float, boot_id: int) -> None:
+    def __init__(
+        self,
+        body: SimBody,
+        layout: LayoutParams,
+        period: float,
+        boot_id: int,
+        standing_noise: bool = False,
+    ) -> None:
         self._body = body
         self._joints = Joints(layout)
         self._period = period
@@ -67,6 +77,7 @@ class TwinRobot:
         self._buffer = bytearray(frame.SAMPLE_FRAME_SIZE)
         self._ticks = self._walked = self._booted = 0
         self._broken = [False, False]
+        self._chance = np.random.default_rng(boot_id) if standing_noise else None
         self.t = 0.0
         self.board_silent = False
         self.servos = [_servo(i, servo) for i, servo in enumerate(layout.ids)]
@@ -137,9 +148,12 @@ class TwinRobot:
             reset = frame.RESET_HARD if self._booted else frame.RESET_POWER_ON
             rate = round(1 / self._period)
             self._stream += frame.encode_hello(self._boot_id, reset, settings, _DEVICE, rate)
+        noise = np.zeros(2)
+        if self._chance is not None and not self._walked:
+            noise = np.rint(self._chance.normal(0.0, _STANDING_NOISE, 2))
         left, right = (
             0 if broken or math.isnan(counts) else int(counts)
-            for counts, broken in zip(self._counts, self._broken, strict=True)
+            for counts, broken in zip(self._counts + noise, self._broken, strict=True)
         )
         flags = _rail(left, frame.FLAG_LEFT_RAIL) | _rail(right, frame.FLAG_RIGHT_RAIL)
         ticks = round(1e6 * since * self._period) & frame.TICK_MASK
