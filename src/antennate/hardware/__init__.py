@@ -1,0 +1,1 @@
+"""The real world: bytes from the board, bytes to the servos."""
