@@ -19,6 +19,7 @@ from antennate.hardware.body import HardwareBody
 from antennate.hardware.dynamixel import bringup
 from antennate.hardware.dynamixel.bus import Bus
 from antennate.hardware.joints import Joints
+from antennate.hardware.session import Session
 from antennate.loop import run_loop
 from antennate.params import Params, number
 from antennate.params.layout import LayoutParams
@@ -124,6 +125,31 @@ def simulated(config: TunnelConfig, arm: Arm, trial: int, layout: LayoutParams) 
     body = _Rounded(watch.body, Joints(layout))
     run_loop(body, watch.controller, config.controller.period, watch.go_on)
     return watch.decisions()
+
+
+@dataclass(frozen=True, slots=True)
+class Rig:
+    """The whole of the hardware code in front of a twin, in invented time."""
+
+    robot: TwinRobot
+    clock: LockstepClock
+    session: Session
+
+
+def rig(config: TwinConfig, arm: Arm = "closed") -> Rig:
+    """A session before a twin robot, not yet armed."""
+    robot, params = build(config), config.world.controller
+    clock = LockstepClock(robot)
+    session = Session(
+        board=Board(BoardPort(robot, clock), AGE_LIMIT),
+        bus=Bus(clock, clock=clock.now),
+        joints=Joints(config.layout),
+        clock=clock,
+        decider=Controller(params, arm),
+        period=params.period,
+        conditioning=params.conditioning,
+    )
+    return Rig(robot, clock, session)
 
 
 def on_twin(

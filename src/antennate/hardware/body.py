@@ -10,7 +10,7 @@ from antennate.hardware.dynamixel.bus import Bus
 from antennate.hardware.dynamixel.tables import XC430_W240
 from antennate.hardware.esp32.clock import Timed
 from antennate.hardware.joints import Joints
-from antennate.records import AntennaFrame, Pose
+from antennate.records import AntennaFrame, Floats, Ints, Pose
 
 _GOAL = XC430_W240["goal_position"]
 """At the same address in both models."""
@@ -27,6 +27,9 @@ class HardwareBody:
         bus: Its servos, torque on.
         joints: Which servo moves what.
         clock: The host's time, which never steps.
+
+    Attributes:
+        used: Usable samples that the last reading found.
     """
 
     def __init__(self, board: Board, bus: Bus, joints: Joints, clock: Clock) -> None:
@@ -34,6 +37,7 @@ class HardwareBody:
         self._bus = bus
         self._joints = joints
         self._clock = clock
+        self.used = 0
         self._stamp: Timed | None = None
         self._stamp_t = self._stamp_now = 0.0
 
@@ -45,7 +49,7 @@ class HardwareBody:
     def read(self) -> AntennaFrame:
         """The newest reading of both antennae."""
         now = self._clock.now()
-        self._board.poll(now)
+        self.used = self._board.poll(now)
         timed = self._board.newest(now)
         return AntennaFrame(t=np.array([self._time(timed, now)]), counts=counts_of(timed))
 
@@ -67,6 +71,13 @@ class HardwareBody:
             PoseError: The pose must not be sent; nothing is.
             PortError: The bus is gone.
         """
-        goals = self._joints.ticks(pose).tolist()
-        pairs = zip(self._joints.ids, goals, strict=True)
+        self.send(self._joints.ticks(pose))
+
+    def send(self, goals: Ints | Floats) -> None:
+        """Send goal positions [ticks], shape (19,), rounded.
+
+        Raises:
+            PortError: The bus is gone.
+        """
+        pairs = zip(self._joints.ids, np.rint(goals).astype(int).tolist(), strict=True)
         self._bus.write_all(_GOAL.address, {servo: _GOAL.encode(goal) for servo, goal in pairs})

@@ -52,7 +52,12 @@ class Joints:
             )
         return np.rint(exact).astype(np.int64)
 
-    def align(self, ticks: Ints, pose: Pose) -> None:
+    @staticmethod
+    def reach(angle: float) -> float:
+        """Ticks of an angle [rad]."""
+        return angle / _STEP
+
+    def align(self, ticks: Ints | Floats, pose: Pose) -> None:
         """Count whole turns of legs so that a pose is nearest to where they stand [ticks]."""
         away = (ticks - self.ticks(pose))[YAW_COUNT:-2]
         self._zero[YAW_COUNT:-2] += TICKS_A_TURN * np.rint(away / TICKS_A_TURN)

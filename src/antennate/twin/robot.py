@@ -173,4 +173,5 @@ def _servo(place: int, servo: int) -> DrivenServo:
         made.set("operating_mode", EXTENDED_MODE)
     made.set("return_delay_time", 0)
     made.set("baud_rate", 3)
+    made.set("present_input_voltage", 111 if table is XC430_W240 else 50)
     return made
