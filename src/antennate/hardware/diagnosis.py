@@ -194,25 +194,25 @@ class ChannelDiagnosis:
 
     def _broken(self) -> Finding | None:
         """A channel that says nothing about the film, as far as known."""
-        params, raw = self._params, self._raw
-        if self._equal >= params.stuck and params.low_rail < raw[-1] < params.high_rail:
-            return Finding.STUCK
-        if len(raw) < params.window:
-            return None
-        if self._pinned(low=True):
+        params = self._params
+        full = len(self._raw) == params.window
+        if full and self._pinned(low=True):
             return Finding.SHORT_LO
-        if self._pinned(low=False):
+        if full and self._pinned(low=False):
             return Finding.SHORT_HI
-        return Finding.OPEN if sum(self._bad) >= params.open_bad else None
+        if self._equal >= params.stuck:
+            return Finding.STUCK
+        return Finding.OPEN if full and sum(self._bad) >= params.open_bad else None
 
     def _pinned(self, low: bool) -> bool:
         """Whether the whole window is at one rail; a bent film that reaches it still has noise."""
         params, bent_low = self._params, self._band.polarity < 0
         if low:
             bound = 0.0 if bent_low and self._plausible(params.low_rail) else params.low_rail
-            return max(self._raw) <= bound
+            return all(counts <= bound for counts in self._raw)
         bent = not bent_low and self._plausible(params.high_rail)
-        return min(self._raw) >= (FULL_SCALE if bent else params.high_rail)
+        bound = FULL_SCALE if bent else params.high_rail
+        return all(counts >= bound for counts in self._raw)
 
     def _at_bent_rail(self) -> int:
         if self._band.polarity > 0:
