@@ -29,6 +29,8 @@ from antennate.records import AntennaFrame, Pose
 
 _GREETING_TIME = 3.0
 """A board greets within this time [s], also one that opening the port has reset."""
+_ARMING_TIME = 1.0
+"""Time after which torque must have come on, or the drive ends [s]."""
 _PATIENCE = 0.05
 _POSITION_MODE = 3
 _BOARD_BAUD = 115_200
@@ -213,7 +215,7 @@ def drive(
         due = report.ticks + report.missed
         skipped = max(0, math.floor(t / period + 1e-6) - due)
         report.missed += skipped
-        late = t - (due + skipped) * period
+        late = max(0.0, t - (due + skipped) * period)
         report.late = max(report.late, late + skipped * period)
         report.ticks += 1
         session.orders.arm = t >= walk
@@ -221,7 +223,7 @@ def drive(
         if out is not None and out.torque:
             report.worst = max(report.worst, out.state)
         on_tick(session, clock.now(), late)
-        failed = out is not None and t > walk + 1.0 and out.state >= State.FAULT
+        failed = out is not None and t > walk + _ARMING_TIME and out.state >= State.FAULT
         return t < end and not failed
 
     try:

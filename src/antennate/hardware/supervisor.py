@@ -68,6 +68,7 @@ class Supervisor:
         self._waiting: set[Cause] = {Cause.STALE}
         self._streak = 0
         self._last = -math.inf
+        self._arming = False
         self._resets: int | None = None
         self._asked = False
         self._low: set[Cause] = set()
@@ -97,6 +98,7 @@ class Supervisor:
         self._list(now, present)
         state = self._settle(now)
         self._last = now
+        self._arming = arming
         return self._outputs(state, decided and not inputs.failure, arming, refusal)
 
     def _outputs(
@@ -130,7 +132,8 @@ class Supervisor:
         self.meter.step(now, inputs.valid)
         if self.meter.wrong:
             found[Cause.RATE] = f"{self.meter.rate:.0f} Hz"
-        if not now - self._last < params.longest_pause and self._last > -math.inf:
+        longest = params.longest_arming if self._arming else params.longest_pause
+        if not now - self._last < longest and self._last > -math.inf:
             found[Cause.PAUSE] = f"{now - self._last:.3g} s"
         elif not now > self._last:
             found[Cause.PAUSE] = "time did not advance"

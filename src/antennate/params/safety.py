@@ -229,6 +229,14 @@ class SupervisorParams(Params):
     rate_time: float = number(
         1.0, "s", "assumed: a hundred samples", "window of the rate, and patience", gt=0, le=60
     )
+    longest_arming: float = number(
+        1.0,
+        "s",
+        "measured: 0.14 s against the twin; each step is written and read back",
+        "longest time from an arm event to the next tick",
+        gt=0,
+        le=10,
+    )
     longest_pause: float = number(
         0.12,
         "s",
