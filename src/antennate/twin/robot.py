@@ -34,11 +34,15 @@ _ROUNDING = 1e-9
 class DrivenServo(Servo):
     """A servo whose shaft the physics moves."""
 
+    _stood: float | None = None
+
     def goal(self) -> float:
-        """Where it pulls to [ticks]; where it is, without torque or after a stop."""
-        return (
-            float(self.get("goal_position")) if self.torque and not self._stopped else self.position
-        )
+        """Where it pulls to [ticks]: where it stopped after a stop; nowhere without torque."""
+        if self.torque and self._stopped:
+            self._stood = self.position if self._stood is None else self._stood
+            return self._stood
+        self._stood = None
+        return float(self.get("goal_position")) if self.torque else self.position
 
     def _speed(self) -> float:
         return 0.0

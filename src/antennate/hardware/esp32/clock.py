@@ -161,7 +161,7 @@ class DeviceClock:
         newest = self.newest
         if newest is None or not self._settled:
             return math.inf
-        return now - self._floor - 1e-6 * newest.elapsed_us
+        return max(0.0, now - self._floor - 1e-6 * newest.elapsed_us)
 
     def _judge(self, sample: Sample, now: float) -> Verdict:
         if sample.boot_id != self._boot:
