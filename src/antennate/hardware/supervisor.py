@@ -149,8 +149,9 @@ class Supervisor:
 
     def _servos(self, inputs: Inputs, found: dict[Cause, str]) -> None:
         params = self._params
+        silent = [i for i, missed in inputs.missed.items() if missed >= params.silent_answers]
         late = [i for i, missed in inputs.missed.items() if missed >= params.late_answers]
-        silent = [i for i in late if inputs.missed[i] >= params.silent_answers]
+        late = [i for i in late if i not in silent]
         _name(found, Cause.LATE_ANSWERS, late)
         _name(found, Cause.SILENT_SERVO, silent)
         _name(found, Cause.WATCHDOG, inputs.watchdogs)
