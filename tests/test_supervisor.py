@@ -48,6 +48,7 @@ BAD: dict[Cause, dict[str, Any]] = {
     Cause.BUS_ERROR: {"bus_error": "port gone"},
     Cause.WATCHDOG: {"watchdogs": (4, 5)},
     Cause.SUPPLY_OFF: {"supply": 9.5},
+    Cause.NOT_READY: {"objections": ("the firmware is old",)},
     Cause.STOPPED: {"stop": True},
 }
 """A change of healthy inputs that brings about each cause."""

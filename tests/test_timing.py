@@ -14,7 +14,7 @@ from antennate.errors import ConfigError
 from antennate.hardware.timing import LoopTiming
 
 PERIOD = 0.01
-PURE = ("causes", "diagnosis", "rate", "supervisor", "timing")
+PURE = ("causes", "diagnosis", "rate", "supervisor", "timing", "touch_check")
 
 
 def run(delays: dict[int, tuple[str, float]], ticks: int, start: float = 5.0):
