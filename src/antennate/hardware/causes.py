@@ -53,6 +53,7 @@ class Cause(Enum):
     SERVO_ERROR = (State.FAULT, "servos report a hardware error")
     BUS_ERROR = (State.FAULT, "the servo bus does not work")
     WATCHDOG = (State.FAULT, "watchdogs of servos have stopped them")
+    NOT_READY = (State.FAULT, "something speaks against arming")
     PAUSE = (State.FAULT, "the loop stood still, or its clock did")
     SUPPLY_OFF = (State.OFF, "the supply is empty")
     NOT_ARMED = (State.OFF, "not armed yet")
@@ -118,6 +119,7 @@ class Inputs:
         bus_error: What is wrong with the bus as a whole, empty if nothing is.
         watchdogs: Ids of servos stopped by their watchdog.
         supply: Voltage of the supply [V], NaN if unknown.
+        objections: What speaks against arming, such as a failed touch check or foreign firmware.
         stop: Whether the operator wants the torque off.
         arm: Whether the operator wants it on; only the change to True in FAULT or OFF counts.
     """
@@ -138,6 +140,7 @@ class Inputs:
     servo_errors: Mapping[int, str] = field(default_factory=dict[int, str])
     bus_error: str = ""
     watchdogs: tuple[int, ...] = ()
+    objections: tuple[str, ...] = ()
     stop: bool = False
     arm: bool = False
 

@@ -202,7 +202,14 @@ class ChannelDiagnosis:
             return Finding.SHORT_HI
         if self._equal >= params.stuck:
             return Finding.STUCK
-        return Finding.OPEN if full and sum(self._bad) >= params.open_bad else None
+        floats = sum(self._bad) >= params.open_bad or self._at_both_rails()
+        return Finding.OPEN if full and floats else None
+
+    def _at_both_rails(self) -> bool:
+        """Whether the window has two readings or more at either rail, which no film can reach."""
+        low = sum(counts <= self._params.low_rail for counts in self._raw)
+        high = sum(counts >= self._params.high_rail for counts in self._raw)
+        return min(low, high) >= 2
 
     def _pinned(self, low: bool) -> bool:
         """Whether the whole window is at one rail; a bent film that reaches it still has noise."""

@@ -139,6 +139,8 @@ class Supervisor:
             found[Cause.PAUSE] = "time did not advance"
         self._servos(inputs, found)
         self._supply(inputs.supply, found)
+        if inputs.objections:
+            found[Cause.NOT_READY] = "; ".join(inputs.objections)
         if inputs.stop:
             found[Cause.STOPPED] = ""
         return found
@@ -152,8 +154,9 @@ class Supervisor:
 
     def _servos(self, inputs: Inputs, found: dict[Cause, str]) -> None:
         params = self._params
+        silent = [i for i, missed in inputs.missed.items() if missed >= params.silent_answers]
         late = [i for i, missed in inputs.missed.items() if missed >= params.late_answers]
-        silent = [i for i in late if inputs.missed[i] >= params.silent_answers]
+        late = [i for i in late if i not in silent]
         _name(found, Cause.LATE_ANSWERS, late)
         _name(found, Cause.SILENT_SERVO, silent)
         _name(found, Cause.WATCHDOG, inputs.watchdogs)

@@ -18,7 +18,7 @@ from antennate.params.mind import (
     RuleParams,
 )
 from antennate.params.robot import RobotParams, ServoParams
-from antennate.params.safety import DiagnosisParams, SupervisorParams
+from antennate.params.safety import DiagnosisParams, SupervisorParams, TouchCheckParams
 from antennate.params.scene import (
     BenchPhysicsParams,
     CylinderParams,
@@ -69,6 +69,7 @@ __all__ = [
     "SupervisorParams",
     "SweepParams",
     "TaperParams",
+    "TouchCheckParams",
     "TouchWallsParams",
     "TunnelParams",
     "VariationParams",

@@ -136,6 +136,36 @@ class DiagnosisParams(Params):
         return self
 
 
+class TouchCheckParams(Params):
+    """The check by hand that left is left and that bending reads as bending."""
+
+    bend: float = number(
+        0.3,
+        "1",
+        "assumed: well above noise and creep, easily done by hand",
+        "change of the reading that is a touch, in calibrated spans",
+        gt=0,
+        le=1,
+    )
+    still: float = number(
+        0.15,
+        "1",
+        "assumed: half a touch",
+        "change below which an antenna is at rest, in calibrated spans",
+        gt=0,
+        le=1,
+    )
+    readings: int = number(
+        10, "1", "assumed: 100 ms at 100 Hz", "readings in a row that count", ge=1, le=1000
+    )
+
+    @model_validator(mode="after")
+    def _order(self) -> TouchCheckParams:
+        if self.still >= self.bend:
+            raise ValueError(f"still must be below bend, got {self.still} and {self.bend}")
+        return self
+
+
 class SupervisorParams(Params):
     """Limits at which the robot is slowed, held, or switched off."""
 
