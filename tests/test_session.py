@@ -33,7 +33,7 @@ class Log:
         self.texts: list[str] = []
         self.goals: list[list[int]] = []
 
-    def __call__(self, session: Session, t: float, late: float) -> None:
+    def __call__(self, session: Session, t: float) -> None:
         out = session.outputs
         assert out is not None
         self.t.append(t)
@@ -72,7 +72,8 @@ def test_a_dry_run_writes_nothing_to_any_servo() -> None:
     before = [bytes(servo._memory[64:70]) for servo in made.robot.servos]
     goals = [servo.get("goal_position") for servo in made.robot.servos]
     report = drive(made.session, CONFIG, arm=False)
-    assert report.ticks == pytest.approx(100, abs=1)
+    assert report.timing is not None
+    assert report.timing.ticks == pytest.approx(100, abs=1)
     assert [bytes(servo._memory[64:70]) for servo in made.robot.servos] == before
     assert [servo.get("goal_position") for servo in made.robot.servos] == goals
     assert made.session.tally.sent == 0
@@ -167,7 +168,7 @@ def drive_until(made: Rig, t: float) -> None:
     class Killed(BaseException):
         pass
 
-    def kill(session: Session, now: float, late: float) -> None:
+    def kill(session: Session, now: float) -> None:
         if now >= t:
             made.session.release = list  # type: ignore[method-assign]
             raise Killed
@@ -226,7 +227,7 @@ def test_S5_B14_a_pose_that_is_not_finite_never_reaches_the_bus(bad: float) -> N
 def test_B19_stopping_takes_torque_off_and_verifies_it_within_2_s() -> None:
     made = rig(TwinConfig())
 
-    def stop(session: Session, t: float, late: float) -> None:
+    def stop(session: Session, t: float) -> None:
         if t > 2.0:
             raise KeyboardInterrupt
 
@@ -239,7 +240,7 @@ def test_B19_stopping_takes_torque_off_and_verifies_it_within_2_s() -> None:
 def test_B19_a_servo_that_does_not_confirm_is_named() -> None:
     made = rig(TwinConfig())
 
-    def stop(session: Session, t: float, late: float) -> None:
+    def stop(session: Session, t: float) -> None:
         if t > 2.0:
             made.robot.bus.trouble[4] = Trouble(Fault.SILENT)
             raise KeyboardInterrupt

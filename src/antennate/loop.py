@@ -46,5 +46,5 @@ def run_loop(
         ticks += 1
         if not go_on(frame, pose):
             return ticks
-        due = max(due + 1, math.floor((body.clock.now() - start) / period + _ROUNDING))
+        due = max(due + 1, math.ceil((body.clock.now() - start) / period - _ROUNDING))
         body.clock.sleep_until(start + due * period)

@@ -59,25 +59,26 @@ def command(argv: Sequence[str]) -> int:
     return OK if report.safe and report.worst < State.FAULT else BAD_INPUT
 
 
-def _status() -> Callable[[Session, float, float], None]:
+def _status() -> Callable[[Session, float], None]:
     """A function that shows one line now and then, over the last one on a terminal."""
     due = -math.inf
     end = "\r" if sys.stderr.isatty() else "\n"
     every = 1.0 / _LINES_A_SECOND if sys.stderr.isatty() else 1.0
 
-    def show(session: Session, t: float, late: float) -> None:
+    def show(session: Session, t: float) -> None:
         nonlocal due
         if t < due:
             return
         due = t + every
-        sys.stderr.write(_line(session, t, late) + end)
+        sys.stderr.write(_line(session, t) + end)
         sys.stderr.flush()
 
     return show
 
 
-def _line(session: Session, t: float, late: float) -> str:
+def _line(session: Session, t: float) -> str:
     out, clock, bus = session.outputs, session.board.clock, session.bus.tally
+    missed = 0 if session.timing is None else session.timing.report().missed_cycles
     bytes_ = session.board.decoder.counters
     state = "-" if out is None else out.state.name
     why = "" if out is None or not out.causes else f" {out.causes[0].text}"
@@ -85,7 +86,7 @@ def _line(session: Session, t: float, late: float) -> str:
     read = " ".join(f"{channel.reading.counts:.0f}" for channel in session.channels)
     return (
         f"{t:7.1f} s {state} {maneuver} counts={read} age={1e3 * clock.age(t):.0f}ms "
-        f"late={1e3 * late:.1f}ms frames={bytes_.good} crc={bytes_.crc_errors} "
+        f"missed={missed} frames={bytes_.good} crc={bytes_.crc_errors} "
         f"lost={clock.sequence.lost} misses={bus.misses} stale={bus.stale} "
         f"sent={session.tally.sent}{why}"
     )
@@ -94,9 +95,10 @@ def _line(session: Session, t: float, late: float) -> str:
 def _tell(report: Report, armed: bool) -> None:
     if not armed:
         sys.stderr.write("\ndry run over, nothing was written to the servos; --arm lets it walk\n")
-    sys.stderr.write(
-        f"\n{report.ticks} ticks, {report.missed} missed, worst {1e3 * report.late:.1f} ms late; "
-        f"worst state {report.worst.name}; torque "
-        + ("off, verified" if report.safe else f"NOT confirmed off: servos {report.on}")
-        + "\n"
-    )
+    if (timing := report.timing) is not None:
+        stages = ", ".join(f"{n} {1e3 * s.worst:.1f}" for n, s in timing.stages.items())
+        missed = f"{timing.missed_cycles} missed ({100 * timing.missed_share:.2f} %)"
+        late = f"worst {1e3 * timing.worst_lateness:.1f} ms late"
+        sys.stderr.write(f"\n{timing.ticks} ticks, {missed}, {late}; worst stages [ms]: {stages}")
+    off = "off, verified" if report.safe else f"NOT confirmed off: servos {report.on}"
+    sys.stderr.write(f"\nworst state {report.worst.name}; torque {off}\n")

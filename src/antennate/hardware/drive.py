@@ -22,6 +22,7 @@ from antennate.hardware.host_clock import HostClock
 from antennate.hardware.joints import Joints
 from antennate.hardware.port import Port, PortError
 from antennate.hardware.session import Decider, Session
+from antennate.hardware.timing import TimingReport
 from antennate.loop import run_loop
 from antennate.params import ControllerParams, Params, SupervisorParams, number
 from antennate.params.layout import LayoutParams
@@ -58,16 +59,12 @@ class Report:
     """How a drive went.
 
     Attributes:
-        ticks: Ticks run.
-        missed: Ticks left out because the loop was late.
-        late: Worst lateness of a tick [s].
+        timing: How well the pace was kept, None if no tick was run.
         worst: Worst state after torque had come on.
         on: Servos that did not confirm that their torque is off.
     """
 
-    ticks: int = 0
-    missed: int = 0
-    late: float = 0.0
+    timing: TimingReport | None = None
     worst: State = State.OK
     on: list[int] = field(default_factory=list[int])
 
@@ -86,7 +83,13 @@ def connect(config: DriveConfig, esp32: str, bus: str) -> Iterator[Session]:
         BadInputError: No antenna board speaks, or it is refused.
         BringUpError: The servos are not those expected.
     """
-    from antennate.hardware.serial_port import SerialPort
+    try:
+        from antennate.hardware.serial_port import SerialPort
+    except ModuleNotFoundError as error:
+        raise ConfigError(
+            f"expected pyserial for real ports, found no module {error.name}; install "
+            "antennate[hardware], or run `uv run --extra hardware antennate drive ...`"
+        ) from None
 
     with contextlib.ExitStack() as stack:
         lines: list[Port] = []
@@ -192,7 +195,7 @@ def drive(
     session: Session,
     config: DriveConfig,
     arm: bool,
-    on_tick: Callable[[Session, float, float], None] = lambda session, t, late: None,
+    on_tick: Callable[[Session, float], None] = lambda session, t: None,
 ) -> Report:
     """A dry run, then, if `arm`, a walk; torque is off at the end whatever happens.
 
@@ -200,37 +203,32 @@ def drive(
         session: As from `connect`.
         config: For how long.
         arm: Whether torque may come on.
-        on_tick: Called after every tick with the session, the time and the tick's lateness [s].
+        on_tick: Called after every tick with the session and the time [s].
 
     Returns:
         How it went. After Ctrl-C the report is that of the way so far.
     """
-    report, clock, period = Report(), session.clock, session.period
+    report, clock = Report(), session.clock
     start = clock.now()
     walk = config.dry_run if arm else math.inf
     end = config.dry_run if not arm else config.dry_run + (config.duration or math.inf)
 
     def go_on(frame: AntennaFrame, pose: Pose) -> bool:
         t = clock.now() - start
-        due = report.ticks + report.missed
-        skipped = max(0, math.floor(t / period + 1e-6) - due)
-        report.missed += skipped
-        late = max(0.0, t - (due + skipped) * period)
-        report.late = max(report.late, late + skipped * period)
-        report.ticks += 1
         session.orders.arm = t >= walk
         out = session.outputs
         if out is not None and out.torque:
             report.worst = max(report.worst, out.state)
-        on_tick(session, clock.now(), late)
+        on_tick(session, clock.now())
         failed = out is not None and t > walk + _ARMING_TIME and out.state >= State.FAULT
         return t < end and not failed
 
     try:
-        run_loop(session, session, period, go_on)
+        run_loop(session, session, session.period, go_on)
     except KeyboardInterrupt:
         pass
     finally:
+        report.timing = None if session.timing is None else session.timing.report()
         try:
             report.on = session.release()
         except PortError:

@@ -25,6 +25,7 @@ from antennate.hardware.dynamixel.bus import Bus
 from antennate.hardware.joints import Joints, PoseError
 from antennate.hardware.port import PortError
 from antennate.hardware.supervisor import Supervisor
+from antennate.hardware.timing import LoopTiming
 from antennate.hardware.watch import ServoWatch
 from antennate.params import ConditioningParams, DiagnosisParams, SupervisorParams
 from antennate.records import AntennaFrame, Floats, Ints, Pose
@@ -101,6 +102,7 @@ class Session:
         channels: Diagnosis of the left and the right antenna.
         watch: What the servos say.
         tally: What was done.
+        timing: Whether the loop keeps its pace, None before the first tick.
     """
 
     def __init__(
@@ -124,6 +126,7 @@ class Session:
         self.watch = ServoWatch(bus, joints.ids)
         self.orders = Orders()
         self.tally = Tally()
+        self.timing: LoopTiming | None = None
         self.outputs: Outputs | None = None
         self._body = HardwareBody(board, bus, joints, clock)
         self._thought = _Thought()
@@ -134,6 +137,10 @@ class Session:
 
     def read(self) -> AntennaFrame:
         """The newest reading, diagnosed; NaN while the supervisor wants the gait to stand still."""
+        now = self.clock.now()
+        if self.timing is None:
+            self.timing = LoopTiming(now, self.period)
+        self.timing.begin(now)
         before = sum(self.board.clock.verdicts.values())
         frame = self._body.read()
         self._used = self._body.used
@@ -143,10 +150,22 @@ class Session:
         said = [channel.step(t, c).counts for channel, c in zip(self.channels, raw, strict=True)]
         if self.outputs is None or not self.outputs.clear:
             said = [math.nan, math.nan]
+        self._mark("read")
         return AntennaFrame(t=frame.t, counts=np.array([said]))
 
     def write(self, pose: Pose) -> None:
         """Let the supervisor judge this tick, and do what it says; then look at the servos."""
+        self._mark("decide")
+        self._act(pose)
+        self._mark("bus")
+        if self.timing is not None:
+            self.timing.finish(self.clock.now())
+
+    def _mark(self, stage: str) -> None:
+        if self.timing is not None:
+            self.timing.mark(stage, self.clock.now())
+
+    def _act(self, pose: Pose) -> None:
         now = self.clock.now()
         self.outputs = out = self.supervisor.step(now, self._inputs(now))
         self.tally.ticks += 1
