@@ -101,6 +101,18 @@ class Ladder(RuleBasedStateMachine):
         self.well(15)
         self.tick(arm=True)
 
+    @rule(bad=st.lists(st.sampled_from(list(BAD)), min_size=1, max_size=2))
+    def fall_ill_while_walking(self, bad: list[Cause]) -> None:
+        self.settle_and_arm()
+        self.well(2)
+        self.tick(**together(*bad))
+
+    @rule(age=st.floats(0.0, 0.12), valid=st.integers(0, 3), refused=st.integers(0, 1))
+    def come_late_while_walking(self, age: float, valid: int, refused: int) -> None:
+        self.settle_and_arm()
+        self.well(2)
+        self.tick(age=age, valid=valid, refused=refused)
+
     @rule(maneuver=st.integers(-2, 8))
     def act(self, maneuver: int) -> None:
         self.tick(maneuver=maneuver)
