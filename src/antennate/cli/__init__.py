@@ -25,6 +25,8 @@ COMMANDS = {
     "sensor": "flex to counts: curve, hysteresis, creep, noise and the best divider",
     "force": "how much of a contact's force the flex tells, with and without knowing the place",
     "sweep": "sweep an antenna beside walls: its shapes, and the distances that active touch tells",
+    "twin": "serve a simulated robot as real bytes: an antenna board and a bus of 19 servos",
+    "drive": "let a controller walk the real robot, or its twin",
     "touch": "move an antenna along walls: sensed contact against true contact",
 }
 

@@ -39,7 +39,18 @@ Config = TypeVar("Config", bound=Params)
 
 
 @dataclass(frozen=True)
-class Options:
+class FromFile:
+    """Where parameters come from.
+
+    Attributes:
+        config: TOML file with the parameters below as keys and tables; flags override it
+    """
+
+    config: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
+
+
+@dataclass(frozen=True)
+class Options(FromFile):
     """How to run; nothing here changes a result.
 
     Attributes:
@@ -51,7 +62,6 @@ class Options:
         no_figures: draw no figures
     """
 
-    config: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
     out: Annotated[Path | None, tyro.conf.arg(metavar="FOLDER")] = None
     overwrite: bool = False
     workers: Annotated[int | None, tyro.conf.arg(metavar="INT")] = None
@@ -64,9 +74,12 @@ class Options:
         return core_count() if self.workers is None else self.workers
 
 
+Chosen = TypeVar("Chosen", bound=FromFile)
+
+
 @dataclass(frozen=True)
-class _Call(Generic[Config]):
-    options: Annotated[Options, tyro.conf.arg(name="")]
+class _Call(Generic[Config, Chosen]):
+    options: Annotated[Chosen, tyro.conf.arg(name="")]
     parameters: Annotated[Config, tyro.conf.arg(name="")]
 
 
@@ -94,19 +107,26 @@ def _plain(info: StructTypeInfo) -> StructConstructorSpec | None:
 def parse(
     command: str, description: str, model: type[Config], argv: Sequence[str]
 ) -> tuple[Config, Options]:
-    """Read the words of a command.
+    """Read the words of a command that runs a study.
 
     Raises:
         ConfigError: A flag, the file or a value cannot be used.
         SystemExit: Help was asked for and has been printed.
     """
-    call = _words(command, description, model(), argv)
-    base = model()
+    config, options = parse_with(command, description, model, argv, Options())
+    if options.worker_count < 1:
+        raise ConfigError(f"--workers: expected at least 1, found {options.workers}")
+    return config, options
+
+
+def parse_with(
+    command: str, description: str, model: type[Config], argv: Sequence[str], options: Chosen
+) -> tuple[Config, Chosen]:
+    """The same with options of another kind, given by their defaults."""
+    call = _words(command, description, model(), argv, options)
     if call.options.config is not None:
         base = read_file(call.options.config, model)
-        call = _words(command, description, base, argv)
-    if call.options.worker_count < 1:
-        raise ConfigError(f"--workers: expected at least 1, found {call.options.workers}")
+        call = _words(command, description, base, argv, options)
     try:
         return model.model_validate(call.parameters), call.options
     except ValidationError as error:
@@ -150,20 +170,22 @@ def read_file(path: Path, model: type[Config]) -> Config:
         raise ConfigError(f"{path}: {describe(error, model, dotted)}") from None
 
 
-def _words(command: str, description: str, default: Params, argv: Sequence[str]) -> _Call[Any]:
+def _words(
+    command: str, description: str, default: Params, argv: Sequence[str], options: FromFile
+) -> _Call[Any, Any]:
     with _refusals():
         call, unknown = tyro.cli(
-            _Call[type(default)],
+            _Call[type(default), type(options)],
             prog=f"antennate {command}",
             description=description,
             args=argv,
-            default=_Call(Options(), default),
+            default=_Call(options, default),
             config=(tyro.conf.FlagCreatePairsOff,),
             registry=_registry,
             return_unknown_args=True,
         )
     if unknown:
-        raise ConfigError(_unknown(unknown[0], type(default)))
+        raise ConfigError(_unknown(unknown[0], type(default), options))
     return call
 
 
@@ -204,11 +226,11 @@ def _unbox(box: str) -> str:
     return message
 
 
-def _unknown(word: str, model: type[Params]) -> str:
+def _unknown(word: str, model: type[Params], chosen: FromFile) -> str:
     if not word.startswith("-"):
         return f"expected flags only, found {shown(word)}"
     name = word.split("=")[0].replace("_", "-")
-    options = [flag((option,)) for option in Options.__dataclass_fields__]
+    options = [flag((option,)) for option in chosen.__dataclass_fields__]
     known = [*options, *_flags(model, ())]
     return f"expected a known flag{nearest(name, known)}, found {shown(word)}"
 

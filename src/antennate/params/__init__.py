@@ -18,6 +18,7 @@ from antennate.params.mind import (
     RuleParams,
 )
 from antennate.params.robot import RobotParams, ServoParams
+from antennate.params.safety import DiagnosisParams, SupervisorParams, TouchCheckParams
 from antennate.params.scene import (
     BenchPhysicsParams,
     CylinderParams,
@@ -48,6 +49,7 @@ __all__ = [
     "ControllerParams",
     "CornerWallParams",
     "CylinderParams",
+    "DiagnosisParams",
     "EscapeParams",
     "EstimateParams",
     "FlatWallParams",
@@ -64,8 +66,10 @@ __all__ = [
     "SinusoidalWallParams",
     "SpringParams",
     "StepWallParams",
+    "SupervisorParams",
     "SweepParams",
     "TaperParams",
+    "TouchCheckParams",
     "TouchWallsParams",
     "TunnelParams",
     "VariationParams",

@@ -96,6 +96,7 @@ class World:
         bases = [p + ANTENNA_BASE for p in ANTENNA_PREFIXES]
         names = [PREFIX + n for n in (*YAW_JOINTS, *LEGS, *bases)]
         self._drive: Ints = np.array([model.actuator(n).id for n in names])
+        self._driven = self._addresses(names)
         self._root: int = model.joint(PREFIX + "root").qposadr[0]
         self._links: Ints = np.array([model.body(PREFIX + n).id for n in LINKS])
         bodies = range(model.nbody)
@@ -141,6 +142,10 @@ class World:
                 f"target of actuator {self.model.actuator(self._drive[bad]).name} is {drive[bad]}",
             )
         self._ctrl[self._drive] = drive
+
+    def drives(self) -> Floats:
+        """Angles of all driven joints, in the order of `command` [rad], shape (19,)."""
+        return self._qpos[self._driven]
 
     def step(self, count: int) -> None:
         """Advance by `count` physics steps.

@@ -1,0 +1,12 @@
+"""Settings of one antenna board; the host knows them by their hash."""
+
+RATE = 100
+"""Samples per second [Hz]."""
+BURST = 15
+"""Readings of each antenna per sample; their median is sent. Odd."""
+PIN_LEFT = 34
+"""GPIO of the left antenna. Only 32 to 39 have ADC1, which works beside WiFi."""
+PIN_RIGHT = 35
+"""GPIO of the right antenna."""
+PIN_BUTTON = 0
+"""GPIO of the button that stops the program (BOOT on most boards)."""

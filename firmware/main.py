@@ -1,0 +1,203 @@
+"""Reads two flex sensors at a steady rate and sends frames over the USB serial port.
+
+MicroPython for the ESP32 runs this file after a reset. A timer takes the samples; the loop sends
+them, a greeting once a second and whenever the host asks. Holding the BOOT button ends it and gives
+the prompt back. What the host sends is compared with one known request, and never executed.
+"""
+
+import array
+import os
+import select
+import sys
+import time
+
+import antenna_frame as frame
+import config
+import machine
+import micropython
+
+SLOTS = 8
+"""Samples that wait for sending; then the oldest is dropped and counted."""
+GREETING_MS = 1000
+
+
+class Sampler:
+    """Takes samples in the timer's callback; keeps the newest SLOTS.
+
+    The callback writes only `head` and slots, the loop only `tail` and `drops`, so neither waits.
+    """
+
+    def __init__(self, left, right):
+        self._left = left
+        self._right = right
+        self._bursts = (
+            array.array("H", [0] * config.BURST),
+            array.array("H", [0] * config.BURST),
+        )
+        self._ticks = array.array("I", [0] * SLOTS)
+        self._counts = array.array("H", [0] * (2 * SLOTS))
+        self._flags = bytearray(SLOTS)
+        self._longest = 1500000 // config.RATE
+        self._last = None
+        self.head = 0
+        self.tail = 0
+        self.drops = 0
+
+    def sample(self, _timer):
+        """Read both antennae in turn; the time is that of the first reading."""
+        ticks = time.ticks_us() & frame.TICK_MASK
+        lefts, rights = self._bursts
+        for i in range(config.BURST):
+            insert(lefts, i, self._left.read_u16() >> 4)
+            insert(rights, i, self._right.read_u16() >> 4)
+        left = lefts[config.BURST // 2]
+        right = rights[config.BURST // 2]
+        slot = self.head % SLOTS
+        self._ticks[slot] = ticks
+        self._counts[2 * slot] = left
+        self._counts[2 * slot + 1] = right
+        self._flags[slot] = self._flag(ticks, left, right)
+        self.head += 1
+
+    def _flag(self, ticks, left, right):
+        flags = 0
+        if left == 0 or left == frame.FULL_SCALE:
+            flags |= frame.FLAG_LEFT_RAIL
+        if right == 0 or right == frame.FULL_SCALE:
+            flags |= frame.FLAG_RIGHT_RAIL
+        if self._last is not None and (ticks - self._last) & frame.TICK_MASK > self._longest:
+            flags |= frame.FLAG_LATE
+        self._last = ticks
+        return flags
+
+    def encode_next_into(self, encoder, buffer):
+        """Write the oldest waiting sample as a frame; False if none waits."""
+        while self.tail != self.head:
+            self._drop()
+            seq = self.tail
+            slot = seq % SLOTS
+            encoder.encode_sample_into(
+                buffer,
+                seq,
+                self._ticks[slot],
+                self._counts[2 * slot],
+                self._counts[2 * slot + 1],
+                self._flags[slot],
+                self.drops,
+            )
+            if self.head - seq <= SLOTS:  # else the callback has overwritten the slot meanwhile
+                self.tail = seq + 1
+                return True
+        return False
+
+    def _drop(self):
+        late = self.head - self.tail - SLOTS
+        if late > 0:
+            self.tail += late
+            self.drops += late
+
+
+def insert(burst, filled, reading):
+    """Keep the first readings of a burst sorted while one is added."""
+    while filled and burst[filled - 1] > reading:
+        burst[filled] = burst[filled - 1]
+        filled -= 1
+    burst[filled] = reading
+
+
+class Requests:
+    """Compares incoming bytes with the one request known; keeps nothing but how many match."""
+
+    def __init__(self):
+        self._expected = frame.encode_request()
+        self._matched = 0
+
+    def feed(self, byte):
+        """Take a byte; True if it completes a request."""
+        if byte == self._expected[self._matched]:
+            self._matched += 1
+        else:
+            self._matched = 1 if byte == 0 else 0
+        if self._matched < len(self._expected):
+            return False
+        self._matched = 1  # its last delimiter may be the first of the next
+        return True
+
+
+def reset_reason():
+    """Why the board started, in the numbers of the frame."""
+    cause = machine.reset_cause()
+    for name, reason in (
+        ("PWRON_RESET", frame.RESET_POWER_ON),
+        ("HARD_RESET", frame.RESET_HARD),
+        ("WDT_RESET", frame.RESET_WATCHDOG),
+        ("DEEPSLEEP_RESET", frame.RESET_DEEP_SLEEP),
+        ("SOFT_RESET", frame.RESET_SOFT),
+    ):
+        if cause == getattr(machine, name, None):
+            return reason
+    return frame.RESET_UNKNOWN
+
+
+def random_id():
+    """Random 32 bits; the time since start is mixed in, as no radio feeds the generator."""
+    return frame.crc32(os.urandom(8) + str(time.ticks_us()).encode()) & 0xFFFFFFFF
+
+
+def channel(pin):
+    """Converter of one antenna, for up to about 2.45 V."""
+    return machine.ADC(machine.Pin(pin), atten=machine.ADC.ATTN_11DB)
+
+
+def greeting(boot_id):
+    """Frame that says who speaks, since when and with which settings."""
+    settings = frame.config_hash(config.RATE, config.BURST, config.PIN_LEFT, config.PIN_RIGHT)
+    return frame.encode_hello(boot_id, reset_reason(), settings, machine.unique_id(), config.RATE)
+
+
+def asked(poller, requests):
+    """Look at one byte from the host, if there is one; True if it completes a request."""
+    for _ in poller.ipoll(0):
+        byte = sys.stdin.buffer.read(1)
+        return bool(byte) and requests.feed(byte[0])
+    return False
+
+
+def stream(sampler, boot_id, button):
+    """Send until the button is held."""
+    out = sys.stdout.buffer
+    poller = select.poll()
+    poller.register(sys.stdin, select.POLLIN)
+    requests = Requests()
+    encoder = frame.SampleEncoder(boot_id)
+    buffer = bytearray(frame.SAMPLE_FRAME_SIZE)
+    hello = greeting(boot_id)
+    out.write(hello)
+    greeted = time.ticks_ms()
+    while button.value():
+        if sampler.encode_next_into(encoder, buffer):
+            out.write(buffer)
+        else:
+            time.sleep_ms(1)
+        due = time.ticks_diff(time.ticks_ms(), greeted) >= GREETING_MS
+        if asked(poller, requests) or due:
+            out.write(hello)
+            greeted = time.ticks_ms()
+
+
+def main():
+    """Set up the board and stream; the serial port is a prompt again afterwards."""
+    sampler = Sampler(channel(config.PIN_LEFT), channel(config.PIN_RIGHT))
+    button = machine.Pin(config.PIN_BUTTON, machine.Pin.IN, machine.Pin.PULL_UP)
+    timer = machine.Timer(0)
+    micropython.kbd_intr(-1)  # a byte 3 from the host is no keyboard interrupt
+    try:
+        timer.init(freq=config.RATE, mode=machine.Timer.PERIODIC, callback=sampler.sample)
+        stream(sampler, random_id(), button)
+    finally:
+        timer.deinit()
+        micropython.kbd_intr(3)
+
+
+if __name__ == "__main__":
+    main()

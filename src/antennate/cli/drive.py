@@ -1,0 +1,104 @@
+"""`antennate drive`: the controller on the real robot, or on its twin."""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Annotated
+
+import tyro
+
+from antennate.cli import BAD_INPUT, OK
+from antennate.cli.arguments import FromFile, parse_with
+from antennate.cli.progress import terminate_as_interrupt
+from antennate.errors import ConfigError
+from antennate.hardware.causes import State
+from antennate.hardware.drive import DriveConfig, Report, connect, drive
+from antennate.hardware.session import Session
+from antennate.records import Maneuver
+
+DESCRIPTION = """\
+Let a controller walk the robot whose antenna board and servo bus hang on two serial ports, or its
+twin. First a dry run: everything is read and nothing written. Then, with --arm only, torque comes
+on with every servo where it stands. Ctrl-C or SIGTERM ends it: pose held, torque off, verified. A
+lost board or servo makes it hold; the watchdogs of the servos stop it if this program dies."""
+_LINES_A_SECOND = 5
+
+
+@dataclass(frozen=True)
+class Orders(FromFile):
+    """What to talk to, and whether to move.
+
+    Attributes:
+        config: robot.toml with the parameters below as keys and tables; flags override it
+        esp32: serial port of the antenna board
+        bus: serial port of the servo bus
+        arm: torque on after the dry run
+    """
+
+    esp32: Annotated[str, tyro.conf.arg(metavar="PORT")] = ""
+    bus: Annotated[str, tyro.conf.arg(metavar="PORT")] = ""
+    arm: bool = False
+
+
+def command(argv: Sequence[str]) -> int:
+    """Drive until the duration is over or it is stopped.
+
+    Raises:
+        AntennateError: A port, a servo or the board is not what is needed; nothing moved then.
+    """
+    config, orders = parse_with("drive", DESCRIPTION, DriveConfig, argv, Orders())
+    for name in ("esp32", "bus"):
+        if not getattr(orders, name):
+            raise ConfigError(f"--{name}: expected a serial port, found none")
+    with connect(config, orders.esp32, orders.bus) as session, terminate_as_interrupt():
+        report = drive(session, config, orders.arm, _status())
+    _tell(report, orders.arm)
+    return OK if report.safe and report.worst < State.FAULT else BAD_INPUT
+
+
+def _status() -> Callable[[Session, float], None]:
+    """A function that shows one line now and then, over the last one on a terminal."""
+    due = -math.inf
+    end = "\r" if sys.stderr.isatty() else "\n"
+    every = 1.0 / _LINES_A_SECOND if sys.stderr.isatty() else 1.0
+
+    def show(session: Session, t: float) -> None:
+        nonlocal due
+        if t < due:
+            return
+        due = t + every
+        sys.stderr.write(_line(session, t) + end)
+        sys.stderr.flush()
+
+    return show
+
+
+def _line(session: Session, t: float) -> str:
+    out, clock, bus = session.outputs, session.board.clock, session.bus.tally
+    missed = 0 if session.timing is None else session.timing.report().missed_cycles
+    bytes_ = session.board.decoder.counters
+    state = "-" if out is None else out.state.name
+    why = "" if out is None or not out.causes else f" {out.causes[0].text}"
+    maneuver = Maneuver(int(session.decider.maneuver[0])).name
+    read = " ".join(f"{channel.reading.counts:.0f}" for channel in session.channels)
+    return (
+        f"{t:7.1f} s {state} {maneuver} counts={read} age={1e3 * clock.age(t):.0f}ms "
+        f"missed={missed} frames={bytes_.good} crc={bytes_.crc_errors} "
+        f"lost={clock.sequence.lost} misses={bus.misses} stale={bus.stale} "
+        f"sent={session.tally.sent}{why}"
+    )
+
+
+def _tell(report: Report, armed: bool) -> None:
+    if not armed:
+        sys.stderr.write("\ndry run over, nothing was written to the servos; --arm lets it walk\n")
+    if (timing := report.timing) is not None:
+        stages = ", ".join(f"{n} {1e3 * s.worst:.1f}" for n, s in timing.stages.items())
+        missed = f"{timing.missed_cycles} missed ({100 * timing.missed_share:.2f} %)"
+        late = f"worst {1e3 * timing.worst_lateness:.1f} ms late"
+        sys.stderr.write(f"\n{timing.ticks} ticks, {missed}, {late}; worst stages [ms]: {stages}")
+    off = "off, verified" if report.safe else f"NOT confirmed off: servos {report.on}"
+    sys.stderr.write(f"\nworst state {report.worst.name}; torque {off}\n")

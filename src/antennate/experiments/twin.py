@@ -1,0 +1,194 @@
+"""One tunnel trial three ways: pure simulation, and hardware code against the twin in lock-step.
+
+Servos take goals in whole ticks and the board stamps in whole microseconds, so the pure simulation
+rounds both as well; nothing else differs, and every maneuver must be the same.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from antennate.controller import Arm, Controller
+from antennate.experiments.judge import Judge
+from antennate.experiments.tunnel import TunnelConfig, prepare
+from antennate.hardware.board import Board
+from antennate.hardware.body import HardwareBody
+from antennate.hardware.dynamixel import bringup
+from antennate.hardware.dynamixel.bus import Bus
+from antennate.hardware.joints import Joints
+from antennate.hardware.session import Session
+from antennate.loop import run_loop
+from antennate.params import Params, number
+from antennate.params.layout import LayoutParams
+from antennate.records import AntennaFrame, Pose
+from antennate.sim.body import SimBody
+from antennate.twin.lockstep import BoardPort, LockstepClock
+from antennate.twin.robot import TwinRobot
+
+AGE_LIMIT = 0.05
+"""Readings older than this are not acted upon [s]; measured: leaves 40 ms for the bus in 100 ms."""
+_WARM_UP = 2.0
+"""Longest time until the board's clock is known [s]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Decisions:
+    """What was decided in a trial.
+
+    Attributes:
+        maneuvers: One a tick.
+        counts: Readings of each tick [counts], two a tick.
+        status: How the trial ended, as in `trials.csv`.
+    """
+
+    maneuvers: list[int]
+    counts: list[tuple[float, float]]
+    status: str
+
+
+class TwinConfig(Params):
+    """The robot and its world that `antennate twin` serves."""
+
+    trial: int = number(0, "1", "assumed: the first", "trial of the world's seed", ge=0)
+    duration: float | None = number(
+        None, "s", "assumed: until it is stopped", "time to serve", gt=0
+    )
+    fault: tuple[str, ...] = number(
+        (), "1", "assumed: nothing is broken", "faults, such as servo:7=silent@3s"
+    )
+    layout: LayoutParams = LayoutParams()
+    world: TunnelConfig = TunnelConfig()
+
+
+def build(config: TwinConfig) -> TwinRobot:
+    """The robot at the start of a tunnel."""
+    world, start = config.world, prepare(config.world, config.trial)
+    period = world.controller.period
+    body = SimBody(1, world.robot.sensor, period, world.physics.timestep)
+    body.load(0, start.world, start.chance)
+    return TwinRobot(body, config.layout, period, boot_id=config.trial + 1, standing_noise=True)
+
+
+class _Rounded:
+    """A simulated body whose servos take whole ticks and whose board stamps microseconds."""
+
+    def __init__(self, body: SimBody, joints: Joints) -> None:
+        self._body, self._joints = body, joints
+        self.clock = body.clock
+
+    def read(self) -> AntennaFrame:
+        """Read, with the time rounded."""
+        frame = self._body.read()
+        return AntennaFrame(t=1e-6 * np.rint(1e6 * frame.t), counts=frame.counts)
+
+    def write(self, pose: Pose) -> None:
+        """Round, then command."""
+        self._body.write(self._joints.pose(self._joints.ticks(pose)))
+
+
+class _Watch:
+    """The judge of a trial, and what was decided."""
+
+    def __init__(self, config: TunnelConfig, arm: Arm, trial: int) -> None:
+        start = prepare(config, trial)
+        period = config.controller.period
+        self.body = SimBody(1, config.robot.sensor, period, config.physics.timestep)
+        self.body.load(0, start.world, start.chance)
+        self.controller = Controller(config.controller, arm)
+        self.controller.reset(np.array([0]), start.phase)
+        self._judge = Judge(arm, trial, start.tunnel, config.time_limit)
+        self.maneuvers: list[int] = []
+        self.counts: list[tuple[float, float]] = []
+        self.status = ""
+
+    def go_on(self, frame: AntennaFrame, pose: Pose) -> bool:
+        """Note one tick; False once the trial has ended."""
+        maneuver = int(self.controller.maneuver[0])
+        self.maneuvers.append(maneuver)
+        left, right = frame.counts[0].tolist()
+        self.counts.append((left, right))
+        failed = self.body.failure(0) is not None
+        self.status = self._judge.watch(self.body.world(0), maneuver, failed) or ""
+        return not self.status
+
+    def decisions(self) -> Decisions:
+        """All of it."""
+        return Decisions(self.maneuvers, self.counts, self.status)
+
+
+def simulated(config: TunnelConfig, arm: Arm, trial: int, layout: LayoutParams) -> Decisions:
+    """The trial in pure simulation, goals rounded to ticks."""
+    watch = _Watch(config, arm, trial)
+    body = _Rounded(watch.body, Joints(layout))
+    run_loop(body, watch.controller, config.controller.period, watch.go_on)
+    return watch.decisions()
+
+
+@dataclass(frozen=True, slots=True)
+class Rig:
+    """The whole of the hardware code in front of a twin, in invented time."""
+
+    robot: TwinRobot
+    clock: LockstepClock
+    session: Session
+
+
+def rig(config: TwinConfig, arm: Arm = "closed") -> Rig:
+    """A session before a twin robot, not yet armed."""
+    robot, params = build(config), config.world.controller
+    clock = LockstepClock(robot)
+    session = Session(
+        board=Board(BoardPort(robot, clock), AGE_LIMIT),
+        bus=Bus(clock, clock=clock.now),
+        joints=Joints(config.layout),
+        clock=clock,
+        decider=Controller(params, arm),
+        period=params.period,
+        conditioning=params.conditioning,
+    )
+    return Rig(robot, clock, session)
+
+
+def on_twin(
+    config: TunnelConfig,
+    arm: Arm,
+    trial: int,
+    layout: LayoutParams,
+    on_tick: Callable[[TwinRobot], None] = lambda robot: None,
+) -> Decisions:
+    """The trial by the hardware code, all of it through bytes, in invented time.
+
+    Args:
+        config: The trial's world.
+        arm: Its controller.
+        trial: Its number.
+        layout: Servos of the robot.
+        on_tick: Called after every tick, for instance to break something.
+
+    Raises:
+        BringUpError: The servos did not come up.
+    """
+    watch = _Watch(config, arm, trial)
+    period = config.controller.period
+    robot = TwinRobot(watch.body, layout, period, boot_id=trial + 1)
+    clock = LockstepClock(robot)
+    board = Board(BoardPort(robot, clock), AGE_LIMIT)
+    bus = Bus(clock, clock=clock.now)
+    while board.newest(clock.now()) is None and clock.now() < _WARM_UP:
+        clock.sleep(period)
+        board.poll(clock.now())
+    bringup.require(bus, {servo.get("id"): servo.table.model for servo in robot.servos})
+    bringup.arm_watchdogs(bus, layout.ids)
+    clock.sleep_until(period * np.ceil(clock.now() / period + 1.0))
+    bringup.enable(bus, layout.ids)
+    body = HardwareBody(board, bus, Joints(layout), clock)
+
+    def go_on(frame: AntennaFrame, pose: Pose) -> bool:
+        on_tick(robot)
+        return watch.go_on(frame, pose)
+
+    run_loop(body, watch.controller, period, go_on)
+    return watch.decisions()

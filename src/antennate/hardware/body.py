@@ -1,0 +1,83 @@
+"""The real robot as a Body: the newest reading of the board, goals to all servos at once."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from antennate.body import Clock
+from antennate.hardware.board import Board, counts_of
+from antennate.hardware.dynamixel.bus import Bus
+from antennate.hardware.dynamixel.tables import XC430_W240
+from antennate.hardware.esp32.clock import Timed
+from antennate.hardware.joints import Joints
+from antennate.records import AntennaFrame, Floats, Ints, Pose
+
+_GOAL = XC430_W240["goal_position"]
+"""At the same address in both models."""
+
+
+class HardwareBody:
+    """One robot behind the wall. A reading that is missing or too old is NaN.
+
+    Frames are stamped with the board's own time since the first reading, so that neither its way to
+    the host nor the host's load shows in them.
+
+    Args:
+        board: Its antennae.
+        bus: Its servos, torque on.
+        joints: Which servo moves what.
+        clock: The host's time, which never steps.
+
+    Attributes:
+        used: Usable samples that the last reading found.
+    """
+
+    def __init__(self, board: Board, bus: Bus, joints: Joints, clock: Clock) -> None:
+        self._board = board
+        self._bus = bus
+        self._joints = joints
+        self._clock = clock
+        self.used = 0
+        self._stamp: Timed | None = None
+        self._stamp_t = self._stamp_now = 0.0
+
+    @property
+    def clock(self) -> Clock:
+        """The host's clock."""
+        return self._clock
+
+    def read(self) -> AntennaFrame:
+        """The newest reading of both antennae."""
+        now = self._clock.now()
+        self.used = self._board.poll(now)
+        timed = self._board.newest(now)
+        return AntennaFrame(t=np.array([self._time(timed, now)]), counts=counts_of(timed))
+
+    def _time(self, timed: Timed | None, now: float) -> float:
+        """The board's time [s]; by the host's clock where the board has none or begins anew."""
+        last = self._stamp
+        if timed is None:
+            return self._stamp_t + now - self._stamp_now
+        if last is None or timed.epoch != last.epoch:
+            self._stamp_t += now - self._stamp_now if last else 0.0
+            self._stamp, self._stamp_now = timed, now
+            return self._stamp_t
+        return self._stamp_t + 1e-6 * (timed.elapsed_us - last.elapsed_us)
+
+    def write(self, pose: Pose) -> None:
+        """Send goals to all servos.
+
+        Raises:
+            PoseError: The pose must not be sent; nothing is.
+            PortError: The bus is gone.
+        """
+        self.send(self._joints.ticks(pose))
+
+    def send(self, goals: Ints | Floats) -> None:
+        """Send goal positions [ticks], shape (19,), rounded.
+
+        Raises:
+            PortError: The bus is gone.
+        """
+        pairs = zip(self._joints.ids, np.rint(goals).astype(int).tolist(), strict=True)
+        self._bus.write_all(_GOAL.address, {servo: _GOAL.encode(goal) for servo, goal in pairs})

@@ -1,0 +1,196 @@
+"""Why a robot is not simply well: the ladder of states, the causes, and what they need to know."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import Enum, IntEnum
+
+from antennate.hardware.diagnosis import Finding
+from antennate.records import Contact, Maneuver
+
+
+class State(IntEnum):
+    """The ladder; each state is safer than the one before.
+
+    DEGRADED walks. HOLD keeps the last pose with torque on. FAULT is a HOLD that only an arm event
+    ends. OFF has no torque and also needs an arm event.
+    """
+
+    OK = 0
+    DEGRADED = 1
+    HOLD = 2
+    FAULT = 3
+    OFF = 4
+
+
+class Cause(Enum):
+    """What can be wrong, and the state it asks for."""
+
+    SPIKY = (State.DEGRADED, "many readings are bad")
+    OUT_OF_CAL = (State.DEGRADED, "readings lie beyond the calibrated range")
+    SATURATED = (State.DEGRADED, "readings are at the rail of a bent film")
+    RATE = (State.DEGRADED, "samples do not come at the expected rate")
+    LATE_ANSWERS = (State.DEGRADED, "servos answer late")
+    SUPPLY_UNKNOWN = (State.DEGRADED, "the supply cannot be read")
+    SUPPLY_WARN = (State.DEGRADED, "the supply is nearly empty")
+    STALE = (State.HOLD, "no fresh sample")
+    REBOOT = (State.HOLD, "the antenna board has restarted")
+    LOST = (State.HOLD, "no good reading for too long")
+    STUCK = (State.HOLD, "a channel repeats one reading")
+    OPEN = (State.HOLD, "a channel floats, its wire is open")
+    SHORT_LO = (State.HOLD, "a channel is shorted to ground, or its film torn off")
+    SHORT_HI = (State.HOLD, "a channel is shorted to the supply")
+    FAILED = (State.HOLD, "the controller raised an exception")
+    UNDECIDED = (State.HOLD, "the controller took no decision in this tick")
+    BAD_ACTION = (State.HOLD, "the controller asked for what does not exist")
+    UNKNOWN_CONTACT = (State.HOLD, "contact is not known")
+    SUPPLY_HOLD = (State.HOLD, "the supply is too low to walk")
+    REPEATED_HOLDS = (State.FAULT, "too many holds in a short time")
+    REPEATED_FAILURES = (State.FAULT, "the controller failed too often in a short time")
+    REBOOT_LOOP = (State.FAULT, "the antenna board restarts again and again")
+    SILENT_SERVO = (State.FAULT, "servos do not answer")
+    SERVO_ERROR = (State.FAULT, "servos report a hardware error")
+    BUS_ERROR = (State.FAULT, "the servo bus does not work")
+    WATCHDOG = (State.FAULT, "watchdogs of servos have stopped them")
+    NOT_READY = (State.FAULT, "something speaks against arming")
+    PAUSE = (State.FAULT, "the loop stood still, or its clock did")
+    SUPPLY_OFF = (State.OFF, "the supply is empty")
+    NOT_ARMED = (State.OFF, "not armed yet")
+    STOPPED = (State.OFF, "stopped by the operator")
+
+    @property
+    def severity(self) -> State:
+        """The state it asks for."""
+        return self.value[0]
+
+    @property
+    def text(self) -> str:
+        """What it means."""
+        return self.value[1]
+
+
+DATA = frozenset(
+    {
+        Cause.STALE,
+        Cause.REBOOT,
+        Cause.LOST,
+        Cause.STUCK,
+        Cause.OPEN,
+        Cause.SHORT_LO,
+        Cause.SHORT_HI,
+    }
+)
+"""Losses of data: they end after enough fresh valid samples in a row."""
+OF_MIND = frozenset({Cause.FAILED, Cause.UNDECIDED, Cause.BAD_ACTION, Cause.UNKNOWN_CONTACT})
+"""Causes in the controller: they end as soon as it decides well again."""
+CURED_BY_ARMING = frozenset({Cause.UNKNOWN_CONTACT, Cause.WATCHDOG})
+"""Causes that do not stand against an arm event."""
+OF_FINDING = {
+    Finding.OUT_OF_CAL: Cause.OUT_OF_CAL,
+    Finding.SPIKY: Cause.SPIKY,
+    Finding.SATURATED: Cause.SATURATED,
+    Finding.LOST: Cause.LOST,
+    Finding.STUCK: Cause.STUCK,
+    Finding.OPEN: Cause.OPEN,
+    Finding.SHORT_LO: Cause.SHORT_LO,
+    Finding.SHORT_HI: Cause.SHORT_HI,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Inputs:
+    """What is known in one tick, after the controller had its turn.
+
+    Attributes:
+        age: Age of the newest valid sample [s]; inf if there is none.
+        valid: Valid samples that arrived since the tick before, without those that were too old.
+        refused: Samples that arrived since then and were not valid.
+        findings: State of the left and the right channel.
+        decided_at: Time at which the controller finished its newest decision [s].
+        maneuver: That decision.
+        contact: What it rests on, left and right.
+        finite: Whether every number of its pose is finite.
+        failure: Text of an exception of the controller in this tick, empty if none.
+        resets: Restarts of the antenna board so far.
+        reset_reason: Why it last restarted, as far as it can tell.
+        missed: Answers missed in a row, by servo id; ids without any may be left out.
+        servo_errors: Hardware errors in words, by servo id.
+        bus_error: What is wrong with the bus as a whole, empty if nothing is.
+        watchdogs: Ids of servos stopped by their watchdog.
+        supply: Voltage of the supply [V], NaN if unknown.
+        objections: What speaks against arming, such as a failed touch check or foreign firmware.
+        stop: Whether the operator wants the torque off.
+        arm: Whether the operator wants it on; only the change to True in FAULT or OFF counts.
+    """
+
+    age: float
+    valid: int
+    findings: tuple[Finding, Finding]
+    decided_at: float
+    supply: float
+    maneuver: int = Maneuver.HOLD
+    contact: tuple[int, int] = (Contact.UNKNOWN, Contact.UNKNOWN)
+    finite: bool = True
+    failure: str = ""
+    refused: int = 0
+    resets: int = 0
+    reset_reason: str = ""
+    missed: Mapping[int, int] = field(default_factory=dict[int, int])
+    servo_errors: Mapping[int, str] = field(default_factory=dict[int, str])
+    bus_error: str = ""
+    watchdogs: tuple[int, ...] = ()
+    objections: tuple[str, ...] = ()
+    stop: bool = False
+    arm: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Active:
+    """A cause in force.
+
+    Attributes:
+        cause: Which.
+        since: When it began [s].
+        detail: Side, ids or reason; may be empty.
+        present: Whether it is still there; if not, it is latched or waits for fresh samples.
+    """
+
+    cause: Cause
+    since: float
+    detail: str
+    present: bool
+
+    @property
+    def text(self) -> str:
+        """One line for the status."""
+        detail = f" ({self.detail})" if self.detail else ""
+        return f"{self.cause.severity.name} {self.cause.name}: {self.cause.text}{detail}"
+
+
+@dataclass(frozen=True, slots=True)
+class Outputs:
+    """What the tick may do.
+
+    Attributes:
+        state: Where on the ladder the robot is.
+        move: Whether the pose just decided may be sent; if not, the last one sent stays.
+        torque: Whether torque is on.
+        arming: True in the one tick of an accepted arm event: clear the watchdogs, set all goals to
+            the present positions, then switch the torque on.
+        feed_watchdog: Whether the watchdogs of the servos may be fed: only upon a decision taken in
+            this very tick.
+        clear: Whether data and actuators are well and the torque on. While it is False the
+            controller gets NaN for counts in the next tick, so that its gait stands still.
+        causes: All causes in force, the most severe first, then the oldest.
+        refusal: Why an arm event of this tick was not accepted, empty if it was or none came.
+    """
+
+    state: State
+    move: bool
+    torque: bool
+    arming: bool
+    feed_watchdog: bool
+    clear: bool
+    causes: tuple[Active, ...]
+    refusal: tuple[Cause, ...]

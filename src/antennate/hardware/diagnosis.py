@@ -1,0 +1,227 @@
+"""Whether a film can be believed: counts of one channel in, counts to use and a finding out.
+
+Nothing here reads a clock. A reading that jumps, or lies far outside the calibrated range, is bad:
+the last good one stands in for it for a few readings, so a spike changes nothing. A jump that three
+readings in a row agree on is believed. Where nothing is left to believe, the counts are NaN.
+
+A film is the upper half of a divider, so one torn off its wire reads 0 like a short to ground, and
+both are SHORT_LO; OPEN is a converter pin that hangs in the air.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import dataclass
+from enum import Enum
+
+from antennate.errors import CalibrationError
+from antennate.params import DiagnosisParams
+from antennate.sensor import FULL_SCALE
+
+
+class Finding(Enum):
+    """What one channel is found to be."""
+
+    OK = "ok"
+    OUT_OF_CAL = "beyond the calibrated range, clamped"
+    SPIKY = "too many bad readings"
+    SATURATED = "at the rail of a bent film"
+    LOST = "no good reading for too long"
+    STUCK = "always the same reading"
+    OPEN = "floating, wire open"
+    SHORT_LO = "short to ground, or film torn off"
+    SHORT_HI = "short to supply"
+
+    @property
+    def usable(self) -> bool:
+        """Whether contact may be decided on such a channel."""
+        return self in _USABLE
+
+
+_USABLE = {Finding.OK, Finding.OUT_OF_CAL, Finding.SPIKY, Finding.SATURATED}
+
+
+@dataclass(frozen=True, slots=True)
+class Band:
+    """Calibrated range of a channel.
+
+    Attributes:
+        low: Lowest calibrated reading [counts].
+        high: Highest calibrated reading [counts].
+        polarity: +1 if readings rise with the bend, -1 if they fall.
+    """
+
+    low: float
+    high: float
+    polarity: int
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """A reading after diagnosis.
+
+    Attributes:
+        counts: Reading to use [counts], within the band; NaN where nothing can be said.
+        finding: State of the channel.
+    """
+
+    counts: float
+    finding: Finding
+
+
+_NOTHING = Reading(math.nan, Finding.LOST)
+
+
+class ChannelDiagnosis:
+    """Judges the readings of one antenna.
+
+    Args:
+        params: Windows and limits.
+        band: The channel's calibrated range.
+
+    Attributes:
+        reading: The newest result; LOST before the first.
+        counted: Readings by the finding they got.
+        bad: Readings not believed.
+        clamped: Readings clamped to the band.
+
+    Raises:
+        CalibrationError: The band is empty or reaches a rail, where a broken wire looks alive.
+    """
+
+    def __init__(self, params: DiagnosisParams, band: Band) -> None:
+        if not params.low_rail < band.low < band.high < params.high_rail:
+            raise CalibrationError(
+                f"a calibrated range must lie within {params.low_rail:g} and {params.high_rail:g} "
+                f"counts, so that a broken wire can be told from a film; got {band.low:g} to "
+                f"{band.high:g}; choose another divider resistor"
+            )
+        self._params = params
+        self._band = band
+        self._span = band.high - band.low
+        self.counted = dict.fromkeys(Finding, 0)
+        self.bad = 0
+        self.clamped = 0
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget all readings; the counters stay."""
+        window = self._params.window
+        self.reading = _NOTHING
+        self._t = -math.inf
+        self._raw: deque[float] = deque(maxlen=window)
+        self._bad: deque[bool] = deque(maxlen=window)
+        self._share: deque[bool] = deque(maxlen=self._params.share_window)
+        self._clamped: deque[bool] = deque(maxlen=window)
+        self._good = math.nan
+        self._bad_run = self._params.longest_hold + 1
+        self._doubted: list[float] = []
+        self._equal = 0
+        self._share_bad = 0
+
+    def step(self, t: float, counts: float) -> Reading:
+        """Take a reading.
+
+        Args:
+            t: Time at which it was taken [s]; one not newer than the last is not counted again.
+            counts: The reading [counts]; NaN where one is known to be missing.
+        """
+        if not t > self._t:
+            return self.reading
+        if t - self._t > self._params.gap:
+            self.reset()
+        self._t = t
+        self._equal = self._equal + 1 if self._raw and counts == self._raw[-1] else 1
+        self._raw.append(counts)
+        self._believe(counts)
+        finding = self._find()
+        value = self._clamp(self._good) if finding.usable else math.nan
+        self.counted[finding] += 1
+        self.reading = Reading(value, finding)
+        return self.reading
+
+    def _clamp(self, counts: float) -> float:
+        return min(max(counts, self._band.low), self._band.high)
+
+    def _plausible(self, counts: float) -> bool:
+        reach = self._params.beyond * self._span
+        return self._band.low - reach <= counts <= self._band.high + reach
+
+    def _near(self, one: float, other: float) -> bool:
+        return abs(one - other) <= self._params.jump * self._span
+
+    def _believe(self, counts: float) -> None:
+        """Accept a reading as the good one, or count it as bad."""
+        good = self._plausible(counts)
+        if good and not self._near(counts, self._good):
+            doubted = self._doubted
+            follows = doubted and self._near(counts, doubted[-1])
+            self._doubted = [*doubted, counts] if follows else [counts]
+            good = len(self._doubted) >= self._params.agree
+        elif not good:
+            self._doubted = []
+        if good:
+            self._good = counts
+            self._doubted = []
+        self._bad_run = 0 if good else self._bad_run + 1
+        self._count(good, counts)
+
+    def _count(self, good: bool, counts: float) -> None:
+        margin = self._params.margin
+        outside = not self._band.low - margin <= counts <= self._band.high + margin
+        self._clamped.append(good and outside)
+        self.clamped += good and outside
+        self.bad += not good
+        if len(self._share) == self._share.maxlen:
+            self._share_bad -= self._share[0]
+        self._share.append(not good)
+        self._share_bad += not good
+        self._bad.append(not good)
+
+    def _find(self) -> Finding:
+        params = self._params
+        broken = self._broken()
+        if broken is not None:
+            return broken
+        if self._bad_run > params.longest_hold:
+            return Finding.LOST
+        if self._at_bent_rail() >= params.saturated:
+            return Finding.SATURATED
+        if self._share_bad > params.share * params.share_window:
+            return Finding.SPIKY
+        return Finding.OUT_OF_CAL if any(self._clamped) else Finding.OK
+
+    def _broken(self) -> Finding | None:
+        """A channel that says nothing about the film, as far as known."""
+        params = self._params
+        full = len(self._raw) == params.window
+        if full and self._pinned(low=True):
+            return Finding.SHORT_LO
+        if full and self._pinned(low=False):
+            return Finding.SHORT_HI
+        if self._equal >= params.stuck:
+            return Finding.STUCK
+        floats = sum(self._bad) >= params.open_bad or self._at_both_rails()
+        return Finding.OPEN if full and floats else None
+
+    def _at_both_rails(self) -> bool:
+        """Whether the window has two readings or more at either rail, which no film can reach."""
+        low = sum(counts <= self._params.low_rail for counts in self._raw)
+        high = sum(counts >= self._params.high_rail for counts in self._raw)
+        return min(low, high) >= 2
+
+    def _pinned(self, low: bool) -> bool:
+        """Whether the whole window is at one rail; a bent film that reaches it still has noise."""
+        params, bent_low = self._params, self._band.polarity < 0
+        if low:
+            bound = 0.0 if bent_low and self._plausible(params.low_rail) else params.low_rail
+            return all(counts <= bound for counts in self._raw)
+        bent = not bent_low and self._plausible(params.high_rail)
+        bound = FULL_SCALE if bent else params.high_rail
+        return all(counts >= bound for counts in self._raw)
+
+    def _at_bent_rail(self) -> int:
+        if self._band.polarity > 0:
+            return sum(counts >= self._params.high_rail for counts in self._raw)
+        return sum(counts <= self._params.low_rail for counts in self._raw)

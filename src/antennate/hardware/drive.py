@@ -1,0 +1,236 @@
+"""From two ports to a walking robot, and back to one without torque."""
+
+from __future__ import annotations
+
+import contextlib
+import importlib
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from typing import Any, cast
+
+from antennate.anatomy import LEGS, YAW_COUNT
+from antennate.controller import ARMS, Controller
+from antennate.errors import BadInputError, ConfigError
+from antennate.hardware.board import Board
+from antennate.hardware.causes import State
+from antennate.hardware.dynamixel import bringup
+from antennate.hardware.dynamixel.bringup import BringUpError
+from antennate.hardware.dynamixel.bus import Bus
+from antennate.hardware.dynamixel.tables import EXTENDED_MODE, XC430_W240, XL330_M288
+from antennate.hardware.host_clock import HostClock
+from antennate.hardware.joints import Joints
+from antennate.hardware.port import Port, PortError
+from antennate.hardware.session import Decider, Session
+from antennate.hardware.timing import TimingReport
+from antennate.loop import run_loop
+from antennate.params import ControllerParams, Params, SupervisorParams, number
+from antennate.params.layout import LayoutParams
+from antennate.records import AntennaFrame, Pose
+
+_GREETING_TIME = 3.0
+"""A board greets within this time [s], also one that opening the port has reset."""
+_ARMING_TIME = 1.0
+"""Time after which torque must have come on, or the drive ends [s]."""
+_PATIENCE = 0.05
+_POSITION_MODE = 3
+_BOARD_BAUD = 115_200
+
+
+class DriveConfig(Params):
+    """The robot, its controller, and how long it runs: what robot.toml holds."""
+
+    controller: str = number(
+        "closed", "1", "assumed: our best", "open, paper, closed, or MODULE:CLASS of your own"
+    )
+    dry_run: float = number(
+        10.0, "s", "assumed: long enough to touch both antennae", "time before torque", ge=0, le=600
+    )
+    duration: float | None = number(
+        None, "s", "assumed: until it is stopped", "time from torque on to off", gt=0
+    )
+    layout: LayoutParams = LayoutParams()
+    mind: ControllerParams = ControllerParams()
+    limits: SupervisorParams = SupervisorParams()
+
+
+@dataclass(slots=True)
+class Report:
+    """How a drive went.
+
+    Attributes:
+        timing: How well the pace was kept, None if no tick was run.
+        worst: Worst state after torque had come on.
+        on: Servos that did not confirm that their torque is off.
+    """
+
+    timing: TimingReport | None = None
+    worst: State = State.OK
+    on: list[int] = field(default_factory=list[int])
+
+    @property
+    def safe(self) -> bool:
+        """No servo has torque."""
+        return not self.on
+
+
+@contextlib.contextmanager
+def connect(config: DriveConfig, esp32: str, bus: str) -> Iterator[Session]:
+    """Open both ports, find who is there, and close them again afterwards.
+
+    Raises:
+        PortError: A port cannot be opened.
+        BadInputError: No antenna board speaks, or it is refused.
+        BringUpError: The servos are not those expected.
+    """
+    try:
+        from antennate.hardware.serial_port import SerialPort
+    except ModuleNotFoundError as error:
+        raise ConfigError(
+            f"expected pyserial for real ports, found no module {error.name}; install "
+            "antennate[hardware], or run `uv run --extra hardware antennate drive ...`"
+        ) from None
+
+    with contextlib.ExitStack() as stack:
+        lines: list[Port] = []
+        for path, baud in ((esp32, _BOARD_BAUD), (bus, config.layout.baud)):
+            line = SerialPort(path, baud)
+            stack.callback(line.close)
+            lines.append(line)
+        yield prepare(config, lines[0], lines[1], HostClock())
+
+
+def prepare(config: DriveConfig, esp32: Port, bus: Port, clock: Any) -> Session:
+    """A session before two open ports, after both sides have said who they are."""
+    board = Board(esp32, config.limits.stale_age)
+    await_board(board, clock)
+    master = Bus(bus, clock=clock.now)
+    require_servos(master, config.layout)
+    return Session(
+        board=board,
+        bus=master,
+        joints=Joints(config.layout),
+        clock=clock,
+        decider=decider(config),
+        period=config.mind.period,
+        conditioning=config.mind.conditioning,
+        limits=config.limits,
+    )
+
+
+def await_board(board: Board, clock: Any) -> None:
+    """Wait for a greeting and samples.
+
+    Raises:
+        BadInputError: None came; says what came instead.
+    """
+    end = clock.now() + _GREETING_TIME
+    while board.clock.newest is None:
+        if clock.now() > end:
+            came = board.decoder.counters
+            why = (
+                board.refusals[-1]
+                if board.refusals
+                else (
+                    f"{came.received} bytes and {came.good} frames; is it the right port, with the "
+                    "firmware on the board? Perhaps --esp32 and --bus are swapped"
+                )
+            )
+            raise BadInputError(
+                f"--esp32: expected an antenna board within {_GREETING_TIME:g} s, found {why}"
+            )
+        clock.sleep_until(clock.now() + _PATIENCE)
+        board.poll(clock.now())
+
+
+def require_servos(bus: Bus, layout: LayoutParams) -> None:
+    """All servos are there, of the right model and in the right mode.
+
+    Raises:
+        BringUpError: Otherwise; names each id that is not, and the cure.
+    """
+    legs = slice(YAW_COUNT, YAW_COUNT + len(LEGS))
+    models = dict.fromkeys(layout.ids, XC430_W240.model)
+    models |= dict.fromkeys(layout.antennae.ids, XL330_M288.model)
+    try:
+        bringup.require(bus, models)
+    except BringUpError as error:
+        raise BringUpError(
+            f"--bus: {error}; check power, wiring, ids and baud {layout.baud}, or whether --esp32 "
+            "and --bus are swapped"
+        ) from None
+    modes = bringup.read_register(bus, layout.ids, XC430_W240["operating_mode"])
+    wanted = dict.fromkeys(layout.ids, _POSITION_MODE)
+    wanted |= dict.fromkeys(layout.ids[legs], EXTENDED_MODE)
+    if wrong := [i for i in layout.ids if modes[i] != wanted[i]]:
+        raise BringUpError(
+            f"--bus: expected operating mode 4 (extended position) of legs and 3 (position) of the "
+            f"others, found another in servos {wrong}; set register 11 with torque off"
+        )
+
+
+def decider(config: DriveConfig) -> Decider:
+    """The controller that the configuration names.
+
+    Raises:
+        ConfigError: There is none of that name.
+    """
+    name = config.controller
+    if name in ARMS:
+        return Controller(config.mind, name)
+    module, _, made = name.partition(":")
+    if not made:
+        raise ConfigError(
+            f"--controller: expected one of {', '.join(ARMS)} or MODULE:CLASS, found {name!r}"
+        )
+    try:
+        return cast(Decider, getattr(importlib.import_module(module), made)(config.mind))
+    except (ImportError, AttributeError, TypeError) as error:
+        raise ConfigError(
+            f"--controller: expected a class that takes ControllerParams, found {name!r}: {error}"
+        ) from None
+
+
+def drive(
+    session: Session,
+    config: DriveConfig,
+    arm: bool,
+    on_tick: Callable[[Session, float], None] = lambda session, t: None,
+) -> Report:
+    """A dry run, then, if `arm`, a walk; torque is off at the end whatever happens.
+
+    Args:
+        session: As from `connect`.
+        config: For how long.
+        arm: Whether torque may come on.
+        on_tick: Called after every tick with the session and the time [s].
+
+    Returns:
+        How it went. After Ctrl-C the report is that of the way so far.
+    """
+    report, clock = Report(), session.clock
+    start = clock.now()
+    walk = config.dry_run if arm else math.inf
+    end = config.dry_run if not arm else config.dry_run + (config.duration or math.inf)
+
+    def go_on(frame: AntennaFrame, pose: Pose) -> bool:
+        t = clock.now() - start
+        session.orders.arm = t >= walk
+        out = session.outputs
+        if out is not None and out.torque:
+            report.worst = max(report.worst, out.state)
+        on_tick(session, clock.now())
+        failed = out is not None and t > walk + _ARMING_TIME and out.state >= State.FAULT
+        return t < end and not failed
+
+    try:
+        run_loop(session, session, session.period, go_on)
+    except KeyboardInterrupt:
+        pass
+    finally:
+        report.timing = None if session.timing is None else session.timing.report()
+        try:
+            report.on = session.release()
+        except PortError:
+            report.on = list(session.joints.ids)
+    return report

@@ -1,0 +1,122 @@
+"""What a servo may answer, what is asked of it, and how long it may take."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from antennate.hardware.dynamixel.packets import OVERHEAD, Status, StatusError
+
+
+@dataclass(frozen=True, slots=True)
+class Value:
+    """A servo answered.
+
+    Attributes:
+        data: The bytes asked for.
+        alert: The servo reports a hardware error all the same.
+    """
+
+    data: bytes
+    alert: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Refused:
+    """A servo answered that it cannot.
+
+    Attributes:
+        error: Why.
+        alert: The servo reports a hardware error.
+    """
+
+    error: StatusError
+    alert: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Silent:
+    """No right answer came in time."""
+
+
+Answer = Value | Refused | Silent
+SILENT = Silent()
+
+
+@dataclass(frozen=True, slots=True)
+class Span:
+    """Bytes of the control table to read.
+
+    Attributes:
+        address: First byte.
+        length: Bytes wanted.
+        spare: Bytes after those that may be read too, to tell new answers from late ones.
+    """
+
+    address: int
+    length: int
+    spare: int = 0
+
+
+MOTION = Span(126, 10, spare=12)
+"""Load or current (2 bytes), velocity (4) and position (4) of both models; up to 147 all is
+defined, so that more may be read."""
+POSITION = Span(132, 4, spare=12)
+"""The position of both models."""
+
+
+@dataclass(frozen=True, slots=True)
+class Timing:
+    """What the bus may take.
+
+    Attributes:
+        baud: Bits per second; a byte is ten bits.
+        gap: Longest silence inside an answer or before it, beyond the time on the wire [s]; more
+            than the return delay of the servos and the latency of the adapter.
+        quiet: Silence after which nothing more is expected [s].
+        doubt: An answer later than this never comes [s].
+    """
+
+    baud: int = 1_000_000
+    gap: float = 0.002
+    quiet: float = 0.002
+    doubt: float = 0.1
+
+    def wire(self, count: int) -> float:
+        """Time of so many bytes on the wire [s]."""
+        return 10.0 * count / self.baud
+
+    def answer(self, length: int) -> float:
+        """Longest time to an answer with so many bytes of data, or between two [s]."""
+        return self.wire(OVERHEAD + length) + self.gap
+
+
+@dataclass(slots=True)
+class Tally:
+    """What the bus has seen.
+
+    Attributes:
+        misses: Requests to one servo without a right answer.
+        stale: Answers that were right but not to the request, and were thrown away.
+        bad_crc: Packets with a wrong CRC.
+        drained: Bytes thrown away before a request.
+    """
+
+    misses: int = 0
+    stale: int = 0
+    bad_crc: int = 0
+    drained: int = 0
+
+
+def answer(status: Status) -> Answer:
+    """What a status packet says."""
+    if status.error != StatusError.NONE:
+        return Refused(status.error, status.alert)
+    return Value(status.data, status.alert)
+
+
+def cut(answers: dict[int, Answer], length: int) -> dict[int, Answer]:
+    """The answers with no more data than was wanted."""
+    return {
+        servo: Value(said.data[:length], said.alert) if isinstance(said, Value) else said
+        for servo, said in answers.items()
+    }

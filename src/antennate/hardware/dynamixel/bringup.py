@@ -1,0 +1,181 @@
+"""From power-on to torque without a jump: who is there, watchdogs armed, goals where servos stand.
+
+Each step changes nothing unless all servos are fit for it, and what was written is read back.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from antennate.errors import AntennateError
+from antennate.hardware.dynamixel.answers import Answer, Span, Value
+from antennate.hardware.dynamixel.bus import Bus
+from antennate.hardware.dynamixel.tables import (
+    EXTENDED_MODE,
+    TABLES,
+    XC430_W240,
+    Register,
+)
+
+WATCHDOG_COUNTS = 5
+"""Bus watchdog: a servo stops 100 ms after the last packet."""
+
+_TRIES = 5
+_BUDGET = 0.1
+"""Time for one reading of all, outside the control loop [s]."""
+_COMMON = XC430_W240.registers
+"""Both models have the registers used here at the same addresses."""
+
+
+class BringUpError(AntennateError):
+    """The servos are not fit to be moved; says which and why."""
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """One id on the bus.
+
+    Attributes:
+        servo: The id.
+        model: Model number, None if it does not answer.
+        firmware: Firmware version, None if it does not answer.
+        verdict: "ok", or what is wrong with it.
+    """
+
+    servo: int
+    model: int | None
+    firmware: int | None
+    verdict: str
+
+
+def inventory(bus: Bus, expected: Mapping[int, int]) -> list[Found]:
+    """What is on the bus, next to the model numbers expected by id; asks nobody to move.
+
+    Two servos of one id and model answer a ping with the same bytes at the same time. Only what
+    differs between them, the tick and the position, comes back broken.
+    """
+    table = [_look(bus, servo, model) for servo, model in expected.items()]
+    strangers = {status.id: status.data for status in bus.scan() if status.id not in expected}
+    for servo, data in sorted(strangers.items()):
+        table.append(Found(servo, *_model(data), "not expected"))
+    return table
+
+
+def require(bus: Bus, expected: Mapping[int, int]) -> list[Found]:
+    """The inventory, if all of it is as expected.
+
+    Raises:
+        BringUpError: Otherwise; the text says each id that is not, and why.
+    """
+    table = inventory(bus, expected)
+    if wrong := [f"id {row.servo}: {row.verdict}" for row in table if row.verdict != "ok"]:
+        raise BringUpError(
+            f"expected {len(expected)} servos, found {len(table) - len(wrong)} fit; "
+            + "; ".join(wrong)
+        )
+    return table
+
+
+def hold_here(bus: Bus, ids: Sequence[int]) -> dict[int, int]:
+    """Make each goal position the present one [ticks], and read it back.
+
+    Raises:
+        BringUpError: A servo did not answer, or refused: a tripped bus watchdog locks goals.
+    """
+    present = read_register(bus, ids, _COMMON["present_position"])
+    _write_checked(bus, _COMMON["goal_position"], present)
+    return present
+
+
+def arm_watchdogs(bus: Bus, ids: Sequence[int], counts: int = WATCHDOG_COUNTS) -> None:
+    """Clear the bus watchdogs, hold the present position, and arm them.
+
+    Raises:
+        BringUpError: A servo did not take it; or it is in extended position mode with a homing
+            offset, where the watchdog makes it move
+            (https://github.com/ROBOTIS-GIT/DynamixelSDK/issues/584).
+    """
+    modes = read_register(bus, ids, _COMMON["operating_mode"])
+    offsets = read_register(bus, ids, _COMMON["homing_offset"])
+    if bad := [i for i in ids if modes[i] == EXTENDED_MODE and offsets[i]]:
+        raise BringUpError(
+            f"expected no homing offset in extended position mode, found one in servos {bad}"
+        )
+    _write_checked(bus, _COMMON["bus_watchdog"], dict.fromkeys(ids, 0))
+    hold_here(bus, ids)
+    _write_checked(bus, _COMMON["bus_watchdog"], dict.fromkeys(ids, counts))
+
+
+def enable(bus: Bus, ids: Sequence[int]) -> None:
+    """Torque on, each servo where it stands.
+
+    Raises:
+        BringUpError: A servo did not take it; those that did keep holding their place.
+    """
+    hold_here(bus, ids)
+    _write_checked(bus, _COMMON["torque_enable"], dict.fromkeys(ids, 1))
+
+
+def disable(bus: Bus, ids: Sequence[int]) -> list[int]:
+    """Torque off as well as can be: the ids that did not confirm it after several tries."""
+    torque, left = _COMMON["torque_enable"], list(ids)
+    for _ in range(_TRIES):
+        bus.write_all(torque.address, dict.fromkeys(left, b"\0"))
+        said = bus.read_all(left, Span(torque.address, 1, spare=1), _BUDGET)
+        left = [i for i in left if not isinstance(a := said[i], Value) or a.data != b"\0"]
+        if not left:
+            break
+        bus.settle()
+    return left
+
+
+def read_register(bus: Bus, ids: Sequence[int], register: Register) -> dict[int, int]:
+    """One register of each servo.
+
+    Raises:
+        BringUpError: A servo did not answer after several tries.
+    """
+    values: dict[int, int] = {}
+    left = list(ids)
+    for _ in range(_TRIES):
+        said = bus.read_all(left, Span(register.address, register.size), _BUDGET)
+        values |= {i: register.decode(a.data) for i, a in said.items() if isinstance(a, Value)}
+        left = [i for i in ids if i not in values]
+        if not left:
+            return values
+        bus.settle()
+    raise BringUpError(f"could not read {register.name} of servos {left}")
+
+
+def _write_checked(bus: Bus, register: Register, values: Mapping[int, int]) -> None:
+    bus.write_all(register.address, {i: register.encode(v) for i, v in values.items()})
+    there = read_register(bus, list(values), register)
+    if wrong := {i: there[i] for i, value in values.items() if there[i] != value}:
+        raise BringUpError(f"could not write {register.name}, servos still have {wrong}")
+
+
+def _look(bus: Bus, servo: int, model: int) -> Found:
+    found, firmware = _model(_data(bus.ping(servo)))
+    ticks = Span(_COMMON["realtime_tick"].address, 16)
+    if found is None:
+        return Found(servo, None, None, "silent")
+    if found != model:
+        name = TABLES[model].name if model in TABLES else str(model)
+        return Found(servo, found, firmware, f"expected model {name}, found number {found}")
+    if all(_data(_patient(bus, servo, ticks)) == b"" for _ in range(_TRIES)):
+        return Found(servo, found, firmware, "answers collide: two servos with this id?")
+    return Found(servo, found, firmware, "ok")
+
+
+def _patient(bus: Bus, servo: int, span: Span) -> Answer:
+    bus.settle()
+    return bus.read(servo, span)
+
+
+def _data(answer: Answer) -> bytes:
+    return answer.data if isinstance(answer, Value) else b""
+
+
+def _model(data: bytes) -> tuple[int | None, int | None]:
+    return (int.from_bytes(data[:2], "little"), data[2]) if len(data) == 3 else (None, None)

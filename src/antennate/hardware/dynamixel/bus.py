@@ -1,0 +1,291 @@
+"""The master of a half-duplex bus of DYNAMIXEL servos: every servo answers for itself.
+
+A read of many servos gives a value, an error or silence for each, within a budget of time. The
+chain of answers to a group read stops at a silent servo (DynamixelSDK issue 331), and the next ones
+are asked anew without it.
+
+Nothing in the protocol says to which request an answer belongs, so late answers are told apart by
+what can be told: the id and the length. Each id keeps the lengths of its unanswered requests for
+`doubt` seconds, and meanwhile it is asked for a length that none of them had (some `spare` bytes
+more), or not at all. After trouble the bus is also drained until it was quiet for a while.
+Time is monotonic and comes from outside; nothing is kept that an exception could leave wrong.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable, Mapping, Sequence
+
+from antennate.hardware.dynamixel import packets
+from antennate.hardware.dynamixel.answers import (
+    SILENT,
+    Answer,
+    Span,
+    Tally,
+    Timing,
+    answer,
+    cut,
+)
+from antennate.hardware.dynamixel.doubts import Doubts
+from antennate.hardware.dynamixel.packets import HEADER, OVERHEAD, Packet, Status, StatusError
+from antennate.hardware.dynamixel.parser import Parser
+from antennate.hardware.port import Port, PortError
+
+CHUNK = 1024
+PING_DATA = 3
+"""Bytes of the answer to a ping: model number and firmware version."""
+FAST_TRIES = 3
+"""Fast reads without any answer, but answers to a slow one, after which fast ones are given up."""
+
+ALONE = 2
+"""Misses in a row after which a servo no longer holds up the others."""
+BUSY = 0.010
+"""How long goals wait for a quiet bus [s]."""
+
+
+class Bus:
+    """Master of one bus; for one thread.
+
+    Args:
+        port: The wire.
+        timing: Its speed and patience.
+        fast: Read groups with fast sync reads, as long as the servos understand them.
+        clock: Monotonic time [s].
+    """
+
+    def __init__(
+        self,
+        port: Port,
+        timing: Timing | None = None,
+        fast: bool = True,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self.timing = timing or Timing()
+        self.tally = Tally()
+        self._port = port
+        self._clock = clock
+        self._fast = fast
+        self._fast_failures = 0
+        self._doubts = Doubts(self.timing.doubt, clock)
+        self._missed: dict[int, int] = {}
+        self._calm = False
+        self._last_byte = self._sent = clock()
+
+    @property
+    def fast(self) -> bool:
+        """Groups are read with fast sync reads."""
+        return self._fast
+
+    def write_all(self, address: int, data: Mapping[int, bytes]) -> None:
+        """Write equally many bytes to several servos at once; none answers."""
+        if not self._send(packets.sync_write(address, data), self._clock() + BUSY):
+            raise PortError(f"expected a quiet bus, found it busy for {1e3 * BUSY:g} ms")
+        self._calm = True
+
+    def read_all(self, ids: Sequence[int], span: Span, budget: float = 0.010) -> dict[int, Answer]:
+        """Read the same span of several servos.
+
+        A servo at which the chain stops is asked again at its end; one that was silent twice in a
+        row is asked alone, after the others.
+
+        Args:
+            ids: The servos.
+            span: What to read.
+            budget: Time for all of it [s].
+
+        Returns:
+            An answer for each id, in the order of `ids`.
+        """
+        end = self._clock() + budget
+        answers: dict[int, Answer] = dict.fromkeys(ids, SILENT)
+        alone = [servo for servo, n in self._missed.items() if n >= ALONE and servo in ids]
+        left = sorted(set(ids) - set(alone), key=lambda servo: (servo in self._missed, servo))
+        fast, dumb = self._fast, False
+        while left and self._time_for(span, len(left), end):
+            got = (self._read_fast if fast else self._read_chain)(left, span, end)
+            dumb = self._judge_fast(fast, dumb, bool(got))
+            answers |= got
+            left, fast = [servo for servo in left if servo not in got], False
+            self._note(got, left[:1])
+            again = [servo for servo in left[:1] if self._missed[servo] < ALONE]
+            left = left[1:] + again
+        for servo in alone:
+            if self._time_for(span, 1, end):
+                answers[servo] = self._read_one(servo, span, end)
+        return answers
+
+    def read(self, servo: int, span: Span) -> Answer:
+        """Read a span of one servo."""
+        return self._read_one(servo, span, self._clock() + self.timing.doubt)
+
+    def write(self, servo: int, address: int, data: bytes) -> Answer:
+        """Write to one servo and wait for its answer; a Value without data is success."""
+        return self._ask(servo, packets.write(servo, address, data), 0)
+
+    def ping(self, servo: int) -> Answer:
+        """Model number (2 bytes, low first) and firmware version of one servo."""
+        return self._ask(servo, packets.ping(servo), PING_DATA)
+
+    def reboot(self, servo: int) -> Answer:
+        """Restart one servo; it does not listen for a while after it has answered."""
+        return self._ask(servo, packets.reboot(servo), 0)
+
+    def clear(self, servo: int) -> Answer:
+        """Let one servo, standing still, forget its whole turns."""
+        return self._ask(servo, packets.clear(servo), 0)
+
+    def scan(self, window: float = 0.8) -> list[Status]:
+        """Answers of all servos to a ping within a time [s], an id twice if it answers twice."""
+        self.settle()
+        end = self._clock() + window
+        self._send(packets.ping(), end)
+        parser, found = Parser(), list[Status]()
+        while self._clock() < end:
+            found += filter(None, map(packets.as_status, parser.feed(self._listen(window, end))))
+        self.tally.bad_crc += parser.counters.bad_crc
+        return found
+
+    def settle(self) -> None:
+        """Wait until no late answer can come any more, at most `doubt` seconds."""
+        while (left := self._doubts.longest()) > 0.0:
+            self._listen(left, self._clock() + left)
+
+    # one request and its answers
+
+    def _ask(self, servo: int, request: bytes, length: int) -> Answer:
+        if self._doubts.holds(servo):
+            self.settle()
+        end = self._clock() + self.timing.doubt
+        return self._exchange(request, [servo], length, end).get(servo, SILENT)
+
+    def _read_one(self, servo: int, span: Span, end: float) -> Answer:
+        length = self._doubts.free([servo], span)
+        if length is None:
+            return SILENT
+        request = packets.read(servo, span.address, length)
+        found = cut(self._exchange(request, [servo], length, end), span.length)
+        self._note(found, [] if found else [servo])
+        return found.get(servo, SILENT)
+
+    def _read_chain(self, ids: Sequence[int], span: Span, end: float) -> dict[int, Answer]:
+        length = self._doubts.free(ids, span)
+        if length is None:
+            return {}
+        request = packets.sync_read(ids, span.address, length)
+        return cut(self._exchange(request, ids, length, end), span.length)
+
+    def _read_fast(self, ids: Sequence[int], span: Span, end: float) -> dict[int, Answer]:
+        length = self._doubts.free(ids, span)
+        if length is None:
+            return {}
+        self._doubts.open(ids, length)
+        if not self._send(packets.fast_sync_read(ids, span.address, length), end):
+            return {}
+        size = packets.fast_reply_size(len(ids), length)
+        received = b""
+        wait = self._sent - self._clock() + self.timing.answer(length)
+        while part := self._listen(wait, end):
+            received += part
+            if len(received) - max(received.find(HEADER), 0) >= size:
+                break
+            wait = self.timing.answer(length)
+        found = packets.split_fast_reply(received, ids, length)
+        good = {status.id: answer(status) for status in found}
+        self._finish(ids, length, good, len(received) == size)
+        return cut(good, span.length)
+
+    def _exchange(
+        self, request: bytes, ids: Sequence[int], length: int, end: float
+    ) -> dict[int, Answer]:
+        doubtful = {servo for servo in ids if self._doubts.holds(servo)}
+        self._doubts.open(ids, length)
+        if not self._send(request, end):
+            return {}
+        parser, good, stale = Parser(), dict[int, Answer](), 0
+        twice: set[int] = set()
+        wait = self._sent - self._clock() + self.timing.answer(length)
+        while len(good) < len(ids) and (part := self._listen(wait, end)):
+            wait = self.timing.answer(length)
+            for packet in parser.feed(part):
+                status = _fitting(packet, length, doubtful)
+                if status and status.id in ids and status.id not in good:
+                    good[status.id] = answer(status)
+                    continue
+                stale += 1
+                twice |= {status.id} if status else set()
+        good = {servo: said for servo, said in good.items() if servo not in twice}
+        self.tally.stale += stale
+        self.tally.bad_crc += parser.counters.bad_crc
+        self._finish(
+            ids, length, good, not (stale or parser.pending or parser.counters.skipped_bytes)
+        )
+        return good
+
+    def _finish(
+        self, ids: Sequence[int], length: int, good: Mapping[int, Answer], clean: bool
+    ) -> None:
+        self._doubts.close(good, length)
+        missed = len(ids) - len(good)
+        self.tally.misses += missed
+        self._calm = clean and not missed
+
+    def _note(self, good: Iterable[int], silent: Iterable[int]) -> None:
+        for servo in good:
+            self._missed.pop(servo, None)
+        for servo in silent:
+            self._missed[servo] = self._missed.pop(servo, 0) + 1
+
+    def _judge_fast(self, fast: bool, dumb: bool, answered: bool) -> bool:
+        if fast:
+            self._fast_failures = 0 if answered else self._fast_failures
+            return not answered
+        if dumb and answered:
+            self._fast_failures += 1
+            self._fast = self._fast_failures < FAST_TRIES
+            return False
+        return dumb
+
+    # the wire
+
+    def _time_for(self, span: Span, count: int, end: float) -> bool:
+        """A first answer would come before the end, unless servos or adapter are slow."""
+        wire = self.timing.wire(2 * OVERHEAD + 3 + count + span.length + span.spare)
+        return self._clock() + wire + 0.5 * self.timing.gap <= end
+
+    def _send(self, request: bytes, end: float) -> bool:
+        """Send once the bus is known to be quiet; False if it was not by `end`."""
+        calm, self._calm = self._calm, False
+        dropped = self._port.drain()
+        self.tally.drained += dropped
+        if dropped:
+            self._last_byte = self._clock()
+        if (dropped or not calm) and not self._quiet(end):
+            return False
+        self._port.write(request)
+        self._sent = max(self._sent, self._clock()) + self.timing.wire(len(request))
+        return True
+
+    def _quiet(self, end: float) -> bool:
+        while (now := self._clock()) < end:
+            left = max(self._last_byte, self._sent) + self.timing.quiet - now
+            if left <= 0.0:
+                return True
+            self.tally.drained += len(self._listen(left, end))
+        return False
+
+    def _listen(self, timeout: float, end: float) -> bytes:
+        part = self._port.read(CHUNK, max(min(timeout, end - self._clock()), 0.0))
+        if part:
+            self._last_byte = self._clock()
+        return part
+
+
+def _fitting(packet: Packet, length: int, doubtful: set[int]) -> Status | None:
+    """The status, if it can be the answer to a request for so many bytes."""
+    status = packets.as_status(packet)
+    if status is None:
+        return None
+    refused = status.error != StatusError.NONE and not status.data
+    if refused and length > 0 and status.id in doubtful:
+        return None
+    return status if refused or len(status.data) == length else None

@@ -1,0 +1,242 @@
+"""Control tables of the two servo models as data: what lies where, and what may be written.
+
+Sources: https://emanual.robotis.com/docs/en/dxl/x/xc430-w240/ (XC430-W240-T) and
+https://emanual.robotis.com/docs/en/dxl/x/xl330-m288/ (XL330-M288-T), section Control Table.
+Indirect addresses (from 168) are left out. Where a bound is another register (a goal by its limit),
+the bound here is the widest that register can set. Bus Watchdog also takes 0, which turns it off.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+EEPROM_END = 64
+"""Registers below this address survive power-off and are locked while torque is on."""
+
+
+@dataclass(frozen=True, slots=True)
+class Register:
+    """One entry of a control table; values are counts.
+
+    Attributes:
+        name: Name in the manual, lower case with underscores.
+        address: First byte.
+        size: Bytes, low first.
+        access: "R" or "RW".
+        unit: What one count is; "" if it has none.
+        default: Value after a reset, None if the manual gives none.
+        low: Smallest value that may be written, None without a bound in the table.
+        high: Largest.
+        signed: Two's complement.
+    """
+
+    name: str
+    address: int
+    size: int
+    access: str
+    unit: str
+    default: int | None
+    low: int | None
+    high: int | None
+    signed: bool
+
+    @property
+    def eeprom(self) -> bool:
+        """It survives power-off and is locked while torque is on."""
+        return self.address < EEPROM_END
+
+    @property
+    def writable(self) -> bool:
+        """It may be written at all."""
+        return self.access == "RW"
+
+    def encode(self, value: int) -> bytes:
+        """The value as it is sent."""
+        return value.to_bytes(self.size, "little", signed=self.signed)
+
+    def decode(self, data: bytes) -> int:
+        """The value of `size` bytes."""
+        return int.from_bytes(data, "little", signed=self.signed)
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """The control table of one model.
+
+    Attributes:
+        model: Model number.
+        name: Model name.
+        source: Address of the manual.
+        fast_read_firmware: First firmware that understands a fast sync read.
+        registers: By name, in the order of their addresses.
+    """
+
+    model: int
+    name: str
+    source: str
+    fast_read_firmware: int
+    registers: dict[str, Register]
+
+    def __getitem__(self, name: str) -> Register:
+        return self.registers[name]
+
+
+EXTENDED_MODE = 4
+"""Operating mode: position over many turns."""
+
+VELOCITY_UNIT = 0.229 * 2.0 * math.pi / 60.0
+"""One count of a velocity [rad/s]."""
+POSITION_UNIT = 2.0 * math.pi / 4096
+"""One count of a position [rad]."""
+WATCHDOG_UNIT = 0.020
+"""One count of the bus watchdog [s]."""
+RETURN_DELAY_UNIT = 2e-6
+"""One count of the return delay time [s]."""
+
+BAUD_RATES = (9_600, 57_600, 115_200, 1_000_000, 2_000_000, 3_000_000, 4_000_000, 4_500_000)
+"""Bits per second by the value of `baud_rate`."""
+
+GOALS = frozenset({"goal_pwm", "goal_current", "goal_velocity", "goal_position"})
+"""Registers that a tripped bus watchdog locks."""
+
+_SIGNED = frozenset(
+    {
+        "homing_offset",
+        "bus_watchdog",
+        "present_pwm",
+        "present_load",
+        "present_current",
+        "present_velocity",
+        "present_position",
+        "velocity_trajectory",
+        "position_trajectory",
+    }
+    | GOALS
+)
+
+_RPM, _PULSE, _VOLT, _DUTY = "0.229 rev/min", "1 pulse", "0.1 V", "0.113 %"
+_GAIN = (0, 16_383)
+
+_Row = tuple[str, int, int, str, str, int | None, int | None, int | None]
+
+_COMMON: list[_Row] = [
+    ("model_number", 0, 2, "R", "", None, None, None),
+    ("model_information", 2, 4, "R", "", None, None, None),
+    ("firmware_version", 6, 1, "R", "", None, None, None),
+    ("id", 7, 1, "RW", "", 1, 0, 252),
+    ("baud_rate", 8, 1, "RW", "", 1, 0, 7),
+    ("return_delay_time", 9, 1, "RW", "2 us", 250, 0, 254),
+    ("drive_mode", 10, 1, "RW", "", 0, 0, 13),
+    ("operating_mode", 11, 1, "RW", "", 3, 0, 16),
+    ("secondary_id", 12, 1, "RW", "", 255, 0, 252),
+    ("protocol_type", 13, 1, "RW", "", 2, 1, 2),
+    ("homing_offset", 20, 4, "RW", _PULSE, 0, -1_044_479, 1_044_479),
+    ("moving_threshold", 24, 4, "RW", _RPM, 10, 0, 1_023),
+    ("temperature_limit", 31, 1, "RW", "1 degC", 80, 0, 100),
+    ("max_voltage_limit", 32, 2, "RW", _VOLT, 160, 60, 160),
+    ("min_voltage_limit", 34, 2, "RW", _VOLT, 60, 60, 160),
+    ("pwm_limit", 36, 2, "RW", _DUTY, 885, 0, 885),
+    ("velocity_limit", 44, 4, "RW", _RPM, 306, 0, 1_023),
+    ("max_position_limit", 48, 4, "RW", _PULSE, 4_095, 0, 4_095),
+    ("min_position_limit", 52, 4, "RW", _PULSE, 0, 0, 4_095),
+    ("startup_configuration", 60, 1, "RW", "", 0, 0, 3),
+    ("shutdown", 63, 1, "RW", "", 52, None, None),
+    ("torque_enable", 64, 1, "RW", "", 0, 0, 1),
+    ("led", 65, 1, "RW", "", 0, 0, 1),
+    ("status_return_level", 68, 1, "RW", "", 2, 0, 2),
+    ("registered_instruction", 69, 1, "R", "", 0, 0, 1),
+    ("hardware_error_status", 70, 1, "R", "", 0, None, None),
+    ("velocity_i_gain", 76, 2, "RW", "", 1_920, *_GAIN),
+    ("velocity_p_gain", 78, 2, "RW", "", 100, *_GAIN),
+    ("position_d_gain", 80, 2, "RW", "", 0, *_GAIN),
+    ("position_i_gain", 82, 2, "RW", "", 0, *_GAIN),
+    ("position_p_gain", 84, 2, "RW", "", 700, *_GAIN),
+    ("feedforward_2nd_gain", 88, 2, "RW", "", 0, *_GAIN),
+    ("feedforward_1st_gain", 90, 2, "RW", "", 0, *_GAIN),
+    ("bus_watchdog", 98, 1, "RW", "20 ms", 0, 0, 127),
+    ("goal_pwm", 100, 2, "RW", _DUTY, None, -885, 885),
+    ("goal_velocity", 104, 4, "RW", _RPM, None, -1_023, 1_023),
+    ("profile_acceleration", 108, 4, "RW", "214.577 rev/min2", 0, 0, 32_767),
+    ("profile_velocity", 112, 4, "RW", _RPM, 0, 0, 32_767),
+    ("goal_position", 116, 4, "RW", _PULSE, None, -1_048_575, 1_048_575),
+    ("realtime_tick", 120, 2, "R", "1 ms", None, 0, 32_767),
+    ("moving", 122, 1, "R", "", 0, 0, 1),
+    ("moving_status", 123, 1, "R", "", 0, None, None),
+    ("present_pwm", 124, 2, "R", _DUTY, None, None, None),
+    ("present_load", 126, 2, "R", "0.1 %", None, -1_000, 1_000),
+    ("present_velocity", 128, 4, "R", _RPM, None, None, None),
+    ("present_position", 132, 4, "R", _PULSE, None, None, None),
+    ("velocity_trajectory", 136, 4, "R", _RPM, None, None, None),
+    ("position_trajectory", 140, 4, "R", _PULSE, None, None, None),
+    ("present_input_voltage", 144, 2, "R", _VOLT, None, None, None),
+    ("present_temperature", 146, 1, "R", "1 degC", None, None, None),
+    ("backup_ready", 147, 1, "R", "", None, 0, 1),
+]
+
+
+def _registers(changes: dict[str, dict[str, object]], more: list[_Row]) -> dict[str, Register]:
+    rows = [Register(*row, signed=row[0] in _SIGNED) for row in _COMMON + more]
+    rows = [replace(row, **changes.get(row.name, {})) for row in rows]
+    return {row.name: row for row in sorted(rows, key=lambda row: row.address)}
+
+
+XC430_W240 = Table(
+    model=1080,
+    name="XC430-W240-T",
+    source="https://emanual.robotis.com/docs/en/dxl/x/xc430-w240/",
+    fast_read_firmware=45,
+    registers=_registers({"model_number": {"default": 1080}}, []),
+)
+
+XL330_M288 = Table(
+    model=1200,
+    name="XL330-M288-T",
+    source="https://emanual.robotis.com/docs/en/dxl/x/xl330-m288/",
+    fast_read_firmware=46,
+    registers=_registers(
+        {
+            "model_number": {"default": 1200},
+            "baud_rate": {"high": 6},
+            "drive_mode": {"high": 5},
+            "protocol_type": {"low": 2, "high": 22},
+            "temperature_limit": {"default": 70},
+            "max_voltage_limit": {"default": 70, "low": 31, "high": 70},
+            "min_voltage_limit": {"default": 35, "low": 31, "high": 70},
+            "velocity_limit": {"default": 445, "high": 2_047},
+            "shutdown": {"default": 53},
+            "velocity_i_gain": {"default": 1_600},
+            "velocity_p_gain": {"default": 180},
+            "position_p_gain": {"default": 400},
+            "goal_velocity": {"low": -2_047, "high": 2_047},
+            "present_load": {
+                "name": "present_current",
+                "unit": "1 mA",
+                "low": None,
+                "high": None,
+            },
+        },
+        [
+            ("current_limit", 38, 2, "RW", "1 mA", 1_750, 0, 1_750),
+            ("pwm_slope", 62, 1, "RW", "1.977 mV/ms", 140, 1, 255),
+            ("goal_current", 102, 2, "RW", "1 mA", None, -1_750, 1_750),
+        ],
+    ),
+)
+
+TABLES = {table.model: table for table in (XC430_W240, XL330_M288)}
+"""By model number."""
+
+HARDWARE_ERRORS = {
+    0: "input voltage",
+    2: "overheating",
+    3: "encoder",
+    4: "electrical shock",
+    5: "overload",
+}
+"""What the bits of `hardware_error_status` mean."""
+
+
+def hardware_errors(bits: int) -> list[str]:
+    """Names of the errors in a hardware error status."""
+    return [name for bit, name in HARDWARE_ERRORS.items() if bits >> bit & 1]

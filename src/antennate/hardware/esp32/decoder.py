@@ -1,0 +1,188 @@
+"""Bytes to frames, without any input or output of its own.
+
+However a stream is cut into pieces, the frames, the text and the counters are the same.
+"""
+
+from __future__ import annotations
+
+import re
+from binascii import crc32
+from dataclasses import dataclass
+
+from antennate.hardware.esp32 import frame
+from antennate.hardware.esp32.wire import Frame, Refused, parse
+
+LONGEST = 128
+"""Bytes between delimiters that are held; from here on they cannot be a frame."""
+SHORTEST = 2 + frame.CRC_SIZE + 1
+"""Version, kind, CRC and one byte of COBS."""
+TEXT_KEPT = 512
+"""Bytes of text held until they are taken."""
+
+_TEXT = re.compile(rb"[\t\n\r\x20-\x7e]{8,}")
+
+
+@dataclass(slots=True)
+class Counters:
+    """What became of every byte received; `accounted` and the bytes held add up to `received`.
+
+    The bytes between two delimiters are one piece.
+
+    Attributes:
+        received: Bytes fed.
+        delimiters: Zero bytes.
+        good: Frames delivered.
+        good_bytes: Bytes of them.
+        refused: Intact frames of an unknown version, kind, length or range.
+        refused_bytes: Bytes of them.
+        crc_errors: Pieces of COBS with a wrong CRC.
+        crc_bytes: Bytes of them.
+        cobs_errors: Pieces that are not COBS.
+        cobs_bytes: Bytes of them.
+        oversize: Pieces longer than any frame.
+        oversize_bytes: Bytes of them.
+        noise: Pieces shorter than any frame.
+        noise_bytes: Bytes of them.
+        text: Pieces that are printable text only.
+        text_bytes: Bytes of them.
+        text_lost: Printable bytes that found no room; not part of the sum.
+    """
+
+    received: int = 0
+    delimiters: int = 0
+    good: int = 0
+    good_bytes: int = 0
+    refused: int = 0
+    refused_bytes: int = 0
+    crc_errors: int = 0
+    crc_bytes: int = 0
+    cobs_errors: int = 0
+    cobs_bytes: int = 0
+    oversize: int = 0
+    oversize_bytes: int = 0
+    noise: int = 0
+    noise_bytes: int = 0
+    text: int = 0
+    text_bytes: int = 0
+    text_lost: int = 0
+
+    @property
+    def accounted(self) -> int:
+        """Bytes whose fate is known."""
+        return (
+            self.delimiters
+            + self.good_bytes
+            + self.refused_bytes
+            + self.crc_bytes
+            + self.cobs_bytes
+            + self.oversize_bytes
+            + self.noise_bytes
+            + self.text_bytes
+        )
+
+
+class FrameDecoder:
+    """Finds frames in a stream; keeps less than 1 KiB whatever comes."""
+
+    def __init__(self) -> None:
+        self.counters = Counters()
+        self._held = bytearray()
+        self._spilled = False
+        self._text = bytearray()
+
+    @property
+    def held(self) -> int:
+        """Bytes waiting for their delimiter."""
+        return len(self._held)
+
+    def feed(self, data: bytes) -> list[Frame]:
+        """Frames completed by these bytes, in order of arrival; Refused ones say why."""
+        frames: list[Frame] = []
+        self.counters.received += len(data)
+        at = 0
+        while at < len(data):
+            limit = at + LONGEST - len(self._held)
+            end = data.find(0, at, limit)
+            if end < 0:
+                self._held += data[at:limit]
+                at = limit
+                if len(self._held) == LONGEST:
+                    self._spill()
+                continue
+            self._held += data[at:end]
+            at = end + 1
+            self.counters.delimiters += 1
+            found = self._close()
+            if found is not None:
+                frames.append(found)
+        return frames
+
+    def take_text(self) -> str:
+        """Printable text found between frames since the last call, at most TEXT_KEPT bytes.
+
+        Asking at most 8 times a second keeps a log below 4 KiB/s.
+        """
+        text = self._text.replace(b"\r", b"").decode("ascii")
+        self._text = bytearray()
+        return text
+
+    def _spill(self) -> None:
+        """Give up bytes that cannot be a frame any more, except text."""
+        self._keep_text(self._held)
+        self.counters.oversize_bytes += len(self._held)
+        self._held = bytearray()
+        self._spilled = True
+
+    def _close(self) -> Frame | None:
+        """Judge what lies between two delimiters."""
+        chunk = bytes(self._held)
+        self._held = bytearray()
+        if self._spilled:
+            self._spilled = False
+            self.counters.oversize += 1
+            self.counters.oversize_bytes += len(chunk)
+            self._keep_text(chunk)
+            return None
+        if not chunk:
+            return None
+        content = frame.unstuff(chunk) if len(chunk) >= SHORTEST else None
+        if content is not None and _intact(content):
+            return self._deliver(parse(content[: -frame.CRC_SIZE]), len(chunk))
+        self._reject(chunk, cobs=content is not None)
+        return None
+
+    def _deliver(self, found: Frame, size: int) -> Frame:
+        if isinstance(found, Refused):
+            self.counters.refused += 1
+            self.counters.refused_bytes += size
+        else:
+            self.counters.good += 1
+            self.counters.good_bytes += size
+        return found
+
+    def _reject(self, chunk: bytes, cobs: bool) -> None:
+        counters, size = self.counters, len(chunk)
+        self._keep_text(chunk)
+        if _TEXT.fullmatch(chunk):
+            counters.text += 1
+            counters.text_bytes += size
+        elif size < SHORTEST:
+            counters.noise += 1
+            counters.noise_bytes += size
+        elif cobs:
+            counters.crc_errors += 1
+            counters.crc_bytes += size
+        else:
+            counters.cobs_errors += 1
+            counters.cobs_bytes += size
+
+    def _keep_text(self, chunk: bytes | bytearray) -> None:
+        for run in _TEXT.findall(chunk):
+            room = TEXT_KEPT - len(self._text)
+            self._text += run[:room]
+            self.counters.text_lost += max(0, len(run) - room)
+
+
+def _intact(content: bytes | bytearray) -> bool:
+    end = len(content) - frame.CRC_SIZE
+    return crc32(content[:end]) == int.from_bytes(content[end:], "little")

@@ -1,0 +1,138 @@
+"""What the bodies of frames say, as records for the host."""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass
+from enum import IntEnum
+
+from antennate.hardware.esp32 import frame
+
+
+class Reset(IntEnum):
+    """Why a board started. MicroPython cannot tell a brown-out from the other two it may report."""
+
+    UNKNOWN = frame.RESET_UNKNOWN
+    POWER_ON = frame.RESET_POWER_ON
+    HARD = frame.RESET_HARD
+    WATCHDOG = frame.RESET_WATCHDOG
+    DEEP_SLEEP = frame.RESET_DEEP_SLEEP
+    SOFT = frame.RESET_SOFT
+
+
+@dataclass(frozen=True, slots=True)
+class Hello:
+    """A board's greeting.
+
+    Attributes:
+        boot_id: Random number of this boot.
+        firmware: Version: major, minor, patch.
+        reset: Why the board started.
+        config_hash: `frame.config_hash` of its settings.
+        device_id: The chip's serial number in hexadecimal.
+        tick_bits: Ticks count modulo 2**tick_bits.
+        rate: Samples per second [Hz].
+    """
+
+    boot_id: int
+    firmware: tuple[int, int, int]
+    reset: Reset
+    config_hash: int
+    device_id: str
+    tick_bits: int
+    rate: int
+
+
+@dataclass(frozen=True, slots=True)
+class Sample:
+    """One reading of both antennae.
+
+    Attributes:
+        boot_id: Boot it belongs to.
+        seq: Number since boot, modulo 2**32.
+        ticks: The board's time [us], modulo what HELLO declared.
+        left: Left reading [counts].
+        right: Right reading [counts].
+        flags: Sum of `frame.FLAG_` values.
+        drops: Samples the board could not send since boot, modulo 2**16.
+    """
+
+    boot_id: int
+    seq: int
+    ticks: int
+    left: int
+    right: int
+    flags: int
+    drops: int
+
+
+@dataclass(frozen=True, slots=True)
+class Refused:
+    """A frame that arrived intact and cannot be used."""
+
+    reason: str
+
+
+Frame = Hello | Sample | Refused
+
+
+def parse(body: bytes | bytearray) -> Frame:
+    """Record of an intact body of at least two bytes, without its CRC; Refused says why not."""
+    version, kind = body[0], body[1]
+    if version != frame.PROTOCOL:
+        return Refused(
+            f"the board speaks protocol version {version}, this host version {frame.PROTOCOL}: "
+            "deploy the firmware of this release"
+        )
+    sizes = {frame.HELLO: frame.HELLO_SIZE, frame.SAMPLE: frame.SAMPLE_SIZE}
+    if kind not in sizes:
+        return Refused(f"frame kind {kind} is unknown, valid are {frame.HELLO} and {frame.SAMPLE}")
+    if len(body) != sizes[kind]:
+        return Refused(f"frame kind {kind} has {sizes[kind]} bytes, found {len(body)}")
+    return _hello(body) if kind == frame.HELLO else _sample(body)
+
+
+def _hello(body: bytes | bytearray) -> Hello | Refused:
+    _, _, boot_id, major, minor, patch, reset, config, device_id, bits, rate = struct.unpack(
+        frame.HELLO_LAYOUT, body
+    )
+    if not 16 <= bits <= 32:
+        return Refused(f"ticks have 16 to 32 bits, found {bits}")
+    if rate == 0:
+        return Refused("the rate is at least 1 Hz, found 0")
+    known = reset in set(Reset)
+    return Hello(
+        boot_id=boot_id,
+        firmware=(major, minor, patch),
+        reset=Reset(reset) if known else Reset.UNKNOWN,
+        config_hash=config,
+        device_id=device_id.hex(),
+        tick_bits=bits,
+        rate=rate,
+    )
+
+
+def _sample(body: bytes | bytearray) -> Sample | Refused:
+    _, _, boot_id, seq, ticks, left, right, flags, drops = struct.unpack(frame.SAMPLE_LAYOUT, body)
+    if max(left, right) > frame.FULL_SCALE:
+        return Refused(f"counts are at most {frame.FULL_SCALE}, found {left} and {right}")
+    return Sample(boot_id, seq, ticks, left, right, flags, drops)
+
+
+def objections(hello: Hello, config_hash: int | None = None) -> tuple[str, ...]:
+    """Reasons not to arm with this board, each with what was expected and found; none is good.
+
+    Args:
+        hello: The board's greeting.
+        config_hash: The settings wanted, or None to take any.
+    """
+    found = []
+    if hello.firmware < frame.FIRMWARE:
+        has, needs = (".".join(map(str, v)) for v in (hello.firmware, frame.FIRMWARE))
+        found.append(f"the board runs firmware {has}, this host needs {needs} or newer")
+    if config_hash is not None and hello.config_hash != config_hash:
+        found.append(
+            f"the board's settings have hash {hello.config_hash:08x}, expected {config_hash:08x}: "
+            "deploy firmware/config.py again"
+        )
+    return tuple(found)

@@ -1,0 +1,73 @@
+"""Angles of joints to positions of servos and back."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from antennate.anatomy import LINK_COUNT, YAW_COUNT
+from antennate.errors import AntennateError
+from antennate.params.layout import TICKS_A_TURN, LayoutParams
+from antennate.records import Floats, Ints, Pose
+
+_STEP = 2.0 * math.pi / TICKS_A_TURN
+_MOST = 1_048_575
+"""Farthest position in extended mode, 256 turns either way [ticks]."""
+
+
+class PoseError(AntennateError):
+    """A pose that no servo must be sent."""
+
+
+class Joints:
+    """The 19 joints of one robot in the order yaws, legs, antennae.
+
+    Attributes:
+        ids: Ids of their servos.
+    """
+
+    def __init__(self, layout: LayoutParams) -> None:
+        self.ids = layout.ids
+        self._sign: Floats = np.array(layout.directions, float)
+        self._zero: Floats = np.array(layout.zeros, float)
+
+    def ticks(self, pose: Pose) -> Ints:
+        """Goal positions [ticks] of a pose of one robot, shape (19,).
+
+        Raises:
+            PoseError: It is not one robot's, not finite, or beyond what servos count. It is refused
+                as a whole.
+        """
+        angles = np.concatenate([pose.yaw.ravel(), pose.leg.ravel(), pose.antenna.ravel()])
+        if angles.shape != self._sign.shape:
+            raise PoseError(f"expected {len(self.ids)} joint angles, found {len(angles)}")
+        exact = self.positions(angles)
+        bad = ~(abs(exact) <= _MOST)
+        if bad.any():
+            first = int(np.argmax(bad))
+            raise PoseError(
+                f"expected a finite angle within 256 turns for servo {self.ids[first]}, found "
+                f"{angles[first]}"
+            )
+        return np.rint(exact).astype(np.int64)
+
+    @staticmethod
+    def reach(angle: float) -> float:
+        """Ticks of an angle [rad]."""
+        return angle / _STEP
+
+    def align(self, ticks: Ints | Floats, pose: Pose) -> None:
+        """Count whole turns of legs so that a pose is nearest to where they stand [ticks]."""
+        away = (ticks - self.ticks(pose))[YAW_COUNT:-2]
+        self._zero[YAW_COUNT:-2] += TICKS_A_TURN * np.rint(away / TICKS_A_TURN)
+
+    def positions(self, angles: Floats) -> Floats:
+        """Positions, not rounded [ticks], of joint angles [rad], both of shape (19,)."""
+        return np.asarray(self._zero + self._sign * angles / _STEP)
+
+    def pose(self, ticks: Ints | Floats) -> Pose:
+        """The pose of one robot at these positions [ticks], shape (19,)."""
+        angles: Floats = (ticks - self._zero) * self._sign * _STEP
+        legs = angles[YAW_COUNT:-2].reshape(1, LINK_COUNT, 2)
+        return Pose(yaw=angles[None, :YAW_COUNT], leg=legs, antenna=angles[None, -2:])

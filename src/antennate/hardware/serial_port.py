@@ -1,0 +1,65 @@
+"""A serial line as a Port, through pyserial; nobody else may open it meanwhile."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from contextlib import contextmanager
+
+import serial
+
+from antennate.hardware.port import PortError
+
+
+class SerialPort:
+    """A serial line.
+
+    Args:
+        path: Its device file.
+        baud: Bits per second.
+
+    Raises:
+        PortError: If it cannot be opened, or another program holds it.
+    """
+
+    def __init__(self, path: str, baud: int) -> None:
+        self._path = path
+        with self._mapped("open"):
+            self._line = serial.Serial(path, baud, timeout=0, write_timeout=0.1, exclusive=True)
+
+    def write(self, data: bytes) -> None:
+        """Send all of it."""
+        with self._mapped("write to"):
+            sent = self._line.write(data)
+        if sent != len(data):
+            raise PortError(f"{self._path}: expected to send {len(data)} bytes, sent {sent}")
+
+    def read(self, most: int, timeout: float) -> bytes:
+        """What has come, empty if nothing comes within `timeout` [s]."""
+        with self._mapped("read from"):
+            self._line.timeout = max(timeout, 0.0)
+            first = self._line.read(1)
+            if not first or most == 1:
+                return first
+            self._line.timeout = 0
+            return first + self._line.read(most - 1)
+
+    def drain(self) -> int:
+        """Throw away what has come; how many bytes that was."""
+        with self._mapped("read from"):
+            self._line.timeout = 0
+            count = 0
+            while part := self._line.read(4096):
+                count += len(part)
+            return count
+
+    def close(self) -> None:
+        """Let it go."""
+        with self._mapped("close"):
+            self._line.close()
+
+    @contextmanager
+    def _mapped(self, what: str) -> Generator[None]:
+        try:
+            yield
+        except (OSError, TypeError, ValueError) as error:
+            raise PortError(f"could not {what} {self._path}: {error}") from error

@@ -1,0 +1,255 @@
+"""One robot driven from its bytes: what stands on both sides of the one loop.
+
+It is the body, which reads the board and writes goals, and the mind, a controller behind a
+supervisor. Nothing reaches the servos but what the supervisor lets through. Their watchdogs are fed
+by goals alone, and goals are sent only upon a decision of this very tick. Goals move at a limited
+speed, so that neither the first pose nor a broken controller makes a joint jump.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from antennate.body import Clock
+from antennate.hardware.board import Board
+from antennate.hardware.body import HardwareBody
+from antennate.hardware.causes import Inputs, Outputs
+from antennate.hardware.diagnosis import Band, ChannelDiagnosis
+from antennate.hardware.dynamixel import bringup
+from antennate.hardware.dynamixel.bringup import BringUpError
+from antennate.hardware.dynamixel.bus import Bus
+from antennate.hardware.joints import Joints, PoseError
+from antennate.hardware.port import PortError
+from antennate.hardware.supervisor import Supervisor
+from antennate.hardware.timing import LoopTiming
+from antennate.hardware.watch import ServoWatch
+from antennate.params import ConditioningParams, DiagnosisParams, SupervisorParams
+from antennate.records import AntennaFrame, Floats, Ints, Pose
+
+FASTEST = 4.5
+"""Fastest that goals move [rad/s]; two thirds of an unloaded XC430-W240 at 11.1 V."""
+
+
+class Decider(Protocol):
+    """A controller of one robot."""
+
+    maneuver: Ints
+    contact: Ints
+
+    def step(self, frame: AntennaFrame) -> Pose:
+        """The pose of this tick."""
+        ...
+
+
+@dataclass(slots=True)
+class Orders:
+    """What the operator wants.
+
+    Attributes:
+        arm: Torque on; only the change to True counts.
+        stop: Torque off.
+    """
+
+    arm: bool = False
+    stop: bool = False
+
+
+@dataclass(slots=True)
+class _Thought:
+    """What the mind did in this tick."""
+
+    decided_at: float = -math.inf
+    finite: bool = True
+    failure: str = ""
+
+
+@dataclass(slots=True)
+class Tally:
+    """What a session has done.
+
+    Attributes:
+        ticks: Ticks run.
+        sent: Poses sent to the servos.
+        limited: Goals that moved slower than asked.
+    """
+
+    ticks: int = 0
+    sent: int = 0
+    limited: int = 0
+
+
+class Session:
+    """A robot, its controller and its supervisor; for one thread.
+
+    Args:
+        board: The antennae.
+        bus: The servos.
+        joints: Which servo moves what.
+        clock: The host's time.
+        decider: The controller.
+        period: Control period [s].
+        conditioning: The calibrated range of both antennae.
+        diagnosis: Windows and limits of the diagnosis.
+        limits: Limits of the supervisor.
+
+    Attributes:
+        orders: The operator's, read in every tick.
+        outputs: The supervisor's of the last tick, None before the first.
+        channels: Diagnosis of the left and the right antenna.
+        watch: What the servos say.
+        tally: What was done.
+        timing: Whether the loop keeps its pace, None before the first tick.
+    """
+
+    def __init__(
+        self,
+        board: Board,
+        bus: Bus,
+        joints: Joints,
+        clock: Clock,
+        decider: Decider,
+        period: float,
+        conditioning: ConditioningParams,
+        diagnosis: DiagnosisParams | None = None,
+        limits: SupervisorParams | None = None,
+    ) -> None:
+        self.board, self.bus, self.joints, self.clock = board, bus, joints, clock
+        self.decider, self.period = decider, period
+        band = Band(conditioning.counts_low, conditioning.counts_high, conditioning.polarity)
+        windows = diagnosis or DiagnosisParams()
+        self.channels = [ChannelDiagnosis(windows, band) for _ in range(2)]
+        self.supervisor = Supervisor(limits or SupervisorParams())
+        self.watch = ServoWatch(bus, joints.ids)
+        self.orders = Orders()
+        self.tally = Tally()
+        self.timing: LoopTiming | None = None
+        self.outputs: Outputs | None = None
+        self._body = HardwareBody(board, bus, joints, clock)
+        self._thought = _Thought()
+        self._goals: Floats | None = None
+        self._used = self._refused = 0
+
+    # the body
+
+    def read(self) -> AntennaFrame:
+        """The newest reading, diagnosed; NaN while the supervisor wants the gait to stand still."""
+        now = self.clock.now()
+        if self.timing is None:
+            self.timing = LoopTiming(now, self.period)
+        self.timing.begin(now)
+        before = sum(self.board.clock.verdicts.values())
+        frame = self._body.read()
+        self._used = self._body.used
+        self._refused = sum(self.board.clock.verdicts.values()) - before - self._used
+        t = float(frame.t[0])
+        raw = frame.counts[0].tolist()
+        said = [channel.step(t, c).counts for channel, c in zip(self.channels, raw, strict=True)]
+        if self.outputs is None or not self.outputs.clear:
+            said = [math.nan, math.nan]
+        self._mark("read")
+        return AntennaFrame(t=frame.t, counts=np.array([said]))
+
+    def write(self, pose: Pose) -> None:
+        """Let the supervisor judge this tick, and do what it says; then look at the servos."""
+        self._mark("decide")
+        self._act(pose)
+        self._mark("bus")
+        if self.timing is not None:
+            self.timing.finish(self.clock.now())
+
+    def _mark(self, stage: str) -> None:
+        if self.timing is not None:
+            self.timing.mark(stage, self.clock.now())
+
+    def _act(self, pose: Pose) -> None:
+        now = self.clock.now()
+        self.outputs = out = self.supervisor.step(now, self._inputs(now))
+        self.tally.ticks += 1
+        try:
+            if out.arming:
+                self._arm(pose)
+            elif out.feed_watchdog and self._goals is not None:
+                self._send(pose if out.move else None)
+        except (PortError, PoseError, BringUpError) as error:
+            self.watch.bus_error = str(error)
+            return
+        if not out.torque and self._goals is not None:
+            self.release()
+        if out.feed_watchdog or not out.torque:  # any packet would feed the watchdogs
+            self.watch.step()
+
+    # the mind
+
+    def step(self, frame: AntennaFrame) -> Pose:
+        """The controller's pose; an exception of it is a cause, not the end."""
+        thought = self._thought = _Thought()
+        try:
+            pose = self.decider.step(frame)
+        except Exception as error:  # noqa: BLE001 a plugged-in controller may raise anything
+            thought.failure = f"{type(error).__name__}: {error}"
+            return _nowhere()
+        angles = (pose.yaw, pose.leg, pose.antenna)
+        thought.finite = all(bool(np.isfinite(a).all()) for a in angles)
+        thought.decided_at = self.clock.now()
+        return pose
+
+    def release(self) -> list[int]:
+        """Torque off, verified: ids that did not confirm it."""
+        self._goals = None
+        return bringup.disable(self.bus, self.joints.ids)
+
+    def _inputs(self, now: float) -> Inputs:
+        clock, watch, thought = self.board.clock, self.watch, self._thought
+        left, right = self.channels
+        contact = self.decider.contact[0].tolist()
+        return Inputs(
+            age=clock.age(now),
+            valid=self._used,
+            refused=self._refused,
+            findings=(left.reading.finding, right.reading.finding),
+            decided_at=thought.decided_at,
+            maneuver=int(self.decider.maneuver[0]),
+            contact=(int(contact[0]), int(contact[1])),
+            finite=thought.finite,
+            failure=thought.failure,
+            resets=clock.resets,
+            reset_reason="" if clock.last_reset is None else clock.last_reset.name,
+            missed=watch.missed,
+            servo_errors=watch.errors,
+            bus_error=watch.bus_error,
+            watchdogs=watch.watchdogs,
+            supply=watch.supply,
+            arm=self.orders.arm,
+            stop=self.orders.stop,
+        )
+
+    def _arm(self, pose: Pose) -> None:
+        """Torque on where everything stands; legs count their turns from there."""
+        bringup.arm_watchdogs(self.bus, self.joints.ids)
+        bringup.enable(self.bus, self.joints.ids)
+        present = bringup.hold_here(self.bus, self.joints.ids)
+        here = np.array([present[servo] for servo in self.joints.ids], float)
+        self.joints.align(here, pose)
+        self._goals = here
+
+    def _send(self, pose: Pose | None) -> None:
+        """Goals one tick nearer to a pose; where they are without one."""
+        goals = self._goals
+        if goals is None:
+            return
+        if pose is not None:
+            reach = self.joints.reach(FASTEST * self.period)
+            wanted = self.joints.ticks(pose) - goals
+            self.tally.limited += int((abs(wanted) > reach).sum())
+            goals = goals + np.clip(wanted, -reach, reach)
+            self.tally.sent += 1
+        self._body.send(goals)
+        self._goals = goals
+
+
+def _nowhere() -> Pose:
+    return Pose(*(np.full(shape, math.nan) for shape in ((1, 5), (1, 6, 2), (1, 2))))

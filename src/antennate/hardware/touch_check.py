@@ -1,0 +1,101 @@
+"""A check by hand before arming: bend the left antenna, let go, bend the right one, let go.
+
+It finds channels that are swapped and films whose reading runs the wrong way.
+"""
+
+from __future__ import annotations
+
+import math
+from enum import Enum
+
+from antennate.hardware.diagnosis import Band
+from antennate.params import TouchCheckParams
+
+_NAMES = ("left", "right")
+
+
+class Ask(Enum):
+    """What the person is asked to do next."""
+
+    REST = "let go of both antennae"
+    LEFT = "bend the left antenna towards the tail"
+    RIGHT = "bend the right antenna towards the tail"
+    NOTHING = "the check is over"
+
+
+class TouchCheck:
+    """Follows the check, one pair of readings after the other.
+
+    Args:
+        params: What counts as a touch and as rest.
+        bands: Calibrated ranges of the left and the right channel.
+
+    Attributes:
+        ask: What to do next.
+        objection: Why not to arm, empty once the check has passed.
+    """
+
+    def __init__(self, params: TouchCheckParams, bands: tuple[Band, Band]) -> None:
+        self._params = params
+        self._bands = bands
+        self.reset()
+
+    def reset(self) -> None:
+        """Begin anew."""
+        self.ask = Ask.REST
+        self.objection = "the antennae were not yet checked by touch"
+        self._side = 0
+        self._run: tuple[str, int] = ("", 0)
+
+    def step(self, left: float, right: float) -> Ask:
+        """Take the newest readings as they came [counts]; NaN if unknown. What to do next."""
+        if self.ask is Ask.NOTHING:
+            return self.ask
+        bends = [self._bend(*pair) for pair in zip(self._bands, (left, right), strict=True)]
+        seen = self._see(bends)
+        count = self._run[1] + 1 if seen == self._run[0] else 1
+        self._run = (seen, count)
+        if seen and count >= self._params.readings:
+            self._follow(seen)
+        return self.ask
+
+    @staticmethod
+    def _bend(band: Band, counts: float) -> float:
+        """Bend from the straight end of the band on, in spans; negative is the wrong way."""
+        straight = band.low if band.polarity > 0 else band.high
+        return band.polarity * (counts - straight) / (band.high - band.low)
+
+    def _see(self, bends: list[float]) -> str:
+        """What the readings say: rest, right, swapped or reversed; empty if nothing clear."""
+        if not all(map(math.isfinite, bends)):
+            return ""
+        still = [abs(bend) < self._params.still for bend in bends]
+        if all(still):
+            return "rest"
+        bent = [abs(bend) >= self._params.bend for bend in bends]
+        if sum(bent) != 1 or sum(still) != 1:
+            return ""
+        if not bent[self._side]:
+            return "swapped"
+        return "right" if bends[self._side] > 0 else "reversed"
+
+    def _follow(self, seen: str) -> None:
+        if self.ask is Ask.REST:
+            if seen == "rest":
+                self.ask = (Ask.LEFT, Ask.RIGHT)[self._side]
+        elif seen == "right" and self._side == 0:
+            self.ask, self._side = Ask.REST, 1
+        elif seen == "right":
+            self.ask, self.objection = Ask.NOTHING, ""
+        elif seen in ("swapped", "reversed"):
+            self.objection = self._why(seen)
+            self.ask = Ask.NOTHING
+
+    def _why(self, seen: str) -> str:
+        name, other = _NAMES[self._side], _NAMES[1 - self._side]
+        if seen == "swapped":
+            return f"the {name} antenna was asked for and the {other} channel answered: swap them"
+        return (
+            f"the reading of the {name} antenna runs against its calibration: check the divider "
+            "or calibrate this film"
+        )

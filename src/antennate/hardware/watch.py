@@ -1,0 +1,89 @@
+"""What the servos say of themselves, a little in every tick."""
+
+from __future__ import annotations
+
+import math
+from itertools import cycle
+
+from antennate.hardware.dynamixel.answers import POSITION, Answer, Span, Value
+from antennate.hardware.dynamixel.bus import Bus
+from antennate.hardware.dynamixel.tables import XC430_W240, hardware_errors
+from antennate.hardware.port import PortError
+
+_ERRORS = Span(XC430_W240["hardware_error_status"].address, 1)
+_WATCHDOG = XC430_W240["bus_watchdog"]
+_VOLTAGE = XC430_W240["present_input_voltage"]
+_POSITION = XC430_W240["present_position"]
+_VOLT = 0.1
+
+
+class ServoWatch:
+    """Reads all positions every tick, and one servo's watchdog and the supply in turn.
+
+    Args:
+        bus: The bus.
+        ids: All servos; the first one tells the voltage of the supply.
+        budget: Time for the positions [s].
+
+    Attributes:
+        positions: Newest position by id [ticks].
+        missed: Answers missed in a row, by id.
+        errors: Hardware errors in words, by id.
+        watchdogs: Ids stopped by their watchdog.
+        supply: Voltage [V], NaN before it was read.
+        bus_error: What is wrong with the bus as a whole, empty if nothing is.
+    """
+
+    def __init__(self, bus: Bus, ids: tuple[int, ...], budget: float = 0.006) -> None:
+        self._bus = bus
+        self._ids = ids
+        self._budget = budget
+        self._turn = cycle(range(len(ids)))
+        self.positions: dict[int, int] = {}
+        self.missed: dict[int, int] = dict.fromkeys(ids, 0)
+        self.errors: dict[int, str] = {}
+        self.watchdogs: tuple[int, ...] = ()
+        self.supply = math.nan
+        self.bus_error = ""
+
+    def step(self) -> None:
+        """One tick's share. A dead wire is noted, not raised."""
+        try:
+            self._look()
+            self.bus_error = ""
+        except PortError as error:
+            self.bus_error = str(error)
+            self.missed = {servo: count + 1 for servo, count in self.missed.items()}
+
+    def _look(self) -> None:
+        answers = self._bus.read_all(self._ids, POSITION, self._budget)
+        for servo, said in answers.items():
+            self._note(servo, said)
+        at = next(self._turn)
+        servo = self._ids[at]
+        if self.missed[servo]:
+            return
+        watchdog = self._one(servo, Span(_WATCHDOG.address, _WATCHDOG.size))
+        if watchdog is not None:
+            tripped = _WATCHDOG.decode(watchdog) < 0
+            others = tuple(i for i in self.watchdogs if i != servo)
+            self.watchdogs = (*others, servo) if tripped else others
+        if at == 0 and (volts := self._one(servo, Span(_VOLTAGE.address, 2))) is not None:
+            self.supply = _VOLT * _VOLTAGE.decode(volts)
+
+    def _note(self, servo: int, said: Answer) -> None:
+        if not isinstance(said, Value):
+            self.missed[servo] += 1
+            return
+        self.missed[servo] = 0
+        self.positions[servo] = _POSITION.decode(said.data)
+        if said.alert:
+            bits = self._one(servo, _ERRORS)
+            words = hardware_errors(bits[0]) if bits else []
+            self.errors[servo] = ", ".join(words) or "alert"
+        else:
+            self.errors.pop(servo, None)
+
+    def _one(self, servo: int, span: Span) -> bytes | None:
+        said = self._bus.read_all([servo], span, 0.003)[servo]
+        return said.data if isinstance(said, Value) else None

@@ -1,0 +1,286 @@
+"""When a reading is not believed, and when the robot must stand still."""
+
+from __future__ import annotations
+
+from pydantic import model_validator
+
+from antennate.params.base import Params, number
+
+
+class DiagnosisParams(Params):
+    """What tells a healthy film from a broken one; windows are counted in readings."""
+
+    low_rail: float = number(
+        5.0,
+        "counts",
+        "assumed: two sigma of the noise of a reading above zero",
+        "readings up to this are at the lower rail",
+        ge=0,
+        le=100,
+    )
+    high_rail: float = number(
+        4090.0,
+        "counts",
+        "assumed: two sigma of the noise of a reading below full scale",
+        "readings from this on are at the upper rail",
+        ge=3995,
+        le=4095,
+    )
+    window: int = number(
+        10,
+        "1",
+        "assumed: 100 ms at 100 Hz, within which a broken wire must be known",
+        "readings from which a broken wire is told",
+        ge=5,
+        le=100,
+    )
+    open_bad: int = number(
+        6,
+        "1",
+        "assumed: a floating input fails 1 window in 10^4, 20 % of spikes pass 99 in 100",
+        "bad readings in the window that mean an open wire",
+        ge=1,
+        le=100,
+    )
+    saturated: int = number(
+        3,
+        "1",
+        "assumed: more than spikes bring at 1 %",
+        "readings in the window at the rail of a bent film that mean saturation",
+        ge=1,
+        le=100,
+    )
+    stuck: int = number(
+        100,
+        "1",
+        "assumed: 1 s at 100 Hz; a film at rest has noise of 2 to 3 counts, so equal readings in a "
+        "row do not happen",
+        "equal readings in a row that mean a stuck converter",
+        ge=10,
+        le=10_000,
+    )
+    jump: float = number(
+        1 / 3,
+        "1",
+        "assumed: a film bends fully in 30 ms or more, three readings",
+        "change between readings that is doubted, in calibrated spans",
+        gt=0,
+        le=1,
+    )
+    agree: int = number(
+        3,
+        "1",
+        "assumed: three spikes in a row that agree are rarer than one in 10^7 readings at 1 %",
+        "doubted readings in a row that agree and are believed",
+        ge=2,
+        le=5,
+    )
+    longest_hold: int = number(
+        4,
+        "1",
+        "assumed: 40 ms at 100 Hz, below the age at which data are stale",
+        "bad readings in a row that the last good one stands in for",
+        ge=0,
+        le=50,
+    )
+    share_window: int = number(
+        100,
+        "1",
+        "assumed: 1 s at 100 Hz",
+        "readings over which bad ones are counted",
+        ge=10,
+        le=1e4,
+    )
+    share: float = number(
+        0.2,
+        "1",
+        "assumed: above it averages and contacts are no longer worth much",
+        "share of bad readings above which a side is degraded",
+        gt=0,
+        lt=1,
+    )
+    margin: float = number(
+        20.0,
+        "counts",
+        "assumed: eight sigma of the noise of a reading, for its spikes",
+        "reading beyond the calibrated range that is still taken for noise",
+        ge=0,
+        le=1000,
+    )
+    beyond: float = number(
+        0.5,
+        "1",
+        "assumed: drift and harder bends stay within half a span",
+        "distance from the calibrated range up to which a reading is clamped and not refused, in "
+        "spans",
+        ge=0,
+        le=2,
+    )
+    gap: float = number(
+        0.1,
+        "s",
+        "assumed: twice the age at which data are stale",
+        "time without a reading after which nothing before it is remembered",
+        gt=0,
+        le=10,
+    )
+
+    @model_validator(mode="after")
+    def _windows(self) -> DiagnosisParams:
+        if max(self.open_bad, self.saturated) > self.window or self.agree > self.longest_hold + 1:
+            raise ValueError(
+                f"open_bad and saturated must fit into window and agree into longest_hold + 1, got "
+                f"{self.open_bad} and {self.saturated} in {self.window}, {self.agree} in "
+                f"{self.longest_hold + 1}"
+            )
+        return self
+
+
+class TouchCheckParams(Params):
+    """The check by hand that left is left and that bending reads as bending."""
+
+    bend: float = number(
+        0.3,
+        "1",
+        "assumed: well above noise and creep, easily done by hand",
+        "change of the reading that is a touch, in calibrated spans",
+        gt=0,
+        le=1,
+    )
+    still: float = number(
+        0.15,
+        "1",
+        "assumed: half a touch",
+        "change below which an antenna is at rest, in calibrated spans",
+        gt=0,
+        le=1,
+    )
+    readings: int = number(
+        10, "1", "assumed: 100 ms at 100 Hz", "readings in a row that count", ge=1, le=1000
+    )
+
+    @model_validator(mode="after")
+    def _order(self) -> TouchCheckParams:
+        if self.still >= self.bend:
+            raise ValueError(f"still must be below bend, got {self.still} and {self.bend}")
+        return self
+
+
+class SupervisorParams(Params):
+    """Limits at which the robot is slowed, held, or switched off."""
+
+    stale_age: float = number(
+        0.05,
+        "s",
+        "measured: with a tick of 10 ms HOLD is decided 60 ms after the last valid sample, which "
+        "leaves 40 ms of 100 ms for the bus",
+        "age of a sample from which on it is not acted upon",
+        gt=0,
+        le=0.06,
+    )
+    recovery: int = number(
+        10,
+        "1",
+        "assumed: 100 ms at 100 Hz, the length of the running mean",
+        "fresh valid samples in a row that end a loss of data",
+        ge=1,
+        le=1000,
+    )
+    repeats: int = number(
+        3,
+        "1",
+        "assumed: once is chance, three times is a defect",
+        "holds, failures of the controller or reboots of the board that become a fault",
+        ge=1,
+        le=100,
+    )
+    repeat_time: float = number(
+        10.0, "s", "assumed: five gait cycles", "time within which they count", gt=0, le=600
+    )
+    late_answers: int = number(
+        2,
+        "1",
+        "assumed: single answers are lost by noise on the bus",
+        "answers missed in a row that degrade",
+        ge=1,
+        le=100,
+    )
+    silent_answers: int = number(
+        5,
+        "1",
+        "assumed: at 1 % loss five in a row happen once in 10^10",
+        "answers missed in a row that mean a silent servo",
+        ge=1,
+        le=100,
+    )
+    supply_warn: float = number(
+        10.8,
+        "V",
+        "assumed: three lithium cells at 3.6 V, near empty",
+        "supply below which is warned",
+        gt=0,
+        le=100,
+    )
+    supply_hold: float = number(
+        10.2,
+        "V",
+        "assumed: three cells at 3.4 V",
+        "supply below which to stand still",
+        gt=0,
+        le=100,
+    )
+    supply_off: float = number(
+        9.6,
+        "V",
+        "assumed: three cells at 3.2 V, before they are harmed",
+        "supply below which to switch off",
+        gt=0,
+        le=100,
+    )
+    supply_rise: float = number(
+        0.3,
+        "V",
+        "assumed: more than the supply recovers when the legs stop",
+        "rise above a level that ends its cause",
+        ge=0,
+        le=10,
+    )
+    rate: float = number(
+        100.0, "Hz", "paper: about 100 Hz over serial", "samples per second expected", gt=0, le=1000
+    )
+    rate_error: float = number(
+        0.2,
+        "1",
+        "assumed: far beyond any crystal",
+        "relative error of the rate allowed",
+        gt=0,
+        lt=1,
+    )
+    rate_time: float = number(
+        1.0, "s", "assumed: a hundred samples", "window of the rate, and patience", gt=0, le=60
+    )
+    longest_arming: float = number(
+        1.0,
+        "s",
+        "measured: 0.14 s against the twin; each step is written and read back",
+        "longest time from an arm event to the next tick",
+        gt=0,
+        le=10,
+    )
+    longest_pause: float = number(
+        0.12,
+        "s",
+        "assumed: by then the watchdogs of the servos have stopped them",
+        "time between ticks from which on a restart needs a person",
+        gt=0,
+        le=10,
+    )
+
+    @model_validator(mode="after")
+    def _levels(self) -> SupervisorParams:
+        if not self.supply_off < self.supply_hold < self.supply_warn:
+            raise ValueError(
+                f"supply levels must fall from warn over hold to off, got {self.supply_warn}, "
+                f"{self.supply_hold} and {self.supply_off} V"
+            )
+        return self

@@ -1,0 +1,1 @@
+"""The simulated robot behind real bytes, with faults on demand."""

@@ -1,0 +1,259 @@
+"""Servos behind one half-duplex wire: bytes in, bytes out, at the pace of the baud rate.
+
+No input or output, and no clock: every call is told the time [s].
+
+A reply leaves one return delay after the request, and is there when its last byte is. Servos asked
+together answer one after the other; each waits for the one before it, so that the chain stops at a
+silent servo, in sync reads (https://github.com/ROBOTIS-GIT/DynamixelSDK/issues/331) as in fast
+ones. Two servos with one id talk at the same time, and of their bits the zeros win. The master
+is expected to be quiet meanwhile: what it says never collides with an answer.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import Enum
+from itertools import zip_longest
+
+import numpy as np
+
+from antennate.hardware.dynamixel import packets
+from antennate.hardware.dynamixel.packets import BROADCAST, Instruction, Packet, Status, StatusError
+from antennate.hardware.dynamixel.parser import Parser
+from antennate.hardware.dynamixel.tables import RETURN_DELAY_UNIT
+from antennate.twin.registers import Servo
+
+_GIVE_UP = 0.01
+"""Silence after which servos forget half a packet [s]."""
+_CLEAR = b"\x01\x44\x58\x4c\x22"
+
+
+class Fault(Enum):
+    """What may be wrong with the answers of a servo."""
+
+    SILENT = "hears nothing and says nothing"
+    BAD_CRC = "answers with a wrong CRC"
+    TRUNCATED = "stops in the middle of an answer"
+    LATE = "answers, and all after it, `delay` seconds late"
+    DOUBLED = "answers twice"
+    WRONG_ID = "answers with the id of its neighbour"
+    OVERSIZED = "answers with four bytes too many"
+
+
+@dataclass(slots=True)
+class Trouble:
+    """A fault of one servo.
+
+    Attributes:
+        fault: What.
+        delay: For LATE, by how much [s].
+        count: How many more answers it spoils, None for all; not used for SILENT.
+    """
+
+    fault: Fault
+    delay: float = 0.0
+    count: int | None = None
+
+
+class ServoBus:
+    """The servos and the wire.
+
+    Args:
+        servos: In any order; two may share an id.
+        baud: Bits per second; a byte is ten bits.
+        loss: Share of answers that get lost between the wire and the master.
+        rng: Which of them.
+        fast: They understand fast sync reads.
+    """
+
+    def __init__(
+        self,
+        servos: Sequence[Servo],
+        baud: int = 1_000_000,
+        loss: float = 0.0,
+        rng: np.random.Generator | None = None,
+        fast: bool = True,
+    ) -> None:
+        self.servos = list(servos)
+        self.trouble: dict[int, Trouble] = {}
+        self.loss = loss
+        self.fast = fast
+        self._byte_time = 10.0 / baud
+        self._rng = rng or np.random.default_rng(0)
+        self._parser = Parser()
+        self._last = 0.0
+        self._out: list[tuple[float, bytes]] = []
+
+    def advance(self, t: float) -> None:
+        """Let the servos move until t."""
+        for servo in self.servos:
+            servo.advance(t)
+
+    def receive(self, t: float, data: bytes) -> None:
+        """The master sends these bytes from t on, or once it has sent the ones before."""
+        if t - self._last > _GIVE_UP:
+            self._parser.reset()
+        self._last = max(self._last, t) + self._byte_time * len(data)
+        for packet in self._parser.feed(data):
+            if packet.instruction != Instruction.STATUS:
+                self._handle(self._last, packet)
+
+    def next_time(self) -> float | None:
+        """When the next bytes for the master are there [s]."""
+        return min((when for when, _ in self._out), default=None)
+
+    def transmit(self, t: float) -> bytes:
+        """Bytes that have reached the master by t."""
+        due = sorted((when, i) for i, (when, _) in enumerate(self._out) if when <= t)
+        data = b"".join(self._out[i][1] for _, i in due)
+        self._out = [item for item in self._out if item[0] > t]
+        return data
+
+    # requests
+
+    def _handle(self, t: float, packet: Packet) -> None:
+        present = [s for s in self.servos if s.awake(t) and not self._is(s, Fault.SILENT)]
+        for servo in present:
+            servo.heard(t)
+        many = {
+            Instruction.SYNC_READ: self._sync_read,
+            Instruction.FAST_SYNC_READ: self._fast_sync_read,
+            Instruction.SYNC_WRITE: self._sync_write,
+        }
+        if packet.instruction in many:
+            if packet.id == BROADCAST and len(packet.params) > 4:
+                many[Instruction(packet.instruction)](t, present, packet.params)
+            return
+        reached = [s for s in present if packet.id in (s.get("id"), BROADCAST)]
+        for servos in self._by_id(reached):
+            answers = [a for s in servos if (a := self._single(t, s, packet)) is not None]
+            t = self._reply(t, servos[0], [packets.status(answer) for answer in answers])
+
+    def _single(self, t: float, servo: Servo, packet: Packet) -> Status | None:
+        level, name = servo.get("status_return_level"), servo.get("id")
+        asks_all = packet.id == BROADCAST
+        if packet.instruction == Instruction.PING:
+            data = b"".join(
+                servo.table[r].encode(servo.get(r)) for r in ("model_number", "firmware_version")
+            )
+            return _answer(servo, name, StatusError.NONE, data)
+        if packet.instruction == Instruction.READ:
+            error, data = servo.read(*_two_words(packet.params))
+            return _answer(servo, name, error, data) if level >= 1 and not asks_all else None
+        error = self._change(t, servo, packet)
+        return _answer(servo, name, error, b"") if level >= 2 and not asks_all else None
+
+    def _change(self, t: float, servo: Servo, packet: Packet) -> StatusError:
+        if packet.instruction == Instruction.WRITE and len(packet.params) > 2:
+            return servo.write(int.from_bytes(packet.params[:2], "little"), packet.params[2:])
+        if packet.instruction == Instruction.REBOOT:
+            servo.restart(t)
+            return StatusError.NONE
+        if packet.instruction == Instruction.CLEAR and packet.params == _CLEAR:
+            return servo.clear_turns()
+        return StatusError.INSTRUCTION
+
+    def _sync_write(self, t: float, present: list[Servo], params: bytes) -> None:
+        address, length = _two_words(params)
+        for at in range(4, len(params) - length, length + 1):
+            for servo in present:
+                if servo.get("id") == params[at]:
+                    servo.write(address, params[at + 1 : at + 1 + length])
+
+    def _sync_read(self, t: float, present: list[Servo], params: bytes) -> None:
+        address, length = _two_words(params)
+        for name in params[4:]:
+            servos = [s for s in present if s.get("id") == name and s.get("status_return_level")]
+            if not servos:
+                return
+            said = [packets.status(_answer(s, name, *s.read(address, length))) for s in servos]
+            t = self._reply(t, servos[0], said)
+
+    def _fast_sync_read(self, t: float, present: list[Servo], params: bytes) -> None:
+        address, length = _two_words(params)
+        names = params[4:]
+        chain: list[tuple[Servo, Status]] = []
+        for name in names if self.fast else b"":
+            servo = next((s for s in present if s.get("id") == name), None)
+            if servo is None:
+                break
+            chain.append((servo, _answer(servo, name, *servo.read(address, length))))
+        pieces = packets.fast_reply(len(names), [answer for _, answer in chain], length)
+        for (servo, _), piece in zip(chain, pieces, strict=True):
+            broken = any(self._is(servo, f) for f in (Fault.BAD_CRC, Fault.TRUNCATED))
+            delay = 0.0 if servo is not chain[0][0] else None
+            t = self._reply(t, servo, [piece], delay)
+            if broken:
+                return
+
+    # answers
+
+    def _reply(
+        self, t: float, servo: Servo, said: list[bytes], delay: float | None = None
+    ) -> float:
+        """Put what servos of one id say on the wire after t; the time at which it ends."""
+        if not said:
+            return t
+        trouble = self._use(servo)
+        start = t + (RETURN_DELAY_UNIT * servo.get("return_delay_time") if delay is None else delay)
+        if trouble and trouble.fault is Fault.LATE:
+            start += trouble.delay
+        data = bytes(_collide(said))
+        data = _spoil(data, trouble.fault) if trouble else data
+        end = start + self._byte_time * len(data)
+        if not (self.loss and self._rng.random() < self.loss):
+            self._out.append((end, data))
+        return end
+
+    def _is(self, servo: Servo, fault: Fault) -> bool:
+        trouble = self.trouble.get(servo.get("id"))
+        return trouble is not None and trouble.fault is fault and trouble.count != 0
+
+    def _use(self, servo: Servo) -> Trouble | None:
+        trouble = self.trouble.get(servo.get("id"))
+        if trouble is None or trouble.count == 0:
+            return None
+        if trouble.count is not None:
+            trouble.count -= 1
+        return trouble
+
+    def _by_id(self, servos: list[Servo]) -> list[list[Servo]]:
+        names = sorted({servo.get("id") for servo in servos})
+        return [[servo for servo in servos if servo.get("id") == name] for name in names]
+
+
+def _answer(servo: Servo, name: int, error: StatusError, data: bytes) -> Status:
+    return Status(name, error, servo.get("hardware_error_status") != 0, data)
+
+
+def _two_words(params: bytes) -> tuple[int, int]:
+    return int.from_bytes(params[:2], "little"), int.from_bytes(params[2:4], "little")
+
+
+def _collide(said: list[bytes]) -> list[int]:
+    mixed: list[int] = []
+    for together in zip_longest(*said, fillvalue=0xFF):
+        byte = 0xFF
+        for one in together:
+            byte &= one
+        mixed.append(byte)
+    return mixed
+
+
+def _spoil(data: bytes, fault: Fault) -> bytes:
+    if fault is Fault.BAD_CRC:
+        return data[:-1] + bytes([data[-1] ^ 0x55])
+    if fault is Fault.TRUNCATED:
+        return data[: len(data) // 2]
+    if fault is Fault.DOUBLED:
+        return data + data
+    status = next(iter(Parser().feed(data)), None)
+    answer = status and packets.as_status(status)
+    if answer and fault is Fault.WRONG_ID:
+        return packets.status(Status(answer.id + 1, answer.error, answer.alert, answer.data))
+    if answer and fault is Fault.OVERSIZED:
+        return packets.status(
+            Status(answer.id, answer.error, answer.alert, answer.data + b"\0" * 4)
+        )
+    return data

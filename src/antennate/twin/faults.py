@@ -1,0 +1,98 @@
+"""Faults on demand: `servo:7=silent@3s`, `esp32=reset@5s`, `bus=loss:0.01`."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from antennate.errors import BadInputError
+from antennate.twin.bus import Fault, Trouble
+from antennate.twin.robot import TwinRobot
+
+_FORM = re.compile(
+    r"(?P<target>servo:(?P<id>\d{1,3})|esp32|bus)=(?P<what>[a-z_]+)(:(?P<size>[0-9.e-]+))?"
+    r"(@(?P<t>[0-9.]+)s)?"
+)
+_SERVO = {fault.name.lower(): fault for fault in Fault}
+_HARDWARE = {"voltage": 1, "overheat": 4, "encoder": 8, "shock": 16, "overload": 32}
+"""Bits of the register Hardware Error Status, from the manuals of both models."""
+_KNOWN = {
+    "servo": (*_SERVO, *_HARDWARE, "reboot"),
+    "esp32": ("silent", "reset", "open_left", "open_right"),
+    "bus": ("loss", "silent"),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Demand:
+    """One fault, and when.
+
+    Attributes:
+        target: "servo", "esp32" or "bus".
+        servo: Id, for a servo.
+        what: Its name.
+        size: Delay of a late answer [s], or share of answers lost.
+        t: When it begins [s].
+    """
+
+    target: str
+    servo: int
+    what: str
+    size: float
+    t: float
+
+
+def read(text: str) -> Demand:
+    """One demand from its text.
+
+    Raises:
+        BadInputError: It has another form, or is not known.
+    """
+    match = _FORM.fullmatch(text)
+    if match is None:
+        raise BadInputError(
+            f"--fault: expected TARGET=WHAT[:SIZE][@Ts], such as servo:7=silent@3s, found {text!r}"
+        )
+    target = match["target"].split(":")[0]
+    if match["what"] not in _KNOWN[target]:
+        known = ", ".join(_KNOWN[target])
+        raise BadInputError(f"--fault: expected one of {known} for {target}, found {match['what']}")
+    try:
+        size, t = float(match["size"] or 0.0), float(match["t"] or 0.0)
+    except ValueError:
+        raise BadInputError(
+            f"--fault: expected numbers for size and time, found {text!r}"
+        ) from None
+    return Demand(target, int(match["id"] or 0), match["what"], size, t)
+
+
+class Faults:
+    """Demands that wait for their time."""
+
+    def __init__(self, demands: Sequence[Demand], ids: Sequence[int]) -> None:
+        self._waiting = sorted(demands, key=lambda demand: demand.t)
+        for demand in demands:
+            if demand.target == "servo" and demand.servo not in ids:
+                known = ", ".join(map(str, ids))
+                raise BadInputError(f"--fault: expected a servo of {known}, found {demand.servo}")
+
+    def apply(self, robot: TwinRobot, t: float) -> None:
+        """Let happen what is due at time t [s]."""
+        while self._waiting and self._waiting[0].t <= t:
+            _apply(robot, self._waiting.pop(0))
+
+
+def _apply(robot: TwinRobot, demand: Demand) -> None:
+    if demand.target == "esp32":
+        robot.break_board(demand.what)
+    elif demand.target == "bus":
+        robot.bus.loss = 1.0 if demand.what == "silent" else demand.size
+    elif demand.what in _SERVO:
+        robot.bus.trouble[demand.servo] = Trouble(_SERVO[demand.what], delay=demand.size)
+    else:
+        servo = next(s for s in robot.servos if s.get("id") == demand.servo)
+        if demand.what == "reboot":
+            servo.restart(robot.t)
+        else:
+            servo.fail(_HARDWARE[demand.what])

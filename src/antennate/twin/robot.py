@@ -1,0 +1,181 @@
+"""The simulated robot behind real bytes: a bus of 19 servos and the stream of an antenna board.
+
+Time is an argument. Servos do not move by themselves: every control period the physics takes their
+goals and gives back their positions. Physics begins when the first servo has torque; until then the
+robot stands and the board repeats its first reading.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from antennate.anatomy import YAW_COUNT
+from antennate.errors import SimulationError
+from antennate.hardware.dynamixel.tables import EXTENDED_MODE, XC430_W240, XL330_M288, Table
+from antennate.hardware.esp32 import frame
+from antennate.hardware.joints import Joints
+from antennate.params.layout import LayoutParams
+from antennate.sim.body import SimBody
+from antennate.twin.bus import ServoBus
+from antennate.twin.registers import Servo
+
+GREETING_PERIOD = 1.0
+"""Time between greetings of the board [s]."""
+BOOT_TICKS = 50
+"""Samples that a starting board does not send."""
+_STANDING_NOISE = 2.5
+"""Noise of a resting film [counts], as while walking."""
+_DEVICE = b"twin\0\0\0\0"
+_ROUNDING = 1e-9
+
+
+class DrivenServo(Servo):
+    """A servo whose shaft the physics moves."""
+
+    _stood: float | None = None
+
+    def goal(self) -> float:
+        """Where it pulls to [ticks]: where it stopped after a stop; nowhere without torque."""
+        if self.torque and self._stopped:
+            self._stood = self.position if self._stood is None else self._stood
+            return self._stood
+        self._stood = None
+        return float(self.get("goal_position")) if self.torque else self.position
+
+    def _speed(self) -> float:
+        return 0.0
+
+
+class TwinRobot:
+    """One robot in row 0 of a simulated body, served as bytes.
+
+    Args:
+        body: Holds one world.
+        layout: Ids, directions and zeros of the servos.
+        period: Control period of the board and the physics [s].
+        boot_id: Random number of the board's boot.
+        standing_noise: Whether readings are noisy before the physics begins, as a real film's are.
+
+    Attributes:
+        bus: The servos on their wire.
+        t: Time up to which everything has happened [s].
+        board_silent: The board says nothing.
+    """
+
+    def __init__(
+        self,
+        body: SimBody,
+        layout: LayoutParams,
+        period: float,
+        boot_id: int,
+        standing_noise: bool = False,
+    ) -> None:
+        self._body = body
+        self._joints = Joints(layout)
+        self._period = period
+        self._encoder = frame.SampleEncoder(boot_id)
+        self._boot_id = boot_id
+        self._stream = bytearray()
+        self._buffer = bytearray(frame.SAMPLE_FRAME_SIZE)
+        self._ticks = self._walked = self._booted = 0
+        self._broken = [False, False]
+        self._chance = np.random.default_rng(boot_id) if standing_noise else None
+        self.t = 0.0
+        self.board_silent = False
+        self.servos = [_servo(i, servo) for i, servo in enumerate(layout.ids)]
+        self.bus = ServoBus(self.servos, layout.baud)
+        self._show()
+        self._counts = body.read().counts[0]
+        self._say()
+
+    @property
+    def failure(self) -> SimulationError | None:
+        """What ended the physics, if anything did."""
+        return self._body.failure(0)
+
+    def advance(self, t: float) -> None:
+        """Let everything happen until t."""
+        while (self._ticks + 1) * self._period <= t + _ROUNDING:
+            self._ticks += 1
+            self.bus.advance(self._ticks * self._period)
+            if self._walked or any(servo.torque for servo in self.servos):
+                self._walk()
+            self._say()
+        self.bus.advance(t)
+        self.t = max(self.t, t)
+
+    def next_time(self) -> float:
+        """When something happens next without anybody asking [s]."""
+        due = self.bus.next_time()
+        tick = (self._ticks + 1) * self._period
+        return tick if due is None else min(due, tick)
+
+    def take(self) -> bytes:
+        """What the board has sent since the last call."""
+        data, self._stream = bytes(self._stream), bytearray()
+        return data
+
+    def break_board(self, what: str) -> None:
+        """Let the board fall silent, start anew after BOOT_TICKS, or lose an antenna's wire."""
+        if what == "silent":
+            self.board_silent = True
+        elif what == "reset":
+            self._boot_id = (self._boot_id * 1_103_515_245 + 12_345) & 0xFFFFFFFF
+            self._encoder = frame.SampleEncoder(self._boot_id)
+            self._booted = self._ticks + BOOT_TICKS
+        else:
+            self._broken[what == "open_right"] = True
+
+    def _walk(self) -> None:
+        goals = np.array([servo.goal() for servo in self.servos])
+        self._body.write(self._joints.pose(goals))
+        self._walked += 1
+        self._body.clock.sleep_until(self._walked * self._period)
+        self._show()
+        self._counts = self._body.read().counts[0]
+
+    def _show(self) -> None:
+        """Let the servos know where their shafts are."""
+        shafts = self._joints.positions(self._body.world(0).drives())
+        for servo, ticks in zip(self.servos, shafts.tolist(), strict=True):
+            servo.place(ticks)
+
+    def _say(self) -> None:
+        """One sample of the board, and a greeting now and then."""
+        since = self._ticks - self._booted
+        if self.board_silent or since < 0:
+            return
+        if since % round(GREETING_PERIOD / self._period) == 0:
+            settings = frame.config_hash(round(1 / self._period), 15, 34, 35)
+            reset = frame.RESET_HARD if self._booted else frame.RESET_POWER_ON
+            rate = round(1 / self._period)
+            self._stream += frame.encode_hello(self._boot_id, reset, settings, _DEVICE, rate)
+        noise = np.zeros(2)
+        if self._chance is not None and not self._walked:
+            noise = np.rint(self._chance.normal(0.0, _STANDING_NOISE, 2))
+        left, right = (
+            0 if broken or math.isnan(counts) else int(counts)
+            for counts, broken in zip(self._counts + noise, self._broken, strict=True)
+        )
+        flags = _rail(left, frame.FLAG_LEFT_RAIL) | _rail(right, frame.FLAG_RIGHT_RAIL)
+        ticks = round(1e6 * since * self._period) & frame.TICK_MASK
+        size = self._encoder.encode_sample_into(self._buffer, since, ticks, left, right, flags, 0)
+        self._stream += self._buffer[:size]
+
+
+def _rail(counts: int, flag: int) -> int:
+    return flag if counts in (0, frame.FULL_SCALE) else 0
+
+
+def _servo(place: int, servo: int) -> DrivenServo:
+    """A servo as the robot needs it: legs in extended mode, antennae of the small model."""
+    table: Table = XC430_W240 if place < YAW_COUNT + 12 else XL330_M288
+    made = DrivenServo(table, servo)
+    if YAW_COUNT <= place < YAW_COUNT + 12:
+        made.set("operating_mode", EXTENDED_MODE)
+    made.set("return_delay_time", 0)
+    made.set("baud_rate", 3)
+    made.set("present_input_voltage", 111 if table is XC430_W240 else 50)
+    return made

@@ -1,0 +1,173 @@
+"""Films, controller and supervisor put together in invented time, as a robot would have them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+
+from antennate.controller import Arm, Controller
+from antennate.hardware.causes import Inputs, Outputs, State
+from antennate.hardware.diagnosis import Band, ChannelDiagnosis, Finding
+from antennate.hardware.supervisor import Supervisor
+from antennate.params import (
+    ConditioningParams,
+    ControllerParams,
+    DiagnosisParams,
+    SupervisorParams,
+)
+from antennate.records import AntennaFrame, Contact, Maneuver, Pose
+
+PERIOD = 0.01
+FREE, BENT = 1872.0, 1450.0
+"""Readings of a straight and of a strongly bent flex film [counts]."""
+BAND = Band(ConditioningParams().counts_low, ConditioningParams().counts_high, -1)
+LIMIT = SupervisorParams().stale_age
+
+
+def healthy(now: float, **changes: Any) -> Inputs:
+    """Inputs of a tick in which all is well, with some changed."""
+    settings: dict[str, Any] = {
+        "age": 0.005,
+        "valid": 1,
+        "findings": (Finding.OK, Finding.OK),
+        "decided_at": now,
+        "maneuver": Maneuver.FORWARD,
+        "contact": (Contact.FREE, Contact.FREE),
+        "supply": 12.0,
+    }
+    return Inputs(**(settings | changes))
+
+
+class Ticker:
+    """A supervisor with its own invented time."""
+
+    def __init__(self, params: SupervisorParams | None = None) -> None:
+        self.supervisor = Supervisor(params or SupervisorParams())
+        self.n = 0
+
+    @property
+    def now(self) -> float:
+        return self.n * PERIOD
+
+    def step(self, **changes: Any) -> Outputs:
+        self.n += 1
+        return self.supervisor.step(self.now, healthy(self.now, **changes))
+
+    def run(self, ticks: int, **changes: Any) -> list[Outputs]:
+        return [self.step(**changes) for _ in range(ticks)]
+
+
+def armed(params: SupervisorParams | None = None) -> Ticker:
+    """One that walks."""
+    ticker = Ticker(params)
+    ticker.run(20)
+    assert ticker.step(arm=True).arming
+    assert ticker.step().state is State.OK
+    return ticker
+
+
+class Rig:
+    """One tick after the other: readings in, pose sent out."""
+
+    def __init__(self, arm: Arm = "paper", mind: Any = None) -> None:
+        self.mind = mind or Controller(ControllerParams(), arm)
+        self.films = [ChannelDiagnosis(DiagnosisParams(), BAND) for _ in range(2)]
+        self.supervisor = Supervisor(SupervisorParams())
+        self.n = -1
+        self.newest = -math.inf
+        self.clear = False
+        self.used_ages: list[float] = []
+        self.sent: list[Pose] = []
+        self.outputs: list[Outputs] = []
+
+    @property
+    def now(self) -> float:
+        return self.n * PERIOD
+
+    def step(
+        self,
+        samples: Iterable[tuple[float, float, float]],
+        age: float | None = None,
+        **changes: Any,
+    ) -> Outputs:
+        """One tick with the samples (time taken [s], left, right [counts]) that arrived for it."""
+        self.n += 1
+        fresh = 0
+        for taken, *counts in samples:
+            self.newest = taken
+            fresh += self.now - taken <= LIMIT
+            for film, reading in zip(self.films, counts, strict=True):
+                film.step(taken, reading)
+        age = self.now - self.newest if age is None else age
+        frame = self._frame(age)
+        failure = ""
+        try:
+            pose = self.mind.step(frame)
+        except RuntimeError as error:
+            failure, pose = str(error), None
+        known = {} if failure else self._known()
+        outputs = self.supervisor.step(
+            self.now,
+            healthy(
+                self.now,
+                **(
+                    {
+                        "age": age,
+                        "valid": fresh,
+                        "findings": tuple(film.reading.finding for film in self.films),
+                        "failure": failure,
+                    }
+                    | known
+                    | changes
+                ),
+            ),
+        )
+        self.clear = outputs.clear
+        if outputs.move:
+            assert pose is not None
+            assert np.isfinite(frame.counts).all()
+            self.used_ages.append(self.now - self.newest)
+        self.sent.append(pose if outputs.move and pose is not None else self.sent[-1])
+        self.outputs.append(outputs)
+        return outputs
+
+    def _frame(self, age: float) -> AntennaFrame:
+        usable = age <= LIMIT and self.clear
+        counts = [film.reading.counts if usable else math.nan for film in self.films]
+        return AntennaFrame(t=np.array([self.now]), counts=np.array([counts]))
+
+    def _known(self) -> dict[str, Any]:
+        return {
+            "maneuver": int(self.mind.maneuver[0]),
+            "contact": tuple(self.mind.contact[0].tolist()),
+        }
+
+    def start(self, counts: tuple[float, float] = (FREE, FREE)) -> None:
+        """Arm it and wait until it walks."""
+        self.sent.append(self.mind.gait.step(np.array([int(Maneuver.HOLD)])))
+        self.go(30, counts)
+        assert self.step([(self.now + PERIOD, *counts)], arm=True).arming
+        self.go(30, counts)
+        assert self.outputs[-1].move
+
+    def go(self, ticks: int, counts: tuple[float, float] = (FREE, FREE), **changes: Any) -> None:
+        """Some ticks with a fresh sample each."""
+        rng = np.random.default_rng(self.n + 1)
+        for _ in range(ticks):
+            noise = np.rint(rng.normal(0.0, 2.5, 2))
+            left, right = (np.array(counts) + noise).tolist()
+            self.step([((self.n + 1) * PERIOD, left, right)], **changes)
+
+    def pose_step(self) -> float:
+        """Largest change between the last two poses sent [rad]."""
+        return pose_change(*self.sent[-2:])
+
+
+def pose_change(before: Pose, after: Pose) -> float:
+    """Largest change of a joint [rad]."""
+    return max(
+        float(np.abs(after.yaw - before.yaw).max()), float(np.abs(after.leg - before.leg).max())
+    )

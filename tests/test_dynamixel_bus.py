@@ -1,0 +1,437 @@
+"""The master of the servo bus under faults, in invented time; B1 ... are rows of a fault table."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+import pytest
+from servo_rig import IDS, MODELS, Rig, positions
+
+from antennate.hardware.dynamixel import bringup
+from antennate.hardware.dynamixel.answers import (
+    MOTION,
+    POSITION,
+    SILENT,
+    Refused,
+    Silent,
+    Span,
+    Timing,
+    Value,
+)
+from antennate.hardware.dynamixel.bringup import BringUpError
+from antennate.hardware.dynamixel.bus import Bus
+from antennate.hardware.dynamixel.packets import StatusError
+from antennate.hardware.dynamixel.tables import XL330_M288
+from antennate.hardware.port import PortError
+from antennate.twin.bus import Fault, ServoBus, Trouble
+from antennate.twin.link import Link
+from antennate.twin.registers import Servo
+
+LIMIT = 0.010 + 1e-9
+TRUE = {i: 100 * i for i in IDS}
+
+
+def test_all_answer_in_a_third_of_the_period() -> None:
+    """19 x (10 + 4) + 8 bytes of reply and 33 of request take 3.07 ms at 1 Mbit/s."""
+    rig = Rig()
+    rig.cycle()
+    answers, took = rig.cycle()
+    assert positions(answers) == TRUE
+    assert took == pytest.approx((19 * 14 + 8 + 33) * 1e-5)
+    slow = Rig(fast=False)
+    slow.cycle()
+    answers, took = slow.cycle()
+    assert positions(answers) == TRUE
+    assert took == pytest.approx((19 * 21 + 33) * 1e-5)
+
+
+@pytest.mark.parametrize("fast", [True, False])
+@pytest.mark.parametrize("dead", IDS)
+def test_B1_one_silent_servo_costs_10_ms_and_no_other_value(dead: int, fast: bool) -> None:
+    rig = Rig(fast)
+    rig.twin.trouble[dead] = Trouble(Fault.SILENT)
+    for cycle in range(15):
+        answers, took = rig.cycle()
+        assert took <= (LIMIT if cycle < 2 else 0.0065 if fast else 0.0075)
+        assert list(answers) == IDS
+        assert isinstance(answers[dead], Silent)
+        assert positions(answers) == {i: p for i, p in TRUE.items() if i != dead}
+    rig.twin.trouble.clear()
+    assert positions(rig.cycle()[0] | rig.cycle()[0]) == TRUE
+
+
+def test_B1_two_silent_servos_leave_seventeen() -> None:
+    rig = Rig()
+    rig.twin.trouble = {5: Trouble(Fault.SILENT), 12: Trouble(Fault.SILENT)}
+    for cycle in range(15):
+        answers, took = rig.cycle()
+        assert took <= LIMIT
+        assert len(positions(answers)) == 17 or cycle == 0
+
+
+def test_B2_a_lost_answer_in_a_hundred_is_asked_for_again_in_time() -> None:
+    """Five misses in a row would stop the robot; here none misses more than twice."""
+    rig = Rig(loss=0.01)
+    row, worst, misses = dict.fromkeys(IDS, 0), 0, 0
+    for _ in range(600):
+        answers, took = rig.cycle()
+        assert took <= LIMIT
+        for i, answer in answers.items():
+            row[i] = 0 if isinstance(answer, Value) else row[i] + 1
+            misses += isinstance(answer, Silent)
+        worst = max(worst, *row.values())
+    assert worst <= 2
+    assert misses / (600 * 19) < 0.01
+
+
+@pytest.mark.parametrize("fast", [True, False])
+def test_B2_an_answer_spoiled_once_is_there_in_the_same_cycle(fast: bool) -> None:
+    for hurt in IDS:
+        rig = Rig(fast)
+        rig.cycle()
+        rig.twin.trouble[hurt] = Trouble(Fault.BAD_CRC, count=1)
+        answers, took = rig.cycle()
+        assert positions(answers) == TRUE
+        assert took <= LIMIT
+
+
+def test_B2_one_in_twenty_lost_gives_no_wrong_value() -> None:
+    rig = Rig(loss=0.05)
+    for _ in range(200):
+        answers, took = rig.cycle()
+        assert took <= LIMIT
+        assert positions(answers).items() <= TRUE.items()
+
+
+@pytest.mark.parametrize("fast", [True, False])
+@pytest.mark.parametrize(
+    "fault", [Fault.BAD_CRC, Fault.TRUNCATED, Fault.OVERSIZED, Fault.WRONG_ID, Fault.DOUBLED]
+)
+def test_B3_no_wrong_value_and_the_bus_works_on(fault: Fault, fast: bool) -> None:
+    for hurt in (1, 10, 19):
+        rig = Rig(fast)
+        rig.twin.trouble[hurt] = Trouble(fault, count=1)
+        answers, took = rig.cycle()
+        assert took <= LIMIT
+        assert positions(answers).items() <= TRUE.items()
+        assert positions(rig.cycle()[0]) == TRUE
+
+
+@pytest.mark.parametrize("fast", [True, False])
+def test_B3_a_servo_that_never_gets_it_right_is_silent(fast: bool) -> None:
+    rig = Rig(fast)
+    rig.twin.trouble[7] = Trouble(Fault.BAD_CRC)
+    for _ in range(5):
+        answers, took = rig.cycle()
+        assert took <= LIMIT
+        assert answers[7] == SILENT
+        assert len(positions(answers)) == 18
+    assert rig.bus.tally.bad_crc > 0
+
+
+@pytest.mark.parametrize("delay", [0.003, 0.020, 0.040, 0.060])
+@pytest.mark.parametrize("fast", [True, False])
+def test_B4_no_late_answer_is_taken_for_a_new_one(delay: float, fast: bool) -> None:
+    """Each cycle has its own true positions; what is accepted is true now."""
+    rig = Rig(fast)
+    rig.cycle()
+    rng = np.random.default_rng(4)
+    for cycle in range(60):
+        late = int(rng.integers(1, 20))
+        rig.twin.trouble = {late: Trouble(Fault.LATE, delay, count=1)} if cycle % 3 == 0 else {}
+        for i in IDS:
+            rig.servo(i).place(1000 * i + cycle)
+        answers, took = rig.cycle()
+        assert took <= LIMIT
+        assert positions(answers).items() <= {i: 1000 * i + cycle for i in IDS}.items()
+    assert rig.bus.tally.stale + rig.bus.tally.drained > 0
+
+
+def test_B4_single_reads_after_a_late_answer() -> None:
+    """The case that the manufacturer's program gets wrong: asked again, the old value comes."""
+    rig = Rig()
+    rig.twin.trouble[3] = Trouble(Fault.LATE, 0.050, count=1)
+    stale = 0
+    for k in range(300):
+        rig.servo(3).place(k)
+        answer = rig.bus.read(3, POSITION)
+        if isinstance(answer, Value):
+            assert int.from_bytes(answer.data, "little") == k
+        rig.link.sleep(0.0005)
+        stale = rig.bus.tally.stale
+        if k % 100 == 50:
+            rig.twin.trouble[3] = Trouble(Fault.LATE, 0.030, count=1)
+    assert stale > 0
+
+
+def test_B4_without_spare_bytes_a_servo_in_doubt_is_not_asked() -> None:
+    rig = Rig()
+    rig.twin.trouble[3] = Trouble(Fault.LATE, 0.050, count=1)
+    exact = Span(132, 4)
+    assert rig.bus.read(3, exact) == SILENT
+    rig.servo(3).place(77)
+    assert rig.bus.read(3, exact) == SILENT
+    rig.link.sleep(0.1)
+    assert rig.bus.read(3, exact) == Value((77).to_bytes(4, "little"), alert=False)
+
+
+def test_B4_a_late_confirmation_does_not_confirm_the_next_write() -> None:
+    """The second answer is slow itself, so that the first one would be there before it."""
+    rig = Rig()
+    rig.twin.trouble[3] = Trouble(Fault.LATE, 0.003, count=1)
+    assert rig.bus.write(3, 116, bytes(4)) == SILENT
+    rig.twin.trouble[3] = Trouble(Fault.LATE, 0.0015, count=1)
+    answer = rig.bus.write(3, 116, (99_999).to_bytes(4, "little"))
+    assert answer == Refused(StatusError.DATA_LIMIT, alert=False)
+
+
+def test_B4_a_late_refusal_does_not_refuse_the_next_read() -> None:
+    rig = Rig()
+    rig.twin.trouble[3] = Trouble(Fault.LATE, 0.003, count=1)
+    assert rig.bus.read(3, Span(66, 1)) == SILENT
+    rig.twin.trouble[3] = Trouble(Fault.LATE, 0.0015, count=1)
+    assert rig.bus.read(3, POSITION) == Value((300).to_bytes(4, "little"), alert=False)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_B3_B4_whatever_happens_no_value_is_wrong_and_no_cycle_late(seed: int) -> None:
+    """Random faults of random servos, late by up to 60 ms; each cycle has its own positions."""
+    rng = np.random.default_rng(seed)
+    rig = Rig(fast=bool(seed % 2), loss=0.01)
+    kinds = [f for f in Fault if f is not Fault.WRONG_ID]
+    for cycle in range(60):
+        for i in IDS:
+            rig.servo(i).place(1000 * i + cycle)
+        if rng.random() < 0.3:
+            kind = kinds[rng.integers(len(kinds))]
+            count = None if kind is Fault.SILENT else 1
+            trouble = Trouble(kind, float(rng.uniform(0.0, 0.06)), count)
+            rig.twin.trouble = {int(rng.integers(1, 20)): trouble}
+        answers, took = rig.cycle()
+        assert took <= LIMIT
+        assert positions(answers).items() <= {i: 1000 * i + cycle for i in IDS}.items()
+
+
+class Boom(Exception):
+    """Something that is no error of the port."""
+
+
+class Fragile(Link):
+    """A wire that raises at its n-th call."""
+
+    def __init__(self, bus: ServoBus) -> None:
+        super().__init__(bus)
+        self.until = -1
+
+    def _count(self) -> None:
+        self.until -= 1
+        if self.until == 0:
+            raise Boom
+
+    def write(self, data: bytes) -> None:
+        self._count()
+        super().write(data)
+        self._count()
+
+    def read(self, most: int, timeout: float) -> bytes:
+        self._count()
+        came = super().read(most, timeout)
+        self._count()
+        return came
+
+    def drain(self) -> int:
+        self._count()
+        return super().drain()
+
+
+@pytest.mark.parametrize("fast", [True, False])
+def test_B5_the_bus_works_after_an_exception_anywhere(fast: bool) -> None:
+    raised = 0
+    for call in range(1, 60):
+        link = Fragile(Rig().twin)
+        bus = Bus(link, fast=fast, clock=link.now)
+        bus.read_all(IDS, MOTION)
+        link.until = call
+        try:
+            bus.read_all(IDS, MOTION)
+        except Boom:
+            raised += 1
+        link.until = -1
+        for i in IDS:
+            link.bus.servos[i - 1].place(7 * i)
+        begin = link.now()
+        answers = bus.read_all(IDS, MOTION)
+        assert link.now() - begin <= LIMIT
+        assert positions(answers).items() <= {i: 7 * i for i in IDS}.items()
+        assert positions(bus.read_all(IDS, MOTION)) == {i: 7 * i for i in IDS}
+    assert raised >= 40
+
+
+def test_B6_all_silent_costs_no_more_and_all_are_back_soon_after() -> None:
+    rig = Rig()
+    rig.cycle()
+    rig.twin.trouble = {i: Trouble(Fault.SILENT) for i in IDS}
+    for _ in range(30):
+        answers, took = rig.cycle()
+        assert took <= LIMIT
+        assert set(answers.values()) == {SILENT}
+    rig.twin.trouble = {}
+    begin = rig.link.now()
+    while len(positions(rig.cycle()[0])) < 19:
+        assert rig.link.now() - begin < 0.2
+
+
+def test_servos_that_do_not_know_fast_reads_are_asked_slowly() -> None:
+    rig = Rig(speaks_fast=False)
+    for _ in range(6):
+        answers, took = rig.cycle()
+        assert took <= LIMIT
+        assert len(positions(answers)) >= 18
+    assert not rig.bus.fast
+    answers, took = rig.cycle()
+    assert took < 0.005
+    assert positions(answers) == TRUE
+
+
+def test_a_silent_first_servo_does_not_end_fast_reads() -> None:
+    rig = Rig()
+    rig.twin.trouble[1] = Trouble(Fault.SILENT)
+    for _ in range(20):
+        rig.cycle()
+    assert rig.bus.fast
+
+
+def test_goals_reach_all_servos() -> None:
+    rig = Rig()
+    rig.bus.write_all(116, {i: (50 * i).to_bytes(4, "little") for i in IDS})
+    rig.link.sleep(0.01)
+    assert [servo.get("goal_position") for servo in rig.twin.servos] == [50 * i for i in IDS]
+
+
+def test_values_that_do_not_fit_are_not_sent() -> None:
+    rig = Rig()
+    with pytest.raises(ValueError, match="as many bytes"):
+        rig.bus.write_all(116, {1: b"\0\0\0\0", 2: b"\0\0"})
+    assert positions(rig.cycle()[0]) == TRUE
+
+
+def test_a_babbling_bus_is_given_up_in_time() -> None:
+    class Noise(Link):
+        def read(self, most: int, timeout: float) -> bytes:
+            self.sleep(min(timeout, 0.0003))
+            return b"\xff\xff\xfd\x00\x01"
+
+        def drain(self) -> int:
+            return 5
+
+    link = Noise(Rig().twin)
+    bus = Bus(link, clock=link.now)
+    assert set(bus.read_all(IDS, MOTION).values()) == {SILENT}
+    assert link.now() <= 0.011
+    with pytest.raises(PortError, match="quiet"):
+        bus.write_all(116, {1: bytes(4)})
+
+
+def test_the_wall_clock_is_never_asked(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail() -> float:
+        raise AssertionError("wall clock")
+
+    monkeypatch.setattr(time, "time", fail)
+    link = Link(Rig().twin)
+    assert positions(Bus(link, clock=link.now).read_all(IDS, MOTION)) == TRUE
+    assert Bus(link).timing == Timing()
+
+
+def test_B12_an_alert_comes_with_the_value_and_names_its_cause() -> None:
+    rig = Rig()
+    rig.servo(4).fail(0b100000)
+    answers, _ = rig.cycle()
+    said = answers[4]
+    assert isinstance(said, Value)
+    assert said.alert
+    assert [i for i, a in answers.items() if isinstance(a, Value) and a.alert] == [4]
+    assert rig.bus.read(4, Span(70, 1)) == Value(b"\x20", alert=True)
+
+
+def test_refusals_have_their_reason() -> None:
+    rig = Rig()
+    assert rig.bus.read(4, Span(66, 1)) == Refused(StatusError.ACCESS, alert=False)
+    assert rig.bus.write(4, 132, bytes(4)) == Refused(StatusError.ACCESS, alert=False)
+    assert rig.bus.write(4, 116, bytes(2)) == Refused(StatusError.DATA_LENGTH, alert=False)
+    assert rig.bus.write(4, 65, b"\x07") == Refused(StatusError.DATA_RANGE, alert=False)
+    answers = rig.bus.read_all(IDS, Span(66, 1))
+    assert set(answers.values()) == {Refused(StatusError.ACCESS, alert=False)}
+
+
+def test_B15_all_as_expected() -> None:
+    rig = Rig()
+    table = bringup.require(rig.bus, MODELS)
+    assert [row.servo for row in table] == IDS
+    assert rig.link.now() < 3.0
+
+
+def test_B15_missing_wrong_double_and_strange_servos_are_named_within_3_s() -> None:
+    rig = Rig()
+    rig.twin.trouble[2] = Trouble(Fault.SILENT)
+    rig.twin.servos[4] = Servo(XL330_M288, 5)
+    rig.twin.servos.append(Servo(XL330_M288, 19, position=5.0, t=0.3))
+    rig.twin.servos.append(Servo(XL330_M288, 42))
+    rig.link.sleep(1.0)
+    begin = rig.link.now()
+    with pytest.raises(BringUpError) as caught:
+        bringup.require(rig.bus, MODELS)
+    assert rig.link.now() - begin < 3.0
+    said = str(caught.value)
+    assert "expected 19 servos, found 16 fit" in said
+    for part in ("id 2: silent", "id 5: expected model XC430", "id 19: answers collide", "id 42"):
+        assert part in said
+    assert not any(servo.torque for servo in rig.twin.servos)
+
+
+def test_B10_torque_goes_on_without_a_jump() -> None:
+    rng = np.random.default_rng(10)
+    for _ in range(20):
+        rig = Rig()
+        for servo in rig.twin.servos:
+            servo.set("goal_position", int(rng.integers(0, 4096)))
+        bringup.enable(rig.bus, IDS)
+        for _ in range(50):
+            rig.link.sleep(0.01)
+            for servo in rig.twin.servos:
+                assert servo.torque
+                assert abs(servo.get("goal_position") - servo.position) <= 5
+                assert abs(servo.position - 100 * servo.get("id")) <= 5
+
+
+def test_B9_latched_watchdogs_are_seen_and_rearmed_in_place() -> None:
+    rig = Rig()
+    bringup.arm_watchdogs(rig.bus, IDS)
+    bringup.enable(rig.bus, IDS)
+    rig.bus.write_all(116, {i: (100 * i + 500).to_bytes(4, "little") for i in IDS})
+    rig.link.sleep(0.5)
+    watchdog = Span(98, 1)
+    said = rig.bus.read_all(IDS, watchdog)
+    assert set(said.values()) == {Value(b"\xff", alert=False)}
+    with pytest.raises(BringUpError, match="goal_position"):
+        bringup.hold_here(rig.bus, IDS)
+    before = [servo.position for servo in rig.twin.servos]
+    bringup.arm_watchdogs(rig.bus, IDS)
+    assert [servo.get("bus_watchdog") for servo in rig.twin.servos] == [5] * 19
+    assert [servo.position for servo in rig.twin.servos] == pytest.approx(before, abs=1.0)
+
+
+def test_B9_extended_mode_with_an_offset_is_refused() -> None:
+    rig = Rig()
+    rig.servo(8).set("operating_mode", 4)
+    rig.servo(8).set("homing_offset", 100)
+    with pytest.raises(BringUpError, match=r"\[8\]"):
+        bringup.arm_watchdogs(rig.bus, IDS)
+
+
+def test_B19_torque_off_is_confirmed_and_what_did_not_is_named() -> None:
+    rig = Rig(loss=0.05)
+    bringup.enable(rig.bus, IDS)
+    rig.twin.trouble[6] = Trouble(Fault.SILENT)
+    assert bringup.disable(rig.bus, IDS) == [6]
+    assert [servo.torque for servo in rig.twin.servos] == [i == 6 for i in IDS]

@@ -1,0 +1,300 @@
+"""A session before the twin, in invented time: nothing moves unless all is well."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from antennate.errors import BadInputError, ConfigError
+from antennate.experiments.twin import Rig, TwinConfig, rig
+from antennate.hardware.causes import Cause, State
+from antennate.hardware.drive import DriveConfig, await_board, decider, drive, require_servos
+from antennate.hardware.dynamixel.bringup import BringUpError
+from antennate.hardware.session import Session
+from antennate.params.layout import LayoutParams
+from antennate.records import AntennaFrame, Maneuver, Pose
+from antennate.twin.bus import Fault, Trouble
+from antennate.twin.faults import Faults, read
+
+CONFIG = DriveConfig(dry_run=1.0, duration=3.0)
+
+
+class Log:
+    """What was seen after every tick: time, state, causes, maneuver and goals."""
+
+    def __init__(self, rig: Rig, act: Callable[[Rig, float], None] | None = None) -> None:
+        self.rig, self._act = rig, act
+        self.t: list[float] = []
+        self.state: list[State] = []
+        self.causes: list[set[Cause]] = []
+        self.texts: list[str] = []
+        self.goals: list[list[int]] = []
+
+    def __call__(self, session: Session, t: float) -> None:
+        out = session.outputs
+        assert out is not None
+        self.t.append(t)
+        self.state.append(out.state)
+        self.causes.append({active.cause for active in out.causes})
+        self.texts.append("; ".join(active.text for active in out.causes))
+        self.goals.append([servo.get("goal_position") for servo in self.rig.robot.servos])
+        if self._act is not None:
+            self._act(self.rig, t)
+
+    def first(self, cause: Cause) -> float:
+        return next(t for t, causes in zip(self.t, self.causes, strict=True) if cause in causes)
+
+
+def walked(act: Callable[[Rig, float], None] | None = None, config: DriveConfig = CONFIG) -> Log:
+    made = rig(TwinConfig())
+    log = Log(made, act)
+    drive(made.session, config, arm=True, on_tick=log)
+    return log
+
+
+def at(when: float, demand: str) -> Callable[[Rig, float], None]:
+    """Let a fault happen."""
+    faults: list[Faults] = []
+
+    def act(rig: Rig, t: float) -> None:
+        if not faults:
+            faults.append(Faults([read(f"{demand}@{when}s")], tuple(LayoutParams().ids)))
+        faults[0].apply(rig.robot, t)
+
+    return act
+
+
+def test_a_dry_run_writes_nothing_to_any_servo() -> None:
+    made = rig(TwinConfig())
+    before = [bytes(servo._memory[64:70]) for servo in made.robot.servos]
+    goals = [servo.get("goal_position") for servo in made.robot.servos]
+    report = drive(made.session, CONFIG, arm=False)
+    assert report.timing is not None
+    assert report.timing.ticks == pytest.approx(100, abs=1)
+    assert [bytes(servo._memory[64:70]) for servo in made.robot.servos] == before
+    assert [servo.get("goal_position") for servo in made.robot.servos] == goals
+    assert made.session.tally.sent == 0
+
+
+def test_it_arms_walks_and_ends_without_torque() -> None:
+    log = walked()
+    assert State.OK in log.state
+    assert log.rig.session.tally.sent > 250
+    assert not any(servo.torque for servo in log.rig.robot.servos)
+    legs = np.ptp([goals[5:17] for goals in log.goals], axis=0)
+    assert (legs > 4096).all()  # more than a turn in 3 s at half a turn a second
+
+
+def test_B10_torque_comes_on_with_goals_where_servos_stand_and_they_move_slowly() -> None:
+    log = walked()
+    on = next(i for i, state in enumerate(log.state) if state is not State.OFF)
+    standing = np.rint([servo.position for servo in rig(TwinConfig()).robot.servos])
+    assert abs(np.array(log.goals[on]) - standing).max() <= 5
+    steps = abs(np.diff(log.goals[on : on + 50], axis=0))
+    assert steps.max() <= math.ceil(4.5 * 0.01 / (2 * math.pi / 4096))
+
+
+def test_L8_L9_a_silent_board_makes_it_hold_within_100_ms_and_its_return_walk() -> None:
+    def act(rig: Rig, t: float) -> None:
+        rig.robot.board_silent = 2.0 <= t < 2.5
+
+    log = walked(act)
+    t = np.array(log.t)
+    state = np.array(log.state)
+    held = t[(t > 2.0) & (state >= State.HOLD)]
+    assert held[0] - 2.0 <= 0.1
+    still = [g for g, when in zip(log.goals, log.t, strict=True) if held[0] <= when < 2.5]
+    assert len({tuple(g) for g in still}) == 1
+    assert (state[t > 3.5] <= State.DEGRADED).all()
+
+
+def test_E1_a_board_that_resets_is_counted_and_used_again_within_a_second_of_its_greeting() -> None:
+    log = walked(at(2.0, "esp32=reset"))
+    clock = log.rig.session.board.clock
+    assert clock.resets == 1
+    assert "HARD" in " ".join(log.texts)
+    t, state = np.array(log.t), np.array(log.state)
+    assert (state[(t > 2.11) & (t < 2.5)] >= State.HOLD).all()
+    assert (state[t > 3.5] <= State.DEGRADED).all()
+
+
+def test_S1_an_open_wire_makes_it_hold_and_says_which_side() -> None:
+    log = walked(at(2.0, "esp32=open_left"))
+    t, state = np.array(log.t), np.array(log.state)
+    assert (state[t > 2.11] >= State.HOLD).all()
+    assert any("(l" in text or "l)" in text for text in log.texts[-5:])
+
+
+def test_B1_a_silent_servo_is_named_within_100_ms_and_the_others_keep_their_torque() -> None:
+    log = walked(at(2.0, "servo:7=silent"))
+    named = next(t for t, s in zip(log.t, log.texts, strict=True) if "servo 7" in s)
+    assert named - 2.0 <= 0.1
+    assert log.state[-1] >= State.HOLD
+
+
+@pytest.mark.parametrize("what", ["overload", "overheat", "voltage"])
+def test_B12_a_hardware_error_is_named_within_200_ms_and_it_holds(what: str) -> None:
+    log = walked(at(2.0, f"servo:9={what}"))
+    at_error = log.first(Cause.SERVO_ERROR)
+    assert at_error - 2.0 <= 0.2
+    assert any("servo 9" in text for text in log.texts)
+    assert log.state[-1] >= State.FAULT
+
+
+def test_B6_a_cut_bus_makes_it_hold_within_100_ms() -> None:
+    log = walked(at(2.0, "bus=silent"))
+    t, state = np.array(log.t), np.array(log.state)
+    assert t[(t > 2.0) & (state >= State.HOLD)][0] - 2.0 <= 0.1
+
+
+def test_B7_T5_servos_stop_by_themselves_within_120_ms_of_the_last_packet() -> None:
+    made = rig(TwinConfig())
+    drive_until(made, 2.0)
+    end = made.clock.now()
+    made.clock.sleep_until(end + 0.120)
+    assert all(servo.get("bus_watchdog") == -1 for servo in made.robot.servos)
+    stood = [servo.position for servo in made.robot.servos]
+    made.clock.sleep_until(end + 0.5)
+    moved = abs(np.array([servo.position for servo in made.robot.servos]) - stood)
+    assert moved.max() < 100  # settling, not walking: a leg would turn by 780 ticks
+
+
+def drive_until(made: Rig, t: float) -> None:
+    """Walk, then stop dead, as a killed program does."""
+
+    class Killed(BaseException):
+        pass
+
+    def kill(session: Session, now: float) -> None:
+        if now >= t:
+            made.session.release = list  # type: ignore[method-assign]
+            raise Killed
+
+    with pytest.raises(Killed):
+        drive(made.session, CONFIG, arm=True, on_tick=kill)
+
+
+def test_B8_a_controller_that_fails_does_not_feed_the_watchdogs() -> None:
+    class Broken:
+        def __init__(self, sound: object) -> None:
+            self._sound = sound
+            self.maneuver, self.contact = sound.maneuver, sound.contact  # type: ignore[attr-defined]
+            self.ticks = 0
+
+        def step(self, frame: AntennaFrame) -> Pose:
+            self.ticks += 1
+            if self.ticks > 200:
+                raise ValueError("a bug")
+            pose = self._sound.step(frame)  # type: ignore[attr-defined]
+            self.maneuver, self.contact = self._sound.maneuver, self._sound.contact  # type: ignore[attr-defined]
+            return pose
+
+    made = rig(TwinConfig())
+    made.session.decider = Broken(made.session.decider)
+    log = Log(made)
+    drive(made.session, CONFIG, arm=True, on_tick=log)
+    t = np.array(log.t)
+    failed = log.first(Cause.FAILED)
+    assert any("ValueError: a bug" in text for text in log.texts)
+    state = np.array(log.state)
+    assert (state[(t >= failed) & (t < failed + 0.02)] >= State.HOLD).all()
+    assert log.first(Cause.REPEATED_FAILURES) - failed <= 0.1
+
+
+@pytest.mark.parametrize("bad", [math.nan, math.inf])
+def test_S5_B14_a_pose_that_is_not_finite_never_reaches_the_bus(bad: float) -> None:
+    made = rig(TwinConfig())
+    sound = made.session.decider.step
+
+    def step(frame: AntennaFrame) -> Pose:
+        pose = sound(frame)
+        if made.clock.now() > 2.0:
+            pose.leg[0, 2, 1] = bad
+        return pose
+
+    made.session.decider.step = step  # type: ignore[method-assign]
+    log = Log(made)
+    drive(made.session, CONFIG, arm=True, on_tick=log)
+    assert Cause.BAD_ACTION in set().union(*log.causes)
+    bad_since = log.first(Cause.BAD_ACTION)
+    sent = {tuple(g) for g, t in zip(log.goals, log.t, strict=True) if t >= bad_since}
+    assert len(sent) == 1
+
+
+def test_B19_stopping_takes_torque_off_and_verifies_it_within_2_s() -> None:
+    made = rig(TwinConfig())
+
+    def stop(session: Session, t: float) -> None:
+        if t > 2.0:
+            raise KeyboardInterrupt
+
+    report = drive(made.session, CONFIG, arm=True, on_tick=stop)
+    assert made.clock.now() - 2.0 <= 2.0
+    assert report.safe
+    assert not any(servo.torque for servo in made.robot.servos)
+
+
+def test_B19_a_servo_that_does_not_confirm_is_named() -> None:
+    made = rig(TwinConfig())
+
+    def stop(session: Session, t: float) -> None:
+        if t > 2.0:
+            made.robot.bus.trouble[4] = Trouble(Fault.SILENT)
+            raise KeyboardInterrupt
+
+    report = drive(made.session, CONFIG, arm=True, on_tick=stop)
+    assert report.on == [4]
+    assert not report.safe
+
+
+def test_L14_a_port_without_a_board_is_refused_and_the_text_says_what_came() -> None:
+    made = rig(TwinConfig())
+    made.robot.board_silent = True
+    made.robot.take()
+    with pytest.raises(BadInputError, match=r"--esp32: expected an antenna board .* swapped"):
+        await_board(made.session.board, made.clock)
+
+
+@pytest.mark.parametrize(
+    ("spoil", "said"),
+    [
+        (lambda robot: robot.bus.servos.pop(6), "id 7: silent"),
+        (lambda robot: robot.servos[0].set("model_number", 1200), "id 1: expected model XC430"),
+        (lambda robot: robot.servos[8].set("operating_mode", 3), r"mode .* \[9\]"),
+    ],
+)
+def test_B15_servos_that_are_not_as_expected_are_refused(
+    spoil: Callable[[object], object], said: str
+) -> None:
+    made = rig(TwinConfig())
+    spoil(made.robot)
+    with pytest.raises(BringUpError, match=said):
+        require_servos(made.session.bus, LayoutParams())
+
+
+@pytest.mark.parametrize("name", ["clsoed", "antennate.controller:Nobody", "no_such_module:X"])
+def test_a_controller_that_does_not_exist_is_refused(name: str) -> None:
+    with pytest.raises(ConfigError, match="--controller"):
+        decider(DriveConfig(controller=name))
+
+
+def test_a_controller_of_ones_own_is_taken() -> None:
+    made = decider(DriveConfig(controller="antennate.controller:Controller"))
+    assert int(made.maneuver[0]) == Maneuver.FORWARD
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("servo:7", "expected TARGET=WHAT"),
+        ("servo:7=asleep", "expected one of silent"),
+        ("esp32=loss", "expected one of silent, reset"),
+        ("servo:99=silent", "expected a servo of 1, 2"),
+    ],
+)
+def test_faults_that_do_not_exist_are_refused(text: str, said: str) -> None:
+    with pytest.raises(BadInputError, match=said):
+        Faults([read(text)], LayoutParams().ids)

@@ -1,0 +1,107 @@
+"""The twin robot: the hardware code cannot tell it from the simulation it is made of."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from antennate.experiments.tunnel import TunnelConfig
+from antennate.experiments.twin import Decisions, on_twin, simulated
+from antennate.hardware.joints import Joints, PoseError
+from antennate.params.layout import LayoutParams
+from antennate.records import Maneuver, Pose
+from antennate.twin.robot import TwinRobot
+
+LAYOUT = LayoutParams()
+MIRRORED = LayoutParams.model_validate(
+    {
+        "yaw": {"ids": (5, 4, 3, 2, 1), "directions": (-1,) * 5, "zeros": (1500,) * 5},
+        "legs": {"ids": tuple(range(40, 52)), "directions": (1, -1) * 6, "zeros": (0,) * 12},
+        "antennae": {"ids": (61, 60), "directions": (-1, 1), "zeros": (1024, 3072)},
+    }
+)
+
+
+def pose(yaw: float = 0.0, leg: float = 0.0) -> Pose:
+    return Pose(yaw=np.full((1, 5), yaw), leg=np.full((1, 6, 2), leg), antenna=np.zeros((1, 2)))
+
+
+def test_a_quarter_turn_is_1024_ticks_from_the_middle_and_directions_count() -> None:
+    ticks = Joints(LAYOUT).ticks(pose(yaw=math.pi / 2, leg=4 * math.pi))
+    assert ticks[:5].tolist() == [3072] * 5
+    assert ticks[5:17].tolist() == [2048 + 2 * 4096] * 12
+    assert Joints(MIRRORED).ticks(pose(yaw=math.pi / 2))[:5].tolist() == [1500 - 1024] * 5
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"yaw": {"ids": (1, 2)}}, "yaw.ids must have 5 entries, got 2"),
+        ({"antennae": {**LAYOUT.antennae.model_dump(), "ids": (1, 19)}}, "ids must differ, got 1"),
+        ({"yaw": {**LAYOUT.yaw.model_dump(), "zeros": (2048,) * 4 + (100,)}}, "quarter turn"),
+    ],
+)
+def test_a_layout_that_no_robot_can_have_is_refused(change: dict[str, object], said: str) -> None:
+    with pytest.raises(ValidationError, match=said):
+        LayoutParams.model_validate(change)
+
+
+@pytest.mark.parametrize("layout", [LAYOUT, MIRRORED])
+def test_ticks_and_back_lose_half_a_tick_at_most(layout: LayoutParams) -> None:
+    joints, rng = Joints(layout), np.random.default_rng(5)
+    sent = Pose(
+        yaw=rng.uniform(-1, 1, (1, 5)),
+        leg=rng.uniform(-300, 300, (1, 6, 2)),
+        antenna=rng.uniform(-1, 1, (1, 2)),
+    )
+    back = joints.pose(joints.ticks(sent))
+    half = math.pi / 4096 * (1 + 1e-9)
+    for name in ("yaw", "leg", "antenna"):
+        np.testing.assert_allclose(getattr(back, name), getattr(sent, name), atol=half, rtol=0)
+
+
+@pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf, 1e4])
+def test_B14_a_goal_that_is_not_finite_or_too_far_is_refused_as_a_whole(bad: float) -> None:
+    sent = pose()
+    sent.leg[0, 3, 1] = bad
+    with pytest.raises(PoseError, match="servo 13"):
+        Joints(LAYOUT).ticks(sent)
+
+
+def test_B14_a_pose_of_two_robots_is_refused() -> None:
+    two = Pose(np.zeros((2, 5)), np.zeros((2, 6, 2)), np.zeros((2, 2)))
+    with pytest.raises(PoseError, match="19"):
+        Joints(LAYOUT).ticks(two)
+
+
+@pytest.mark.parametrize("layout", [LAYOUT, MIRRORED])
+@pytest.mark.parametrize(("arm", "trial"), [("closed", 1), ("paper", 0)])
+def test_a_whole_trial_through_bytes_is_decided_like_the_pure_simulation(
+    arm: str, trial: int, layout: LayoutParams
+) -> None:
+    config = TunnelConfig(seed=0)
+    pure = simulated(config, arm, trial, layout)
+    twin = on_twin(config, arm, trial, layout)
+    assert len({Maneuver.FORWARD, Maneuver.REVERSE} & set(pure.maneuvers)) == 2
+    assert twin == pure
+
+
+def test_a_board_that_falls_silent_makes_the_robot_hold_within_100_ms() -> None:
+    """Row L8: UNKNOWN after 50 ms, decided at the next tick; the pose then stays."""
+    config = TunnelConfig(seed=0, time_limit=2.0)
+    ticks = 0
+
+    def cut(robot: TwinRobot) -> None:
+        nonlocal ticks
+        ticks += 1
+        if ticks > 100:
+            robot.board_silent = True
+
+    found: Decisions = on_twin(config, "open", 0, LAYOUT, cut)
+    first = found.maneuvers.index(Maneuver.HOLD)
+    assert 100 < first <= 100 + 10
+    assert set(found.maneuvers[first:]) == {Maneuver.HOLD}
+    assert math.isnan(found.counts[-1][0])
