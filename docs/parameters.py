@@ -15,7 +15,7 @@ HEAD = """\
 
 Every physical number of the project: its default, its unit, what it means and where it comes from.
 A source begins with `paper` (arXiv:2603.07795), `datasheet`, `measured`, `fitted` or `assumed`.
-This page is generated: change `src/antennate/params.py`, then run `python docs/parameters.py`.
+This page is generated: change `src/antennate/params/`, then run `python docs/parameters.py`.
 """
 COMMANDS = """\
 # Parameters of commands
@@ -41,6 +41,7 @@ def commands() -> list[type[params.Params]]:
     """Return the classes that hold the top level of a command's parameters."""
     names = sorted(module.name for module in pkgutil.iter_modules(experiments.__path__))
     modules = [importlib.import_module(f"{experiments.__name__}.{name}") for name in names]
+    modules.append(importlib.import_module("antennate.hardware.drive"))
     return [group for module in modules for group in groups(module)]
 
 

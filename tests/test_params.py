@@ -48,7 +48,7 @@ def numeric() -> list[tuple[type[Params], str, object]]:
     found = []
     for cls, name in fields():
         default = cls.model_fields[name].default
-        sample = default[0] if isinstance(default, tuple) else default
+        sample = default[0] if isinstance(default, tuple) and default else default
         if isinstance(sample, int | float) and not isinstance(sample, bool):
             found.append((cls, name, default))
     return found

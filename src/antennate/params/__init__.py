@@ -9,6 +9,7 @@ properties, computed here and never typed.
 from antennate.params.antenna import N_MM_PER_DEG, AntennaParams
 from antennate.params.base import Params, number
 from antennate.params.bench import BenchVariationParams, WallParams
+from antennate.params.layout import JointsParams, LayoutParams
 from antennate.params.mind import (
     ConditioningParams,
     ControllerParams,
@@ -55,6 +56,8 @@ __all__ = [
     "FlatWallParams",
     "GaitParams",
     "GapWallParams",
+    "JointsParams",
+    "LayoutParams",
     "Params",
     "PhysicsParams",
     "RepetitionParams",
