@@ -13,11 +13,13 @@ from antennate.experiments.twin import Rig, TwinConfig, rig
 from antennate.hardware.causes import Cause, State
 from antennate.hardware.drive import DriveConfig, await_board, decider, drive, require_servos
 from antennate.hardware.dynamixel.bringup import BringUpError
+from antennate.hardware.port import PortError
 from antennate.hardware.session import Session
 from antennate.params.layout import LayoutParams
 from antennate.records import AntennaFrame, Maneuver, Pose
 from antennate.twin.bus import Fault, Trouble
 from antennate.twin.faults import Faults, read
+from antennate.twin.pty import PtyServer
 
 CONFIG = DriveConfig(dry_run=1.0, duration=3.0)
 
@@ -298,3 +300,48 @@ def test_a_controller_of_ones_own_is_taken() -> None:
 def test_faults_that_do_not_exist_are_refused(text: str, said: str) -> None:
     with pytest.raises(BadInputError, match=said):
         Faults([read(text)], LayoutParams().ids)
+
+
+def test_B11_a_servo_that_reboots_alone_is_a_fault_within_a_second() -> None:
+    log = walked(at(2.0, "servo:6=reboot"))
+    t, state = np.array(log.t), np.array(log.state)
+    assert t[(t > 2.0) & (state >= State.FAULT)][0] - 2.0 <= 1.0
+    assert any("servo 6" in text for text in log.texts)
+
+
+def test_B9_a_tripped_watchdog_is_named_within_200_ms() -> None:
+    done: list[float] = []
+
+    def act(rig: Rig, t: float) -> None:
+        if t >= 2.0 and not done:
+            done.append(t)
+            rig.robot.servos[11].set("bus_watchdog", -1)
+
+    log = walked(act)
+    assert log.first(Cause.WATCHDOG) - done[0] <= 0.2
+    assert any("servo 12" in text for text in log.texts)
+
+
+def test_B13_a_sagging_supply_warns_then_holds_then_switches_off() -> None:
+    """From 11.1 V by 0.5 V a second; the manual's limit of the XC430-W240 is 6.5 V."""
+
+    def sag(rig: Rig, t: float) -> None:
+        volts = 11.1 - 0.5 * max(0.0, t - 1.5)
+        for servo in rig.robot.servos[:17]:
+            servo.set("present_input_voltage", round(10 * volts))
+
+    log = walked(sag, DriveConfig(dry_run=1.0, duration=5.0))
+    order = [log.first(c) for c in (Cause.SUPPLY_WARN, Cause.SUPPLY_HOLD, Cause.SUPPLY_OFF)]
+    assert order == sorted(order)
+    assert not any(servo.torque for servo in log.rig.robot.servos)
+    assert not any(servo.get("hardware_error_status") for servo in log.rig.robot.servos)
+
+
+def test_L15_B16_a_second_program_on_a_port_is_refused() -> None:
+    serial_port = pytest.importorskip("antennate.hardware.serial_port")
+    with PtyServer(rig(TwinConfig()).robot.bus) as server:
+        first = serial_port.SerialPort(server.path, 1_000_000)
+        with pytest.raises(PortError, match=server.path):
+            serial_port.SerialPort(server.path, 1_000_000)
+        first.close()
+        serial_port.SerialPort(server.path, 1_000_000).close()
