@@ -101,4 +101,5 @@ def _tell(report: Report, armed: bool) -> None:
         late = f"worst {1e3 * timing.worst_lateness:.1f} ms late"
         sys.stderr.write(f"\n{timing.ticks} ticks, {missed}, {late}; worst stages [ms]: {stages}")
     off = "off, verified" if report.safe else f"NOT confirmed off: servos {report.on}"
-    sys.stderr.write(f"\nworst state {report.worst.name}; torque {off}\n")
+    worst = f"{report.worst.name} ({report.why})" if report.why else report.worst.name
+    sys.stderr.write(f"\nworst state {worst}; torque {off}\n")

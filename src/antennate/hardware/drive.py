@@ -15,6 +15,7 @@ from antennate.errors import BadInputError, ConfigError
 from antennate.hardware.board import Board
 from antennate.hardware.causes import State
 from antennate.hardware.dynamixel import bringup
+from antennate.hardware.dynamixel.answers import Timing
 from antennate.hardware.dynamixel.bringup import BringUpError
 from antennate.hardware.dynamixel.bus import Bus
 from antennate.hardware.dynamixel.tables import EXTENDED_MODE, XC430_W240, XL330_M288
@@ -33,6 +34,8 @@ _GREETING_TIME = 3.0
 _ARMING_TIME = 1.0
 """Time after which torque must have come on, or the drive ends [s]."""
 _PATIENCE = 0.05
+_DOUBT = 0.07
+"""Longest that a late answer is waited for [s]: less than the watchdogs' 100 ms."""
 _POSITION_MODE = 3
 _BOARD_BAUD = 115_200
 
@@ -60,12 +63,13 @@ class Report:
 
     Attributes:
         timing: How well the pace was kept, None if no tick was run.
-        worst: Worst state after torque had come on.
+        worst: Worst state after torque had come on, and why.
         on: Servos that did not confirm that their torque is off.
     """
 
     timing: TimingReport | None = None
     worst: State = State.OK
+    why: str = ""
     on: list[int] = field(default_factory=list[int])
 
     @property
@@ -104,7 +108,7 @@ def prepare(config: DriveConfig, esp32: Port, bus: Port, clock: Any) -> Session:
     """A session before two open ports, after both sides have said who they are."""
     board = Board(esp32, config.limits.stale_age)
     await_board(board, clock)
-    master = Bus(bus, clock=clock.now)
+    master = Bus(bus, Timing(config.layout.baud, doubt=_DOUBT), clock=clock.now)
     require_servos(master, config.layout)
     return Session(
         board=board,
@@ -217,8 +221,8 @@ def drive(
         t = clock.now() - start
         session.orders.arm = t >= walk
         out = session.outputs
-        if out is not None and out.torque:
-            report.worst = max(report.worst, out.state)
+        if out is not None and out.torque and out.state > report.worst:
+            report.worst, report.why = out.state, "; ".join(c.text for c in out.causes)
         on_tick(session, clock.now())
         failed = out is not None and t > walk + _ARMING_TIME and out.state >= State.FAULT
         return t < end and not failed

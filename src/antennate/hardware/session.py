@@ -230,8 +230,7 @@ class Session:
     def _arm(self, pose: Pose) -> None:
         """Torque on where everything stands; legs count their turns from there."""
         bringup.arm_watchdogs(self.bus, self.joints.ids)
-        bringup.enable(self.bus, self.joints.ids)
-        present = bringup.hold_here(self.bus, self.joints.ids)
+        present = bringup.enable(self.bus, self.joints.ids)
         here = np.array([present[servo] for servo in self.joints.ids], float)
         self.joints.align(here, pose)
         self._goals = here

@@ -34,7 +34,7 @@ class ServoWatch:
         bus_error: What is wrong with the bus as a whole, empty if nothing is.
     """
 
-    def __init__(self, bus: Bus, ids: tuple[int, ...], budget: float = 0.006) -> None:
+    def __init__(self, bus: Bus, ids: tuple[int, ...], budget: float = 0.007) -> None:
         self._bus = bus
         self._ids = ids
         self._budget = budget
@@ -57,8 +57,9 @@ class ServoWatch:
 
     def _look(self) -> None:
         answers = self._bus.read_all(self._ids, POSITION, self._budget)
+        dead = not any(isinstance(said, Value) for said in answers.values())
         for servo, said in answers.items():
-            self._note(servo, said)
+            self._note(servo, said, dead)
         at = next(self._turn)
         servo = self._ids[at]
         if self.missed[servo]:
@@ -71,9 +72,12 @@ class ServoWatch:
         if at == 0 and (volts := self._one(servo, Span(_VOLTAGE.address, 2))) is not None:
             self.supply = _VOLT * _VOLTAGE.decode(volts)
 
-    def _note(self, servo: int, said: Answer) -> None:
-        if not isinstance(said, Value):
-            self.missed[servo] += 1
+    def _note(self, servo: int, said: Answer, dead: bool) -> None:
+        if not isinstance(
+            said, Value
+        ):  # one that was not asked for want of time has missed nothing
+            asked = self._bus.missed.get(servo, 0)
+            self.missed[servo] = self.missed[servo] + 1 if dead else max(self.missed[servo], asked)
             return
         self.missed[servo] = 0
         self.positions[servo] = _POSITION.decode(said.data)

@@ -37,12 +37,15 @@ class DrivenServo(Servo):
     _stood: float | None = None
 
     def goal(self) -> float:
-        """Where it pulls to [ticks]: where it stopped after a stop; nowhere without torque."""
-        if self.torque and self._stopped:
-            self._stood = self.position if self._stood is None else self._stood
-            return self._stood
-        self._stood = None
-        return float(self.get("goal_position")) if self.torque else self.position
+        """Where it pulls to [ticks]; where it stood when it was stopped or lost its torque.
+
+        A gear of 245 to 1 does not let a leg sink.
+        """
+        if self.torque and not self._stopped:
+            self._stood = None
+            return float(self.get("goal_position"))
+        self._stood = self.position if self._stood is None else self._stood
+        return self._stood
 
     def _speed(self) -> float:
         return 0.0

@@ -107,14 +107,15 @@ def arm_watchdogs(bus: Bus, ids: Sequence[int], counts: int = WATCHDOG_COUNTS) -
     _write_checked(bus, _COMMON["bus_watchdog"], dict.fromkeys(ids, counts))
 
 
-def enable(bus: Bus, ids: Sequence[int]) -> None:
-    """Torque on, each servo where it stands.
+def enable(bus: Bus, ids: Sequence[int]) -> dict[int, int]:
+    """Torque on, each servo where it stands: those positions [ticks].
 
     Raises:
         BringUpError: A servo did not take it; those that did keep holding their place.
     """
-    hold_here(bus, ids)
+    present = hold_here(bus, ids)
     _write_checked(bus, _COMMON["torque_enable"], dict.fromkeys(ids, 1))
+    return present
 
 
 def disable(bus: Bus, ids: Sequence[int]) -> list[int]:

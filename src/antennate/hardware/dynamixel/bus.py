@@ -76,6 +76,11 @@ class Bus:
         """Groups are read with fast sync reads."""
         return self._fast
 
+    @property
+    def missed(self) -> Mapping[int, int]:
+        """Requests in a row that a servo left unanswered, by id, of those it was asked."""
+        return self._missed
+
     def write_all(self, address: int, data: Mapping[int, bytes]) -> None:
         """Write equally many bytes to several servos at once; none answers."""
         if not self._send(packets.sync_write(address, data), self._clock() + BUSY):
