@@ -22,6 +22,7 @@ WATCHDOG_COUNTS = 5
 """Bus watchdog: a servo stops 100 ms after the last packet."""
 
 _TRIES = 5
+_PINGS = 3
 _BUDGET = 0.1
 """Time for one reading of all, outside the control loop [s]."""
 _COMMON = XC430_W240.registers
@@ -157,7 +158,11 @@ def _write_checked(bus: Bus, register: Register, values: Mapping[int, int]) -> N
 
 
 def _look(bus: Bus, servo: int, model: int) -> Found:
-    found, firmware = _model(_data(bus.ping(servo)))
+    found = firmware = None
+    for _ in range(_PINGS):
+        found, firmware = _model(_data(bus.ping(servo)))
+        if found is not None:
+            break
     ticks = Span(_COMMON["realtime_tick"].address, 16)
     if found is None:
         return Found(servo, None, None, "silent")
