@@ -10,12 +10,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from antennate import calibration
-from antennate.calibration import Calibration, Samples
+from antennate import calibration, fitting
+from antennate.calibration import Calibration
 from antennate.cli import main
 from antennate.errors import CalibrationError, OutputError
 from antennate.experiments.calibrate import CalibrateConfig, RigParams, averaged, run
 from antennate.experiments.recording import Recording, RecordingParams, read, write
+from antennate.fitting import Samples
 from antennate.records import Floats
 
 LOW, HIGH = 1300.0, 1900.0
@@ -37,7 +38,7 @@ def simulated(
 
 
 def fit(samples: Samples, **rest: object) -> Calibration:
-    return calibration.fit(samples, "left-1", HASH, **{"draws": 20, **rest})  # pyright: ignore[reportArgumentType]
+    return fitting.fit(samples, "left-1", HASH, **{"draws": 20, **rest})  # pyright: ignore[reportArgumentType]
 
 
 @pytest.mark.parametrize("seed", range(20))

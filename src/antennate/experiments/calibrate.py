@@ -15,10 +15,11 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import Field, model_validator
 
-from antennate import calibration
-from antennate.calibration import Calibration, Samples
+from antennate import fitting
+from antennate.calibration import Calibration
 from antennate.conditioning import bending_level
 from antennate.experiments.recording import Recording, RecordingParams, read, write
+from antennate.fitting import Samples
 from antennate.params import (
     AntennaParams,
     BenchPhysicsParams,
@@ -267,7 +268,7 @@ def run(
     else:
         raw = read(Path(config.recording), config.columns)
     used = averaged(raw, config.averaging_time)
-    found = calibration.fit(
+    found = fitting.fit(
         used.samples,
         config.sensor_id,
         raw.sha256,

@@ -12,8 +12,8 @@ from typing import Literal
 
 import numpy as np
 
-from antennate.calibration import Samples
 from antennate.errors import CalibrationError
+from antennate.fitting import Samples
 from antennate.params import Params
 from antennate.params.base import number
 from antennate.records import Floats, Ints
