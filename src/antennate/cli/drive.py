@@ -16,6 +16,7 @@ from antennate.cli.progress import terminate_as_interrupt
 from antennate.errors import ConfigError
 from antennate.hardware.causes import State
 from antennate.hardware.drive import DriveConfig, Report, connect, drive
+from antennate.hardware.priority import Priority, urgent
 from antennate.hardware.session import Session
 from antennate.records import Maneuver
 
@@ -53,9 +54,13 @@ def command(argv: Sequence[str]) -> int:
     for name in ("esp32", "bus"):
         if not getattr(orders, name):
             raise ConfigError(f"--{name}: expected a serial port, found none")
-    with connect(config, orders.esp32, orders.bus) as session, terminate_as_interrupt():
+    with (
+        connect(config, orders.esp32, orders.bus) as session,
+        terminate_as_interrupt(),
+        urgent() as priority,
+    ):
         report = drive(session, config, orders.arm, _status())
-    _tell(report, orders.arm)
+    _tell(report, orders.arm, priority)
     return OK if report.safe and report.worst < State.FAULT else BAD_INPUT
 
 
@@ -92,14 +97,17 @@ def _line(session: Session, t: float) -> str:
     )
 
 
-def _tell(report: Report, armed: bool) -> None:
+def _tell(report: Report, armed: bool, priority: Priority) -> None:
     if not armed:
         sys.stderr.write("\ndry run over, nothing was written to the servos; --arm lets it walk\n")
     if (timing := report.timing) is not None:
         stages = ", ".join(f"{n} {1e3 * s.worst:.1f}" for n, s in timing.stages.items())
         missed = f"{timing.missed_cycles} missed ({100 * timing.missed_share:.2f} %)"
         late = f"worst {1e3 * timing.worst_lateness:.1f} ms late"
-        sys.stderr.write(f"\n{timing.ticks} ticks, {missed}, {late}; worst stages [ms]: {stages}")
+        sys.stderr.write(
+            f"\n{timing.ticks} ticks at {priority.value} priority, {missed}, {late}; "
+            f"worst stages [ms]: {stages}"
+        )
     off = "off, verified" if report.safe else f"NOT confirmed off: servos {report.on}"
     worst = f"{report.worst.name} ({report.why})" if report.why else report.worst.name
     sys.stderr.write(f"\nworst state {worst}; torque {off}\n")

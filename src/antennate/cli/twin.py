@@ -10,6 +10,7 @@ from antennate.cli import OK
 from antennate.cli.arguments import FromFile, parse_with
 from antennate.cli.progress import terminate_as_interrupt
 from antennate.experiments.twin import TwinConfig, build
+from antennate.hardware.priority import LEVEL, urgent
 from antennate.twin.faults import Faults, read
 from antennate.twin.serve import TwinServer
 
@@ -32,7 +33,7 @@ def command(argv: Sequence[str]) -> int:
     faults = Faults([read(text) for text in config.fault], config.layout.ids)
     robot = build(config)
     end = float("inf") if config.duration is None else config.duration
-    with TwinServer(robot, faults) as server, terminate_as_interrupt():
+    with TwinServer(robot, faults) as server, terminate_as_interrupt(), urgent(LEVEL + 1):
         sys.stdout.write(json.dumps(server.paths) + "\n")
         sys.stdout.flush()
         server.run(lambda t: t < end and robot.failure is None)

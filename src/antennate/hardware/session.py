@@ -123,7 +123,7 @@ class Session:
         windows = diagnosis or DiagnosisParams()
         self.channels = [ChannelDiagnosis(windows, band) for _ in range(2)]
         self.supervisor = Supervisor(limits or SupervisorParams())
-        self.watch = ServoWatch(bus, joints.ids)
+        self.watch = ServoWatch(bus, joints.ids, clock.now)
         self.orders = Orders()
         self.tally = Tally()
         self.timing: LoopTiming | None = None

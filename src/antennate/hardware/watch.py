@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from itertools import cycle
 
 from antennate.hardware.dynamixel.answers import POSITION, Answer, Span, Value
@@ -15,6 +16,10 @@ _WATCHDOG = XC430_W240["bus_watchdog"]
 _VOLTAGE = XC430_W240["present_input_voltage"]
 _POSITION = XC430_W240["present_position"]
 _VOLT = 0.1
+_ALONE = 0.003
+"""Time for one servo asked alone [s]."""
+_PATIENCE = 10
+"""Ticks after which watchdogs and supply are looked at even if time is short."""
 
 
 class ServoWatch:
@@ -23,7 +28,8 @@ class ServoWatch:
     Args:
         bus: The bus.
         ids: All servos; the first one tells the voltage of the supply.
-        budget: Time for the positions [s].
+        clock: Monotonic time [s].
+        budget: Time for the positions [s]; the rest waits for the next tick if they took all of it.
 
     Attributes:
         positions: Newest position by id [ticks].
@@ -34,11 +40,19 @@ class ServoWatch:
         bus_error: What is wrong with the bus as a whole, empty if nothing is.
     """
 
-    def __init__(self, bus: Bus, ids: tuple[int, ...], budget: float = 0.007) -> None:
+    def __init__(
+        self,
+        bus: Bus,
+        ids: tuple[int, ...],
+        clock: Callable[[], float],
+        budget: float = 0.007,
+    ) -> None:
         self._bus = bus
+        self._clock = clock
         self._ids = ids
         self._budget = budget
         self._turn = cycle(range(len(ids)))
+        self._waited = 0
         self.positions: dict[int, int] = {}
         self.missed: dict[int, int] = dict.fromkeys(ids, 0)
         self.errors: dict[int, str] = {}
@@ -56,10 +70,15 @@ class ServoWatch:
             self.missed = {servo: count + 1 for servo, count in self.missed.items()}
 
     def _look(self) -> None:
+        end = self._clock() + self._budget
         answers = self._bus.read_all(self._ids, POSITION, self._budget)
         dead = not any(isinstance(said, Value) for said in answers.values())
         for servo, said in answers.items():
             self._note(servo, said, dead)
+        self._waited += 1
+        if self._clock() + _ALONE > end and self._waited < _PATIENCE:
+            return
+        self._waited = 0
         at = next(self._turn)
         servo = self._ids[at]
         if self.missed[servo]:
@@ -89,5 +108,5 @@ class ServoWatch:
             self.errors.pop(servo, None)
 
     def _one(self, servo: int, span: Span) -> bytes | None:
-        said = self._bus.read_all([servo], span, 0.003)[servo]
+        said = self._bus.read_all([servo], span, _ALONE)[servo]
         return said.data if isinstance(said, Value) else None

@@ -174,8 +174,9 @@ class ServoBus:
         address, length = _two_words(params)
         names = params[4:]
         chain: list[tuple[Servo, Status]] = []
+        known = {servo.get("id"): servo for servo in reversed(present)}
         for name in names if self.fast else b"":
-            servo = next((s for s in present if s.get("id") == name), None)
+            servo = known.get(name)
             if servo is None:
                 break
             chain.append((servo, _answer(servo, name, *servo.read(address, length))))

@@ -49,6 +49,10 @@ class Servo:
         self.eeprom_writes = 0
         self._memory = bytearray(max(r.address + r.size for r in table.registers.values()))
         self._starts = {r.address: r for r in table.registers.values()}
+        self._where = {
+            r.name: (slice(r.address, r.address + r.size), r.size, r.signed)
+            for r in table.registers.values()
+        }
         self._defined = {
             a for r in self._starts.values() for a in range(r.address, r.address + r.size)
         }
@@ -64,15 +68,13 @@ class Servo:
 
     def get(self, name: str) -> int:
         """The value of a register."""
-        register = self.table[name]
-        return register.decode(
-            bytes(self._memory[register.address : register.address + register.size])
-        )
+        where, _, signed = self._where[name]
+        return int.from_bytes(self._memory[where], "little", signed=signed)
 
     def set(self, name: str, value: int) -> None:
         """Change a register, whatever its access."""
-        register = self.table[name]
-        self._memory[register.address : register.address + register.size] = register.encode(value)
+        where, size, signed = self._where[name]
+        self._memory[where] = value.to_bytes(size, "little", signed=signed)
 
     @property
     def position(self) -> float:
@@ -113,6 +115,8 @@ class Servo:
 
     def advance(self, t: float) -> None:
         """Let time pass until t [s]."""
+        if t <= self._t:
+            return
         trip = self._trip_time()
         if trip < t:
             self._move(trip)

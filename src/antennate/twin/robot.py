@@ -17,6 +17,7 @@ from antennate.hardware.dynamixel.tables import EXTENDED_MODE, XC430_W240, XL330
 from antennate.hardware.esp32 import frame
 from antennate.hardware.joints import Joints
 from antennate.params.layout import LayoutParams
+from antennate.records import Floats
 from antennate.sim.body import SimBody
 from antennate.twin.bus import ServoBus
 from antennate.twin.registers import Servo
@@ -89,7 +90,7 @@ class TwinRobot:
         self.board_silent = False
         self.servos = [_servo(i, servo) for i, servo in enumerate(layout.ids)]
         self.bus = ServoBus(self.servos, layout.baud)
-        self._show()
+        self._show(self._shafts())
         self._counts = body.read().counts[0]
         self._say()
 
@@ -100,20 +101,47 @@ class TwinRobot:
 
     def advance(self, t: float) -> None:
         """Let everything happen until t."""
-        while (self._ticks + 1) * self._period <= t + _ROUNDING:
-            self._ticks += 1
-            self.bus.advance(self._ticks * self._period)
-            if self._walked or any(servo.torque for servo in self.servos):
-                self._walk()
-            self._say()
-        self.bus.advance(t)
+        while self.due <= t + _ROUNDING:
+            self.end_tick(self.move(self.begin_tick()))
         self.t = max(self.t, t)
+
+    @property
+    def due(self) -> float:
+        """When the next tick of the physics and the board begins [s]."""
+        return (self._ticks + 1) * self._period
+
+    def begin_tick(self) -> Floats | None:
+        """A tick begins: where the servos pull to [ticks], None before any of them has torque."""
+        self._ticks += 1
+        self.bus.advance(self._ticks * self._period)
+        self.t = max(self.t, self._ticks * self._period)
+        if not self._walked and not any(servo.torque for servo in self.servos):
+            return None
+        return np.array([servo.goal() for servo in self.servos])
+
+    def move(self, goals: Floats | None) -> Floats | None:
+        """The physics of a tick: where the shafts are then [ticks].
+
+        Touches nothing that the bus does, so that another thread may do it meanwhile.
+        """
+        if goals is None:
+            return None
+        self._body.write(self._joints.pose(goals))
+        self._walked += 1
+        self._body.clock.sleep_until(self._walked * self._period)
+        self._counts = self._body.read().counts[0]
+        return self._shafts()
+
+    def end_tick(self, shafts: Floats | None) -> None:
+        """A tick ends: servos learn where their shafts are, and the board sends a sample."""
+        if shafts is not None:
+            self._show(shafts)
+        self._say()
 
     def next_time(self) -> float:
         """When something happens next without anybody asking [s]."""
         due = self.bus.next_time()
-        tick = (self._ticks + 1) * self._period
-        return tick if due is None else min(due, tick)
+        return self.due if due is None else min(due, self.due)
 
     def take(self) -> bytes:
         """What the board has sent since the last call."""
@@ -131,17 +159,11 @@ class TwinRobot:
         else:
             self._broken[what == "open_right"] = True
 
-    def _walk(self) -> None:
-        goals = np.array([servo.goal() for servo in self.servos])
-        self._body.write(self._joints.pose(goals))
-        self._walked += 1
-        self._body.clock.sleep_until(self._walked * self._period)
-        self._show()
-        self._counts = self._body.read().counts[0]
+    def _shafts(self) -> Floats:
+        return self._joints.positions(self._body.world(0).drives())
 
-    def _show(self) -> None:
-        """Let the servos know where their shafts are."""
-        shafts = self._joints.positions(self._body.world(0).drives())
+    def _show(self, shafts: Floats) -> None:
+        """Let the servos know where their shafts are [ticks]."""
         for servo, ticks in zip(self.servos, shafts.tolist(), strict=True):
             servo.place(ticks)
 

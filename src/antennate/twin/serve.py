@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import select
 import termios
@@ -11,9 +12,13 @@ from collections.abc import Callable
 from types import TracebackType
 
 from antennate.twin.faults import Faults
+from antennate.twin.physics import Physics
 from antennate.twin.robot import TwinRobot
 
 _CHUNK = 4096
+_LONGEST = 1.0
+_LUMP = 0.0005
+"""Answers leave in lumps of this time [s], as those of a fast USB adapter do."""
 
 
 class _Terminal:
@@ -83,20 +88,29 @@ class TwinServer:
     def run(self, go_on: Callable[[float], bool]) -> None:
         """Serve until `go_on`, told the twin's time [s], says no."""
         begin = time.monotonic()
-        robot = self._robot
+        robot, bus = self._robot, self._robot.bus
         ends = [self._bus.master, self._board.master]
-        while go_on(now := time.monotonic() - begin):
-            wait = robot.next_time() - now
-            ready, _, _ = select.select(ends, [], [], max(wait, 0.0))
-            now = time.monotonic() - begin
-            self.late = max(self.late, now - robot.next_time())
-            self._faults.apply(robot, now)
-            robot.advance(now)
-            if self._bus.master in ready:
-                robot.bus.receive(now, self._bus.read())
-            if self._board.master in ready:
-                self._board.read()
-            if answers := robot.bus.transmit(now):
-                self._bus.write(answers)
-            if stream := robot.take():
-                self._board.write(stream)
+        with Physics(robot) as physics:
+            while go_on(now := time.monotonic() - begin):
+                ready, _, _ = select.select([*ends, physics.bell], [], [], self._wait(now, physics))
+                if physics.bell in ready:
+                    physics.end()
+                    self._board.write(robot.take())
+                now = time.monotonic() - begin
+                if not physics.busy and now >= robot.due:
+                    self.late = max(self.late, now - robot.due)
+                    self._faults.apply(robot, now)
+                    physics.begin()
+                if self._bus.master in ready:
+                    bus.receive(now, self._bus.read())
+                if self._board.master in ready:
+                    self._board.read()
+                if answers := bus.transmit(time.monotonic() - begin):
+                    self._bus.write(answers)
+
+    def _wait(self, now: float, physics: Physics) -> float:
+        """Time until something happens by itself [s]."""
+        answer = self._robot.bus.next_time()
+        tick = math.inf if physics.busy else self._robot.due - now
+        lump = math.inf if answer is None else max(answer - now, _LUMP)
+        return max(min(tick, lump, _LONGEST), 0.0)

@@ -1,0 +1,62 @@
+"""The scheduling that a control loop needs beside busy programs, where it is allowed.
+
+Linux runs a process of the real-time class SCHED_FIFO whenever it has something to do, before all
+ordinary ones (sched(7)). That needs a privilege. Without it the loop runs as an ordinary process,
+and a busy machine makes it miss ticks.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import gc
+import os
+from collections.abc import Iterator
+from enum import Enum
+
+LEVEL = 20
+"""Real-time level of a control loop, of 1 to 99; the kernel's interrupt threads stand at 50."""
+_LINUX = hasattr(os, "sched_setscheduler")
+
+
+class Priority(Enum):
+    """How this thread is scheduled."""
+
+    REAL_TIME = "real-time"
+    ORDINARY = "ordinary"
+
+
+@contextlib.contextmanager
+def urgent(level: int = LEVEL) -> Iterator[Priority]:
+    """Run the block, which must sleep most of the time, before all ordinary processes if allowed.
+
+    Processes and threads started inside are ordinary again. What was made before is also kept from
+    the collector of garbage, which would walk through all of it in one tick or another.
+
+    Args:
+        level: Real-time level, 1 to 99.
+
+    Yields:
+        What was got.
+    """
+    policy = param = None
+    if _LINUX:
+        policy, param = os.sched_getscheduler(0), os.sched_getparam(0)
+    gc.collect()
+    gc.freeze()
+    try:
+        yield claim(level)
+    finally:
+        gc.unfreeze()
+        if policy is not None and param is not None:
+            os.sched_setscheduler(0, policy, param)
+
+
+def claim(level: int = LEVEL) -> Priority:
+    """Ask for a real-time level for this thread, for good; what was got."""
+    if not _LINUX:
+        return Priority.ORDINARY
+    try:
+        os.sched_setscheduler(0, os.SCHED_FIFO | os.SCHED_RESET_ON_FORK, os.sched_param(level))
+    except OSError:
+        return Priority.ORDINARY
+    return Priority.REAL_TIME
