@@ -42,6 +42,7 @@ def commands() -> list[type[params.Params]]:
     names = sorted(module.name for module in pkgutil.iter_modules(experiments.__path__))
     modules = [importlib.import_module(f"{experiments.__name__}.{name}") for name in names]
     modules.append(importlib.import_module("antennate.hardware.drive"))
+    modules.append(importlib.import_module("antennate.telemetry.replay"))
     return [group for module in modules for group in groups(module)]
 
 

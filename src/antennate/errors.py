@@ -43,3 +43,7 @@ class WorkerError(AntennateError):
 
 class CalibrationError(BadInputError):
     """A recording or a calibration file cannot be used."""
+
+
+class LogError(BadInputError):
+    """The log of a drive cannot be written, read or replayed."""

@@ -10,6 +10,7 @@ from antennate.params.antenna import N_MM_PER_DEG, AntennaParams
 from antennate.params.base import Params, number
 from antennate.params.bench import BenchVariationParams, WallParams
 from antennate.params.layout import JointsParams, LayoutParams
+from antennate.params.log import LogParams
 from antennate.params.mind import (
     ConditioningParams,
     ControllerParams,
@@ -58,6 +59,7 @@ __all__ = [
     "GapWallParams",
     "JointsParams",
     "LayoutParams",
+    "LogParams",
     "Params",
     "PhysicsParams",
     "RepetitionParams",

@@ -1,0 +1,133 @@
+"""Reads one log. What is damaged is left out and counted; what follows it is still read."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+
+from antennate.errors import LogError
+from antennate.telemetry.framing import SCHEMA, Kind, opened, pieces
+from antennate.telemetry.header import Header
+from antennate.telemetry.ticks import Tick
+
+_LISTED = 100
+"""Most damaged places that are listed."""
+
+
+@dataclass(frozen=True, slots=True)
+class Damage:
+    """One place that could not be read.
+
+    Attributes:
+        offset: Where it begins in the file [bytes].
+        reason: What is wrong.
+    """
+
+    offset: int
+    reason: str
+
+
+class LogReader:
+    """The ticks of a file, one after the other; iterate once.
+
+    Args:
+        path: The log.
+
+    Attributes:
+        path: The log.
+        header: Its header.
+        ticks: Ticks read so far.
+        first: Number of the first tick read, 0 before it.
+        last: Number of the last tick read, 0 before the first.
+        bad: Damaged places so far.
+        damage: The first of them.
+        end: Ticks that were written, if the log was closed and its end is read; else None.
+
+    Raises:
+        LogError: The file cannot be read, or has no header; says what can be read of it.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.ticks = self.first = self.last = self.bad = 0
+        self.damage: list[Damage] = []
+        self.end: int | None = None
+        try:
+            self._file = path.open("rb")
+        except OSError as error:
+            raise LogError(f"expected a log, found {path}: {error.strerror}") from None
+        self._records = self._read()
+        try:
+            self.header = self._header()
+        except LogError:
+            self._file.close()
+            raise
+
+    @property
+    def missing(self) -> int:
+        """Ticks known to have been written or to have happened that were not read."""
+        after = 0 if self.end is None else max(0, self.end - self.ticks)
+        return max(after, self.last - self.ticks)
+
+    def __iter__(self) -> Iterator[Tick]:
+        """The ticks, in order.
+
+        Raises:
+            LogError: The disk fails.
+        """
+        for offset, piece in self._records:
+            content = None if piece is None else opened(piece)
+            if content is None:
+                self._note(offset, "damaged record")
+            elif content[0] == SCHEMA and content[1] == Kind.END and len(content) == 10:
+                self.end = int.from_bytes(content[2:], "little")
+            else:
+                try:
+                    tick = Tick.unpack(content)
+                except LogError as error:
+                    self._note(offset, str(error))
+                    continue
+                if tick.number <= self.last:
+                    self._note(offset, f"tick {tick.number} after {self.last}")
+                    continue
+                self.ticks += 1
+                self.first, self.last = self.first or tick.number, tick.number
+                yield tick
+
+    def __enter__(self) -> LogReader:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._file.close()
+
+    def _read(self) -> Iterator[tuple[int, bytes | None]]:
+        try:
+            yield from pieces(self._file)
+        except OSError as error:
+            raise LogError(f"expected to read {self.path}, found: {error.strerror}") from None
+
+    def _header(self) -> Header:
+        _, piece = next(self._records, (0, b""))
+        content = None if piece is None else opened(piece)
+        if content is not None:
+            try:
+                return Header.unpack(content)
+            except LogError as error:
+                raise LogError(f"{self.path}: {error}") from None
+        ticks = sum(1 for _ in self)
+        raise LogError(
+            f"{self.path}: expected a log, found no intact header, {ticks} intact ticks and "
+            f"{self.bad + 1} damaged places"
+        )
+
+    def _note(self, offset: int, reason: str) -> None:
+        self.bad += 1
+        if self.bad <= _LISTED:
+            self.damage.append(Damage(offset, reason))

@@ -1,0 +1,201 @@
+"""A log as a world: the mind gets what was read then, and says what it would do now."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from antennate.controller import ARMS, Controller
+from antennate.errors import LogError
+from antennate.hardware.drive import DriveConfig
+from antennate.hardware.drive import decider as named
+from antennate.hardware.session import Decider
+from antennate.loop import run_loop
+from antennate.params import Params, number
+from antennate.records import AntennaFrame, Pose
+from antennate.telemetry.header import Header
+from antennate.telemetry.ticks import Tick, angles_of
+
+
+class ReplayConfig(Params):
+    """Who decides upon the readings of a log."""
+
+    controller: str | None = number(
+        None,
+        "1",
+        "assumed: the one recorded",
+        "open, paper, closed, or MODULE:CLASS of your own, in place of the one recorded",
+    )
+
+
+class ReplayBody:
+    """Recorded readings behind the wall; also their clock.
+
+    Each sleep goes on to the next tick, however long it is, so that none is left out. Time is that
+    of the sleeper; frames carry the recorded one.
+
+    Args:
+        ticks: The log, in order.
+
+    Attributes:
+        tick: The present tick, None after the last.
+        pose: What was written last, None before.
+    """
+
+    def __init__(self, ticks: Iterable[Tick]) -> None:
+        self._ticks = iter(ticks)
+        self._now = 0.0
+        self.pose: Pose | None = None
+        self.tick: Tick | None = next(self._ticks, None)
+        self._next: Tick | None = next(self._ticks, None)
+
+    @property
+    def clock(self) -> ReplayBody:
+        """The body itself keeps the time."""
+        return self
+
+    @property
+    def more(self) -> bool:
+        """Whether a tick follows the present one."""
+        return self._next is not None
+
+    def now(self) -> float:
+        """Time [s] to which it has been slept."""
+        return self._now
+
+    def sleep_until(self, t: float) -> None:
+        """Go on to the next tick, unless time t [s] has passed."""
+        if t > self._now:
+            self._now = t
+            self.tick, self._next = self._next, next(self._ticks, None)
+
+    def read(self) -> AntennaFrame:
+        """The frame of the present tick.
+
+        Raises:
+            LogError: The log is over.
+        """
+        if self.tick is None:
+            raise LogError("expected a tick to replay, found the end of the log")
+        return self.tick.frame()
+
+    def write(self, pose: Pose) -> None:
+        """Keep a pose; nothing moves."""
+        self.pose = pose
+
+
+class _Guarded:
+    """A controller whose exceptions give a pose of NaN, as in a session."""
+
+    def __init__(self, decider: Decider) -> None:
+        self._decider = decider
+        self.failures = 0
+
+    def step(self, frame: AntennaFrame) -> Pose:
+        """The pose of this tick."""
+        try:
+            return self._decider.step(frame)
+        except Exception:  # noqa: BLE001 a plugged-in controller may raise anything
+            self.failures += 1
+            return Pose(*(np.full(shape, math.nan) for shape in ((1, 5), (1, 6, 2), (1, 2))))
+
+
+@dataclass(frozen=True, slots=True)
+class Difference:
+    """A tick that was decided otherwise.
+
+    Attributes:
+        number: The tick's number.
+        now: The loop's time then [s].
+        recorded: The maneuver then.
+        replayed: The maneuver now.
+    """
+
+    number: int
+    now: float
+    recorded: int
+    replayed: int
+
+
+@dataclass(slots=True)
+class Replayed:
+    """What came of a replay.
+
+    Attributes:
+        maneuvers: Decided now, one a tick.
+        recorded: Ticks of each maneuver decided then.
+        states: Ticks of each state of the supervisor then.
+        start: The loop's time at the first tick [s].
+        end: The loop's time at the last tick [s].
+        different: Ticks whose maneuver differs.
+        poses: Ticks whose pose differs in any bit of its value.
+        failures: Ticks in which the controller raised an exception.
+        first: The first tick whose maneuver differs, None if none does.
+    """
+
+    maneuvers: list[int] = field(default_factory=list[int])
+    recorded: Counter[int] = field(default_factory=Counter[int])
+    states: Counter[str] = field(default_factory=Counter[str])
+    start: float = 0.0
+    end: float = 0.0
+    different: int = 0
+    poses: int = 0
+    failures: int = 0
+    first: Difference | None = None
+
+    def note(self, tick: Tick, maneuver: int, pose: Pose) -> None:
+        """Compare one tick."""
+        if not self.maneuvers:
+            self.start = tick.now
+        self.end = tick.now
+        self.maneuvers.append(maneuver)
+        self.recorded[tick.maneuver] += 1
+        self.states[tick.state] += 1
+        self.poses += not np.array_equal(angles_of(pose), tick.angles, equal_nan=True)
+        if maneuver != tick.maneuver:
+            self.different += 1
+            self.first = self.first or Difference(tick.number, tick.now, tick.maneuver, maneuver)
+
+
+def replay(ticks: Iterable[Tick], decider: Decider, period: float) -> Replayed:
+    """Let a controller that has just begun decide upon all ticks of a log.
+
+    Args:
+        ticks: The log, in order.
+        decider: The controller.
+        period: Its period [s].
+    """
+    body, mind, found = ReplayBody(ticks), _Guarded(decider), Replayed()
+
+    def go_on(frame: AntennaFrame, pose: Pose) -> bool:
+        if body.tick is not None:
+            found.note(body.tick, int(decider.maneuver[0]), pose)
+        return body.more
+
+    if body.tick is not None:
+        run_loop(body, mind, period, go_on)
+    found.failures = mind.failures
+    return found
+
+
+def recorded_decider(header: Header, name: str | None = None) -> Decider:
+    """The controller of a log as it began, or one of another name with the same numbers.
+
+    Raises:
+        LogError: It is code outside this package, and only the log names it.
+        ConfigError: There is none of that name.
+    """
+    chosen = header.controller if name is None else name
+    if name is None and chosen not in ARMS:
+        raise LogError(
+            f"expected a controller of {', '.join(ARMS)} in the log, found {chosen!r}; give "
+            "--controller with this name if its code may run"
+        )
+    made = named(DriveConfig(controller=chosen, mind=header.params))
+    if isinstance(made, Controller):
+        made.reset(np.array([0]), header.phase)
+    return made

@@ -1,0 +1,223 @@
+"""One tick of a drive, as it is kept: what was read, decided and commanded, and how all were.
+
+Packed it is bytes of a fixed layout and a text after them. Every float comes back bit by bit, NaN
+and infinities too.
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+
+from antennate.anatomy import LEGS, SIDES, YAW_JOINTS
+from antennate.errors import LogError
+from antennate.hardware.session import Session
+from antennate.records import AntennaFrame, Ints, Pose
+from antennate.telemetry.framing import SCHEMA, Kind
+
+JOINTS = (*YAW_JOINTS, *LEGS, *(f"antenna_{side}" for side in SIDES))
+"""The order of angles."""
+LAYOUT = f"<BBQ8d3q{len(JOINTS) + 2}d7QI"
+"""For `struct`: all fields but the text, whose length in bytes comes last."""
+FIELDS = (
+    *("schema", "kind", "number", "t", "now"),
+    *("counts_l", "counts_r", "reading_l", "reading_r", "b_l", "b_r"),
+    *("contact_l", "contact_r", "maneuver", "phase", *JOINTS, "age"),
+    *("missed", "frames", "crc", "lost", "misses", "stale", "sent", "text"),
+)
+
+_STRUCT = struct.Struct(LAYOUT)
+_LONGEST_CAUSE = 160
+_NOWHERE = (math.nan,) * len(JOINTS)
+_NEITHER = (math.nan, math.nan)
+
+Pair = tuple[float, float]
+
+
+class Decided(Protocol):
+    """A controller after its step; `b` [(1, 2)] and `gait.phase` [(1,)] are kept where it has them.
+
+    Attributes:
+        maneuver: `Maneuver`, shape (1,).
+        contact: `Contact`, shape (1, 2).
+    """
+
+    maneuver: Ints
+    contact: Ints
+
+
+@dataclass(frozen=True, slots=True)
+class Tick:
+    """What one tick was. Pairs are left and right.
+
+    Attributes:
+        number: Ticks since the controller began, this one included.
+        t: Time of the frame, as the controller got it [s].
+        now: The loop's time [s].
+        counts: Readings that the controller got [counts]; NaN is UNKNOWN.
+        reading: Readings before the supervisor withheld them [counts].
+        b: Bending levels, NaN if the controller has none.
+        contact: One `Contact` a side.
+        maneuver: The `Maneuver` decided.
+        phase: Gait phase [rad], NaN if the controller has none.
+        angles: Joint targets decided [rad] in the order of JOINTS; NaN if it failed.
+        state: The supervisor's state, empty without one.
+        causes: Its causes in force, the most severe first.
+        age: Age of the newest sample [s], NaN in simulation.
+        missed: Ticks left out so far.
+        frames: Good frames of the board so far.
+        crc: Frames with a wrong CRC so far.
+        lost: Samples that never came.
+        misses: Answers that servos did not give so far.
+        stale: Late answers thrown away so far.
+        sent: Poses sent so far.
+    """
+
+    number: int
+    t: float
+    now: float
+    counts: Pair
+    reading: Pair
+    b: Pair
+    contact: tuple[int, int]
+    maneuver: int
+    phase: float
+    angles: tuple[float, ...]
+    state: str = ""
+    causes: tuple[str, ...] = ()
+    age: float = math.nan
+    missed: int = 0
+    frames: int = 0
+    crc: int = 0
+    lost: int = 0
+    misses: int = 0
+    stale: int = 0
+    sent: int = 0
+
+    @classmethod
+    def of(cls, session: Session, frame: AntennaFrame, pose: Pose, t: float) -> Tick:
+        """A tick of a session that has just written.
+
+        Args:
+            session: The robot.
+            frame: What its controller got.
+            pose: What its controller said.
+            t: The host's time [s].
+        """
+        out, clock, bus = session.outputs, session.board.clock, session.bus.tally
+        left, right = (channel.reading.counts for channel in session.channels)
+        bytes_ = session.board.decoder.counters
+        return cls(
+            **_thought(session.decider, frame, pose),
+            number=session.tally.ticks,
+            now=t,
+            reading=(left, right),
+            state="" if out is None else out.state.name,
+            causes=() if out is None else tuple(_clean(cause.text) for cause in out.causes),
+            age=clock.age(t),
+            missed=0 if session.timing is None else session.timing.report().missed_cycles,
+            frames=bytes_.good,
+            crc=bytes_.crc_errors,
+            lost=clock.sequence.lost,
+            misses=bus.misses,
+            stale=bus.stale,
+            sent=session.tally.sent,
+        )
+
+    @classmethod
+    def plain(cls, mind: Decided, frame: AntennaFrame, pose: Pose, number: int, now: float) -> Tick:
+        """A tick of a controller without supervisor, as in simulation."""
+        thought = _thought(mind, frame, pose)
+        return cls(**thought, number=number, now=now, reading=thought["counts"])
+
+    def frame(self) -> AntennaFrame:
+        """What the controller got."""
+        return AntennaFrame(t=np.array([self.t]), counts=np.array([self.counts]))
+
+    def pack(self) -> bytes:
+        """The content of its record.
+
+        Raises:
+            LogError: A number does not fit.
+        """
+        text = "\n".join((self.state, *self.causes)).encode("utf-8", "backslashreplace")
+        try:
+            fixed = _STRUCT.pack(
+                *(SCHEMA, Kind.TICK, self.number, self.t, self.now),
+                *(*self.counts, *self.reading, *self.b, *self.contact, self.maneuver, self.phase),
+                *(*self.angles, self.age, self.missed, self.frames, self.crc, self.lost),
+                *(self.misses, self.stale, self.sent, len(text)),
+            )
+        except struct.error as error:
+            raise LogError(f"expected a tick of numbers that fit, found: {error}") from None
+        return fixed + text
+
+    @classmethod
+    def unpack(cls, content: bytes) -> Tick:
+        """Back from `pack`.
+
+        Raises:
+            LogError: It is no tick of this schema.
+        """
+        if len(content) < _STRUCT.size or content[:2] != bytes((SCHEMA, Kind.TICK)):
+            raise LogError(f"expected a tick of schema {SCHEMA}, found {len(content)} other bytes")
+        _, _, number, t, now, *rest, length = _STRUCT.unpack_from(content)
+        if len(content) != _STRUCT.size + length:
+            raise LogError(f"expected a text of {length} bytes, found another length")
+        try:
+            state, *causes = content[_STRUCT.size :].decode().split("\n")
+        except UnicodeDecodeError:
+            raise LogError("expected UTF-8 as the text of a tick, found other bytes") from None
+        counts, reading, b, contact = (tuple(rest[i : i + 2]) for i in (0, 2, 4, 6))
+        maneuver, phase, *rest = rest[8:]
+        angles, rest = tuple(rest[: len(JOINTS)]), rest[len(JOINTS) :]
+        health = dict(zip(FIELDS[-9:-1], rest, strict=True))
+        return cls(
+            *(number, t, now, counts, reading, b, contact, maneuver, phase, angles),
+            *(state, tuple(causes)),
+            **health,
+        )
+
+
+def angles_of(pose: Pose) -> tuple[float, ...]:
+    """Joint targets of one robot [rad] in the order of JOINTS; NaN if they are not 19 numbers."""
+    try:
+        angles = np.concatenate(
+            [np.asarray(part, float).ravel() for part in (pose.yaw, pose.leg, pose.antenna)]
+        ).tolist()
+    except (TypeError, ValueError):
+        return _NOWHERE
+    return tuple(angles) if len(angles) == len(JOINTS) else _NOWHERE
+
+
+def _thought(mind: Decided, frame: AntennaFrame, pose: Pose) -> dict[str, Any]:
+    """The fields that every world has."""
+    left, right = mind.contact[0].tolist()
+    phase = _numbers(getattr(getattr(mind, "gait", None), "phase", None), 1)
+    return {
+        "t": float(frame.t[0]),
+        "counts": tuple(frame.counts[0].tolist()),
+        "b": _numbers(getattr(mind, "b", None), 2) or _NEITHER,
+        "contact": (int(left), int(right)),
+        "maneuver": int(mind.maneuver[0]),
+        "phase": phase[0] if phase else math.nan,
+        "angles": angles_of(pose),
+    }
+
+
+def _numbers(value: Any, count: int) -> tuple[float, ...]:
+    """Some numbers of a controller that may be anybody's; empty if it does not have them."""
+    try:
+        found = np.asarray(value, float).ravel().tolist()
+    except (TypeError, ValueError):
+        return ()
+    return tuple(found) if len(found) == count else ()
+
+
+def _clean(cause: str) -> str:
+    """A cause in one line of bounded length; it may quote an exception of anybody."""
+    return " ".join(cause.split())[:_LONGEST_CAUSE]
