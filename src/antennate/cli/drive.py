@@ -2,46 +2,55 @@
 
 from __future__ import annotations
 
-import math
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Annotated
+from pathlib import Path
+from typing import Annotated, Any
 
 import tyro
 
 from antennate.cli import BAD_INPUT, OK
 from antennate.cli.arguments import FromFile, parse_with
+from antennate.cli.folder import LOG, RunFolder, to_json
 from antennate.cli.progress import terminate_as_interrupt
+from antennate.cli.tables import Cell, number, show
 from antennate.errors import ConfigError
 from antennate.hardware.causes import State
-from antennate.hardware.drive import DriveConfig, Report, connect, drive
+from antennate.hardware.drive import DriveConfig, connect, drive
 from antennate.hardware.priority import Priority, urgent
 from antennate.hardware.session import Session
-from antennate.records import Maneuver
+from antennate.telemetry.feed import Feed
+from antennate.telemetry.header import Header
+from antennate.telemetry.ticks import Tick
 
 DESCRIPTION = """\
 Let a controller walk the robot whose antenna board and servo bus hang on two serial ports, or its
 twin. First a dry run: everything is read and nothing written. Then, with --arm only, torque comes
 on with every servo where it stands. Ctrl-C or SIGTERM ends it: pose held, torque off, verified. A
 lost board or servo makes it hold; the watchdogs of the servos stop it if this program dies."""
-_LINES_A_SECOND = 5
 
 
 @dataclass(frozen=True)
 class Orders(FromFile):
-    """What to talk to, and whether to move.
+    """What to talk to, whether to move, and where the results go.
 
     Attributes:
         config: robot.toml with the parameters below as keys and tables; flags override it
         esp32: serial port of the antenna board
         bus: serial port of the servo bus
         arm: torque on after the dry run
+        out: folder for log and result, runs/drive-N if not given
+        overwrite: replace the results that the folder holds
+        json: print the content of result.json and nothing else on stdout
     """
 
     esp32: Annotated[str, tyro.conf.arg(metavar="PORT")] = ""
     bus: Annotated[str, tyro.conf.arg(metavar="PORT")] = ""
     arm: bool = False
+    out: Annotated[Path | None, tyro.conf.arg(metavar="FOLDER")] = None
+    overwrite: bool = False
+    json: bool = False
 
 
 def command(argv: Sequence[str]) -> int:
@@ -54,60 +63,77 @@ def command(argv: Sequence[str]) -> int:
     for name in ("esp32", "bus"):
         if not getattr(orders, name):
             raise ConfigError(f"--{name}: expected a serial port, found none")
-    with (
-        connect(config, orders.esp32, orders.bus) as session,
-        terminate_as_interrupt(),
-        urgent() as priority,
-    ):
-        report = drive(session, config, orders.arm, _status())
-    _tell(report, orders.arm, priority)
-    return OK if report.safe and report.worst < State.FAULT else BAD_INPUT
+    with RunFolder.open("drive", orders.out, orders.overwrite) as folder:
+        folder.describe("drive", argv, config)
+        with connect(config, orders.esp32, orders.bus) as session, terminate_as_interrupt():
+            result = _carry_out(config, session, orders.arm, folder.path / LOG)
+        folder.finish(result, ())
+        if orders.json:
+            sys.stdout.write(to_json(result))
+        else:
+            _show(result)
+        sys.stderr.write(f"written to {folder.path}\n")
+    fault = result["worst_state"] in (State.FAULT.name, State.OFF.name)
+    return OK if result["torque_off"] and not fault else BAD_INPUT
 
 
-def _status() -> Callable[[Session, float], None]:
-    """A function that shows one line now and then, over the last one on a terminal."""
-    due = -math.inf
-    end = "\r" if sys.stderr.isatty() else "\n"
-    every = 1.0 / _LINES_A_SECOND if sys.stderr.isatty() else 1.0
+def _carry_out(config: DriveConfig, session: Session, arm: bool, log: Path) -> dict[str, Any]:
+    """Drive, with the log and the status line in a process of their own."""
+    header = Header(controller=config.controller, params=config.mind, layout=config.layout)
+    viewer = [sys.executable, "-m", "antennate.cli.viewer", str(log)]
+    feed = Feed(viewer, header.pack())
 
-    def show(session: Session, t: float) -> None:
-        nonlocal due
-        if t < due:
-            return
-        due = t + every
-        sys.stderr.write(_line(session, t) + end)
-        sys.stderr.flush()
+    def keep(session: Session, t: float) -> None:
+        feed.send(Tick.of(session, t).pack())
 
-    return show
-
-
-def _line(session: Session, t: float) -> str:
-    out, clock, bus = session.outputs, session.board.clock, session.bus.tally
-    missed = 0 if session.timing is None else session.timing.report().missed_cycles
-    bytes_ = session.board.decoder.counters
-    state = "-" if out is None else out.state.name
-    why = "" if out is None or not out.causes else f" {out.causes[0].text}"
-    maneuver = Maneuver(int(session.decider.maneuver[0])).name
-    read = " ".join(f"{channel.reading.counts:.0f}" for channel in session.channels)
-    return (
-        f"{t:7.1f} s {state} {maneuver} counts={read} age={1e3 * clock.age(t):.0f}ms "
-        f"missed={missed} frames={bytes_.good} crc={bytes_.crc_errors} "
-        f"lost={clock.sequence.lost} misses={bus.misses} stale={bus.stale} "
-        f"sent={session.tally.sent}{why}"
-    )
+    with feed, urgent() as priority:
+        report = drive(session, config, arm, keep)
+    head = {"schema": 1, "command": "drive", "controller": config.controller, "armed": arm}
+    tail = {"priority": priority.value, "unlogged": feed.dropped, "log_complete": not feed.failed}
+    return head | report.result(session) | tail
 
 
-def _tell(report: Report, armed: bool, priority: Priority) -> None:
-    if not armed:
-        sys.stderr.write("\ndry run over, nothing was written to the servos; --arm lets it walk\n")
-    if (timing := report.timing) is not None:
-        stages = ", ".join(f"{n} {1e3 * s.worst:.1f}" for n, s in timing.stages.items())
-        missed = f"{timing.missed_cycles} missed ({100 * timing.missed_share:.2f} %)"
-        late = f"worst {1e3 * timing.worst_lateness:.1f} ms late"
-        sys.stderr.write(
-            f"\n{timing.ticks} ticks at {priority.value} priority, {missed}, {late}; "
-            f"worst stages [ms]: {stages}"
-        )
-    off = "off, verified" if report.safe else f"NOT confirmed off: servos {report.on}"
-    worst = f"{report.worst.name} ({report.why})" if report.why else report.worst.name
-    sys.stderr.write(f"\nworst state {worst}; torque {off}\n")
+def _show(result: Mapping[str, Any]) -> None:
+    show("Drive", {result["controller"]: result}, _ROWS, _note(result))
+
+
+def _note(result: Mapping[str, Any]) -> str:
+    off = "off, verified" if result["torque_off"] else f"NOT confirmed off: {result['servos_on']}"
+    why = f" ({result['why']})" if result["why"] else ""
+    note = f"Worst state {result['worst_state']}{why}; torque {off}.\n"
+    if not result["armed"]:
+        note += "A dry run: nothing was written to the servos; --arm lets it walk.\n"
+    if result["priority"] == Priority.ORDINARY.value:
+        note += "Real-time priority was not allowed; a busy machine will make it miss ticks.\n"
+    if not result["log_complete"]:
+        note += "The log is not complete.\n"
+    return note
+
+
+def _pace(key: str, form: str, scale: float = 1.0) -> Cell:
+    def cell(result: Mapping[str, Any]) -> str:
+        pace = result["pace"]
+        return number(None if pace is None else scale * pace[key], form)
+
+    return cell
+
+
+def _walking(result: Mapping[str, Any]) -> str:
+    walking = result["walking"]
+    return number(None if walking is None else 100.0 * walking["missed_share"], ".2f")
+
+
+_ROWS: list[tuple[str, Cell]] = [
+    ("ticks", _pace("ticks", ".0f")),
+    ("missed ticks", _pace("missed_cycles", ".0f")),
+    ("missed [%]", _pace("missed_share", ".2f", 100.0)),
+    ("missed while walking [%]", _walking),
+    ("worst lateness [ms]", _pace("worst_lateness_s", ".1f", 1e3)),
+    ("worst tick [ms]", _pace("worst_tick_s", ".1f", 1e3)),
+    *(
+        (name.replace("_", " "), lambda result, name=name: number(result[name], "d"))
+        for name in ("frames", "crc_errors", "lost_samples", "missed_answers", "stale_answers")
+    ),
+    ("poses sent", lambda result: number(result["poses_sent"], "d")),
+    ("priority", lambda result: result["priority"]),
+]

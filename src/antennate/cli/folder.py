@@ -36,7 +36,8 @@ _MORE = ("trajectories", "summary", "passages", "touch_roc", "touch_trace")
 DRAWINGS = tuple(
     f"figures/{name}.{suffix}" for name in (*_MORE, *COMMANDS) for suffix in ("svg", "png")
 )
-FILES = ("calibration.json", "conditioning.toml", "recording.csv")
+LOG = "drive.log"
+FILES = ("calibration.json", "conditioning.toml", "recording.csv", LOG)
 _NAMES = (RESULT, PARTIAL, TABLE, CONFIG, VERSIONS, COMMAND, *FILES, *DRAWINGS)
 """Every file that a run may write."""
 _CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f]+")

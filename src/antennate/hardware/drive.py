@@ -6,7 +6,6 @@ import contextlib
 import importlib
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
 from typing import Any, cast
 
 from antennate.anatomy import LEGS, YAW_COUNT
@@ -22,8 +21,9 @@ from antennate.hardware.dynamixel.tables import EXTENDED_MODE, XC430_W240, XL330
 from antennate.hardware.host_clock import HostClock
 from antennate.hardware.joints import Joints
 from antennate.hardware.port import Port, PortError
+from antennate.hardware.report import Report
 from antennate.hardware.session import Decider, Session
-from antennate.hardware.timing import TimingReport
+from antennate.hardware.signals import undisturbed
 from antennate.loop import run_loop
 from antennate.params import ControllerParams, Params, SupervisorParams, number
 from antennate.params.layout import LayoutParams
@@ -55,27 +55,6 @@ class DriveConfig(Params):
     layout: LayoutParams = LayoutParams()
     mind: ControllerParams = ControllerParams()
     limits: SupervisorParams = SupervisorParams()
-
-
-@dataclass(slots=True)
-class Report:
-    """How a drive went.
-
-    Attributes:
-        timing: How well the pace was kept, None if no tick was run.
-        worst: Worst state after torque had come on, and why.
-        on: Servos that did not confirm that their torque is off.
-    """
-
-    timing: TimingReport | None = None
-    worst: State = State.OK
-    why: str = ""
-    on: list[int] = field(default_factory=list[int])
-
-    @property
-    def safe(self) -> bool:
-        """No servo has torque."""
-        return not self.on
 
 
 @contextlib.contextmanager
@@ -220,10 +199,9 @@ def drive(
     def go_on(frame: AntennaFrame, pose: Pose) -> bool:
         t = clock.now() - start
         session.orders.arm = t >= walk
-        out = session.outputs
-        if out is not None and out.torque and out.state > report.worst:
-            report.worst, report.why = out.state, "; ".join(c.text for c in out.causes)
+        report.watch(session)
         on_tick(session, clock.now())
+        out = session.outputs
         failed = out is not None and t > walk + _ARMING_TIME and out.state >= State.FAULT
         return t < end and not failed
 
@@ -232,9 +210,10 @@ def drive(
     except KeyboardInterrupt:
         pass
     finally:
-        report.timing = None if session.timing is None else session.timing.report()
-        try:
-            report.on = session.release()
-        except PortError:
-            report.on = list(session.joints.ids)
+        with undisturbed():
+            report.timing = None if session.timing is None else session.timing.report()
+            try:
+                report.on = session.release()
+            except PortError:
+                report.on = list(session.joints.ids)
     return report

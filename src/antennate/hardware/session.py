@@ -103,6 +103,8 @@ class Session:
         watch: What the servos say.
         tally: What was done.
         timing: Whether the loop keeps its pace, None before the first tick.
+        frame: What the controller got in the last tick.
+        pose: What it said.
     """
 
     def __init__(
@@ -128,6 +130,8 @@ class Session:
         self.tally = Tally()
         self.timing: LoopTiming | None = None
         self.outputs: Outputs | None = None
+        self.frame = AntennaFrame(t=np.zeros(1), counts=np.full((1, 2), math.nan))
+        self.pose = _nowhere()
         self._body = HardwareBody(board, bus, joints, clock)
         self._thought = _Thought()
         self._goals: Floats | None = None
@@ -151,11 +155,13 @@ class Session:
         if self.outputs is None or not self.outputs.clear:
             said = [math.nan, math.nan]
         self._mark("read")
-        return AntennaFrame(t=frame.t, counts=np.array([said]))
+        self.frame = AntennaFrame(t=frame.t, counts=np.array([said]))
+        return self.frame
 
     def write(self, pose: Pose) -> None:
         """Let the supervisor judge this tick, and do what it says; then look at the servos."""
         self._mark("decide")
+        self.pose = pose
         self._act(pose)
         self._mark("bus")
         if self.timing is not None:

@@ -99,20 +99,13 @@ class Tick:
     sent: int = 0
 
     @classmethod
-    def of(cls, session: Session, frame: AntennaFrame, pose: Pose, t: float) -> Tick:
-        """A tick of a session that has just written.
-
-        Args:
-            session: The robot.
-            frame: What its controller got.
-            pose: What its controller said.
-            t: The host's time [s].
-        """
+    def of(cls, session: Session, t: float) -> Tick:
+        """The tick of a session that has just written, at the host's time t [s]."""
         out, clock, bus = session.outputs, session.board.clock, session.bus.tally
         left, right = (channel.reading.counts for channel in session.channels)
         bytes_ = session.board.decoder.counters
         return cls(
-            **_thought(session.decider, frame, pose),
+            **_thought(session.decider, session.frame, session.pose),
             number=session.tally.ticks,
             now=t,
             reading=(left, right),

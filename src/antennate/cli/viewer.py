@@ -1,0 +1,90 @@
+"""The other process of `antennate drive`: it keeps the log and shows one line.
+
+It reads from its standard input what a `Feed` sends, and nobody waits for it.
+"""
+
+from __future__ import annotations
+
+import math
+import signal
+import sys
+from pathlib import Path
+
+from antennate.cli.messages import one_line
+from antennate.errors import LogError
+from antennate.records import Maneuver
+from antennate.telemetry.feed import Message, messages
+from antennate.telemetry.header import Header
+from antennate.telemetry.ticks import Tick
+from antennate.telemetry.writer import LogWriter
+
+_LINES_A_SECOND = 5
+
+
+class StatusLine:
+    """One line on stderr now and then, over the last one on a terminal."""
+
+    def __init__(self) -> None:
+        self._terminal = sys.stderr.isatty()
+        self._every = 1.0 / _LINES_A_SECOND if self._terminal else 1.0
+        self._due = -math.inf
+
+    def show(self, message: Message) -> None:
+        """Show a tick, if one is due."""
+        tick = Tick.unpack(message.content)
+        if tick.now >= self._due:
+            self._due = tick.now + self._every
+            start, end = ("\r\x1b[K", "") if self._terminal else ("", "\n")
+            sys.stderr.write(start + line(tick, message.dropped) + end)
+            sys.stderr.flush()
+
+
+def line(tick: Tick, dropped: int) -> str:
+    """All counters of a tick in one line."""
+    left, right = tick.reading
+    why = f" {tick.causes[0]}" if tick.causes else ""
+    return (
+        f"{tick.now:7.1f} s {tick.state or '-'} {Maneuver(tick.maneuver).name} "
+        f"counts={left:.0f} {right:.0f} age={1e3 * tick.age:.0f}ms missed={tick.missed} "
+        f"frames={tick.frames} crc={tick.crc} lost={tick.lost} misses={tick.misses} "
+        f"stale={tick.stale} sent={tick.sent} unlogged={dropped}{why}"
+    )
+
+
+def main() -> int:
+    """Keep and show ticks until they end; 0 if all of them are kept."""
+    for number in (signal.SIGINT, signal.SIGTERM):  # the other end decides when it is over
+        signal.signal(number, signal.SIG_IGN)
+    status = StatusLine()
+    log: LogWriter | None = None
+    kept = True
+    try:
+        for message in messages(sys.stdin.buffer):
+            if log is None:
+                log = LogWriter(Path(sys.argv[1]), Header.unpack(message.content))
+                continue
+            status.show(message)
+            kept = kept and _keep(log, message.content)
+        if log is not None and kept:
+            log.close()
+    except LogError as error:
+        kept = _say(error)
+    return int(log is None or not kept)
+
+
+def _keep(log: LogWriter, content: bytes) -> bool:
+    """Write one tick; a disk that fails is said once, and the robot walks on."""
+    try:
+        log.write(content)
+    except LogError as error:
+        return _say(error)
+    return True
+
+
+def _say(error: LogError) -> bool:
+    sys.stderr.write(f"\nantennate drive: {one_line(str(error))}\n")
+    return False
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,89 @@
+"""How a drive went."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from antennate.hardware.causes import State
+from antennate.hardware.session import Session
+from antennate.hardware.timing import TimingReport
+
+
+@dataclass(slots=True)
+class Report:
+    """How a drive went.
+
+    Attributes:
+        timing: How well the pace was kept, None if no tick was run.
+        before: The same up to the first tick with torque, None if it never came on.
+        worst: Worst state after the first pose, or a fault before it, and why.
+        on: Servos that did not confirm that their torque is off.
+    """
+
+    timing: TimingReport | None = None
+    before: TimingReport | None = None
+    worst: State = State.OK
+    why: str = ""
+    on: list[int] = field(default_factory=list[int])
+
+    @property
+    def safe(self) -> bool:
+        """No servo has torque."""
+        return not self.on
+
+    def watch(self, session: Session) -> None:
+        """Take note of a tick."""
+        out = session.outputs
+        if out is None or not out.torque:
+            return
+        if self.before is None and session.timing is not None and session.tally.sent:
+            self.before = session.timing.report()
+        walked = self.before is not None  # until then it holds, for want of a first decision
+        if out.state > self.worst and (walked or out.state >= State.FAULT):
+            self.worst, self.why = out.state, "; ".join(c.text for c in out.causes)
+
+    def result(self, session: Session) -> dict[str, Any]:
+        """All of it as plain numbers and words, for result.json."""
+        board, bus = session.board, session.bus.tally
+        return {
+            "worst_state": self.worst.name,
+            "why": self.why,
+            "torque_off": self.safe,
+            "servos_on": self.on,
+            "pace": _pace(self.timing),
+            "walking": _since(self.timing, self.before),
+            "frames": board.decoder.counters.good,
+            "crc_errors": board.decoder.counters.crc_errors,
+            "lost_samples": board.clock.sequence.lost,
+            "missed_answers": bus.misses,
+            "stale_answers": bus.stale,
+            "poses_sent": session.tally.sent,
+            "poses_limited": session.tally.limited,
+        }
+
+
+def _pace(timing: TimingReport | None) -> dict[str, Any] | None:
+    if timing is None:
+        return None
+    return {
+        "ticks": timing.ticks,
+        "missed_cycles": timing.missed_cycles,
+        "missed_share": timing.missed_share,
+        "worst_lateness_s": timing.worst_lateness,
+        "worst_tick_s": timing.worst_tick,
+        "stages": {
+            name: {"worst_s": stage.worst, "overruns": stage.overruns}
+            for name, stage in timing.stages.items()
+        },
+    }
+
+
+def _since(end: TimingReport | None, begin: TimingReport | None) -> dict[str, Any] | None:
+    """Ticks from the first pose that was sent; the time that arming takes is before it."""
+    if end is None or begin is None:
+        return None
+    ticks = end.ticks - begin.ticks
+    missed = end.missed_cycles - begin.missed_cycles
+    share = missed / max(1, ticks + missed)
+    return {"ticks": ticks, "missed_cycles": missed, "missed_share": share}
