@@ -1,0 +1,181 @@
+"""One contract for all worlds: the mind cannot tell which it is in.
+
+The rules take a world that has run for TICKS ticks and was blind from tick BLIND on; the decisions
+of all worlds are the same, bit by bit.
+"""
+
+from __future__ import annotations
+
+import copy
+import math
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from worlds import TICKS, WORLDS, World, recorded, replayed, session, simulated, twin
+
+from antennate.records import Contact, Maneuver
+from antennate.telemetry.reader import LogReader
+from antennate.telemetry.replay import recorded_decider, replay
+from antennate.telemetry.ticks import Tick
+
+BLIND = 220
+SHAPES = {"yaw": (1, 5), "leg": (1, 6, 2), "antenna": (1, 2)}
+
+
+@pytest.fixture(scope="module", params=WORLDS)
+def world(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> World:
+    """A world that has run. It was read before anything was written to it."""
+    made = WORLDS[request.param](tmp_path_factory.mktemp("world"), "closed", 1, BLIND)
+    made.early = [made.body.read()]
+    made.run(TICKS)
+    return made
+
+
+# rules of the wall, for every world
+
+
+def test_M7_frames_have_one_shape_and_type(world: World) -> None:
+    assert len(world.seen) == TICKS
+    for frame in [*world.early, *(seen.frame for seen in world.seen)]:
+        assert frame.t.shape == (1,)
+        assert frame.counts.shape == (1, 2)
+        assert frame.t.dtype == frame.counts.dtype == np.float64
+        assert np.isfinite(frame.t).all()
+        counts = frame.counts[~np.isnan(frame.counts)]
+        assert ((counts >= 0) & (counts <= 4095)).all()
+
+
+def test_M7_time_goes_forward_and_every_sleep_lasts_until_its_end(world: World) -> None:
+    period = world.header.params.period
+    for before, after in pairwise(world.seen):
+        assert after.frame.t[0] >= before.frame.t[0]  # a sample may be the newest twice
+        assert after.now > before.now
+    steps = np.diff([seen.frame.t[0] for seen in world.seen])
+    assert np.median(steps) == pytest.approx(period, rel=1e-3)
+    clock = world.body.clock
+    for ahead in (0.3 * period, period, 2.5 * period):
+        end = clock.now() + ahead
+        clock.sleep_until(end)
+        assert clock.now() >= end - 1e-9
+
+
+def test_M7_a_sleep_until_the_past_never_turns_time_back(world: World) -> None:
+    clock = world.body.clock
+    for t in (clock.now(), clock.now() - 1.0, -math.inf):
+        before = clock.now()
+        clock.sleep_until(t)
+        assert before <= clock.now() <= before + 1e-3
+
+
+def test_M7_what_cannot_be_read_is_unknown_and_unknown_never_walks(world: World) -> None:
+    """Of all ticks: a NaN means HOLD, with the pose of the tick before."""
+    blind = [bool(np.isnan(seen.frame.counts).any()) for seen in world.seen]
+    assert blind.index(True, BLIND) <= BLIND + 10
+    walked = 0
+    for unknown, (before, seen) in zip(blind[1:], pairwise(world.seen), strict=True):
+        if unknown:
+            assert int(Contact.UNKNOWN) in seen.contact
+            assert seen.maneuver == Maneuver.HOLD
+        if seen.maneuver == Maneuver.HOLD:
+            assert seen.decision()[1] == before.decision()[1]
+        else:
+            walked += seen.decision()[1] != before.decision()[1]
+    assert walked > BLIND // 4
+
+
+def test_M7_poses_have_one_shape_and_are_not_changed_by_the_world(world: World) -> None:
+    for seen in world.seen:
+        for name, shape in SHAPES.items():
+            part = getattr(seen.pose, name)
+            assert part.shape == shape
+            assert part.dtype == np.float64
+            assert np.isfinite(part).all()
+    pose = world.seen[-1].pose
+    kept = copy.deepcopy(pose)
+    world.body.write(pose)
+    for name in SHAPES:
+        np.testing.assert_array_equal(getattr(pose, name), getattr(kept, name))
+
+
+# the same decisions
+
+
+def same_everywhere(folder: Path, arm: str, trial: int, ticks: float) -> set[int]:
+    """Run three worlds and the replays of two logs; the maneuvers that occurred."""
+    worlds = {"simulation": simulated(folder, arm, trial), "twin": twin(folder, arm, trial)}
+    logs = [recorded(world, folder / name, ticks) for name, world in worlds.items()]
+    seen = [world.seen for world in worlds.values()] + [replayed(log).run() for log in logs]
+    first = [one.decision() for one in seen[0]]
+    counts = [one.frame.counts.tobytes() for one in seen[0]]
+    for other in seen[1:]:
+        assert [one.decision() for one in other] == first
+        assert [one.frame.counts.tobytes() for one in other] == counts
+    return {maneuver for maneuver, _ in first}
+
+
+def test_M7_G7_all_worlds_decide_the_same_in_the_same_scene(tmp_path: Path) -> None:
+    """Four seconds with a turn and a step back."""
+    met = same_everywhere(tmp_path, "paper", 0, 400)
+    assert {Maneuver.FORWARD, Maneuver.REVERSE} < met
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("arm", "trial"), [("closed", 1), ("paper", 0), ("paper", 2)])
+def test_M7_G7_all_worlds_decide_the_same_for_a_whole_trial(
+    tmp_path: Path, arm: str, trial: int
+) -> None:
+    assert Maneuver.REVERSE in same_everywhere(tmp_path, arm, trial, math.inf)
+
+
+def test_G7_a_session_with_a_silent_board_is_replayed_to_the_bit(tmp_path: Path) -> None:
+    """Before torque, walking, held, and walking again: as the log says, and as it was."""
+    live = session(tmp_path, "closed", 1, blind=200)
+    path = recorded(live, tmp_path / "log", 350)
+    again = replayed(path)
+    assert [one.decision() for one in again.run()] == [one.decision() for one in live.seen]
+    with LogReader(path) as log:
+        found = replay(log, recorded_decider(log.header), log.header.params.period)
+        assert (log.ticks, log.missing, log.bad, log.end) == (350, 0, 0, 350)
+    assert (found.different, found.poses, found.failures) == (0, 0, 0)
+    assert {"OFF", "OK", "HOLD"} < set(found.states)
+    with LogReader(path) as log:
+        ticks = list(log)
+    held = [tick for tick in ticks[200:] if tick.state == "HOLD"]
+    assert held[0].age > 0.05
+    assert any("HOLD STALE" in cause for cause in held[0].causes)
+    assert {tick.maneuver for tick in held[1:]} == {Maneuver.HOLD}
+    assert ticks[-1].state in {"OK", "DEGRADED"}
+    assert ticks[-1].sent > ticks[200].sent > 50
+    assert math.isnan(ticks[60].counts[0])  # withheld before torque
+    assert not math.isnan(ticks[60].reading[0])
+
+
+def test_G7_another_controller_differs_and_the_first_difference_is_named(tmp_path: Path) -> None:
+    world = simulated(tmp_path, "paper", 0)
+    path = recorded(world, tmp_path / "log", 200)
+    with LogReader(path) as log:
+        found = replay(log, recorded_decider(log.header, "open"), log.header.params.period)
+    decided = [one.maneuver for one in world.seen]
+    turned = next(i for i, maneuver in enumerate(decided) if maneuver != Maneuver.FORWARD)
+    assert found.first is not None
+    assert found.first.number == turned + 1
+    assert (found.first.recorded, found.first.replayed) == (decided[turned], Maneuver.FORWARD)
+    assert found.different == sum(maneuver != Maneuver.FORWARD for maneuver in decided)
+
+
+def test_a_tick_of_a_controller_of_anybody_is_kept_too() -> None:
+    """It has no b and no phase, and its pose is of another robot."""
+
+    class Odd:
+        maneuver = np.array([3])
+        contact = np.array([[0, 1]])
+        gait = "none"
+
+    seen = simulated(Path(), "open", 0).run(1)[0]
+    seen.pose.yaw.resize((1, 4), refcheck=False)
+    tick = Tick.plain(Odd(), seen.frame, seen.pose, 1, 0.5)
+    assert (tick.maneuver, tick.contact) == (3, (0, 1))
+    assert all(map(math.isnan, (*tick.b, tick.phase, *tick.angles)))
+    assert Tick.unpack(tick.pack()).pack() == tick.pack()
