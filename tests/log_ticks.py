@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import random
 import struct
+from functools import lru_cache
 
 from antennate.params import ControllerParams, LayoutParams
 from antennate.telemetry.header import Header
@@ -22,6 +23,7 @@ ODD = [0.0, -0.0, math.nan, math.inf, -math.inf, 5e-324, 1.7976931348623157e308,
 CAUSES = ["HOLD STALE: no fresh sample (age 0.06 s)", "FAULT SILENT_SERVO: servo 7", "µ — ≥", ""]
 
 
+@lru_cache(maxsize=64)
 def tick(number: int) -> Tick:
     """Odd and random bit patterns in every field."""
     chance = random.Random(number)

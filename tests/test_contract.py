@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import copy
 import math
+from collections import Counter
 from itertools import pairwise
 from pathlib import Path
 
@@ -15,10 +16,15 @@ import numpy as np
 import pytest
 from worlds import TICKS, WORLDS, World, recorded, replayed, session, simulated, twin
 
-from antennate.records import Contact, Maneuver
+from antennate.controller import ARMS
+from antennate.loop import run_loop
+from antennate.params import ControllerParams, LogParams
+from antennate.records import AntennaFrame, Contact, Maneuver, Pose
+from antennate.telemetry.header import Header
 from antennate.telemetry.reader import LogReader
 from antennate.telemetry.replay import recorded_decider, replay
 from antennate.telemetry.ticks import Tick
+from antennate.telemetry.writer import LogWriter
 
 BLIND = 220
 SHAPES = {"yaw": (1, 5), "leg": (1, 6, 2), "antenna": (1, 2)}
@@ -150,6 +156,68 @@ def test_G7_a_session_with_a_silent_board_is_replayed_to_the_bit(tmp_path: Path)
     assert ticks[-1].sent > ticks[200].sent > 50
     assert math.isnan(ticks[60].counts[0])  # withheld before torque
     assert not math.isnan(ticks[60].reading[0])
+
+
+class Wandering:
+    """A world without physics: readings that wander, touch, jump and vanish."""
+
+    def __init__(self, seed: int, period: float) -> None:
+        self._rng = np.random.default_rng(seed)
+        self._period = period
+        self._ticks = 0
+        self._at = np.array([1800.0, 1800.0])
+        self._gone = np.zeros(2, int)
+
+    @property
+    def clock(self) -> Wandering:
+        return self
+
+    def now(self) -> float:
+        return self._ticks * self._period
+
+    def sleep_until(self, t: float) -> None:
+        self._ticks = max(self._ticks, round(t / self._period))
+
+    def read(self) -> AntennaFrame:
+        self._at += self._rng.normal(0.0, 15.0, 2)
+        self._at = np.where(self._rng.random(2) < 0.002, self._rng.uniform(1300, 1950, 2), self._at)
+        self._at = np.clip(self._at, 1300.0, 1950.0)
+        lost = self._rng.random(2) < 0.001
+        self._gone = np.where(lost, self._rng.integers(1, 80, 2), np.maximum(self._gone - 1, 0))
+        counts = np.where(self._gone > 0, math.nan, np.rint(self._at))
+        return AntennaFrame(t=np.array([self.now()]), counts=counts[None])
+
+    def write(self, pose: Pose) -> None:
+        pass
+
+
+@pytest.mark.parametrize(
+    ("logs", "ticks"), [(3, 3000), pytest.param(10, 100_000, marks=pytest.mark.slow)]
+)
+def test_G7_logs_of_wandering_readings_are_replayed_to_the_bit(
+    tmp_path: Path, logs: int, ticks: int
+) -> None:
+    met: Counter[int] = Counter()
+    for seed in range(logs):
+        arm = ARMS[seed % len(ARMS)]
+        header = Header(controller=arm, params=ControllerParams(), seed=seed, phase=0.1 * seed)
+        mind = recorded_decider(header)
+        body = Wandering(seed, header.params.period)
+        path = tmp_path / str(seed)
+        with LogWriter(path, header, LogParams(least_free=0.0)) as out:
+
+            def go_on(frame: AntennaFrame, pose: Pose) -> bool:
+                tick = Tick.plain(mind, frame, pose, out.written + 1, body.now())  # noqa: B023
+                out.write(tick)
+                return out.written < ticks
+
+            run_loop(body, mind, header.params.period, go_on)
+        with LogReader(path) as log:
+            found = replay(log, recorded_decider(log.header), log.header.params.period)
+            assert (log.ticks, log.missing, log.bad) == (ticks, 0, 0)
+        assert (found.different, found.poses) == (0, 0)
+        met += found.recorded
+    assert all(met[maneuver] > 0.01 * logs * ticks / len(Maneuver) for maneuver in Maneuver)
 
 
 def test_G7_another_controller_differs_and_the_first_difference_is_named(tmp_path: Path) -> None:

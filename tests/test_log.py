@@ -83,7 +83,7 @@ def test_a_record_of_any_length_is_framed_and_opened(size: int, byte: int) -> No
 
 
 def test_G2_a_log_cut_at_every_byte_gives_a_correct_prefix(tmp_path: Path) -> None:
-    data = written(tmp_path / "whole", 12)
+    data = written(tmp_path / "whole", 6)
     lengths = []
     for size in range(len(data)):
         result = found(tmp_path / "cut", data[:size])
@@ -95,17 +95,21 @@ def test_G2_a_log_cut_at_every_byte_gives_a_correct_prefix(tmp_path: Path) -> No
         assert log.bad <= 1
         lengths.append(len(numbers))
     assert lengths == sorted(lengths)
-    assert (lengths[0], lengths[-1]) == (0, 12)
+    assert (lengths[0], lengths[-1]) == (0, 6)
 
 
-@pytest.mark.parametrize("flips", [1, 3, 40])
-def test_G2_flipped_bits_cost_the_records_they_hit_and_no_other(tmp_path: Path, flips: int) -> None:
-    """10^4 in all: 8500, then 500 times 3; and 100 times 40."""
+@pytest.mark.parametrize(
+    ("flips", "logs"),
+    [(1, 1000), (3, 100), (40, 20), pytest.param(1, 10_000, marks=pytest.mark.slow)],
+)
+def test_G2_flipped_bits_cost_the_records_they_hit_and_no_other(
+    tmp_path: Path, flips: int, logs: int
+) -> None:
     data = written(tmp_path / "whole", 12)
     start = data.index(0, 1) + 1
     rng = np.random.default_rng(flips)
     damaged = 0
-    for _ in range({1: 8500, 3: 500, 40: 100}[flips]):
+    for _ in range(logs):
         spoiled = bytearray(data)
         places = rng.integers(start, len(data), flips)
         for place in places.tolist():
@@ -121,18 +125,17 @@ def test_G2_flipped_bits_cost_the_records_they_hit_and_no_other(tmp_path: Path, 
             assert log.bad > 0
             assert log.damage[0].offset > 0
             damaged += 1
-    assert damaged > 80
+    assert damaged > 0.8 * logs
 
 
 def test_G2_a_damaged_header_is_refused_and_what_follows_counted(tmp_path: Path) -> None:
-    data = bytearray(written(tmp_path / "whole", 12))
+    data = bytearray(written(tmp_path / "whole", 2))
     for place in range(1, data.index(0, 1)):
-        for bit in (0, 7):
-            spoiled = bytearray(data)
-            spoiled[place] ^= 1 << bit
-            (tmp_path / "spoiled").write_bytes(spoiled)
-            with pytest.raises(LogError, match=r"no intact header, 12 intact ticks and [12] damag"):
-                LogReader(tmp_path / "spoiled")
+        spoiled = bytearray(data)
+        spoiled[place] ^= 1 << place % 8
+        (tmp_path / "spoiled").write_bytes(spoiled)
+        with pytest.raises(LogError, match=r"no intact header, 2 intact ticks and [12] damaged"):
+            LogReader(tmp_path / "spoiled")
 
 
 @pytest.mark.parametrize(

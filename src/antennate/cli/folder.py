@@ -36,7 +36,7 @@ _MORE = ("trajectories", "summary", "passages", "touch_roc", "touch_trace")
 DRAWINGS = tuple(
     f"figures/{name}.{suffix}" for name in (*_MORE, *COMMANDS) for suffix in ("svg", "png")
 )
-FILES = ("calibration.json", "conditioning.toml", "recording.csv")
+FILES = ("calibration.json", "conditioning.toml", "recording.csv", "ticks.csv")
 _NAMES = (RESULT, PARTIAL, TABLE, CONFIG, VERSIONS, COMMAND, *FILES, *DRAWINGS)
 """Every file that a run may write."""
 _CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f]+")
@@ -140,11 +140,11 @@ class RunFolder:
 
 def to_csv(rows: Iterable[Mapping[str, Any]]) -> str:
     """A table with a header; text that a spreadsheet would take for a formula gets a quote."""
-    rows = list(rows)
     file = io.StringIO()
     writer = csv.writer(file, lineterminator="\n")
-    writer.writerow(rows[0])
-    for row in rows:
+    for number, row in enumerate(rows):
+        if not number:
+            writer.writerow(row)
         writer.writerow([_cell(value) for value in row.values()])
     return file.getvalue()
 
