@@ -17,6 +17,9 @@ import pytest
 from worlds import TICKS, WORLDS, World, recorded, replayed, session, simulated, twin
 
 from antennate.controller import ARMS
+from antennate.hardware.body import HardwareBody
+from antennate.hardware.esp32.clock import Timed
+from antennate.hardware.esp32.wire import Sample
 from antennate.loop import run_loop
 from antennate.params import ControllerParams, LogParams
 from antennate.records import AntennaFrame, Contact, Maneuver, Pose
@@ -27,6 +30,7 @@ from antennate.telemetry.ticks import Tick
 from antennate.telemetry.writer import LogWriter
 
 BLIND = 220
+EMPTY = Sample(boot_id=1, seq=0, ticks=0, left=1800, right=1800, flags=0, drops=0)
 SHAPES = {"yaw": (1, 5), "leg": (1, 6, 2), "antenna": (1, 2)}
 
 
@@ -103,6 +107,36 @@ def test_M7_poses_have_one_shape_and_are_not_changed_by_the_world(world: World) 
     world.body.write(pose)
     for name in SHAPES:
         np.testing.assert_array_equal(getattr(pose, name), getattr(kept, name))
+
+
+def test_M7_time_of_a_board_follows_the_host_whatever_comes_and_never_goes_back() -> None:
+    """Samples of ages up to 50 ms, silences, and new epochs; no clock drifts."""
+    rng = np.random.default_rng(4)
+
+    class Chance:
+        """A board whose newest usable sample is left to chance."""
+
+        def __init__(self) -> None:
+            self.epoch, self.taken = 0, -1.0
+
+        def poll(self, now: float) -> int:
+            self.epoch += rng.random() < 0.01
+            self.taken = max(self.taken, now - rng.uniform(0.0, 0.05))
+            return 1
+
+        def newest(self, now: float) -> Timed | None:
+            if now < 0.2 or rng.random() < 0.1:
+                return None
+            return Timed(EMPTY, self.epoch, 0, round(1e6 * self.taken), 0.0)
+
+    clock = Wandering(0, 0.01)
+    body = HardwareBody(Chance(), None, None, clock)  # type: ignore[arg-type]
+    times = []
+    for tick in range(5000):
+        clock.sleep_until(0.01 * tick)
+        times.append(float(body.read().t[0]))
+    assert times == sorted(times)
+    assert abs(np.array(times) - 0.01 * np.arange(5000)).max() <= 0.051
 
 
 # the same decisions
@@ -192,7 +226,7 @@ class Wandering:
 
 
 @pytest.mark.parametrize(
-    ("logs", "ticks"), [(3, 3000), pytest.param(10, 100_000, marks=pytest.mark.slow)]
+    ("logs", "ticks"), [(3, 1500), pytest.param(10, 100_000, marks=pytest.mark.slow)]
 )
 def test_G7_logs_of_wandering_readings_are_replayed_to_the_bit(
     tmp_path: Path, logs: int, ticks: int

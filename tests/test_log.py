@@ -83,7 +83,7 @@ def test_a_record_of_any_length_is_framed_and_opened(size: int, byte: int) -> No
 
 
 def test_G2_a_log_cut_at_every_byte_gives_a_correct_prefix(tmp_path: Path) -> None:
-    data = written(tmp_path / "whole", 6)
+    data = written(tmp_path / "whole", 4)
     lengths = []
     for size in range(len(data)):
         result = found(tmp_path / "cut", data[:size])
@@ -95,7 +95,7 @@ def test_G2_a_log_cut_at_every_byte_gives_a_correct_prefix(tmp_path: Path) -> No
         assert log.bad <= 1
         lengths.append(len(numbers))
     assert lengths == sorted(lengths)
-    assert (lengths[0], lengths[-1]) == (0, 6)
+    assert (lengths[0], lengths[-1]) == (0, 4)
 
 
 @pytest.mark.parametrize(
@@ -178,6 +178,13 @@ def test_G2_random_bytes_between_records_hide_none(tmp_path: Path) -> None:
     assert result[1].bad > 10
 
 
+def test_G2_what_is_too_long_for_a_record_is_not_held() -> None:
+    long, longer = b"\xaa" * (2 * LONGEST), b"\xbb" * (5 * LONGEST)
+    file = io.BytesIO(b"\0one\0" + long + b"\0\0two\0" + longer)
+    places = [1, 5, 5 + len(long) + 2, 5 + len(long) + 6]
+    assert list(pieces(file)) == list(zip(places, [b"one", None, b"two", None], strict=True))
+
+
 def test_G2_a_tick_that_came_before_is_not_read_again(tmp_path: Path) -> None:
     order = [1, 2, 2, 5, 4, 6]
     data = framed(HEADER.pack()) + b"".join(framed(tick(n).pack()) for n in order)
@@ -237,6 +244,22 @@ def test_G4_a_full_disk_ends_the_log_with_one_message_and_keeps_what_was_written
     assert log.written > 20
     assert reader.end is None
     assert reader.bad == 1
+
+
+def test_G4_a_disk_that_takes_nothing_more_is_said_once(tmp_path: Path) -> None:
+    path = tmp_path / "log"
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    log = LogWriter(path, HEADER, ROOM)
+    log.write(tick(1))
+    try:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (path.stat().st_size, hard))
+        with pytest.raises(LogError, match="File too large; the log ends after 1 ticks"):
+            log.write(tick(2))
+        log.write(tick(3))
+        log.close()
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert found(tmp_path / "copy", path.read_bytes())[0] == [1]  # type: ignore[index]
 
 
 def test_G4_a_log_that_cannot_begin_is_refused(tmp_path: Path) -> None:

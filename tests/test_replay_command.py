@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import csv
+import dataclasses
 import json
+import math
 from pathlib import Path
 
 import numpy as np
@@ -160,8 +162,12 @@ def test_a_controller_that_raises_is_counted_and_does_not_end_the_replay(log: Pa
             def step(self, frame: object) -> None:
                 raise ValueError("a bug")
 
-        found = replay(reader, Broken(), 0.01)  # type: ignore[arg-type]
+        ticks = list(reader)
+    found = replay(ticks, Broken(), 0.01)  # type: ignore[arg-type]
     assert (found.failures, found.poses, len(found.maneuvers)) == (TICKS, TICKS, TICKS)
+    nowhere = (math.nan,) * len(JOINTS)
+    failed = [dataclasses.replace(tick, angles=nowhere) for tick in ticks]
+    assert replay(failed, Broken(), 0.01).poses == 0  # type: ignore[arg-type]
 
 
 def test_the_figure_shows_every_stretch_and_repeats_its_bytes() -> None:
