@@ -15,6 +15,7 @@ import tyro
 from antennate.cli import BAD_INPUT, OK
 from antennate.cli.arguments import FromFile, parse_with
 from antennate.cli.folder import RunFolder, to_csv, to_json
+from antennate.cli.messages import one_line
 from antennate.cli.tables import show
 from antennate.errors import ConfigError
 from antennate.records import Maneuver
@@ -119,7 +120,10 @@ def _result(log: LogReader, found: Replayed, controller: str | None) -> dict[str
 
 def _show(result: Mapping[str, Any]) -> None:
     first = result["first_difference"]
-    shares = {**result["shares"], **{f"state {k}": v for k, v in result["states"].items()}}
+    shares = {
+        **result["shares"],
+        **{one_line(f"state {k}"): v for k, v in result["states"].items()},
+    }
     show(
         "Replay",
         {result["controller"]: result},
@@ -132,7 +136,8 @@ def _show(result: Mapping[str, Any]) -> None:
             ("exceptions", lambda row: str(row["failures"])),
             ("ticks missing", lambda row: str(row["missing"])),
         ],
-        f"Recorded by {result['recorded_controller']}, antennate {result['version']}; "
+        f"Recorded by {one_line(result['recorded_controller'])}, antennate "
+        f"{one_line(result['version'])}; "
         f"{'closed at its end' if result['closed'] else 'not closed: its program was killed'}.\n"
         + (
             f"First difference: tick {first['tick']}, {first['time_s']:.2f} s, "
