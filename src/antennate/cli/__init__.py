@@ -27,6 +27,7 @@ COMMANDS = {
     "sweep": "sweep an antenna beside walls: its shapes, and the distances that active touch tells",
     "twin": "serve a simulated robot as real bytes: an antenna board and a bus of 19 servos",
     "drive": "let a controller walk the real robot, or its twin",
+    "replay": "let a controller decide again upon the log of a drive",
     "touch": "move an antenna along walls: sensed contact against true contact",
 }
 

@@ -37,7 +37,7 @@ DRAWINGS = tuple(
     f"figures/{name}.{suffix}" for name in (*_MORE, *COMMANDS) for suffix in ("svg", "png")
 )
 LOG = "drive.log"
-FILES = ("calibration.json", "conditioning.toml", "recording.csv", LOG)
+FILES = ("calibration.json", "conditioning.toml", "recording.csv", "ticks.csv", LOG)
 _NAMES = (RESULT, PARTIAL, TABLE, CONFIG, VERSIONS, COMMAND, *FILES, *DRAWINGS)
 """Every file that a run may write."""
 _CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f]+")
@@ -141,11 +141,11 @@ class RunFolder:
 
 def to_csv(rows: Iterable[Mapping[str, Any]]) -> str:
     """A table with a header; text that a spreadsheet would take for a formula gets a quote."""
-    rows = list(rows)
     file = io.StringIO()
     writer = csv.writer(file, lineterminator="\n")
-    writer.writerow(rows[0])
-    for row in rows:
+    for number, row in enumerate(rows):
+        if not number:
+            writer.writerow(row)
         writer.writerow([_cell(value) for value in row.values()])
     return file.getvalue()
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from antennate.body import Body, Clock
 from antennate.controller import Arm, Controller
 from antennate.experiments.judge import Judge
 from antennate.experiments.tunnel import TunnelConfig, prepare
@@ -77,7 +78,11 @@ class _Rounded:
 
     def __init__(self, body: SimBody, joints: Joints) -> None:
         self._body, self._joints = body, joints
-        self.clock = body.clock
+
+    @property
+    def clock(self) -> Clock:
+        """The simulation's."""
+        return self._body.clock
 
     def read(self) -> AntennaFrame:
         """Read, with the time rounded."""
@@ -119,12 +124,40 @@ class _Watch:
         return Decisions(self.maneuvers, self.counts, self.status)
 
 
-def simulated(config: TunnelConfig, arm: Arm, trial: int, layout: LayoutParams) -> Decisions:
+@dataclass(frozen=True, slots=True)
+class Stage:
+    """A world with its mind at the first tick of a trial.
+
+    Attributes:
+        body: The world.
+        mind: The controller, its phase that of the trial.
+        period: Control period [s].
+        go_on: For `run_loop`; False once the trial has ended.
+        decisions: What was decided so far.
+        robot: The twin, None in pure simulation.
+    """
+
+    body: Body
+    mind: Controller
+    period: float
+    go_on: Callable[[AntennaFrame, Pose], bool]
+    decisions: Callable[[], Decisions]
+    robot: TwinRobot | None = None
+
+
+def simulation(config: TunnelConfig, arm: Arm, trial: int, layout: LayoutParams) -> Stage:
     """The trial in pure simulation, goals rounded to ticks."""
     watch = _Watch(config, arm, trial)
     body = _Rounded(watch.body, Joints(layout))
-    run_loop(body, watch.controller, config.controller.period, watch.go_on)
-    return watch.decisions()
+    period = config.controller.period
+    return Stage(body, watch.controller, period, watch.go_on, watch.decisions)
+
+
+def simulated(config: TunnelConfig, arm: Arm, trial: int, layout: LayoutParams) -> Decisions:
+    """The whole trial in pure simulation."""
+    stage = simulation(config, arm, trial, layout)
+    run_loop(stage.body, stage.mind, stage.period, stage.go_on)
+    return stage.decisions()
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,6 +185,29 @@ def rig(config: TwinConfig, arm: Arm = "closed") -> Rig:
     return Rig(robot, clock, session)
 
 
+def before_twin(config: TunnelConfig, arm: Arm, trial: int, layout: LayoutParams) -> Stage:
+    """The hardware code before a twin, torque on.
+
+    Raises:
+        BringUpError: The servos did not come up.
+    """
+    watch = _Watch(config, arm, trial)
+    period = config.controller.period
+    robot = TwinRobot(watch.body, layout, period, boot_id=trial + 1)
+    clock = LockstepClock(robot)
+    board = Board(BoardPort(robot, clock), AGE_LIMIT)
+    bus = Bus(clock, clock=clock.now)
+    while board.newest(clock.now()) is None and clock.now() < _WARM_UP:
+        clock.sleep(period)
+        board.poll(clock.now())
+    bringup.require(bus, {servo.get("id"): servo.table.model for servo in robot.servos})
+    bringup.arm_watchdogs(bus, layout.ids)
+    clock.sleep_until(period * np.ceil(clock.now() / period + 1.0))
+    bringup.enable(bus, layout.ids)
+    body = HardwareBody(board, bus, Joints(layout), clock)
+    return Stage(body, watch.controller, period, watch.go_on, watch.decisions, robot)
+
+
 def on_twin(
     config: TunnelConfig,
     arm: Arm,
@@ -171,24 +227,12 @@ def on_twin(
     Raises:
         BringUpError: The servos did not come up.
     """
-    watch = _Watch(config, arm, trial)
-    period = config.controller.period
-    robot = TwinRobot(watch.body, layout, period, boot_id=trial + 1)
-    clock = LockstepClock(robot)
-    board = Board(BoardPort(robot, clock), AGE_LIMIT)
-    bus = Bus(clock, clock=clock.now)
-    while board.newest(clock.now()) is None and clock.now() < _WARM_UP:
-        clock.sleep(period)
-        board.poll(clock.now())
-    bringup.require(bus, {servo.get("id"): servo.table.model for servo in robot.servos})
-    bringup.arm_watchdogs(bus, layout.ids)
-    clock.sleep_until(period * np.ceil(clock.now() / period + 1.0))
-    bringup.enable(bus, layout.ids)
-    body = HardwareBody(board, bus, Joints(layout), clock)
+    stage = before_twin(config, arm, trial, layout)
 
     def go_on(frame: AntennaFrame, pose: Pose) -> bool:
-        on_tick(robot)
-        return watch.go_on(frame, pose)
+        if stage.robot is not None:
+            on_tick(stage.robot)
+        return stage.go_on(frame, pose)
 
-    run_loop(body, watch.controller, period, go_on)
-    return watch.decisions()
+    run_loop(stage.body, stage.mind, stage.period, go_on)
+    return stage.decisions()

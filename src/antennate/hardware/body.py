@@ -20,7 +20,7 @@ class HardwareBody:
     """One robot behind the wall. A reading that is missing or too old is NaN.
 
     Frames are stamped with the board's own time since the first reading, so that neither its way to
-    the host nor the host's load shows in them.
+    the host nor the host's load shows in them. Their time never goes back.
 
     Args:
         board: Its antennae.
@@ -39,7 +39,8 @@ class HardwareBody:
         self._clock = clock
         self.used = 0
         self._stamp: Timed | None = None
-        self._stamp_t = self._stamp_now = 0.0
+        self._stamp_now: float | None = None
+        self._stamp_t = self._t = 0.0
 
     @property
     def clock(self) -> Clock:
@@ -51,15 +52,19 @@ class HardwareBody:
         now = self._clock.now()
         self.used = self._board.poll(now)
         timed = self._board.newest(now)
-        return AntennaFrame(t=np.array([self._time(timed, now)]), counts=counts_of(timed))
+        self._t = max(self._t, self._time(timed, now))
+        return AntennaFrame(t=np.array([self._t]), counts=counts_of(timed))
 
     def _time(self, timed: Timed | None, now: float) -> float:
         """The board's time [s]; by the host's clock where the board has none or begins anew."""
         last = self._stamp
+        if self._stamp_now is None:
+            self._stamp_now = now
+        since = now - self._stamp_now
         if timed is None:
-            return self._stamp_t + now - self._stamp_now
+            return self._stamp_t + since
         if last is None or timed.epoch != last.epoch:
-            self._stamp_t += now - self._stamp_now if last else 0.0
+            self._stamp_t += since
             self._stamp, self._stamp_now = timed, now
             return self._stamp_t
         return self._stamp_t + 1e-6 * (timed.elapsed_us - last.elapsed_us)

@@ -1,0 +1,205 @@
+"""`antennate replay`: the readings of a log decided upon again."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import islice
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import numpy as np
+import tyro
+
+from antennate.cli import BAD_INPUT, OK
+from antennate.cli.arguments import FromFile, parse_with
+from antennate.cli.folder import RunFolder, to_csv, to_json
+from antennate.cli.messages import one_line
+from antennate.cli.tables import show
+from antennate.errors import ConfigError
+from antennate.records import Maneuver
+from antennate.telemetry.reader import LogReader
+from antennate.telemetry.replay import ReplayConfig, Replayed, recorded_decider, replay
+from antennate.telemetry.ticks import FIELDS, Tick
+
+if TYPE_CHECKING:
+    from antennate.figures.replay import Course
+
+DESCRIPTION = """\
+Let the controller of a log decide upon the recorded readings again, or another one in its place,
+and compare. The same code decides the same, bit by bit. Damaged parts of a log are left out and
+named; the exit code is 2 then."""
+TICKS = "ticks.csv"
+_MOST_DRAWN = 5000
+"""Most ticks that a figure shows."""
+
+
+@dataclass(frozen=True)
+class Options(FromFile):
+    """Which log, and what to leave behind.
+
+    Attributes:
+        log: log of a drive
+        config: TOML file with the parameters below as keys; flags override it
+        out: folder for result.json, ticks.csv and a figure; none are written if not given
+        overwrite: replace the results that the folder holds
+        json: print the result as JSON and nothing else
+    """
+
+    log: tyro.conf.Positional[Annotated[str, tyro.conf.arg(metavar="LOG")]] = ""
+    out: Annotated[Path | None, tyro.conf.arg(metavar="FOLDER")] = None
+    overwrite: bool = False
+    json: bool = False
+
+
+def command(argv: Sequence[str]) -> int:
+    """Replay one log.
+
+    Raises:
+        AntennateError: The log, the controller or the folder cannot be used.
+    """
+    config, options = parse_with("replay", DESCRIPTION, ReplayConfig, argv, Options())
+    if not options.log:
+        raise ConfigError("expected the log of a drive, found none")
+    path = Path(options.log)
+    with LogReader(path) as log:
+        decider = recorded_decider(log.header, config.controller)
+        found = replay(log, decider, log.header.params.period)
+    result = _result(log, found, config.controller)
+    if options.out is not None:
+        with RunFolder.open("replay", options.out, options.overwrite) as folder:
+            folder.describe("replay", argv, config)
+            _keep(folder, path, found)
+            folder.finish(result, ())
+            sys.stderr.write(f"written to {folder.path}\n")
+    if options.json:
+        sys.stdout.write(to_json(result))
+    else:
+        _show(result)
+    if not log.bad and not log.missing:
+        return OK
+    place = f"; first at byte {log.damage[0].offset}: {log.damage[0].reason}" if log.bad else ""
+    sys.stderr.write(
+        f"antennate replay: error: {path}: expected an undamaged log, found {log.bad} damaged "
+        f"places and {log.missing} ticks missing; {log.ticks} ticks were read{place}\n"
+    )
+    return BAD_INPUT
+
+
+def _result(log: LogReader, found: Replayed, controller: str | None) -> dict[str, Any]:
+    header, ticks = log.header, max(1, log.ticks)
+    first = found.first
+    return {
+        "log": str(log.path),
+        "version": header.version,
+        "recorded_controller": header.controller,
+        "controller": controller or header.controller,
+        "seed": header.seed,
+        "trial": header.trial,
+        "ticks": log.ticks,
+        "duration_s": found.end - found.start,
+        "shares": {m.name: found.recorded[m] / ticks for m in Maneuver},
+        "states": {state or "none": n / ticks for state, n in found.states.items()},
+        "different": found.different,
+        "first_difference": None
+        if first is None
+        else {
+            "tick": first.number,
+            "time_s": first.now - found.start,
+            "recorded": _name(first.recorded),
+            "replayed": _name(first.replayed),
+        },
+        "different_poses": found.poses,
+        "failures": found.failures,
+        "missing": log.missing,
+        "damaged": log.bad,
+        "closed": log.end is not None,
+    }
+
+
+def _show(result: Mapping[str, Any]) -> None:
+    first = result["first_difference"]
+    shares = {
+        **result["shares"],
+        **{one_line(f"state {k}"): v for k, v in result["states"].items()},
+    }
+    show(
+        "Replay",
+        {result["controller"]: result},
+        [
+            ("ticks", lambda row: str(row["ticks"])),
+            ("duration [s]", lambda row: f"{row['duration_s']:.2f}"),
+            *((f"{name} [%]", _percent(share)) for name, share in shares.items() if share),
+            ("maneuvers that differ", lambda row: str(row["different"])),
+            ("poses that differ", lambda row: str(row["different_poses"])),
+            ("exceptions", lambda row: str(row["failures"])),
+            ("ticks missing", lambda row: str(row["missing"])),
+        ],
+        f"Recorded by {one_line(result['recorded_controller'])}, antennate "
+        f"{one_line(result['version'])}; "
+        f"{'closed at its end' if result['closed'] else 'not closed: its program was killed'}.\n"
+        + (
+            f"First difference: tick {first['tick']}, {first['time_s']:.2f} s, "
+            f"{first['recorded']} then, {first['replayed']} now.\n"
+            if first
+            else "Every maneuver is the recorded one.\n"
+        ),
+    )
+
+
+def _percent(share: float) -> Any:
+    return lambda row: f"{100 * share:.1f}"
+
+
+def _name(maneuver: int) -> str:
+    return Maneuver(maneuver).name if maneuver in set(Maneuver) else str(maneuver)
+
+
+def _keep(folder: RunFolder, path: Path, found: Replayed) -> None:
+    """Write the table and the figure, in a second pass over the log."""
+    from antennate.figures import style
+    from antennate.figures.replay import replay as draw
+
+    with LogReader(path) as log:
+        folder.write(TICKS, to_csv(_rows(log, found.maneuvers)))
+    if found.maneuvers:
+        with LogReader(path) as log:
+            figure = draw(_course(log, found.maneuvers))
+        for suffix, data in style.render(figure).items():
+            folder.write(f"figures/replay.{suffix}", data)
+
+
+def _rows(ticks: Iterable[Tick], replayed: Sequence[int]) -> Iterator[dict[str, Any]]:
+    """One row a tick; numbers as they are, so that they come back exactly."""
+    for tick, maneuver in zip(ticks, replayed, strict=True):
+        pairs = (tick.counts, tick.reading, tick.b, tick.contact)
+        values = [
+            *(tick.number, tick.t, tick.now, *(value for pair in pairs for value in pair)),
+            *(tick.maneuver, tick.phase, *tick.angles, tick.age, tick.missed, tick.frames),
+            *(tick.crc, tick.lost, tick.misses, tick.stale, tick.sent),
+        ]
+        row = dict(zip(FIELDS[2:-1], values, strict=True))
+        yield row | {
+            "replayed": maneuver,
+            "state": tick.state,
+            "causes": "; ".join(tick.causes),
+        }
+
+
+def _course(ticks: Iterable[Tick], replayed: Sequence[int]) -> Course:
+    """What the figure shows: every tick of a short log, some of a long one."""
+    from antennate.figures.replay import Course
+
+    every = -(-len(replayed) // _MOST_DRAWN)
+    kept = [(tick, m) for tick, m in islice(zip(ticks, replayed, strict=True), 0, None, every)]
+    start = kept[0][0].now
+    return Course(
+        t=np.array([tick.now - start for tick, _ in kept]),
+        reading=np.array([tick.reading for tick, _ in kept]),
+        b=np.array([tick.b for tick, _ in kept]),
+        contact=np.array([tick.contact for tick, _ in kept]),
+        recorded=np.array([tick.maneuver for tick, _ in kept]),
+        replayed=np.array([maneuver for _, maneuver in kept]),
+        state=[tick.state for tick, _ in kept],
+    )

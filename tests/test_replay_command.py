@@ -1,0 +1,187 @@
+"""`antennate replay`: what it says of a log, what it leaves behind, and when it refuses."""
+
+from __future__ import annotations
+
+import csv
+import dataclasses
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from worlds import recorded, session, simulated
+
+from antennate.cli import main
+from antennate.errors import LogError
+from antennate.figures import style
+from antennate.figures.replay import Course
+from antennate.figures.replay import replay as draw
+from antennate.params import ControllerParams
+from antennate.records import Contact, Maneuver
+from antennate.telemetry.framing import framed
+from antennate.telemetry.header import Header
+from antennate.telemetry.replay import ReplayBody, recorded_decider, replay
+from antennate.telemetry.ticks import JOINTS
+from antennate.telemetry.writer import LogWriter
+
+TICKS = 200
+
+
+@pytest.fixture(scope="module")
+def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Two seconds of the published rule, with a turn."""
+    folder = tmp_path_factory.mktemp("log")
+    return recorded(simulated(folder, "paper", 0), folder / "log", TICKS)
+
+
+@pytest.fixture(autouse=True)
+def _elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "80")
+
+
+def said(capsys: pytest.CaptureFixture[str], *argv: str) -> dict:
+    assert main(["replay", *argv, "--json"]) == 0
+    return json.loads(capsys.readouterr().out)
+
+
+def test_G7_the_same_code_decides_the_same(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    result = said(capsys, str(log))
+    assert (result["ticks"], result["different"], result["different_poses"]) == (TICKS, 0, 0)
+    assert result["first_difference"] is None
+    assert result["duration_s"] == pytest.approx((TICKS - 1) * 0.01)
+    assert sum(result["shares"].values()) == pytest.approx(1.0)
+    assert result["controller"] == result["recorded_controller"] == "paper"
+    assert (result["seed"], result["trial"]) == (0, 0)
+    assert result["closed"]
+
+
+def test_another_controller_is_compared(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    result = said(capsys, str(log), "--controller", "open")
+    turning = 1.0 - result["shares"]["FORWARD"]
+    assert result["different"] == round(turning * TICKS) > 0
+    assert result["first_difference"]["replayed"] == "FORWARD"
+    assert main(["replay", str(log), "--controller", "open"]) == 0
+    out = capsys.readouterr().out
+    assert f"First difference: tick {result['first_difference']['tick']}, " in out
+
+
+def test_it_leaves_a_table_and_a_figure(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The table holds what the log holds, to the last digit."""
+    live = session(tmp_path, "closed", 1, blind=130)
+    path = recorded(live, tmp_path / "log", 180)
+    out = tmp_path / "out"
+    assert main(["replay", str(path), "--out", str(out)]) == 0
+    with (out / "ticks.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == 180
+    for row, seen in zip(rows, live.seen, strict=True):
+        angles = np.concatenate([seen.pose.yaw[0], seen.pose.leg.ravel(), seen.pose.antenna[0]])
+        assert [float(row[name]) for name in JOINTS] == angles.tolist()
+        counts = np.array([float(row["counts_l"]), float(row["counts_r"])])
+        np.testing.assert_array_equal(counts, seen.frame.counts[0])
+        assert int(row["maneuver"]) == int(row["replayed"]) == seen.maneuver
+    assert rows[145]["state"] == "HOLD"
+    assert "HOLD STALE: no fresh sample" in rows[145]["causes"]
+    assert {p.name for p in (out / "figures").iterdir()} == {"replay.svg", "replay.png"}
+    assert json.loads((out / "result.json").read_text())["states"]["OFF"] > 0.5
+    capsys.readouterr()
+    assert main(["replay", str(path), "--out", str(out)]) == 2
+    assert "--overwrite" in capsys.readouterr().err
+
+
+def test_G2_a_damaged_log_is_replayed_as_far_as_it_goes(
+    log: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    data = bytearray(log.read_bytes())
+    data[len(data) // 2] ^= 4
+    bad = tmp_path / "bad"
+    bad.write_bytes(data)
+    assert main(["replay", str(bad), "--json"]) == 2
+    out, err = capsys.readouterr()
+    result = json.loads(out)
+    assert (result["ticks"], result["missing"]) == (TICKS - 1, 1)
+    assert f"1 ticks missing; {TICKS - 1} ticks were read; first at byte " in err
+    assert err.count("\n") == 1
+
+
+def test_a_log_that_was_not_closed_is_no_error(
+    log: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Its program was killed; nothing that was written is lost."""
+    data = log.read_bytes()
+    cut = tmp_path / "cut"
+    cut.write_bytes(data[: data.rindex(b"\0\0") + 1])
+    result = said(capsys, str(cut))
+    assert (result["ticks"], result["closed"]) == (TICKS, False)
+
+
+@pytest.mark.parametrize(
+    ("argv", "what"),
+    [
+        ([], "expected the log of a drive, found none"),
+        (["nothing.log"], "nothing.log: No such file"),
+        (["."], "Is a directory"),
+        (["text"], "no intact header, 0 intact ticks and 1 damaged"),
+        (["own"], "give --controller with this name if its code may run"),
+        (["own", "--controller", "zigzag"], "--controller: expected one of open, paper, closed"),
+    ],
+)
+def test_what_cannot_be_replayed_is_refused_in_one_line(
+    argv: list[str], what: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "text").write_text("not a log of anything\n")
+    own = Header(controller="this:Class", params=ControllerParams())
+    (tmp_path / "own").write_bytes(framed(own.pack()))
+    assert main(["replay", *argv]) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert what in err
+    assert err.count("\n") == 1
+
+
+def test_an_empty_log_is_replayed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "empty"
+    LogWriter(path, Header(controller="open", params=ControllerParams())).close()
+    assert said(capsys, str(path), "--out", "out")["ticks"] == 0
+    body = ReplayBody([])
+    with pytest.raises(LogError, match="found the end of the log"):
+        body.read()
+
+
+def test_a_controller_that_raises_is_counted_and_does_not_end_the_replay(log: Path) -> None:
+    from antennate.telemetry.reader import LogReader
+
+    with LogReader(log) as reader:
+        sound = recorded_decider(reader.header)
+
+        class Broken:
+            maneuver, contact = sound.maneuver, sound.contact
+
+            def step(self, frame: object) -> None:
+                raise ValueError("a bug")
+
+        ticks = list(reader)
+    found = replay(ticks, Broken(), 0.01)  # type: ignore[arg-type]
+    assert (found.failures, found.poses, len(found.maneuvers)) == (TICKS, TICKS, TICKS)
+    nowhere = (math.nan,) * len(JOINTS)
+    failed = [dataclasses.replace(tick, angles=nowhere) for tick in ticks]
+    assert replay(failed, Broken(), 0.01).poses == 0  # type: ignore[arg-type]
+
+
+def test_the_figure_shows_every_stretch_and_repeats_its_bytes() -> None:
+    n = 100
+    course = Course(
+        t=0.01 * np.arange(n),
+        reading=np.full((n, 2), 1800.0),
+        b=np.zeros((n, 2)),
+        contact=np.repeat([[Contact.FREE, Contact.CONTACT], [Contact.UNKNOWN, 9]], 50, axis=0),
+        recorded=np.repeat([Maneuver.FORWARD, Maneuver.HOLD], 50).astype(int),
+        replayed=np.repeat([Maneuver.FORWARD, 7], 50).astype(int),
+        state=["OFF"] * 30 + ["OK"] * 70,
+    )
+    figure = draw(course)
+    bars = [len(panel.collections) for panel in figure.axes]
+    assert bars == [0, 0, 2, 5]  # one unknown, one contact; 2 recorded, 1 known replayed, 2 states
+    assert style.render(figure) == style.render(draw(course))

@@ -1,0 +1,178 @@
+"""Worlds behind the wall: a fourth one is a function here and a line in WORLDS."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from antennate.body import Body, Clock
+from antennate.controller import Arm
+from antennate.experiments.tunnel import TunnelConfig
+from antennate.experiments.twin import Stage, TwinConfig, before_twin, rig, simulation
+from antennate.hardware.drive import await_board
+from antennate.loop import run_loop
+from antennate.params.layout import LayoutParams
+from antennate.records import AntennaFrame, Pose
+from antennate.telemetry.header import Header
+from antennate.telemetry.reader import LogReader
+from antennate.telemetry.replay import ReplayBody, recorded_decider
+from antennate.telemetry.ticks import Tick
+from antennate.telemetry.writer import LogWriter
+
+CONFIG = TunnelConfig(seed=0)
+LAYOUT = LayoutParams()
+TICKS = 260
+"""Ticks that a world can at least be run."""
+ARMED_AT = 100
+"""Tick at which a session is asked for torque."""
+
+
+@dataclass
+class Seen:
+    """One tick as seen from in front of the wall."""
+
+    frame: AntennaFrame
+    pose: Pose
+    maneuver: int
+    contact: tuple[int, int]
+    now: float
+
+    def decision(self) -> tuple[int, bytes]:
+        angles = (self.pose.yaw, self.pose.leg, self.pose.antenna)
+        return self.maneuver, b"".join(part.tobytes() for part in angles)
+
+
+@dataclass
+class World:
+    """A body with the mind that belongs to it, at its first tick."""
+
+    body: Any
+    mind: Any
+    header: Header
+    decider: Any
+    go_on: Callable[[AntennaFrame, Pose], bool] = lambda frame, pose: True
+    tick_of: Callable[[AntennaFrame, Pose, int], Tick] | None = None
+    seen: list[Seen] = field(default_factory=list)
+    early: list[AntennaFrame] = field(default_factory=list)
+
+    def run(self, ticks: float = math.inf, log: LogWriter | None = None) -> list[Seen]:
+        """Run some ticks, or until the world ends; note them, and write them to a log."""
+
+        def go_on(frame: AntennaFrame, pose: Pose) -> bool:
+            number, now = len(self.seen) + 1, self.body.clock.now()
+            left, right = self.decider.contact[0].tolist()
+            maneuver = int(self.decider.maneuver[0])
+            self.seen.append(Seen(frame, pose, maneuver, (left, right), now))
+            if log is not None:
+                own = self.tick_of
+                plain = Tick.plain(self.decider, frame, pose, number, now)
+                log.write(plain if own is None else own(frame, pose, number))
+            return self.go_on(frame, pose) and number < ticks
+
+        run_loop(self.body, self.mind, self.header.params.period, go_on)
+        return self.seen
+
+
+class Blinded:
+    """A simulated body whose left antenna is gone from some tick on."""
+
+    def __init__(self, body: Body, after: float) -> None:
+        self._body, self._left = body, after
+
+    @property
+    def clock(self) -> Clock:
+        return self._body.clock
+
+    def read(self) -> AntennaFrame:
+        frame = self._body.read()
+        self._left -= 1
+        if self._left < 0:
+            frame.counts[0, 0] = math.nan
+        return frame
+
+    def write(self, pose: Pose) -> None:
+        self._body.write(pose)
+
+
+def _world(stage: Stage, arm: Arm, trial: int) -> World:
+    header = Header(
+        controller=arm,
+        params=CONFIG.controller,
+        layout=LAYOUT,
+        seed=CONFIG.seed,
+        trial=trial,
+        phase=float(stage.mind.gait.phase[0]),
+    )
+    return World(stage.body, stage.mind, header, stage.mind, stage.go_on)
+
+
+def simulated(folder: Path, arm: Arm, trial: int, blind: float = math.inf) -> World:
+    """The pure simulation, rounded as servos and board do."""
+    world = _world(simulation(CONFIG, arm, trial, LAYOUT), arm, trial)
+    world.body = Blinded(world.body, blind)
+    return world
+
+
+def twin(folder: Path, arm: Arm, trial: int, blind: float = math.inf) -> World:
+    """The hardware code before the twin, in lock-step."""
+    stage = before_twin(CONFIG, arm, trial, LAYOUT)
+    world = _world(stage, arm, trial)
+
+    def go_on(frame: AntennaFrame, pose: Pose) -> bool:
+        assert stage.robot is not None
+        stage.robot.board_silent = len(world.seen) >= blind
+        return stage.go_on(frame, pose)
+
+    world.go_on = go_on
+    return world
+
+
+def session(folder: Path, arm: Arm, trial: int, blind: float = math.inf) -> World:
+    """The same with its supervisor; armed at tick ARMED_AT, blind for 30 ticks only."""
+    made = rig(TwinConfig(world=CONFIG, trial=trial), arm)
+    await_board(made.session.board, made.clock)
+    header = Header(controller=arm, params=CONFIG.controller, layout=LAYOUT)
+
+    def go_on(frame: AntennaFrame, pose: Pose) -> bool:
+        made.session.orders.arm = len(world.seen) >= ARMED_AT
+        made.robot.board_silent = blind <= len(world.seen) < blind + 30
+        return True
+
+    def tick_of(frame: AntennaFrame, pose: Pose, number: int) -> Tick:
+        tick = Tick.of(made.session, made.clock.now())
+        assert tick.number == number
+        return Tick.unpack(tick.pack())
+
+    world = World(made.session, made.session, header, made.session.decider, go_on, tick_of)
+    return world
+
+
+def recorded(world: World, path: Path, ticks: float = math.inf) -> Path:
+    """Run a world and keep its log."""
+    with LogWriter(path, world.header) as log:
+        world.run(ticks, log)
+    return path
+
+
+def replayed(path: Path) -> World:
+    """The world that a log is."""
+    with LogReader(path) as log:
+        body, mind = ReplayBody(list(log)), recorded_decider(log.header)
+    return World(body, mind, log.header, mind, lambda frame, pose: body.more)
+
+
+def replay_of_simulation(folder: Path, arm: Arm, trial: int, blind: float = math.inf) -> World:
+    """The third world: what the pure simulation left on disk."""
+    return replayed(recorded(simulated(folder, arm, trial, blind), folder / "log", TICKS))
+
+
+WORLDS = {
+    "simulation": simulated,
+    "twin": twin,
+    "session": session,
+    "replay": replay_of_simulation,
+}
+"""Makers of worlds; each takes a folder, an arm, a trial and the tick from which it is blind."""
