@@ -11,7 +11,7 @@ from antennate.hardware.priority import claim
 from antennate.records import Floats
 from antennate.twin.robot import TwinRobot
 
-_SWITCH = 0.0003
+_SWITCH = 0.00005
 """Longest time that one thread keeps the other from Python [s]; the physics itself does not."""
 
 

@@ -48,6 +48,12 @@ class DrivenServo(Servo):
         self._stood = self.position if self._stood is None else self._stood
         return self._stood
 
+    def heard(self, t: float) -> None:
+        """An instruction packet was on the bus; all else waits for the next tick."""
+        if self._trip_time() < t:
+            self.advance(t)
+        self._heard = t
+
     def _speed(self) -> float:
         return 0.0
 

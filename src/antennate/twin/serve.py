@@ -17,7 +17,7 @@ from antennate.twin.robot import TwinRobot
 
 _CHUNK = 4096
 _LONGEST = 1.0
-_LUMP = 0.0005
+_LUMP = 0.00025
 """Answers leave in lumps of this time [s], as those of a fast USB adapter do."""
 
 
