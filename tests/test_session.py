@@ -215,6 +215,40 @@ def test_T2_a_controller_that_hangs_stops_every_servo_within_120_ms_of_the_last_
     assert stopped.max() < 100  # settling, not walking
 
 
+def test_B8_servos_stop_within_120_ms_when_only_the_controller_fails_and_the_loop_goes_on() -> None:
+    """The loop still reads the board in every tick; a packet to any servo would feed them all."""
+    made = rig(TwinConfig())
+    sound, servos = made.session.decider.step, made.robot.servos
+    heard: list[float] = []
+    tripped: list[float] = []
+
+    def step(frame: AntennaFrame) -> Pose:
+        if made.clock.now() < 1.6:
+            heard[:] = [max(servo.last_heard for servo in servos)]
+            return sound(frame)
+        if all(servo.get("bus_watchdog") == -1 for servo in servos):
+            tripped.append(made.clock.now())
+        raise ValueError("a bug")
+
+    made.session.decider.step = step  # type: ignore[method-assign]
+    drive(made.session, CONFIG, arm=True)
+    assert tripped[0] - heard[0] <= 0.120 + 0.02  # its last tick, and the one that looks
+
+
+def test_L9_the_gait_stands_still_during_a_hold_so_that_no_leg_has_to_catch_up() -> None:
+    """Goals move at a limited speed: a gait that had gone on meanwhile would be out of reach."""
+    limited: list[int] = []
+
+    def act(rig: Rig, t: float) -> None:
+        rig.robot.board_silent = 3.0 <= t < 3.5
+        if t >= 3.0:
+            limited.append(rig.session.tally.limited)
+
+    log = walked(act, DriveConfig(dry_run=1.0, duration=3.5))
+    assert log.state[-2] <= State.DEGRADED
+    assert (limited[-1] - limited[0]) / 12 < 5
+
+
 def test_B8_a_controller_that_fails_does_not_feed_the_watchdogs() -> None:
     class Broken:
         def __init__(self, sound: object) -> None:
