@@ -265,13 +265,14 @@ def late(twin: Twin, master: Master, reads: int, found: Found) -> None:
 
 def interrupted(twin: Twin, master: Master, found: Found) -> None:
     twin.tell("trouble", {ONE: Trouble(Fault.LATE, 0.008, count=1)})
-    signal.signal(signal.SIGALRM, boom)
+    usual = signal.signal(signal.SIGALRM, boom)
     signal.setitimer(signal.ITIMER_REAL, 0.004)
     try:
         master.one(ONE)
         signal.pause()
     except Boom:
         pass
+    signal.signal(signal.SIGALRM, usual)
     twin.tell("trouble", {})
     found.after_exception = settled(master)
 
