@@ -1,5 +1,6 @@
 """The benchmarks measure what they say."""
 
+import importlib
 import importlib.util
 import sys
 from pathlib import Path
@@ -47,3 +48,15 @@ def test_long_tunnel_has_cylinders_enough(trial):
     drawn, order = trial.long_tunnel(TunnelConfig())
     assert sorted(order) == list(range(len(drawn.cylinders)))
     assert len(order) >= max(trial.COUNTS)
+
+
+def test_three_masters_are_put_to_the_same_test(monkeypatch):
+    """Ours takes no wrong and no stale value; how long anything takes is not judged here."""
+    if not FOLDER.is_dir():
+        pytest.skip("benchmarks are not part of this copy")
+    monkeypatch.syspath_prepend(str(FOLDER))
+    bus = importlib.import_module("bus")
+    found = bus.measure("ours", reads=1)
+    assert found.late_asked > 0
+    assert found.crc_wrong == found.late_stale == 0
+    assert set(bus.MASTERS) == {"ours", "rustypot", "sdk"}

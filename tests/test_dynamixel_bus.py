@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from servo_rig import IDS, MODELS, Rig, positions
 
-from antennate.hardware.dynamixel import bringup
+from antennate.hardware.dynamixel import bringup, packets
 from antennate.hardware.dynamixel.answers import (
     MOTION,
     POSITION,
@@ -21,9 +21,10 @@ from antennate.hardware.dynamixel.answers import (
 )
 from antennate.hardware.dynamixel.bringup import BringUpError
 from antennate.hardware.dynamixel.bus import Bus
-from antennate.hardware.dynamixel.packets import StatusError
+from antennate.hardware.dynamixel.packets import Status, StatusError
 from antennate.hardware.dynamixel.tables import XL330_M288
 from antennate.hardware.port import PortError
+from antennate.hardware.watch import ServoWatch
 from antennate.twin.bus import Fault, ServoBus, Trouble
 from antennate.twin.link import Link
 from antennate.twin.registers import Servo
@@ -329,8 +330,10 @@ def test_a_babbling_bus_is_given_up_in_time() -> None:
     bus = Bus(link, clock=link.now)
     assert set(bus.read_all(IDS, MOTION).values()) == {SILENT}
     assert link.now() <= 0.011
+    begin = link.now()
     with pytest.raises(PortError, match="quiet"):
         bus.write_all(116, {1: bytes(4)})
+    assert link.now() - begin <= 0.011
 
 
 def test_the_wall_clock_is_never_asked(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -427,6 +430,36 @@ def test_B9_extended_mode_with_an_offset_is_refused() -> None:
     rig.servo(8).set("homing_offset", 100)
     with pytest.raises(BringUpError, match=r"\[8\]"):
         bringup.arm_watchdogs(rig.bus, IDS)
+
+
+def test_an_answer_with_another_id_is_no_answer() -> None:
+    rig = Rig(fast=False)
+    rig.twin.trouble[3] = Trouble(Fault.WRONG_ID, count=1)
+    assert list(rig.bus.read_all([3, 7], POSITION)) == [3, 7]
+    assert rig.bus.tally.stale == 1
+
+
+def test_two_answers_of_one_servo_that_differ_are_none() -> None:
+    class Echo(Link):
+        def read(self, most: int, timeout: float) -> bytes:
+            came = super().read(most, timeout)
+            other = Status(3, StatusError.NONE, False, bytes(4))
+            return packets.status(other) + came if came else came
+
+    link = Echo(Rig().twin)
+    assert Bus(link, clock=link.now).read(3, POSITION) == SILENT
+
+
+def test_a_dead_wire_is_noted_by_the_watch_and_ends_nothing() -> None:
+    class Dead(Link):
+        def write(self, data: bytes) -> None:
+            raise PortError("the wire is gone")
+
+    link = Dead(Rig().twin)
+    watch = ServoWatch(Bus(link, clock=link.now), tuple(IDS))
+    watch.step()
+    assert watch.bus_error == "the wire is gone"
+    assert set(watch.missed.values()) == {1}
 
 
 def test_B19_torque_off_is_confirmed_and_what_did_not_is_named() -> None:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+import sys
+import time
 import tracemalloc
 from itertools import pairwise
 
@@ -209,6 +212,45 @@ def test_L6_mutated_frames_raise_nothing() -> None:
     delivered = decoder.feed(sent.tobytes())
     assert set(delivered) <= set(samples)
     assert closed(decoder.counters, decoder.held)
+
+
+def flood(megabytes: int) -> float:
+    """Noise, damaged frames and storms of delimiters by turns; speed [MB/s] of the slowest."""
+    rng = np.random.default_rng(9)
+    samples = [made(i) for i in range(30_000)]
+    whole, known = frames_of(samples).reshape(-1), set(samples)
+    decoder = FrameDecoder()
+    slowest = math.inf
+    for number in range(megabytes):
+        if number % 3 == 0:
+            piece = rng.bytes(1_000_000)
+        elif number % 3 == 1:
+            hit = rng.random(whole.size) < rng.uniform(0.001, 0.2)
+            piece = np.where(hit, rng.integers(0, 256, whole.size), whole).astype(np.uint8)
+            piece = piece.tobytes()[:1_000_000].ljust(1_000_000, b"\1")
+        else:
+            piece = rng.choice(np.array([0, 0, 1, 2, 12, 255], np.uint8), 1_000_000).tobytes()
+        begin = time.process_time()
+        delivered = decoder.feed(piece)
+        slowest = min(slowest, 1.0 / max(time.process_time() - begin, 1e-9))
+        assert known.issuperset(delivered)
+        assert decoder.held < LONGEST
+        assert len(decoder.take_text()) <= TEXT_KEPT
+    assert decoder.counters.received == 1_000_000 * megabytes
+    assert decoder.counters.good > 1000
+    assert closed(decoder.counters, decoder.held)
+    return slowest
+
+
+def test_L6_a_flood_of_hostile_bytes_delivers_nothing_false() -> None:
+    flood(3)
+
+
+@pytest.mark.slow
+def test_L6_a_hundred_million_hostile_bytes() -> None:
+    slowest = flood(100)
+    sys.stdout.write(f"slowest {slowest:.2f} MB/s\n")
+    assert slowest >= 0.2
 
 
 @given(st.binary(min_size=2, max_size=100))

@@ -91,7 +91,7 @@ def test_it_arms_walks_and_ends_without_torque() -> None:
 
 
 def test_B10_torque_comes_on_with_goals_where_servos_stand_and_they_move_slowly() -> None:
-    log = walked()
+    log = walked(config=DriveConfig(dry_run=1.0, duration=0.8))
     on = next(i for i, state in enumerate(log.state) if state is not State.OFF)
     standing = np.rint([servo.position for servo in rig(TwinConfig()).robot.servos])
     assert abs(np.array(log.goals[on]) - standing).max() <= 5
@@ -177,6 +177,77 @@ def drive_until(made: Rig, t: float) -> None:
 
     with pytest.raises(Killed):
         drive(made.session, CONFIG, arm=True, on_tick=kill)
+
+
+def test_T2_a_controller_that_hangs_stops_every_servo_within_120_ms_of_the_last_packet() -> None:
+    """It never comes back from its decision: nobody sends, and nobody has to."""
+
+    class Ended(BaseException):
+        pass
+
+    made = rig(TwinConfig())
+    sound, servos, wait = made.session.decider.step, made.robot.servos, made.clock.sleep_until
+    tripped: list[float] = []
+    seen: list[list[float]] = []
+
+    def step(frame: AntennaFrame) -> Pose:
+        seen.append([servo.position for servo in servos])
+        if made.clock.now() < 2.0:
+            return sound(frame)
+        last = max(servo.last_heard for servo in servos)
+        while not all(servo.get("bus_watchdog") == -1 for servo in servos):
+            wait(made.clock.now() + 0.001)
+            if made.clock.now() > last + 1.0:
+                raise Ended
+        tripped.append(made.clock.now() - last)
+        for _ in range(2):
+            seen.append([servo.position for servo in servos])
+            wait(made.clock.now() + 0.4)
+        raise Ended
+
+    made.session.decider.step = step  # type: ignore[method-assign]
+    made.session.release = list  # type: ignore[method-assign]
+    with pytest.raises(Ended):
+        drive(made.session, CONFIG, arm=True)
+    assert tripped[0] <= 0.120
+    walked, stopped = np.ptp(seen[-43:-2], axis=0), np.ptp(seen[-2:], axis=0)
+    assert walked[5:17].min() > 700
+    assert stopped.max() < 100  # settling, not walking
+
+
+def test_B8_servos_stop_within_120_ms_when_only_the_controller_fails_and_the_loop_goes_on() -> None:
+    """The loop still reads the board in every tick; a packet to any servo would feed them all."""
+    made = rig(TwinConfig())
+    sound, servos = made.session.decider.step, made.robot.servos
+    heard: list[float] = []
+    tripped: list[float] = []
+
+    def step(frame: AntennaFrame) -> Pose:
+        if made.clock.now() < 1.6:
+            heard[:] = [max(servo.last_heard for servo in servos)]
+            return sound(frame)
+        if all(servo.get("bus_watchdog") == -1 for servo in servos):
+            tripped.append(made.clock.now())
+        raise ValueError("a bug")
+
+    made.session.decider.step = step  # type: ignore[method-assign]
+    drive(made.session, CONFIG, arm=True)
+    assert tripped
+    assert tripped[0] - heard[0] <= 0.120 + 0.02  # its last tick, and the one that looks
+
+
+def test_L9_the_gait_stands_still_during_a_hold_so_that_no_leg_has_to_catch_up() -> None:
+    """Goals move at a limited speed: a gait that had gone on meanwhile would be out of reach."""
+    limited: list[int] = []
+
+    def act(rig: Rig, t: float) -> None:
+        rig.robot.board_silent = 2.3 <= t < 2.8
+        if t >= 2.3:
+            limited.append(rig.session.tally.limited)
+
+    log = walked(act, DriveConfig(dry_run=0.5, duration=3.2))
+    assert log.state[-2] <= State.DEGRADED
+    assert (limited[-1] - limited[0]) / 12 < 5
 
 
 def test_B8_a_controller_that_fails_does_not_feed_the_watchdogs() -> None:

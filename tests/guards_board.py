@@ -1,0 +1,258 @@
+"""Guards on readings: frames, the clock of the board, films, contact."""
+
+from __future__ import annotations
+
+import dataclasses
+from functools import partial
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import test_bad_readings
+import test_board
+import test_conditioning
+import test_contact
+import test_diagnosis
+import test_esp32_clock as test_clock
+import test_esp32_decoder as test_decoder
+import test_esp32_frame as test_frame
+import test_maneuver
+import test_touch_check
+from guard_tools import Guard, after, around, before, constant, put
+from hardware_rig import BAND
+
+from antennate import conditioning, contact, maneuver
+from antennate.hardware import (
+    board,
+    diagnosis,
+    touch_check,
+)
+from antennate.hardware.esp32 import clock, decoder, frame
+from antennate.hardware.esp32.clock import DeviceClock, Verdict
+from antennate.records import Maneuver
+
+
+def trusting(self: DeviceClock, sample: Any, now: float) -> None:
+    self._boot, self._modulus = sample.boot_id, self._modulus or 1 << 30
+    self._period = self._period or 1e4
+
+
+def within(old: Any, self: DeviceClock, sample: Any, now: float) -> Verdict:
+    return old(self, dataclasses.replace(sample, ticks=sample.ticks % (1 << 30)), now)
+
+
+def any_version(old: Any, body: Any) -> Any:
+    return old(bytes([frame.PROTOCOL]) + bytes(body[1:]))
+
+
+def believing(self: Any, counts: float) -> None:
+    self._good, self._bad_run = counts, 0
+    self._count(True, counts)
+
+
+def seeing_right(old: Any, self: Any, bends: Any) -> str:
+    return "right" if old(self, bends) == "swapped" else old(self, bends)
+
+
+def first(one: Any, other: Any) -> Any:
+    return one
+
+
+def unclamped(old: Any, self: Any, counts: float) -> float:
+    return counts
+
+
+LIE = (lambda n: n * 10_000 + 3_600_000_000, Verdict.AHEAD)
+STILL = (lambda n: 1_000_000, Verdict.FROZEN)
+OLD_FIRMWARE = test_board.test_E8_no_sample_of_a_board_with_old_firmware_is_used
+
+STREAM = [
+    Guard(
+        "CRC of frames",
+        put(decoder, "_intact", constant(True)),
+        partial(test_decoder.test_L1_random_bit_errors, 1e-2),
+    ),
+    Guard(
+        "longest piece between delimiters",
+        put(decoder, "LONGEST", 1 << 30),
+        test_decoder.test_L4_endless_garbage_without_a_delimiter,
+    ),
+    Guard(
+        "room for text",
+        put(decoder, "TEXT_KEPT", 1 << 30),
+        test_decoder.test_L5_a_flood_of_text_is_bounded_and_its_rest_counted,
+    ),
+    Guard(
+        "protocol version",
+        around(decoder, "parse", any_version),
+        test_frame.test_E8_another_protocol_version_is_refused_and_both_are_named,
+    ),
+    Guard(
+        "range of readings",
+        put(frame, "FULL_SCALE", 65_535),
+        partial(
+            test_frame.test_E8_what_cannot_be_used_says_why,
+            b"\x01\x02" + bytes(12) + b"\x00\x10\x03" + bytes(4),
+            "at most 4095",
+        ),
+    ),
+    Guard("firmware", put(board, "objections", constant(())), OLD_FIRMWARE),
+    Guard(
+        "flag of a reading at a rail",
+        put(board, "_RAILS", (0, 0)),
+        partial(test_board.test_S5_a_reading_at_a_rail_is_none, 3, [True, True]),
+    ),
+    Guard(
+        "age limit of readings",
+        put(board.Board, "newest", lambda self, now: self.clock.newest),
+        test_board.test_a_reading_older_than_the_limit_is_none,
+    ),
+]
+CLOCK = [
+    Guard(
+        "greeting before samples, and their boot",
+        before(DeviceClock, "take", trusting),
+        test_clock.test_E8_before_a_greeting_no_sample_is_used,
+    ),
+    Guard(
+        "earlier boots",
+        put(clock, "RETIRED_BOOTS", 0),
+        test_clock.test_E1_a_greeting_that_comes_late_does_not_bring_the_old_boot_back,
+    ),
+    Guard(
+        "ticks beyond the modulus",
+        around(DeviceClock, "_judge", within),
+        test_clock.test_E7_ticks_beyond_the_declared_modulus_are_refused,
+    ),
+    Guard(
+        "doubled and late samples",
+        put(clock.Sequence, "place", constant(Verdict.USED)),
+        test_clock.test_L7_the_window_tells_late_from_doubled,
+    ),
+    Guard(
+        "board's time jumps",
+        put(DeviceClock, "_judge_time", constant(Verdict.USED)),
+        partial(test_clock.test_E7_lies_of_the_boards_clock, *LIE),
+    ),
+    Guard(
+        "board's time stands still",
+        put(DeviceClock, "_judge_time", constant(Verdict.USED)),
+        partial(test_clock.test_E7_lies_of_the_boards_clock, *STILL),
+    ),
+    Guard(
+        "ten samples before a new time is believed",
+        put(clock, "SETTLE_SAMPLES", 1),
+        test_clock.test_E7_single_lies_do_no_harm,
+    ),
+    Guard(
+        "ages settle before they are believed",
+        after(DeviceClock, "_follow", lambda self, *args: setattr(self, "_settled", True)),
+        partial(test_clock.test_L10_a_burst_at_the_start_is_not_believed_to_be_fresh, 100, 0.0),
+    ),
+    Guard(
+        "wraps hidden by an outage",
+        before(DeviceClock, "_judge", lambda self, sample, now: setattr(self, "_arrived", now)),
+        partial(test_clock.test_E5_a_wrap_hidden_by_an_outage, 18.0),
+    ),
+]
+FILMS = [
+    Guard(
+        "open wire",
+        put(diagnosis.ChannelDiagnosis, "_broken", constant(None)),
+        partial(
+            test_diagnosis.test_S1_a_floating_wire_is_open_within_ten_readings,
+            test_diagnosis.rail_to_rail,
+            BAND,
+        ),
+    ),
+    Guard(
+        "short circuit",
+        put(diagnosis.ChannelDiagnosis, "_pinned", constant(False)),
+        partial(
+            test_diagnosis.test_S2_shorts_are_named_at_the_tenth_reading,
+            [0.0] * 10,
+            diagnosis.Finding.SHORT_LO,
+            BAND,
+            test_diagnosis.FREE,
+        ),
+    ),
+    Guard(
+        "stuck reading",
+        after(
+            diagnosis.ChannelDiagnosis, "_believe", lambda self, counts: setattr(self, "_equal", 1)
+        ),
+        test_diagnosis.test_S4_a_repeated_reading_is_stuck_after_100,
+        by=(ValueError,),
+    ),
+    Guard(
+        "isolated spikes",
+        put(diagnosis.ChannelDiagnosis, "_believe", believing),
+        test_diagnosis.test_S6_a_real_jump_is_believed_after_three_readings,
+    ),
+    Guard(
+        "share of bad readings",
+        before(diagnosis.ChannelDiagnosis, "_find", lambda self: setattr(self, "_share_bad", 0)),
+        partial(test_diagnosis.test_S6_more_than_a_fifth_bad_is_degraded_or_worse, 0.3),
+    ),
+    Guard(
+        "clamping to the calibrated range",
+        around(diagnosis.ChannelDiagnosis, "_clamp", unclamped),
+        partial(
+            test_diagnosis.test_S11_beyond_the_calibrated_range_is_clamped_and_flagged, 0.3, True
+        ),
+    ),
+    Guard(
+        "readings far beyond the range",
+        put(diagnosis.ChannelDiagnosis, "_plausible", constant(True)),
+        test_diagnosis.test_S11_far_beyond_is_not_believed,
+    ),
+    Guard(
+        "findings that say nothing of contact",
+        put(diagnosis.Finding, "usable", True),
+        test_diagnosis.test_S4_a_repeated_reading_is_stuck_after_100,
+    ),
+    Guard(
+        "a sample is counted once",
+        before(
+            diagnosis.ChannelDiagnosis,
+            "step",
+            lambda self, t, counts: setattr(self, "_t", t - 0.001),
+        ),
+        test_diagnosis.test_S4_the_same_sample_seen_twice_is_not_counted_twice,
+    ),
+    Guard(
+        "gap in time",
+        before(
+            diagnosis.ChannelDiagnosis,
+            "step",
+            lambda self, t, counts: setattr(self, "_t", t - 0.01),
+        ),
+        test_diagnosis.test_a_gap_in_time_forgets_what_was_before,
+    ),
+    Guard(
+        "swapped antennae",
+        around(touch_check.TouchCheck, "_see", seeing_right),
+        test_touch_check.test_S8_swapped_channels_are_refused,
+    ),
+    Guard(
+        "a missing sample taints its mean",
+        around(conditioning.RunningMean, "step", lambda old, self, c: old(self, np.nan_to_num(c))),
+        test_conditioning.test_a_missing_sample_taints_its_side_until_the_window_has_passed,
+    ),
+    Guard(
+        "overflow of the sigmoid",
+        put(conditioning, "np", SimpleNamespace(exp=np.exp, minimum=first, maximum=first)),
+        test_bad_readings.test_S10_the_sigmoid_never_overflows,
+        by=(RuntimeWarning,),
+    ),
+    Guard(
+        "NaN is UNKNOWN",
+        around(contact, "classify", lambda old, p, b, was: old(p, np.nan_to_num(b), was)),
+        test_contact.test_nan_is_unknown_and_is_not_remembered_as_contact,
+    ),
+    Guard(
+        "UNKNOWN ends a held maneuver",
+        put(maneuver, "Maneuver", SimpleNamespace(HOLD=99, FORWARD=Maneuver.FORWARD)),
+        test_maneuver.test_unknown_stops_a_held_maneuver_at_once_and_ends_with_its_cause,
+    ),
+]

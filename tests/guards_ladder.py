@@ -1,0 +1,167 @@
+"""Guards of the supervisor."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+import test_supervisor
+import test_supervisor_outages as test_outages
+import test_touch_check
+from guard_tools import Guard, after, around, before, blind, constant, put
+from hardware_rig import PERIOD
+
+from antennate.hardware import (
+    diagnosis,
+    rate,
+)
+from antennate.hardware.causes import Cause, Outputs
+from antennate.hardware.supervisor import Supervisor
+from antennate.records import Contact, Maneuver
+
+
+class Never:
+    """Counts nothing."""
+
+    def add(self, now: float) -> bool:
+        return False
+
+    def clear(self) -> None:
+        """Nothing to forget."""
+
+
+def nothing_known(self: Any, *args: Any) -> None:
+    self._waiting.clear()
+    self._streak = 10**6
+
+
+def fed(old: Any, self: Any, *args: Any) -> Outputs:
+    out = old(self, *args)
+    return dataclasses.replace(out, feed_watchdog=out.torque)
+
+
+def told(cause: Cause) -> Callable[[], Any]:
+    return partial(test_supervisor.test_every_cause_is_named_dated_and_as_severe_as_it_says, cause)
+
+
+SUPERVISOR = [
+    Guard(
+        "age limit of the supervisor",
+        blind(age=0.0),
+        partial(test_supervisor.test_S5_an_age_that_is_no_age_is_stale, 0.0501),
+    ),
+    Guard(
+        "age that is NaN",
+        blind(age=0.0),
+        partial(test_supervisor.test_S5_an_age_that_is_no_age_is_stale, math.nan),
+    ),
+    Guard(
+        "findings hold the robot",
+        blind(findings=(diagnosis.Finding.OK, diagnosis.Finding.OK)),
+        told(Cause.OPEN),
+    ),
+    Guard("restart of the board", blind(resets=0), told(Cause.REBOOT)),
+    Guard("silent servo", blind(missed={}), told(Cause.SILENT_SERVO)),
+    Guard("hardware error of a servo", blind(servo_errors={}), told(Cause.SERVO_ERROR)),
+    Guard("dead bus", blind(bus_error=""), told(Cause.BUS_ERROR)),
+    Guard("tripped watchdog", blind(watchdogs=()), told(Cause.WATCHDOG)),
+    Guard("supply", blind(supply=12.0), told(Cause.SUPPLY_OFF)),
+    Guard("stop by the operator", blind(stop=False), told(Cause.STOPPED)),
+    Guard("exception of the controller", blind(failure=""), told(Cause.FAILED)),
+    Guard("action that does not exist", blind(maneuver=Maneuver.HOLD), told(Cause.BAD_ACTION)),
+    Guard(
+        "pose that is not finite",
+        blind(finite=True),
+        partial(
+            test_supervisor.test_S5_a_pose_or_maneuver_that_is_none_is_not_sent, {"finite": False}
+        ),
+    ),
+    Guard(
+        "UNKNOWN never walks",
+        blind(contact=(Contact.FREE, Contact.FREE)),
+        partial(
+            test_supervisor.test_S5_unknown_contact_never_walks,
+            (Contact.FREE, Contact.UNKNOWN),
+            Maneuver.FORWARD,
+        ),
+    ),
+    Guard(
+        "fresh decision before motion",
+        blind(decided_at="now"),
+        test_supervisor.test_B8_watchdogs_are_fed_only_upon_a_decision_of_this_tick,
+    ),
+    Guard(
+        "watchdogs fed only upon a fresh decision",
+        around(Supervisor, "_outputs", fed),
+        test_supervisor.test_B8_watchdogs_are_fed_only_upon_a_decision_of_this_tick,
+    ),
+    Guard(
+        "touch check and other objections",
+        blind(objections=()),
+        test_touch_check.test_S8_an_objection_keeps_the_robot_from_being_armed,
+    ),
+    Guard(
+        "arm gate",
+        put(Supervisor, "_objections", constant(())),
+        test_supervisor.test_it_begins_off_and_arms_on_good_data_only,
+    ),
+    Guard(
+        "arming is an event",
+        before(Supervisor, "step", lambda self, *args: setattr(self, "_asked", False)),
+        test_supervisor.test_it_begins_off_and_arms_on_good_data_only,
+    ),
+    Guard(
+        "faults stay until an arm event",
+        put(Supervisor, "_latch", constant(None)),
+        test_outages.test_T5_after_a_pause_it_does_not_resume,
+    ),
+    Guard(
+        "clock that lies",
+        before(Supervisor, "step", lambda self, *args: setattr(self, "_last", -math.inf)),
+        partial(test_supervisor.test_a_clock_that_lies_is_a_fault, -1.0),
+    ),
+    Guard(
+        "pause of the loop",
+        before(Supervisor, "step", lambda self, now, seen: setattr(self, "_last", now - PERIOD)),
+        test_outages.test_T5_after_a_pause_it_does_not_resume,
+    ),
+    Guard(
+        "ten good samples after a loss",
+        after(Supervisor, "_recover", nothing_known),
+        test_supervisor.test_data_must_be_well_ten_times_in_a_row,
+    ),
+    Guard(
+        "refused samples break the row",
+        blind(refused=0),
+        test_supervisor.test_data_must_be_well_ten_times_in_a_row,
+    ),
+    Guard(
+        "three holds are a fault",
+        after(Supervisor, "__init__", lambda self, params: setattr(self, "_holds", Never())),
+        test_supervisor.test_three_holds_in_ten_seconds_are_a_fault,
+    ),
+    Guard(
+        "three failures are a fault",
+        after(Supervisor, "__init__", lambda self, params: setattr(self, "_failures", Never())),
+        partial(test_outages.test_T6_an_exception_holds_in_the_same_tick_and_three_are_a_fault, 0),
+    ),
+    Guard(
+        "reboot loop",
+        after(Supervisor, "__init__", lambda self, params: setattr(self, "_reboots", Never())),
+        partial(test_outages.test_E2_a_reboot_loop_is_a_fault_after_three, 0.3, "HARD"),
+        by=(KeyError,),
+    ),
+    Guard(
+        "wrong rate",
+        after(rate.RateMeter, "step", lambda self, *args: setattr(self, "wrong", False)),
+        partial(test_outages.test_L16_a_wrong_rate_is_shown_and_degrades, 50, True),
+    ),
+    Guard(
+        "supply does not flutter",
+        before(Supervisor, "_supply", lambda self, *args: self._low.clear()),
+        test_supervisor.test_the_supply_sags_down_the_ladder_and_does_not_flutter,
+    ),
+]

@@ -1,0 +1,328 @@
+"""Guards on servos: packets, the bus, bring-up, goals and the session."""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import math
+from functools import partial
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import test_dynamixel_bus as test_bus
+import test_dynamixel_packets as test_packets
+import test_loop
+import test_servo_hours
+import test_session
+import test_twin_bus
+import test_twin_robot
+from guard_tools import Guard, after, around, constant, put
+
+from antennate import loop
+from antennate.hardware import (
+    joints,
+    serial_port,
+    session,
+    watch,
+)
+from antennate.hardware.causes import Outputs
+from antennate.hardware.dynamixel import bringup, bus, packets, parser
+from antennate.hardware.dynamixel.answers import Value
+from antennate.hardware.dynamixel.doubts import Doubts
+from antennate.hardware.port import PortError
+from antennate.hardware.supervisor import Supervisor
+from antennate.twin.link import Link
+
+
+class AnyNumber(int):
+    """A CRC that is right whatever it is compared with."""
+
+    def __ne__(self, other: object) -> bool:
+        return False
+
+    __hash__ = int.__hash__
+
+    def to_bytes(self, *args: Any) -> Any:
+        return AnyBytes()
+
+
+class AnyBytes(bytes):
+    def __eq__(self, other: object) -> bool:
+        return True
+
+    __hash__ = bytes.__hash__
+
+
+class Everyone(list[int]):
+    """Ids among which every id is."""
+
+    def __contains__(self, key: object) -> bool:
+        return True
+
+
+def any_refusal(old: Any, packet: Any, length: int, doubtful: set[int]) -> Any:
+    return old(packet, length, set())
+
+
+def any_length(old: Any, packet: Any, length: int, doubtful: set[int]) -> Any:
+    status = packets.as_status(packet)
+    return status and dataclasses.replace(status, data=status.data[-length:] if length else b"")
+
+
+def from_anybody(old: Any, self: Any, request: bytes, ids: Any, length: int, end: float) -> Any:
+    return old(self, request, Everyone(ids), length, end)
+
+
+def unread(old: Any, master: Any, register: Any, values: Any) -> None:
+    master.write_all(register.address, {i: register.encode(v) for i, v in values.items()})
+
+
+def where_goals_were(old: Any, master: Any, ids: Any) -> Any:
+    return bringup.read_register(master, ids, bringup._COMMON["present_position"])
+
+
+def always_watch(old: Any, self: Any, pose: Any) -> None:
+    old(self, pose)
+    if self.outputs.torque and not self.outputs.feed_watchdog:
+        self.watch.step()
+
+
+def cleared(old: Any, self: Any, now: float, inputs: Any) -> Outputs:
+    return dataclasses.replace(old(self, now, inputs), clear=True)
+
+
+def raising(self: Any) -> None:
+    self._look()
+
+
+def finite_goals(old: Any, self: Any, angles: Any) -> Any:
+    return old(self, np.nan_to_num(angles))
+
+
+def careless(old: Any, self: Any, frame_: Any) -> Any:
+    self._thought = session._Thought(decided_at=self.clock.now())
+    return self.decider.step(frame_)
+
+
+def no_line_of_errors(self: Any, what: str) -> Any:
+    return contextlib.nullcontext()
+
+
+def shared(old: Any, *args: Any, exclusive: bool = True, **kwargs: Any) -> Any:
+    return old(*args, exclusive=False, **kwargs)
+
+
+def first_of_each(old: Any, self: Any, data: bytes) -> Any:
+    found = {packet.id: packet for packet in reversed(old(self, data))}
+    return list(reversed(found.values()))
+
+
+BUS = [
+    Guard(
+        "CRC of servo packets",
+        put(parser, "crc16", constant(AnyNumber())),
+        test_packets.test_B3_no_flipped_bit_makes_a_wrong_packet_and_the_next_one_is_found,
+    ),
+    Guard(
+        "CRC of each part of a fast reply",
+        put(packets, "crc16", constant(AnyNumber())),
+        test_packets.test_B3_a_flipped_bit_in_a_fast_reply_spoils_two_values_at_most_and_makes_none,
+    ),
+    Guard(
+        "byte stuffing",
+        put(packets, "stuff", lambda body: body),
+        test_packets.test_B3_every_pattern_near_a_header_survives_stuffing,
+    ),
+    Guard(
+        "length of a packet",
+        put(parser, "LONGEST", 1 << 20),
+        test_packets.test_lengths_that_cannot_be_are_refused_at_once,
+    ),
+    Guard(
+        "ids in requests",
+        put(packets, "_check_ids", constant(None)),
+        partial(test_packets.test_ids_that_cannot_be_are_refused, [1, 1]),
+    ),
+    Guard(
+        "stale bytes drained before a request",
+        put(Link, "drain", constant(0)),
+        partial(test_bus.test_B4_no_late_answer_is_taken_for_a_new_one, 0.003, True),
+    ),
+    Guard(
+        "bus quiet before a request",
+        put(bus.Bus, "_quiet", constant(True)),
+        partial(test_bus.test_B4_no_late_answer_is_taken_for_a_new_one, 0.060, True),
+    ),
+    Guard(
+        "other lengths while an answer may come late",
+        put(Doubts, "free", lambda self, ids, span: span.length),
+        test_bus.test_B4_single_reads_after_a_late_answer,
+    ),
+    Guard(
+        "wait before a write that cannot be told apart",
+        put(Doubts, "holds", constant(False)),
+        test_bus.test_B4_a_late_confirmation_does_not_confirm_the_next_write,
+    ),
+    Guard(
+        "late refusals",
+        around(bus, "_fitting", any_refusal),
+        test_bus.test_B4_a_late_refusal_does_not_refuse_the_next_read,
+    ),
+    Guard(
+        "length of an answer",
+        around(bus, "_fitting", any_length),
+        test_bus.test_B4_single_reads_after_a_late_answer,
+    ),
+    Guard(
+        "id of an answer",
+        around(bus.Bus, "_exchange", from_anybody),
+        test_bus.test_an_answer_with_another_id_is_no_answer,
+    ),
+    Guard(
+        "two answers of one id",
+        around(parser.Parser, "feed", first_of_each),
+        test_bus.test_two_answers_of_one_servo_that_differ_are_none,
+    ),
+    Guard(
+        "one caller at a time",
+        after(
+            bus.Bus,
+            "__init__",
+            lambda self, *args, **kwargs: setattr(self, "turn", contextlib.nullcontext()),
+        ),
+        partial(test_servo_hours.hammer, 800),
+    ),
+    Guard(
+        "budget of time",
+        put(bus.Bus, "_time_for", constant(True)),
+        test_bus.test_B1_two_silent_servos_leave_seventeen,
+    ),
+    Guard(
+        "goals wait for a quiet bus, not for ever",
+        put(bus, "BUSY", 1.0),
+        test_bus.test_a_babbling_bus_is_given_up_in_time,
+    ),
+    Guard(
+        "servos without fast reads",
+        put(bus, "FAST_TRIES", 1 << 30),
+        test_bus.test_servos_that_do_not_know_fast_reads_are_asked_slowly,
+    ),
+    Guard(
+        "second program on a port",
+        around(serial_port.serial, "Serial", shared),
+        test_session.test_L15_B16_a_second_program_on_a_port_is_refused,
+    ),
+    Guard(
+        "line that goes away",
+        put(serial_port.SerialPort, "_mapped", no_line_of_errors),
+        test_twin_bus.test_L12_a_line_that_goes_away_is_a_port_error,
+        by=(OSError,),
+    ),
+]
+SERVOS = [
+    Guard(
+        "duplicate id",
+        put(bringup, "_patient", constant(Value(b"x", alert=False))),
+        test_bus.test_B15_missing_wrong_double_and_strange_servos_are_named_within_3_s,
+    ),
+    Guard(
+        "servos nobody expects",
+        put(bus.Bus, "scan", constant([])),
+        test_bus.test_B15_missing_wrong_double_and_strange_servos_are_named_within_3_s,
+    ),
+    Guard(
+        "model of a servo",
+        around(
+            bringup,
+            "_look",
+            lambda old, master, i, model: old(
+                master, i, bringup._model(bringup._data(master.ping(i)))[0] or model
+            ),
+        ),
+        test_bus.test_B15_missing_wrong_double_and_strange_servos_are_named_within_3_s,
+    ),
+    Guard(
+        "operating mode of a servo",
+        put(bringup, "read_register", constant(dict.fromkeys(range(1, 20), AnyNumber()))),
+        partial(
+            test_session.test_B15_servos_that_are_not_as_expected_are_refused,
+            lambda robot: robot.servos[8].set("operating_mode", 3),
+            r"mode .* \[9\]",
+        ),
+    ),
+    Guard(
+        "present goals on torque-on",
+        around(bringup, "hold_here", where_goals_were),
+        test_bus.test_B10_torque_goes_on_without_a_jump,
+    ),
+    Guard(
+        "writes are read back",
+        around(bringup, "_write_checked", unread),
+        test_bus.test_B9_latched_watchdogs_are_seen_and_rearmed_in_place,
+    ),
+    Guard(
+        "homing offset in extended mode",
+        put(bringup, "EXTENDED_MODE", -1),
+        test_bus.test_B9_extended_mode_with_an_offset_is_refused,
+    ),
+    Guard(
+        "torque off is confirmed",
+        put(bringup, "disable", constant([])),
+        test_bus.test_B19_torque_off_is_confirmed_and_what_did_not_is_named,
+    ),
+    Guard(
+        "watchdogs armed",
+        around(bringup, "arm_watchdogs", lambda old, master, ids: old(master, ids, 0)),
+        test_session.test_B8_servos_stop_within_120_ms_when_only_the_controller_fails_and_the_loop_goes_on,
+    ),
+    Guard(
+        "goals beyond 256 turns",
+        put(joints, "_MOST", math.inf),
+        partial(
+            test_twin_robot.test_B14_a_goal_that_is_not_finite_or_too_far_is_refused_as_a_whole, 1e4
+        ),
+    ),
+]
+SESSION = [
+    Guard(
+        "goals that are NaN",
+        around(joints.Joints, "positions", finite_goals),
+        partial(
+            test_twin_robot.test_B14_a_goal_that_is_not_finite_or_too_far_is_refused_as_a_whole,
+            math.nan,
+        ),
+    ),
+    Guard(
+        "speed of goals",
+        put(session, "FASTEST", 1e6),
+        test_session.test_B10_torque_comes_on_with_goals_where_servos_stand_and_they_move_slowly,
+    ),
+    Guard(
+        "gait stands still while held",
+        around(Supervisor, "step", cleared),
+        test_session.test_L9_the_gait_stands_still_during_a_hold_so_that_no_leg_has_to_catch_up,
+    ),
+    Guard(
+        "no packet without a decision",
+        around(session.Session, "_act", always_watch),
+        test_session.test_B8_servos_stop_within_120_ms_when_only_the_controller_fails_and_the_loop_goes_on,
+    ),
+    Guard(
+        "exceptions of the controller end nothing",
+        around(session.Session, "step", careless),
+        test_session.test_B8_servos_stop_within_120_ms_when_only_the_controller_fails_and_the_loop_goes_on,
+        by=(ValueError,),
+    ),
+    Guard(
+        "dead wire ends nothing",
+        put(watch.ServoWatch, "step", raising),
+        test_bus.test_a_dead_wire_is_noted_by_the_watch_and_ends_nothing,
+        by=(PortError,),
+    ),
+    Guard(
+        "no burst after an overrun",
+        put(loop, "math", SimpleNamespace(ceil=constant(0))),
+        test_loop.test_T1_an_overrun_leaves_out_the_ticks_it_covers_and_delays_none_after,
+    ),
+]
