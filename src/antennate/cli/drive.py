@@ -56,7 +56,8 @@ def command(argv: Sequence[str]) -> int:
     with connect(config, orders.esp32, orders.bus) as session, terminate_as_interrupt():
         report = drive(session, config, orders.arm, _status())
     _tell(report, orders.arm)
-    return OK if report.safe and report.worst < State.FAULT else BAD_INPUT
+    well = report.safe and report.worst < State.FAULT and not report.refusal
+    return OK if well else BAD_INPUT
 
 
 def _status() -> Callable[[Session, float], None]:
@@ -88,13 +89,17 @@ def _line(session: Session, t: float) -> str:
         f"{t:7.1f} s {state} {maneuver} counts={read} age={1e3 * clock.age(t):.0f}ms "
         f"missed={missed} frames={bytes_.good} crc={bytes_.crc_errors} "
         f"lost={clock.sequence.lost} misses={bus.misses} stale={bus.stale} "
-        f"sent={session.tally.sent}{why}"
+        f"sent={session.tally.sent} {session.trust.said}{why}"
     )
 
 
 def _tell(report: Report, armed: bool) -> None:
     if not armed:
         sys.stderr.write("\ndry run over, nothing was written to the servos; --arm lets it walk\n")
+    if report.refusal:
+        sys.stderr.write(
+            f"\nnot armed: {report.refusal}; --no-touch-check arms without the check\n"
+        )
     if (timing := report.timing) is not None:
         stages = ", ".join(f"{n} {1e3 * s.worst:.1f}" for n, s in timing.stages.items())
         missed = f"{timing.missed_cycles} missed ({100 * timing.missed_share:.2f} %)"

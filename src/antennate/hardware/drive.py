@@ -14,6 +14,7 @@ from antennate.controller import ARMS, Controller
 from antennate.errors import BadInputError, ConfigError
 from antennate.hardware.board import Board
 from antennate.hardware.causes import State
+from antennate.hardware.dry_run import DryRun
 from antennate.hardware.dynamixel import bringup
 from antennate.hardware.dynamixel.answers import Timing
 from antennate.hardware.dynamixel.bringup import BringUpError
@@ -24,8 +25,16 @@ from antennate.hardware.joints import Joints
 from antennate.hardware.port import Port, PortError
 from antennate.hardware.session import Decider, Session
 from antennate.hardware.timing import TimingReport
+from antennate.hardware.trust import Trust
 from antennate.loop import run_loop
-from antennate.params import ControllerParams, Params, SupervisorParams, number
+from antennate.params import (
+    ControllerParams,
+    DriftParams,
+    Params,
+    SupervisorParams,
+    TouchCheckParams,
+    number,
+)
 from antennate.params.layout import LayoutParams
 from antennate.records import AntennaFrame, Pose
 
@@ -52,6 +61,14 @@ class DriveConfig(Params):
     duration: float | None = number(
         None, "s", "assumed: until it is stopped", "time from torque on to off", gt=0
     )
+    touch_check: bool = number(
+        True,
+        "1",
+        "assumed: swapped channels turn the robot towards what it touches",
+        "whether it is armed only after both antennae were bent by hand in the dry run",
+    )
+    touch: TouchCheckParams = TouchCheckParams()
+    drift: DriftParams = DriftParams()
     layout: LayoutParams = LayoutParams()
     mind: ControllerParams = ControllerParams()
     limits: SupervisorParams = SupervisorParams()
@@ -64,12 +81,14 @@ class Report:
     Attributes:
         timing: How well the pace was kept, None if no tick was run.
         worst: Worst state after torque had come on, and why.
+        refusal: Why torque did not come on although it was wanted, empty if nothing forbade it.
         on: Servos that did not confirm that their torque is off.
     """
 
     timing: TimingReport | None = None
     worst: State = State.OK
     why: str = ""
+    refusal: str = ""
     on: list[int] = field(default_factory=list[int])
 
     @property
@@ -119,6 +138,9 @@ def prepare(config: DriveConfig, esp32: Port, bus: Port, clock: Any) -> Session:
         period=config.mind.period,
         conditioning=config.mind.conditioning,
         limits=config.limits,
+        trust=Trust(
+            config.mind.conditioning, config.drift, config.touch if config.touch_check else None
+        ),
     )
 
 
@@ -214,18 +236,20 @@ def drive(
     """
     report, clock = Report(), session.clock
     start = clock.now()
-    walk = config.dry_run if arm else math.inf
-    end = config.dry_run if not arm else config.dry_run + (config.duration or math.inf)
+    duration = config.duration or math.inf
+    dry = DryRun(session.trust, config.dry_run, config.touch.patience, arm, duration)
 
     def go_on(frame: AntennaFrame, pose: Pose) -> bool:
         t = clock.now() - start
-        session.orders.arm = t >= walk
+        dry.step(t)
+        session.orders.arm = t >= dry.over
+        report.refusal = dry.refusal
         out = session.outputs
         if out is not None and out.torque and out.state > report.worst:
             report.worst, report.why = out.state, "; ".join(c.text for c in out.causes)
         on_tick(session, clock.now())
-        failed = out is not None and t > walk + _ARMING_TIME and out.state >= State.FAULT
-        return t < end and not failed
+        failed = out is not None and t > dry.over + _ARMING_TIME and out.state >= State.FAULT
+        return t < dry.end and not failed
 
     try:
         run_loop(session, session, session.period, go_on)
