@@ -6,6 +6,7 @@ import math
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Annotated
 
 import tyro
@@ -16,6 +17,7 @@ from antennate.cli.progress import terminate_as_interrupt
 from antennate.errors import ConfigError
 from antennate.hardware.causes import State
 from antennate.hardware.drive import DriveConfig, Report, connect, drive
+from antennate.hardware.film import calibrated
 from antennate.hardware.session import Session
 from antennate.records import Maneuver
 
@@ -53,6 +55,9 @@ def command(argv: Sequence[str]) -> int:
     for name in ("esp32", "bus"):
         if not getattr(orders, name):
             raise ConfigError(f"--{name}: expected a serial port, found none")
+    if config.calibration is not None:
+        mind, film = calibrated(config.mind, Path(config.calibration), config.sensor_id)
+        config = config.model_copy(update={"mind": mind, "sensor_id": film.sensor_id})
     with connect(config, orders.esp32, orders.bus) as session, terminate_as_interrupt():
         report = drive(session, config, orders.arm, _status())
     _tell(report, orders.arm)

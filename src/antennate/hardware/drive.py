@@ -20,6 +20,7 @@ from antennate.hardware.dynamixel.answers import Timing
 from antennate.hardware.dynamixel.bringup import BringUpError
 from antennate.hardware.dynamixel.bus import Bus
 from antennate.hardware.dynamixel.tables import EXTENDED_MODE, XC430_W240, XL330_M288
+from antennate.hardware.film import require_film
 from antennate.hardware.host_clock import HostClock
 from antennate.hardware.joints import Joints
 from antennate.hardware.port import Port, PortError
@@ -60,6 +61,18 @@ class DriveConfig(Params):
     )
     duration: float | None = number(
         None, "s", "assumed: until it is stopped", "time from torque on to off", gt=0
+    )
+    calibration: str | None = number(
+        None,
+        "1",
+        "assumed: the numbers of mind.conditioning",
+        "file of `antennate calibrate`, for both antennae, in place of mind.conditioning",
+    )
+    sensor_id: str | None = number(
+        None,
+        "1",
+        "assumed: that of the calibration file",
+        "name of the film; 16 hexadecimal digits name the board it is soldered to",
     )
     touch_check: bool = number(
         True,
@@ -127,6 +140,7 @@ def prepare(config: DriveConfig, esp32: Port, bus: Port, clock: Any) -> Session:
     """A session before two open ports, after both sides have said who they are."""
     board = Board(esp32, config.limits.stale_age)
     await_board(board, clock)
+    require_film(board, config.sensor_id)
     master = Bus(bus, Timing(config.layout.baud, doubt=_DOUBT), clock=clock.now)
     require_servos(master, config.layout)
     return Session(
