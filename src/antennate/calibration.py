@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 from pathlib import Path
 from typing import Literal
 
+import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from antennate.conditioning import bending_level
@@ -17,6 +19,13 @@ from antennate.records import Floats
 SCHEMA = 1
 FEWEST = 20
 """Fewest readings."""
+NARROWEST_SPAN = 20.0
+"""Fewest counts between straight and bent that can be told from noise."""
+NARROWEST_RISE = 10.0
+"""Fewest counts over which the bend may rise from 0.1 to 0.9: four sigma of a reading's noise."""
+_RISE = 2.0 * math.log(9.0)
+"""That rise of a sigmoid in units of 1 / slope."""
+_FULL_SCALE = 4095
 _LARGEST_FILE = 1_000_000
 
 
@@ -75,11 +84,16 @@ def level(calibration: Calibration, counts: Floats) -> Floats:
     return bending_level(calibration.conditioning(), counts)
 
 
-def load(path: Path) -> Calibration:
+def load(path: Path, sensor_id: str | None = None) -> Calibration:
     """Read a calibration file.
 
+    Args:
+        path: The file.
+        sensor_id: The film it has to belong to, None for any.
+
     Raises:
-        CalibrationError: It cannot be read, or a field is missing, unknown or out of bounds.
+        CalibrationError: It cannot be read; a field is missing, doubled, unknown or out of bounds;
+            or no film can have such a curve.
     """
     try:
         with path.open("rb") as file:
@@ -90,16 +104,60 @@ def load(path: Path) -> Calibration:
         raise CalibrationError(f"{path}: expected at most {_LARGEST_FILE} bytes, found more")
     try:
         found = Calibration.model_validate_json(data, strict=True)
+        json.loads(data, object_pairs_hook=_once)
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         field = ".".join(str(part) for part in first["loc"]) or "the file"
         raise CalibrationError(f"{path}: {field}: {first['msg']}") from None
-    if found.counts_high - found.counts_low < 1:
+    except CalibrationError as error:
+        raise CalibrationError(f"{path}: {error}") from None
+    if sensor_id is not None and found.sensor_id != sensor_id:
         raise CalibrationError(
-            f"{path}: counts_high: expected more than counts_low, found {found.counts_low} and "
-            f"{found.counts_high}"
+            f"{path}: sensor_id: expected {sensor_id}, found {found.sensor_id}: the calibration of "
+            "another film"
         )
+    if why := _impossible(found):
+        raise CalibrationError(f"{path}: {why}")
     return found
+
+
+def _once(pairs: list[tuple[str, object]]) -> None:
+    """Refuse what pydantic lets pass: doubled keys, and truth values, taken for numbers."""
+    keys = [key for key, _ in pairs]
+    if doubled := next((key for key in keys if keys.count(key) > 1), None):
+        raise CalibrationError(f"{doubled}: expected once, found {keys.count(doubled)} times")
+    if said := next((key for key, value in pairs if isinstance(value, bool)), None):
+        raise CalibrationError(f"{said}: expected no truth value, found one")
+
+
+def _impossible(found: Calibration) -> str:
+    """Why no film can have this curve, empty if one can; these bounds no file can widen."""
+    span = found.counts_high - found.counts_low
+    if span < NARROWEST_SPAN:
+        return (
+            f"counts_high: expected {NARROWEST_SPAN:g} counts more than counts_low or more, found "
+            f"{found.counts_low:g} and {found.counts_high:g}"
+        )
+    for field in ("slope_95", "midpoint_95", "valid_counts", "valid_bend"):
+        low, high = getattr(found, field)
+        if not low <= high:
+            return f"{field}: expected the lower end first, found {low:g} and {high:g}"
+    low, high = found.valid_counts
+    if not (0 <= low < high <= _FULL_SCALE):
+        return f"valid_counts: expected readings of 12 bits, found {low:g} to {high:g}"
+    if (width := _RISE * span / found.slope) < NARROWEST_RISE:
+        return (
+            f"slope: expected a bend that rises from 0.1 to 0.9 over {NARROWEST_RISE:g} counts or "
+            f"more, found {width:.3g}"
+        )
+    ends = level(found, np.array([found.counts_low, found.counts_high]))
+    straight, bent = ends if found.polarity > 0 else ends[::-1]
+    if not straight < found.threshold < bent:
+        return (
+            f"midpoint: expected a bend below the threshold {found.threshold:g} at the straight "
+            f"end and above it at the bent end, found {straight:.3g} and {bent:.3g}"
+        )
+    return ""
 
 
 def to_json(calibration: Calibration) -> str:

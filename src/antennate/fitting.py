@@ -15,13 +15,11 @@ import numpy as np
 from scipy.optimize import isotonic_regression, least_squares
 
 from antennate import __version__
-from antennate.calibration import FEWEST, Calibration, SpeedFit
+from antennate.calibration import FEWEST, NARROWEST_SPAN, Calibration, SpeedFit
 from antennate.errors import CalibrationError
 from antennate.records import Bools, Floats, Ints
 
 MODELS = ("sigmoid", "line", "isotonic")
-LOWEST_SPAN = 20.0
-"""Fewest counts between the ends of a recording that can be told from noise [counts]."""
 REVERSAL = 0.15
 """Share of the span by which mean readings may run backwards over the bend."""
 _BINS = 10
@@ -86,9 +84,9 @@ def check(samples: Samples) -> None:
             f"{bend.min():.3g} to {bend.max():.3g}; bend farther or declare the full bend"
         )
     low, high = np.percentile(counts, [1, 99])
-    if high - low < LOWEST_SPAN:
+    if high - low < NARROWEST_SPAN:
         raise CalibrationError(
-            f"row {samples.row[0]}: expected readings that change by {LOWEST_SPAN:g} counts or "
+            f"row {samples.row[0]}: expected readings that change by {NARROWEST_SPAN:g} counts or "
             f"more, found {low:g} to {high:g} (constant); check the wiring and the divider"
         )
     _check_monotonic(samples, high - low)

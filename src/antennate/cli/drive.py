@@ -18,6 +18,7 @@ from antennate.cli.tables import Cell, number, show
 from antennate.errors import ConfigError
 from antennate.hardware.causes import State
 from antennate.hardware.drive import DriveConfig, connect, drive
+from antennate.hardware.film import calibrated
 from antennate.hardware.priority import Priority, urgent
 from antennate.hardware.session import Session
 from antennate.telemetry.feed import Feed
@@ -63,6 +64,9 @@ def command(argv: Sequence[str]) -> int:
     for name in ("esp32", "bus"):
         if not getattr(orders, name):
             raise ConfigError(f"--{name}: expected a serial port, found none")
+    if config.calibration is not None:
+        mind, film = calibrated(config.mind, Path(config.calibration), config.sensor_id)
+        config = config.model_copy(update={"mind": mind, "sensor_id": film.sensor_id})
     with RunFolder.open("drive", orders.out, orders.overwrite) as folder:
         folder.describe("drive", argv, config)
         with connect(config, orders.esp32, orders.bus) as session, terminate_as_interrupt():
@@ -74,7 +78,7 @@ def command(argv: Sequence[str]) -> int:
             _show(result)
         sys.stderr.write(f"written to {folder.path}\n")
     fault = result["worst_state"] in (State.FAULT.name, State.OFF.name)
-    return OK if result["torque_off"] and not fault else BAD_INPUT
+    return OK if result["torque_off"] and not fault and not result["refusal"] else BAD_INPUT
 
 
 def _carry_out(config: DriveConfig, session: Session, arm: bool, log: Path) -> dict[str, Any]:
@@ -103,6 +107,8 @@ def _note(result: Mapping[str, Any]) -> str:
     note = f"Worst state {result['worst_state']}{why}; torque {off}.\n"
     if not result["armed"]:
         note += "A dry run: nothing was written to the servos; --arm lets it walk.\n"
+    if result["refusal"]:
+        note += f"Not armed: {result['refusal']}; --no-touch-check arms without the check.\n"
     if result["priority"] == Priority.ORDINARY.value:
         note += "Real-time priority was not allowed; a busy machine will make it miss ticks.\n"
     if not result["log_complete"]:

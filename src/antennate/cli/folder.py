@@ -3,6 +3,7 @@
 Files are written whole. While a run goes on, finished trials are appended to
 `trials.partial.jsonl`. A folder that holds any file of a run belongs to another one and is left
 alone unless told otherwise; then those files go first, so that nothing old stands beside the new.
+Only a calibration stays until the next one replaces it, so that a robot is never without.
 """
 
 from __future__ import annotations
@@ -36,8 +37,8 @@ _MORE = ("trajectories", "summary", "passages", "touch_roc", "touch_trace")
 DRAWINGS = tuple(
     f"figures/{name}.{suffix}" for name in (*_MORE, *COMMANDS) for suffix in ("svg", "png")
 )
-LOG = "drive.log"
-FILES = ("calibration.json", "conditioning.toml", "recording.csv", "ticks.csv", LOG)
+CALIBRATION, LOG = "calibration.json", "drive.log"
+FILES = (CALIBRATION, "conditioning.toml", "recording.csv", "ticks.csv", LOG)
 _NAMES = (RESULT, PARTIAL, TABLE, CONFIG, VERSIONS, COMMAND, *FILES, *DRAWINGS)
 """Every file that a run may write."""
 _CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f]+")
@@ -74,7 +75,8 @@ class RunFolder:
                     "choose another or give --overwrite"
                 )
             for name in held:
-                (path / name).unlink()
+                if (command, name) != ("calibrate", CALIBRATION):
+                    (path / name).unlink()
             return cls(path, missing, (path / PARTIAL).open("x", encoding="utf-8"))
 
     def describe(self, command: str, argv: Sequence[str], config: Params) -> None:

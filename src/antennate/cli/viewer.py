@@ -47,7 +47,7 @@ def line(tick: Tick, dropped: int) -> str:
         f"{tick.now:7.1f} s {tick.state or '-'} {Maneuver(tick.maneuver).name} "
         f"counts={left:.0f} {right:.0f} age={1e3 * tick.age:.0f}ms missed={tick.missed} "
         f"frames={tick.frames} crc={tick.crc} lost={tick.lost} misses={tick.misses} "
-        f"stale={tick.stale} sent={tick.sent} unlogged={dropped}{why}"
+        f"stale={tick.stale} sent={tick.sent} unlogged={dropped} {tick.note}{why}"
     )
 
 

@@ -21,11 +21,13 @@ from antennate.hardware.dynamixel import bringup
 from antennate.hardware.dynamixel.bus import Bus
 from antennate.hardware.joints import Joints
 from antennate.hardware.session import Session
+from antennate.hardware.trust import Trust
 from antennate.loop import run_loop
-from antennate.params import Params, number
+from antennate.params import Params, TouchCheckParams, number
 from antennate.params.layout import LayoutParams
 from antennate.records import AntennaFrame, Pose
 from antennate.sim.body import SimBody
+from antennate.twin.hand import Hand
 from antennate.twin.lockstep import BoardPort, LockstepClock
 from antennate.twin.robot import TwinRobot
 
@@ -60,6 +62,12 @@ class TwinConfig(Params):
     fault: tuple[str, ...] = number(
         (), "1", "assumed: nothing is broken", "faults, such as servo:7=silent@3s"
     )
+    touch: tuple[str, ...] = number(
+        (),
+        "1",
+        "assumed: nobody is there",
+        "antennae bent by hand before it walks, such as left@2s; from the first packet on the bus",
+    )
     layout: LayoutParams = LayoutParams()
     world: TunnelConfig = TunnelConfig()
 
@@ -70,7 +78,8 @@ def build(config: TwinConfig) -> TwinRobot:
     period = world.controller.period
     body = SimBody(1, world.robot.sensor, period, world.physics.timestep)
     body.load(0, start.world, start.chance)
-    return TwinRobot(body, config.layout, period, boot_id=config.trial + 1, standing_noise=True)
+    hand = Hand(config.touch, world.controller.conditioning)
+    return TwinRobot(body, config.layout, period, config.trial + 1, standing_noise=True, hand=hand)
 
 
 class _Rounded:
@@ -169,8 +178,8 @@ class Rig:
     session: Session
 
 
-def rig(config: TwinConfig, arm: Arm = "closed") -> Rig:
-    """A session before a twin robot, not yet armed."""
+def rig(config: TwinConfig, arm: Arm = "closed", touch: TouchCheckParams | None = None) -> Rig:
+    """A session before a twin robot, not yet armed; checked by touch if `touch` says how."""
     robot, params = build(config), config.world.controller
     clock = LockstepClock(robot)
     session = Session(
@@ -181,6 +190,7 @@ def rig(config: TwinConfig, arm: Arm = "closed") -> Rig:
         decider=Controller(params, arm),
         period=params.period,
         conditioning=params.conditioning,
+        trust=Trust(params.conditioning, touch=touch),
     )
     return Rig(robot, clock, session)
 

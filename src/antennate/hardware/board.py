@@ -27,12 +27,14 @@ class Board:
     Attributes:
         decoder: With the counters of its bytes.
         clock: With the verdicts on its samples.
+        hello: The newest greeting, None before the first.
         refusals: Why a board or its frames were refused, newest last, at most 8.
     """
 
     def __init__(self, port: Port, age_limit: float) -> None:
         self.decoder = FrameDecoder()
         self.clock = DeviceClock()
+        self.hello: Hello | None = None
         self.refusals: list[str] = []
         self._port = port
         self._limit = age_limit
@@ -55,6 +57,7 @@ class Board:
         reasons = (frame.reason,) if isinstance(frame, Refused) else objections(frame)
         if isinstance(frame, Hello) and not reasons:
             self.clock.greet(frame)
+            self.hello = frame
         self.refusals = [*self.refusals, *reasons][-8:]
         return False
 

@@ -30,6 +30,7 @@ class Cause(Enum):
     SPIKY = (State.DEGRADED, "many readings are bad")
     OUT_OF_CAL = (State.DEGRADED, "readings lie beyond the calibrated range")
     SATURATED = (State.DEGRADED, "readings are at the rail of a bent film")
+    DRIFT = (State.DEGRADED, "resting readings have drifted from the calibration")
     RATE = (State.DEGRADED, "samples do not come at the expected rate")
     LATE_ANSWERS = (State.DEGRADED, "servos answer late")
     SUPPLY_UNKNOWN = (State.DEGRADED, "the supply cannot be read")
@@ -119,6 +120,7 @@ class Inputs:
         bus_error: What is wrong with the bus as a whole, empty if nothing is.
         watchdogs: Ids of servos stopped by their watchdog.
         supply: Voltage of the supply [V], NaN if unknown.
+        drift: How far resting readings have drifted, empty if not far.
         objections: What speaks against arming, such as a failed touch check or foreign firmware.
         stop: Whether the operator wants the torque off.
         arm: Whether the operator wants it on; only the change to True in FAULT or OFF counts.
@@ -140,6 +142,7 @@ class Inputs:
     servo_errors: Mapping[int, str] = field(default_factory=dict[int, str])
     bus_error: str = ""
     watchdogs: tuple[int, ...] = ()
+    drift: str = ""
     objections: tuple[str, ...] = ()
     stop: bool = False
     arm: bool = False

@@ -13,19 +13,29 @@ from antennate.controller import ARMS, Controller
 from antennate.errors import BadInputError, ConfigError
 from antennate.hardware.board import Board
 from antennate.hardware.causes import State
+from antennate.hardware.dry_run import DryRun
 from antennate.hardware.dynamixel import bringup
 from antennate.hardware.dynamixel.answers import Timing
 from antennate.hardware.dynamixel.bringup import BringUpError
 from antennate.hardware.dynamixel.bus import Bus
 from antennate.hardware.dynamixel.tables import EXTENDED_MODE, XC430_W240, XL330_M288
+from antennate.hardware.film import require_film
 from antennate.hardware.host_clock import HostClock
 from antennate.hardware.joints import Joints
 from antennate.hardware.port import Port, PortError
 from antennate.hardware.report import Report
 from antennate.hardware.session import Decider, Session
 from antennate.hardware.signals import undisturbed
+from antennate.hardware.trust import Trust
 from antennate.loop import run_loop
-from antennate.params import ControllerParams, Params, SupervisorParams, number
+from antennate.params import (
+    ControllerParams,
+    DriftParams,
+    Params,
+    SupervisorParams,
+    TouchCheckParams,
+    number,
+)
 from antennate.params.layout import LayoutParams
 from antennate.records import AntennaFrame, Pose
 
@@ -52,6 +62,26 @@ class DriveConfig(Params):
     duration: float | None = number(
         None, "s", "assumed: until it is stopped", "time from torque on to off", gt=0
     )
+    calibration: str | None = number(
+        None,
+        "1",
+        "assumed: the numbers of mind.conditioning",
+        "file of `antennate calibrate`, for both antennae, in place of mind.conditioning",
+    )
+    sensor_id: str | None = number(
+        None,
+        "1",
+        "assumed: that of the calibration file",
+        "name of the film; 16 hexadecimal digits name the board it is soldered to",
+    )
+    touch_check: bool = number(
+        True,
+        "1",
+        "assumed: swapped channels turn the robot towards what it touches",
+        "whether it is armed only after both antennae were bent by hand in the dry run",
+    )
+    touch: TouchCheckParams = TouchCheckParams()
+    drift: DriftParams = DriftParams()
     layout: LayoutParams = LayoutParams()
     mind: ControllerParams = ControllerParams()
     limits: SupervisorParams = SupervisorParams()
@@ -87,6 +117,7 @@ def prepare(config: DriveConfig, esp32: Port, bus: Port, clock: Any) -> Session:
     """A session before two open ports, after both sides have said who they are."""
     board = Board(esp32, config.limits.stale_age)
     await_board(board, clock)
+    require_film(board, config.sensor_id)
     master = Bus(bus, Timing(config.layout.baud, doubt=_DOUBT), clock=clock.now)
     require_servos(master, config.layout)
     return Session(
@@ -98,6 +129,9 @@ def prepare(config: DriveConfig, esp32: Port, bus: Port, clock: Any) -> Session:
         period=config.mind.period,
         conditioning=config.mind.conditioning,
         limits=config.limits,
+        trust=Trust(
+            config.mind.conditioning, config.drift, config.touch if config.touch_check else None
+        ),
     )
 
 
@@ -193,17 +227,19 @@ def drive(
     """
     report, clock = Report(), session.clock
     start = clock.now()
-    walk = config.dry_run if arm else math.inf
-    end = config.dry_run if not arm else config.dry_run + (config.duration or math.inf)
+    duration = config.duration or math.inf
+    dry = DryRun(session.trust, config.dry_run, config.touch.patience, arm, duration)
 
     def go_on(frame: AntennaFrame, pose: Pose) -> bool:
         t = clock.now() - start
-        session.orders.arm = t >= walk
+        dry.step(t)
+        session.orders.arm = t >= dry.over
+        report.refusal = dry.refusal
         report.watch(session)
         on_tick(session, clock.now())
         out = session.outputs
-        failed = out is not None and t > walk + _ARMING_TIME and out.state >= State.FAULT
-        return t < end and not failed
+        failed = out is not None and t > dry.over + _ARMING_TIME and out.state >= State.FAULT
+        return t < dry.end and not failed
 
     try:
         run_loop(session, session, session.period, go_on)

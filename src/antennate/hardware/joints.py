@@ -62,6 +62,10 @@ class Joints:
         away = (ticks - self.ticks(pose))[YAW_COUNT:-2]
         self._zero[YAW_COUNT:-2] += TICKS_A_TURN * np.rint(away / TICKS_A_TURN)
 
+    def shift(self, at: int, ticks: float) -> None:
+        """Count the position of the joint at a place in `ids` from elsewhere by some ticks."""
+        self._zero[at] += ticks
+
     def positions(self, angles: Floats) -> Floats:
         """Positions, not rounded [ticks], of joint angles [rad], both of shape (19,)."""
         return np.asarray(self._zero + self._sign * angles / _STEP)

@@ -18,6 +18,7 @@ class Report:
         timing: How well the pace was kept, None if no tick was run.
         before: The same up to the first tick with torque, None if it never came on.
         worst: Worst state after the first pose, or a fault before it, and why.
+        refusal: Why torque did not come on although it was wanted, empty if nothing forbade it.
         on: Servos that did not confirm that their torque is off.
     """
 
@@ -25,6 +26,7 @@ class Report:
     before: TimingReport | None = None
     worst: State = State.OK
     why: str = ""
+    refusal: str = ""
     on: list[int] = field(default_factory=list[int])
 
     @property
@@ -49,6 +51,7 @@ class Report:
         return {
             "worst_state": self.worst.name,
             "why": self.why,
+            "refusal": self.refusal,
             "torque_off": self.safe,
             "servos_on": self.on,
             "pace": _pace(self.timing),

@@ -26,6 +26,8 @@ from antennate.hardware.joints import Joints, PoseError
 from antennate.hardware.port import PortError
 from antennate.hardware.supervisor import Supervisor
 from antennate.hardware.timing import LoopTiming
+from antennate.hardware.trust import Trust
+from antennate.hardware.turns import Turns
 from antennate.hardware.watch import ServoWatch
 from antennate.params import ConditioningParams, DiagnosisParams, SupervisorParams
 from antennate.records import AntennaFrame, Floats, Ints, Pose
@@ -95,12 +97,14 @@ class Session:
         conditioning: The calibrated range of both antennae.
         diagnosis: Windows and limits of the diagnosis.
         limits: Limits of the supervisor.
+        trust: What is known of the antennae; they are not checked by touch if not given.
 
     Attributes:
         orders: The operator's, read in every tick.
         outputs: The supervisor's of the last tick, None before the first.
         channels: Diagnosis of the left and the right antenna.
         watch: What the servos say.
+        turns: How far legs have turned.
         tally: What was done.
         timing: Whether the loop keeps its pace, None before the first tick.
         frame: What the controller got in the last tick.
@@ -118,6 +122,7 @@ class Session:
         conditioning: ConditioningParams,
         diagnosis: DiagnosisParams | None = None,
         limits: SupervisorParams | None = None,
+        trust: Trust | None = None,
     ) -> None:
         self.board, self.bus, self.joints, self.clock = board, bus, joints, clock
         self.decider, self.period = decider, period
@@ -126,6 +131,8 @@ class Session:
         self.channels = [ChannelDiagnosis(windows, band) for _ in range(2)]
         self.supervisor = Supervisor(limits or SupervisorParams())
         self.watch = ServoWatch(bus, joints.ids, clock.now)
+        self.trust = trust or Trust(conditioning)
+        self.turns = Turns(bus, joints)
         self.orders = Orders()
         self.tally = Tally()
         self.timing: LoopTiming | None = None
@@ -135,6 +142,7 @@ class Session:
         self._body = HardwareBody(board, bus, joints, clock)
         self._thought = _Thought()
         self._goals: Floats | None = None
+        self._pose: Pose | None = None
         self._used = self._refused = 0
 
     # the body
@@ -151,11 +159,13 @@ class Session:
         self._refused = sum(self.board.clock.verdicts.values()) - before - self._used
         t = float(frame.t[0])
         raw = frame.counts[0].tolist()
-        said = [channel.step(t, c).counts for channel, c in zip(self.channels, raw, strict=True)]
+        found = [channel.step(t, c) for channel, c in zip(self.channels, raw, strict=True)]
+        self.trust.step(t, raw, found, self.decider.contact[0].tolist())
+        said = [reading.counts for reading in found]
         if self.outputs is None or not self.outputs.clear:
             said = [math.nan, math.nan]
         self._mark("read")
-        self.frame = AntennaFrame(t=frame.t, counts=np.array([said]))
+        self.frame = AntennaFrame(t=self.turns.time(frame.t), counts=np.array([said]))
         return self.frame
 
     def write(self, pose: Pose) -> None:
@@ -179,7 +189,8 @@ class Session:
             if out.arming:
                 self._arm(pose)
             elif out.feed_watchdog and self._goals is not None:
-                self._send(pose if out.move else None)
+                self._forget_turns(out.move)
+                self._send(pose if out.move and not self.turns.standing else None)
         except (PortError, PoseError, BringUpError) as error:
             self.watch.bus_error = str(error)
             return
@@ -191,8 +202,14 @@ class Session:
     # the mind
 
     def step(self, frame: AntennaFrame) -> Pose:
-        """The controller's pose; an exception of it is a cause, not the end."""
+        """The controller's pose; an exception of it is a cause, not the end.
+
+        While legs forget their turns the controller is not asked, and its time stands still.
+        """
         thought = self._thought = _Thought()
+        if self.turns.standing and self._pose is not None:
+            thought.decided_at = self.clock.now()
+            return self._pose
         try:
             pose = self.decider.step(frame)
         except Exception as error:  # noqa: BLE001 a plugged-in controller may raise anything
@@ -201,11 +218,13 @@ class Session:
         angles = (pose.yaw, pose.leg, pose.antenna)
         thought.finite = all(bool(np.isfinite(a).all()) for a in angles)
         thought.decided_at = self.clock.now()
+        self._pose = pose
         return pose
 
     def release(self) -> list[int]:
         """Torque off, verified: ids that did not confirm it."""
         self._goals = None
+        self.turns.reset()
         return bringup.disable(self.bus, self.joints.ids)
 
     def _inputs(self, now: float) -> Inputs:
@@ -229,17 +248,27 @@ class Session:
             bus_error=watch.bus_error,
             watchdogs=watch.watchdogs,
             supply=watch.supply,
+            drift=self.trust.drifted,
+            objections=() if self._goals is not None else self.trust.objections,
             arm=self.orders.arm,
             stop=self.orders.stop,
         )
 
     def _arm(self, pose: Pose) -> None:
         """Torque on where everything stands; legs count their turns from there."""
+        self.turns.reset()
         bringup.arm_watchdogs(self.bus, self.joints.ids)
         present = bringup.enable(self.bus, self.joints.ids)
         here = np.array([present[servo] for servo in self.joints.ids], float)
         self.joints.align(here, pose)
         self._goals = here
+
+    def _forget_turns(self, may_begin: bool) -> None:
+        if self._goals is None:
+            return
+        if may_begin:
+            self.turns.begin(self._goals)
+        self.turns.step(self._goals, self.watch.positions)
 
     def _send(self, pose: Pose | None) -> None:
         """Goals one tick nearer to a pose; where they are without one."""

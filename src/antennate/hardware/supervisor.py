@@ -139,6 +139,8 @@ class Supervisor:
             found[Cause.PAUSE] = "time did not advance"
         self._servos(inputs, found)
         self._supply(inputs.supply, found)
+        if inputs.drift:
+            found[Cause.DRIFT] = inputs.drift
         if inputs.objections:
             found[Cause.NOT_READY] = "; ".join(inputs.objections)
         if inputs.stop:

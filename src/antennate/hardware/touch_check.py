@@ -32,7 +32,6 @@ class TouchCheck:
 
     Attributes:
         ask: What to do next.
-        objection: Why not to arm, empty once the check has passed.
     """
 
     def __init__(self, params: TouchCheckParams, bands: tuple[Band, Band]) -> None:
@@ -43,9 +42,17 @@ class TouchCheck:
     def reset(self) -> None:
         """Begin anew."""
         self.ask = Ask.REST
-        self.objection = "the antennae were not yet checked by touch"
+        self._against = ""
         self._side = 0
         self._run: tuple[str, int] = ("", 0)
+
+    @property
+    def objection(self) -> str:
+        """Why not to arm, empty once the check has passed."""
+        if self.ask is Ask.NOTHING:
+            return self._against
+        felt = "not seen at rest" if self.ask is Ask.REST else "no bend felt"
+        return f"the antennae were not yet checked by touch, {felt}: {self.ask.value}"
 
     def step(self, left: float, right: float) -> Ask:
         """Take the newest readings as they came [counts]; NaN if unknown. What to do next."""
@@ -86,9 +93,9 @@ class TouchCheck:
         elif seen == "right" and self._side == 0:
             self.ask, self._side = Ask.REST, 1
         elif seen == "right":
-            self.ask, self.objection = Ask.NOTHING, ""
+            self.ask = Ask.NOTHING
         elif seen in ("swapped", "reversed"):
-            self.objection = self._why(seen)
+            self._against = self._why(seen)
             self.ask = Ask.NOTHING
 
     def _why(self, seen: str) -> str:

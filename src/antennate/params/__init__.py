@@ -9,6 +9,7 @@ properties, computed here and never typed.
 from antennate.params.antenna import N_MM_PER_DEG, AntennaParams
 from antennate.params.base import Params, number
 from antennate.params.bench import BenchVariationParams, WallParams
+from antennate.params.endurance import DriftParams, TurnsParams
 from antennate.params.layout import JointsParams, LayoutParams
 from antennate.params.log import LogParams
 from antennate.params.mind import (
@@ -52,6 +53,7 @@ __all__ = [
     "CornerWallParams",
     "CylinderParams",
     "DiagnosisParams",
+    "DriftParams",
     "EscapeParams",
     "EstimateParams",
     "FlatWallParams",
@@ -77,6 +79,7 @@ __all__ = [
     "TouchCheckParams",
     "TouchWallsParams",
     "TunnelParams",
+    "TurnsParams",
     "VariationParams",
     "WallParams",
     "number",

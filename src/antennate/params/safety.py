@@ -158,6 +158,14 @@ class TouchCheckParams(Params):
     readings: int = number(
         10, "1", "assumed: 100 ms at 100 Hz", "readings in a row that count", ge=1, le=1000
     )
+    patience: float = number(
+        60.0,
+        "s",
+        "assumed: a person walks to the robot and bends both antennae",
+        "time by which the dry run is extended for the check",
+        ge=0,
+        le=3600,
+    )
 
     @model_validator(mode="after")
     def _order(self) -> TouchCheckParams:

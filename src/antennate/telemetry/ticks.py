@@ -67,6 +67,7 @@ class Tick:
         angles: Joint targets decided [rad] in the order of JOINTS; NaN if it failed.
         state: The supervisor's state, empty without one.
         causes: Its causes in force, the most severe first.
+        note: What the operator should know or do, in one line.
         age: Age of the newest sample [s], NaN in simulation.
         missed: Ticks left out so far.
         frames: Good frames of the board so far.
@@ -89,6 +90,7 @@ class Tick:
     angles: tuple[float, ...]
     state: str = ""
     causes: tuple[str, ...] = ()
+    note: str = ""
     age: float = math.nan
     missed: int = 0
     frames: int = 0
@@ -111,6 +113,7 @@ class Tick:
             reading=(left, right),
             state="" if out is None else out.state.name,
             causes=() if out is None else tuple(_clean(cause.text) for cause in out.causes),
+            note=_clean(session.trust.said),
             age=clock.age(t),
             missed=0 if session.timing is None else session.timing.report().missed_cycles,
             frames=bytes_.good,
@@ -137,7 +140,7 @@ class Tick:
         Raises:
             LogError: A number does not fit.
         """
-        text = "\n".join((self.state, *self.causes)).encode("utf-8", "backslashreplace")
+        text = "\n".join((self.state, self.note, *self.causes)).encode("utf-8", "backslashreplace")
         try:
             fixed = _STRUCT.pack(
                 *(SCHEMA, Kind.TICK, self.number, self.t, self.now),
@@ -162,16 +165,16 @@ class Tick:
         if len(content) != _STRUCT.size + length:
             raise LogError(f"expected a text of {length} bytes, found another length")
         try:
-            state, *causes = content[_STRUCT.size :].decode().split("\n")
-        except UnicodeDecodeError:
-            raise LogError("expected UTF-8 as the text of a tick, found other bytes") from None
+            state, note, *causes = content[_STRUCT.size :].decode().split("\n")
+        except ValueError:
+            raise LogError("expected lines in UTF-8 as text of a tick, found others") from None
         counts, reading, b, contact = (tuple(rest[i : i + 2]) for i in (0, 2, 4, 6))
         maneuver, phase, *rest = rest[8:]
         angles, rest = tuple(rest[: len(JOINTS)]), rest[len(JOINTS) :]
         health = dict(zip(FIELDS[-9:-1], rest, strict=True))
         return cls(
             *(number, t, now, counts, reading, b, contact, maneuver, phase, angles),
-            *(state, tuple(causes)),
+            *(state, tuple(causes), note),
             **health,
         )
 

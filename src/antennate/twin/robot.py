@@ -13,13 +13,15 @@ import numpy as np
 
 from antennate.anatomy import YAW_COUNT
 from antennate.errors import SimulationError
+from antennate.hardware.dynamixel.packets import StatusError
 from antennate.hardware.dynamixel.tables import EXTENDED_MODE, XC430_W240, XL330_M288, Table
 from antennate.hardware.esp32 import frame
 from antennate.hardware.joints import Joints
-from antennate.params.layout import LayoutParams
+from antennate.params.layout import TICKS_A_TURN, LayoutParams
 from antennate.records import Floats
 from antennate.sim.body import SimBody
 from antennate.twin.bus import ServoBus
+from antennate.twin.hand import Hand
 from antennate.twin.registers import Servo
 
 GREETING_PERIOD = 1.0
@@ -36,16 +38,35 @@ class DrivenServo(Servo):
     """A servo whose shaft the physics moves."""
 
     _stood: float | None = None
+    _ahead = 0.0
+    """Ticks that it counts more than the shaft has turned."""
+
+    def turn(self, turns: int) -> None:
+        """Let it have counted some turns more, as after a long walk."""
+        self._ahead += turns * TICKS_A_TURN
+        self.place(self.position + turns * TICKS_A_TURN)
+
+    def shaft(self, ticks: float) -> None:
+        """Where the physics has turned the shaft [ticks]."""
+        self.place(ticks + self._ahead)
+
+    def clear_turns(self) -> StatusError:
+        """Forget whole turns; the shaft stays."""
+        before = self.position
+        said = super().clear_turns()
+        self._ahead += self.position - before
+        self._stood = None
+        return said
 
     def goal(self) -> float:
-        """Where it pulls to [ticks]; where it stood when it was stopped or lost its torque.
+        """Where it pulls the shaft to [ticks]; where that stood when it was stopped or let go.
 
         A gear of 245 to 1 does not let a leg sink.
         """
         if self.torque and not self._stopped:
             self._stood = None
-            return float(self.get("goal_position"))
-        self._stood = self.position if self._stood is None else self._stood
+            return float(self.get("goal_position")) - self._ahead
+        self._stood = self.position - self._ahead if self._stood is None else self._stood
         return self._stood
 
     def heard(self, t: float) -> None:
@@ -81,6 +102,7 @@ class TwinRobot:
         period: float,
         boot_id: int,
         standing_noise: bool = False,
+        hand: Hand | None = None,
     ) -> None:
         self._body = body
         self._joints = Joints(layout)
@@ -92,6 +114,7 @@ class TwinRobot:
         self._ticks = self._walked = self._booted = 0
         self._broken = [False, False]
         self._chance = np.random.default_rng(boot_id) if standing_noise else None
+        self._hand = hand
         self.t = 0.0
         self.board_silent = False
         self.servos = [_servo(i, servo) for i, servo in enumerate(layout.ids)]
@@ -171,7 +194,7 @@ class TwinRobot:
     def _show(self, shafts: Floats) -> None:
         """Let the servos know where their shafts are [ticks]."""
         for servo, ticks in zip(self.servos, shafts.tolist(), strict=True):
-            servo.place(ticks)
+            servo.shaft(ticks)
 
     def _say(self) -> None:
         """One sample of the board, and a greeting now and then."""
@@ -186,6 +209,9 @@ class TwinRobot:
         noise = np.zeros(2)
         if self._chance is not None and not self._walked:
             noise = np.rint(self._chance.normal(0.0, _STANDING_NOISE, 2))
+        if self._hand is not None and not self._walked:
+            heard = any(servo.last_heard > 0.0 for servo in self.servos)
+            noise = noise + np.rint(self._hand.change(self._ticks * self._period, heard))
         left, right = (
             0 if broken or math.isnan(counts) else int(counts)
             for counts, broken in zip(self._counts + noise, self._broken, strict=True)

@@ -1,0 +1,56 @@
+"""How far the resting reading of an antenna has drifted from the calibrated one.
+
+Readings without contact hold light touches as well, but most of the time nothing bends the film.
+Their low quantile is followed in small steps, up by `speed` and down by more, so that the share
+`quantile` of them lies nearer to straight; a touch of some seconds moves it by less than its step.
+"""
+
+from __future__ import annotations
+
+import math
+
+from antennate.hardware.diagnosis import Band
+from antennate.params import DriftParams
+
+_LONGEST = 0.1
+"""Longest time that one reading stands for [s]."""
+
+
+class Drift:
+    """Follows one antenna.
+
+    Args:
+        params: How fast, and when it is too much.
+        band: The calibrated range, whose straight end is at rest.
+
+    Attributes:
+        share: Drift in spans, positive towards the bend.
+        beyond: Whether it is more than the band allows.
+    """
+
+    def __init__(self, params: DriftParams, band: Band) -> None:
+        self._params = params
+        self._straight = band.low if band.polarity > 0 else band.high
+        self._scale = band.polarity / (band.high - band.low)
+        self._down = params.speed * (1.0 - params.quantile) / params.quantile
+        self._t = math.nan
+        self.share = 0.0
+        self.beyond = False
+
+    def step(self, t: float, counts: float, free: bool) -> None:
+        """Take a reading.
+
+        Args:
+            t: Time at which it was taken [s]; one not newer than the last is not counted again.
+            counts: The reading as it came [counts]; NaN if it cannot be used.
+            free: Whether the antenna is judged not to touch.
+        """
+        elapsed = t - self._t
+        self._t = t
+        if not elapsed > 0.0 or not free or not math.isfinite(counts):
+            return
+        elapsed = min(elapsed, _LONGEST)
+        bend = self._scale * (counts - self._straight)
+        self.share += elapsed * (self._params.speed if bend > self.share else -self._down)
+        bound = self._params.band - (self._params.rise if self.beyond else 0.0)
+        self.beyond = abs(self.share) > bound

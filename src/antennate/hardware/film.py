@@ -1,0 +1,60 @@
+"""Which film is on the robot, and its calibration file in place of numbers typed by hand."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from antennate import calibration
+from antennate.calibration import Calibration
+from antennate.errors import CalibrationError, ConfigError
+from antennate.hardware.board import Board
+from antennate.params import ConditioningParams, ControllerParams
+
+_SERIAL = re.compile("[0-9a-f]{16}")
+"""A sensor id of this form is the serial number of a board."""
+
+
+def calibrated(
+    mind: ControllerParams, path: Path, sensor_id: str | None = None
+) -> tuple[ControllerParams, Calibration]:
+    """The controller's numbers with the curve of a calibration file.
+
+    Args:
+        mind: Its numbers, without a curve of their own.
+        path: The file; one curve serves both antennae.
+        sensor_id: The film it has to belong to, None for any.
+
+    Raises:
+        CalibrationError: The file cannot be used.
+        ConfigError: There is another curve, or another theta, beside it.
+    """
+    found = calibration.load(path, sensor_id)
+    plain = ConditioningParams(averaging_time=mind.conditioning.averaging_time)
+    if mind.conditioning != plain:
+        raise ConfigError(
+            "mind.conditioning: expected no curve beside a calibration file, found one; give "
+            "averaging_time alone"
+        )
+    if mind.rule.threshold != found.threshold:
+        raise ConfigError(
+            f"mind.rule.threshold: expected theta of {path}, {found.threshold:g}, found "
+            f"{mind.rule.threshold:g}; set it alike"
+        )
+    curve = found.conditioning(mind.conditioning.averaging_time)
+    return mind.model_copy(update={"conditioning": curve}), found
+
+
+def require_film(board: Board, sensor_id: str | None) -> None:
+    """Refuse a board to which the calibrated film is not soldered, where its id names a board.
+
+    Raises:
+        CalibrationError: Says both serial numbers.
+    """
+    if sensor_id is None or not _SERIAL.fullmatch(sensor_id) or board.hello is None:
+        return
+    if board.hello.device_id != sensor_id:
+        raise CalibrationError(
+            f"--calibration: expected the board {sensor_id} of its sensor_id, found board "
+            f"{board.hello.device_id}; calibrate the films of this board"
+        )

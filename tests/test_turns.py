@@ -1,0 +1,127 @@
+"""Legs that turn without end: near the servos' limit the robot stands still, and goes on."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from antennate.experiments.twin import Rig, TwinConfig, rig
+from antennate.hardware.causes import State
+from antennate.hardware.drive import DriveConfig, drive
+from antennate.hardware.session import Session
+from antennate.records import AntennaFrame, Pose
+from antennate.twin.bus import Fault, Trouble
+
+LEGS = slice(5, 17)
+REACH = math.ceil(4.5 * 0.01 / (2 * math.pi / 4096))
+CONFIG = DriveConfig(dry_run=0.5, duration=4.0)
+
+
+class Walk:
+    """A walk, what the controller decided in it, and what every servo was told."""
+
+    def __init__(self, turns: int, duration: float = 4.0, act: Any = None) -> None:
+        self.rig: Rig = rig(TwinConfig())
+        for servo in self.rig.robot.servos[LEGS]:
+            servo.turn(turns)
+        self.goals: list[list[int]] = []
+        self.torque: list[list[bool]] = []
+        self.standing: list[bool] = []
+        self.states: list[State] = []
+        self.frames: list[float] = []
+        self.maneuvers: list[int] = []
+        self._act = act
+        session = self.rig.session
+        think = session.decider.step
+
+        def step(frame: AntennaFrame) -> Pose:
+            pose = think(frame)
+            if session.outputs is not None and session.outputs.clear:
+                self.frames.append(float(frame.t[0]))
+                self.maneuvers.append(int(session.decider.maneuver[0]))
+            return pose
+
+        session.decider.step = step  # type: ignore[method-assign]
+        config = CONFIG.model_copy(update={"duration": duration})
+        self.report = drive(session, config, arm=True, on_tick=self._note)
+
+    def _note(self, session: Session, t: float) -> None:
+        assert session.outputs is not None
+        if session.outputs.torque:
+            servos = self.rig.robot.servos
+            self.goals.append([servo.get("goal_position") for servo in servos])
+            self.torque.append([servo.torque for servo in servos])
+            self.standing.append(session.turns.standing)
+            self.states.append(session.outputs.state)
+        if self._act is not None:
+            self._act(self, session)
+
+
+@pytest.fixture(scope="module")
+def far() -> Walk:
+    """Started at 249 turns: past 250 they are forgotten, where 256 are the end."""
+    return Walk(249, duration=6.0)
+
+
+def test_legs_near_the_limit_forget_their_turns_and_the_walk_goes_on(far: Walk) -> None:
+    assert min(far.goals[0][LEGS]) > 249 * 4096
+    assert far.rig.session.turns.forgotten == 12
+    assert max(abs(np.array(far.goals[-1][LEGS]))) < 4 * 4096
+    assert max(far.states[30:]) <= State.DEGRADED
+    first, last = far.standing.index(True), len(far.standing) - far.standing[::-1].index(True)
+    assert last - first < 75
+    walked = np.ptp(np.array(far.goals)[last:, LEGS], axis=0)
+    assert (walked > 2 * 4096).all()
+
+
+def test_no_goal_jumps_but_by_whole_turns(far: Walk) -> None:
+    steps = np.diff(np.array(far.goals), axis=0)
+    turned = 4096 * np.rint(steps / 4096)
+    assert abs(steps - turned).max() <= REACH
+    assert np.count_nonzero(turned) == 12
+
+
+def test_one_leg_at_a_time_is_without_torque_and_all_have_it_afterwards(far: Walk) -> None:
+    off = (~np.array(far.torque)).sum(axis=1)
+    assert off.max() == 1
+    assert np.array(far.torque)[:, :5].all()
+    assert off[-1] == 0
+    assert far.report.safe
+
+
+def test_the_maneuvers_are_those_of_a_walk_without_it(far: Walk) -> None:
+    """The controller's time stands still with the robot, so that no maneuver is cut short."""
+    plain = Walk(0, duration=3.0)
+    assert plain.rig.session.turns.forgotten == 0
+    n = 250
+    assert far.maneuvers[:n] == plain.maneuvers[:n]
+    assert np.diff(far.frames).max() <= 0.0101
+
+
+@pytest.mark.parametrize("fault", [Fault.SILENT, Fault.BAD_CRC])
+def test_a_leg_that_does_not_answer_is_a_fault_and_never_pulls_to_a_far_goal(fault: Fault) -> None:
+    away: list[float] = []
+
+    def spoil(walk: Walk, session: Session) -> None:
+        if session.turns.forgotten == 3:
+            walk.rig.robot.bus.trouble[9] = Trouble(fault)
+        servos = [servo for servo in walk.rig.robot.servos if servo.torque]
+        away.extend(abs(servo.get("goal_position") - servo.position) for servo in servos)
+
+    walk = Walk(253, duration=1.5, act=spoil)
+    assert walk.states[-1] >= State.FAULT
+    assert max(away) < 1024
+    on = {servo.get("id") for servo in walk.rig.robot.servos if servo.torque}
+    assert on <= set(walk.report.on) == {9}
+
+
+def test_lost_answers_do_not_keep_legs_from_forgetting() -> None:
+    def lose(walk: Walk, session: Session) -> None:
+        walk.rig.robot.bus.loss = 0.01
+
+    walk = Walk(253, duration=2.0, act=lose)
+    assert walk.rig.session.turns.forgotten == 12
+    assert max(walk.states) <= State.HOLD
