@@ -9,6 +9,7 @@ properties, computed here and never typed.
 from antennate.params.antenna import N_MM_PER_DEG, AntennaParams
 from antennate.params.base import Params, number
 from antennate.params.bench import BenchVariationParams, WallParams
+from antennate.params.doctor import DoctorParams
 from antennate.params.layout import JointsParams, LayoutParams
 from antennate.params.mind import (
     ConditioningParams,
@@ -51,6 +52,7 @@ __all__ = [
     "CornerWallParams",
     "CylinderParams",
     "DiagnosisParams",
+    "DoctorParams",
     "EscapeParams",
     "EstimateParams",
     "FlatWallParams",

@@ -10,10 +10,14 @@ import tty
 from collections.abc import Callable
 from types import TracebackType
 
+from antennate.hardware.dynamixel.tables import BAUD_RATES
 from antennate.twin.faults import Faults
 from antennate.twin.robot import TwinRobot
 
 _CHUNK = 4096
+_SPEEDS: dict[int, int] = {
+    getattr(termios, f"B{baud}"): baud for baud in BAUD_RATES if hasattr(termios, f"B{baud}")
+}
 
 
 class _Terminal:
@@ -24,6 +28,10 @@ class _Terminal:
         tty.setraw(self._slave, termios.TCSANOW)
         os.set_blocking(self.master, False)
         self.path = os.ttyname(self._slave)
+
+    def baud(self) -> int | None:
+        """Bits per second that the client has set, None if it is none of the usual ones."""
+        return _SPEEDS.get(termios.tcgetattr(self._slave)[5])
 
     def read(self) -> bytes:
         """What has come."""
@@ -93,6 +101,7 @@ class TwinServer:
             self._faults.apply(robot, now)
             robot.advance(now)
             if self._bus.master in ready:
+                robot.bus.heard_at = self._bus.baud()
                 robot.bus.receive(now, self._bus.read())
             if self._board.master in ready:
                 self._board.read()
