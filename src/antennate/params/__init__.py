@@ -19,6 +19,7 @@ from antennate.params.mind import (
     RepetitionParams,
     RuleParams,
 )
+from antennate.params.record import RecordParams
 from antennate.params.robot import RobotParams, ServoParams
 from antennate.params.safety import DiagnosisParams, SupervisorParams, TouchCheckParams
 from antennate.params.scene import (
@@ -62,6 +63,7 @@ __all__ = [
     "LayoutParams",
     "Params",
     "PhysicsParams",
+    "RecordParams",
     "RepetitionParams",
     "RobotParams",
     "RuleParams",

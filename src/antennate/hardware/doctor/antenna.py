@@ -83,7 +83,7 @@ def listen(
         stream = Stream(port, now)
         end = now() + params.greeting
         while (stream.hello is None or stream.clock.newest is None) and now() < end:
-            list(stream.take(_PATIENCE))
+            stream.take(_PATIENCE)
         if stream.hello is not None:
             _record(stream, heard, params.listen, now)
         heard.hello, heard.refusals = stream.hello, stream.refusals

@@ -10,6 +10,7 @@ from antennate.hardware.doctor.rows import Row, Verdict, grouped, ids_text, row
 from antennate.hardware.doctor.survey import Seen, Survey, watchdog_text
 from antennate.hardware.dynamixel.tables import (
     EXTENDED_MODE,
+    RETURN_DELAY_UNIT,
     TABLES,
     XC430_W240,
     hardware_errors,
@@ -94,7 +95,11 @@ def _whole(survey: Survey) -> Row:
     said: list[str] = []
     cures: list[str] = []
     for state, text, cure in (
-        ("collides", "doubled", "two servos have this id: unplug one and give the other a new id"),
+        (
+            "collides",
+            "doubled",
+            "two servos have this id: give one its own with DYNAMIXEL Wizard, alone on the bus",
+        ),
         ("broken", "never whole from", "two servos of one id, or a bad cable or plug there"),
         ("mute", "pings only from", "status return level 0: switch the supply off and on"),
     ):
@@ -182,10 +187,11 @@ def _settings(known: Registers, layout: LayoutParams) -> list[Row]:
         _check(
             known,
             "return_delay_time",
-            "return delay [2 us]",
-            "0",
+            "return delay",
+            "0 us",
             lambda _, value: "warn" if value else None,
             _FIX,
+            lambda value: f"{1e6 * RETURN_DELAY_UNIT * value:g} us",
         ),
         _check(
             known,
@@ -251,7 +257,7 @@ def _shutdown(known: Registers) -> Row:
         ", ".join(hardware_errors(wanted)),
         lambda _, bits: "warn" if bits & wanted != wanted else None,
         f"set register 63 of {{ids}} to {wanted} with DYNAMIXEL Wizard",
-        lambda bits: ", ".join(hardware_errors(bits)) or "nothing",
+        lambda bits: "all of these" if bits & wanted == wanted else "not all of these",
     )
 
 

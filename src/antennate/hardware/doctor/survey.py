@@ -70,7 +70,8 @@ class Seen:
         state: "ok"; "broken", no answer is whole; "collides", pings are whole but other answers are
             not, as of two servos with one id; "mute", it answers pings and no reads.
         registers: Value by name, of those that could be read.
-        ping_time: Median time to its answer beyond wire and return delay [s], None if not measured.
+        ping_time: Shortest time to its answer beyond wire and return delay [s], None if not
+            measured.
     """
 
     servo: int
@@ -230,7 +231,7 @@ def _time_pings(bus: Bus, here: Mapping[int, Seen], now: Callable[[], float]) ->
                 times.append(now() - begin)
         if times:
             delay = RETURN_DELAY_UNIT * seen.registers.get("return_delay_time", 0)
-            seen.ping_time = max(median(times) - wire - delay, 0.0)
+            seen.ping_time = max(min(times) - wire - delay, 0.0)
 
 
 def _time_reads(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from antennate.hardware.esp32.clock import DeviceClock, Timed, Verdict
@@ -48,10 +48,10 @@ class Stream:
         self._port = port
         self._now = now
 
-    def take(self, timeout: float) -> Iterator[Reading]:
+    def take(self, timeout: float) -> list[Reading]:
         """Readings that have come, or come within `timeout` [s]."""
         data = self._port.read(_CHUNK, timeout)
-        now = self._now()
+        now, readings = self._now(), list[Reading]()
         for frame in self.decoder.feed(data):
             if isinstance(frame, Hello):
                 self.hello = frame
@@ -59,4 +59,5 @@ class Stream:
             elif not isinstance(frame, Sample):
                 self.refusals += [frame.reason] if frame.reason not in self.refusals else []
             elif self.clock.take(frame, now) is Verdict.USED and self.clock.newest is not None:
-                yield Reading(self.clock.newest, now)
+                readings.append(Reading(self.clock.newest, now))
+        return readings
