@@ -66,7 +66,7 @@ def command(argv: Sequence[str]) -> int:
     with serial_opener(orders.esp32, "--esp32")(BOARD_BAUD) as port:
         stream = Stream(port, now)
         status = Status(stream, params, now)
-        with _Lines(orders.out) as lines, terminate_as_interrupt():
+        with Lines(orders.out) as lines, terminate_as_interrupt():
             recorder = Recorder(stream, params, now, ask(status), lines.write, status)
             try:
                 recorder.run()
@@ -78,14 +78,14 @@ def command(argv: Sequence[str]) -> int:
     return OK
 
 
-class _Lines:
+class Lines:
     """A file that is made with its first line, and flushed with each."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
         self._count = 0
 
-    def __enter__(self) -> _Lines:
+    def __enter__(self) -> Lines:
         try:
             self._file = self._path.open("x", encoding="utf-8", newline="\n")
         except FileExistsError:

@@ -171,7 +171,7 @@ class TwinRobot:
             noise = np.rint(self._chance.normal(0.0, _STANDING_NOISE, 2))
         read = np.where(np.isnan(self._held), self._counts, self._held)
         left, right = (
-            0 if broken or math.isnan(counts) else int(counts)
+            0 if broken or math.isnan(counts) else min(max(int(counts), 0), frame.FULL_SCALE)
             for counts, broken in zip(read + noise, self._broken, strict=True)
         )
         flags = _rail(left, frame.FLAG_LEFT_RAIL) | _rail(right, frame.FLAG_RIGHT_RAIL)
