@@ -19,6 +19,8 @@ Ask: TypeAlias = Callable[[str], Callable[[], bool]]
 SILENCE = 3.0
 """Time without a reading after which a recording ends; a board greets within it [s]."""
 _PATIENCE = 0.02
+_MICROSECOND = 1e-6
+"""What the board counts; sums of its times are no rounder [s]."""
 
 
 class Recorder:
@@ -113,7 +115,7 @@ class Recorder:
         begin = math.nan
         for reading, t in self._readings():
             begin = t if math.isnan(begin) else begin
-            if t - begin >= seconds:
+            if t - begin > seconds - _MICROSECOND:
                 return
             yield reading, t
 
