@@ -26,6 +26,8 @@ COMMANDS = {
     "force": "how much of a contact's force the flex tells, with and without knowing the place",
     "sweep": "sweep an antenna beside walls: its shapes, and the distances that active touch tells",
     "twin": "serve a simulated robot as real bytes: an antenna board and a bus of 19 servos",
+    "doctor": "examine the real robot, or its twin: what is wrong, and the cure",
+    "record": "antenna readings to a CSV file that calibrate takes",
     "drive": "let a controller walk the real robot, or its twin",
     "replay": "let a controller decide again upon the log of a drive",
     "touch": "move an antenna along walls: sensed contact against true contact",

@@ -19,9 +19,9 @@ Serve the simulated robot in a tunnel as real bytes on two pseudo-terminals: the
 antenna board, and a DYNAMIXEL bus of 19 servos. Prints one JSON line with both paths when ready.
 Physics begins when the first servo gets torque. Faults, each with @Ts for its time:
 servo:ID=silent, bad_crc, truncated, late:SECONDS, doubled, wrong_id, oversized, voltage, overheat,
-encoder, shock, overload or reboot; esp32=silent, reset, open_left or open_right; bus=silent or
-loss:SHARE. --touch left@2s right@5s bends the antennae of the standing robot, as the check by
-touch of `antennate drive` wants it."""
+encoder, shock, overload, reboot or REGISTER:VALUE; esp32=silent, reset, open_left, open_right,
+left:COUNTS or right:COUNTS; bus=silent, loss:SHARE or latency:SECONDS. --touch left@2s right@5s
+bends the antennae of the standing robot, as the check by touch of `antennate drive` wants it."""
 
 
 def command(argv: Sequence[str]) -> int:

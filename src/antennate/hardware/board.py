@@ -13,6 +13,8 @@ from antennate.hardware.esp32.wire import Hello, Refused, Sample, objections
 from antennate.hardware.port import Port
 from antennate.records import Floats
 
+BOARD_BAUD = 115_200
+"""Bits per second of the board's port."""
 _CHUNK = 4096
 _RAILS = (FLAG_LEFT_RAIL, FLAG_RIGHT_RAIL)
 

@@ -8,17 +8,17 @@ import math
 from collections.abc import Callable, Iterator
 from typing import Any, cast
 
-from antennate.anatomy import LEGS, YAW_COUNT
 from antennate.controller import ARMS, Controller
 from antennate.errors import BadInputError, ConfigError
-from antennate.hardware.board import Board
+from antennate.hardware import roster
+from antennate.hardware.board import BOARD_BAUD, Board
 from antennate.hardware.causes import State
 from antennate.hardware.dry_run import DryRun
 from antennate.hardware.dynamixel import bringup
 from antennate.hardware.dynamixel.answers import Timing
 from antennate.hardware.dynamixel.bringup import BringUpError
 from antennate.hardware.dynamixel.bus import Bus
-from antennate.hardware.dynamixel.tables import EXTENDED_MODE, XC430_W240, XL330_M288
+from antennate.hardware.dynamixel.tables import XC430_W240
 from antennate.hardware.film import require_film
 from antennate.hardware.host_clock import HostClock
 from antennate.hardware.joints import Joints
@@ -46,8 +46,6 @@ _ARMING_TIME = 1.0
 _PATIENCE = 0.05
 _DOUBT = 0.07
 """Longest that a late answer is waited for [s]: less than the watchdogs' 100 ms."""
-_POSITION_MODE = 3
-_BOARD_BAUD = 115_200
 
 
 class DriveConfig(Params):
@@ -106,8 +104,11 @@ def connect(config: DriveConfig, esp32: str, bus: str) -> Iterator[Session]:
 
     with contextlib.ExitStack() as stack:
         lines: list[Port] = []
-        for path, baud in ((esp32, _BOARD_BAUD), (bus, config.layout.baud)):
-            line = SerialPort(path, baud)
+        for flag, path, baud in (
+            ("--esp32", esp32, BOARD_BAUD),
+            ("--bus", bus, config.layout.baud),
+        ):
+            line = SerialPort(path, baud, flag)
             stack.callback(line.close)
             lines.append(line)
         yield prepare(config, lines[0], lines[1], HostClock())
@@ -166,19 +167,15 @@ def require_servos(bus: Bus, layout: LayoutParams) -> None:
     Raises:
         BringUpError: Otherwise; names each id that is not, and the cure.
     """
-    legs = slice(YAW_COUNT, YAW_COUNT + len(LEGS))
-    models = dict.fromkeys(layout.ids, XC430_W240.model)
-    models |= dict.fromkeys(layout.antennae.ids, XL330_M288.model)
     try:
-        bringup.require(bus, models)
+        bringup.require(bus, roster.models(layout))
     except BringUpError as error:
         raise BringUpError(
             f"--bus: {error}; check power, wiring, ids and baud {layout.baud}, or whether --esp32 "
             "and --bus are swapped"
         ) from None
     modes = bringup.read_register(bus, layout.ids, XC430_W240["operating_mode"])
-    wanted = dict.fromkeys(layout.ids, _POSITION_MODE)
-    wanted |= dict.fromkeys(layout.ids[legs], EXTENDED_MODE)
+    wanted = roster.modes(layout)
     if wrong := [i for i in layout.ids if modes[i] != wanted[i]]:
         raise BringUpError(
             f"--bus: expected operating mode 4 (extended position) of legs and 3 (position) of the "

@@ -8,6 +8,7 @@ from contextlib import contextmanager
 import serial
 
 from antennate.hardware.port import PortError
+from antennate.hardware.port_errors import explain
 
 
 class SerialPort:
@@ -16,15 +17,18 @@ class SerialPort:
     Args:
         path: Its device file.
         baud: Bits per second.
+        flag: The flag that named it, for errors.
 
     Raises:
-        PortError: If it cannot be opened, or another program holds it.
+        PortError: If it cannot be opened, or another program holds it; with the cure.
     """
 
-    def __init__(self, path: str, baud: int) -> None:
+    def __init__(self, path: str, baud: int, flag: str = "") -> None:
         self._path = path
-        with self._mapped("open"):
+        try:
             self._line = serial.Serial(path, baud, timeout=0, write_timeout=0.1, exclusive=True)
+        except (OSError, TypeError, ValueError) as error:
+            raise explain(flag, path, baud, error) from error
 
     def write(self, data: bytes) -> None:
         """Send all of it."""

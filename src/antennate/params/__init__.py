@@ -9,6 +9,7 @@ properties, computed here and never typed.
 from antennate.params.antenna import N_MM_PER_DEG, AntennaParams
 from antennate.params.base import Params, number
 from antennate.params.bench import BenchVariationParams, WallParams
+from antennate.params.doctor import DoctorParams
 from antennate.params.endurance import DriftParams, TurnsParams
 from antennate.params.layout import JointsParams, LayoutParams
 from antennate.params.log import LogParams
@@ -20,6 +21,7 @@ from antennate.params.mind import (
     RepetitionParams,
     RuleParams,
 )
+from antennate.params.record import RecordParams
 from antennate.params.robot import RobotParams, ServoParams
 from antennate.params.safety import DiagnosisParams, SupervisorParams, TouchCheckParams
 from antennate.params.scene import (
@@ -53,6 +55,7 @@ __all__ = [
     "CornerWallParams",
     "CylinderParams",
     "DiagnosisParams",
+    "DoctorParams",
     "DriftParams",
     "EscapeParams",
     "EstimateParams",
@@ -64,6 +67,7 @@ __all__ = [
     "LogParams",
     "Params",
     "PhysicsParams",
+    "RecordParams",
     "RepetitionParams",
     "RobotParams",
     "RuleParams",

@@ -21,7 +21,7 @@ import numpy as np
 from antennate.hardware.dynamixel import packets
 from antennate.hardware.dynamixel.packets import BROADCAST, Instruction, Packet, Status, StatusError
 from antennate.hardware.dynamixel.parser import Parser
-from antennate.hardware.dynamixel.tables import RETURN_DELAY_UNIT
+from antennate.hardware.dynamixel.tables import BAUD_RATES, RETURN_DELAY_UNIT
 from antennate.twin.registers import Servo
 
 _GIVE_UP = 0.01
@@ -65,6 +65,11 @@ class ServoBus:
         loss: Share of answers that get lost between the wire and the master.
         rng: Which of them.
         fast: They understand fast sync reads.
+
+    Attributes:
+        latency: Time by which the adapter delivers answers late [s].
+        heard_at: Bits per second of the master; servos set to another baud hear nothing. None
+            while that is not known: then all do.
     """
 
     def __init__(
@@ -79,6 +84,8 @@ class ServoBus:
         self.trouble: dict[int, Trouble] = {}
         self.loss = loss
         self.fast = fast
+        self.latency = 0.0
+        self.heard_at: int | None = None
         self._byte_time = 10.0 / baud
         self._rng = rng or np.random.default_rng(0)
         self._parser = Parser()
@@ -113,7 +120,7 @@ class ServoBus:
     # requests
 
     def _handle(self, t: float, packet: Packet) -> None:
-        present = [s for s in self.servos if s.awake(t) and not self._is(s, Fault.SILENT)]
+        present = [s for s in self.servos if s.awake(t) and self._hears(s)]
         for servo in present:
             servo.heard(t)
         many = {
@@ -204,8 +211,12 @@ class ServoBus:
         data = _spoil(data, trouble.fault) if trouble else data
         end = start + self._byte_time * len(data)
         if not (self.loss and self._rng.random() < self.loss):
-            self._out.append((end, data))
+            self._out.append((end + self.latency, data))
         return end
+
+    def _hears(self, servo: Servo) -> bool:
+        known = self.heard_at is None or BAUD_RATES[servo.get("baud_rate")] == self.heard_at
+        return known and not self._is(servo, Fault.SILENT)
 
     def _is(self, servo: Servo, fault: Fault) -> bool:
         trouble = self.trouble.get(servo.get("id"))

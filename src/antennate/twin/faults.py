@@ -1,4 +1,7 @@
-"""Faults on demand: `servo:7=silent@3s`, `esp32=reset@5s`, `bus=loss:0.01`."""
+"""Faults on demand: `servo:7=silent@3s`, `esp32=reset@5s`, `bus=loss:0.01`.
+
+A register of a servo takes a value by its name: `servo:7=return_delay_time:250`.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +10,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from antennate.errors import BadInputError
+from antennate.hardware.dynamixel.tables import XC430_W240
 from antennate.twin.bus import Fault, Trouble
+from antennate.twin.registers import Servo
 from antennate.twin.robot import TwinRobot
 
 _FORM = re.compile(
@@ -17,10 +22,11 @@ _FORM = re.compile(
 _SERVO = {fault.name.lower(): fault for fault in Fault}
 _HARDWARE = {"voltage": 1, "overheat": 4, "encoder": 8, "shock": 16, "overload": 32}
 """Bits of the register Hardware Error Status, from the manuals of both models."""
+_SIDES = ("left", "right")
 _KNOWN = {
     "servo": (*_SERVO, *_HARDWARE, "reboot"),
-    "esp32": ("silent", "reset", "open_left", "open_right"),
-    "bus": ("loss", "silent"),
+    "esp32": ("silent", "reset", "open_left", "open_right", "left", "right"),
+    "bus": ("loss", "silent", "latency"),
 }
 
 
@@ -32,7 +38,8 @@ class Demand:
         target: "servo", "esp32" or "bus".
         servo: Id, for a servo.
         what: Its name.
-        size: Delay of a late answer [s], or share of answers lost.
+        size: Delay of a late answer or of all [s], share of answers lost, reading of a bent
+            antenna [counts], or value of a register.
         t: When it begins [s].
     """
 
@@ -55,7 +62,8 @@ def read(text: str) -> Demand:
             f"--fault: expected TARGET=WHAT[:SIZE][@Ts], such as servo:7=silent@3s, found {text!r}"
         )
     target = match["target"].split(":")[0]
-    if match["what"] not in _KNOWN[target]:
+    register = target == "servo" and match["what"] in XC430_W240.registers
+    if match["what"] not in _KNOWN[target] and not register:
         known = ", ".join(_KNOWN[target])
         raise BadInputError(f"--fault: expected one of {known} for {target}, found {match['what']}")
     try:
@@ -64,7 +72,19 @@ def read(text: str) -> Demand:
         raise BadInputError(
             f"--fault: expected numbers for size and time, found {text!r}"
         ) from None
+    if register:
+        _check_register(match["what"], size)
     return Demand(target, int(match["id"] or 0), match["what"], size, t)
+
+
+def _check_register(name: str, value: float) -> None:
+    try:
+        XC430_W240[name].encode(int(value))
+    except OverflowError:
+        size = XC430_W240[name].size
+        raise BadInputError(
+            f"--fault: expected a value of {size} bytes for {name}, found {value:g}"
+        ) from None
 
 
 class Faults:
@@ -72,6 +92,7 @@ class Faults:
 
     def __init__(self, demands: Sequence[Demand], ids: Sequence[int]) -> None:
         self._waiting = sorted(demands, key=lambda demand: demand.t)
+        self._ids = tuple(ids)
         for demand in demands:
             if demand.target == "servo" and demand.servo not in ids:
                 known = ", ".join(map(str, ids))
@@ -80,19 +101,35 @@ class Faults:
     def apply(self, robot: TwinRobot, t: float) -> None:
         """Let happen what is due at time t [s]."""
         while self._waiting and self._waiting[0].t <= t:
-            _apply(robot, self._waiting.pop(0))
+            demand = self._waiting.pop(0)
+            if demand.target == "esp32":
+                _break_board(robot, demand)
+            elif demand.target == "bus":
+                _break_bus(robot, demand)
+            else:
+                _break_servo(robot, robot.servos[self._ids.index(demand.servo)], demand)
 
 
-def _apply(robot: TwinRobot, demand: Demand) -> None:
-    if demand.target == "esp32":
-        robot.break_board(demand.what)
-    elif demand.target == "bus":
-        robot.bus.loss = 1.0 if demand.what == "silent" else demand.size
-    elif demand.what in _SERVO:
-        robot.bus.trouble[demand.servo] = Trouble(_SERVO[demand.what], delay=demand.size)
+def _break_board(robot: TwinRobot, demand: Demand) -> None:
+    if demand.what in _SIDES:
+        robot.hold(_SIDES.index(demand.what), demand.size)
     else:
-        servo = next(s for s in robot.servos if s.get("id") == demand.servo)
-        if demand.what == "reboot":
-            servo.restart(robot.t)
-        else:
-            servo.fail(_HARDWARE[demand.what])
+        robot.break_board(demand.what)
+
+
+def _break_bus(robot: TwinRobot, demand: Demand) -> None:
+    if demand.what == "latency":
+        robot.bus.latency = demand.size
+    else:
+        robot.bus.loss = 1.0 if demand.what == "silent" else demand.size
+
+
+def _break_servo(robot: TwinRobot, servo: Servo, demand: Demand) -> None:
+    if demand.what in _SERVO:
+        robot.bus.trouble[demand.servo] = Trouble(_SERVO[demand.what], delay=demand.size)
+    elif demand.what == "reboot":
+        servo.restart(robot.t)
+    elif demand.what in _HARDWARE:
+        servo.fail(_HARDWARE[demand.what])
+    elif demand.what in servo.table.registers:
+        servo.set(demand.what, int(demand.size))

@@ -14,7 +14,13 @@ import numpy as np
 from antennate.anatomy import YAW_COUNT
 from antennate.errors import SimulationError
 from antennate.hardware.dynamixel.packets import StatusError
-from antennate.hardware.dynamixel.tables import EXTENDED_MODE, XC430_W240, XL330_M288, Table
+from antennate.hardware.dynamixel.tables import (
+    BAUD_RATES,
+    EXTENDED_MODE,
+    XC430_W240,
+    XL330_M288,
+    Table,
+)
 from antennate.hardware.esp32 import frame
 from antennate.hardware.joints import Joints
 from antennate.params.layout import TICKS_A_TURN, LayoutParams
@@ -113,11 +119,12 @@ class TwinRobot:
         self._buffer = bytearray(frame.SAMPLE_FRAME_SIZE)
         self._ticks = self._walked = self._booted = 0
         self._broken = [False, False]
+        self._held = [math.nan, math.nan]
         self._chance = np.random.default_rng(boot_id) if standing_noise else None
         self._hand = hand
         self.t = 0.0
         self.board_silent = False
-        self.servos = [_servo(i, servo) for i, servo in enumerate(layout.ids)]
+        self.servos = [_servo(i, servo, layout.baud) for i, servo in enumerate(layout.ids)]
         self.bus = ServoBus(self.servos, layout.baud)
         self._show(self._shafts())
         self._counts = body.read().counts[0]
@@ -188,6 +195,10 @@ class TwinRobot:
         else:
             self._broken[what == "open_right"] = True
 
+    def hold(self, side: int, counts: float) -> None:
+        """Somebody bends antenna 0 (left) or 1 so that it reads so; NaN lets it go [counts]."""
+        self._held[side] = counts
+
     def _shafts(self) -> Floats:
         return self._joints.positions(self._body.world(0).drives())
 
@@ -212,9 +223,10 @@ class TwinRobot:
         if self._hand is not None and not self._walked:
             heard = any(servo.last_heard > 0.0 for servo in self.servos)
             noise = noise + np.rint(self._hand.change(self._ticks * self._period, heard))
+        read = np.where(np.isnan(self._held), self._counts, self._held)
         left, right = (
-            0 if broken or math.isnan(counts) else int(counts)
-            for counts, broken in zip(self._counts + noise, self._broken, strict=True)
+            0 if broken or math.isnan(counts) else min(max(int(counts), 0), frame.FULL_SCALE)
+            for counts, broken in zip(read + noise, self._broken, strict=True)
         )
         flags = _rail(left, frame.FLAG_LEFT_RAIL) | _rail(right, frame.FLAG_RIGHT_RAIL)
         ticks = round(1e6 * since * self._period) & frame.TICK_MASK
@@ -226,13 +238,13 @@ def _rail(counts: int, flag: int) -> int:
     return flag if counts in (0, frame.FULL_SCALE) else 0
 
 
-def _servo(place: int, servo: int) -> DrivenServo:
+def _servo(place: int, servo: int, baud: int) -> DrivenServo:
     """A servo as the robot needs it: legs in extended mode, antennae of the small model."""
     table: Table = XC430_W240 if place < YAW_COUNT + 12 else XL330_M288
     made = DrivenServo(table, servo)
     if YAW_COUNT <= place < YAW_COUNT + 12:
         made.set("operating_mode", EXTENDED_MODE)
     made.set("return_delay_time", 0)
-    made.set("baud_rate", 3)
+    made.set("baud_rate", BAUD_RATES.index(baud))
     made.set("present_input_voltage", 111 if table is XC430_W240 else 50)
     return made

@@ -11,6 +11,7 @@ import tty
 from collections.abc import Callable
 from types import TracebackType
 
+from antennate.hardware.dynamixel.tables import BAUD_RATES
 from antennate.twin.faults import Faults
 from antennate.twin.physics import Physics
 from antennate.twin.robot import TwinRobot
@@ -19,6 +20,9 @@ _CHUNK = 4096
 _LONGEST = 1.0
 _LUMP = 0.00025
 """Answers leave in lumps of this time [s], as those of a fast USB adapter do."""
+_SPEEDS: dict[int, int] = {
+    getattr(termios, f"B{baud}"): baud for baud in BAUD_RATES if hasattr(termios, f"B{baud}")
+}
 
 
 class _Terminal:
@@ -29,6 +33,10 @@ class _Terminal:
         tty.setraw(self._slave, termios.TCSANOW)
         os.set_blocking(self.master, False)
         self.path = os.ttyname(self._slave)
+
+    def baud(self) -> int | None:
+        """Bits per second that the client has set, None if it is none of the usual ones."""
+        return _SPEEDS.get(termios.tcgetattr(self._slave)[5])
 
     def read(self) -> bytes:
         """What has come."""
@@ -102,6 +110,7 @@ class TwinServer:
                     self._faults.apply(robot, now)
                     physics.begin()
                 if self._bus.master in ready:
+                    bus.heard_at = self._bus.baud()
                     bus.receive(now, self._bus.read())
                 if self._board.master in ready:
                     self._board.read()

@@ -1,0 +1,40 @@
+"""Rows of checks as a table, and under it what to do."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from typing import IO
+
+from rich.box import SIMPLE_HEAD
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from antennate.cli.messages import one_line
+from antennate.hardware.doctor.rows import Row
+
+_STYLES = {"ok": "green", "warn": "yellow", "bad": "bold red"}
+
+
+def show_rows(rows: Sequence[Row], file: IO[str] | None = None) -> None:
+    """Print one line for each row, then the cures; on stdout unless told otherwise."""
+    console = Console(file=file or sys.stdout, highlight=False)
+    table = Table(box=SIMPLE_HEAD, pad_edge=False)
+    for head in ("", "check", "expected", "found"):
+        table.add_column(head, overflow="fold", no_wrap=not head)
+    for row in rows:
+        verdict = Text(row.verdict, _STYLES[row.verdict])
+        words = (f"{row.part}: {row.check}", row.expected, row.found)
+        table.add_row(verdict, *(Text(one_line(word)) for word in words))
+    console.print(table)
+    wrong = [row for row in rows if row.verdict != "ok"]
+    for row in sorted(wrong, key=lambda row: row.verdict == "warn"):
+        line = Text.assemble(
+            (f"{row.verdict:<4} ", _STYLES[row.verdict]),
+            (f"{row.part}: {row.check}: ", "bold"),
+            one_line(row.cure),
+        )
+        console.print(line, soft_wrap=True)
+    bad = sum(row.verdict == "bad" for row in wrong)
+    console.print(Text(f"{len(rows)} checks: {bad} bad, {len(wrong) - bad} warnings"))

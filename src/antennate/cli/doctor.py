@@ -1,0 +1,145 @@
+"""`antennate doctor`: what is wrong with the real robot, or its twin, and the cure."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from antennate.cli import BAD_INPUT, OK
+from antennate.cli.arguments import FromFile, parse_with
+from antennate.cli.checks import show_rows
+from antennate.cli.folder import RunFolder, to_json
+from antennate.cli.progress import terminate_as_interrupt
+from antennate.errors import ConfigError
+from antennate.hardware.doctor.checkup import Checkup, Robot, examine
+from antennate.hardware.doctor.fix import Change, apply, plan
+from antennate.hardware.doctor.ports import same, serial_opener
+from antennate.hardware.doctor.rows import Opener, worst
+from antennate.hardware.drive import DriveConfig
+from antennate.hardware.host_clock import HostClock
+
+DESCRIPTION = """\
+Examine the antenna board and the servo bus of a robot at rest, or of its twin: one line for each
+check, with the cure for what is not good. Torque never comes on. Nothing is written without --fix,
+which asks before each change of an id, a speed, an operating mode or a return delay, and reads it
+back. Either port may be left out. Exit code 2 if anything is bad."""
+_ROUNDS = 4
+"""Servos that change their id or speed are looked at anew before the rest is put right."""
+
+
+@dataclass(frozen=True)
+class Orders(FromFile):
+    """What to examine, and what to do about it.
+
+    Attributes:
+        config: robot.toml with the parameters below as keys and tables; flags override it
+        esp32: serial port of the antenna board
+        bus: serial port of the servo bus
+        fix: put right what can be, asking before each change
+        yes: answer yes to all that --fix asks
+        json: print the result in JSON and nothing else
+        out: folder for result.json, none if not given
+        overwrite: replace the run that the folder holds
+    """
+
+    esp32: Annotated[str, tyro.conf.arg(metavar="PORT")] = ""
+    bus: Annotated[str, tyro.conf.arg(metavar="PORT")] = ""
+    fix: bool = False
+    yes: bool = False
+    json: bool = False
+    out: Annotated[Path | None, tyro.conf.arg(metavar="FOLDER")] = None
+    overwrite: bool = False
+
+
+def command(argv: Sequence[str]) -> int:
+    """Examine, put right what was asked for, and tell.
+
+    Raises:
+        AntennateError: Something given cannot be used, or a change did not succeed.
+    """
+    config, orders = parse_with("doctor", DESCRIPTION, DriveConfig, argv, Orders())
+    _check(orders)
+    if orders.out is None:
+        checkup, changes = _examine(config, orders)
+    else:
+        with RunFolder.open("doctor", orders.out, orders.overwrite) as folder:
+            folder.describe("doctor", argv, config)
+            checkup, changes = _examine(config, orders)
+            folder.finish(checkup.result(changes), ())
+            sys.stderr.write(f"written to {folder.path}\n")
+    if orders.json:
+        sys.stdout.write(to_json(checkup.result(changes)))
+    else:
+        show_rows(checkup.rows)
+    return BAD_INPUT if worst(checkup.rows) == "bad" else OK
+
+
+def _check(orders: Orders) -> None:
+    if not (orders.esp32 or orders.bus):
+        raise ConfigError("expected --esp32 PORT, --bus PORT or both, found none")
+    if orders.esp32 and orders.bus and same(orders.esp32, orders.bus):
+        raise ConfigError(f"--esp32 and --bus: expected two ports, found {orders.bus} twice")
+    if orders.fix and not orders.bus:
+        raise ConfigError("--fix: expected --bus PORT with it, found none")
+    if orders.yes and not orders.fix:
+        raise ConfigError("--yes: expected --fix with it, found none")
+    if orders.fix and not orders.yes and not sys.stdin.isatty():
+        raise ConfigError("--fix: expected a terminal to ask on, found none; or give --yes")
+
+
+def _examine(config: DriveConfig, orders: Orders) -> tuple[Checkup, list[str]]:
+    """The examination, the last one if something was changed, and the changes."""
+    robot = Robot(layout=config.layout, mind=config.mind, limits=config.limits)
+    bus = (orders.bus, serial_opener(orders.bus, "--bus")) if orders.bus else None
+    esp32 = (orders.esp32, serial_opener(orders.esp32, "--esp32")) if orders.esp32 else None
+    now = HostClock().now
+    with terminate_as_interrupt():
+        checkup = examine(robot, bus, esp32, now)
+        if not orders.fix or bus is None:
+            return checkup, []
+        show_rows(checkup.rows, sys.stderr)
+        changes = _fix(robot, bus, orders.yes, now, checkup)
+        if changes:
+            checkup = examine(robot, bus, esp32, now)
+        else:
+            sys.stderr.write("nothing was changed\n")
+    return checkup, changes
+
+
+def _fix(
+    robot: Robot,
+    bus: tuple[str, Opener],
+    yes: bool,
+    now: Callable[[], float],
+    checkup: Checkup,
+) -> list[str]:
+    made: list[str] = []
+    refused: set[Change] = set()
+    for _ in range(_ROUNDS):
+        if checkup.survey is None:
+            break
+        todo = [one for one in plan(checkup.survey, robot.layout) if one not in refused]
+        if not todo:
+            break
+        for change in todo:
+            if not _agreed(change, yes):
+                refused.add(change)
+                continue
+            apply(bus[1], change, now)
+            made.append(str(change))
+            sys.stderr.write(f"changed, read back: {change}\n")
+        checkup = examine(robot, bus, None, now)
+    return made
+
+
+def _agreed(change: Change, yes: bool) -> bool:
+    if yes:
+        return True
+    sys.stderr.write(f"{change}; torque goes off first. Change it? [y/N] ")
+    sys.stderr.flush()
+    return sys.stdin.readline().strip().lower() in ("y", "yes")

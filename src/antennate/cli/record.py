@@ -1,0 +1,187 @@
+"""`antennate record`: readings of an antenna, with the bends at which it was held."""
+
+from __future__ import annotations
+
+import math
+import os
+import select
+import shlex
+import sys
+from collections import deque
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from statistics import fmean, pstdev
+from typing import Annotated
+
+import tyro
+
+from antennate.cli import OK
+from antennate.cli.arguments import FromFile, parse_with
+from antennate.cli.progress import terminate_as_interrupt
+from antennate.errors import BadInputError, ConfigError, OutputError
+from antennate.hardware.board import BOARD_BAUD
+from antennate.hardware.doctor.ports import serial_opener
+from antennate.hardware.esp32.stream import Reading, Stream
+from antennate.hardware.host_clock import HostClock
+from antennate.hardware.recorder import Recorder
+from antennate.params import RecordParams
+
+DESCRIPTION = """\
+Record an antenna at a bench, into a CSV file that `antennate calibrate` takes. With --marks you
+hold the antenna at one place after the other and press Enter at each; with --speed a stage pushes
+it at a constant speed from Enter on; with neither, readings of both antennae are written until the
+duration is over or Ctrl-C. Every line is flushed; a file that exists is left alone."""
+_LINES_A_SECOND = 5
+_SHOWN = 100
+"""Readings over which mean and noise are shown."""
+
+
+@dataclass(frozen=True)
+class Orders(FromFile):
+    """Where from and where to.
+
+    Attributes:
+        config: TOML file with the parameters below as keys; flags override it
+        esp32: serial port of the antenna board
+        out: CSV file to make
+    """
+
+    esp32: Annotated[str, tyro.conf.arg(metavar="PORT")] = ""
+    out: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
+
+
+def command(argv: Sequence[str]) -> int:
+    """Record until all marks or pushes are done, or the time is over.
+
+    Raises:
+        AntennateError: Something given cannot be used, or the board is silent.
+    """
+    params, orders = parse_with("record", DESCRIPTION, RecordParams, argv, Orders())
+    if not orders.esp32:
+        raise ConfigError("--esp32: expected a serial port, found none")
+    if orders.out is None:
+        raise ConfigError("--out: expected a CSV file to make, found none")
+    now = HostClock().now
+    with serial_opener(orders.esp32, "--esp32")(BOARD_BAUD) as port:
+        stream = Stream(port, now)
+        status = Status(stream, params, now)
+        with Lines(orders.out) as lines, terminate_as_interrupt():
+            recorder = Recorder(stream, params, now, ask(status), lines.write, status)
+            try:
+                recorder.run()
+            finally:
+                where = f"written to {orders.out}" if recorder.rows else "nothing is written"
+                lost = stream.clock.sequence.lost
+                sys.stderr.write(f"\n{recorder.rows} readings, {lost} lost, {where}\n")
+    sys.stderr.write(_next(params, orders.out) + "\n")
+    return OK
+
+
+class Lines:
+    """A file that is made with its first line, and flushed with each."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._count = 0
+
+    def __enter__(self) -> Lines:
+        try:
+            self._file = self._path.open("x", encoding="utf-8", newline="\n")
+        except FileExistsError:
+            raise OutputError(
+                f"--out: expected no such file, found {self._path}; choose another name"
+            ) from None
+        except OSError as error:
+            raise self._refused(error) from None
+        return self
+
+    def write(self, line: str) -> None:
+        """One line, at once."""
+        try:
+            self._file.write(line + "\n")
+            self._file.flush()
+            self._count += 1
+        except OSError as error:
+            raise self._refused(error) from None
+
+    def __exit__(self, *_: object) -> None:
+        self._file.close()
+        if self._count < 2:  # no reading came; an empty file would be in the way
+            self._path.unlink()
+
+    def _refused(self, error: OSError) -> OutputError:
+        return OutputError(f"--out: expected to write {self._path}, found: {error.strerror}")
+
+
+class Status:
+    """One line on stderr now and then: readings, their noise, rate and losses."""
+
+    def __init__(self, stream: Stream, params: RecordParams, now: Callable[[], float]) -> None:
+        self.said = ""
+        self._stream, self._params, self._now = stream, params, now
+        self._shown: deque[Reading] = deque(maxlen=_SHOWN)
+        self._due = -math.inf
+        terminal = sys.stderr.isatty()
+        self._end = "\r" if terminal else "\n"
+        self._every = 1.0 / _LINES_A_SECOND if terminal else 1.0
+
+    def __call__(self, reading: Reading) -> None:
+        """Take a reading; show the line if it is time."""
+        self._shown.append(reading)
+        if (now := self._now()) >= self._due:
+            self._due = now + self._every
+            sys.stderr.write(self.line() + self._end)
+            sys.stderr.flush()
+
+    def line(self) -> str:
+        """The line."""
+        span = self._shown[-1].now - self._shown[0].now
+        rate = (len(self._shown) - 1) / span if span > 0 else 0.0
+        said = [f"{self.said:<44}" if self.said else "recording"]
+        for side in ("left", "right"):
+            counts = [float(getattr(one.timed.sample, side)) for one in self._shown]
+            said.append(f"{side} {fmean(counts):6.1f} ± {pstdev(counts):4.1f}")
+        bytes_ = self._stream.decoder.counters
+        lost = self._stream.clock.sequence.lost
+        return f"{'  '.join(said)}  {rate:5.1f} Hz  lost {lost}  crc {bytes_.crc_errors} "
+
+
+def ask(status: Status) -> Callable[[str], Callable[[], bool]]:
+    """Ask on stderr, and hear Enter on stdin without waiting for it."""
+
+    def asked(text: str) -> Callable[[], bool]:
+        sys.stderr.write(f"\n{text}\n")
+        sys.stderr.flush()
+        status.said = text
+
+        def confirmed() -> bool:
+            if not _entered():
+                return False
+            status.said = ""
+            return True
+
+        return confirmed
+
+    return asked
+
+
+def _entered() -> bool:
+    """Whether a line has been typed; takes no more than that line."""
+    handle = sys.stdin.fileno()
+    while select.select([handle], [], [], 0.0)[0]:
+        byte = os.read(handle, 1)
+        if not byte:
+            raise BadInputError("expected Enter on a terminal, found the end of the input")
+        if byte == b"\n":
+            return True
+    return False
+
+
+def _next(params: RecordParams, out: Path) -> str:
+    """What to do with the file."""
+    if not params.marks and params.speed is None:
+        return "no bends are known: the file shows rate, noise and drift; calibrate needs --marks"
+    unit = params.unit if params.marks else "m"
+    words = ["antennate", "calibrate", "--recording", str(out), "--columns.bend-unit", unit]
+    return "next: " + shlex.join([*words, "--sensor-id", params.side])

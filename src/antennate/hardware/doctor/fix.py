@@ -1,0 +1,147 @@
+"""Puts right what doctor found: ids, speed, mode and delay, each change on its own and verified.
+
+Torque goes off first. EEPROM is written only where it differs, and read back.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from antennate.hardware import roster
+from antennate.hardware.doctor.rows import Opener
+from antennate.hardware.doctor.survey import Seen, Survey, look, master, read_some
+from antennate.hardware.dynamixel import bringup
+from antennate.hardware.dynamixel.bringup import BringUpError
+from antennate.hardware.dynamixel.bus import Bus
+from antennate.hardware.dynamixel.tables import BAUD_RATES, XC430_W240
+from antennate.params.layout import LayoutParams
+
+_ID, _BAUD = "id", "baud_rate"
+_MOVED = (_ID, _BAUD)
+"""Registers after whose change a servo is found elsewhere."""
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """One register of one servo.
+
+    Attributes:
+        servo: Its id.
+        baud: Bits per second at which it answers.
+        register: Name of the register.
+        before: Its value now.
+        after: Its value then.
+    """
+
+    servo: int
+    baud: int
+    register: str
+    before: int
+    after: int
+
+    def __str__(self) -> str:
+        name = self.register.replace("_", " ")
+        values: tuple[object, object] = self.before, self.after
+        if self.register == _BAUD:
+            values = BAUD_RATES[self.before], BAUD_RATES[self.after]
+        return f"servo {self.servo} (at {self.baud}): {name} {values[0]} -> {values[1]}"
+
+
+def plan(survey: Survey, layout: LayoutParams) -> list[Change]:
+    """Changes that would put right what can be; those that move a servo come alone, first."""
+    return _moves(survey, layout) or _settings(survey, layout)
+
+
+def _moves(survey: Survey, layout: LayoutParams) -> list[Change]:
+    missing = [servo for servo in layout.ids if servo not in survey.here]
+    strangers = [seen for i, seen in survey.here.items() if i not in layout.ids]
+    strangers += [seen for seen in survey.elsewhere if seen.servo not in missing]
+    if len(missing) == 1 and len(strangers) == 1 and strangers[0].state == "ok":
+        one = strangers[0]
+        if one.model == roster.models(layout)[missing[0]]:
+            return [Change(one.servo, one.baud, _ID, one.servo, missing[0])]
+    return [
+        Change(seen.servo, seen.baud, _BAUD, _speed(seen.baud), _speed(layout.baud))
+        for seen in survey.elsewhere
+        if seen.servo in missing and seen.state == "ok" and _alone(seen, survey)
+    ]
+
+
+def _alone(seen: Seen, survey: Survey) -> bool:
+    return sum(other.servo == seen.servo for other in survey.elsewhere) == 1
+
+
+def _speed(baud: int) -> int:
+    return BAUD_RATES.index(baud)
+
+
+def _settings(survey: Survey, layout: LayoutParams) -> list[Change]:
+    wanted = {"operating_mode": roster.modes(layout), "return_delay_time": {}}
+    return [
+        Change(servo, survey.baud, name, there[name], target)
+        for servo, seen in survey.here.items()
+        if servo in layout.ids and seen.state == "ok"
+        for there in (seen.registers,)
+        for name, values in wanted.items()
+        if name in there and there[name] != (target := values.get(servo, 0))
+    ]
+
+
+def apply(opener: Opener, change: Change, now: Callable[[], float]) -> None:
+    """Make one change: torque off, write if it differs, read back.
+
+    Raises:
+        BringUpError: The servo does not answer alone, keeps its torque, or did not take the value.
+        PortError: The port is gone.
+    """
+    register = XC430_W240[change.register]
+    with opener(change.baud) as port:
+        bus = master(port, change.baud, now)
+        _require_alone(bus, change)
+        if left := bringup.disable(bus, [change.servo]):
+            raise BringUpError(f"expected torque off, servo {left[0]} did not confirm it; {_POWER}")
+        if read_some(bus, [change.servo], register).get(change.servo) == change.after:
+            return
+        bus.write(change.servo, register.address, register.encode(change.after))
+        bus.settle()
+        if change.register not in _MOVED:
+            _require_value(bus, change.servo, change)
+    if change.register in _MOVED:
+        _require_moved(opener, change, now)
+
+
+_POWER = "switch its supply off and on"
+
+
+def _require_alone(bus: Bus, change: Change) -> None:
+    seen = look(bus, change.servo)
+    if seen is None or seen.state != "ok":
+        state = "silent" if seen is None else seen.state
+        raise BringUpError(
+            f"expected servo {change.servo} alone at {change.baud}, found it {state}; "
+            "leave it alone on the bus"
+        )
+    if change.register == _ID and look(bus, change.after, 1) is not None:
+        raise BringUpError(f"expected id {change.after} to be free, found a servo of this id")
+
+
+def _require_moved(opener: Opener, change: Change, now: Callable[[], float]) -> None:
+    """The servo is where the change has put it, and not where it was."""
+    to_id = change.register == _ID
+    servo = change.after if to_id else change.servo
+    baud = change.baud if to_id else BAUD_RATES[change.after]
+    with opener(baud) as port:
+        bus = master(port, baud, now)
+        _require_value(bus, servo, change)
+        if to_id and look(bus, change.servo, 1) is not None:
+            raise BringUpError(f"expected id {change.servo} to be left by all, found one there")
+
+
+def _require_value(bus: Bus, servo: int, change: Change) -> None:
+    there = read_some(bus, [servo], XC430_W240[change.register]).get(servo)
+    if there != change.after:
+        found = "no answer" if there is None else str(there)
+        raise BringUpError(
+            f"expected {change.register} {change.after} in servo {servo}, found {found}; {_POWER}"
+        )

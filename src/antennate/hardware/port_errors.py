@@ -1,0 +1,101 @@
+"""Why a serial port did not open: what was expected, what was found, and the cure."""
+
+from __future__ import annotations
+
+import errno
+import os
+import re
+from pathlib import Path
+
+from antennate.hardware.port import PortError
+
+_BUSY = (errno.EBUSY, errno.EAGAIN)
+_DENIED = (errno.EACCES, errno.EPERM)
+_GONE = (errno.ENXIO, errno.ENODEV, errno.EIO)
+_MASTER = "/dev/ptmx"
+_NAMES = Path("/dev/serial/by-id")
+
+
+class OpenError(PortError):
+    """A port did not open.
+
+    Attributes:
+        found: What was found.
+        cure: What to do.
+    """
+
+    def __init__(self, flag: str, path: str, found: str, cure: str) -> None:
+        where = f"{flag}: " if flag else ""
+        super().__init__(f"{where}expected a serial port that opens, found {path}: {found}; {cure}")
+        self.found = found
+        self.cure = cure
+
+
+def explain(flag: str, path: str, baud: int, error: Exception) -> OpenError:
+    """The error to raise when a port did not open.
+
+    Args:
+        flag: The flag that named it, "--esp32" or "--bus"; empty if none did.
+        path: Its device file.
+        baud: Bits per second asked for.
+        error: What the system or pyserial said.
+    """
+    return OpenError(flag, path, *_why(path, baud, error))
+
+
+def _why(path: str, baud: int, error: Exception) -> tuple[str, str]:
+    number = getattr(error, "errno", None)
+    if not Path(path).exists():
+        return "no such file", f"plug it in and give one of: {known_ports()}"
+    if number in _DENIED:
+        return "no permission", permission_cure(path)
+    if number in _BUSY:
+        who = ", ".join(holders(path)) or "another program"
+        return f"in use by {who}", "end that program, then try again"
+    if number in _GONE:
+        return "the device is gone", f"plug it in again; ports here are: {known_ports()}"
+    text = str(error)
+    if isinstance(error, ValueError) or "baud" in text:
+        return f"it cannot do {baud} bit/s", "set layout.baud to a speed that the adapter can do"
+    if number == errno.EISDIR or not Path(path).is_char_device() or "ioctl" in text:
+        return "not a serial port", f"give one of: {known_ports()}"
+    return text, f"ports here are: {known_ports()}"
+
+
+def permission_cure(path: str) -> str:
+    """The command that lets this user open a port."""
+    try:
+        group = Path(path).group()
+    except (OSError, KeyError):
+        group = "dialout"
+    if group in ("root", "tty"):  # nobody is to join those; the rule of the adapter is missing
+        return f"run `sudo chmod a+rw {path}`"
+    return f"run `sudo usermod -aG {group} $USER`, log out and in again"
+
+
+def known_ports() -> str:
+    """The serial ports of this machine, by their lasting names where they have one."""
+    from serial.tools import list_ports
+
+    lasting = {os.path.realpath(name): str(name) for name in sorted(_NAMES.glob("*"))}
+    here = sorted(port.device for port in list_ports.comports())
+    return ", ".join(lasting.get(path, path) for path in here) or "none (no adapter is plugged in)"
+
+
+def holders(path: str) -> list[str]:
+    """Other programs that have a port open, as `pid 12 (name)`, as far as this user may see them.
+
+    Whoever made a pseudo-terminal holds both its ends, and is left out.
+    """
+    device, found = os.path.realpath(path), list[str]()
+    for process in Path("/proc").glob("[0-9]*"):
+        if int(process.name) == os.getpid():
+            continue
+        try:
+            opened = {str(link.readlink()) for link in (process / "fd").iterdir()}
+            name = re.sub(r"\s+", " ", (process / "comm").read_text().strip())
+        except OSError:
+            continue
+        if device in opened and _MASTER not in opened:
+            found.append(f"pid {process.name} ({name})")
+    return sorted(found)

@@ -1,0 +1,152 @@
+"""Records antenna readings with known bends, as the rows of a file that can be calibrated.
+
+Every line is whole when it is written. Time is the board's own, and goes on if the board restarts.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from typing import TypeAlias
+
+from antennate.errors import BadInputError
+from antennate.hardware.esp32.stream import Reading, Stream
+from antennate.params import RecordParams
+
+Ask: TypeAlias = Callable[[str], Callable[[], bool]]
+"""Tells a person what to do; the function it returns says whether that has been confirmed."""
+
+SILENCE = 3.0
+"""Time without a reading after which a recording ends; a board greets within it [s]."""
+_PATIENCE = 0.02
+_MICROSECOND = 1e-6
+"""What the board counts; sums of its times are no rounder [s]."""
+
+
+class Recorder:
+    """Rows of one recording.
+
+    Args:
+        stream: The board's readings.
+        params: What to record.
+        now: Monotonic time [s].
+        ask: Asks for a mark or a push.
+        write: Takes each line of the file, without its line break.
+        on_reading: Called with every reading, recorded or not.
+
+    Attributes:
+        rows: Readings written.
+    """
+
+    def __init__(
+        self,
+        stream: Stream,
+        params: RecordParams,
+        now: Callable[[], float],
+        ask: Ask,
+        write: Callable[[str], None],
+        on_reading: Callable[[Reading], None] = lambda reading: None,
+    ) -> None:
+        self.rows = 0
+        self._stream, self._params, self._now = stream, params, now
+        self._ask, self._write, self._on_reading = ask, write, on_reading
+        self._last: tuple[Reading, float] | None = None
+
+    def run(self) -> None:
+        """Write the header, then all rows.
+
+        Raises:
+            BadInputError: The board is silent.
+            PortError: Its port is gone.
+        """
+        for _ in self._readings():  # it has to be there before anybody is asked for anything
+            break
+        if self._params.marks:
+            self._marks()
+        elif self._params.speed is not None:
+            self._pushes(self._params.speed)
+        else:
+            self._free()
+
+    def _marks(self) -> None:
+        self._write("trial,time,counts,bend")
+        params = self._params
+        for trial in range(params.passes):
+            for mark in params.marks if trial % 2 == 0 else params.marks[::-1]:
+                where = "" if params.unit == "1" else f" {params.unit}"
+                self._wait(f"pass {trial + 1} of {params.passes}: hold at {mark:g}{where}, Enter")
+                for reading, t in self._for(params.hold):
+                    self._row(f"{trial},{t:.6f},{self._counts(reading)},{mark!r}")
+
+    def _pushes(self, speed: float) -> None:
+        self._write("trial,speed_m_s,time,counts,bend")
+        params = self._params
+        for trial in range(params.passes):
+            self._wait(f"push {trial + 1} of {params.passes}: Enter as the stage starts")
+            start = math.nan
+            for reading, t in self._for(params.length / speed):
+                start = t if math.isnan(start) else start
+                way = speed * (t - start)
+                self._row(f"{trial},{speed!r},{t:.6f},{self._counts(reading)},{way:.6f}")
+
+    def _free(self) -> None:
+        self._write("time,left,right")
+        for reading, t in self._for(self._params.duration or math.inf):
+            sample = reading.timed.sample
+            self._row(f"{t:.6f},{sample.left},{sample.right}")
+
+    def _row(self, line: str) -> None:
+        self._write(line)
+        self.rows += 1
+
+    def _counts(self, reading: Reading) -> int:
+        sample = reading.timed.sample
+        return sample.left if self._params.side == "left" else sample.right
+
+    def _wait(self, text: str) -> None:
+        """Let readings pass until a person has confirmed."""
+        confirmed = self._ask(text)
+        for _ in self._readings():
+            if confirmed():
+                return
+
+    def _for(self, seconds: float) -> Iterator[tuple[Reading, float]]:
+        """Readings of the next so many seconds of the board."""
+        begin = math.nan
+        for reading, t in self._readings():
+            begin = t if math.isnan(begin) else begin
+            if t - begin > seconds - _MICROSECOND:
+                return
+            yield reading, t
+
+    def _readings(self) -> Iterator[tuple[Reading, float]]:
+        """All readings from now on, each with its time since the first of all [s]."""
+        heard = self._now()
+        while True:
+            for reading in self._stream.take(_PATIENCE):
+                heard = reading.now
+                self._last = (reading, self._time(reading))
+                self._on_reading(reading)
+                yield self._last
+            if self._now() - heard > SILENCE:
+                raise BadInputError(self._silent())
+
+    def _time(self, reading: Reading) -> float:
+        if self._last is None:
+            return 0.0
+        last, t = self._last
+        if reading.timed.epoch != last.timed.epoch:
+            return t + max(reading.now - last.now, 1e-6)
+        return t + 1e-6 * (reading.timed.elapsed_us - last.timed.elapsed_us)
+
+    def _silent(self) -> str:
+        came = self._stream.decoder.counters
+        why = (
+            self._stream.refusals[-1]
+            if self._stream.refusals
+            else f"{came.received} bytes and {came.good} frames in all"
+        )
+        return (
+            f"--esp32: expected readings of an antenna board, found none for {SILENCE:g} s "
+            f"({why}); run `antennate doctor --esp32 PORT`"
+        )

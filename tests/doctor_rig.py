@@ -1,0 +1,63 @@
+"""A twin robot before the doctor, in invented time: each wire is opened at a speed."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterator
+
+from antennate.experiments.twin import TwinConfig, build
+from antennate.hardware.doctor.checkup import Checkup, Robot, examine
+from antennate.hardware.doctor.fix import apply, plan
+from antennate.hardware.doctor.rows import Row
+from antennate.hardware.port import Port
+from antennate.twin.faults import Faults, read
+from antennate.twin.lockstep import BoardPort, LockstepClock
+from antennate.twin.robot import TwinRobot
+
+ROBOT = Robot()
+
+
+class Patient:
+    """A robot with faults, and what opens its two ports."""
+
+    def __init__(self, *faults: str) -> None:
+        self.robot: TwinRobot = build(TwinConfig())
+        self.clock = LockstepClock(self.robot)
+        self.board = BoardPort(self.robot, self.clock)
+        Faults([read(text) for text in faults], ROBOT.layout.ids).apply(self.robot, 0.0)
+        self.clock.latency = self.robot.bus.latency
+        self.robot.bus.latency = 0.0
+
+    @contextlib.contextmanager
+    def bus(self, baud: int) -> Iterator[Port]:
+        self.robot.bus.heard_at = baud
+        yield self.clock
+
+    @contextlib.contextmanager
+    def esp32(self, baud: int) -> Iterator[Port]:
+        yield self.board
+
+    def examine(self, bus: bool = True, esp32: bool = True, swapped: bool = False) -> Checkup:
+        openers = (self.esp32, self.bus) if swapped else (self.bus, self.esp32)
+        return examine(
+            ROBOT,
+            ("/dev/bus", openers[0]) if bus else None,
+            ("/dev/esp32", openers[1]) if esp32 else None,
+            self.clock.now,
+        )
+
+    def fix(self) -> list[str]:
+        """Changes made until nothing is left to change."""
+        made: list[str] = []
+        while (survey := self.examine(esp32=False).survey) and (
+            changes := plan(survey, ROBOT.layout)
+        ):
+            for change in changes:
+                apply(self.bus, change, self.clock.now)
+                made.append(str(change))
+        return made
+
+
+def wrong(checkup: Checkup) -> dict[str, Row]:
+    """Rows that are not ok, by part and check."""
+    return {f"{row.part}: {row.check}": row for row in checkup.rows if row.verdict != "ok"}

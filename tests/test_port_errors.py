@@ -1,0 +1,127 @@
+"""Ports that do not open: one line with the flag, what was found, and the cure."""
+
+from __future__ import annotations
+
+import errno
+import io
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from antennate.cli import BAD_INPUT, main
+from antennate.hardware.port_errors import explain, holders
+from antennate.hardware.serial_port import SerialPort
+
+
+@pytest.fixture
+def terminal() -> object:
+    master, slave = os.openpty()
+    yield os.ttyname(slave)
+    os.close(master)
+    os.close(slave)
+
+
+@pytest.mark.parametrize(
+    ("error", "said"),
+    [
+        (OSError(errno.EACCES, "Permission denied"), "no permission; run `sudo "),
+        (OSError(errno.EIO, "Input/output error"), "the device is gone; plug it in again"),
+        (ValueError("Failed to set custom baud rate"), "it cannot do 123 bit/s; set layout.baud"),
+        (OSError(errno.EBUSY, "Device or resource busy"), "in use by another program; end that"),
+    ],
+)
+def test_the_reason_and_the_cure_are_said(terminal: str, error: Exception, said: str) -> None:
+    text = str(explain("--bus", terminal, 123, error))
+    assert text.startswith(f"--bus: expected a serial port that opens, found {terminal}: ")
+    assert said in text
+
+
+def test_permission_names_the_group_of_the_device(
+    terminal: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(Path, "group", lambda _: "dialout")
+    error = explain("--esp32", terminal, 1, PermissionError(errno.EACCES, "no"))
+    assert error.cure == "run `sudo usermod -aG dialout $USER`, log out and in again"
+
+
+def test_L15_a_second_program_is_told_the_pid_of_the_first() -> None:
+    """The first one is another process without the master's end, as one that uses a real port."""
+    master, slave = os.openpty()
+    path = os.ttyname(slave)
+    hold = (
+        "import serial, sys; s = serial.Serial(sys.argv[1], exclusive=True); print(1, flush=True)"
+    )
+    first = subprocess.Popen(
+        [sys.executable, "-c", hold + "; sys.stdin.read()", path],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+    )
+    try:
+        assert first.stdout is not None
+        assert first.stdout.readline() == b"1\n"
+        assert [who.split()[1] for who in holders(path)] == [str(first.pid)]
+        with pytest.raises(Exception, match=f"in use by pid {first.pid} "):
+            SerialPort(path, 1_000_000, "--bus")
+    finally:
+        first.communicate(b"")
+        os.close(master)
+        os.close(slave)
+
+
+@pytest.mark.parametrize("command", ["doctor", "drive"])
+@pytest.mark.parametrize(
+    ("path", "said"),
+    [("/dev/nowhere", "no such file"), ("/dev/null", "not a serial port"), ("/", "not a serial")],
+)
+def test_every_command_says_it_and_ends_with_2(
+    command: str, path: str, said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = [command, "--bus", path, *(["--esp32", path] if command == "drive" else [])]
+    assert main(words) == BAD_INPUT
+    told = capsys.readouterr()
+    assert said in told.out + told.err
+    assert "Traceback" not in told.err
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ([], "--esp32 PORT, --bus PORT or both"),
+        (["--bus", "/dev/null", "--esp32", "/dev/null"], "expected two ports"),
+        (["--esp32", "/dev/null", "--fix"], "--fix: expected --bus PORT"),
+        (["--bus", "/dev/null", "--yes"], "--yes: expected --fix"),
+        (["--bus", "/dev/null", "--fix"], "--fix: expected a terminal"),
+        (["--bus", "/dev/null", "--layout.baud", "7"], "--layout.baud: expected one of"),
+    ],
+)
+def test_orders_that_cannot_be_are_refused_in_one_line(
+    words: list[str], said: str, capsys: pytest.CaptureFixture[str], monkeypatch
+) -> None:
+    monkeypatch.setattr(sys, "stdin", io.StringIO())
+    assert main(["doctor", *words]) == BAD_INPUT
+    told = capsys.readouterr()
+    assert told.out == ""
+    assert said in told.err
+    assert told.err.count("\n") == 1
+
+
+def test_bad_robot_toml_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "robot.toml"
+    file.write_text("[layout]\nbuad = 1\n")
+    assert main(["doctor", "--bus", "/dev/null", "--config", str(file)]) == BAD_INPUT
+    assert "did you mean baud?" in capsys.readouterr().err
+
+
+def test_json_is_the_result_alone_and_out_keeps_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "run"
+    assert main(["doctor", "--bus", "/dev/null", "--json", "--out", str(out)]) == BAD_INPUT
+    result = json.loads(capsys.readouterr().out)
+    assert result == json.loads((out / "result.json").read_text())
+    assert (result["schema"], result["command"], result["verdict"]) == (1, "doctor", "bad")
+    assert result["rows"][0]["check"] == "port"
