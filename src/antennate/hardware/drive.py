@@ -18,10 +18,11 @@ from antennate.hardware.dynamixel import bringup
 from antennate.hardware.dynamixel.answers import Timing
 from antennate.hardware.dynamixel.bringup import BringUpError
 from antennate.hardware.dynamixel.bus import Bus
-from antennate.hardware.dynamixel.tables import EXTENDED_MODE, XC430_W240, XL330_M288
+from antennate.hardware.dynamixel.tables import EXTENDED_MODE, XC430_W240
 from antennate.hardware.host_clock import HostClock
 from antennate.hardware.joints import Joints
 from antennate.hardware.port import Port, PortError
+from antennate.hardware.reconnecting import Reconnecting
 from antennate.hardware.session import Decider, Session
 from antennate.hardware.timing import TimingReport
 from antennate.loop import run_loop
@@ -51,6 +52,14 @@ class DriveConfig(Params):
     )
     duration: float | None = number(
         None, "s", "assumed: until it is stopped", "time from torque on to off", gt=0
+    )
+    bus_return: float = number(
+        30.0,
+        "s",
+        "assumed: long enough to put a plug back",
+        "time that a lost servo bus is waited for, to take the torque off",
+        ge=0,
+        le=600,
     )
     layout: LayoutParams = LayoutParams()
     mind: ControllerParams = ControllerParams()
@@ -88,7 +97,7 @@ def connect(config: DriveConfig, esp32: str, bus: str) -> Iterator[Session]:
         BringUpError: The servos are not those expected.
     """
     try:
-        from antennate.hardware.serial_port import SerialPort
+        from antennate.hardware.serial_finder import SerialFinder
     except ModuleNotFoundError as error:
         raise ConfigError(
             f"expected pyserial for real ports, found no module {error.name}; install "
@@ -98,7 +107,7 @@ def connect(config: DriveConfig, esp32: str, bus: str) -> Iterator[Session]:
     with contextlib.ExitStack() as stack:
         lines: list[Port] = []
         for path, baud in ((esp32, _BOARD_BAUD), (bus, config.layout.baud)):
-            line = SerialPort(path, baud)
+            line = Reconnecting(SerialFinder(path, baud))
             stack.callback(line.close)
             lines.append(line)
         yield prepare(config, lines[0], lines[1], HostClock())
@@ -154,10 +163,8 @@ def require_servos(bus: Bus, layout: LayoutParams) -> None:
         BringUpError: Otherwise; names each id that is not, and the cure.
     """
     legs = slice(YAW_COUNT, YAW_COUNT + len(LEGS))
-    models = dict.fromkeys(layout.ids, XC430_W240.model)
-    models |= dict.fromkeys(layout.antennae.ids, XL330_M288.model)
     try:
-        bringup.require(bus, models)
+        bringup.require(bus, Joints(layout).models)
     except BringUpError as error:
         raise BringUpError(
             f"--bus: {error}; check power, wiring, ids and baud {layout.baud}, or whether --esp32 "
@@ -203,6 +210,8 @@ def drive(
 ) -> Report:
     """A dry run, then, if `arm`, a walk; torque is off at the end whatever happens.
 
+    A FAULT ends it. If the bus is gone then, its return is waited for with the robot standing.
+
     Args:
         session: As from `connect`.
         config: For how long.
@@ -216,6 +225,13 @@ def drive(
     start = clock.now()
     walk = config.dry_run if arm else math.inf
     end = config.dry_run if not arm else config.dry_run + (config.duration or math.inf)
+    failed_at = math.inf
+
+    def done(t: float) -> bool:
+        """After a fault: torque can be taken off now, or it cannot and patience is over."""
+        nonlocal failed_at
+        failed_at = min(failed_at, t)
+        return not session.mute or t > failed_at + config.bus_return
 
     def go_on(frame: AntennaFrame, pose: Pose) -> bool:
         t = clock.now() - start
@@ -225,7 +241,7 @@ def drive(
             report.worst, report.why = out.state, "; ".join(c.text for c in out.causes)
         on_tick(session, clock.now())
         failed = out is not None and t > walk + _ARMING_TIME and out.state >= State.FAULT
-        return t < end and not failed
+        return t < end and not (failed and done(t))
 
     try:
         run_loop(session, session, session.period, go_on)

@@ -95,7 +95,7 @@ class TwinServer:
             if self._bus.master in ready:
                 robot.bus.receive(now, self._bus.read())
             if self._board.master in ready:
-                self._board.read()
+                robot.hear(self._board.read())
             if answers := robot.bus.transmit(now):
                 self._bus.write(answers)
             if stream := robot.take():
