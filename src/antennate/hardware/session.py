@@ -248,6 +248,7 @@ class Session:
         """Torque on where everything stands; legs count their turns from there."""
         bringup.require_models(self.bus, self.joints.models)
         bringup.arm_watchdogs(self.bus, self.joints.ids)
+        self.watch.watchdogs = ()
         present = bringup.enable(self.bus, self.joints.ids)
         here = np.array([present[servo] for servo in self.joints.ids], float)
         self.joints.align(here, pose)
