@@ -19,15 +19,18 @@ from antennate.loop import run_loop
 from antennate.params.layout import LayoutParams
 from antennate.twin.lockstep import BoardPort
 
-OUT, BACK = 2.0, 2.6
-"""When a cable is pulled and put back [s]."""
+ARM, OUT, BACK, AGAIN = 0.5, 1.2, 1.7, 2.2
+"""When torque comes on, a cable is pulled and put back, and an arm event comes [s]."""
+
+SYNC_WRITE = 0x83
+"""Instruction, the eighth byte of a packet, by which goals are sent (DYNAMIXEL protocol 2.0)."""
 
 
 class Cable:
     """A port that raises as long as it is out."""
 
     def __init__(self, port: Port) -> None:
-        self._port, self.out, self.wrote = port, False, 0
+        self._port, self.out, self.sent = port, False, list[bytes]()
 
     def _check(self) -> Port:
         if self.out:
@@ -42,17 +45,18 @@ class Cable:
 
     def write(self, data: bytes) -> None:
         self._check().write(data)
-        self.wrote += 1
+        self.sent.append(data)
 
 
 class Story:
-    """A session that is armed at 1 s; states and goals of every tick."""
+    """A session that is armed; states and goals of every tick."""
 
     def __init__(self, act: Callable[[Story, float], None]) -> None:
         self.rig = rig(TwinConfig())
         session: Any = self.rig.session
         self.board = session.board._port = Cable(session.board._port)
         self.bus = session.bus._port = Cable(session.bus._port)
+        self.waiting: list[bytes] = []
         self._act = act
         self.t: list[float] = []
         self.state: list[State] = []
@@ -69,7 +73,7 @@ class Story:
             self.state.append(out.state)
             self.texts.append("; ".join(active.text for active in out.causes))
             self.goals.append([s.get("goal_position") for s in self.rig.robot.servos])
-            session.orders.arm = 1.0 <= t < 1.5
+            session.orders.arm = ARM <= t < OUT
             self._act(self, t)
             return t < end
 
@@ -95,8 +99,8 @@ def test_L12_L13_a_board_pulled_out_makes_it_hold_and_put_back_walk_within_a_sec
     def act(story: Story, t: float) -> None:
         story.board.out = OUT <= t < BACK
 
-    story = Story(act).run(4.5)
-    assert story.walks(1.5, OUT)
+    story = Story(act).run(3.1)
+    assert story.walks(ARM + 0.3, OUT)
     assert story.held_after(OUT) <= 0.1
     assert any("the cable is out" in story.texts[i] for i in story.during(OUT, BACK))
     assert story.stands(OUT + 0.1, BACK)
@@ -112,7 +116,11 @@ def pulled(how: str) -> Callable[[Story, float], None]:
             story.bus.out = OUT <= t < BACK
         else:
             story.rig.robot.bus.loss = float(OUT <= t < BACK)
-        if t >= 4.0:
+        if t < BACK:
+            story.bus.sent.clear()
+        if t < AGAIN:
+            story.waiting = list(story.bus.sent)
+        else:
             story.rig.session.orders.arm = True
 
     return act
@@ -122,14 +130,16 @@ def pulled(how: str) -> Callable[[Story, float], None]:
 def test_B6_L12_a_bus_put_back_stands_until_an_arm_event_and_begins_where_the_servos_are(
     how: str,
 ) -> None:
-    story = Story(pulled(how)).run(5.5)
-    assert story.walks(1.5, OUT)
+    story = Story(pulled(how)).run(3.0)
+    assert story.walks(ARM + 0.3, OUT)
     assert story.held_after(OUT) <= 0.1
-    assert all(story.state[i] == State.FAULT for i in story.during(OUT + 0.1, 4.0))
-    assert story.stands(OUT + 0.1, 4.0)
-    assert story.walks(5.0, 9)
-    armed = next(i for i in story.during(4.0, 9) if story.state[i] < State.FAULT)
-    assert story.t[armed] - 4.0 <= 1.0
+    assert all(story.state[i] == State.FAULT for i in story.during(OUT + 0.1, AGAIN))
+    assert story.stands(OUT + 0.1, AGAIN)
+    assert story.waiting
+    assert not any(packet[7] == SYNC_WRITE for packet in story.waiting)
+    assert story.walks(AGAIN + 0.3, 9)
+    armed = next(i for i in story.during(AGAIN, 9) if story.state[i] < State.FAULT)
+    assert story.t[armed] - AGAIN <= 1.0
     steps = abs(np.diff(story.goals[armed : armed + 50], axis=0))
     assert steps.max() <= 30
     servos = story.rig.robot.servos
@@ -142,7 +152,7 @@ def test_B6_another_robot_on_the_bus_does_not_get_armed() -> None:
         if t >= OUT:
             story.rig.robot.servos[3].set("model_number", 1200)
 
-    story = Story(act).run(5.0)
+    story = Story(act).run(2.6)
     assert story.stands(OUT + 0.1, 9)
     assert any("found {4: 1200}" in text for text in story.texts)
     assert story.state[-1] == State.FAULT
@@ -178,7 +188,8 @@ def test_L14_swapped_ports_are_refused_by_name_and_no_servo_hears_a_byte() -> No
     with pytest.raises(BadInputError, match=r"expected an antenna board.*swapped"):
         prepare(DriveConfig(), esp32=bus, bus=board, clock=made.clock)
     assert made.clock.now() - begin <= 3.1
-    assert bus.wrote == board.wrote == 0
+    assert not bus.sent
+    assert not board.sent
 
 
 def test_L14_a_board_on_the_port_of_the_bus_is_refused_by_name() -> None:
