@@ -456,7 +456,7 @@ def test_a_dead_wire_is_noted_by_the_watch_and_ends_nothing() -> None:
             raise PortError("the wire is gone")
 
     link = Dead(Rig().twin)
-    watch = ServoWatch(Bus(link, clock=link.now), tuple(IDS))
+    watch = ServoWatch(Bus(link, clock=link.now), tuple(IDS), link.now)
     watch.step()
     assert watch.bus_error == "the wire is gone"
     assert set(watch.missed.values()) == {1}

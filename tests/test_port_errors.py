@@ -13,7 +13,8 @@ from pathlib import Path
 import pytest
 
 from antennate.cli import BAD_INPUT, main
-from antennate.hardware.port_errors import explain, holders
+from antennate.hardware.port_errors import explain
+from antennate.hardware.port_holder import holders
 from antennate.hardware.serial_port import SerialPort
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import secrets
 import sys
 from collections.abc import Sequence
 
@@ -32,7 +33,7 @@ def command(argv: Sequence[str]) -> int:
     """
     config, _ = parse_with("twin", DESCRIPTION, TwinConfig, argv, FromFile())
     faults = Faults([read(text) for text in config.fault], config.layout.ids)
-    robot = build(config)
+    robot = build(config, boot_id=secrets.randbits(32))
     end = float("inf") if config.duration is None else config.duration
     with TwinServer(robot, faults) as server, terminate_as_interrupt(), urgent(LEVEL + 1):
         sys.stdout.write(json.dumps(server.paths) + "\n")

@@ -72,14 +72,15 @@ class TwinConfig(Params):
     world: TunnelConfig = TunnelConfig()
 
 
-def build(config: TwinConfig) -> TwinRobot:
-    """The robot at the start of a tunnel."""
+def build(config: TwinConfig, boot_id: int | None = None) -> TwinRobot:
+    """The robot at the start of a tunnel; each start of a real board has a boot id of its own."""
     world, start = config.world, prepare(config.world, config.trial)
     period = world.controller.period
     body = SimBody(1, world.robot.sensor, period, world.physics.timestep)
     body.load(0, start.world, start.chance)
+    boot = config.trial + 1 if boot_id is None else boot_id
     hand = Hand(config.touch, world.controller.conditioning)
-    return TwinRobot(body, config.layout, period, config.trial + 1, standing_noise=True, hand=hand)
+    return TwinRobot(body, config.layout, period, boot, standing_noise=True, hand=hand)
 
 
 class _Rounded:

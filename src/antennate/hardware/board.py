@@ -8,19 +8,28 @@ import numpy as np
 
 from antennate.hardware.esp32.clock import DeviceClock, Timed, Verdict
 from antennate.hardware.esp32.decoder import FrameDecoder
-from antennate.hardware.esp32.frame import FLAG_LEFT_RAIL, FLAG_RIGHT_RAIL
+from antennate.hardware.esp32.frame import (
+    FLAG_LEFT_RAIL,
+    FLAG_RIGHT_RAIL,
+    SAMPLE_FRAME_SIZE,
+    encode_request,
+)
 from antennate.hardware.esp32.wire import Hello, Refused, Sample, objections
-from antennate.hardware.port import Port
+from antennate.hardware.port import Port, PortError
 from antennate.records import Floats
 
 BOARD_BAUD = 115_200
 """Bits per second of the board's port."""
+KEPT = 64 * SAMPLE_FRAME_SIZE
+"""Most bytes of a backlog that are looked at, the newest: 64 samples."""
 _CHUNK = 4096
+_CHUNKS = 64
+"""Most chunks read at once: more than Linux keeps for a line."""
 _RAILS = (FLAG_LEFT_RAIL, FLAG_RIGHT_RAIL)
 
 
 class Board:
-    """Reads one antenna board.
+    """Reads one antenna board, always the same one. If its port is gone, it is merely silent.
 
     Args:
         port: Its wire.
@@ -31,6 +40,8 @@ class Board:
         clock: With the verdicts on its samples.
         hello: The newest greeting, None before the first.
         refusals: Why a board or its frames were refused, newest last, at most 8.
+        skipped: Bytes of backlogs that were not looked at.
+        trouble: What is wrong with its port, empty if nothing is.
     """
 
     def __init__(self, port: Port, age_limit: float) -> None:
@@ -38,16 +49,33 @@ class Board:
         self.clock = DeviceClock()
         self.hello: Hello | None = None
         self.refusals: list[str] = []
+        self.skipped = 0
+        self.trouble = ""
         self._port = port
         self._limit = age_limit
+        self._first: Hello | None = None
 
     def poll(self, now: float) -> int:
-        """Take what has come by now [s]; how many usable samples that were."""
-        used = 0
-        while data := self._port.read(_CHUNK, 0.0):
-            for frame in self.decoder.feed(data):
-                used += self._take(frame, now)
-        return used
+        """Take the newest of what has come by now [s]; how many usable samples that were."""
+        return sum(self._take(frame, now) for frame in self.decoder.feed(self._read()))
+
+    def _read(self) -> bytes:
+        """What has come, of a backlog the end; a board that is back is asked to greet."""
+        came = b""
+        try:
+            for _ in range(_CHUNKS):
+                part = self._port.read(_CHUNK, 0.0)
+                if self.trouble:
+                    self._port.write(encode_request())
+                    self.trouble = ""
+                if not part:
+                    break
+                came += part
+                self.skipped += max(len(came) - KEPT, 0)
+                came = came[-KEPT:]
+        except PortError as error:
+            self.trouble = str(error)
+        return came
 
     def newest(self, now: float) -> Timed | None:
         """The newest usable sample, or None if it is too old or its age is not known."""
@@ -56,12 +84,25 @@ class Board:
     def _take(self, frame: Hello | Sample | Refused, now: float) -> bool:
         if isinstance(frame, Sample):
             return self.clock.take(frame, now) is Verdict.USED
-        reasons = (frame.reason,) if isinstance(frame, Refused) else objections(frame)
+        reasons = (frame.reason,) if isinstance(frame, Refused) else self._objections(frame)
         if isinstance(frame, Hello) and not reasons:
+            self._first = self._first or frame
             self.clock.greet(frame)
             self.hello = frame
         self.refusals = [*self.refusals, *reasons][-8:]
         return False
+
+    def _objections(self, hello: Hello) -> tuple[str, ...]:
+        """What speaks against a board, also that it is not the one that greeted first."""
+        first = self._first
+        if first is None:
+            return objections(hello)
+        if hello.device_id != first.device_id:
+            return (
+                f"expected the board {first.device_id} that greeted first, found another one, "
+                f"{hello.device_id}; begin anew with it",
+            )
+        return objections(hello, first.config_hash)
 
 
 def counts_of(timed: Timed | None) -> Floats:

@@ -115,6 +115,7 @@ class Inputs:
         failure: Text of an exception of the controller in this tick, empty if none.
         resets: Restarts of the antenna board so far.
         reset_reason: Why it last restarted, as far as it can tell.
+        board_error: What is wrong with its port, empty if nothing is.
         missed: Answers missed in a row, by servo id; ids without any may be left out.
         servo_errors: Hardware errors in words, by servo id.
         bus_error: What is wrong with the bus as a whole, empty if nothing is.
@@ -138,6 +139,7 @@ class Inputs:
     refused: int = 0
     resets: int = 0
     reset_reason: str = ""
+    board_error: str = ""
     missed: Mapping[int, int] = field(default_factory=dict[int, int])
     servo_errors: Mapping[int, str] = field(default_factory=dict[int, str])
     bus_error: str = ""

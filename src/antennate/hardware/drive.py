@@ -23,6 +23,7 @@ from antennate.hardware.film import require_film
 from antennate.hardware.host_clock import HostClock
 from antennate.hardware.joints import Joints
 from antennate.hardware.port import Port, PortError
+from antennate.hardware.reconnecting import Reconnecting
 from antennate.hardware.report import Report
 from antennate.hardware.session import Decider, Session
 from antennate.hardware.signals import undisturbed
@@ -80,6 +81,14 @@ class DriveConfig(Params):
     )
     touch: TouchCheckParams = TouchCheckParams()
     drift: DriftParams = DriftParams()
+    bus_return: float = number(
+        30.0,
+        "s",
+        "assumed: long enough to put a plug back",
+        "time that a lost servo bus is waited for, to take the torque off",
+        ge=0,
+        le=600,
+    )
     layout: LayoutParams = LayoutParams()
     mind: ControllerParams = ControllerParams()
     limits: SupervisorParams = SupervisorParams()
@@ -95,7 +104,7 @@ def connect(config: DriveConfig, esp32: str, bus: str) -> Iterator[Session]:
         BringUpError: The servos are not those expected.
     """
     try:
-        from antennate.hardware.serial_port import SerialPort
+        from antennate.hardware.serial_finder import SerialFinder
     except ModuleNotFoundError as error:
         raise ConfigError(
             f"expected pyserial for real ports, found no module {error.name}; install "
@@ -108,7 +117,7 @@ def connect(config: DriveConfig, esp32: str, bus: str) -> Iterator[Session]:
             ("--esp32", esp32, BOARD_BAUD),
             ("--bus", bus, config.layout.baud),
         ):
-            line = SerialPort(path, baud, flag)
+            line = Reconnecting(SerialFinder(path, baud, flag))
             stack.callback(line.close)
             lines.append(line)
         yield prepare(config, lines[0], lines[1], HostClock())
@@ -213,6 +222,8 @@ def drive(
 ) -> Report:
     """A dry run, then, if `arm`, a walk; torque is off at the end whatever happens.
 
+    A FAULT ends it. If the bus is gone then, its return is waited for with the robot standing.
+
     Args:
         session: As from `connect`.
         config: For how long.
@@ -226,6 +237,13 @@ def drive(
     start = clock.now()
     duration = config.duration or math.inf
     dry = DryRun(session.trust, config.dry_run, config.touch.patience, arm, duration)
+    failed_at = math.inf
+
+    def done(t: float) -> bool:
+        """After a fault: torque can be taken off now, or it cannot and patience is over."""
+        nonlocal failed_at
+        failed_at = min(failed_at, t)
+        return not session.mute or t > failed_at + config.bus_return
 
     def go_on(frame: AntennaFrame, pose: Pose) -> bool:
         t = clock.now() - start
@@ -236,7 +254,7 @@ def drive(
         on_tick(session, clock.now())
         out = session.outputs
         failed = out is not None and t > dry.over + _ARMING_TIME and out.state >= State.FAULT
-        return t < dry.end and not failed
+        return t < dry.end and not (failed and done(t))
 
     try:
         run_loop(session, session, session.period, go_on)

@@ -8,6 +8,7 @@ import numpy as np
 
 from antennate.anatomy import LINK_COUNT, YAW_COUNT
 from antennate.errors import AntennateError
+from antennate.hardware import roster
 from antennate.params.layout import TICKS_A_TURN, LayoutParams
 from antennate.records import Floats, Ints, Pose
 
@@ -25,10 +26,12 @@ class Joints:
 
     Attributes:
         ids: Ids of their servos.
+        models: Model numbers by id.
     """
 
     def __init__(self, layout: LayoutParams) -> None:
         self.ids = layout.ids
+        self.models = roster.models(layout)
         self._sign: Floats = np.array(layout.directions, float)
         self._zero: Floats = np.array(layout.zeros, float)
 

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import errno
 import os
-import re
 from pathlib import Path
 
 from antennate.hardware.port import PortError
+from antennate.hardware.port_holder import holders
 
 _BUSY = (errno.EBUSY, errno.EAGAIN)
 _DENIED = (errno.EACCES, errno.EPERM)
 _GONE = (errno.ENXIO, errno.ENODEV, errno.EIO)
-_MASTER = "/dev/ptmx"
 _NAMES = Path("/dev/serial/by-id")
 
 
@@ -80,22 +79,3 @@ def known_ports() -> str:
     lasting = {os.path.realpath(name): str(name) for name in sorted(_NAMES.glob("*"))}
     here = sorted(port.device for port in list_ports.comports())
     return ", ".join(lasting.get(path, path) for path in here) or "none (no adapter is plugged in)"
-
-
-def holders(path: str) -> list[str]:
-    """Other programs that have a port open, as `pid 12 (name)`, as far as this user may see them.
-
-    Whoever made a pseudo-terminal holds both its ends, and is left out.
-    """
-    device, found = os.path.realpath(path), list[str]()
-    for process in Path("/proc").glob("[0-9]*"):
-        if int(process.name) == os.getpid():
-            continue
-        try:
-            opened = {str(link.readlink()) for link in (process / "fd").iterdir()}
-            name = re.sub(r"\s+", " ", (process / "comm").read_text().strip())
-        except OSError:
-            continue
-        if device in opened and _MASTER not in opened:
-            found.append(f"pid {process.name} ({name})")
-    return sorted(found)

@@ -1,7 +1,24 @@
-"""A serial line as a Port, through pyserial; nobody else may open it meanwhile."""
+"""A serial line as a Port, through pyserial; nobody else may open it meanwhile.
+
+Opening must not reset the antenna board. On the usual board for the ESP32 two crossed transistors
+turn the modem lines into a reset (EN) and a boot button (IO0); so say Espressif's schematics
+(https://docs.espressif.com/projects/esp-dev-kits, "Auto program"):
+
+| DTR | RTS | the chip |
+|---|---|---|
+| off | off | runs |
+| on | on | runs |
+| off | on | EN low: held in reset |
+| on | off | IO0 low: BOOT pressed, which ends our firmware's stream |
+
+Linux switches both on in one step when a line is opened, and both off when it is closed. pyserial
+then sets DTR first and RTS after it. Wanting both off would therefore pass through "RTS alone" and
+reset the board; wanting both on changes nothing more. Both on it is, said before the line is open.
+"""
 
 from __future__ import annotations
 
+import termios
 from collections.abc import Generator
 from contextlib import contextmanager
 
@@ -26,8 +43,12 @@ class SerialPort:
     def __init__(self, path: str, baud: int, flag: str = "") -> None:
         self._path = path
         try:
-            self._line = serial.Serial(path, baud, timeout=0, write_timeout=0.1, exclusive=True)
-        except (OSError, TypeError, ValueError) as error:
+            line = serial.Serial(baudrate=baud, timeout=0, write_timeout=0.1, exclusive=True)
+            line.dtr = line.rts = True
+            line.port = path
+            line.open()
+            self._line = line
+        except (OSError, TypeError, ValueError, termios.error) as error:
             raise explain(flag, path, baud, error) from error
 
     def write(self, data: bytes) -> None:
@@ -65,5 +86,5 @@ class SerialPort:
     def _mapped(self, what: str) -> Generator[None]:
         try:
             yield
-        except (OSError, TypeError, ValueError) as error:
+        except (OSError, TypeError, ValueError, termios.error) as error:
             raise PortError(f"could not {what} {self._path}: {error}") from error

@@ -4,6 +4,9 @@ It is the body, which reads the board and writes goals, and the mind, a controll
 supervisor. Nothing reaches the servos but what the supervisor lets through. Their watchdogs are fed
 by goals alone, and goals are sent only upon a decision of this very tick. Goals move at a limited
 speed, so that neither the first pose nor a broken controller makes a joint jump.
+
+After the bus was lost no goal is sent until an arm event. With that one ids and models are checked,
+watchdogs armed and goals set to where the servos stand, as with the first.
 """
 
 from __future__ import annotations
@@ -129,7 +132,8 @@ class Session:
         band = Band(conditioning.counts_low, conditioning.counts_high, conditioning.polarity)
         windows = diagnosis or DiagnosisParams()
         self.channels = [ChannelDiagnosis(windows, band) for _ in range(2)]
-        self.supervisor = Supervisor(limits or SupervisorParams())
+        self._limits = limits or SupervisorParams()
+        self.supervisor = Supervisor(self._limits)
         self.watch = ServoWatch(bus, joints.ids, clock.now)
         self.trust = trust or Trust(conditioning)
         self.turns = Turns(bus, joints)
@@ -144,6 +148,15 @@ class Session:
         self._goals: Floats | None = None
         self._pose: Pose | None = None
         self._used = self._refused = 0
+        self._lost = False
+
+    @property
+    def mute(self) -> bool:
+        """No servo answers: the bus, its adapter or the power of all servos is gone."""
+        return self._dead(self._limits.late_answers)
+
+    def _dead(self, missed: int) -> bool:
+        return bool(self.watch.bus_error) or min(self.watch.missed.values()) >= missed
 
     # the body
 
@@ -188,16 +201,18 @@ class Session:
         try:
             if out.arming:
                 self._arm(pose)
-            elif out.feed_watchdog and self._goals is not None:
+            elif out.feed_watchdog and self._goals is not None and not self._lost:
                 self._forget_turns(out.move)
                 self._send(pose if out.move and not self.turns.standing else None)
+            if not out.torque and self._goals is not None:
+                self.release()
         except (PortError, PoseError, BringUpError) as error:
             self.watch.bus_error = str(error)
+            self._lost |= not isinstance(error, PoseError)
             return
-        if not out.torque and self._goals is not None:
-            self.release()
         if out.feed_watchdog or not out.torque:  # any packet would feed the watchdogs
             self.watch.step()
+        self._lost |= self._dead(self._limits.silent_answers)
 
     # the mind
 
@@ -223,9 +238,10 @@ class Session:
 
     def release(self) -> list[int]:
         """Torque off, verified: ids that did not confirm it."""
+        left = bringup.disable(self.bus, self.joints.ids)
         self._goals = None
         self.turns.reset()
-        return bringup.disable(self.bus, self.joints.ids)
+        return left
 
     def _inputs(self, now: float) -> Inputs:
         clock, watch, thought = self.board.clock, self.watch, self._thought
@@ -243,6 +259,7 @@ class Session:
             failure=thought.failure,
             resets=clock.resets,
             reset_reason="" if clock.last_reset is None else clock.last_reset.name,
+            board_error=self.board.trouble,
             missed=watch.missed,
             servo_errors=watch.errors,
             bus_error=watch.bus_error,
@@ -257,11 +274,14 @@ class Session:
     def _arm(self, pose: Pose) -> None:
         """Torque on where everything stands; legs count their turns from there."""
         self.turns.reset()
+        bringup.require_models(self.bus, self.joints.models)
         bringup.arm_watchdogs(self.bus, self.joints.ids)
+        self.watch.watchdogs = ()
         present = bringup.enable(self.bus, self.joints.ids)
         here = np.array([present[servo] for servo in self.joints.ids], float)
         self.joints.align(here, pose)
         self._goals = here
+        self._lost = False
 
     def _forget_turns(self, may_begin: bool) -> None:
         if self._goals is None:

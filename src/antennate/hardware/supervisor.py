@@ -123,7 +123,7 @@ class Supervisor:
         params = self._params
         found: dict[Cause, str] = {}
         if not 0.0 <= inputs.age <= params.stale_age:
-            found[Cause.STALE] = f"age {inputs.age:.3g} s"
+            found[Cause.STALE] = inputs.board_error or f"age {inputs.age:.3g} s"
         for side, finding in zip(("left", "right"), inputs.findings, strict=True):
             cause = OF_FINDING.get(finding)
             if cause is not None:

@@ -24,7 +24,7 @@ class LockstepClock(Link):
 
 
 class BoardPort:
-    """The board's stream of a twin robot as a Port; what is written to it is not heard."""
+    """The board's stream of a twin robot as a Port."""
 
     def __init__(self, robot: TwinRobot, clock: LockstepClock) -> None:
         self._robot = robot
@@ -32,7 +32,8 @@ class BoardPort:
         self._came = b""
 
     def write(self, data: bytes) -> None:
-        """The twin's board greets by itself."""
+        """Send to the board."""
+        self._robot.hear(data)
 
     def read(self, most: int, timeout: float) -> bytes:
         """What has come by now, or comes within `timeout` [s]."""

@@ -184,6 +184,12 @@ class TwinRobot:
         data, self._stream = bytes(self._stream), bytearray()
         return data
 
+    def hear(self, data: bytes) -> None:
+        """Let the board take bytes from the host: it greets if it is asked to."""
+        asked = frame.encode_request() in data
+        if asked and not self.board_silent and self._ticks >= self._booted:
+            self._greet()
+
     def break_board(self, what: str) -> None:
         """Let the board fall silent, start anew after BOOT_TICKS, or lose an antenna's wire."""
         if what == "silent":
@@ -213,10 +219,7 @@ class TwinRobot:
         if self.board_silent or since < 0:
             return
         if since % round(GREETING_PERIOD / self._period) == 0:
-            settings = frame.config_hash(round(1 / self._period), 15, 34, 35)
-            reset = frame.RESET_HARD if self._booted else frame.RESET_POWER_ON
-            rate = round(1 / self._period)
-            self._stream += frame.encode_hello(self._boot_id, reset, settings, _DEVICE, rate)
+            self._greet()
         noise = np.zeros(2)
         if self._chance is not None and not self._walked:
             noise = np.rint(self._chance.normal(0.0, _STANDING_NOISE, 2))
@@ -232,6 +235,12 @@ class TwinRobot:
         ticks = round(1e6 * since * self._period) & frame.TICK_MASK
         size = self._encoder.encode_sample_into(self._buffer, since, ticks, left, right, flags, 0)
         self._stream += self._buffer[:size]
+
+    def _greet(self) -> None:
+        rate = round(1 / self._period)
+        settings = frame.config_hash(rate, 15, 34, 35)
+        reset = frame.RESET_HARD if self._booted else frame.RESET_POWER_ON
+        self._stream += frame.encode_hello(self._boot_id, reset, settings, _DEVICE, rate)
 
 
 def _rail(counts: int, flag: int) -> int:

@@ -113,7 +113,7 @@ class TwinServer:
                     bus.heard_at = self._bus.baud()
                     bus.receive(now, self._bus.read())
                 if self._board.master in ready:
-                    self._board.read()
+                    robot.hear(self._board.read())
                 if answers := bus.transmit(time.monotonic() - begin):
                     self._bus.write(answers)
 

@@ -10,7 +10,8 @@ from antennate.errors import ConfigError
 from antennate.hardware.board import BOARD_BAUD
 from antennate.hardware.doctor.rows import Opener, Row, row
 from antennate.hardware.port import Port
-from antennate.hardware.port_errors import OpenError, holders
+from antennate.hardware.port_errors import OpenError
+from antennate.hardware.port_holder import holders
 
 
 def serial_opener(path: str, flag: str) -> Opener:

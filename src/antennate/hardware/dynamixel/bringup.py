@@ -78,6 +78,18 @@ def require(bus: Bus, expected: Mapping[int, int]) -> list[Found]:
     return table
 
 
+def require_models(bus: Bus, models: Mapping[int, int]) -> None:
+    """All ids answer with these model numbers: a glance of some ms, unlike `require`.
+
+    Raises:
+        BringUpError: One did not answer, or with another model.
+    """
+    found = read_register(bus, list(models), _COMMON["model_number"])
+    if wrong := {i: found[i] for i, model in models.items() if found[i] != model}:
+        wanted = {i: models[i] for i in wrong}
+        raise BringUpError(f"expected model numbers {wanted} by id, found {wrong}")
+
+
 def hold_here(bus: Bus, ids: Sequence[int]) -> dict[int, int]:
     """Make each goal position the present one [ticks], and read it back.
 

@@ -1,0 +1,152 @@
+"""A port that comes back: whatever was unplugged is looked for, and the loop never waits for it."""
+
+from __future__ import annotations
+
+import contextlib
+import threading
+import time
+from collections.abc import Callable
+from queue import Empty, SimpleQueue
+from typing import Protocol
+
+from antennate.hardware.port import Port, PortError
+
+RETRY = 0.2
+"""Time between two looks for a port that is gone [s]."""
+_FAREWELL = 1.0
+"""Longest that closing waits for a look that is under way [s]."""
+
+
+class Line(Port, Protocol):
+    """A port that can be closed."""
+
+    def close(self) -> None:
+        """Let it go."""
+        ...
+
+
+def in_background(work: Callable[[], None]) -> threading.Thread:
+    """Do it in a thread that does not keep the program alive."""
+    thread = threading.Thread(target=work, name="port", daemon=True)
+    thread.start()
+    return thread
+
+
+class Reconnecting:
+    """A port that is opened again after it was lost; for one thread.
+
+    While it is gone each call raises PortError at once. Opening and closing may take long, so they
+    happen in the background.
+
+    Args:
+        find: Finds and opens it.
+        clock: Monotonic time [s].
+        start: Does work in the background.
+
+    Attributes:
+        losses: How often it was lost.
+
+    Raises:
+        PortError: If it cannot be opened the first time.
+    """
+
+    def __init__(
+        self,
+        find: Callable[[], Line],
+        clock: Callable[[], float] = time.monotonic,
+        start: Callable[[Callable[[], None]], threading.Thread | None] = in_background,
+    ) -> None:
+        self._find, self._clock, self._start = find, clock, start
+        self._line: Line | None = find()
+        self._old: Line | None = None
+        self._results: SimpleQueue[Line | PortError] = SimpleQueue()
+        self._looking = False
+        self._thread: threading.Thread | None = None
+        self._due = 0.0
+        self._why = ""
+        self.losses = 0
+
+    @property
+    def gone(self) -> bool:
+        """It was lost and is not back."""
+        return self._line is None
+
+    def write(self, data: bytes) -> None:
+        """Send all of it."""
+        line = self._there()
+        try:
+            line.write(data)
+        except PortError as error:
+            raise self._lose(error) from None
+
+    def read(self, most: int, timeout: float) -> bytes:
+        """What has come, empty if nothing comes within `timeout` [s]."""
+        line = self._there()
+        try:
+            return line.read(most, timeout)
+        except PortError as error:
+            raise self._lose(error) from None
+
+    def drain(self) -> int:
+        """Throw away what has come; how many bytes that was."""
+        line = self._there()
+        try:
+            return line.drain()
+        except PortError as error:
+            raise self._lose(error) from None
+
+    def close(self) -> None:
+        """Let it go for good."""
+        if self._thread is not None:
+            self._thread.join(_FAREWELL)
+        self._collect()
+        for line in (self._line, self._old):
+            _close(line)
+        self._line = self._old = None
+        self._due = float("inf")
+
+    def _there(self) -> Line:
+        """The port, if it is there; looks for it now and then if not."""
+        if self._looking:
+            self._collect()
+        if self._line is not None:
+            return self._line
+        if not self._looking and self._clock() >= self._due:
+            self._looking = True
+            self._thread = self._start(self._look)
+            self._collect()
+        if self._line is None:
+            raise PortError(self._why)
+        return self._line
+
+    def _look(self) -> None:
+        """In the background: let go of the old one, find the new one."""
+        old, self._old = self._old, None
+        _close(old)
+        try:
+            self._results.put(self._find())
+        except PortError as error:
+            self._results.put(error)
+
+    def _collect(self) -> None:
+        with contextlib.suppress(Empty):
+            found = self._results.get_nowait()
+            self._looking = False
+            if isinstance(found, PortError):
+                self._due = self._clock() + RETRY
+                self._why = str(found)
+            else:
+                self._line = found
+
+    def _lose(self, error: PortError) -> PortError:
+        self.losses += 1
+        self._old, self._line = self._line, None
+        self._due = self._clock() + RETRY
+        self._why = str(error)
+        return error
+
+
+def _close(line: Line | None) -> None:
+    if line is not None:
+        with contextlib.suppress(PortError):
+            line.close()

@@ -1,0 +1,104 @@
+"""Finds a serial line again by what it is, whatever it is called now."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from serial.tools import list_ports
+
+from antennate.hardware.port import PortError
+from antennate.hardware.serial_port import SerialPort
+
+
+@dataclass(frozen=True, slots=True)
+class Identity:
+    """What a USB adapter says of itself.
+
+    Attributes:
+        vid: Vendor.
+        pid: Product.
+        serial_number: Of the adapter; empty if it has none of its own.
+        location: Socket it hangs on, with the interface of an adapter that has several.
+    """
+
+    vid: int
+    pid: int
+    serial_number: str
+    location: str
+
+
+class SerialFinder:
+    """Opens a serial line, and opens the same one again each time it is called.
+
+    The adapter behind it is remembered at the first opening: by its serial number, and by its
+    socket where it has none or two share one. What is no USB adapter, such as a pseudo-terminal, is
+    opened by its path, and a link is followed anew each time.
+
+    Args:
+        path: Its device file, or a link to it.
+        baud: Bits per second.
+        flag: The flag that named it, for errors.
+    """
+
+    def __init__(self, path: str, baud: int, flag: str = "") -> None:
+        self._path, self._baud, self._flag = path, baud, flag
+        self._known: Identity | None = None
+
+    def __call__(self) -> SerialPort:
+        """The line, opened.
+
+        Raises:
+            PortError: It is not there, cannot be told from others, or cannot be opened.
+        """
+        if self._known is not None:
+            return SerialPort(find(self._known, self._path), self._baud, self._flag)
+        line = SerialPort(self._path, self._baud, self._flag)
+        self._known = identity(self._path)
+        return line
+
+
+def identity(path: str) -> Identity | None:
+    """The adapter behind a device file; None if it is none.
+
+    A serial number that another adapter has too, such as the 0001 of many boards, is no number.
+    """
+    there = adapters()
+    found = there.get(str(Path(path).resolve()))
+    if found is None or sum(_alike(found, other) for other in there.values()) == 1:
+        return found
+    return replace(found, serial_number="")
+
+
+def find(known: Identity, path: str) -> str:
+    """Device file of a known adapter.
+
+    Raises:
+        PortError: None of those plugged in is it, or more than one may be.
+    """
+    alike = {device: other for device, other in adapters().items() if _alike(known, other)}
+    same = [device for device, other in alike.items() if other.location == known.location]
+    if not same and known.serial_number:
+        same = list(alike)
+    if len(same) == 1:
+        return same[0]
+    what = f"USB adapter {known.vid:04x}:{known.pid:04x}"
+    what += f" with serial number {known.serial_number}" if known.serial_number else ""
+    found = f"{len(same)} of them" if same else "none"
+    raise PortError(f"{path}: expected its {what} in socket {known.location}, found {found}")
+
+
+def _alike(known: Identity, other: Identity) -> bool:
+    number = known.serial_number in ("", other.serial_number)
+    return number and (known.vid, known.pid) == (other.vid, other.pid)
+
+
+def adapters() -> dict[str, Identity]:
+    """All serial USB adapters by their device file."""
+    ports: list[Any] = list(list_ports.comports())
+    return {
+        port.device: Identity(port.vid, port.pid, port.serial_number or "", port.location or "")
+        for port in ports
+        if port.vid is not None and port.pid is not None
+    }
