@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from antennate.conditioning import bending_level
-from antennate.controller import Controller
+from antennate.controller import Arm, Controller
 from antennate.params import (
     ConditioningParams,
     ControllerParams,
@@ -81,6 +81,29 @@ def test_S12_chatter_turns_the_robot_once_per_hold_at_most(frequency: float) -> 
     bound = duration / params.rule.hold_time + 1
     assert sum(m != Maneuver.FORWARD for m in changes) <= bound
     assert len(changes) <= 2 * bound
+
+
+@pytest.mark.parametrize("right", ["free", "like left", "against left"])
+@pytest.mark.parametrize(("arm", "most"), [("closed", 11), ("open", 0), ("paper", 19)])
+def test_S12_chatter_changes_the_action_as_often_as_the_page_says(
+    arm: Arm, most: int, right: str
+) -> None:
+    """1 to 50 Hz in 20 s, where duration / T_hold + 1 is 11; all changes, FORWARD among them."""
+    params = ControllerParams()
+    frequency = np.repeat(np.arange(1.0, 50.1, 0.3), 2)
+    start = np.tile([0.0, 0.21], len(frequency) // 2)
+    mind = Controller(params, arm, len(frequency))
+    changes, before = np.zeros(len(frequency), int), mind.maneuver
+    for n in range(2000):
+        touch = np.floor(2 * (frequency * n * PERIOD + start) + 1e-9) % 2 == 1
+        left = np.where(touch, BENT, FREE)
+        other = {"free": np.full_like(left, FREE), "like left": left}
+        counts = np.stack([left, other.get(right, np.where(touch, FREE, BENT))], axis=1)
+        mind.step(AntennaFrame(t=np.full(len(frequency), n * PERIOD), counts=counts))
+        changes += mind.maneuver != before
+        before = mind.maneuver
+    assert changes.max() <= most
+    assert changes[frequency > 10].max() <= 11
 
 
 def test_S12_hysteresis_is_wider_than_the_noise() -> None:

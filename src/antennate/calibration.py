@@ -122,7 +122,7 @@ def load(path: Path, sensor_id: str | None = None) -> Calibration:
 
 
 def _once(pairs: list[tuple[str, object]]) -> None:
-    """Refuse what pydantic lets pass: doubled keys, and truth values, taken for numbers."""
+    """Refuse what pydantic lets pass: doubled keys, and truth values taken for numbers."""
     keys = [key for key, _ in pairs]
     if doubled := next((key for key in keys if keys.count(key) > 1), None):
         raise CalibrationError(f"{doubled}: expected once, found {keys.count(doubled)} times")
