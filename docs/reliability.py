@@ -22,7 +22,7 @@ into invented time. A row without a test is not shown yet. This page is generate
 | row | fault | required | measured | tests |
 |---|---|---|---|---|
 """
-_TEST = re.compile(r"^(?:def )?test_((?:[LESTB]\d+_)+)", re.MULTILINE)
+_TEST = re.compile(r"^(?:def )?test_((?:[LESTBX]\d+_)+)", re.MULTILINE)
 
 
 def shown() -> dict[str, dict[str, int]]:

@@ -6,6 +6,7 @@ import math
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Annotated
 
 import tyro
@@ -16,14 +17,18 @@ from antennate.cli.progress import terminate_as_interrupt
 from antennate.errors import ConfigError
 from antennate.hardware.causes import State
 from antennate.hardware.drive import DriveConfig, Report, connect, drive
+from antennate.hardware.keys import read_key
+from antennate.hardware.ports import is_udp
 from antennate.hardware.session import Session
 from antennate.records import Maneuver
 
 DESCRIPTION = """\
 Let a controller walk the robot whose antenna board and servo bus hang on two serial ports, or its
-twin. First a dry run: everything is read and nothing written. Then, with --arm only, torque comes
-on with every servo where it stands. Ctrl-C or SIGTERM ends it: pose held, torque off, verified. A
-lost board or servo makes it hold; the watchdogs of the servos stop it if this program dies."""
+twin. An address is the path of a serial port, tcp://HOST:PORT, or, for a board on the network,
+udp://HOST:PORT with the key it was given. First a dry run: everything is read and nothing written.
+Then, with --arm only, torque comes on with every servo where it stands. Ctrl-C or SIGTERM ends it:
+pose held, torque off, verified. A lost board or servo makes it hold; the watchdogs of the servos
+stop it if this program dies."""
 _LINES_A_SECOND = 5
 
 
@@ -33,14 +38,18 @@ class Orders(FromFile):
 
     Attributes:
         config: robot.toml with the parameters below as keys and tables; flags override it
-        esp32: serial port of the antenna board
-        bus: serial port of the servo bus
+        esp32: serial port of the antenna board, tcp://HOST:PORT or udp://HOST:PORT
+        bus: serial port of the servo bus, or tcp://HOST:PORT
         arm: torque on after the dry run
+        key: file with the key of a board behind udp://, mode 0600; else ANTENNATE_KEY is read
+        insecure_udp: the board has no key; anybody on the network can feign it
     """
 
     esp32: Annotated[str, tyro.conf.arg(metavar="PORT")] = ""
     bus: Annotated[str, tyro.conf.arg(metavar="PORT")] = ""
     arm: bool = False
+    key: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
+    insecure_udp: bool = False
 
 
 def command(argv: Sequence[str]) -> int:
@@ -53,10 +62,27 @@ def command(argv: Sequence[str]) -> int:
     for name in ("esp32", "bus"):
         if not getattr(orders, name):
             raise ConfigError(f"--{name}: expected a serial port, found none")
-    with connect(config, orders.esp32, orders.bus) as session, terminate_as_interrupt():
+    key = _key(orders)
+    with connect(config, orders.esp32, orders.bus, key) as session, terminate_as_interrupt():
         report = drive(session, config, orders.arm, _status())
     _tell(report, orders.arm)
     return OK if report.safe and report.worst < State.FAULT else BAD_INPUT
+
+
+def _key(orders: Orders) -> bytes | None:
+    """The key for a board behind udp://, None if there is no such board."""
+    if is_udp(orders.bus):
+        raise ConfigError("--bus: expected a serial port or tcp://, found udp://; it loses packets")
+    if not is_udp(orders.esp32):
+        return None
+    if not orders.insecure_udp:
+        return read_key(orders.key)
+    if orders.key is not None:
+        raise ConfigError("--insecure-udp: expected no --key beside it, found both")
+    warning = "UDP without a key: anybody on this network can feign the antenna board"
+    red = "\x1b[1;31m{}\x1b[0m" if sys.stderr.isatty() else "{}"
+    sys.stderr.write(red.format(warning) + "\n")
+    return b""
 
 
 def _status() -> Callable[[Session, float], None]:

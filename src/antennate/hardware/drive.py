@@ -22,10 +22,11 @@ from antennate.hardware.dynamixel.tables import EXTENDED_MODE, XC430_W240, XL330
 from antennate.hardware.host_clock import HostClock
 from antennate.hardware.joints import Joints
 from antennate.hardware.port import Port, PortError
+from antennate.hardware.ports import open_port
 from antennate.hardware.session import Decider, Session
 from antennate.hardware.timing import TimingReport
 from antennate.loop import run_loop
-from antennate.params import ControllerParams, Params, SupervisorParams, number
+from antennate.params import ControllerParams, NetworkParams, Params, SupervisorParams, number
 from antennate.params.layout import LayoutParams
 from antennate.records import AntennaFrame, Pose
 
@@ -55,6 +56,7 @@ class DriveConfig(Params):
     layout: LayoutParams = LayoutParams()
     mind: ControllerParams = ControllerParams()
     limits: SupervisorParams = SupervisorParams()
+    network: NetworkParams = NetworkParams()
 
 
 @dataclass(slots=True)
@@ -79,26 +81,26 @@ class Report:
 
 
 @contextlib.contextmanager
-def connect(config: DriveConfig, esp32: str, bus: str) -> Iterator[Session]:
+def connect(
+    config: DriveConfig, esp32: str, bus: str, key: bytes | None = None
+) -> Iterator[Session]:
     """Open both ports, find who is there, and close them again afterwards.
+
+    Args:
+        config: The robot.
+        esp32: Address of the antenna board, as `open_port` takes it.
+        bus: Address of the servo bus.
+        key: Of a board behind udp://; empty for one without a key.
 
     Raises:
         PortError: A port cannot be opened.
         BadInputError: No antenna board speaks, or it is refused.
         BringUpError: The servos are not those expected.
     """
-    try:
-        from antennate.hardware.serial_port import SerialPort
-    except ModuleNotFoundError as error:
-        raise ConfigError(
-            f"expected pyserial for real ports, found no module {error.name}; install "
-            "antennate[hardware], or run `uv run --extra hardware antennate drive ...`"
-        ) from None
-
     with contextlib.ExitStack() as stack:
         lines: list[Port] = []
-        for path, baud in ((esp32, _BOARD_BAUD), (bus, config.layout.baud)):
-            line = SerialPort(path, baud)
+        for address, baud in ((esp32, _BOARD_BAUD), (bus, config.layout.baud)):
+            line = open_port(address, baud, key, config.network)
             stack.callback(line.close)
             lines.append(line)
         yield prepare(config, lines[0], lines[1], HostClock())
@@ -137,7 +139,8 @@ def await_board(board: Board, clock: Any) -> None:
                 if board.refusals
                 else (
                     f"{came.received} bytes and {came.good} frames; is it the right port, with the "
-                    "firmware on the board? Perhaps --esp32 and --bus are swapped"
+                    "firmware on the board? Perhaps --esp32 and --bus are swapped; over UDP a "
+                    "board does not answer to a wrong key"
                 )
             )
             raise BadInputError(

@@ -18,6 +18,7 @@ from antennate.params.mind import (
     RepetitionParams,
     RuleParams,
 )
+from antennate.params.network import NetworkParams
 from antennate.params.robot import RobotParams, ServoParams
 from antennate.params.safety import DiagnosisParams, SupervisorParams, TouchCheckParams
 from antennate.params.scene import (
@@ -58,6 +59,7 @@ __all__ = [
     "GapWallParams",
     "JointsParams",
     "LayoutParams",
+    "NetworkParams",
     "Params",
     "PhysicsParams",
     "RepetitionParams",
