@@ -102,7 +102,7 @@ def test_tags_are_the_same_only_if_every_bit_is() -> None:
 
 
 def forge(count: int) -> None:
-    """Noise of the right size, frames with bits flipped, tags of other keys, cut and longer ones."""
+    """Noise of the right size, flipped bits, tags of other keys, cut and longer ones."""
     air, rng = Air(), np.random.default_rng(2)
     air.greet()
     good = air.frame(0)

@@ -27,7 +27,7 @@ class NetworkParams(Params):
     burst: int = number(
         512,
         "1",
-        "assumed: more than wait in the 208 KiB that Linux holds, so a host that was busy drops none",
+        "assumed: more than wait in the 208 KiB that Linux holds, so a busy host drops none",
         "authentic frames at once",
         ge=1,
         le=1e4,
