@@ -47,7 +47,7 @@ class Sampler:
 
     def sample(self, _timer):
         """Read both antennae in turn; the time is that of the first reading."""
-        ticks = time.ticks_us() & frame.TICK_MASK
+        ticks = time.ticks_us() & frame.TICK_MASK  # pyright: ignore[reportOperatorIssue]  (an int)
         lefts, rights = self._bursts
         for i in range(config.BURST):
             insert(lefts, i, self._left.read_u16() >> 4)

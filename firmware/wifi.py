@@ -53,6 +53,11 @@ class Station:
         self._wlan.connect(self._name, self._password)
 
 
+def now_ms() -> int:
+    """Time [ms], modulo 2**30; the stubs would have it opaque."""
+    return time.ticks_ms()  # pyright: ignore[reportReturnType]
+
+
 class Outlet:
     """Where frames go: to the host that last proved to have the key and to hear this board."""
 
@@ -67,7 +72,7 @@ class Outlet:
 
     def send(self, sample):
         """Send a frame; False if that failed or nobody listens."""
-        signed = self._speaker.sign(sample, time.ticks_ms())
+        signed = self._speaker.sign(sample, now_ms())
         return signed is not None and self._say(signed, self._speaker.listener)
 
     def tend(self):
@@ -77,7 +82,7 @@ class Outlet:
             asked, sender = self._socket.recvfrom(datagram.ASK_SIZE + 1)
         except OSError:  # nothing has come
             return
-        answer = self._speaker.answer(asked, sender, time.ticks_ms())
+        answer = self._speaker.answer(asked, sender, now_ms())
         if answer is not None:
             self._say(answer, sender)
 
