@@ -23,7 +23,7 @@ between bytes and motion, switches each off alone, and sees a test fail. This pa
 | row | fault | required | measured | tests |
 |---|---|---|---|---|
 """
-_TEST = re.compile(r"^(?:def )?test_((?:[LESTBGKM]\d+_)+)", re.MULTILINE)
+_TEST = re.compile(r"^(?:def )?test_((?:[LESTBGKMX]\d+_)+)", re.MULTILINE)
 
 
 def shown() -> dict[str, dict[str, int]]:

@@ -10,3 +10,12 @@ PIN_RIGHT = 35
 """GPIO of the right antenna."""
 PIN_BUTTON = 0
 """GPIO of the button that stops the program (BOOT on most boards)."""
+
+WIFI = ""
+"""Name of the network to join; empty: frames go over USB, and no radio is switched on."""
+PASSWORD = ""
+"""Of that network."""
+UDP_PORT = 4210
+"""Port on which the board is asked for frames."""
+KEY = ""
+"""64 hexadecimal digits that only this board and its host know; empty: anybody can feign it."""

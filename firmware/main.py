@@ -1,11 +1,13 @@
-"""Reads two flex sensors at a steady rate and sends frames over the USB serial port.
+"""Reads two flex sensors at a steady rate and sends frames over the USB serial port or over UDP.
 
 MicroPython for the ESP32 runs this file after a reset. A timer takes the samples; the loop sends
-them, a greeting once a second and whenever the host asks. Holding the BOOT button ends it and gives
-the prompt back. What the host sends is compared with one known request, and never executed.
+them, over USB also a greeting once a second and whenever the host asks. Holding the BOOT button
+ends it and gives the prompt back. What the host sends is compared with known requests, and never
+executed.
 """
 
 import array
+import binascii
 import os
 import select
 import sys
@@ -45,7 +47,7 @@ class Sampler:
 
     def sample(self, _timer):
         """Read both antennae in turn; the time is that of the first reading."""
-        ticks = time.ticks_us() & frame.TICK_MASK
+        ticks = time.ticks_us() & frame.TICK_MASK  # pyright: ignore[reportOperatorIssue]  (an int)
         lefts, rights = self._bursts
         for i in range(config.BURST):
             insert(lefts, i, self._left.read_u16() >> 4)
@@ -89,6 +91,10 @@ class Sampler:
                 self.tail = seq + 1
                 return True
         return False
+
+    def put_back(self):
+        """The sample encoded last could not be sent: it waits again."""
+        self.tail -= 1
 
     def _drop(self):
         late = self.head - self.tail - SLOTS
@@ -140,7 +146,7 @@ def reset_reason():
 
 
 def random_id():
-    """Random 32 bits; the time since start is mixed in, as no radio feeds the generator."""
+    """Random 32 bits; the time since start is mixed in, as without a radio the source is weak."""
     return frame.crc32(os.urandom(8) + str(time.ticks_us()).encode()) & 0xFFFFFFFF
 
 
@@ -155,34 +161,73 @@ def greeting(boot_id):
     return frame.encode_hello(boot_id, reset_reason(), settings, machine.unique_id(), config.RATE)
 
 
-def asked(poller, requests):
-    """Look at one byte from the host, if there is one; True if it completes a request."""
-    for _ in poller.ipoll(0):
-        byte = sys.stdin.buffer.read(1)
-        return bool(byte) and requests.feed(byte[0])
-    return False
+class Usb:
+    """The serial port as the way out."""
+
+    def __init__(self, hello):
+        self._out = sys.stdout.buffer
+        self._poller = select.poll()
+        self._poller.register(sys.stdin, select.POLLIN)
+        self._requests = Requests()
+        self._hello = hello
+        self._greet()
+
+    def send(self, sample):
+        """Send a frame; waits until it has left."""
+        self._out.write(sample)
+        return True
+
+    def tend(self):
+        """Greet if it is time to, or if the host asks."""
+        due = time.ticks_diff(time.ticks_ms(), self._greeted) >= GREETING_MS
+        if self._asked() or due:
+            self._greet()
+
+    def _greet(self):
+        self._out.write(self._hello)
+        self._greeted = time.ticks_ms()
+
+    def _asked(self):
+        """Look at one byte from the host, if there is one; True if it completes a request."""
+        for _ in self._poller.ipoll(0):
+            byte = sys.stdin.buffer.read(1)
+            return bool(byte) and self._requests.feed(byte[0])
+        return False
 
 
-def stream(sampler, boot_id, button):
+def joined():
+    """The network that the settings name, None for USB."""
+    if not config.WIFI:
+        return None
+    import wifi  # a board on USB needs no copy of it
+
+    return wifi.Station(config.WIFI, config.PASSWORD)
+
+
+def outlet(station, boot_id):
+    """The way out of the frames."""
+    hello = greeting(boot_id)
+    if station is None:
+        return Usb(hello)
+    import wifi
+
+    return wifi.Outlet(station, config.UDP_PORT, binascii.unhexlify(config.KEY), boot_id, hello)
+
+
+def stream(sampler, button):
     """Send until the button is held."""
-    out = sys.stdout.buffer
-    poller = select.poll()
-    poller.register(sys.stdin, select.POLLIN)
-    requests = Requests()
+    station = joined()  # before numbers are drawn: its noise makes them random
+    boot_id = random_id()
+    way = outlet(station, boot_id)
     encoder = frame.SampleEncoder(boot_id)
     buffer = bytearray(frame.SAMPLE_FRAME_SIZE)
-    hello = greeting(boot_id)
-    out.write(hello)
-    greeted = time.ticks_ms()
     while button.value():
-        if sampler.encode_next_into(encoder, buffer):
-            out.write(buffer)
-        else:
+        if not sampler.encode_next_into(encoder, buffer):
             time.sleep_ms(1)
-        due = time.ticks_diff(time.ticks_ms(), greeted) >= GREETING_MS
-        if asked(poller, requests) or due:
-            out.write(hello)
-            greeted = time.ticks_ms()
+        elif not way.send(buffer):
+            sampler.put_back()
+            time.sleep_ms(1)
+        way.tend()
 
 
 def main():
@@ -193,7 +238,7 @@ def main():
     micropython.kbd_intr(-1)  # a byte 3 from the host is no keyboard interrupt
     try:
         timer.init(freq=config.RATE, mode=machine.Timer.PERIODIC, callback=sampler.sample)
-        stream(sampler, random_id(), button)
+        stream(sampler, button)
     finally:
         timer.deinit()
         micropython.kbd_intr(3)

@@ -177,3 +177,27 @@ sys.modules["machine"] = machine
 import main
 main.main()
 """
+
+ON_NETWORK = """\
+import sys
+
+
+class WLAN:
+    PM_NONE = 0
+
+    def __init__(self, interface):
+        pass
+
+    def __getattr__(self, name):
+        return lambda *_, **__: True
+
+
+class Network:
+    pass
+
+
+network = Network()
+network.WLAN, network.STA_IF, network.STAT_CONNECTING = WLAN, 0, 1001
+sys.modules["network"] = network
+"""
+"""Before WHOLE_PROGRAM: a network that is always joined."""

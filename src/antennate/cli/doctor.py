@@ -18,7 +18,7 @@ from antennate.cli.progress import terminate_as_interrupt
 from antennate.errors import ConfigError
 from antennate.hardware.doctor.checkup import Checkup, Robot, examine
 from antennate.hardware.doctor.fix import Change, apply, plan
-from antennate.hardware.doctor.ports import same, serial_opener
+from antennate.hardware.doctor.ports import opener_of, same
 from antennate.hardware.doctor.rows import Opener, worst
 from antennate.hardware.drive import DriveConfig
 from antennate.hardware.host_clock import HostClock
@@ -95,8 +95,8 @@ def _check(orders: Orders) -> None:
 def _examine(config: DriveConfig, orders: Orders) -> tuple[Checkup, list[str]]:
     """The examination, the last one if something was changed, and the changes."""
     robot = Robot(layout=config.layout, mind=config.mind, limits=config.limits)
-    bus = (orders.bus, serial_opener(orders.bus, "--bus")) if orders.bus else None
-    esp32 = (orders.esp32, serial_opener(orders.esp32, "--esp32")) if orders.esp32 else None
+    bus = (orders.bus, opener_of(orders.bus, "--bus")) if orders.bus else None
+    esp32 = (orders.esp32, opener_of(orders.esp32, "--esp32")) if orders.esp32 else None
     now = HostClock().now
     with terminate_as_interrupt():
         checkup = examine(robot, bus, esp32, now)

@@ -21,7 +21,7 @@ from antennate.cli.arguments import FromFile, parse_with
 from antennate.cli.progress import terminate_as_interrupt
 from antennate.errors import BadInputError, ConfigError, OutputError
 from antennate.hardware.board import BOARD_BAUD
-from antennate.hardware.doctor.ports import serial_opener
+from antennate.hardware.doctor.ports import opener_of
 from antennate.hardware.esp32.stream import Reading, Stream
 from antennate.hardware.host_clock import HostClock
 from antennate.hardware.recorder import Recorder
@@ -63,7 +63,7 @@ def command(argv: Sequence[str]) -> int:
     if orders.out is None:
         raise ConfigError("--out: expected a CSV file to make, found none")
     now = HostClock().now
-    with serial_opener(orders.esp32, "--esp32")(BOARD_BAUD) as port:
+    with opener_of(orders.esp32, "--esp32")(BOARD_BAUD) as port:
         stream = Stream(port, now)
         status = Status(stream, params, now)
         with Lines(orders.out) as lines, terminate_as_interrupt():

@@ -1,28 +1,58 @@
-"""`antennate twin`: the simulated robot behind two pseudo-terminals."""
+"""`antennate twin`: the simulated robot behind two pseudo-terminals, or on the network."""
 
 from __future__ import annotations
 
 import json
+import re
 import secrets
 import sys
 from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import tyro
 
 from antennate.cli import OK
 from antennate.cli.arguments import FromFile, parse_with
 from antennate.cli.progress import terminate_as_interrupt
+from antennate.errors import ConfigError
 from antennate.experiments.twin import TwinConfig, build
+from antennate.hardware.keys import read_key
 from antennate.hardware.priority import LEVEL, urgent
 from antennate.twin.faults import Faults, read
-from antennate.twin.serve import TwinServer
+from antennate.twin.serve import End, TwinServer
+from antennate.twin.tcp import TcpEnd
+from antennate.twin.udp import UdpEnd
+
+_LAST_PORT = 65_534
 
 DESCRIPTION = """\
 Serve the simulated robot in a tunnel as real bytes on two pseudo-terminals: the frames of the
 antenna board, and a DYNAMIXEL bus of 19 servos. Prints one JSON line with both paths when ready.
+With --tcp both are TCP ports, with --udp the board is a UDP port that signs as the firmware does.
 Physics begins when the first servo gets torque. Faults, each with @Ts for its time:
 servo:ID=silent, bad_crc, truncated, late:SECONDS, doubled, wrong_id, oversized, voltage, overheat,
 encoder, shock, overload, reboot or REGISTER:VALUE; esp32=silent, reset, open_left, open_right,
 left:COUNTS or right:COUNTS; bus=silent, loss:SHARE or latency:SECONDS. --touch left@2s right@5s
 bends the antennae of the standing robot, as the check by touch of `antennate drive` wants it."""
+
+
+@dataclass(frozen=True)
+class Places(FromFile):
+    """Where to serve, two pseudo-terminals if not given.
+
+    Attributes:
+        config: TOML file with the parameters below as keys and tables; flags override it
+        tcp: both on TCP ports of this host, 127.0.0.1 if not given; 0 takes any, else PORT is the
+            board's and PORT+1 the bus's
+        udp: the board on a UDP port instead, likewise
+        key: file with the key for --udp, mode 0600; else ANTENNATE_KEY is read
+    """
+
+    tcp: Annotated[str, tyro.conf.arg(metavar="[HOST:]PORT")] = ""
+    udp: Annotated[str, tyro.conf.arg(metavar="[HOST:]PORT")] = ""
+    key: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
 
 
 def command(argv: Sequence[str]) -> int:
@@ -31,14 +61,40 @@ def command(argv: Sequence[str]) -> int:
     Raises:
         AntennateError: Something given cannot be used.
     """
-    config, _ = parse_with("twin", DESCRIPTION, TwinConfig, argv, FromFile())
+    config, places = parse_with("twin", DESCRIPTION, TwinConfig, argv, Places())
     faults = Faults([read(text) for text in config.fault], config.layout.ids)
     robot = build(config, boot_id=secrets.randbits(32))
     end = float("inf") if config.duration is None else config.duration
-    with TwinServer(robot, faults) as server, terminate_as_interrupt(), urgent(LEVEL + 1):
+    with (
+        TwinServer(robot, faults, *_ends(places)) as server,
+        terminate_as_interrupt(),
+        urgent(LEVEL + 1),
+    ):
         sys.stdout.write(json.dumps(server.paths) + "\n")
         sys.stdout.flush()
         server.run(lambda t: t < end and robot.failure is None)
     why = f"physics became invalid: {robot.failure}" if robot.failure else "the time is over"
     sys.stderr.write(f"antennate twin: {why}; latest tick {1e3 * server.late:.1f} ms late\n")
     return OK
+
+
+def _ends(places: Places) -> tuple[End | None, End | None]:
+    """Ends of the board and of the bus; None for a pseudo-terminal."""
+    board = bus = None
+    if places.udp:
+        board = UdpEnd(*_place("--udp", places.udp), read_key(places.key))
+    if places.tcp:
+        host, port = _place("--tcp", places.tcp)
+        board = board or TcpEnd(host, port)
+        bus = TcpEnd(host, port and port + 1)
+    return board, bus
+
+
+def _place(flag: str, text: str) -> tuple[str, int]:
+    """Host and port; this computer alone is the default, others are named on purpose."""
+    host, _, port = text.rpartition(":")
+    if not re.fullmatch(r"[0-9]{1,5}", port) or int(port) > _LAST_PORT:
+        raise ConfigError(
+            f"{flag}: expected [HOST:]PORT with a port of 0 to {_LAST_PORT}, found {text!r}"
+        )
+    return host or "127.0.0.1", int(port)

@@ -23,6 +23,7 @@ from antennate.hardware.film import require_film
 from antennate.hardware.host_clock import HostClock
 from antennate.hardware.joints import Joints
 from antennate.hardware.port import Port, PortError
+from antennate.hardware.ports import finder
 from antennate.hardware.reconnecting import Reconnecting
 from antennate.hardware.report import Report
 from antennate.hardware.session import Decider, Session
@@ -32,6 +33,7 @@ from antennate.loop import run_loop
 from antennate.params import (
     ControllerParams,
     DriftParams,
+    NetworkParams,
     Params,
     SupervisorParams,
     TouchCheckParams,
@@ -92,32 +94,33 @@ class DriveConfig(Params):
     layout: LayoutParams = LayoutParams()
     mind: ControllerParams = ControllerParams()
     limits: SupervisorParams = SupervisorParams()
+    network: NetworkParams = NetworkParams()
 
 
 @contextlib.contextmanager
-def connect(config: DriveConfig, esp32: str, bus: str) -> Iterator[Session]:
+def connect(
+    config: DriveConfig, esp32: str, bus: str, key: bytes | None = None
+) -> Iterator[Session]:
     """Open both ports, find who is there, and close them again afterwards.
+
+    Args:
+        config: The robot.
+        esp32: Address of the antenna board, as `finder` takes it.
+        bus: Address of the servo bus.
+        key: Of a board behind udp://; empty for one without a key.
 
     Raises:
         PortError: A port cannot be opened.
         BadInputError: No antenna board speaks, or it is refused.
         BringUpError: The servos are not those expected.
     """
-    try:
-        from antennate.hardware.serial_finder import SerialFinder
-    except ModuleNotFoundError as error:
-        raise ConfigError(
-            f"expected pyserial for real ports, found no module {error.name}; install "
-            "antennate[hardware], or run `uv run --extra hardware antennate drive ...`"
-        ) from None
-
     with contextlib.ExitStack() as stack:
         lines: list[Port] = []
-        for flag, path, baud in (
+        for flag, address, baud in (
             ("--esp32", esp32, BOARD_BAUD),
             ("--bus", bus, config.layout.baud),
         ):
-            line = Reconnecting(SerialFinder(path, baud, flag))
+            line = Reconnecting(finder(address, baud, flag, key, config.network))
             stack.callback(line.close)
             lines.append(line)
         yield prepare(config, lines[0], lines[1], HostClock())
@@ -160,7 +163,8 @@ def await_board(board: Board, clock: Any) -> None:
                 if board.refusals
                 else (
                     f"{came.received} bytes and {came.good} frames; is it the right port, with the "
-                    "firmware on the board? Perhaps --esp32 and --bus are swapped"
+                    "firmware on the board? Perhaps --esp32 and --bus are swapped; over UDP a "
+                    "board does not answer to a wrong key"
                 )
             )
             raise BadInputError(

@@ -21,6 +21,7 @@ from antennate.params.mind import (
     RepetitionParams,
     RuleParams,
 )
+from antennate.params.network import NetworkParams
 from antennate.params.record import RecordParams
 from antennate.params.robot import RobotParams, ServoParams
 from antennate.params.safety import DiagnosisParams, SupervisorParams, TouchCheckParams
@@ -65,6 +66,7 @@ __all__ = [
     "JointsParams",
     "LayoutParams",
     "LogParams",
+    "NetworkParams",
     "Params",
     "PhysicsParams",
     "RecordParams",

@@ -1,4 +1,4 @@
-"""A twin robot on two pseudo-terminals, in real time: no client can tell it from the real one."""
+"""A twin robot on two wires, in real time: no client can tell it from the real one."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import time
 import tty
 from collections.abc import Callable
 from types import TracebackType
+from typing import Protocol
 
 from antennate.hardware.dynamixel.tables import BAUD_RATES
 from antennate.twin.faults import Faults
@@ -25,36 +26,69 @@ _SPEEDS: dict[int, int] = {
 }
 
 
-class _Terminal:
+class End(Protocol):
+    """The twin's end of a wire; `select` takes it."""
+
+    @property
+    def path(self) -> str:
+        """What a client opens."""
+        ...
+
+    def fileno(self) -> int:
+        """Ready to be read when something has come."""
+        ...
+
+    def baud(self) -> int | None:
+        """Bits per second that the client has set, None if there is no such thing."""
+        ...
+
+    def read(self) -> bytes:
+        """What has come."""
+        ...
+
+    def write(self, data: bytes) -> None:
+        """Say it; what finds no room is lost."""
+        ...
+
+    def close(self) -> None:
+        """Let it go."""
+        ...
+
+
+class Terminal:
     """One pseudo-terminal; whoever opens `path` talks to us."""
 
     def __init__(self) -> None:
-        self.master, self._slave = os.openpty()
+        self._master, self._slave = os.openpty()
         tty.setraw(self._slave, termios.TCSANOW)
-        os.set_blocking(self.master, False)
+        os.set_blocking(self._master, False)
         self.path = os.ttyname(self._slave)
 
     def baud(self) -> int | None:
         """Bits per second that the client has set, None if it is none of the usual ones."""
         return _SPEEDS.get(termios.tcgetattr(self._slave)[5])
 
+    def fileno(self) -> int:
+        """Of our end."""
+        return self._master
+
     def read(self) -> bytes:
         """What has come."""
         try:
-            return os.read(self.master, _CHUNK)
+            return os.read(self._master, _CHUNK)
         except BlockingIOError:
             return b""
 
     def write(self, data: bytes) -> None:
         """Say it; what finds no room because nobody listens is lost, as on a real line."""
         try:
-            os.write(self.master, data)
+            os.write(self._master, data)
         except BlockingIOError:
             return
 
     def close(self) -> None:
         """Both ends."""
-        os.close(self.master)
+        os.close(self._master)
         os.close(self._slave)
 
 
@@ -64,16 +98,20 @@ class TwinServer:
     Args:
         robot: The robot; only the server touches it.
         faults: What goes wrong, and when.
+        board: The board's end, a pseudo-terminal by default; it is closed on leaving.
+        bus: The servos' end, likewise.
 
     Attributes:
         late: Worst lateness of a control tick of the twin itself [s].
     """
 
-    def __init__(self, robot: TwinRobot, faults: Faults) -> None:
+    def __init__(
+        self, robot: TwinRobot, faults: Faults, board: End | None = None, bus: End | None = None
+    ) -> None:
         self._robot = robot
         self._faults = faults
-        self._bus = _Terminal()
-        self._board = _Terminal()
+        self._bus = bus or Terminal()
+        self._board = board or Terminal()
         self.late = 0.0
 
     @property
@@ -97,7 +135,7 @@ class TwinServer:
         """Serve until `go_on`, told the twin's time [s], says no."""
         begin = time.monotonic()
         robot, bus = self._robot, self._robot.bus
-        ends = [self._bus.master, self._board.master]
+        ends = [self._bus, self._board]
         with Physics(robot) as physics:
             while go_on(now := time.monotonic() - begin):
                 ready, _, _ = select.select([*ends, physics.bell], [], [], self._wait(now, physics))
@@ -109,10 +147,10 @@ class TwinServer:
                     self.late = max(self.late, now - robot.due)
                     self._faults.apply(robot, now)
                     physics.begin()
-                if self._bus.master in ready:
+                if self._bus in ready:
                     bus.heard_at = self._bus.baud()
                     bus.receive(now, self._bus.read())
-                if self._board.master in ready:
+                if self._board in ready:
                     robot.hear(self._board.read())
                 if answers := bus.transmit(time.monotonic() - begin):
                     self._bus.write(answers)

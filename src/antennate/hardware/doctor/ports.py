@@ -6,31 +6,24 @@ import contextlib
 import os
 from collections.abc import Iterator
 
-from antennate.errors import ConfigError
 from antennate.hardware.board import BOARD_BAUD
 from antennate.hardware.doctor.rows import Opener, Row, row
 from antennate.hardware.port import Port
 from antennate.hardware.port_errors import OpenError
 from antennate.hardware.port_holder import holders
+from antennate.hardware.ports import finder
 
 
-def serial_opener(path: str, flag: str) -> Opener:
-    """Opens a serial port at any speed.
+def opener_of(path: str, flag: str) -> Opener:
+    """Opens a port at any speed.
 
     Raises:
         ConfigError: pyserial is not installed.
     """
-    try:
-        from antennate.hardware.serial_port import SerialPort
-    except ModuleNotFoundError as error:
-        raise ConfigError(
-            f"expected pyserial for real ports, found no module {error.name}; install "
-            "antennate[hardware], or run `uv run --extra hardware antennate ...`"
-        ) from None
 
     @contextlib.contextmanager
     def opened(baud: int) -> Iterator[Port]:
-        line = SerialPort(path, baud, flag)
+        line = finder(path, baud, flag)()
         try:
             yield line
         finally:

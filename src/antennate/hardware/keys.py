@@ -1,0 +1,55 @@
+"""The key that an antenna board and its host share; it is read here, and never shown."""
+
+from __future__ import annotations
+
+import os
+import re
+import stat
+from pathlib import Path
+
+from antennate.errors import BadInputError
+
+KEY_SIZE = 32
+"""As many bytes as SHA-256 gives; more would add nothing."""
+ENVIRONMENT = "ANTENNATE_KEY"
+_MAKE = (
+    'make one with: (umask 077; python3 -c "import secrets; print(secrets.token_hex(32))" > FILE)'
+)
+
+
+def read_key(path: Path | None) -> bytes:
+    """The key in a file, or in the environment variable ANTENNATE_KEY if there is no file.
+
+    Raises:
+        BadInputError: There is none, others may read the file, or it holds no key.
+    """
+    if path is None:
+        text = os.environ.get(ENVIRONMENT)
+        if text is None:
+            raise BadInputError(f"--key: expected a file, or {ENVIRONMENT} set; {_MAKE}")
+        return _parse(text, ENVIRONMENT)
+    return _parse(_private(path), f"--key {path}")
+
+
+def _private(path: Path) -> str:
+    """Content of a file that nobody else can read; looked at after opening, so it cannot change."""
+    try:
+        with path.open("rb") as file:
+            mode = os.fstat(file.fileno()).st_mode
+            content = file.read(1024) if stat.S_ISREG(mode) else b""
+    except OSError as error:
+        raise BadInputError(f"--key: expected a file, found {path}: {error.strerror}") from None
+    if not stat.S_ISREG(mode):
+        raise BadInputError(f"--key: expected a plain file, found {path}")
+    if mode & 0o077:
+        raise BadInputError(
+            f"--key: expected a file that only you can read (mode 0600), found {path} with mode "
+            f"{stat.S_IMODE(mode):04o}; others may know this key: chmod 600 it, or better {_MAKE}"
+        )
+    return content.decode("ascii", "replace")
+
+
+def _parse(text: str, where: str) -> bytes:
+    if re.fullmatch(rf"\s*[0-9a-fA-F]{{{2 * KEY_SIZE}}}\s*", text) is None:
+        raise BadInputError(f"{where}: expected {2 * KEY_SIZE} hexadecimal digits; {_MAKE}")
+    return bytes.fromhex(text)

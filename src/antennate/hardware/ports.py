@@ -1,0 +1,79 @@
+"""From an address to a Port: a serial line, a board on the network, or a TCP connection."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from urllib.parse import urlsplit
+
+from antennate.errors import BadInputError, ConfigError
+from antennate.hardware.reconnecting import Line
+from antennate.params.network import NetworkParams
+
+
+def finder(
+    address: str,
+    baud: int,
+    flag: str = "",
+    key: bytes | None = None,
+    network: NetworkParams | None = None,
+) -> Callable[[], Line]:
+    """What opens the port that an address names, and opens the same one again when called again.
+
+    Args:
+        address: Path of a serial line, tcp://HOST:PORT or udp://HOST:PORT.
+        baud: Bits per second of a serial line.
+        flag: The flag that named it, for errors.
+        key: Of the board behind udp://; empty for one without a key.
+        network: Pace and limits of udp://.
+
+    Raises:
+        BadInputError: It is no address, or needs a key.
+    """
+    scheme, separator, _ = address.partition("://")
+    if not separator:
+        return _serial(address, baud, flag)
+    host, port = _place(address)
+    if scheme == "tcp":
+        from antennate.hardware.tcp_port import TcpPort
+
+        return lambda: TcpPort(host, port)
+    if scheme != "udp":
+        raise BadInputError(f"expected a path, tcp:// or udp://, found {address!r}")
+    if key is None:
+        raise BadInputError(
+            f"{address}: expected the key of the board; give --key FILE, or --insecure-udp for a "
+            "board without one, which anybody on the network can feign"
+        )
+    from antennate.hardware.udp_port import UdpPort
+
+    return lambda: UdpPort(host, port, key, network)
+
+
+def is_udp(address: str) -> bool:
+    """Whether an address needs a key."""
+    return address.startswith("udp://")
+
+
+def _place(address: str) -> tuple[str, int]:
+    wanted = "expected SCHEME://HOST:PORT such as udp://192.168.4.2:4210"
+    try:
+        parts = urlsplit(address)
+        host, port = parts.hostname, parts.port
+    except ValueError as error:
+        raise BadInputError(f"{wanted}, found {address!r}: {error}") from None
+    if "@" in parts.netloc:
+        raise BadInputError(f"{wanted}, found one with a name before @; a key never goes there")
+    if not host or not port or parts.path or parts.query or parts.fragment:
+        raise BadInputError(f"{wanted}, found {address!r}")
+    return host, port
+
+
+def _serial(path: str, baud: int, flag: str) -> Callable[[], Line]:
+    try:
+        from antennate.hardware.serial_finder import SerialFinder
+    except ModuleNotFoundError as error:
+        raise ConfigError(
+            f"expected pyserial for real ports, found no module {error.name}; install "
+            "antennate[hardware], or run `uv run --extra hardware antennate ...`"
+        ) from None
+    return SerialFinder(path, baud, flag)

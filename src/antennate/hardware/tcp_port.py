@@ -1,0 +1,66 @@
+"""A TCP connection as a Port, such as a twin on another machine serves."""
+
+from __future__ import annotations
+
+import select
+import socket
+from collections.abc import Generator
+from contextlib import contextmanager
+
+from antennate.hardware.port import PortError
+
+_OPENING_TIME = 3.0
+"""Longest wait for a connection [s]."""
+_WRITING_TIME = 0.1
+"""Longest wait until all is sent [s], as of a serial line."""
+
+
+class TcpPort:
+    """A connection without delays of its own (TCP_NODELAY).
+
+    Args:
+        host: Where to, a name or an address.
+        port: Its TCP port.
+
+    Raises:
+        PortError: Nobody listens there.
+    """
+
+    def __init__(self, host: str, port: int) -> None:
+        self._where = f"tcp://{host}:{port}"
+        with self._mapped("open"):
+            self._line = socket.create_connection((host, port), timeout=_OPENING_TIME)
+            self._line.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            self._line.settimeout(_WRITING_TIME)
+
+    def write(self, data: bytes) -> None:
+        """Send all of it."""
+        with self._mapped("write to"):
+            self._line.sendall(data)
+
+    def read(self, most: int, timeout: float) -> bytes:
+        """What has come, empty if nothing comes within `timeout` [s]."""
+        with self._mapped("read from"):
+            if not select.select([self._line], [], [], max(timeout, 0.0))[0]:
+                return b""
+            if data := self._line.recv(most):
+                return data
+        raise PortError(f"{self._where}: the other end has closed, or serves another client")
+
+    def drain(self) -> int:
+        """Throw away what has come; how many bytes that was."""
+        count = 0
+        while part := self.read(4096, 0.0):
+            count += len(part)
+        return count
+
+    def close(self) -> None:
+        """Let it go."""
+        self._line.close()
+
+    @contextmanager
+    def _mapped(self, what: str) -> Generator[None]:
+        try:
+            yield
+        except (OSError, ValueError) as error:
+            raise PortError(f"could not {what} {self._where}: {error}") from error

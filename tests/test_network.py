@@ -1,0 +1,381 @@
+"""Boards and twins on the network: real UDP and TCP on loopback, and delays in invented time."""
+
+from __future__ import annotations
+
+import math
+import os
+import select
+import socket
+import threading
+from collections import deque
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import pytest
+from esp32_streams import encoded, hello, made
+from hardware_rig import FREE, LIMIT, PERIOD, Rig
+
+from antennate.cli import main
+from antennate.errors import BadInputError
+from antennate.experiments.twin import TwinConfig, rig
+from antennate.hardware.board import Board
+from antennate.hardware.causes import State
+from antennate.hardware.esp32 import datagram, frame
+from antennate.hardware.esp32.decoder import FrameDecoder
+from antennate.hardware.esp32.verifier import Verifier
+from antennate.hardware.esp32.wire import Hello, Sample
+from antennate.hardware.keys import read_key
+from antennate.hardware.port import Port, PortError
+from antennate.hardware.ports import finder
+from antennate.hardware.udp_port import UdpPort
+from antennate.params import LayoutParams, NetworkParams
+from antennate.twin.faults import Faults
+from antennate.twin.serve import TwinServer
+from antennate.twin.tcp import TcpEnd
+from antennate.twin.udp import UdpEnd
+
+KEY = bytes(range(32))
+
+
+class Clock:
+    """Invented time."""
+
+    t = 0.0
+
+    def __call__(self) -> float:
+        return self.t
+
+
+def place(path: str) -> tuple[str, int]:
+    host, _, port = path.removeprefix("udp://").removeprefix("tcp://").rpartition(":")
+    return host, int(port)
+
+
+@contextmanager
+def flooded_board(params: NetworkParams) -> Iterator[tuple[UdpPort, Clock, UdpEnd]]:
+    """A port that a board has been granted, and the board's end."""
+    end, clock = UdpEnd("127.0.0.1", 0, KEY), Clock()
+    port = UdpPort(*place(end.path), KEY, params, clock)
+    end.write(hello(5))
+    for _ in range(3):
+        port.write(b"")
+        end.read()
+        port.read(4096, 0.0)
+    try:
+        yield port, clock, end
+    finally:
+        port.close()
+        end.close()
+
+
+def test_X17_a_flood_is_looked_at_in_part_and_real_frames_get_through() -> None:
+    """50 000 forged datagrams a second, from the board's own address, for 2 s of invented time."""
+    with flooded_board(NetworkParams()) as (port, clock, end):
+        victim, flooder = port._socket.getsockname(), end._socket
+        forged = os.urandom(44)
+        seq, came, most = 0, bytearray(), 0
+        for _ in range(200):
+            clock.t += 0.01
+            end.read()
+            for n in range(500):
+                if n == 100:
+                    end.write(encoded(made(seq, boot=5)))
+                    seq += 1
+                flooder.sendto(forged, victim)
+            before = port.tally.received
+            while part := port.read(4096, 0.0):
+                came += part
+            most = max(most, port.tally.received - before)
+        assert most <= NetworkParams().look_burst
+        assert port.tally.forged >= 10_000
+        samples = [f for f in FrameDecoder().feed(bytes(came)) if isinstance(f, Sample)]
+        assert len(samples) >= 150
+
+
+def test_X14_other_senders_are_not_even_heard() -> None:
+    with flooded_board(NetworkParams()) as (port, _, end):
+        received = port.tally.received
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
+            for _ in range(100):
+                stranger.sendto(os.urandom(44), port._socket.getsockname())
+        end.write(encoded(made(0, boot=5)))
+        assert port.read(4096, 0.0) == encoded(made(0, boot=5))
+        assert port.tally.received == received + 1
+
+
+def test_a_board_that_is_not_there_yet_is_awaited() -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as line:
+        line.bind(("127.0.0.1", 0))
+        number = line.getsockname()[1]
+    clock = Clock()
+    port = UdpPort("127.0.0.1", number, KEY, None, clock)
+    for _ in range(10):
+        clock.t += 0.3
+        assert port.read(4096, 0.0) == b""
+    end = UdpEnd("127.0.0.1", number, KEY)
+    end.write(hello(5))
+    for _ in range(4):
+        clock.t += 0.3
+        port.read(4096, 0.0)
+        end.read()
+    end.write(encoded(made(0, boot=5)))
+    assert encoded(made(0, boot=5)) in port.read(4096, 0.0)
+    port.close()
+    end.close()
+    with pytest.raises(PortError, match="read from udp"):
+        port.read(1, 0.0)
+
+
+class PowerSaving:
+    """A board that hears and speaks only whenever its radio wakes up; a Port in invented time.
+
+    Attributes:
+        wake: Time between two wakings [s], 0 for a radio that never sleeps.
+    """
+
+    def __init__(self) -> None:
+        self.t = self.wake = 0.0
+        self._host = Verifier(KEY, bytes(16), NetworkParams())
+        self._board = datagram.Speaker(datagram.Signer(KEY), 5, hello(5), frame.SAMPLE_FRAME_SIZE)
+        self._up: deque[tuple[float, bytes]] = deque()
+        self._down: deque[tuple[float, bytes]] = deque()
+
+    def _delayed(self) -> float:
+        """When what is sent now arrives [s]."""
+        if self.wake == 0.0:
+            return self.t + 0.003
+        return self.wake * (math.floor(self.t / self.wake) + 1.0) + 0.003
+
+    def sample(self, seq: int, left: int, right: int) -> None:
+        encoder, buffer = frame.SampleEncoder(5), bytearray(frame.SAMPLE_FRAME_SIZE)
+        encoder.encode_sample_into(buffer, seq, round(1e6 * self.t), left, right, 0, 0)
+        if (signed := self._board.sign(buffer, round(1e3 * self.t))) is not None:
+            self._up.append((self._delayed(), bytes(signed)))
+
+    def tick(self, t: float) -> None:
+        self.t = t
+        if (ask := self._host.due_ask(t)) is not None:
+            self._down.append((self._delayed(), ask))
+        while self._down and self._down[0][0] <= t:
+            answer = self._board.answer(self._down.popleft()[1], "host", round(1e3 * t))
+            assert answer is not None
+            self._up.append((self._delayed(), answer))
+
+    def write(self, data: bytes) -> None:
+        raise AssertionError
+
+    def read(self, most: int, timeout: float) -> bytes:
+        found = b""
+        while not found and self._up and self._up[0][0] <= self.t:
+            found, _ = self._host.take(self._up.popleft()[1], self.t)
+        return found
+
+    def drain(self) -> int:
+        raise AssertionError
+
+
+@pytest.mark.parametrize(("beacons", "holds"), [(0, 0.0), (1, 0.99), (2, 0.99), (3, 0.99)])
+def test_L11_no_decision_on_a_sample_that_power_saving_made_old(beacons: int, holds: float) -> None:
+    """From 3 s on the radio wakes every 1 to 3 beacons of 102.4 ms: bursts of 10 to 31 frames."""
+    air, robot = PowerSaving(), Rig()
+    board = Board(air, LIMIT)
+    rng = np.random.default_rng(11)
+    robot.sent.append(robot.mind.gait.step(np.array([4])))
+    states: list[State] = []
+    ages: list[float] = []
+    for n in range(3300):
+        now = n * PERIOD
+        air.wake = 0.1024 * beacons if n >= 300 else 0.0
+        air.tick(now)
+        left, right = (FREE + np.rint(rng.normal(0.0, 2.5, 2))).astype(int).tolist()
+        air.sample(n, left, right)
+        board.poll(now)
+        newest = board.newest(now)
+        new = newest is not None and newest.t > robot.newest
+        arrived = [(newest.t, newest.sample.left, newest.sample.right)] if newest and new else []
+        out = robot.step(arrived, age=board.clock.age(now), arm=n == 200)
+        states.append(out.state)
+        if out.move:
+            assert newest is not None
+            ages.append(now - PERIOD * newest.sample.seq)  # the true age: frame n is taken at n
+    assert max(ages) <= LIMIT + 1e-9
+    later = np.array(states[300:])
+    assert np.mean(later >= State.HOLD) >= holds
+    assert (np.mean(later >= State.HOLD) == 0.0) == (beacons == 0)
+    assert np.count_nonzero(np.diff(later >= State.FAULT)) <= 1
+    assert np.count_nonzero(np.diff(later)) / (PERIOD * later.size) <= 1.0
+
+
+def private(folder: Path, text: str, mode: int = 0o600) -> Path:
+    path = folder / "board.key"
+    path.write_text(text)
+    path.chmod(mode)
+    return path
+
+
+def test_X16_a_key_comes_from_a_private_file_or_the_environment(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert read_key(private(tmp_path, KEY.hex() + "\n")) == KEY
+    assert read_key(private(tmp_path, KEY.hex().upper(), 0o400)) == KEY
+    monkeypatch.setenv("ANTENNATE_KEY", KEY.hex())
+    assert read_key(None) == KEY
+    monkeypatch.delenv("ANTENNATE_KEY")
+    with pytest.raises(BadInputError, match="ANTENNATE_KEY set; make one with"):
+        read_key(None)
+
+
+@pytest.mark.parametrize("mode", [0o644, 0o640, 0o604, 0o620, 0o602, 0o666, 0o777, 0o610, 0o601])
+def test_X16_a_key_that_others_can_read_is_refused_with_the_cure(tmp_path: Path, mode: int) -> None:
+    path = private(tmp_path, KEY.hex(), mode)
+    with pytest.raises(BadInputError, match=rf"mode {mode:04o}.*chmod 600") as refusal:
+        read_key(path)
+    assert KEY.hex() not in str(refusal.value)
+
+
+@pytest.mark.parametrize("text", ["", "00" * 31, "00" * 33, "zz" * 32, "00 " * 32, "0" * 2000])
+def test_X16_what_is_no_key_is_refused_and_not_shown(tmp_path: Path, text: str) -> None:
+    with pytest.raises(BadInputError, match="expected 64 hexadecimal digits") as refusal:
+        read_key(private(tmp_path, text))
+    assert not text or text not in str(refusal.value)
+    with pytest.raises(BadInputError, match="expected a file, found"):
+        read_key(tmp_path / "none")
+    with pytest.raises(BadInputError, match="expected a"):
+        read_key(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--esp32", "udp://127.0.0.1:4210"], "ANTENNATE_KEY set"),
+        (["--esp32", "ftp://127.0.0.1:4210"], "expected a path, tcp:// or udp://"),
+        (["--esp32", "tcp://127.0.0.1"], "expected SCHEME://HOST:PORT"),
+        (["--esp32", "tcp://127.0.0.1:70000"], "expected SCHEME://HOST:PORT"),
+        (["--esp32", "tcp://key@127.0.0.1:4210"], "a key never goes there"),
+        (["--esp32", "tcp://127.0.0.1:1"], "could not open tcp://127.0.0.1:1"),
+        (["--esp32", "x", "--bus", "udp://127.0.0.1:1"], "it loses packets"),
+        (
+            ["--esp32", "udp://127.0.0.1:1", "--insecure-udp", "--key", "k"],
+            "expected no --key beside it",
+        ),
+    ],
+)
+def test_addresses_that_cannot_be_used_are_refused(
+    words: list[str],
+    said: str,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.delenv("ANTENNATE_KEY", raising=False)
+    assert main(["drive", "--bus", "y", *words]) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert said in err
+    assert err.count("\n") == 1
+
+
+@pytest.mark.parametrize("text", ["", ":", "0.0.0.0", "127.0.0.1:70000", "-1", "a:b"])
+def test_a_twin_at_no_port_is_refused(text: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["twin", f"--tcp={text or ':'}"]) == 2
+    assert "expected [HOST:]PORT" in capsys.readouterr().err
+
+
+def eventually(port: Port, end: TcpEnd, said: bytes) -> bool:
+    """Whether what the end writes comes within a second."""
+    for _ in range(100):
+        end.read()
+        end.write(said)
+        if said in port.read(4096, 0.01):
+            return True
+    return False
+
+
+def test_a_tcp_end_serves_one_client_at_a_time_and_lets_it_come_back() -> None:
+    end = TcpEnd("127.0.0.1", 0)
+    end.write(b"lost, as nobody listens")
+    first = finder(end.path, 9600)()
+    assert eventually(first, end, b"one")
+    first.write(b"hello")
+    assert select.select([end], [], [], 1.0)[0] == [end]
+    assert end.read() == b"hello"
+    second = finder(end.path, 9600)()
+    assert select.select([end], [], [], 1.0)[0] == [end]
+    end.read()
+    with pytest.raises(PortError, match="serves another client"):
+        second.read(1, 1.0)
+    first.drain()
+    assert eventually(first, end, b"still here")
+    first.close()
+    third = finder(end.path, 9600)()
+    assert eventually(third, end, b"two")
+    end.close()
+    with pytest.raises(PortError, match="tcp://127"):
+        third.drain()
+    second.close()
+    third.close()
+
+
+def test_X16_the_key_is_in_nothing_that_a_drive_over_udp_says(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A dry run against a twin whose board speaks UDP and whose bus speaks TCP."""
+    key = os.urandom(32)
+    path = private(tmp_path, key.hex())
+    server = TwinServer(
+        rig(TwinConfig()).robot,
+        Faults([], LayoutParams().ids),
+        UdpEnd("127.0.0.1", 0, key),
+        TcpEnd("127.0.0.1", 0),
+    )
+    over = threading.Event()
+    with server:
+        thread = threading.Thread(target=server.run, args=(lambda t: not over.is_set(),))
+        thread.start()
+        words = ["drive", "--esp32", server.paths["esp32"], "--bus", server.paths["bus"]]
+        try:
+            assert main([*words, "--key", str(path), "--dry-run", "0.3"]) == 0
+            board = read_key(path)
+            assert main([*words, "--insecure-udp", "--dry-run", "0.1"]) == 2
+        finally:
+            over.set()
+            thread.join()
+    assert board == key
+    out, err = capsys.readouterr()
+    assert "dry run over" in err
+    assert "anybody on this network" in err
+    assert "does not answer to a wrong key" in err
+    for secret in (key.hex(), key.hex().upper(), repr(key)):
+        assert secret not in out + err
+
+
+def test_a_twin_that_starts_anew_or_falls_silent_does_so_over_udp_too() -> None:
+    clock, end = Clock(), UdpEnd("127.0.0.1", 0, KEY)
+    port = UdpPort(*place(end.path), KEY, None, clock)
+    heard = FrameDecoder()
+
+    def speak(boot: int, first: int) -> list[Hello | Sample]:
+        found: list[Hello | Sample] = []
+        for seq in range(first, first + 100):
+            clock.t += 0.01
+            end.write((hello(boot) if seq == 0 else b"") + encoded(made(seq, boot=boot)))
+            end.read()
+            for frame_ in heard.feed(port.read(4096, 0.0)):
+                assert isinstance(frame_, Hello | Sample)
+                found.append(frame_)
+        return found
+
+    before, after = speak(5, 0), speak(6, 0)
+    assert {found.boot_id for found in before} == {5}
+    assert {found.boot_id for found in after} == {6}
+    assert sum(isinstance(found, Sample) for found in before) >= 90
+    assert sum(isinstance(found, Sample) for found in after) >= 60
+    end._spoke -= 1.0
+    asked = port.tally.greetings
+    port.write(b"")
+    end.read()
+    port.read(4096, 0.0)
+    assert port.tally.greetings == asked
+    port.close()
+    end.close()
