@@ -61,7 +61,7 @@ def test_S7_a_ramp_of_ten_minutes_is_followed_within_2_percent(way: int) -> None
         shares[n], beyond[n] = drift.share, drift.beyond
     assert abs(shares - true).max() <= 0.02
     first = true[np.argmax(beyond)]
-    assert abs(first) == pytest.approx(0.1, abs=0.02)
+    assert abs(first) == pytest.approx(0.15, abs=0.02)
     assert beyond[np.argmax(beyond) :].all()
 
 
@@ -90,10 +90,10 @@ def test_S7_the_contact_that_is_looked_for_would_be_found() -> None:
 
 
 def test_S7_touches_and_spikes_move_the_resting_reading_little() -> None:
-    """Half of the time a light touch of 0.3 spans, for 2 s each; 1 % of spikes."""
+    """Seven tenths of the time a light touch of 0.3 spans, 2.8 s each; 1 % of spikes."""
     rng = np.random.default_rng(4)
     n = 30_000
-    bend = np.where(np.arange(n) % 400 < 200, 0.3, 0.0)
+    bend = np.where(np.arange(n) % 400 < 280, 0.3, 0.0)
     counts = readings(bend, 5)
     counts[rng.random(n) < 0.01] = 4000.0
     shares = follow(Drift(DriftParams(), BAND), counts)

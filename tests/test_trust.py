@@ -93,6 +93,7 @@ def test_S8_swapped_and_inverted_channels_are_refused_and_nothing_gets_torque(
 ) -> None:
     made, report, _ = driven(spoil=spoil)
     assert said in report.refusal
+    assert made.clock.now() < 1.5  # at once
     assert made.session.tally.sent == 0
     assert not any(servo.torque for servo in made.robot.servos)
 

@@ -2,8 +2,9 @@
 
 It moves to its goal at a limited speed and without inertia. Where the manuals are silent the worse
 case is assumed: torque on keeps an old goal, as reported in
-https://github.com/pollen-robotics/reachy_mini/issues/1136; a tripped bus watchdog takes nothing but
-0; a read that touches an undefined byte is refused as a whole; a restart takes a quarter second.
+https://github.com/pollen-robotics/reachy_mini/issues/1136, and so does a Clear; a tripped bus
+watchdog takes nothing but 0; a read that touches an undefined byte is refused as a whole; a restart
+takes a quarter second.
 """
 
 from __future__ import annotations
@@ -159,7 +160,6 @@ class Servo:
         if self.get("moving"):
             return StatusError.RESULT_FAIL
         self._position %= _TICKS
-        self.set("goal_position", round(self._position))
         self._show(0.0)
         return StatusError.NONE
 
