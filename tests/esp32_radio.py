@@ -44,16 +44,18 @@ class Radio:
         self.bound: object = None
         self._decoder = FrameDecoder()
         self._began: int | None = None
+        self._doomed = False
         self._again = False
         self._chance = np.random.default_rng(9)
 
     @property
     def joined(self) -> bool:
-        if self._began is not None and not self.present(self.board.us):
-            started = self.board.us - self._began < JOIN_US
-            self._began = self._began if started else None
-            return False
-        return self._began is not None and self.board.us - self._began >= JOIN_US
+        """An attempt that at any time does not find the network comes to nothing."""
+        self._doomed |= not self.present(self.board.us)
+        done = self._began is not None and self.board.us - self._began >= JOIN_US
+        if done and self._doomed:
+            self._began = None
+        return done and not self._doomed
 
     def status(self) -> int:
         if self.joined:
@@ -64,6 +66,7 @@ class Radio:
         assert (name, password) == ("lab", "secret of the lab")
         self.attempts.append(self.board.us)
         self._began = self.board.us
+        self._doomed = False
 
     def disconnect(self) -> None:
         self._began = None

@@ -2,29 +2,21 @@
 
 from __future__ import annotations
 
-import math
 import os
 import select
 import socket
 import threading
-from collections import deque
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-import numpy as np
 import pytest
 from esp32_streams import encoded, hello, made
-from hardware_rig import FREE, LIMIT, PERIOD, Rig
 
 from antennate.cli import main
 from antennate.errors import BadInputError
 from antennate.experiments.twin import TwinConfig, rig
-from antennate.hardware.board import Board
-from antennate.hardware.causes import State
-from antennate.hardware.esp32 import datagram, frame
 from antennate.hardware.esp32.decoder import FrameDecoder
-from antennate.hardware.esp32.verifier import Verifier
 from antennate.hardware.esp32.wire import Hello, Sample
 from antennate.hardware.keys import read_key
 from antennate.hardware.port import Port, PortError
@@ -94,6 +86,19 @@ def test_X17_a_flood_is_looked_at_in_part_and_real_frames_get_through() -> None:
         assert len(samples) >= 150
 
 
+def test_X17_no_poll_looks_at_more_than_its_share() -> None:
+    """200 datagrams wait at each of 100 polls; a fifth of them may be looked at."""
+    with flooded_board(NetworkParams(look_burst=40, look_rate=4000.0)) as (port, clock, end):
+        for _ in range(100):
+            clock.t += 0.01
+            for _ in range(200):
+                end._socket.sendto(bytes(44), port._socket.getsockname())
+            before = port.tally.received
+            while port.read(4096, 0.0):
+                pass
+            assert 39 <= port.tally.received - before <= 40
+
+
 def test_X14_other_senders_are_not_even_heard() -> None:
     with flooded_board(NetworkParams()) as (port, _, end):
         received = port.tally.received
@@ -126,86 +131,6 @@ def test_a_board_that_is_not_there_yet_is_awaited() -> None:
     end.close()
     with pytest.raises(PortError, match="read from udp"):
         port.read(1, 0.0)
-
-
-class PowerSaving:
-    """A board that hears and speaks only whenever its radio wakes up; a Port in invented time.
-
-    Attributes:
-        wake: Time between two wakings [s], 0 for a radio that never sleeps.
-    """
-
-    def __init__(self) -> None:
-        self.t = self.wake = 0.0
-        self._host = Verifier(KEY, bytes(16), NetworkParams())
-        self._board = datagram.Speaker(datagram.Signer(KEY), 5, hello(5), frame.SAMPLE_FRAME_SIZE)
-        self._up: deque[tuple[float, bytes]] = deque()
-        self._down: deque[tuple[float, bytes]] = deque()
-
-    def _delayed(self) -> float:
-        """When what is sent now arrives [s]."""
-        if self.wake == 0.0:
-            return self.t + 0.003
-        return self.wake * (math.floor(self.t / self.wake) + 1.0) + 0.003
-
-    def sample(self, seq: int, left: int, right: int) -> None:
-        encoder, buffer = frame.SampleEncoder(5), bytearray(frame.SAMPLE_FRAME_SIZE)
-        encoder.encode_sample_into(buffer, seq, round(1e6 * self.t), left, right, 0, 0)
-        if (signed := self._board.sign(buffer, round(1e3 * self.t))) is not None:
-            self._up.append((self._delayed(), bytes(signed)))
-
-    def tick(self, t: float) -> None:
-        self.t = t
-        if (ask := self._host.due_ask(t)) is not None:
-            self._down.append((self._delayed(), ask))
-        while self._down and self._down[0][0] <= t:
-            answer = self._board.answer(self._down.popleft()[1], "host", round(1e3 * t))
-            assert answer is not None
-            self._up.append((self._delayed(), answer))
-
-    def write(self, data: bytes) -> None:
-        raise AssertionError
-
-    def read(self, most: int, timeout: float) -> bytes:
-        found = b""
-        while not found and self._up and self._up[0][0] <= self.t:
-            found, _ = self._host.take(self._up.popleft()[1], self.t)
-        return found
-
-    def drain(self) -> int:
-        raise AssertionError
-
-
-@pytest.mark.parametrize(("beacons", "holds"), [(0, 0.0), (1, 0.99), (2, 0.99), (3, 0.99)])
-def test_L11_no_decision_on_a_sample_that_power_saving_made_old(beacons: int, holds: float) -> None:
-    """From 3 s on the radio wakes every 1 to 3 beacons of 102.4 ms: bursts of 10 to 31 frames."""
-    air, robot = PowerSaving(), Rig()
-    board = Board(air, LIMIT)
-    rng = np.random.default_rng(11)
-    robot.sent.append(robot.mind.gait.step(np.array([4])))
-    states: list[State] = []
-    ages: list[float] = []
-    for n in range(3300):
-        now = n * PERIOD
-        air.wake = 0.1024 * beacons if n >= 300 else 0.0
-        air.tick(now)
-        left, right = (FREE + np.rint(rng.normal(0.0, 2.5, 2))).astype(int).tolist()
-        air.sample(n, left, right)
-        board.poll(now)
-        newest = board.newest(now)
-        new = newest is not None and newest.t > robot.newest
-        arrived = [(newest.t, newest.sample.left, newest.sample.right)] if newest and new else []
-        out = robot.step(arrived, age=board.clock.age(now), arm=n == 200)
-        states.append(out.state)
-        if out.move:
-            assert newest is not None
-            ages.append(now - PERIOD * newest.sample.seq)  # the true age: frame n is taken at n
-    assert max(ages) <= LIMIT + 1e-9
-    later = np.array(states[300:])
-    assert np.mean(later >= State.HOLD) >= holds
-    assert (np.mean(later >= State.HOLD) == 0.0) == (beacons == 0)
-    assert np.count_nonzero(np.diff(later >= State.FAULT)) <= 1
-    assert np.count_nonzero(np.diff(later)) / (PERIOD * later.size) <= 1.0
 
 
 def private(folder: Path, text: str, mode: int = 0o600) -> Path:

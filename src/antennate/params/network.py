@@ -35,7 +35,7 @@ class NetworkParams(Params):
     look_rate: float = number(
         51_200.0,
         "1/s",
-        "measured: 5 us each, so a flood costs at most a quarter of one core",
+        "measured: 3 us each, so a flood costs at most a sixth of one core",
         "datagrams a second that are looked at; the system drops the others",
         gt=0,
         le=1e6,
@@ -43,7 +43,7 @@ class NetworkParams(Params):
     look_burst: int = number(
         512,
         "1",
-        "measured: 5 us each, so at most 2.6 ms of a tick of 10 ms",
+        "measured: 3 us each, so at most 1.5 ms of a tick of 10 ms",
         "datagrams at once that are looked at",
         ge=1,
         le=1e4,
