@@ -50,7 +50,7 @@ def hold_up(cycles: int, loss: float) -> tuple[int, int]:
     rig = Rig()
     rig.twin.servos = standing()
     rig.twin.loss = loss
-    watch, ticker = ServoWatch(rig.bus, tuple(IDS)), Ticker()
+    watch, ticker = ServoWatch(rig.bus, tuple(IDS), rig.link.now), Ticker()
     goals = {i: (100 * i).to_bytes(4, "little") for i in IDS}
     worst = 0
     for n in range(cycles):

@@ -118,7 +118,11 @@ def _carry_out(config: DriveConfig, session: Session, arm: bool, log: Path) -> d
     with feed, urgent() as priority:
         report = drive(session, config, arm, keep)
     head = {"schema": 1, "command": "drive", "controller": config.controller, "armed": arm}
-    tail = {"priority": priority.value, "unlogged": feed.dropped, "log_complete": not feed.failed}
+    tail = {
+        "priority": priority.value,
+        "unlogged": feed.dropped,
+        "log_complete": not (feed.failed or feed.dropped),
+    }
     return head | report.result(session) | tail
 
 

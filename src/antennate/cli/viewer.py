@@ -56,29 +56,39 @@ def main() -> int:
     for number in (signal.SIGINT, signal.SIGTERM):  # the other end decides when it is over
         signal.signal(number, signal.SIG_IGN)
     status = StatusLine()
-    log: LogWriter | None = None
-    kept = True
+    kept = False
+    stream = messages(sys.stdin.buffer)
     try:
-        for message in messages(sys.stdin.buffer):
-            if log is None:
-                log = LogWriter(Path(sys.argv[1]), Header.unpack(message.content))
-                continue
+        first = next(stream, None)
+        log = None if first is None else _begin(Path(sys.argv[1]), first)
+        kept = log is not None
+        for message in stream:
             status.show(message)
             kept = kept and _keep(log, message.content)
         if log is not None and kept:
             log.close()
     except LogError as error:
         kept = _say(error)
-    return int(log is None or not kept)
+    return int(not kept)
 
 
-def _keep(log: LogWriter, content: bytes) -> bool:
-    """Write one tick; a disk that fails is said once, and the robot walks on."""
+def _begin(path: Path, first: Message) -> LogWriter | None:
+    """The log, None if it cannot be written: the robot walks on without it."""
     try:
-        log.write(content)
+        return LogWriter(path, Header.unpack(first.content))
+    except LogError as error:
+        _say(error)
+        return None
+
+
+def _keep(log: LogWriter | None, content: bytes) -> bool:
+    """Write one tick; a disk that fails is said once."""
+    try:
+        if log is not None:
+            log.write(content)
     except LogError as error:
         return _say(error)
-    return True
+    return log is not None
 
 
 def _say(error: LogError) -> bool:

@@ -38,16 +38,26 @@ def urgent(level: int = LEVEL) -> Iterator[Priority]:
     Yields:
         What was got.
     """
-    policy = param = None
-    if _LINUX:
-        policy, param = os.sched_getscheduler(0), os.sched_getparam(0)
-    gc.collect()
-    gc.freeze()
+    with _restored():
+        gc.collect()
+        gc.freeze()
+        try:
+            yield claim(level)
+        finally:
+            gc.unfreeze()
+
+
+@contextlib.contextmanager
+def _restored() -> Iterator[None]:
+    """Give this thread back the scheduling that it has now."""
+    if not _LINUX:
+        yield
+        return
+    policy, param = os.sched_getscheduler(0), os.sched_getparam(0)
     try:
-        yield claim(level)
+        yield
     finally:
-        gc.unfreeze()
-        if policy is not None and param is not None:
+        if os.sched_getscheduler(0) != policy:
             os.sched_setscheduler(0, policy, param)
 
 

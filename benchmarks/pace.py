@@ -1,0 +1,101 @@
+"""Whether the loop of `antennate drive` keeps its pace, alone and beside busy processes.
+
+Twin and loop run on the same machine over two pseudo-terminals, in real time: dry run with a touch
+of both antennae, then a walk. A cycle is missed if the loop still runs when the next one is due.
+
+- `missed_share`: cycles missed of all, arming (about 0.1 s on the bus) included.
+- `walking_missed_share`: the same from the first pose on.
+- `worst_lateness_ms`: farthest that a tick began behind its time.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import Any
+
+PROGRAM = [sys.executable, "-c", "import sys; from antennate.cli import main; sys.exit(main())"]
+BUSY = [sys.executable, "-c", "while True: sum(range(10_000))"]
+TOUCH = ("left@4s", "right@6s")
+DRY_RUN = 7.0
+"""Time that both touches take [s]."""
+
+
+@contextmanager
+def running(words: list[str], **how: Any) -> Iterator[subprocess.Popen[str]]:
+    """A process that is ended afterwards."""
+    process = subprocess.Popen(words, text=True, **how)
+    try:
+        yield process
+    finally:
+        process.terminate()
+        process.wait()
+
+
+def walk(seconds: float, busy: int) -> dict[str, Any]:
+    """One drive against a twin of its own; the content of its result.json."""
+    with ExitStack() as stack:
+        folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
+        twin = [*PROGRAM, "twin", "--touch", *TOUCH]
+        pipe, quiet = subprocess.PIPE, subprocess.DEVNULL
+        server = stack.enter_context(running(twin, stdout=pipe, stderr=quiet))
+        assert server.stdout is not None
+        paths = json.loads(server.stdout.readline())
+        for _ in range(busy):
+            stack.enter_context(running(BUSY))
+        words = [*PROGRAM, "drive", "--esp32", paths["esp32"], "--bus", paths["bus"], "--arm"]
+        words += ["--json", "--out", str(folder / "run")]
+        words += ["--dry-run", str(DRY_RUN), "--duration", str(seconds)]
+        subprocess.run(words, stdout=quiet, stderr=quiet, check=False)
+        result = folder / "run" / "result.json"
+        return json.loads(result.read_text()) if result.exists() else {}
+
+
+def summary(result: dict[str, Any]) -> dict[str, Any]:
+    """What counts of one drive."""
+    pace, walking = result.get("pace"), result.get("walking")
+    if pace is None or walking is None:
+        return {"walked": False, "why": result.get("why") or result.get("refusal") or "no result"}
+    return {
+        "walked": True,
+        "missed_share": pace["missed_share"],
+        "walking_missed_share": walking["missed_share"],
+        "worst_lateness_ms": 1e3 * pace["worst_lateness_s"],
+        "missed_answers": result["missed_answers"],
+        "worst_state": result["worst_state"],
+        "why": result["why"],
+        "torque_off": result["torque_off"],
+        "priority": result["priority"],
+    }
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--seconds", type=float, default=30.0, help="time of each walk")
+    parser.add_argument("--busy", type=int, nargs="*", default=[0, 4], help="busy processes beside")
+    parser.add_argument("--json", action="store_true", help="print one JSON object and no table")
+    args = parser.parse_args()
+    rows = {f"busy_{count}": summary(walk(args.seconds, count)) for count in args.busy}
+    result = {"cores": os.cpu_count(), "seconds": args.seconds, **rows}
+    if args.json:
+        print(json.dumps(result))
+        return
+    print(f"{os.cpu_count()} cores, {args.seconds:g} s of walking each")
+    for name, row in rows.items():
+        print(f"{name}: " + ", ".join(f"{key} {_shown(value)}" for key, value in row.items()))
+
+
+def _shown(value: Any) -> str:
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,70 @@
+"""Scheduling and signals around the control loop."""
+
+from __future__ import annotations
+
+import gc
+import json
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from antennate.hardware.priority import Priority, urgent
+from antennate.hardware.signals import undisturbed
+
+
+def scheduling() -> int:
+    return os.sched_getscheduler(0)
+
+
+def test_the_loop_is_real_time_where_allowed_and_what_it_starts_is_ordinary() -> None:
+    before, known = scheduling(), gc.get_freeze_count()
+    with urgent() as got:
+        if got is Priority.REAL_TIME:
+            assert scheduling() & ~os.SCHED_RESET_ON_FORK == os.SCHED_FIFO
+        child = [sys.executable, "-c", "import os; print(os.sched_getscheduler(0))"]
+        said = subprocess.run(child, capture_output=True, text=True, check=True).stdout
+        assert int(said) == os.SCHED_OTHER
+        assert gc.get_freeze_count() > known
+    assert scheduling() == before
+    assert gc.get_freeze_count() == 0
+
+
+def test_T3_who_may_not_be_real_time_goes_on_as_an_ordinary_process(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def refuse(*words: Any) -> None:
+        raise PermissionError(1, "Operation not permitted")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "sched_setscheduler", refuse)
+        with urgent() as got:
+            assert got is Priority.ORDINARY
+
+
+def test_B19_ctrl_c_and_sigterm_do_not_end_the_release_of_torque() -> None:
+    before = signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)
+    with undisturbed():
+        signal.raise_signal(signal.SIGINT)
+        signal.raise_signal(signal.SIGTERM)
+    assert (signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)) == before
+    with pytest.raises(KeyboardInterrupt):
+        signal.raise_signal(signal.SIGINT)
+
+
+@pytest.mark.slow
+def test_T3_beside_four_busy_processes_one_cycle_in_200_is_missed_at_most() -> None:
+    """In real time, so that it says something of this machine only."""
+    script = Path(__file__).parents[1] / "benchmarks" / "pace.py"
+    words = [sys.executable, str(script), "--json", "--busy", "4", "--seconds", "30"]
+    said = subprocess.run(words, capture_output=True, text=True, check=True, timeout=120).stdout
+    drive = json.loads(said)["busy_4"]
+    assert drive["torque_off"]
+    if drive["priority"] != Priority.REAL_TIME.value:
+        pytest.skip("real-time priority is not allowed here")
+    assert drive["missed_share"] <= 0.005
+    assert drive["worst_lateness_ms"] <= 50.0
