@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import math
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from antennate.experiments.tunnel import TunnelConfig
+from antennate.experiments.passage import Passage
+from antennate.experiments.tunnel import TunnelConfig, prepare
 from antennate.experiments.twin import Decisions, on_twin, simulated
 from antennate.hardware.joints import Joints, PoseError
 from antennate.params.layout import LayoutParams
 from antennate.records import Maneuver, Pose
+from antennate.sim.world import World
 from antennate.twin.robot import TwinRobot
 
 LAYOUT = LayoutParams()
@@ -105,3 +109,17 @@ def test_a_board_that_falls_silent_makes_the_robot_hold_within_100_ms() -> None:
     assert 100 < first <= 100 + 10
     assert set(found.maneuvers[first:]) == {Maneuver.HOLD}
     assert math.isnan(found.counts[-1][0])
+
+
+def test_the_twin_tells_when_its_head_passes_the_exit() -> None:
+    tunnel = prepare(TunnelConfig(), 0).tunnel
+    passage, length = Passage(tunnel), tunnel.params.length
+    direction = tunnel.centre[-1] - tunnel.centre[-2]
+    beyond = tunnel.centre[-1] + 0.1 * direction / np.hypot(*direction)
+    for tick in range(1, 41):
+        head = tunnel.centre[0] if tick <= 20 else beyond
+        passage.watch(cast(World, SimpleNamespace(head=head, t=0.01 * tick)))
+        if tick == 20:
+            assert passage.said == f"the head came 0.00 m of {length:.2f} m"
+    assert passage.passed == pytest.approx(0.3), "the second look of ten ticks after it came out"
+    assert passage.said == "the head passed the exit after 0.3 s of walking"

@@ -17,7 +17,7 @@ from antennate.cli import OK
 from antennate.cli.arguments import FromFile, parse_with
 from antennate.cli.progress import terminate_as_interrupt
 from antennate.errors import ConfigError
-from antennate.experiments.twin import TwinConfig, build
+from antennate.experiments.twin import TwinConfig, watched
 from antennate.hardware.keys import read_key
 from antennate.hardware.priority import LEVEL, urgent
 from antennate.twin.faults import Faults, read
@@ -63,18 +63,18 @@ def command(argv: Sequence[str]) -> int:
     """
     config, places = parse_with("twin", DESCRIPTION, TwinConfig, argv, Places())
     faults = Faults([read(text) for text in config.fault], config.layout.ids)
-    robot = build(config, boot_id=secrets.randbits(32))
+    robot, passage = watched(config, boot_id=secrets.randbits(32))
     end = float("inf") if config.duration is None else config.duration
-    with (
-        TwinServer(robot, faults, *_ends(places)) as server,
-        terminate_as_interrupt(),
-        urgent(LEVEL + 1),
-    ):
+    with TwinServer(robot, faults, *_ends(places)) as server:
         sys.stdout.write(json.dumps(server.paths) + "\n")
         sys.stdout.flush()
-        server.run(lambda t: t < end and robot.failure is None)
-    why = f"physics became invalid: {robot.failure}" if robot.failure else "the time is over"
-    sys.stderr.write(f"antennate twin: {why}; latest tick {1e3 * server.late:.1f} ms late\n")
+        try:
+            with terminate_as_interrupt(), urgent(LEVEL + 1):
+                server.run(lambda t: t < end and robot.failure is None)
+        finally:
+            invalid = f"physics became invalid: {robot.failure}; " if robot.failure else ""
+            late = f"latest tick {1e3 * server.late:.1f} ms late"
+            sys.stderr.write(f"antennate twin: {invalid}{passage.said}; {late}\n")
     return OK
 
 

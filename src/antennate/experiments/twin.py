@@ -14,6 +14,7 @@ import numpy as np
 from antennate.body import Body, Clock
 from antennate.controller import Arm, Controller
 from antennate.experiments.judge import Judge
+from antennate.experiments.passage import Passage
 from antennate.experiments.tunnel import TunnelConfig, prepare
 from antennate.hardware.board import Board
 from antennate.hardware.body import HardwareBody
@@ -74,13 +75,21 @@ class TwinConfig(Params):
 
 def build(config: TwinConfig, boot_id: int | None = None) -> TwinRobot:
     """The robot at the start of a tunnel; each start of a real board has a boot id of its own."""
+    return watched(config, boot_id)[0]
+
+
+def watched(config: TwinConfig, boot_id: int | None = None) -> tuple[TwinRobot, Passage]:
+    """The same, and how far it comes."""
     world, start = config.world, prepare(config.world, config.trial)
     period = world.controller.period
     body = SimBody(1, world.robot.sensor, period, world.physics.timestep)
     body.load(0, start.world, start.chance)
     boot = config.trial + 1 if boot_id is None else boot_id
-    hand = Hand(config.touch, world.controller.conditioning)
-    return TwinRobot(body, config.layout, period, boot, standing_noise=True, hand=hand)
+    hand, passage = Hand(config.touch, world.controller.conditioning), Passage(start.tunnel)
+    robot = TwinRobot(
+        body, config.layout, period, boot, standing_noise=True, hand=hand, watch=passage.watch
+    )
+    return robot, passage
 
 
 class _Rounded:

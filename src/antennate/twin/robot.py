@@ -8,6 +8,7 @@ robot stands and the board repeats its first reading.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 
@@ -26,6 +27,7 @@ from antennate.hardware.joints import Joints
 from antennate.params.layout import TICKS_A_TURN, LayoutParams
 from antennate.records import Floats
 from antennate.sim.body import SimBody
+from antennate.sim.world import World
 from antennate.twin.bus import ServoBus
 from antennate.twin.hand import Hand
 from antennate.twin.registers import Servo
@@ -94,6 +96,8 @@ class TwinRobot:
         period: Control period of the board and the physics [s].
         boot_id: Random number of the board's boot.
         standing_noise: Whether readings are noisy before the physics begins, as a real film's are.
+        hand: Bends the antennae of the standing robot, None if nobody does.
+        watch: Told the world after each tick of the physics.
 
     Attributes:
         bus: The servos on their wire.
@@ -109,8 +113,10 @@ class TwinRobot:
         boot_id: int,
         standing_noise: bool = False,
         hand: Hand | None = None,
+        watch: Callable[[World], None] = lambda world: None,
     ) -> None:
         self._body = body
+        self._watch = watch
         self._joints = Joints(layout)
         self._period = period
         self._encoder = frame.SampleEncoder(boot_id)
@@ -166,6 +172,7 @@ class TwinRobot:
         self._walked += 1
         self._body.clock.sleep_until(self._walked * self._period)
         self._counts = self._body.read().counts[0]
+        self._watch(self._body.world(0))
         return self._shafts()
 
     def end_tick(self, shafts: Floats | None) -> None:
