@@ -172,7 +172,7 @@ def test_B6_a_drive_waits_for_a_lost_bus_to_take_the_torque_off(
         if t >= OUT + 1.0:
             back.append(t)
 
-    config = DriveConfig(dry_run=0.5, duration=9.0, bus_return=patience)
+    config = DriveConfig(dry_run=0.5, duration=9.0, fault_time=0.0, bus_return=patience)
     report = drive(made.session, config, arm=True, on_tick=act)
     assert report.worst == State.FAULT
     assert "servo bus" in report.why

@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 
 from antennate.hardware.priority import Priority, urgent
-from antennate.hardware.signals import undisturbed
+from antennate.hardware.signals import STOPS, StopOnce
 
 
 def scheduling() -> int:
@@ -46,14 +46,19 @@ def test_T3_who_may_not_be_real_time_goes_on_as_an_ordinary_process(
             assert got is Priority.ORDINARY
 
 
-def test_B19_ctrl_c_and_sigterm_do_not_end_the_release_of_torque() -> None:
-    before = signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)
-    with undisturbed():
-        signal.raise_signal(signal.SIGINT)
-        signal.raise_signal(signal.SIGTERM)
-    assert (signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)) == before
-    with pytest.raises(KeyboardInterrupt):
-        signal.raise_signal(signal.SIGINT)
+@pytest.mark.parametrize("number", STOPS)
+def test_B19_only_the_first_of_the_signals_that_end_a_program_is_heard(number: int) -> None:
+    before = [signal.getsignal(other) for other in STOPS]
+    with StopOnce() as stop:
+        with pytest.raises(KeyboardInterrupt):
+            signal.raise_signal(number)
+        for other in STOPS:
+            signal.raise_signal(other)
+        assert stop.deaf
+    assert [signal.getsignal(other) for other in STOPS] == before
+    with StopOnce() as stop:
+        stop.deaf = True
+        signal.raise_signal(number)
 
 
 @pytest.mark.slow

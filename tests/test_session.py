@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import signal
 from collections.abc import Callable
 
 import numpy as np
@@ -13,8 +14,11 @@ from antennate.experiments.twin import Rig, TwinConfig, rig
 from antennate.hardware.causes import Cause, State
 from antennate.hardware.drive import DriveConfig, await_board, decider, drive, require_servos
 from antennate.hardware.dynamixel.bringup import BringUpError
+from antennate.hardware.dynamixel.packets import Instruction
+from antennate.hardware.dynamixel.parser import Parser
 from antennate.hardware.port import PortError
 from antennate.hardware.session import Session
+from antennate.hardware.signals import STOPS
 from antennate.params.layout import LayoutParams
 from antennate.records import AntennaFrame, Maneuver, Pose
 from antennate.twin.bus import Fault, Trouble
@@ -70,15 +74,27 @@ def at(when: float, demand: str) -> Callable[[Rig, float], None]:
 
 
 def test_a_dry_run_writes_nothing_to_any_servo() -> None:
+    """Servos that somebody else left with torque keep it."""
     made = rig(TwinConfig())
-    before = [bytes(servo._memory[64:70]) for servo in made.robot.servos]
-    goals = [servo.get("goal_position") for servo in made.robot.servos]
+    for servo in made.robot.servos:
+        servo.set("torque_enable", 1)
+    before = [bytes(servo._memory[:76]) for servo in made.robot.servos]
+    heard: list[int] = []
+    receive = made.robot.bus.receive
+
+    def listen(t: float, data: bytes) -> None:
+        heard.extend(packet.instruction for packet in Parser().feed(data))
+        receive(t, data)
+
+    made.robot.bus.receive = listen
     report = drive(made.session, CONFIG, arm=False)
     assert report.timing is not None
     assert report.timing.ticks == pytest.approx(100, abs=1)
-    assert [bytes(servo._memory[64:70]) for servo in made.robot.servos] == before
-    assert [servo.get("goal_position") for servo in made.robot.servos] == goals
-    assert made.session.tally.sent == 0
+    reads = {Instruction.READ, Instruction.SYNC_READ, Instruction.FAST_SYNC_READ}
+    assert set(heard) <= reads
+    assert len(heard) > 100
+    assert [bytes(servo._memory[:76]) for servo in made.robot.servos] == before
+    assert report.on is None
 
 
 def test_it_arms_walks_and_ends_without_torque() -> None:
@@ -131,10 +147,23 @@ def test_S1_an_open_wire_makes_it_hold_and_says_which_side() -> None:
 
 
 def test_B1_a_silent_servo_is_named_within_100_ms_and_the_others_keep_their_torque() -> None:
-    log = walked(at(2.0, "servo:7=silent"))
+    with_torque: list[int] = []
+
+    def act(rig: Rig, t: float) -> None:
+        silence(rig, t)
+        with_torque.append(sum(servo.torque for servo in rig.robot.servos))
+
+    silence = at(2.0, "servo:7=silent")
+    log = walked(act, DriveConfig(dry_run=1.0, fault_time=2.0))
     named = next(t for t, s in zip(log.t, log.texts, strict=True) if "servo 7" in s)
     assert named - 2.0 <= 0.1
-    assert log.state[-1] >= State.HOLD
+    fault = log.state.index(State.FAULT)
+    assert with_torque[fault:] == [19] * len(with_torque[fault:])
+    assert log.t[-1] - log.t[fault] == pytest.approx(2.0, abs=0.05)
+    goals = np.array(log.goals[fault:])
+    assert (goals == goals[0]).all()
+    left = [servo.get("id") for servo in log.rig.robot.servos if servo.torque]
+    assert left == [7], "which hears nothing"
 
 
 @pytest.mark.parametrize("what", ["overload", "overheat", "voltage"])
@@ -297,16 +326,43 @@ def test_S5_B14_a_pose_that_is_not_finite_never_reaches_the_bus(bad: float) -> N
     assert len(sent) == 1
 
 
-def test_B19_stopping_takes_torque_off_and_verifies_it_within_2_s() -> None:
+@pytest.mark.parametrize("number", STOPS)
+def test_B19_a_signal_holds_the_pose_and_takes_torque_off_within_2_s(number: int) -> None:
+    """However often it comes; while the torque goes off too."""
     made = rig(TwinConfig())
+    before = signal.getsignal(number)
 
     def stop(session: Session, t: float) -> None:
         if t > 2.0:
-            raise KeyboardInterrupt
+            signal.raise_signal(number)
 
+    stand = made.session.stand
+
+    def again(time: float) -> None:
+        signal.raise_signal(number)
+        goals = [servo.get("goal_position") for servo in made.robot.servos]
+        stand(time)
+        assert [servo.get("goal_position") for servo in made.robot.servos] == goals
+        signal.raise_signal(number)
+
+    made.session.stand = again
     report = drive(made.session, CONFIG, arm=True, on_tick=stop)
     assert made.clock.now() - 2.0 <= 2.0
     assert report.safe
+    assert not any(servo.torque for servo in made.robot.servos)
+    assert signal.getsignal(number) == before
+
+
+def test_B19_an_exception_takes_torque_off_and_is_not_swallowed() -> None:
+    made = rig(TwinConfig())
+
+    def fail(session: Session, t: float) -> None:
+        if t > 2.0:
+            raise RuntimeError("a bug")
+
+    with pytest.raises(RuntimeError, match="a bug"):
+        drive(made.session, CONFIG, arm=True, on_tick=fail)
+    assert made.session.tally.sent > 50
     assert not any(servo.torque for servo in made.robot.servos)
 
 

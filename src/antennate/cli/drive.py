@@ -87,7 +87,8 @@ def command(argv: Sequence[str]) -> int:
             _show(result)
         sys.stderr.write(f"written to {folder.path}\n")
     fault = result["worst_state"] in (State.FAULT.name, State.OFF.name)
-    return OK if result["torque_off"] and not fault and not result["refusal"] else BAD_INPUT
+    stays_on = result["torque_off"] is False
+    return BAD_INPUT if fault or stays_on or result["refusal"] else OK
 
 
 def _key(orders: Orders) -> bytes | None:
@@ -131,9 +132,11 @@ def _show(result: Mapping[str, Any]) -> None:
 
 
 def _note(result: Mapping[str, Any]) -> str:
-    off = "off, verified" if result["torque_off"] else f"NOT confirmed off: {result['servos_on']}"
     why = f" ({result['why']})" if result["why"] else ""
-    note = f"Worst state {result['worst_state']}{why}; torque {off}.\n"
+    note = f"Worst state {result['worst_state']}{why}.\n"
+    if result["torque_off"] is not None:
+        on = result["servos_on"]
+        note += f"Torque is {f'NOT confirmed off: servos {on}' if on else 'off, verified'}.\n"
     if not result["armed"]:
         note += "A dry run: nothing was written to the servos; --arm lets it walk.\n"
     if result["refusal"]:

@@ -27,7 +27,7 @@ from antennate.hardware.ports import finder
 from antennate.hardware.reconnecting import Reconnecting
 from antennate.hardware.report import Report
 from antennate.hardware.session import Decider, Session
-from antennate.hardware.signals import undisturbed
+from antennate.hardware.signals import StopOnce
 from antennate.hardware.trust import Trust
 from antennate.loop import run_loop
 from antennate.params import (
@@ -46,6 +46,8 @@ _GREETING_TIME = 3.0
 """A board greets within this time [s], also one that opening the port has reset."""
 _ARMING_TIME = 1.0
 """Time after which torque must have come on, or the drive ends [s]."""
+_STAND = 0.3
+"""Time that the robot holds its pose before the torque goes off [s]."""
 _PATIENCE = 0.05
 _DOUBT = 0.07
 """Longest that a late answer is waited for [s]: less than the watchdogs' 100 ms."""
@@ -83,6 +85,14 @@ class DriveConfig(Params):
     )
     touch: TouchCheckParams = TouchCheckParams()
     drift: DriftParams = DriftParams()
+    fault_time: float = number(
+        10.0,
+        "s",
+        "assumed: long enough to take hold of the robot",
+        "time that it stands with torque after a fault",
+        ge=0,
+        le=600,
+    )
     bus_return: float = number(
         30.0,
         "s",
@@ -226,7 +236,7 @@ def drive(
 ) -> Report:
     """A dry run, then, if `arm`, a walk; torque is off at the end whatever happens.
 
-    A FAULT ends it. If the bus is gone then, its return is waited for with the robot standing.
+    After a FAULT it stands for `fault_time`, then ends; longer if the bus is gone and may return.
 
     Args:
         session: As from `connect`.
@@ -239,15 +249,21 @@ def drive(
     """
     report, clock = Report(), session.clock
     start = clock.now()
-    duration = config.duration or math.inf
-    dry = DryRun(session.trust, config.dry_run, config.touch.patience, arm, duration)
+    dry = DryRun(
+        session.trust, config.dry_run, config.touch.patience, arm, config.duration or math.inf
+    )
     failed_at = math.inf
 
-    def done(t: float) -> bool:
-        """After a fault: torque can be taken off now, or it cannot and patience is over."""
+    def failed(t: float) -> bool:
+        """After a fault and a time to look at it: torque can be taken off now, or never."""
         nonlocal failed_at
-        failed_at = min(failed_at, t)
-        return not session.mute or t > failed_at + config.bus_return
+        out = session.outputs
+        if out is not None and t > dry.over + _ARMING_TIME and out.state >= State.FAULT:
+            failed_at = min(failed_at, t)
+        if out is not None and out.state is State.OFF and t > failed_at:
+            return True
+        wait = max(config.fault_time, config.bus_return if session.mute else 0.0)
+        return t >= failed_at + wait
 
     def go_on(frame: AntennaFrame, pose: Pose) -> bool:
         t = clock.now() - start
@@ -256,19 +272,29 @@ def drive(
         report.refusal = dry.refusal
         report.watch(session)
         on_tick(session, clock.now())
-        out = session.outputs
-        failed = out is not None and t > dry.over + _ARMING_TIME and out.state >= State.FAULT
-        return t < dry.end and not (failed and done(t))
+        return t < dry.end and not failed(t)
 
-    try:
-        run_loop(session, session, session.period, go_on)
-    except KeyboardInterrupt:
-        pass
-    finally:
-        with undisturbed():
-            report.timing = None if session.timing is None else session.timing.report()
+    with StopOnce() as stop:
+        try:
             try:
-                report.on = session.release()
-            except PortError:
-                report.on = list(session.joints.ids)
+                run_loop(session, session, session.period, go_on)
+            except KeyboardInterrupt:
+                pass
+            finally:
+                stop.deaf = True
+        finally:
+            report.timing = None if session.timing is None else session.timing.report()
+            report.on = _off(session)
     return report
+
+
+def _off(session: Session) -> list[int] | None:
+    """Stand for a moment, then torque off: ids that did not confirm it, None if it never was on."""
+    if not session.touched:
+        return None
+    with contextlib.suppress(PortError):
+        session.stand(_STAND)
+    try:
+        return session.release()
+    except PortError:
+        return list(session.joints.ids)

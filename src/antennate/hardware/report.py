@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 from antennate.hardware.causes import State
@@ -19,7 +19,7 @@ class Report:
         before: The same up to the first tick with torque, None if it never came on.
         worst: Worst state after the first pose, or a fault before it, and why.
         refusal: Why torque did not come on although it was wanted, empty if nothing forbade it.
-        on: Servos that did not confirm that their torque is off.
+        on: Servos that did not confirm that their torque is off; None if it never was on.
     """
 
     timing: TimingReport | None = None
@@ -27,11 +27,11 @@ class Report:
     worst: State = State.OK
     why: str = ""
     refusal: str = ""
-    on: list[int] = field(default_factory=list[int])
+    on: list[int] | None = None
 
     @property
     def safe(self) -> bool:
-        """No servo has torque."""
+        """No servo that was given torque still has it."""
         return not self.on
 
     def watch(self, session: Session) -> None:
@@ -52,8 +52,8 @@ class Report:
             "worst_state": self.worst.name,
             "why": self.why,
             "refusal": self.refusal,
-            "torque_off": self.safe,
-            "servos_on": self.on,
+            "torque_off": None if self.on is None else self.safe,
+            "servos_on": self.on or [],
             "pace": _pace(self.timing),
             "walking": _since(self.timing, self.before),
             "frames": board.decoder.counters.good,

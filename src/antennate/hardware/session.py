@@ -2,8 +2,9 @@
 
 It is the body, which reads the board and writes goals, and the mind, a controller behind a
 supervisor. Nothing reaches the servos but what the supervisor lets through. Their watchdogs are fed
-by goals alone, and goals are sent only upon a decision of this very tick. Goals move at a limited
-speed, so that neither the first pose nor a broken controller makes a joint jump.
+by goals alone, and goals are sent only upon a decision of this very tick: the controller's, or the
+session's own to stand still while legs forget their turns, or for a moment before a release. Goals
+move at a limited speed, so that neither the first pose nor a broken controller makes a joint jump.
 
 After the bus was lost no goal is sent until an arm event. With that one ids and models are checked,
 watchdogs armed and goals set to where the servos stand, as with the first.
@@ -112,6 +113,7 @@ class Session:
         timing: Whether the loop keeps its pace, None before the first tick.
         frame: What the controller got in the last tick.
         pose: What it said.
+        touched: Whether anything was written to the servos.
     """
 
     def __init__(
@@ -148,7 +150,7 @@ class Session:
         self._goals: Floats | None = None
         self._pose: Pose | None = None
         self._used = self._refused = 0
-        self._lost = False
+        self._lost = self.touched = False
 
     @property
     def mute(self) -> bool:
@@ -219,7 +221,8 @@ class Session:
     def step(self, frame: AntennaFrame) -> Pose:
         """The controller's pose; an exception of it is a cause, not the end.
 
-        While legs forget their turns the controller is not asked, and its time stands still.
+        While legs forget their turns the controller is not asked, and its time stands still: to
+        stand is the session's own decision.
         """
         thought = self._thought = _Thought()
         if self.turns.standing and self._pose is not None:
@@ -242,6 +245,17 @@ class Session:
         self._goals = None
         self.turns.reset()
         return left
+
+    def stand(self, time: float) -> None:
+        """Hold the last goals for a time [s], so that the robot comes to rest before a release.
+
+        Raises:
+            PortError: The bus is gone.
+        """
+        end = self.clock.now() + time
+        while self._goals is not None and not self._lost and self.clock.now() < end:
+            self._body.send(self._goals)
+            self.clock.sleep_until(self.clock.now() + self.period)
 
     def _inputs(self, now: float) -> Inputs:
         clock, watch, thought = self.board.clock, self.watch, self._thought
@@ -273,6 +287,7 @@ class Session:
 
     def _arm(self, pose: Pose) -> None:
         """Torque on where everything stands; legs count their turns from there."""
+        self.touched = True
         self.turns.reset()
         bringup.require_models(self.bus, self.joints.models)
         bringup.arm_watchdogs(self.bus, self.joints.ids)
@@ -288,7 +303,7 @@ class Session:
             return
         if may_begin:
             self.turns.begin(self._goals)
-        self.turns.step(self._goals, self.watch.positions)
+        self.turns.step(self._goals, self.watch.positions, may_begin)
 
     def _send(self, pose: Pose | None) -> None:
         """Goals one tick nearer to a pose; where they are without one."""

@@ -1,22 +1,46 @@
-"""Ctrl-C and SIGTERM while torque goes off."""
+"""Ctrl-C, SIGTERM and the loss of the terminal, while servos have torque."""
 
 from __future__ import annotations
 
-import contextlib
 import signal
 import threading
-from collections.abc import Iterator
+from types import FrameType, TracebackType
+from typing import Any
+
+STOPS = tuple(
+    getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
+)
+"""What asks a program to end; a terminal that goes away, as of a lost connection, sends SIGHUP."""
 
 
-@contextlib.contextmanager
-def undisturbed() -> Iterator[None]:
-    """Hear neither inside the block: whoever presses Ctrl-C twice must not keep torque on."""
-    if threading.current_thread() is not threading.main_thread():  # others get no signals
-        yield
-        return
-    before = {s: signal.signal(s, signal.SIG_IGN) for s in (signal.SIGINT, signal.SIGTERM)}
-    try:
-        yield
-    finally:
-        for number, handler in before.items():
+class StopOnce:
+    """Inside the block the first of them raises KeyboardInterrupt, and no other is heard.
+
+    Whoever presses Ctrl-C twice must not keep torque on.
+
+    Attributes:
+        deaf: None is heard any more.
+    """
+
+    def __init__(self) -> None:
+        self.deaf = False
+        self._before: dict[int, Any] = {}
+
+    def __enter__(self) -> StopOnce:
+        if threading.current_thread() is threading.main_thread():  # others get no signals
+            self._before = {number: signal.signal(number, self._hear) for number in STOPS}
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        for number, handler in self._before.items():
             signal.signal(number, handler)
+
+    def _hear(self, number: int, frame: FrameType | None) -> None:
+        if not self.deaf:
+            self.deaf = True
+            raise KeyboardInterrupt

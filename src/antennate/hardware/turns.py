@@ -81,18 +81,20 @@ class Turns:
             far = turned >= 0.5 * self._params.most
             self._left.extend(YAW_COUNT + i for i, is_far in enumerate(far.tolist()) if is_far)
 
-    def step(self, goals: Floats, positions: Mapping[int, int]) -> None:
+    def step(self, goals: Floats, positions: Mapping[int, int], may_begin: bool = True) -> None:
         """One tick's share; goals of legs that have forgotten are changed in place.
 
         Args:
             goals: Of all servos [ticks], shape (19,).
             positions: Newest positions by id [ticks].
+            may_begin: Whether the next leg may lose its torque; one that has lost it goes on.
 
         Raises:
             BringUpError: A leg did not do its part; it has no torque then.
             PortError: The bus is gone.
         """
-        if not self.standing or not self._calm(positions):
+        waits = self._stage == 0 and not may_begin
+        if not self.standing or waits or not self._calm(positions):
             return
         at = self._left[0]
         stages = (self._release, self._forget, self._hold)
