@@ -125,3 +125,29 @@ def test_lost_answers_do_not_keep_legs_from_forgetting() -> None:
     walk = Walk(253, duration=2.0, act=lose)
     assert walk.rig.session.turns.forgotten == 12
     assert max(walk.states) <= State.HOLD
+
+
+def test_T7_while_it_holds_no_further_leg_loses_its_torque() -> None:
+    """The board falls silent while the fourth leg forgets; that one gets its torque back."""
+
+    def silence(walk: Walk, session: Session) -> None:
+        walk.rig.robot.board_silent |= session.turns.forgotten == 3
+
+    walk = Walk(253, duration=2.5, act=silence)
+    assert walk.rig.session.turns.forgotten < 12
+    held = len(walk.states) - walk.states[::-1].index(State.OK)
+    assert State.HOLD in walk.states[held:]
+    loose = [row.count(False) for row in walk.torque]
+    begun = sum(now > before for before, now in zip(loose[held:], loose[held + 1 :], strict=False))
+    assert begun == 0
+    assert loose[-1] == 0
+
+
+def test_B10_legs_that_have_forgotten_go_on_from_where_they_were_when_the_board_is_back() -> None:
+    def blink(walk: Walk, session: Session) -> None:
+        walk.rig.robot.board_silent = session.turns.forgotten == 3 and len(walk.goals) < 150
+
+    walk = Walk(253, duration=4.0, act=blink)
+    assert walk.rig.session.turns.forgotten == 12
+    assert not any(row.count(False) > 1 for row in walk.torque)
+    assert walk.states[-1] <= State.DEGRADED
