@@ -112,7 +112,7 @@ def test_a_bus_where_nobody_answers_says_power_and_wiring() -> None:
         ("servo:18=present_temperature:71", "temperature", "71 degC (18)", "bad"),
         ("servo:3=overload", "hardware errors", "overload (3)", "bad"),
         ("servo:3=bus_watchdog:-1", "bus watchdog", "tripped (3)", "warn"),
-        ("servo:3=torque_enable:1", "torque", "on (3)", "warn"),
+        ("servo:3=torque_enable:1", "torque", "on (3)", "bad"),
         ("servo:3=firmware_version:44", "firmware", "44 (3)", "warn"),
     ],
 )

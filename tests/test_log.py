@@ -134,7 +134,9 @@ def test_G2_a_damaged_header_is_refused_and_what_follows_counted(tmp_path: Path)
         spoiled = bytearray(data)
         spoiled[place] ^= 1 << place % 8
         (tmp_path / "spoiled").write_bytes(spoiled)
-        with pytest.raises(LogError, match=r"no intact header, 2 intact ticks and [12] damaged"):
+        with pytest.raises(
+            LogError, match=r"no intact header, 2 intact ticks; damaged places: [12]"
+        ):
             LogReader(tmp_path / "spoiled")
 
 
@@ -143,7 +145,7 @@ def test_G2_a_damaged_header_is_refused_and_what_follows_counted(tmp_path: Path)
     [
         (b"", "no intact header, 0 intact ticks"),
         (b"\0" * 1000, "no intact header, 0 intact ticks"),
-        (b"t,left,right\n0.0,1800,1801\n", "no intact header, 0 intact ticks and 1 damaged"),
+        (b"t,left,right\n0.0,1800,1801\n", "no intact header, 0 intact ticks; damaged places: 1"),
         (b"\x7fELF" + bytes(range(256)) * 4000, "no intact header"),
         (framed(bytes((SCHEMA + 1, 1)) + b"{}"), "expected a log of schema 1, found schema 2"),
         (framed(tick(1).pack()), "expected a header as first record"),

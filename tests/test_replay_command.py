@@ -59,7 +59,8 @@ def test_G7_the_same_code_decides_the_same(log: Path, capsys: pytest.CaptureFixt
 
 def test_another_controller_is_compared(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
     result = said(capsys, str(log), "--controller", "open")
-    turning = 1.0 - result["shares"]["FORWARD"]
+    turning = 1.0 - result["recorded_shares"]["FORWARD"]
+    assert result["shares"]["FORWARD"] == 1.0
     assert result["different"] == round(turning * TICKS) > 0
     assert result["first_difference"]["replayed"] == "FORWARD"
     assert main(["replay", str(log), "--controller", "open"]) == 0
@@ -123,7 +124,7 @@ def test_a_log_that_was_not_closed_is_no_error(
         ([], "expected the log of a drive, found none"),
         (["nothing.log"], "nothing.log: No such file"),
         (["."], "Is a directory"),
-        (["text"], "no intact header, 0 intact ticks and 1 damaged"),
+        (["text"], "no intact header, 0 intact ticks; damaged places: 1"),
         (["own"], "give --controller with this name if its code may run"),
         (["own", "--controller", "zigzag"], "--controller: expected one of open, paper, closed"),
     ],

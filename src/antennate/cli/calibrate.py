@@ -28,7 +28,7 @@ def show_result(result: Mapping[str, Any]) -> None:
         "Calibration",
         {found["sensor_id"]: found},
         _CURVE_ROWS,
-        f"Readings {way} with bending. {found['samples']} readings of {found['trials']} pushes; "
+        f"Readings {way} with bending. Readings: {found['samples']}, pushes: {found['trials']}; "
         "intervals are bootstrapped\nover whole pushes.\n",
     )
     speeds = {

@@ -37,4 +37,4 @@ def show_rows(rows: Sequence[Row], file: IO[str] | None = None) -> None:
         )
         console.print(line, soft_wrap=True)
     bad = sum(row.verdict == "bad" for row in wrong)
-    console.print(Text(f"{len(rows)} checks: {bad} bad, {len(wrong) - bad} warnings"))
+    console.print(Text(f"Checks: {len(rows)}. Bad: {bad}. Warnings: {len(wrong) - bad}."))

@@ -136,7 +136,7 @@ def _note(result: Mapping[str, Any]) -> str:
     note = f"Worst state {result['worst_state']}{why}.\n"
     if result["torque_off"] is not None:
         on = result["servos_on"]
-        note += f"Torque is {f'NOT confirmed off: servos {on}' if on else 'off, verified'}.\n"
+        note += f"Torque is {_power(on)}.\n"
     if not result["armed"]:
         note += "A dry run: nothing was written to the servos; --arm lets it walk.\n"
     if result["refusal"]:
@@ -146,6 +146,12 @@ def _note(result: Mapping[str, Any]) -> str:
     if not result["log_complete"]:
         note += "The log is not complete.\n"
     return note
+
+
+def _power(on: Sequence[int]) -> str:
+    if not on:
+        return "off, verified"
+    return f"NOT confirmed off: servos {', '.join(map(str, on))}; switch their supply off"
 
 
 def _pace(key: str, form: str, scale: float = 1.0) -> Cell:

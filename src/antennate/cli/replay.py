@@ -16,7 +16,7 @@ from antennate.cli import BAD_INPUT, OK
 from antennate.cli.arguments import FromFile, parse_with
 from antennate.cli.folder import RunFolder, to_csv, to_json
 from antennate.cli.messages import one_line
-from antennate.cli.tables import show
+from antennate.cli.tables import Cell, number, show
 from antennate.errors import ConfigError
 from antennate.records import Maneuver
 from antennate.telemetry.reader import LogReader
@@ -99,7 +99,8 @@ def _result(log: LogReader, found: Replayed, controller: str | None) -> dict[str
         "trial": header.trial,
         "ticks": log.ticks,
         "duration_s": found.end - found.start,
-        "shares": {m.name: found.recorded[m] / ticks for m in Maneuver},
+        "recorded_shares": {m.name: found.recorded[m] / ticks for m in Maneuver},
+        "shares": {m.name: found.maneuvers.count(m) / ticks for m in Maneuver},
         "states": {state or "none": n / ticks for state, n in found.states.items()},
         "different": found.different,
         "first_difference": None
@@ -120,25 +121,29 @@ def _result(log: LogReader, found: Replayed, controller: str | None) -> dict[str
 
 def _show(result: Mapping[str, Any]) -> None:
     first = result["first_difference"]
-    shares = {
-        **result["shares"],
-        **{one_line(f"state {k}"): v for k, v in result["states"].items()},
-    }
+    then = {"shares": result["recorded_shares"], "states": result["states"]}
+    now = {**result, "states": {}}
+    names = [
+        m.name for m in Maneuver if result["recorded_shares"][m.name] + result["shares"][m.name]
+    ]
     show(
         "Replay",
-        {result["controller"]: result},
+        {"recorded": then, one_line(result["controller"]): now},
         [
-            ("ticks", lambda row: str(row["ticks"])),
-            ("duration [s]", lambda row: f"{row['duration_s']:.2f}"),
-            *((f"{name} [%]", _percent(share)) for name, share in shares.items() if share),
-            ("maneuvers that differ", lambda row: str(row["different"])),
-            ("poses that differ", lambda row: str(row["different_poses"])),
-            ("exceptions", lambda row: str(row["failures"])),
-            ("ticks missing", lambda row: str(row["missing"])),
+            *((f"{name} [%]", _percent("shares", name)) for name in names),
+            *(
+                (one_line(f"state {name} [%]"), _percent("states", name))
+                for name in result["states"]
+            ),
+            ("maneuvers that differ", _count("different")),
+            ("poses that differ", _count("different_poses")),
+            ("exceptions", _count("failures")),
+            ("ticks missing", _count("missing")),
         ],
+        f"{result['ticks']} ticks, {result['duration_s']:.2f} s.\n"
         f"Recorded by {one_line(result['recorded_controller'])}, antennate "
         f"{one_line(result['version'])}; "
-        f"{'closed at its end' if result['closed'] else 'not closed: its program was killed'}.\n"
+        f"{'the log is complete' if result['closed'] else 'not ended: its program was killed'}.\n"
         + (
             f"First difference: tick {first['tick']}, {first['time_s']:.2f} s, "
             f"{first['recorded']} then, {first['replayed']} now.\n"
@@ -148,8 +153,16 @@ def _show(result: Mapping[str, Any]) -> None:
     )
 
 
-def _percent(share: float) -> Any:
-    return lambda row: f"{100 * share:.1f}"
+def _percent(of: str, name: str) -> Cell:
+    def cell(column: Mapping[str, Any]) -> str:
+        share = column[of].get(name)
+        return number(None if share is None else 100 * share, ".1f")
+
+    return cell
+
+
+def _count(key: str) -> Cell:
+    return lambda column: number(column.get(key), "d")
 
 
 def _name(maneuver: int) -> str:

@@ -54,6 +54,17 @@ class Board:
         self._port = port
         self._limit = age_limit
         self._first: Hello | None = None
+        self._lost_before = 0
+
+    @property
+    def lost(self) -> int:
+        """Samples that never came since `count_anew`."""
+        return self.clock.sequence.lost - self._lost_before
+
+    def count_anew(self, now: float) -> None:
+        """Forget what was lost by now [s], as while servos were looked for and nobody read."""
+        self.poll(now)
+        self._lost_before = self.clock.sequence.lost
 
     def poll(self, now: float) -> int:
         """Take the newest of what has come by now [s]; how many usable samples that were."""

@@ -143,6 +143,7 @@ def prepare(config: DriveConfig, esp32: Port, bus: Port, clock: Any) -> Session:
     require_film(board, config.sensor_id)
     master = Bus(bus, Timing(config.layout.baud, doubt=_DOUBT), clock=clock.now)
     require_servos(master, config.layout)
+    board.count_anew(clock.now())
     return Session(
         board=board,
         bus=master,
@@ -195,7 +196,7 @@ def require_servos(bus: Bus, layout: LayoutParams) -> None:
     except BringUpError as error:
         raise BringUpError(
             f"--bus: {error}; check power, wiring, ids and baud {layout.baud}, or whether --esp32 "
-            "and --bus are swapped"
+            "and --bus are swapped; `antennate doctor` tells more, slow adapters too"
         ) from None
     modes = bringup.read_register(bus, layout.ids, XC430_W240["operating_mode"])
     wanted = roster.modes(layout)

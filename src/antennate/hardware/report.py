@@ -58,7 +58,7 @@ class Report:
             "walking": _since(self.timing, self.before),
             "frames": board.decoder.counters.good,
             "crc_errors": board.decoder.counters.crc_errors,
-            "lost_samples": board.clock.sequence.lost,
+            "lost_samples": board.lost,
             "missed_answers": bus.misses,
             "stale_answers": bus.stale,
             "poses_sent": session.tally.sent,

@@ -123,8 +123,8 @@ class LogReader:
                 raise LogError(f"{self.path}: {error}") from None
         ticks = sum(1 for _ in self)
         raise LogError(
-            f"{self.path}: expected a log, found no intact header, {ticks} intact ticks and "
-            f"{self.bad + 1} damaged places"
+            f"{self.path}: expected a log of `antennate drive`, found no intact header, {ticks} "
+            f"intact ticks; damaged places: {self.bad + 1}"
         )
 
     def _note(self, offset: int, reason: str) -> None:

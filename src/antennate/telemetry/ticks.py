@@ -118,7 +118,7 @@ class Tick:
             missed=0 if session.timing is None else session.timing.report().missed_cycles,
             frames=bytes_.good,
             crc=bytes_.crc_errors,
-            lost=clock.sequence.lost,
+            lost=session.board.lost,
             misses=bus.misses,
             stale=bus.stale,
             sent=session.tally.sent,

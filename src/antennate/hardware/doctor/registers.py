@@ -118,7 +118,7 @@ def _position_limits(known: Registers, layout: LayoutParams) -> Row:
     return row(
         _PART,
         "position limits",
-        "a quarter turn about each zero",
+        "at least a quarter turn about each zero",
         grouped(both, lambda ends: f"{ends[0]} to {ends[1]}"),
         "warn" if wrong else None,
         f"{ids_text(wrong)}: set registers 48 and 52 to 4095 and 0; goals beyond are refused",
@@ -168,7 +168,7 @@ def health_rows(
             "torque_enable",
             "torque",
             "off",
-            lambda _, value: "warn" if value else None,
+            lambda _, value: "bad" if value else None,
             "{ids}: no other program may drive them; hold the robot and switch the supply off",
             lambda value: "on" if value else "off",
         ),

@@ -70,12 +70,21 @@ def require(bus: Bus, expected: Mapping[int, int]) -> list[Found]:
         BringUpError: Otherwise; the text says each id that is not, and why.
     """
     table = inventory(bus, expected)
-    if wrong := [f"id {row.servo}: {row.verdict}" for row in table if row.verdict != "ok"]:
-        raise BringUpError(
-            f"expected {len(expected)} servos, found {len(table) - len(wrong)} fit; "
-            + "; ".join(wrong)
-        )
+    wrong: dict[str, list[int]] = {}
+    for row in table:
+        if row.verdict != "ok":
+            wrong.setdefault(row.verdict, []).append(row.servo)
+    if wrong:
+        fit = len(table) - sum(map(len, wrong.values()))
+        said = "; ".join(f"{_named(ids, len(expected))}: {why}" for why, ids in wrong.items())
+        raise BringUpError(f"expected {len(expected)} servos, found {fit} fit; {said}")
     return table
+
+
+def _named(ids: Sequence[int], count: int) -> str:
+    if len(ids) == count > 1:
+        return f"all {count}"
+    return f"id{'s' if len(ids) > 1 else ''} {', '.join(map(str, ids))}"
 
 
 def require_models(bus: Bus, models: Mapping[int, int]) -> None:
@@ -132,7 +141,11 @@ def enable(bus: Bus, ids: Sequence[int]) -> dict[int, int]:
 
 
 def disable(bus: Bus, ids: Sequence[int]) -> list[int]:
-    """Torque off as well as can be: the ids that did not confirm it after several tries."""
+    """Torque off as well as can be: the ids that did not confirm it after several tries.
+
+    The watchdogs of the others are switched off, so that nobody takes the robot for one whose
+    program died.
+    """
     torque, left = _COMMON["torque_enable"], list(ids)
     for _ in range(_TRIES):
         bus.write_all(torque.address, dict.fromkeys(left, b"\0"))
@@ -141,6 +154,8 @@ def disable(bus: Bus, ids: Sequence[int]) -> list[int]:
         if not left:
             break
         bus.settle()
+    if off := [i for i in ids if i not in left]:
+        bus.write_all(_COMMON["bus_watchdog"].address, dict.fromkeys(off, b"\0"))
     return left
 
 
