@@ -6,6 +6,7 @@ It reads from its standard input what a `Feed` sends, and nobody waits for it.
 from __future__ import annotations
 
 import math
+import shutil
 import signal
 import sys
 from pathlib import Path
@@ -34,21 +35,29 @@ class StatusLine:
         tick = Tick.unpack(message.content)
         if tick.now >= self._due:
             self._due = tick.now + self._every
-            start, end = ("\r\x1b[K", "") if self._terminal else ("", "\n")
-            sys.stderr.write(start + line(tick, message.dropped) + end)
+            said = line(tick, message.dropped)
+            if self._terminal:  # a line that wraps could not be written over
+                said = "\r\x1b[K" + said[: shutil.get_terminal_size().columns - 1]
+            sys.stderr.write(said if self._terminal else said + "\n")
             sys.stderr.flush()
 
 
 def line(tick: Tick, dropped: int) -> str:
     """All counters of a tick in one line."""
-    left, right = tick.reading
-    why = f" {tick.causes[0]}" if tick.causes else ""
+    left, right = ("-" if math.isnan(counts) else f"{counts:.0f}" for counts in tick.reading)
+    state = tick.state or "-"
+    why = " (" + tick.causes[0].removeprefix(f"{state} ") + ")" if tick.causes else ""
     return (
-        f"{tick.now:7.1f} s {tick.state or '-'} {Maneuver(tick.maneuver).name} "
-        f"counts={left:.0f} {right:.0f} age={1e3 * tick.age:.0f}ms missed={tick.missed} "
-        f"frames={tick.frames} crc={tick.crc} lost={tick.lost} misses={tick.misses} "
-        f"stale={tick.stale} sent={tick.sent} unlogged={dropped} {tick.note}{why}"
+        f"{tick.now:7.1f} s {state}{why} {_name(tick.maneuver)} counts={left},{right} "
+        f"age={1e3 * tick.age:.0f}ms {tick.note} missed_ticks={tick.missed} "
+        f"missed_answers={tick.misses} stale={tick.stale} frames={tick.frames} crc={tick.crc} "
+        f"lost={tick.lost} sent={tick.sent} unlogged={dropped}"
     )
+
+
+def _name(maneuver: int) -> str:
+    """Of a maneuver; somebody's own controller may say anything."""
+    return Maneuver(maneuver).name if maneuver in set(Maneuver) else str(maneuver)
 
 
 def main() -> int:
