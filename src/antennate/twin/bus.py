@@ -22,6 +22,7 @@ from antennate.hardware.dynamixel import packets
 from antennate.hardware.dynamixel.packets import BROADCAST, Instruction, Packet, Status, StatusError
 from antennate.hardware.dynamixel.parser import Parser
 from antennate.hardware.dynamixel.tables import BAUD_RATES, RETURN_DELAY_UNIT
+from antennate.twin.noise import Noise
 from antennate.twin.registers import Servo
 
 _GIVE_UP = 0.01
@@ -68,6 +69,7 @@ class ServoBus:
 
     Attributes:
         latency: Time by which the adapter delivers answers late [s].
+        noise: What the wire does to bytes, both ways.
         heard_at: Bits per second of the master; servos set to another baud hear nothing. None
             while that is not known: then all do.
     """
@@ -85,6 +87,7 @@ class ServoBus:
         self.loss = loss
         self.fast = fast
         self.latency = 0.0
+        self.noise = Noise(seed=1)
         self.heard_at: int | None = None
         self._byte_time = 10.0 / baud
         self._rng = rng or np.random.default_rng(0)
@@ -102,7 +105,7 @@ class ServoBus:
         if t - self._last > _GIVE_UP:
             self._parser.reset()
         self._last = max(self._last, t) + self._byte_time * len(data)
-        for packet in self._parser.feed(data):
+        for packet in self._parser.feed(self.noise(data)):
             if packet.instruction != Instruction.STATUS:
                 self._handle(self._last, packet)
 
@@ -115,7 +118,7 @@ class ServoBus:
         due = sorted((when, i) for i, (when, _) in enumerate(self._out) if when <= t)
         data = b"".join(self._out[i][1] for _, i in due)
         self._out = [item for item in self._out if item[0] > t]
-        return data
+        return self.noise(data)
 
     # requests
 
