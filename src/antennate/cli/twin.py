@@ -9,7 +9,7 @@ import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import tyro
 
@@ -50,11 +50,13 @@ class Places(FromFile):
             board's and PORT+1 the bus's
         udp: the board on a UDP port instead, likewise
         key: file with the key for --udp, mode 0600; else ANTENNATE_KEY is read
+        pace: real time, or lockstep: a control period passes with each sync write of all goals
     """
 
     tcp: Annotated[str, tyro.conf.arg(metavar="[HOST:]PORT")] = ""
     udp: Annotated[str, tyro.conf.arg(metavar="[HOST:]PORT")] = ""
     key: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
+    pace: Literal["real", "lockstep"] = "real"
 
 
 def command(argv: Sequence[str]) -> int:
@@ -72,7 +74,8 @@ def command(argv: Sequence[str]) -> int:
         sys.stdout.flush()
         try:
             with terminate_as_interrupt(), urgent(LEVEL + 1):
-                server.run(lambda t: t < end and robot.failure is None)
+                serve = server.run if places.pace == "real" else server.run_lockstep
+                serve(lambda t: t < end and robot.failure is None)
         finally:
             invalid = f"physics became invalid: {robot.failure}; " if robot.failure else ""
             late = f"latest tick {1e3 * server.late:.1f} ms late"
