@@ -92,8 +92,11 @@ class Truth:
                 self.goals[params[at]].add(goal)
 
 
-def test_L1_B3_bit_errors_are_counted_and_no_wrong_value_is_ever_used() -> None:
-    """Of the answers of 19 servos one in five has a bit error, of the board's frames 2 %."""
+@pytest.mark.parametrize(("ber", "worst"), [("1e-4", State.HOLD), ("1e-3", State.FAULT)])
+def test_L1_B3_bit_errors_are_counted_and_no_wrong_value_is_ever_used(
+    ber: str, worst: State
+) -> None:
+    """At 1e-4 of the answers of 19 servos one in five has a bit error, and it walks on."""
     made = rig(TwinConfig())
     truth, states = Truth(made), list[State]()
 
@@ -101,7 +104,7 @@ def test_L1_B3_bit_errors_are_counted_and_no_wrong_value_is_ever_used() -> None:
         if t < 1.5:
             return
         if not made.robot.noise.ber:
-            broken(made.robot, "link=ber:1e-4")
+            broken(made.robot, f"link=ber:{ber}")
         out, newest = session.outputs, session.board.clock.newest
         assert out is not None
         assert newest is not None
@@ -116,11 +119,12 @@ def test_L1_B3_bit_errors_are_counted_and_no_wrong_value_is_ever_used() -> None:
 
     report = drive(made.session, DriveConfig(dry_run=0.5, duration=6.0), arm=True, on_tick=look)
     result = report.result(made.session)
-    assert made.robot.bus.noise.wrong > 100
+    assert made.robot.bus.noise.wrong > 50
     assert made.robot.noise.wrong > 5
-    assert result["crc_errors"] >= 5
+    assert result["crc_errors"] >= 3
     assert made.session.bus.tally.misses > 100
-    assert set(states[:-1]) <= {State.OK, State.DEGRADED, State.HOLD}
+    assert max(states[:-1]) <= worst
+    assert (states[-1] is State.FAULT) == (worst is State.FAULT)
     assert not any(servo.torque for servo in made.robot.servos)
 
 
