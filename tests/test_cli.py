@@ -16,13 +16,14 @@ import pytest
 
 import antennate
 from antennate.cli import main
-from antennate.cli.arguments import read_file
+from antennate.cli.arguments import FromFile, parse_with, read_file
 from antennate.cli.folder import strict, to_csv
 from antennate.cli.messages import one_line
 from antennate.cli.toml import to_toml
 from antennate.errors import ConfigError
 from antennate.experiments.gait import GaitStudyConfig
 from antennate.experiments.tunnel import TunnelConfig
+from antennate.experiments.twin import TwinConfig
 from antennate.sim.world import World
 
 SMALL = ["tunnel", "--trials", "1", "--arms", "open", "--time-limit", "1", "--workers", "1"]
@@ -166,6 +167,33 @@ def test_bad_files(capsys, tmp_path, text, parts):
     for part in parts:
         assert part in line
     assert line.isprintable()
+
+
+def test_a_list_may_be_given_at_once_or_piece_by_piece():
+    words = ["--fault", "esp32=reset", "bus=loss:0.1@2s", "--touch=left@1s", "--trial", "3"]
+    words += ["--fault=servo:7=silent", "--touch", "right@2s"]
+    config, _ = parse_with("twin", "", TwinConfig, words, FromFile())
+    assert config.fault == ("esp32=reset", "bus=loss:0.1@2s", "servo:7=silent")
+    assert config.touch == ("left@1s", "right@2s")
+    assert config.trial == 3
+
+
+@pytest.mark.parametrize("bad", [0, 1])
+def test_each_of_two_faults_is_looked_at(capsys, bad):
+    faults = ["servo:7=silent", "esp32=reset"]
+    faults[bad] = "esp32=loose"
+    words = [word for fault in faults for word in ("--fault", fault)]
+    assert "found loose" in refusal(capsys, "twin", "--duration", "0.01", *words)
+
+
+def test_robot_is_another_name_of_config(capsys, tmp_path):
+    (tmp_path / "robot.toml").write_text("controller = 3")
+    for name in ("--robot", "--config"):
+        line = refusal(capsys, "drive", name, "robot.toml")
+        assert "robot.toml: controller: expected" in line
+    words = ["--robot", "robot.toml", "--config", "robot.toml"]
+    for command in ("drive", "doctor", "record"):
+        assert "its other name; found both" in refusal(capsys, command, *words)
 
 
 def test_bad_folders(capsys, tmp_path):

@@ -120,6 +120,37 @@ def test_a_turn_may_be_tighter_than_the_gaits_own() -> None:
     assert gait.offset == pytest.approx([0.52])
 
 
+SWEEPING = PARAMS.model_copy(
+    update={"antenna_mean": 0.1, "antenna_amplitude": 0.4, "antenna_frequency": 0.8}
+)
+
+
+def test_the_antenna_bases_stay_where_they_are_mounted_unless_told() -> None:
+    gait = Gait(GaitParams(), 3, PERIOD)
+    for maneuver in Maneuver:
+        assert (gait.step(np.full(3, maneuver)).antenna == np.zeros((3, 2))).all()
+    held = Gait(GaitParams(antenna_mean=-0.3), 1, PERIOD)
+    assert held.step(np.array([Maneuver.FORWARD])).antenna.tolist() == [[-0.3, -0.3]]
+
+
+def test_the_antenna_bases_sweep_at_their_own_pace_and_stand_in_a_hold() -> None:
+    """Row 0 walks, turns and backs off: 0.1 + 0.4 sin(2 pi 0.8 t); row 1 holds from 0.5 s on."""
+    gait, plan = Gait(SWEEPING, 2, PERIOD), [Maneuver.FORWARD, Maneuver.TURN_L, Maneuver.REVERSE]
+    swept = []
+    for tick in range(150):
+        maneuvers = [plan[tick // 50], plan[0] if tick < 50 else Maneuver.HOLD]
+        swept.append(gait.step(np.array(maneuvers)).antenna)
+    t = PERIOD * np.arange(1, 151)
+    alone = 0.1 + 0.4 * np.sin(2 * math.pi * 0.8 * t)
+    held = 0.1 + 0.4 * np.sin(2 * math.pi * 0.8 * np.minimum(t, 0.5))
+    for side in (0, 1):
+        assert np.array(swept)[:, 0, side] == pytest.approx(alone)
+        assert np.array(swept)[:, 1, side] == pytest.approx(held)
+    gait.reset(np.array([1]))
+    assert gait.sweep[1] == 0.0
+    assert gait.sweep[0] == pytest.approx(2 * math.pi * 0.8 * 1.5)
+
+
 def test_reset_starts_its_rows_at_a_phase_and_straight() -> None:
     gait = Gait(PARAMS, 2, PERIOD)
     gait.step(np.array([Maneuver.TURN_R, Maneuver.TURN_R]))

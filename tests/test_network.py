@@ -201,6 +201,18 @@ def test_addresses_that_cannot_be_used_are_refused(
     assert err.count("\n") == 1
 
 
+@pytest.mark.parametrize("command", ["doctor", "record"])
+def test_every_command_that_hears_a_board_on_the_network_wants_its_key(
+    command: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("ANTENNATE_KEY", raising=False)
+    words = [command, "--esp32", "udp://127.0.0.1:1", "--out", "x"]
+    assert main(words) == 2
+    assert "--key: expected a file" in capsys.readouterr().err
+    assert main([*words, "--insecure-udp", "--key", "k"]) == 2
+    assert "expected no --key beside it" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("text", ["", ":", "0.0.0.0", "127.0.0.1:70000", "-1", "a:b"])
 def test_a_twin_at_no_port_is_refused(text: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["twin", f"--tcp={text or ':'}"]) == 2
@@ -263,6 +275,9 @@ def test_X16_the_key_is_in_nothing_that_a_drive_over_udp_says(
         try:
             assert main([*words, "--key", str(path), "--dry-run", "0.3"]) == 0
             board = read_key(path)
+            keyed = [*words[1:3], "--key", str(path)]
+            assert main(["record", *keyed, "--duration", "0.3", "--out", "both.csv"]) == 0
+            assert main(["doctor", *keyed]) == 0
             assert main([*words, "--insecure-udp", "--dry-run", "0.1"]) == 2
         finally:
             over.set()

@@ -8,6 +8,9 @@ legs decides the speed: it is best where the feet are down on the side towards w
 
 A positive offset bends every joint to the right-hand turn: joint j rotates the rear link against
 the front one, so the head points right of the tail.
+
+The antenna bases sweep by themselves, both alike: theta0 + A sin S, with S growing by 2 pi f a
+second in every maneuver but HOLD.
 """
 
 from __future__ import annotations
@@ -26,7 +29,7 @@ _DIRECTION = np.array([1.0, 1.0, 1.0, -1.0, 0.0])
 _STEER = np.array([0.0, -1.0, 1.0, 0.0, 0.0])
 """Sign of the yaw offset in each maneuver."""
 _STEERS = np.array([1.0, 1.0, 1.0, 1.0, 0.0])
-"""Whether the offset moves in each maneuver."""
+"""Whether offset and antennae move in each maneuver."""
 _SIDES = np.array([0.0, math.pi])
 
 
@@ -38,36 +41,40 @@ def _lags(wave_number: float, body_phase: float) -> tuple[Floats, Floats]:
     return joints, lag * np.arange(LINK_COUNT) / LINK_COUNT
 
 
-def targets(params: GaitParams, phase: Floats, offset: Floats) -> Pose:
+def targets(params: GaitParams, phase: Floats, offset: Floats, sweep: Floats | None = None) -> Pose:
     """Joint targets at a gait phase.
 
     Args:
         params: Wave and timing of the gait.
         phase: Gait phase P [rad], shape (B,), unwrapped.
         offset: Yaw offset [rad], shape (B,); positive turns right.
-
-    Returns:
-        The pose, antenna bases at their mounting angle.
+        sweep: Phase S of the antenna bases [rad], shape (B,); 0 if absent.
     """
     joints, links = _lags(params.wave_number, params.body_phase)
     yaw = params.amplitude * np.sin(joints - phase[:, None]) + offset[:, None]
     leg = (phase[:, None] - links)[:, :, None] + _SIDES
-    return Pose(yaw=yaw, leg=leg, antenna=np.zeros((phase.shape[0], 2)))
+    antenna = np.full((phase.shape[0], 2), params.antenna_mean)
+    if sweep is not None:
+        antenna += params.antenna_amplitude * np.sin(sweep)[:, None]
+    return Pose(yaw=yaw, leg=leg, antenna=antenna)
 
 
 class Gait:
-    """The gait's memory: phase and offset. Both are continuous whatever the maneuvers."""
+    """The gait's memory: phases and offset. They are continuous whatever the maneuvers."""
 
     def __init__(self, params: GaitParams, batch: int, period: float) -> None:
         self.params = params
         self.phase: Floats = np.zeros(batch)
         self.offset: Floats = np.zeros(batch)
+        self.sweep: Floats = np.zeros(batch)
         self._advance = 2.0 * math.pi * params.frequency * period
         self._slew = params.offset_rate * period
+        self._swing = 2.0 * math.pi * params.antenna_frequency * period
 
     def reset(self, rows: Ints | Bools, phase: Floats | float = 0.0) -> None:
-        """Start some rows anew at the given phase [rad], straight."""
+        """Start some rows anew at the given phase [rad], straight, antennae in the middle."""
         self.phase[rows] = phase
+        self.sweep[rows] = 0.0
         self.offset[rows] = 0.0
 
     def step(self, maneuver: Ints, turn_offset: Floats | float | None = None) -> Pose:
@@ -82,4 +89,5 @@ class Gait:
         change = np.minimum(np.maximum(change, -self._slew), self._slew)
         self.offset += change * _STEERS[maneuver]
         self.phase += _DIRECTION[maneuver] * self._advance
-        return targets(self.params, self.phase, self.offset)
+        self.sweep += _STEERS[maneuver] * self._swing
+        return targets(self.params, self.phase, self.offset, self.sweep)

@@ -28,6 +28,7 @@ from tyro.constructors import (
 from antennate.cli.messages import describe, dotted, flag, nearest, one_line, shown
 from antennate.errors import ConfigError
 from antennate.params import Params
+from antennate.params.base import GATHERED
 from antennate.trials.pool import core_count
 
 LARGEST_FILE = 1_000_000
@@ -47,6 +48,15 @@ class FromFile:
     """
 
     config: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
+
+    @property
+    def file(self) -> Path | None:
+        """The file that was named.
+
+        Raises:
+            ConfigError: Two were.
+        """
+        return self.config
 
 
 @dataclass(frozen=True)
@@ -124,8 +134,8 @@ def parse_with(
 ) -> tuple[Config, Chosen]:
     """The same with options of another kind, given by their defaults."""
     call = _words(command, description, model(), argv, options)
-    if call.options.config is not None:
-        base = read_file(call.options.config, model)
+    if (file := call.options.file) is not None:
+        base = read_file(file, model)
         call = _words(command, description, base, argv, options)
     try:
         return model.model_validate(call.parameters), call.options
@@ -178,7 +188,7 @@ def _words(
             _Call[type(default), type(options)],
             prog=f"antennate {command}",
             description=description,
-            args=argv,
+            args=_gathered(argv, set(_flags(type(default), (), gathered=True))),
             default=_Call(options, default),
             config=(tyro.conf.FlagCreatePairsOff,),
             registry=_registry,
@@ -187,6 +197,29 @@ def _words(
     if unknown:
         raise ConfigError(_unknown(unknown[0], type(default), options))
     return call
+
+
+def _gathered(argv: Sequence[str], flags: set[str]) -> list[str]:
+    """The words with each of these flags given once, with the values of all."""
+    last: list[str] = []
+    groups = [last]
+    whole: dict[str, list[str]] = {}
+    for word in argv:
+        name, given, value = word.partition("=")
+        name = name.replace("_", "-")
+        if name in flags:
+            if name not in whole:
+                whole[name] = [name]
+                groups.append(whole[name])
+            if given:
+                whole[name].append(value)
+            last = whole[name]
+        elif word.startswith("--"):
+            last = [word]
+            groups.append(last)
+        else:
+            last.append(word)
+    return [word for group in groups for word in group]
 
 
 @contextlib.contextmanager
@@ -235,9 +268,10 @@ def _unknown(word: str, model: type[Params], chosen: FromFile) -> str:
     return f"expected a known flag{nearest(name, known)}, found {shown(word)}"
 
 
-def _flags(model: type[BaseModel], path: tuple[str, ...]) -> Iterator[str]:
+def _flags(model: type[BaseModel], path: tuple[str, ...], gathered: bool = False) -> Iterator[str]:
+    """Flags of all parameters, or of those alone that gather their values."""
     for name, field in model.model_fields.items():
         if isinstance(field.annotation, type) and issubclass(field.annotation, Params):
-            yield from _flags(field.annotation, (*path, name))
-        else:
+            yield from _flags(field.annotation, (*path, name), gathered)
+        elif not gathered or GATHERED in field.metadata:
             yield flag((*path, name))

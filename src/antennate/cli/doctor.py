@@ -11,7 +11,8 @@ from typing import Annotated
 import tyro
 
 from antennate.cli import BAD_INPUT, OK
-from antennate.cli.arguments import FromFile, parse_with
+from antennate.cli.addresses import RobotOrders, key_of, require_lossless
+from antennate.cli.arguments import parse_with
 from antennate.cli.checks import show_rows
 from antennate.cli.folder import RunFolder, to_json
 from antennate.cli.progress import terminate_as_interrupt
@@ -33,13 +34,11 @@ _ROUNDS = 4
 
 
 @dataclass(frozen=True)
-class Orders(FromFile):
+class Orders(RobotOrders):
     """What to examine, and what to do about it.
 
     Attributes:
-        config: robot.toml with the parameters below as keys and tables; flags override it
-        esp32: serial port of the antenna board
-        bus: serial port of the servo bus
+        bus: serial port of the servo bus, or tcp://HOST:PORT
         fix: put right what can be, asking before each change
         yes: answer yes to all that --fix asks
         json: print the result in JSON and nothing else
@@ -47,7 +46,6 @@ class Orders(FromFile):
         overwrite: replace the run that the folder holds
     """
 
-    esp32: Annotated[str, tyro.conf.arg(metavar="PORT")] = ""
     bus: Annotated[str, tyro.conf.arg(metavar="PORT")] = ""
     fix: bool = False
     yes: bool = False
@@ -64,12 +62,13 @@ def command(argv: Sequence[str]) -> int:
     """
     config, orders = parse_with("doctor", DESCRIPTION, DriveConfig, argv, Orders())
     _check(orders)
+    key = key_of(orders)
     if orders.out is None:
-        checkup, changes = _examine(config, orders)
+        checkup, changes = _examine(config, orders, key)
     else:
         with RunFolder.open("doctor", orders.out, orders.overwrite) as folder:
             folder.describe("doctor", argv, config)
-            checkup, changes = _examine(config, orders)
+            checkup, changes = _examine(config, orders, key)
             folder.finish(checkup.result(changes), ())
             sys.stderr.write(f"written to {folder.path}\n")
     if orders.json:
@@ -84,6 +83,7 @@ def _check(orders: Orders) -> None:
         raise ConfigError("expected --esp32 PORT, --bus PORT or both, found none")
     if orders.esp32 and orders.bus and same(orders.esp32, orders.bus):
         raise ConfigError(f"--esp32 and --bus: expected two ports, found {orders.bus} twice")
+    require_lossless(orders.bus)
     if orders.fix and not orders.bus:
         raise ConfigError("--fix: expected --bus PORT with it, found none")
     if orders.yes and not orders.fix:
@@ -92,11 +92,11 @@ def _check(orders: Orders) -> None:
         raise ConfigError("--fix: expected a terminal to ask on, found none; or give --yes")
 
 
-def _examine(config: DriveConfig, orders: Orders) -> tuple[Checkup, list[str]]:
+def _examine(config: DriveConfig, orders: Orders, key: bytes | None) -> tuple[Checkup, list[str]]:
     """The examination, the last one if something was changed, and the changes."""
     robot = Robot(layout=config.layout, mind=config.mind, limits=config.limits)
     bus = (orders.bus, opener_of(orders.bus, "--bus")) if orders.bus else None
-    esp32 = (orders.esp32, opener_of(orders.esp32, "--esp32")) if orders.esp32 else None
+    esp32 = (orders.esp32, opener_of(orders.esp32, "--esp32", key)) if orders.esp32 else None
     now = HostClock().now
     with terminate_as_interrupt():
         checkup = examine(robot, bus, esp32, now)

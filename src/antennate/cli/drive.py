@@ -11,7 +11,8 @@ from typing import Annotated, Any
 import tyro
 
 from antennate.cli import BAD_INPUT, OK
-from antennate.cli.arguments import FromFile, parse_with
+from antennate.cli.addresses import RobotOrders, key_of, require_lossless
+from antennate.cli.arguments import parse_with
 from antennate.cli.folder import LOG, RunFolder, to_json
 from antennate.cli.progress import terminate_as_interrupt
 from antennate.cli.tables import Cell, number, show
@@ -19,8 +20,6 @@ from antennate.errors import ConfigError
 from antennate.hardware.causes import State
 from antennate.hardware.drive import DriveConfig, connect, drive
 from antennate.hardware.film import calibrated
-from antennate.hardware.keys import read_key
-from antennate.hardware.ports import is_udp
 from antennate.hardware.priority import Priority, urgent
 from antennate.hardware.session import Session
 from antennate.telemetry.feed import Feed
@@ -37,29 +36,22 @@ stop it if this program dies."""
 
 
 @dataclass(frozen=True)
-class Orders(FromFile):
+class Orders(RobotOrders):
     """What to talk to, whether to move, and where the results go.
 
     Attributes:
-        config: robot.toml with the parameters below as keys and tables; flags override it
-        esp32: serial port of the antenna board, tcp://HOST:PORT or udp://HOST:PORT
         bus: serial port of the servo bus, or tcp://HOST:PORT
         arm: torque on after the dry run
         out: folder for log and result, runs/drive-N if not given
         overwrite: replace the results that the folder holds
         json: print the content of result.json and nothing else on stdout
-        key: file with the key of a board behind udp://, mode 0600; else ANTENNATE_KEY is read
-        insecure_udp: the board has no key; anybody on the network can feign it
     """
 
-    esp32: Annotated[str, tyro.conf.arg(metavar="PORT")] = ""
     bus: Annotated[str, tyro.conf.arg(metavar="PORT")] = ""
     arm: bool = False
     out: Annotated[Path | None, tyro.conf.arg(metavar="FOLDER")] = None
     overwrite: bool = False
     json: bool = False
-    key: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
-    insecure_udp: bool = False
 
 
 def command(argv: Sequence[str]) -> int:
@@ -75,7 +67,8 @@ def command(argv: Sequence[str]) -> int:
     if config.calibration is not None:
         mind, film = calibrated(config.mind, Path(config.calibration), config.sensor_id)
         config = config.model_copy(update={"mind": mind, "sensor_id": film.sensor_id})
-    key = _key(orders)
+    require_lossless(orders.bus)
+    key = key_of(orders)
     with RunFolder.open("drive", orders.out, orders.overwrite) as folder:
         folder.describe("drive", argv, config)
         with connect(config, orders.esp32, orders.bus, key) as session, terminate_as_interrupt():
@@ -89,22 +82,6 @@ def command(argv: Sequence[str]) -> int:
     fault = result["worst_state"] in (State.FAULT.name, State.OFF.name)
     stays_on = result["torque_off"] is False
     return BAD_INPUT if fault or stays_on or result["refusal"] else OK
-
-
-def _key(orders: Orders) -> bytes | None:
-    """The key for a board behind udp://, None if there is no such board."""
-    if is_udp(orders.bus):
-        raise ConfigError("--bus: expected a serial port or tcp://, found udp://; it loses packets")
-    if not is_udp(orders.esp32):
-        return None
-    if not orders.insecure_udp:
-        return read_key(orders.key)
-    if orders.key is not None:
-        raise ConfigError("--insecure-udp: expected no --key beside it, found both")
-    warning = "UDP without a key: anybody on this network can feign the antenna board"
-    red = "\x1b[1;31m{}\x1b[0m" if sys.stderr.isatty() else "{}"
-    sys.stderr.write(red.format(warning) + "\n")
-    return b""
 
 
 def _carry_out(config: DriveConfig, session: Session, arm: bool, log: Path) -> dict[str, Any]:

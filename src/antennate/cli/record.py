@@ -17,7 +17,8 @@ from typing import Annotated
 import tyro
 
 from antennate.cli import OK
-from antennate.cli.arguments import FromFile, parse_with
+from antennate.cli.addresses import RobotOrders, key_of
+from antennate.cli.arguments import parse_with
 from antennate.cli.progress import terminate_as_interrupt
 from antennate.errors import BadInputError, ConfigError, OutputError
 from antennate.hardware.board import BOARD_BAUD
@@ -38,16 +39,13 @@ _SHOWN = 100
 
 
 @dataclass(frozen=True)
-class Orders(FromFile):
+class Orders(RobotOrders):
     """Where from and where to.
 
     Attributes:
-        config: TOML file with the parameters below as keys; flags override it
-        esp32: serial port of the antenna board
         out: CSV file to make
     """
 
-    esp32: Annotated[str, tyro.conf.arg(metavar="PORT")] = ""
     out: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
 
 
@@ -62,8 +60,8 @@ def command(argv: Sequence[str]) -> int:
         raise ConfigError("--esp32: expected a serial port, found none")
     if orders.out is None:
         raise ConfigError("--out: expected a CSV file to make, found none")
-    now = HostClock().now
-    with opener_of(orders.esp32, "--esp32")(BOARD_BAUD) as port:
+    key, now = key_of(orders), HostClock().now
+    with opener_of(orders.esp32, "--esp32", key)(BOARD_BAUD) as port:
         stream = Stream(port, now)
         status = Status(stream, params, now)
         with Lines(orders.out) as lines, terminate_as_interrupt():

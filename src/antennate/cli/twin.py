@@ -9,7 +9,7 @@ import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import tyro
 
@@ -34,8 +34,10 @@ With --tcp both are TCP ports, with --udp the board is a UDP port that signs as 
 Physics begins when the first servo gets torque. Faults, each with @Ts for its time:
 servo:ID=silent, bad_crc, truncated, late:SECONDS, doubled, wrong_id, oversized, voltage, overheat,
 encoder, shock, overload, reboot or REGISTER:VALUE; esp32=silent, reset, open_left, open_right,
-left:COUNTS or right:COUNTS; bus=silent, loss:SHARE or latency:SECONDS. --touch left@2s right@5s
-bends the antennae of the standing robot, as the check by touch of `antennate drive` wants it."""
+left:COUNTS, right:COUNTS or ber:SHARE; bus=silent, loss:SHARE, latency:SECONDS, sag:VOLTS_A_SECOND
+or ber:SHARE; link=ber:SHARE (bits wrong) or loss:SHARE (bytes lost), on both wires both ways.
+--touch left@2s right@5s bends the antennae of the standing robot, as the check by touch of
+`antennate drive` wants it. --fault and --touch may be repeated."""
 
 
 @dataclass(frozen=True)
@@ -48,11 +50,13 @@ class Places(FromFile):
             board's and PORT+1 the bus's
         udp: the board on a UDP port instead, likewise
         key: file with the key for --udp, mode 0600; else ANTENNATE_KEY is read
+        pace: real time, or lockstep: a control period passes with each sync write of all goals
     """
 
     tcp: Annotated[str, tyro.conf.arg(metavar="[HOST:]PORT")] = ""
     udp: Annotated[str, tyro.conf.arg(metavar="[HOST:]PORT")] = ""
     key: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
+    pace: Literal["real", "lockstep"] = "real"
 
 
 def command(argv: Sequence[str]) -> int:
@@ -70,7 +74,8 @@ def command(argv: Sequence[str]) -> int:
         sys.stdout.flush()
         try:
             with terminate_as_interrupt(), urgent(LEVEL + 1):
-                server.run(lambda t: t < end and robot.failure is None)
+                serve = server.run if places.pace == "real" else server.run_lockstep
+                serve(lambda t: t < end and robot.failure is None)
         finally:
             invalid = f"physics became invalid: {robot.failure}; " if robot.failure else ""
             late = f"latest tick {1e3 * server.late:.1f} ms late"

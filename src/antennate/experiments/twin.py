@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
@@ -25,7 +26,9 @@ from antennate.hardware.session import Session
 from antennate.hardware.trust import Trust
 from antennate.loop import run_loop
 from antennate.params import Params, TouchCheckParams, number
+from antennate.params.base import GATHERED
 from antennate.params.layout import LayoutParams
+from antennate.params.twin import BatteryParams
 from antennate.records import AntennaFrame, Pose
 from antennate.sim.body import SimBody
 from antennate.twin.hand import Hand
@@ -60,15 +63,16 @@ class TwinConfig(Params):
     duration: float | None = number(
         None, "s", "assumed: until it is stopped", "time to serve", gt=0
     )
-    fault: tuple[str, ...] = number(
+    fault: Annotated[tuple[str, ...], GATHERED] = number(
         (), "1", "assumed: nothing is broken", "faults, such as servo:7=silent@3s"
     )
-    touch: tuple[str, ...] = number(
+    touch: Annotated[tuple[str, ...], GATHERED] = number(
         (),
         "1",
         "assumed: nobody is there",
         "antennae bent by hand before it walks, such as left@2s; from the first packet on the bus",
     )
+    battery: BatteryParams = BatteryParams()
     layout: LayoutParams = LayoutParams()
     world: TunnelConfig = TunnelConfig()
 
@@ -87,7 +91,14 @@ def watched(config: TwinConfig, boot_id: int | None = None) -> tuple[TwinRobot, 
     boot = config.trial + 1 if boot_id is None else boot_id
     hand, passage = Hand(config.touch, world.controller.conditioning), Passage(start.tunnel)
     robot = TwinRobot(
-        body, config.layout, period, boot, standing_noise=True, hand=hand, watch=passage.watch
+        body,
+        config.layout,
+        period,
+        boot,
+        standing_noise=True,
+        hand=hand,
+        watch=passage.watch,
+        battery=config.battery,
     )
     return robot, passage
 

@@ -44,10 +44,12 @@ from antennate.params.touch import (
     StepWallParams,
     TouchWallsParams,
 )
+from antennate.params.twin import BatteryParams
 
 __all__ = [
     "N_MM_PER_DEG",
     "AntennaParams",
+    "BatteryParams",
     "BenchPhysicsParams",
     "BenchVariationParams",
     "BouldersWallParams",

@@ -6,6 +6,9 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field
 
+GATHERED = "gathered"
+"""Marks a list whose flag, given again, adds to it; of other flags the last one counts."""
+
 
 class Params(BaseModel):
     """A frozen group of numbers; unknown keys, NaN and infinities are errors."""

@@ -61,6 +61,30 @@ class GaitParams(Params):
         "largest change of the offset",
         gt=0,
     )
+    antenna_mean: float = number(
+        0.0,
+        "rad",
+        "assumed: the mounting angle",
+        "angle about which the antenna bases sweep, or at which they are held",
+        ge=-0.8,
+        le=0.8,
+    )
+    antenna_amplitude: float = number(
+        0.0,
+        "rad",
+        "assumed: held; the paper's robot does not sweep while it walks",
+        "amplitude of the sweep of the antenna bases",
+        ge=0,
+        le=0.7,
+    )
+    antenna_frequency: float = number(
+        0.5,
+        "Hz",
+        "assumed: that of the gait; the largest sweep then stays below the servos' speed",
+        "sweeps of the antenna bases per second",
+        gt=0,
+        le=1.0,
+    )
 
 
 class ConditioningParams(Params):

@@ -11,7 +11,7 @@ is expected to be quiet meanwhile: what it says never collides with an answer.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from itertools import zip_longest
@@ -21,11 +21,13 @@ import numpy as np
 from antennate.hardware.dynamixel import packets
 from antennate.hardware.dynamixel.packets import BROADCAST, Instruction, Packet, Status, StatusError
 from antennate.hardware.dynamixel.parser import Parser
-from antennate.hardware.dynamixel.tables import BAUD_RATES, RETURN_DELAY_UNIT
+from antennate.hardware.dynamixel.tables import BAUD_RATES, RETURN_DELAY_UNIT, XC430_W240
+from antennate.twin.noise import Noise
 from antennate.twin.registers import Servo
 
 _GIVE_UP = 0.01
 """Silence after which servos forget half a packet [s]."""
+_GOAL = XC430_W240["goal_position"]
 _CLEAR = b"\x01\x44\x58\x4c\x22"
 
 
@@ -68,8 +70,10 @@ class ServoBus:
 
     Attributes:
         latency: Time by which the adapter delivers answers late [s].
+        noise: What the wire does to bytes, both ways.
         heard_at: Bits per second of the master; servos set to another baud hear nothing. None
             while that is not known: then all do.
+        on_goals: Called when a sync write has given every servo a goal position.
     """
 
     def __init__(
@@ -85,7 +89,9 @@ class ServoBus:
         self.loss = loss
         self.fast = fast
         self.latency = 0.0
+        self.noise = Noise(seed=1)
         self.heard_at: int | None = None
+        self.on_goals: Callable[[], None] = lambda: None
         self._byte_time = 10.0 / baud
         self._rng = rng or np.random.default_rng(0)
         self._parser = Parser()
@@ -102,7 +108,7 @@ class ServoBus:
         if t - self._last > _GIVE_UP:
             self._parser.reset()
         self._last = max(self._last, t) + self._byte_time * len(data)
-        for packet in self._parser.feed(data):
+        for packet in self._parser.feed(self.noise(data)):
             if packet.instruction != Instruction.STATUS:
                 self._handle(self._last, packet)
 
@@ -115,7 +121,7 @@ class ServoBus:
         due = sorted((when, i) for i, (when, _) in enumerate(self._out) if when <= t)
         data = b"".join(self._out[i][1] for _, i in due)
         self._out = [item for item in self._out if item[0] > t]
-        return data
+        return self.noise(data)
 
     # requests
 
@@ -167,6 +173,9 @@ class ServoBus:
             for servo in present:
                 if servo.get("id") == params[at]:
                     servo.write(address, params[at + 1 : at + 1 + length])
+        named = set(params[4 :: length + 1])
+        if address == _GOAL.address and named >= {servo.get("id") for servo in self.servos}:
+            self.on_goals()
 
     def _sync_read(self, t: float, present: list[Servo], params: bytes) -> None:
         address, length = _two_words(params)

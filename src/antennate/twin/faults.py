@@ -1,4 +1,4 @@
-"""Faults on demand: `servo:7=silent@3s`, `esp32=reset@5s`, `bus=loss:0.01`.
+"""Faults on demand: `servo:7=silent@3s`, `esp32=reset@5s`, `link=ber:1e-4`.
 
 A register of a servo takes a value by its name: `servo:7=return_delay_time:250`.
 """
@@ -16,7 +16,7 @@ from antennate.twin.registers import Servo
 from antennate.twin.robot import TwinRobot
 
 _FORM = re.compile(
-    r"(?P<target>servo:(?P<id>\d{1,3})|esp32|bus)=(?P<what>[a-z_]+)(:(?P<size>[0-9.e-]+))?"
+    r"(?P<target>servo:(?P<id>\d{1,3})|esp32|bus|link)=(?P<what>[a-z_]+)(:(?P<size>[0-9.e-]+))?"
     r"(@(?P<t>[0-9.]+)s)?"
 )
 _SERVO = {fault.name.lower(): fault for fault in Fault}
@@ -25,9 +25,11 @@ _HARDWARE = {"voltage": 1, "overheat": 4, "encoder": 8, "shock": 16, "overload":
 _SIDES = ("left", "right")
 _KNOWN = {
     "servo": (*_SERVO, *_HARDWARE, "reboot"),
-    "esp32": ("silent", "reset", "open_left", "open_right", "left", "right"),
-    "bus": ("loss", "silent", "latency"),
+    "esp32": ("silent", "reset", "open_left", "open_right", "left", "right", "ber"),
+    "bus": ("loss", "silent", "latency", "sag", "ber"),
+    "link": ("loss", "ber"),
 }
+_SHARES = ("loss", "ber")
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,11 +37,12 @@ class Demand:
     """One fault, and when.
 
     Attributes:
-        target: "servo", "esp32" or "bus".
+        target: "servo", "esp32", "bus", or "link" for the wires of both.
         servo: Id, for a servo.
         what: Its name.
-        size: Delay of a late answer or of all [s], share of answers lost, reading of a bent
-            antenna [counts], or value of a register.
+        size: Delay of a late answer or of all [s], share of answers or bytes lost or of bits
+            that are wrong, fall of the supply [V/s], reading of a bent antenna [counts], or value
+            of a register.
         t: When it begins [s].
     """
 
@@ -72,6 +75,8 @@ def read(text: str) -> Demand:
         raise BadInputError(
             f"--fault: expected numbers for size and time, found {text!r}"
         ) from None
+    if match["what"] in _SHARES and not 0.0 <= size <= 1.0:
+        raise BadInputError(f"--fault: expected a share of 0 to 1, found {text!r}")
     if register:
         _check_register(match["what"], size)
     return Demand(target, int(match["id"] or 0), match["what"], size, t)
@@ -106,6 +111,9 @@ class Faults:
                 _break_board(robot, demand)
             elif demand.target == "bus":
                 _break_bus(robot, demand)
+            elif demand.target == "link":
+                for noise in (robot.noise, robot.bus.noise):
+                    setattr(noise, demand.what, demand.size)
             else:
                 _break_servo(robot, robot.servos[self._ids.index(demand.servo)], demand)
 
@@ -113,6 +121,8 @@ class Faults:
 def _break_board(robot: TwinRobot, demand: Demand) -> None:
     if demand.what in _SIDES:
         robot.hold(_SIDES.index(demand.what), demand.size)
+    elif demand.what == "ber":
+        robot.noise.ber = demand.size
     else:
         robot.break_board(demand.what)
 
@@ -120,6 +130,10 @@ def _break_board(robot: TwinRobot, demand: Demand) -> None:
 def _break_bus(robot: TwinRobot, demand: Demand) -> None:
     if demand.what == "latency":
         robot.bus.latency = demand.size
+    elif demand.what == "sag":
+        robot.battery.sag(robot.t, demand.size)
+    elif demand.what == "ber":
+        robot.bus.noise.ber = demand.size
     else:
         robot.bus.loss = 1.0 if demand.what == "silent" else demand.size
 

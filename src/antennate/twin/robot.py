@@ -25,11 +25,14 @@ from antennate.hardware.dynamixel.tables import (
 from antennate.hardware.esp32 import frame
 from antennate.hardware.joints import Joints
 from antennate.params.layout import TICKS_A_TURN, LayoutParams
+from antennate.params.twin import BatteryParams
 from antennate.records import Floats
 from antennate.sim.body import SimBody
 from antennate.sim.world import World
+from antennate.twin.battery import Battery
 from antennate.twin.bus import ServoBus
 from antennate.twin.hand import Hand
+from antennate.twin.noise import Noise
 from antennate.twin.registers import Servo
 
 GREETING_PERIOD = 1.0
@@ -98,11 +101,14 @@ class TwinRobot:
         standing_noise: Whether readings are noisy before the physics begins, as a real film's are.
         hand: Bends the antennae of the standing robot, None if nobody does.
         watch: Told the world after each tick of the physics.
+        battery: Numbers of its supply.
 
     Attributes:
         bus: The servos on their wire.
         t: Time up to which everything has happened [s].
         board_silent: The board says nothing.
+        noise: What the board's wire does to bytes, both ways.
+        battery: What feeds the servos.
     """
 
     def __init__(
@@ -114,6 +120,7 @@ class TwinRobot:
         standing_noise: bool = False,
         hand: Hand | None = None,
         watch: Callable[[World], None] = lambda world: None,
+        battery: BatteryParams | None = None,
     ) -> None:
         self._body = body
         self._watch = watch
@@ -130,6 +137,8 @@ class TwinRobot:
         self._hand = hand
         self.t = 0.0
         self.board_silent = False
+        self.noise = Noise(seed=0)
+        self.battery = Battery(battery or BatteryParams())
         self.servos = [_servo(i, servo, layout.baud) for i, servo in enumerate(layout.ids)]
         self.bus = ServoBus(self.servos, layout.baud)
         self._show(self._shafts())
@@ -157,6 +166,7 @@ class TwinRobot:
         self._ticks += 1
         self.bus.advance(self._ticks * self._period)
         self.t = max(self.t, self._ticks * self._period)
+        self.battery.feed(self.servos, self._ticks * self._period)
         if not self._walked and not any(servo.torque for servo in self.servos):
             return None
         return np.array([servo.goal() for servo in self.servos])
@@ -189,11 +199,11 @@ class TwinRobot:
     def take(self) -> bytes:
         """What the board has sent since the last call."""
         data, self._stream = bytes(self._stream), bytearray()
-        return data
+        return self.noise(data)
 
     def hear(self, data: bytes) -> None:
         """Let the board take bytes from the host: it greets if it is asked to."""
-        asked = frame.encode_request() in data
+        asked = frame.encode_request() in self.noise(data)
         if asked and not self.board_silent and self._ticks >= self._booted:
             self._greet()
 

@@ -1,4 +1,7 @@
-"""A twin robot on two wires, in real time: no client can tell it from the real one."""
+"""A twin robot on two wires, in real time: no client can tell it from the real one.
+
+Or in lock-step with a client that takes all the time it wants, and always gets the same.
+"""
 
 from __future__ import annotations
 
@@ -154,6 +157,28 @@ class TwinServer:
                     robot.hear(self._board.read())
                 if answers := bus.transmit(time.monotonic() - begin):
                     self._bus.write(answers)
+
+    def run_lockstep(self, go_on: Callable[[float], bool]) -> None:
+        """Serve likewise, but let one control period pass with each sync write of all goals.
+
+        Nothing passes otherwise, and the bus answers at once.
+        """
+        robot, bus = self._robot, self._robot.bus
+        bus.on_goals = self._step
+        self._board.write(robot.take())
+        while go_on(robot.t):
+            ready, _, _ = select.select([self._bus, self._board], [], [], _LONGEST)
+            if self._bus in ready:
+                bus.heard_at = self._bus.baud()
+                bus.receive(robot.t, self._bus.read())
+                self._bus.write(bus.transmit(math.inf))
+            if self._board in ready:
+                robot.hear(self._board.read())
+            self._board.write(robot.take())
+
+    def _step(self) -> None:
+        self._faults.apply(self._robot, self._robot.due)
+        self._robot.advance(self._robot.due)
 
     def _wait(self, now: float, physics: Physics) -> float:
         """Time until something happens by itself [s]."""

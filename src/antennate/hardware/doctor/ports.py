@@ -14,8 +14,8 @@ from antennate.hardware.port_holder import holders
 from antennate.hardware.ports import finder
 
 
-def opener_of(path: str, flag: str) -> Opener:
-    """Opens a port at any speed.
+def opener_of(path: str, flag: str, key: bytes | None = None) -> Opener:
+    """Opens a port at any speed; `key` is that of a board behind udp://.
 
     Raises:
         ConfigError: pyserial is not installed.
@@ -23,7 +23,7 @@ def opener_of(path: str, flag: str) -> Opener:
 
     @contextlib.contextmanager
     def opened(baud: int) -> Iterator[Port]:
-        line = finder(path, baud, flag)()
+        line = finder(path, baud, flag, key)()
         try:
             yield line
         finally:

@@ -1,0 +1,73 @@
+"""How a command is told which robot it talks to: its file, its ports and the key of its board."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from antennate.cli.arguments import FromFile
+from antennate.errors import ConfigError
+from antennate.hardware.keys import read_key
+from antennate.hardware.ports import is_udp
+
+
+@dataclass(frozen=True)
+class RobotOrders(FromFile):
+    """The robot.
+
+    Attributes:
+        config: TOML file with the parameters below as keys and tables; flags override it
+        robot: another name of --config
+        esp32: serial port of the antenna board, tcp://HOST:PORT or udp://HOST:PORT
+        key: file with the key of a board behind udp://, mode 0600; else ANTENNATE_KEY is read
+        insecure_udp: the board has no key; anybody on the network can feign it
+    """
+
+    robot: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
+    esp32: Annotated[str, tyro.conf.arg(metavar="PORT")] = ""
+    key: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
+    insecure_udp: bool = False
+
+    @property
+    def file(self) -> Path | None:
+        """The file that was named.
+
+        Raises:
+            ConfigError: Two were.
+        """
+        if self.robot is not None and self.config is not None:
+            raise ConfigError("--robot: expected no --config beside it, its other name; found both")
+        return self.robot or self.config
+
+
+def key_of(orders: RobotOrders) -> bytes | None:
+    """The key for a board behind udp://, None if there is no such board.
+
+    Raises:
+        ConfigError: --insecure-udp beside a key.
+        BadInputError: There is no key, or it cannot be used.
+    """
+    if not is_udp(orders.esp32):
+        return None
+    if not orders.insecure_udp:
+        return read_key(orders.key)
+    if orders.key is not None:
+        raise ConfigError("--insecure-udp: expected no --key beside it, found both")
+    warning = "UDP without a key: anybody on this network can feign the antenna board"
+    red = "\x1b[1;31m{}\x1b[0m" if sys.stderr.isatty() else "{}"
+    sys.stderr.write(red.format(warning) + "\n")
+    return b""
+
+
+def require_lossless(bus: str) -> None:
+    """Refuse a servo bus on the network.
+
+    Raises:
+        ConfigError: It is behind udp://.
+    """
+    if is_udp(bus):
+        raise ConfigError("--bus: expected a serial port or tcp://, found udp://; it loses packets")

@@ -1,0 +1,42 @@
+"""What the twin's robot is fed from."""
+
+from __future__ import annotations
+
+from antennate.params.base import Params, number
+
+
+class BatteryParams(Params):
+    """The supply of a twin once it begins to sag; until then it is stiff."""
+
+    voltage: float = number(
+        11.1,
+        "V",
+        "datasheet: XC430-W240, recommended voltage; three lithium cells",
+        "voltage at rest before it sags",
+        gt=0,
+        le=16,
+    )
+    antenna_voltage: float = number(
+        5.0,
+        "V",
+        "datasheet: XL330-M288, recommended voltage; assumed behind a regulator",
+        "voltage at the antenna servos as long as the supply is above it",
+        gt=0,
+        le=16,
+    )
+    resistance: float = number(
+        0.1,
+        "ohm",
+        "assumed: three small lithium cells of 20 mohm each, a cable and plugs",
+        "source resistance",
+        ge=0,
+        le=10,
+    )
+    stall_current: float = number(
+        1.3,
+        "A",
+        "assumed: about that of a stalled XC430-W240 at 11.1 V",
+        "current of a servo that pulls as hard as it can",
+        ge=0,
+        le=10,
+    )

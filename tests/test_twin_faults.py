@@ -1,0 +1,155 @@
+"""Wires that damage bytes and a supply that runs empty, in invented time."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+
+import numpy as np
+import pytest
+
+from antennate.errors import BadInputError
+from antennate.experiments.twin import Rig, TwinConfig, build, rig
+from antennate.hardware.causes import State
+from antennate.hardware.drive import DriveConfig, drive
+from antennate.hardware.dynamixel.packets import Instruction
+from antennate.hardware.dynamixel.parser import Parser
+from antennate.hardware.session import Session
+from antennate.params import BatteryParams, LayoutParams
+from antennate.twin.faults import Faults, read
+from antennate.twin.noise import Noise
+from antennate.twin.robot import TwinRobot
+
+IDS = LayoutParams().ids
+
+
+def broken(robot: TwinRobot, *texts: str) -> None:
+    Faults([read(text) for text in texts], IDS).apply(robot, robot.t)
+
+
+@pytest.mark.parametrize("ber", [1e-3, 1e-2])
+def test_as_many_bits_are_wrong_as_asked_for(ber: float) -> None:
+    noise, sent = Noise(seed=4), bytes(125_000)
+    noise.ber = ber
+    wrong = int(np.unpackbits(np.frombuffer(noise(sent), np.uint8)).sum())
+    assert wrong == noise.wrong
+    assert wrong == pytest.approx(1e6 * ber, abs=4 * (1e6 * ber) ** 0.5)
+
+
+def test_lost_bytes_leave_the_others_as_they_are_and_chance_has_a_seed() -> None:
+    noise, again, sent = Noise(seed=4), Noise(seed=4), bytes(range(250)) * 400
+    noise.loss = again.loss = 0.1
+    came = noise(sent)
+    assert came == again(sent)
+    assert len(sent) - len(came) == noise.lost == pytest.approx(10_000, abs=400)
+    steps = np.diff(np.frombuffer(came, np.uint8).astype(int)) % 250
+    assert steps.min() > 0  # in order: one value never comes twice in a row
+    assert steps.max() < 10
+
+
+def test_each_wire_has_the_noise_that_was_asked_for() -> None:
+    robot = build(TwinConfig())
+    broken(robot, "bus=ber:1e-3", "link=loss:0.02", "esp32=ber:1e-4")
+    assert (robot.bus.noise.ber, robot.bus.noise.loss) == (1e-3, 0.02)
+    assert (robot.noise.ber, robot.noise.loss) == (1e-4, 0.02)
+    broken(robot, "link=ber:1e-5")
+    assert (robot.bus.noise.ber, robot.noise.ber) == (1e-5, 1e-5)
+
+
+@pytest.mark.parametrize("text", ["link=ber:2", "link=loss:-1", "bus=loss:1.5", "esp32=ber:1e1"])
+def test_a_share_is_not_above_one_or_below_zero(text: str) -> None:
+    with pytest.raises(BadInputError, match="share of 0 to 1"):
+        read(text)
+
+
+class Truth:
+    """What was really sent: goals by the session, readings by the board."""
+
+    def __init__(self, made: Rig) -> None:
+        self.goals: dict[int, set[int]] = defaultdict(set)
+        self.readings: dict[int, tuple[int, int]] = {}
+        self.positions: dict[int, set[int]] = defaultdict(set)
+        self._parser, self._robot = Parser(), made.robot
+        send, encode = made.clock.write, made.robot._encoder.encode_sample_into
+
+        def write(data: bytes) -> None:
+            for packet in self._parser.feed(data):
+                self._note(packet.instruction, packet.params)
+            send(data)
+
+        def encode_sample_into(buffer: bytearray, seq: int, *rest: int) -> int:
+            self.readings[seq] = (rest[1], rest[2])
+            return encode(buffer, seq, *rest)
+
+        made.clock.write = write  # type: ignore[method-assign]
+        made.robot._encoder.encode_sample_into = encode_sample_into  # type: ignore[method-assign]
+
+    def _note(self, instruction: int, params: bytes) -> None:
+        for servo in self._robot.servos:
+            self.positions[servo.get("id")].add(servo.get("present_position"))
+        if instruction == Instruction.SYNC_WRITE and params[:4] == b"\x74\x00\x04\x00":
+            for at in range(4, len(params), 5):
+                goal = int.from_bytes(params[at + 1 : at + 5], "little", signed=True)
+                self.goals[params[at]].add(goal)
+
+
+@pytest.mark.parametrize(("ber", "worst"), [("1e-4", State.HOLD), ("1e-3", State.FAULT)])
+def test_L1_B3_bit_errors_are_counted_and_no_wrong_value_is_ever_used(
+    ber: str, worst: State
+) -> None:
+    """At 1e-4 of the answers of 19 servos one in five has a bit error, and it walks on."""
+    made = rig(TwinConfig())
+    truth, states = Truth(made), list[State]()
+
+    def look(session: Session, t: float) -> None:
+        if t < 1.5:
+            return
+        if not made.robot.noise.ber:
+            broken(made.robot, f"link=ber:{ber}")
+        out, newest = session.outputs, session.board.clock.newest
+        assert out is not None
+        assert newest is not None
+        states.append(out.state)
+        sample = newest.sample
+        assert (sample.left, sample.right) == truth.readings[sample.seq]
+        for servo in made.robot.servos:
+            if t > 1.6:
+                assert servo.get("goal_position") in truth.goals[servo.get("id")]
+        for servo, position in session.watch.positions.items():
+            assert position in truth.positions[servo]
+
+    report = drive(made.session, DriveConfig(dry_run=0.5, duration=6.0), arm=True, on_tick=look)
+    result = report.result(made.session)
+    assert made.robot.bus.noise.wrong > 50
+    assert made.robot.noise.wrong > 5
+    assert result["crc_errors"] >= 3
+    assert made.session.bus.tally.misses > 100
+    assert max(states[:-1]) <= worst
+    assert (states[-1] is State.FAULT) == (worst is State.FAULT)
+    assert not any(servo.torque for servo in made.robot.servos)
+
+
+def test_a_supply_sags_at_its_rate_and_servos_latch_when_it_is_below_their_limit() -> None:
+    robot = build(TwinConfig())
+    large, small = robot.servos[0], robot.servos[17]
+    robot.advance(1.0)
+    broken(robot, "bus=sag:2")
+    robot.advance(3.0)
+    assert large.get("present_input_voltage") == pytest.approx(71, abs=1)  # 11.1 V - 2 s * 2 V/s
+    assert small.get("present_input_voltage") == 50  # behind its regulator
+    assert large.get("hardware_error_status") == 0
+    robot.advance(3.6)  # 5.9 V: the limits are 6.0 and 3.5 V
+    assert large.get("hardware_error_status") == 1
+    assert small.get("hardware_error_status") == 0
+    robot.advance(5.0)
+    assert small.get("hardware_error_status") == 1
+
+
+def test_a_sagging_supply_gives_way_under_load() -> None:
+    """Two servos blocked at full strength: 2 * 1.3 A through 0.5 ohm."""
+    robot = build(TwinConfig(battery=BatteryParams(resistance=0.5, stall_current=1.3)))
+    broken(robot, "bus=sag:0")
+    for servo in robot.servos[:2]:
+        servo.set("torque_enable", 1)
+        servo.set("goal_position", servo.get("present_position") + 4000)
+    robot.battery.feed(robot.servos, 1.0)
+    assert robot.servos[5].get("present_input_voltage") == round(10 * (11.1 - 1.3))
