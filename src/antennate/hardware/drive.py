@@ -47,7 +47,7 @@ _GREETING_TIME = 3.0
 _ARMING_TIME = 1.0
 """Time after which torque must have come on, or the drive ends [s]."""
 _PATIENCE = 0.05
-_DOUBT = 0.07
+DOUBT = 0.07
 """Longest that a late answer is waited for [s]: less than the watchdogs' 100 ms."""
 
 
@@ -131,7 +131,7 @@ def prepare(config: DriveConfig, esp32: Port, bus: Port, clock: Any) -> Session:
     board = Board(esp32, config.limits.stale_age)
     await_board(board, clock)
     require_film(board, config.sensor_id)
-    master = Bus(bus, Timing(config.layout.baud, doubt=_DOUBT), clock=clock.now)
+    master = Bus(bus, Timing(config.layout.baud, doubt=DOUBT), clock=clock.now)
     require_servos(master, config.layout)
     return Session(
         board=board,
