@@ -7,10 +7,11 @@ the controller gets, the simulation begins where the session stands then, and no
 
 - its controller is first asked without readings, at the times at which the session's was;
 - its physics runs the ticks that arming took, with every joint held where it stood;
-- its goals are rounded, count a leg's whole turns and move as fast as the session lets them;
+- its goals are rounded to ticks, as servos take them;
 - its readings are clamped to the calibrated range, as the diagnosis does.
 
-From there on it runs alone, and shares nothing with the session but the trial's seed. The clamp is
+From there on it runs alone, and shares nothing with the session but the trial's seed. The limit of speed never acts: the twin's
+legs stand where its gait begins, and no leg is asked to be faster. The clamp is
 no formality: films in a tunnel bend up to 0.7 spans beyond the range, and `closed`, which looks at
 the bend itself, decides otherwise without it. `paper` does not.
 """
@@ -29,10 +30,10 @@ from antennate.experiments.twin import Watch
 from antennate.hardware.drive import DriveConfig, drive, prepare
 from antennate.hardware.joints import Joints
 from antennate.hardware.report import Report
-from antennate.hardware.session import FASTEST, Session
+from antennate.hardware.session import Session
 from antennate.loop import run_loop
 from antennate.params.layout import LayoutParams
-from antennate.records import AntennaFrame, Floats, Pose
+from antennate.records import AntennaFrame, Floats, Ints, Pose
 from antennate.sim.body import SimBody
 from antennate.twin.lockstep import BoardPort, LockstepClock
 from antennate.twin.robot import TwinRobot
@@ -149,14 +150,11 @@ def simulated_alike(
     """The trial in pure simulation, begun alike; its readings as they are if not `clamped`."""
     watch, walk = Watch(config, arm, trial), Walk()
     period, mind = config.controller.period, watch.controller
-    pose = None
     for t in start.blind:
-        pose = mind.step(AntennaFrame(t=np.array([t]), counts=np.full((1, 2), math.nan)))
-    if pose is None:
-        raise ValueError("expected a session with ticks before its first reading, found none")
+        mind.step(AntennaFrame(t=np.array([t]), counts=np.full((1, 2), math.nan)))
     film = config.controller.conditioning
     band = (film.counts_low, film.counts_high) if clamped else (-math.inf, math.inf)
-    body = _Begun(watch.body, layout, period, start, pose, band)
+    body = _Begun(watch.body, layout, period, start, band)
 
     def go_on(frame: AntennaFrame, pose: Pose) -> bool:
         walk.note(frame, int(mind.maneuver[0]), pose, body.sent)
@@ -180,19 +178,16 @@ class _Begun:
         layout: LayoutParams,
         period: float,
         start: Start,
-        pose: Pose,
         band: tuple[float, float],
     ) -> None:
-        self._body, self._servos, self._joints = body, Joints(layout), Joints(layout)
+        self._body, self._joints = body, Joints(layout)
         self._band = band
-        self._reach = Joints.reach(FASTEST * period)
         self._ahead = start.t - start.standing * period
-        self._goals: Floats = np.rint(self._servos.positions(body.world(0).drives()))
-        self._joints.align(self._goals, pose)
         self.sent: tuple[int, ...] = ()
         self._frame: AntennaFrame | None = body.read()
+        stood = np.rint(self._joints.positions(body.world(0).drives()))
         for tick in range(start.standing):
-            self._send()
+            self._send(stood)
             body.sleep_until((tick + 1) * period)
             self._frame = body.read()
 
@@ -208,12 +203,9 @@ class _Begun:
         return AntennaFrame(t=t, counts=np.clip(frame.counts, *self._band))
 
     def write(self, pose: Pose) -> None:
-        """Move the goals towards a pose, no faster than the session does."""
-        wanted = self._joints.ticks(pose) - self._goals
-        self._goals = self._goals + np.clip(wanted, -self._reach, self._reach)
-        self._send()
+        """Round, then command."""
+        self._send(self._joints.ticks(pose))
 
-    def _send(self) -> None:
-        goals = np.rint(self._goals)
+    def _send(self, goals: Floats | Ints) -> None:
         self.sent = tuple(goals.astype(int).tolist())
-        self._body.write(self._servos.pose(goals))
+        self._body.write(self._joints.pose(goals))
