@@ -113,9 +113,13 @@ def wall_clocks(source: str) -> set[str]:
         if isinstance(node, ast.Import):
             names = {alias.name for alias in node.names}
             found |= names & {"datetime", "calendar", "email.utils"}
-            found |= {f"{a.name} as {a.asname}" for a in node.names if a.name == "time" and a.asname}
+            found |= {
+                f"{a.name} as {a.asname}" for a in node.names if a.name == "time" and a.asname
+            }
         elif isinstance(node, ast.ImportFrom) and node.module in WALL:
-            found |= {alias.name for alias in node.names} & (WALL["time"] | {"*", "datetime", "date"})
+            found |= {alias.name for alias in node.names} & (
+                WALL["time"] | {"*", "datetime", "date"}
+            )
         elif isinstance(node, ast.Attribute):
             owner = getattr(node.value, "id", getattr(node.value, "attr", ""))
             of = "time" if owner == "time" else "datetime" if owner in ("datetime", "date") else ""

@@ -10,10 +10,10 @@ the controller gets, the simulation begins where the session stands then, and no
 - its goals are rounded to ticks, as servos take them;
 - its readings are clamped to the calibrated range, as the diagnosis does.
 
-From there on it runs alone, and shares nothing with the session but the trial's seed. The limit of speed never acts: the twin's
-legs stand where its gait begins, and no leg is asked to be faster. The clamp is
-no formality: films in a tunnel bend up to 0.7 spans beyond the range, and `closed`, which looks at
-the bend itself, decides otherwise without it. `paper` does not.
+From there on it runs alone, and shares nothing with the session but the trial's seed. The limit of
+speed never acts: the twin's legs stand where its gait begins, and none is asked to be faster. The
+clamp is no formality: films in a tunnel bend up to 0.7 spans beyond the range, and
+`closed`, which looks at the bend itself, decides otherwise without it. `paper` does not.
 """
 
 from __future__ import annotations
