@@ -14,6 +14,7 @@ from antennate.hardware.causes import Cause, State
 from antennate.hardware.drive import DriveConfig, await_board, decider, drive, require_servos
 from antennate.hardware.dynamixel.bringup import BringUpError
 from antennate.hardware.port import PortError
+from antennate.hardware.report import Report
 from antennate.hardware.session import Session
 from antennate.params.layout import LayoutParams
 from antennate.records import AntennaFrame, Maneuver, Pose
@@ -341,7 +342,7 @@ def test_T6_tracebacks_of_a_controller_are_kept_once_a_second() -> None:
     assert (len(kept), session.tracebacks.left_out) == (3, 248)
     assert "in step" in kept[0]
     assert "ZeroDivisionError: of the plugin" in kept[0]
-    assert antennate.hardware.report.Report().result(session)["tracebacks"] == list(kept)
+    assert Report().result(session)["tracebacks"] == list(kept)
 
 
 def test_L14_a_port_without_a_board_is_refused_and_the_text_says_what_came() -> None:
