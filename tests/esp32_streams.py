@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from antennate.hardware.esp32 import frame
 from antennate.hardware.esp32.wire import Sample
+from antennate.twin.robot import BOARD_SETTINGS
 
 BOOT = 0x1234ABCD
 Bytes = NDArray[np.uint8]
@@ -65,7 +66,7 @@ def frames_of(samples: list[Sample]) -> Bytes:
 
 def hello(boot: int = BOOT, rate: int = 100, tick_bits: int = 30, reset: int = 1) -> bytes:
     """Frame of a greeting."""
-    config = frame.config_hash(rate, 15, 34, 35)
+    config = frame.config_hash(rate, *BOARD_SETTINGS)
     return frame.encode_hello(boot, reset, config, b"\x24\x0a\xc4\x01\x02\x03", rate, tick_bits)
 
 

@@ -278,7 +278,7 @@ SERVOS = [
     ),
     Guard(
         "goals beyond 256 turns",
-        put(joints, "_MOST", math.inf),
+        put(joints, "MOST_TICKS", math.inf),
         partial(
             test_twin_robot.test_B14_a_goal_that_is_not_finite_or_too_far_is_refused_as_a_whole, 1e4
         ),

@@ -20,6 +20,7 @@ from esp32_streams import encoded, made
 from antennate.hardware.esp32 import frame
 from antennate.hardware.esp32.decoder import FrameDecoder
 from antennate.hardware.esp32.wire import Hello, Reset, Sample
+from antennate.twin.robot import BOARD_SETTINGS
 
 ROOT = Path(__file__).parents[1]
 FIRMWARE = ROOT / "firmware"
@@ -92,7 +93,7 @@ def test_it_streams_at_its_rate_and_greets_every_second(program: Program) -> Non
     assert len(set(greetings)) == 1
     assert greetings[0].rate == 100
     assert greetings[0].device_id == "240ac40102030000"
-    assert greetings[0].config_hash == frame.config_hash(100, 15, 34, 35)
+    assert greetings[0].config_hash == frame.config_hash(100, *BOARD_SETTINGS)
     assert [found.seq for found in samples] == list(range(len(samples)))
     assert len(samples) == pytest.approx(350, abs=1)
     assert {found.boot_id for found in samples} == {greetings[0].boot_id}

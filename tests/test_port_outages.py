@@ -187,7 +187,7 @@ def test_L14_swapped_ports_are_refused_by_name_and_no_servo_hears_a_byte() -> No
     begin = made.clock.now()
     with pytest.raises(BadInputError, match=r"expected an antenna board.*swapped"):
         prepare(DriveConfig(), esp32=bus, bus=board, clock=made.clock)
-    assert made.clock.now() - begin <= 3.1
+    assert made.clock.now() - begin <= 2.0
     assert not bus.sent
     assert not board.sent
 

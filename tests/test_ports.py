@@ -6,6 +6,7 @@ import os
 import pty
 import subprocess
 import sys
+import threading
 import time
 import tty
 from collections.abc import Callable, Iterator
@@ -18,6 +19,7 @@ import pytest
 from esp32_streams import encoded, hello, made
 from port_pieces import Pieces
 
+from antennate.hardware import reconnecting
 from antennate.hardware.board import Board
 from antennate.hardware.drive import await_board
 from antennate.hardware.esp32.frame import encode_request
@@ -279,6 +281,69 @@ def test_L12_a_port_that_opens_slowly_does_not_hold_up_the_loop() -> None:
     assert not port.gone
     assert longest < 0.5  # half of what opening takes, on however busy a machine
     port.close()
+
+
+@pytest.mark.parametrize("error", [TypeError("join() argument"), OSError("gone"), KeyError("x")])
+def test_L12_B6_whatever_a_look_raises_the_next_one_is_made(error: Exception) -> None:
+    """pyserial raises TypeError while files of sysfs vanish."""
+    now, results = [0.0], [error, Pieces(b"back")]
+
+    def look() -> Pieces:
+        result = results.pop(0)
+        if isinstance(result, Exception):
+            raise result
+        return result
+
+    first = Pieces()
+    results.insert(0, first)
+    port = Reconnecting(look, clock=lambda: now[0], start=lambda work: work())
+    first.out = True
+    with pytest.raises(PortError, match="cable is out"):
+        port.drain()
+    now[0] += RETRY
+    with pytest.raises(PortError, match=type(error).__name__):
+        port.drain()
+    now[0] += RETRY
+    assert port.read(4, 0.0) == b"back"
+
+
+def test_L12_B6_what_a_look_finds_after_closing_is_closed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(reconnecting, "_FAREWELL", 0.01)
+    first, late, go = Pieces(), Pieces(), threading.Event()
+    there = [first]
+
+    def look() -> Pieces:
+        if there:
+            return there.pop()
+        assert go.wait(20.0)
+        return late
+
+    port = Reconnecting(look, clock=iter([0.0, 1.0]).__next__)
+    first.out = True
+    for _ in range(2):
+        with pytest.raises(PortError):
+            port.drain()
+    port.close()
+    assert not late.out
+    go.set()
+    assert port._thread is not None
+    port._thread.join(20.0)
+    assert late.out
+
+
+def test_L12_B6_adapters_that_cannot_be_listed_are_an_error_of_the_port_and_it_is_closed(
+    monkeypatch: pytest.MonkeyPatch, plug: Callable[[], Terminal], tmp_path: Path
+) -> None:
+    def comports() -> list[Any]:
+        raise TypeError("expected str, bytes or os.PathLike object, not NoneType")
+
+    plug()
+    finder = SerialFinder(str(tmp_path / "port"), 115_200)
+    with monkeypatch.context() as patch:
+        patch.setattr(serial_finder.list_ports, "comports", comports)
+        with pytest.raises(PortError, match=r"could not list serial ports: TypeError.*try again"):
+            finder()
+    finder().close()  # nobody holds it any more
 
 
 def streaming(board: Board, terminal: Terminal, first: int, begin: float) -> float:

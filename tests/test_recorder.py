@@ -8,11 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 from doctor_rig import Patient
+from esp32_streams import encoded, hello, made
+from port_pieces import Pieces
 
 from antennate.cli import BAD_INPUT, main
 from antennate.errors import BadInputError, OutputError
 from antennate.experiments.calibrate import CalibrateConfig, run
 from antennate.experiments.recording import RecordingParams
+from antennate.hardware.esp32 import frame
 from antennate.hardware.esp32.stream import Stream
 from antennate.hardware.recorder import Recorder
 from antennate.params import RecordParams
@@ -136,6 +139,16 @@ def test_what_cannot_be_recorded_is_refused(
     assert said in error
     assert error.count("\n") == 1
     assert list(tmp_path.iterdir()) == []
+
+
+def test_E8_readings_of_a_board_with_old_firmware_are_not_recorded(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    port = Pieces(hello() + b"".join(encoded(made(n)) for n in range(9)))
+    monkeypatch.setattr(frame, "FIRMWARE", (99, 0, 0))
+    stream = Stream(port, lambda: 0.0)
+    assert stream.take(0.0) == []
+    assert "this host needs 99.0.0" in stream.refusals[0]
 
 
 def test_a_file_is_never_overwritten_and_one_without_readings_is_not_left(tmp_path: Path) -> None:

@@ -17,6 +17,7 @@ from antennate.hardware.dynamixel.bringup import BringUpError
 from antennate.hardware.dynamixel.packets import Instruction
 from antennate.hardware.dynamixel.parser import Parser
 from antennate.hardware.port import PortError
+from antennate.hardware.report import Report
 from antennate.hardware.session import Session
 from antennate.hardware.signals import STOPS
 from antennate.params.layout import LayoutParams
@@ -377,6 +378,27 @@ def test_B19_a_servo_that_does_not_confirm_is_named() -> None:
     report = drive(made.session, CONFIG, arm=True, on_tick=stop)
     assert report.on == [4]
     assert not report.safe
+
+
+def test_T6_tracebacks_of_a_controller_are_kept_once_a_second() -> None:
+    session = rig(TwinConfig()).session
+
+    class Broken:
+        contact = maneuver = np.zeros((1, 2), int)
+
+        def step(self, frame: object) -> object:
+            raise ZeroDivisionError("of the plugin")
+
+    session.decider = Broken()  # type: ignore[assignment]
+    session.clock.sleep_until(1.0)
+    for tick in range(251):
+        session.clock.sleep_until(1.0 + 0.01 * tick)
+        session.step(session.frame)
+    kept = session.tracebacks.kept
+    assert (len(kept), session.tracebacks.left_out) == (3, 248)
+    assert "in step" in kept[0]
+    assert "ZeroDivisionError: of the plugin" in kept[0]
+    assert Report().result(session)["tracebacks"] == list(kept)
 
 
 def test_L14_a_port_without_a_board_is_refused_and_the_text_says_what_came() -> None:

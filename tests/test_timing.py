@@ -9,11 +9,22 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import antennate.hardware
+import antennate
 from antennate.errors import ConfigError
 from antennate.hardware.timing import LoopTiming
 
 PERIOD = 0.01
+LIBRARY = Path(antennate.__path__[0])
+MODULES = sorted(
+    path.relative_to(LIBRARY)
+    for part in ("hardware", "twin")
+    for path in (LIBRARY / part).rglob("*.py")
+)
+WALL = {
+    "time": {"time", "time_ns", "ctime", "localtime", "gmtime", "strftime", "asctime"},
+    "datetime": {"now", "utcnow", "today"},
+}
+"""What asks for the time of day, by the module it belongs to."""
 PURE = ("causes", "diagnosis", "rate", "supervisor", "timing", "touch_check")
 
 
@@ -95,10 +106,53 @@ def test_a_pace_that_cannot_be_kept_is_refused(start: float, period: float) -> N
         LoopTiming(start, period)
 
 
+def wall_clocks(source: str) -> set[str]:
+    """Names by which a module asks for the time of day, or could."""
+    found = set[str]()
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Import):
+            names = {alias.name for alias in node.names}
+            found |= names & {"datetime", "calendar", "email.utils"}
+            found |= {
+                f"{a.name} as {a.asname}" for a in node.names if a.name == "time" and a.asname
+            }
+        elif isinstance(node, ast.ImportFrom) and node.module in WALL:
+            found |= {alias.name for alias in node.names} & (
+                WALL["time"] | {"*", "datetime", "date"}
+            )
+        elif isinstance(node, ast.Attribute):
+            owner = getattr(node.value, "id", getattr(node.value, "attr", ""))
+            of = "time" if owner == "time" else "datetime" if owner in ("datetime", "date") else ""
+            found |= {f"{owner}.{node.attr}"} if of and node.attr in WALL[of] else set()
+            found |= {node.attr} & {"CLOCK_REALTIME"}
+    return found
+
+
+def test_T4_no_module_between_bytes_and_motion_asks_for_the_time_of_day() -> None:
+    assert len(MODULES) > 50
+    for path in MODULES:
+        assert not wall_clocks((LIBRARY / path).read_text(encoding="utf-8")), path
+
+
+@pytest.mark.parametrize(
+    "source",
+    [
+        "import time\ntime.time()",
+        "import time as t",
+        "from time import time_ns",
+        "import datetime",
+        "from datetime import datetime\ndatetime.now()",
+        "import time\ntime.clock_gettime(time.CLOCK_REALTIME)",
+    ],
+)
+def test_T4_such_a_question_is_seen(source: str) -> None:
+    assert wall_clocks(source)
+
+
 @pytest.mark.parametrize("module", PURE)
 def test_T4_nothing_here_can_read_a_clock(module: str) -> None:
     """A step of the wall clock has no effect on what never asks for it."""
-    path = Path(antennate.hardware.__path__[0]) / f"{module}.py"
+    path = LIBRARY / "hardware" / f"{module}.py"
     imported = set()
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):

@@ -19,13 +19,15 @@ from antennate.experiments.passage import Passage
 from antennate.experiments.tunnel import TunnelConfig, prepare
 from antennate.hardware.board import Board
 from antennate.hardware.body import HardwareBody
+from antennate.hardware.drive import DOUBT
 from antennate.hardware.dynamixel import bringup
+from antennate.hardware.dynamixel.answers import Timing
 from antennate.hardware.dynamixel.bus import Bus
 from antennate.hardware.joints import Joints
 from antennate.hardware.session import Session
 from antennate.hardware.trust import Trust
 from antennate.loop import run_loop
-from antennate.params import Params, TouchCheckParams, number
+from antennate.params import Params, SupervisorParams, TouchCheckParams, number
 from antennate.params.base import GATHERED
 from antennate.params.layout import LayoutParams
 from antennate.params.twin import BatteryParams
@@ -35,8 +37,6 @@ from antennate.twin.hand import Hand
 from antennate.twin.lockstep import BoardPort, LockstepClock
 from antennate.twin.robot import TwinRobot
 
-AGE_LIMIT = 0.05
-"""Readings older than this are not acted upon [s]; measured: leaves 40 ms for the bus in 100 ms."""
 _WARM_UP = 2.0
 """Longest time until the board's clock is known [s]."""
 
@@ -124,7 +124,7 @@ class _Rounded:
         self._body.write(self._joints.pose(self._joints.ticks(pose)))
 
 
-class _Watch:
+class Watch:
     """The judge of a trial, and what was decided."""
 
     def __init__(self, config: TunnelConfig, arm: Arm, trial: int) -> None:
@@ -177,7 +177,7 @@ class Stage:
 
 def simulation(config: TunnelConfig, arm: Arm, trial: int, layout: LayoutParams) -> Stage:
     """The trial in pure simulation, goals rounded to ticks."""
-    watch = _Watch(config, arm, trial)
+    watch = Watch(config, arm, trial)
     body = _Rounded(watch.body, Joints(layout))
     period = config.controller.period
     return Stage(body, watch.controller, period, watch.go_on, watch.decisions)
@@ -204,8 +204,8 @@ def rig(config: TwinConfig, arm: Arm = "closed", touch: TouchCheckParams | None 
     robot, params = build(config), config.world.controller
     clock = LockstepClock(robot)
     session = Session(
-        board=Board(BoardPort(robot, clock), AGE_LIMIT),
-        bus=Bus(clock, clock=clock.now),
+        board=Board(BoardPort(robot, clock), SupervisorParams().stale_age),
+        bus=Bus(clock, Timing(config.layout.baud, doubt=DOUBT), clock=clock.now),
         joints=Joints(config.layout),
         clock=clock,
         decider=Controller(params, arm),
@@ -222,12 +222,12 @@ def before_twin(config: TunnelConfig, arm: Arm, trial: int, layout: LayoutParams
     Raises:
         BringUpError: The servos did not come up.
     """
-    watch = _Watch(config, arm, trial)
+    watch = Watch(config, arm, trial)
     period = config.controller.period
     robot = TwinRobot(watch.body, layout, period, boot_id=trial + 1)
     clock = LockstepClock(robot)
-    board = Board(BoardPort(robot, clock), AGE_LIMIT)
-    bus = Bus(clock, clock=clock.now)
+    board = Board(BoardPort(robot, clock), SupervisorParams().stale_age)
+    bus = Bus(clock, Timing(layout.baud, doubt=DOUBT), clock=clock.now)
     while board.newest(clock.now()) is None and clock.now() < _WARM_UP:
         clock.sleep(period)
         board.poll(clock.now())

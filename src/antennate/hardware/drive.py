@@ -32,6 +32,7 @@ from antennate.hardware.trust import Trust
 from antennate.loop import run_loop
 from antennate.params import (
     ControllerParams,
+    DoctorParams,
     DriftParams,
     NetworkParams,
     Params,
@@ -42,14 +43,15 @@ from antennate.params import (
 from antennate.params.layout import LayoutParams
 from antennate.records import AntennaFrame, Pose
 
-_GREETING_TIME = 3.0
-"""A board greets within this time [s], also one that opening the port has reset."""
+_GREETING_TIME = DoctorParams().greeting
+_EVIDENCE_TIME = 1.5
+"""Silence on --esp32 while --bus speaks unasked that shows the two swapped [s]."""
 _ARMING_TIME = 1.0
 """Time after which torque must have come on, or the drive ends [s]."""
 _STAND = 0.3
 """Time that the robot holds its pose before the torque goes off [s]."""
 _PATIENCE = 0.05
-_DOUBT = 0.07
+DOUBT = 0.07
 """Longest that a late answer is waited for [s]: less than the watchdogs' 100 ms."""
 
 
@@ -139,9 +141,9 @@ def connect(
 def prepare(config: DriveConfig, esp32: Port, bus: Port, clock: Any) -> Session:
     """A session before two open ports, after both sides have said who they are."""
     board = Board(esp32, config.limits.stale_age)
-    await_board(board, clock)
+    await_board(board, clock, bus)
     require_film(board, config.sensor_id)
-    master = Bus(bus, Timing(config.layout.baud, doubt=_DOUBT), clock=clock.now)
+    master = Bus(bus, Timing(config.layout.baud, doubt=DOUBT), clock=clock.now)
     require_servos(master, config.layout)
     board.count_anew(clock.now())
     return Session(
@@ -159,14 +161,22 @@ def prepare(config: DriveConfig, esp32: Port, bus: Port, clock: Any) -> Session:
     )
 
 
-def await_board(board: Board, clock: Any) -> None:
-    """Wait for a greeting and samples.
+def await_board(board: Board, clock: Any, bus: Port | None = None) -> None:
+    """Wait for a greeting and samples; what the bus says unasked is read, and nothing written.
 
     Raises:
         BadInputError: None came; says what came instead.
     """
-    end = clock.now() + _GREETING_TIME
+    begin, unasked = clock.now(), 0
+    end = begin + _GREETING_TIME
     while board.clock.newest is None:
+        unasked += 0 if bus is None else _unasked(bus)
+        silent = not board.decoder.counters.received
+        if silent and unasked and clock.now() > begin + _EVIDENCE_TIME:
+            raise BadInputError(
+                f"--esp32: expected an antenna board, found silence, and {unasked} bytes on --bus "
+                "that no servo was asked for; --esp32 and --bus are swapped"
+            )
         if clock.now() > end:
             came = board.decoder.counters
             why = (
@@ -183,6 +193,12 @@ def await_board(board: Board, clock: Any) -> None:
             )
         clock.sleep_until(clock.now() + _PATIENCE)
         board.poll(clock.now())
+
+
+def _unasked(bus: Port) -> int:
+    with contextlib.suppress(PortError):  # the bus has its own check
+        return bus.drain()
+    return 0
 
 
 def require_servos(bus: Bus, layout: LayoutParams) -> None:

@@ -9,12 +9,10 @@ import numpy as np
 from antennate.anatomy import LINK_COUNT, YAW_COUNT
 from antennate.errors import AntennateError
 from antennate.hardware import roster
-from antennate.params.layout import TICKS_A_TURN, LayoutParams
+from antennate.params.layout import MOST_TICKS, TICKS_A_TURN, LayoutParams
 from antennate.records import Floats, Ints, Pose
 
 _STEP = 2.0 * math.pi / TICKS_A_TURN
-_MOST = 1_048_575
-"""Farthest position in extended mode, 256 turns either way [ticks]."""
 
 
 class PoseError(AntennateError):
@@ -46,7 +44,7 @@ class Joints:
         if angles.shape != self._sign.shape:
             raise PoseError(f"expected {len(self.ids)} joint angles, found {len(angles)}")
         exact = self.positions(angles)
-        bad = ~(abs(exact) <= _MOST)
+        bad = ~(abs(exact) <= MOST_TICKS)
         if bad.any():
             first = int(np.argmax(bad))
             raise PoseError(

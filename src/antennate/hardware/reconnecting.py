@@ -60,7 +60,8 @@ class Reconnecting:
         self._line: Line | None = find()
         self._old: Line | None = None
         self._results: SimpleQueue[Line | PortError] = SimpleQueue()
-        self._looking = False
+        self._looking = self._closed = False
+        self._lock = threading.Lock()
         self._thread: threading.Thread | None = None
         self._due = 0.0
         self._why = ""
@@ -96,7 +97,9 @@ class Reconnecting:
             raise self._lose(error) from None
 
     def close(self) -> None:
-        """Let it go for good."""
+        """Let it go for good; a look that lasts longer lets go of what it finds by itself."""
+        with self._lock:
+            self._closed = True
         if self._thread is not None:
             self._thread.join(_FAREWELL)
         self._collect()
@@ -122,11 +125,19 @@ class Reconnecting:
     def _look(self) -> None:
         """In the background: let go of the old one, find the new one."""
         old, self._old = self._old, None
-        _close(old)
         try:
-            self._results.put(self._find())
+            _close(old)
+            found: Line | PortError = self._find()
         except PortError as error:
-            self._results.put(error)
+            found = error
+        except Exception as error:  # noqa: BLE001 a thread that ends would never look again
+            found = PortError(f"could not look for the port: {type(error).__name__}: {error}")
+        with self._lock:
+            if not self._closed:
+                self._results.put(found)
+                return
+        if not isinstance(found, PortError):
+            _close(found)
 
     def _collect(self) -> None:
         with contextlib.suppress(Empty):

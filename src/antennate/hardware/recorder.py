@@ -11,12 +11,12 @@ from typing import TypeAlias
 
 from antennate.errors import BadInputError
 from antennate.hardware.esp32.stream import Reading, Stream
-from antennate.params import RecordParams
+from antennate.params import DoctorParams, RecordParams
 
 Ask: TypeAlias = Callable[[str], Callable[[], bool]]
 """Tells a person what to do; the function it returns says whether that has been confirmed."""
 
-SILENCE = 3.0
+SILENCE = DoctorParams().greeting
 """Time without a reading after which a recording ends; a board greets within it [s]."""
 _PATIENCE = 0.02
 _MICROSECOND = 1e-6

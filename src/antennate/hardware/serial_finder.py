@@ -55,7 +55,11 @@ class SerialFinder:
         if self._known is not None:
             return SerialPort(find(self._known, self._path), self._baud, self._flag)
         line = SerialPort(self._path, self._baud, self._flag)
-        self._known = identity(self._path)
+        try:
+            self._known = identity(self._path)
+        except BaseException:
+            line.close()
+            raise
         return line
 
 
@@ -95,8 +99,16 @@ def _alike(known: Identity, other: Identity) -> bool:
 
 
 def adapters() -> dict[str, Identity]:
-    """All serial USB adapters by their device file."""
-    ports: list[Any] = list(list_ports.comports())
+    """All serial USB adapters by their device file.
+
+    Raises:
+        PortError: They cannot be listed, as while one of them is being unplugged.
+    """
+    try:
+        ports: list[Any] = list(list_ports.comports())
+    except Exception as error:  # pyserial reads files of sysfs that may vanish meanwhile
+        what = f"{type(error).__name__}: {error}"
+        raise PortError(f"could not list serial ports: {what}; try again") from error
     return {
         port.device: Identity(port.vid, port.pid, port.serial_number or "", port.location or "")
         for port in ports

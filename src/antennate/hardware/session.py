@@ -30,6 +30,7 @@ from antennate.hardware.joints import Joints, PoseError
 from antennate.hardware.port import PortError
 from antennate.hardware.supervisor import Supervisor
 from antennate.hardware.timing import LoopTiming
+from antennate.hardware.tracebacks import Tracebacks
 from antennate.hardware.trust import Trust
 from antennate.hardware.turns import Turns
 from antennate.hardware.watch import ServoWatch
@@ -110,6 +111,7 @@ class Session:
         watch: What the servos say.
         turns: How far legs have turned.
         tally: What was done.
+        tracebacks: Of the controller.
         timing: Whether the loop keeps its pace, None before the first tick.
         frame: What the controller got in the last tick.
         pose: What it said.
@@ -141,6 +143,7 @@ class Session:
         self.turns = Turns(bus, joints)
         self.orders = Orders()
         self.tally = Tally()
+        self.tracebacks = Tracebacks()
         self.timing: LoopTiming | None = None
         self.outputs: Outputs | None = None
         self.frame = AntennaFrame(t=np.zeros(1), counts=np.full((1, 2), math.nan))
@@ -232,6 +235,7 @@ class Session:
             pose = self.decider.step(frame)
         except Exception as error:  # noqa: BLE001 a plugged-in controller may raise anything
             thought.failure = f"{type(error).__name__}: {error}"
+            self.tracebacks.keep(self.clock.now(), error)
             return _nowhere()
         angles = (pose.yaw, pose.leg, pose.antenna)
         thought.finite = all(bool(np.isfinite(a).all()) for a in angles)

@@ -11,7 +11,9 @@ from antennate.params.base import Params, number
 
 _Id = Annotated[int, Field(ge=0, le=252)]
 _Direction = Literal[-1, 1]
-_Zero = Annotated[int, Field(ge=-1_048_575, le=1_048_575)]
+MOST_TICKS = 1_048_575
+"""Farthest position in extended mode, 256 turns either way [ticks]."""
+_Zero = Annotated[int, Field(ge=-MOST_TICKS, le=MOST_TICKS)]
 TICKS_A_TURN = 4096
 """Datasheet of both models: 4096 pulses a revolution."""
 _STRAIGHT = 2048

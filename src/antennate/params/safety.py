@@ -108,9 +108,9 @@ class DiagnosisParams(Params):
         le=1000,
     )
     beyond: float = number(
-        0.5,
+        0.8,
         "1",
-        "assumed: drift and harder bends stay within half a span",
+        "measured: simulated films bend up to 0.70 spans beyond; a tenth for drift",
         "distance from the calibrated range up to which a reading is clamped and not refused, in "
         "spans",
         ge=0,

@@ -37,6 +37,8 @@ from antennate.twin.registers import Servo
 
 GREETING_PERIOD = 1.0
 """Time between greetings of the board [s]."""
+BOARD_SETTINGS = (15, 34, 35)
+"""Burst and pins of firmware/config.py."""
 BOOT_TICKS = 50
 """Samples that a starting board does not send."""
 _STANDING_NOISE = 2.5
@@ -255,7 +257,7 @@ class TwinRobot:
 
     def _greet(self) -> None:
         rate = round(1 / self._period)
-        settings = frame.config_hash(rate, 15, 34, 35)
+        settings = frame.config_hash(rate, *BOARD_SETTINGS)
         reset = frame.RESET_HARD if self._booted else frame.RESET_POWER_ON
         self._stream += frame.encode_hello(self._boot_id, reset, settings, _DEVICE, rate)
 

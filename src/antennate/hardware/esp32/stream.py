@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from antennate.hardware.esp32.clock import DeviceClock, Timed, Verdict
 from antennate.hardware.esp32.decoder import FrameDecoder
-from antennate.hardware.esp32.wire import Hello, Sample
+from antennate.hardware.esp32.wire import Hello, Sample, objections
 from antennate.hardware.port import Port
 
 _CHUNK = 4096
@@ -37,7 +37,7 @@ class Stream:
         decoder: With the counters of its bytes.
         clock: With the verdicts on its samples.
         hello: Its newest greeting, None before the first.
-        refusals: Frames refused since the beginning, each reason once.
+        refusals: Boards and frames refused since the beginning, each reason once.
     """
 
     def __init__(self, port: Port, now: Callable[[], float]) -> None:
@@ -54,10 +54,20 @@ class Stream:
         now, readings = self._now(), list[Reading]()
         for frame in self.decoder.feed(data):
             if isinstance(frame, Hello):
-                self.hello = frame
-                self.clock.greet(frame)
+                self._greet(frame)
             elif not isinstance(frame, Sample):
-                self.refusals += [frame.reason] if frame.reason not in self.refusals else []
+                self._refuse(frame.reason)
             elif self.clock.take(frame, now) is Verdict.USED and self.clock.newest is not None:
                 readings.append(Reading(self.clock.newest, now))
         return readings
+
+    def _greet(self, hello: Hello) -> None:
+        """Take a greeting; of a board that is refused no sample is ever used."""
+        self.hello = hello
+        if found := objections(hello):
+            self._refuse(*found)
+            return
+        self.clock.greet(hello)
+
+    def _refuse(self, *reasons: str) -> None:
+        self.refusals += [reason for reason in reasons if reason not in self.refusals]

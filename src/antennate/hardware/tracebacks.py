@@ -1,0 +1,33 @@
+"""Where a controller has failed, for the one who wrote it; a failing one floods nothing."""
+
+from __future__ import annotations
+
+import math
+import traceback
+from collections import deque
+
+EVERY = 1.0
+"""Shortest time between two that are kept [s]."""
+_KEPT = 16
+
+
+class Tracebacks:
+    """The newest tracebacks, at most one a second.
+
+    Attributes:
+        kept: Their texts, oldest first.
+        left_out: Failures whose traceback was not kept.
+    """
+
+    def __init__(self) -> None:
+        self.kept: deque[str] = deque(maxlen=_KEPT)
+        self.left_out = 0
+        self._last = -math.inf
+
+    def keep(self, now: float, error: BaseException) -> None:
+        """Keep that of an error at a time [s], unless there was one just now."""
+        if now - self._last < EVERY:
+            self.left_out += 1
+            return
+        self._last = now
+        self.kept.append("".join(traceback.format_exception(error)))

@@ -1,0 +1,50 @@
+"""A whole trial by `drive`, through session, supervisor and bytes, and in pure simulation."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from antennate.controller import Arm
+from antennate.experiments.driven import driven, simulated_alike
+from antennate.experiments.tunnel import TunnelConfig
+from antennate.hardware.causes import State
+from antennate.params.layout import LayoutParams
+from antennate.records import Maneuver
+
+CONFIG = TunnelConfig(seed=0)
+LAYOUT = LayoutParams()
+
+
+def same(arm: Arm, trial: int, ticks: float) -> tuple[set[int], int, str]:
+    """Both ways agree in every tick; the maneuvers, the number of ticks and the end."""
+    one = driven(CONFIG, arm, trial, LAYOUT, ticks)
+    other = simulated_alike(CONFIG, arm, trial, LAYOUT, one.start, ticks)
+    assert one.walk.maneuvers == other.maneuvers
+    assert one.walk.poses == other.poses
+    assert one.walk.readings == other.readings
+    assert one.walk.goals == other.goals
+    assert one.walk.status == other.status
+    assert one.report.worst <= State.DEGRADED
+    assert one.report.safe
+    return set(other.maneuvers), len(other.maneuvers), other.status
+
+
+def test_M7_drive_decides_as_the_pure_simulation_from_the_first_reading_on() -> None:
+    met, ticks, _ = same("paper", 0, 400)
+    assert {Maneuver.FORWARD, Maneuver.REVERSE} < met
+    assert ticks == 400
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("arm", "trial"), [("closed", 0), ("closed", 1), ("paper", 0)])
+def test_M7_drive_decides_as_the_pure_simulation_for_a_whole_trial(arm: Arm, trial: int) -> None:
+    met, ticks, status = same(arm, trial, math.inf)
+    assert Maneuver.REVERSE in met
+    assert ticks > 1000
+    assert status
+    if arm == "paper":  # sees contacts alone, and no clamp
+        one = driven(CONFIG, arm, trial, LAYOUT, 1000)
+        free = simulated_alike(CONFIG, arm, trial, LAYOUT, one.start, 1000, clamped=False)
+        assert (one.walk.maneuvers, one.walk.poses) == (free.maneuvers, free.poses)
