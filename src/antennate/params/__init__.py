@@ -11,7 +11,7 @@ from antennate.params.base import Params, number
 from antennate.params.bench import BenchVariationParams, WallParams
 from antennate.params.doctor import DoctorParams
 from antennate.params.endurance import DriftParams, TurnsParams
-from antennate.params.layout import JointsParams, LayoutParams
+from antennate.params.layout import BasesParams, JointsParams, LayoutParams, YawsParams
 from antennate.params.log import LogParams
 from antennate.params.mind import (
     ConditioningParams,
@@ -48,6 +48,7 @@ from antennate.params.touch import (
 __all__ = [
     "N_MM_PER_DEG",
     "AntennaParams",
+    "BasesParams",
     "BenchPhysicsParams",
     "BenchVariationParams",
     "BouldersWallParams",
@@ -88,5 +89,6 @@ __all__ = [
     "TurnsParams",
     "VariationParams",
     "WallParams",
+    "YawsParams",
     "number",
 ]
