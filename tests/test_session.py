@@ -465,7 +465,7 @@ def test_B18_a_walk_writes_no_eeprom() -> None:
     assert sum(servo.eeprom_writes for servo in log.rig.robot.servos) == 0
 
 
-def test_B13_a_supply_that_cannot_be_read_any_more_is_not_known_after_a_second() -> None:
+def test_B13_a_supply_that_cannot_be_read_any_more_is_not_known_after_4_s() -> None:
     def act(rig: Rig, t: float) -> None:
         if t >= 2.0:
             rig.robot.bus.trouble[1] = Trouble(Fault.SILENT)
@@ -478,10 +478,10 @@ def test_B13_a_supply_that_cannot_be_read_any_more_is_not_known_after_a_second()
         log(session, t)
         supply.append(session.watch.supply)
 
-    drive(made.session, DriveConfig(dry_run=3.5, duration=3.5), arm=False, on_tick=note)
+    drive(made.session, DriveConfig(dry_run=7.0, duration=7.0), arm=False, on_tick=note)
     known = np.isfinite(supply)
     assert known[(np.array(log.t) > 1.0) & (np.array(log.t) < 2.2)].all()
-    assert not known[np.array(log.t) > 3.2].any()
+    assert not known[np.array(log.t) > 6.1].any()
     assert Cause.SUPPLY_UNKNOWN in log.causes[-1]
 
 

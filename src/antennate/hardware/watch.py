@@ -22,8 +22,8 @@ _ALONE = 0.003
 """Time for one servo asked alone [s]."""
 _PATIENCE = 10
 """Ticks after which watchdogs and supply are looked at even if time is short."""
-_FORGOTTEN = 3
-"""Turns of the first servo without its voltage after which the supply is not known; 0.6 s."""
+_OLD = 4.0
+"""Age from which on the supply is not known [s]; twice what a round of all takes at the slowest."""
 
 
 class ServoWatch:
@@ -68,7 +68,7 @@ class ServoWatch:
         self.loose: int | None = None
         self.disarmed: tuple[int, ...] = ()
         self.supply = math.nan
-        self._silence = 0
+        self._weighed = -math.inf
         self.bus_error = ""
 
     def arm(self, armed: bool) -> None:
@@ -87,6 +87,8 @@ class ServoWatch:
         except PortError as error:
             self.bus_error = str(error)
             self.missed = {servo: count + 1 for servo, count in self.missed.items()}
+        if self._clock() - self._weighed > _OLD:
+            self.supply = math.nan
 
     def _look(self) -> None:
         end = self._clock() + self._budget
@@ -100,10 +102,12 @@ class ServoWatch:
         self._waited = 0
         at = next(self._turn)
         servo = self._ids[at]
-        if not self.missed[servo]:
-            self._guard(servo)
-        if at == 0:
-            self._weigh(servo)
+        if self.missed[servo]:
+            return
+        self._guard(servo)
+        if at == 0 and (volts := self._one(servo, Span(_VOLTAGE.address, 2))) is not None:
+            self.supply = _VOLT * _VOLTAGE.decode(volts)
+            self._weighed = self._clock()
 
     def _guard(self, servo: int) -> None:
         """Whether a servo still has the watchdog and the torque that it was given."""
@@ -119,15 +123,6 @@ class ServoWatch:
         if torque is not None or lost:
             lost |= torque is not None and not _TORQUE.decode(torque)
             self.disarmed = _with(self.disarmed, servo, lost)
-
-    def _weigh(self, servo: int) -> None:
-        """The supply; a voltage that is old says nothing."""
-        volts = None if self.missed[servo] else self._one(servo, Span(_VOLTAGE.address, 2))
-        self._silence = 0 if volts is not None else self._silence + 1
-        if volts is not None:
-            self.supply = _VOLT * _VOLTAGE.decode(volts)
-        elif self._silence >= _FORGOTTEN:
-            self.supply = math.nan
 
     def _note(self, servo: int, said: Answer, dead: bool) -> None:
         if not isinstance(
