@@ -95,11 +95,11 @@ def test_B14_a_yaw_or_an_antenna_beyond_its_limit_is_refused_as_a_whole() -> Non
     )
     joints = Joints(narrow)
     joints.ticks(pose(yaw=-1.0))
-    with pytest.raises(PoseError, match="within 1 rad for servo 1, found -1.001"):
+    with pytest.raises(PoseError, match=r"within 1 rad for servo 1, found -1\.001"):
         joints.ticks(pose(yaw=-1.001))
     sent = pose()
     sent.antenna[0, 1] = 0.501
-    with pytest.raises(PoseError, match=r"within 0.5 rad for servo 19, found 0.501"):
+    with pytest.raises(PoseError, match=r"within 0\.5 rad for servo 19, found 0\.501"):
         joints.ticks(sent)
 
 

@@ -47,8 +47,8 @@ class Joints:
         angles = np.concatenate([pose.yaw.ravel(), pose.leg.ravel(), pose.antenna.ravel()])
         if angles.shape != self._sign.shape:
             raise PoseError(f"expected {len(self.ids)} joint angles, found {len(angles)}")
-        exact = self.positions(angles)
-        ticks = np.rint(exact)
+        with np.errstate(over="ignore"):  # infinite then, and refused
+            ticks = np.rint(self.positions(angles))
         turning = np.isinf(self._limit)
         counted = np.where(turning, abs(ticks) <= _MOST, (ticks >= 0) & (ticks < TICKS_A_TURN))
         bad = ~(counted & (abs(angles) <= self._limit))
