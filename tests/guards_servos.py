@@ -288,6 +288,7 @@ SERVOS = [
             7,
             ("torque_enable",),
         ),
+        by=(StopIteration,),
     ),
     Guard(
         "watchdog lost while armed",
@@ -297,6 +298,7 @@ SERVOS = [
             7,
             ("bus_watchdog",),
         ),
+        by=(StopIteration,),
     ),
     Guard(
         "torque taken off on purpose",

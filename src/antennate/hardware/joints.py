@@ -51,7 +51,7 @@ class Joints:
             ticks = np.rint(self.positions(angles))
         turning = np.isinf(self._limit)
         counted = np.where(turning, abs(ticks) <= _MOST, (ticks >= 0) & (ticks < TICKS_A_TURN))
-        bad = ~(counted & (abs(angles) <= self._limit))
+        bad = ~counted | (abs(angles) > self._limit)
         if bad.any():
             first = int(np.argmax(bad))
             within = "256 turns" if turning[first] else f"{self._limit[first]:.4g} rad"
