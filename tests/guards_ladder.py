@@ -68,6 +68,7 @@ SUPERVISOR = [
     Guard("hardware error of a servo", blind(servo_errors={}), told(Cause.SERVO_ERROR)),
     Guard("dead bus", blind(bus_error=""), told(Cause.BUS_ERROR)),
     Guard("tripped watchdog", blind(watchdogs=()), told(Cause.WATCHDOG)),
+    Guard("servo without torque or watchdog", blind(disarmed=()), told(Cause.DISARMED)),
     Guard("supply", blind(supply=12.0), told(Cause.SUPPLY_OFF)),
     Guard("stop by the operator", blind(stop=False), told(Cause.STOPPED)),
     Guard("exception of the controller", blind(failure=""), told(Cause.FAILED)),

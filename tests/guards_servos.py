@@ -15,6 +15,7 @@ import test_dynamixel_packets as test_packets
 import test_loop
 import test_servo_hours
 import test_session
+import test_turns
 import test_twin_bus
 import test_twin_robot
 from guard_tools import Guard, after, around, constant, put
@@ -30,8 +31,11 @@ from antennate.hardware.causes import Outputs
 from antennate.hardware.dynamixel import bringup, bus, packets, parser
 from antennate.hardware.dynamixel.answers import Value
 from antennate.hardware.dynamixel.doubts import Doubts
+from antennate.hardware.dynamixel.tables import XC430_W240
 from antennate.hardware.port import PortError
 from antennate.hardware.supervisor import Supervisor
+from antennate.hardware.turns import Turns
+from antennate.params import LayoutParams
 from antennate.twin.link import Link
 
 
@@ -277,6 +281,48 @@ SERVOS = [
         test_session.test_B8_servos_stop_within_120_ms_when_only_the_controller_fails_and_the_loop_goes_on,
     ),
     Guard(
+        "torque lost while armed",
+        put(watch, "_TORQUE", XC430_W240["status_return_level"]),
+        partial(
+            test_session.test_B11_B9_a_servo_without_torque_or_watchdog_is_a_fault_within_a_second,
+            7,
+            ("torque_enable",),
+        ),
+        by=(StopIteration,),
+    ),
+    Guard(
+        "watchdog lost while armed",
+        put(watch, "WATCHDOG_COUNTS", AnyNumber()),
+        partial(
+            test_session.test_B11_B9_a_servo_without_torque_or_watchdog_is_a_fault_within_a_second,
+            7,
+            ("bus_watchdog",),
+        ),
+        by=(StopIteration,),
+    ),
+    Guard(
+        "torque taken off on purpose",
+        put(Turns, "loose", None),
+        test_turns.test_a_leg_without_torque_to_forget_its_turns_is_not_reported,
+    ),
+    Guard(
+        "supply read long ago",
+        put(watch, "_OLD", math.inf),
+        test_session.test_B13_a_supply_that_cannot_be_read_any_more_is_not_known_after_4_s,
+    ),
+    Guard(
+        "no torque after half an arming",
+        put(session, "AntennateError", ()),
+        partial(
+            test_session.test_B10_arming_that_fails_half_way_leaves_no_servo_with_torque, "servo"
+        ),
+    ),
+    Guard(
+        "limits of yaw joints and antennae",
+        put(LayoutParams, "limits", (math.inf,) * 19),
+        test_twin_robot.test_B14_a_yaw_or_an_antenna_beyond_its_limit_is_refused_as_a_whole,
+    ),
+    Guard(
         "goals beyond 256 turns",
         put(joints, "MOST_TICKS", math.inf),
         partial(
@@ -295,7 +341,7 @@ SESSION = [
     ),
     Guard(
         "speed of goals",
-        put(session, "FASTEST", 1e6),
+        put(joints.Joints, "reach", constant(1e6)),
         test_session.test_B10_torque_comes_on_with_goals_where_servos_stand_and_they_move_slowly,
     ),
     Guard(

@@ -32,6 +32,7 @@ BAD: dict[Cause, dict[str, Any]] = {
     Cause.SERVO_ERROR: {"servo_errors": {7: "overload"}},
     Cause.BUS_ERROR: {"bus_error": "port gone"},
     Cause.WATCHDOG: {"watchdogs": (4, 5)},
+    Cause.DISARMED: {"disarmed": (6,)},
     Cause.SUPPLY_OFF: {"supply": 9.5},
     Cause.NOT_READY: {"objections": ("the firmware is old",)},
     Cause.STOPPED: {"stop": True},

@@ -14,7 +14,7 @@ from antennate.experiments.twin import Rig, TwinConfig, rig
 from antennate.hardware.causes import Cause, State
 from antennate.hardware.drive import DriveConfig, await_board, decider, drive, require_servos
 from antennate.hardware.dynamixel.bringup import BringUpError
-from antennate.hardware.dynamixel.packets import Instruction
+from antennate.hardware.dynamixel.packets import Instruction, StatusError
 from antennate.hardware.dynamixel.parser import Parser
 from antennate.hardware.port import PortError
 from antennate.hardware.report import Report
@@ -25,6 +25,7 @@ from antennate.records import AntennaFrame, Maneuver, Pose
 from antennate.twin.bus import Fault, Trouble
 from antennate.twin.faults import Faults, read
 from antennate.twin.pty import PtyServer
+from antennate.twin.registers import Servo
 
 CONFIG = DriveConfig(dry_run=1.0, duration=3.0)
 
@@ -469,6 +470,137 @@ def test_B9_a_tripped_watchdog_is_named_within_200_ms() -> None:
     log = walked(act)
     assert log.first(Cause.WATCHDOG) - done[0] <= 0.2
     assert any("servo 12" in text for text in log.texts)
+
+
+def spoil(servo: int, *registers: str) -> Callable[[Rig, float], None]:
+    """At 2 s registers become 0, and nothing else happens."""
+    done: list[float] = []
+
+    def act(rig: Rig, t: float) -> None:
+        if t >= 2.0 and not done:
+            done.append(t)
+            for register in registers:
+                rig.robot.servos[servo - 1].set(register, 0)
+
+    return act
+
+
+@pytest.mark.parametrize(
+    "registers", [("torque_enable",), ("bus_watchdog",), ("torque_enable", "bus_watchdog")]
+)
+@pytest.mark.parametrize("servo", [1, 7, 19])
+def test_B11_B9_a_servo_without_torque_or_watchdog_is_a_fault_within_a_second(
+    servo: int, registers: tuple[str, ...]
+) -> None:
+    log = walked(spoil(servo, *registers), DriveConfig(dry_run=1.0, duration=2.4))
+    assert log.first(Cause.DISARMED) - 2.0 <= 0.25
+    assert log.state[-1] >= State.FAULT
+    assert any(f"(servo {servo})" in text for text in log.texts if "DISARMED" in text)
+
+
+def test_B11_a_restart_that_answers_at_once_is_a_fault_and_arming_sets_all_of_it_anew() -> None:
+    made = rig(TwinConfig())
+    session, servo = made.session, made.robot.servos[5]
+    causes: list[set[Cause]] = []
+
+    def tick(n: int) -> None:
+        for _ in range(n):
+            session.write(session.step(session.read()))
+            assert session.outputs is not None
+            causes.append({active.cause for active in session.outputs.causes})
+            made.clock.sleep_until(made.clock.now() + session.period / 2)
+
+    tick(100)
+    session.orders.arm = True
+    tick(200)
+    assert servo.torque
+    assert session.outputs is not None
+    assert session.outputs.state is State.OK
+    servo._start(made.clock.now())
+    began = len(causes)
+    session.orders.arm = False
+    tick(30)
+    assert any(Cause.DISARMED in found for found in causes[began : began + 25])
+    assert session.outputs.state is State.FAULT
+    assert not servo.torque
+    session.orders.arm = True
+    tick(30)
+    assert session.outputs.state <= State.DEGRADED
+    assert (servo.torque, servo.get("bus_watchdog")) == (True, 5)
+
+
+def test_B11_nothing_is_said_of_torque_in_a_dry_run() -> None:
+    made = rig(TwinConfig())
+    log = Log(made, spoil(7, "bus_watchdog"))
+    drive(made.session, DriveConfig(dry_run=2.5, duration=3.0), arm=False, on_tick=log)
+    assert Cause.DISARMED not in set().union(*log.causes)
+
+
+def test_B18_a_walk_writes_no_eeprom() -> None:
+    log = walked(config=DriveConfig(dry_run=1.0, duration=2.0))
+    assert log.rig.session.tally.sent > 50
+    assert sum(servo.eeprom_writes for servo in log.rig.robot.servos) == 0
+
+
+def test_B13_a_supply_that_cannot_be_read_any_more_is_not_known_after_4_s() -> None:
+    def act(rig: Rig, t: float) -> None:
+        if t >= 2.0:
+            rig.robot.bus.trouble[1] = Trouble(Fault.SILENT)
+
+    made = rig(TwinConfig())
+    log = Log(made, act)
+    supply: list[float] = []
+
+    def note(session: Session, t: float) -> None:
+        log(session, t)
+        supply.append(session.watch.supply)
+
+    drive(made.session, DriveConfig(dry_run=7.0, duration=7.0), arm=False, on_tick=note)
+    known = np.isfinite(supply)
+    assert known[(np.array(log.t) > 1.0) & (np.array(log.t) < 2.2)].all()
+    assert not known[np.array(log.t) > 6.1].any()
+    assert Cause.SUPPLY_UNKNOWN in log.causes[-1]
+
+
+@pytest.mark.parametrize("what", ["servo", "pose"])
+def test_B10_arming_that_fails_half_way_leaves_no_servo_with_torque(what: str) -> None:
+    made = rig(TwinConfig())
+    servos, sound = made.robot.servos, made.session.decider.step
+    had_torque: list[int] = []
+
+    def step(frame: AntennaFrame) -> Pose:
+        pose = sound(frame)
+        if what == "pose":
+            pose.yaw[0, 2] = 2.0
+        return pose
+
+    def note(session: Session, t: float) -> None:
+        had_torque.append(sum(servo.torque for servo in servos))
+
+    made.session.decider.step = step  # type: ignore[method-assign]
+    if what == "servo":
+        servos[11].write = refusing(servos[11])  # type: ignore[method-assign]
+    log = Log(made)
+
+    def both(session: Session, t: float) -> None:
+        log(session, t)
+        note(session, t)
+
+    drive(made.session, DriveConfig(dry_run=1.0, duration=2.0), arm=True, on_tick=both)
+    assert max(had_torque) == 0
+    assert log.state[-1] >= State.FAULT
+    said = "torque_enable" if what == "servo" else "1.571 rad for servo 3"
+    assert any(said in text for text in log.texts)
+
+
+def refusing(servo: Servo) -> Callable[[int, bytes], StatusError]:
+    """How a servo writes that takes anything but torque."""
+    write = servo.write
+
+    def taken(address: int, data: bytes) -> StatusError:
+        return StatusError.RESULT_FAIL if (address, data) == (64, b"\1") else write(address, data)
+
+    return taken
 
 
 def test_B13_a_sagging_supply_warns_then_holds_then_switches_off() -> None:

@@ -151,3 +151,19 @@ def test_B10_legs_that_have_forgotten_go_on_from_where_they_were_when_the_board_
     assert walk.rig.session.turns.forgotten == 12
     assert not any(row.count(False) > 1 for row in walk.torque)
     assert walk.states[-1] <= State.DEGRADED
+
+
+def test_a_leg_without_torque_to_forget_its_turns_is_not_reported() -> None:
+    """Every look at a servo falls on the leg whose torque is off, or on one that has it."""
+    disarmed: list[int] = []
+
+    def look(walk: Walk, session: Session) -> None:
+        off = [servo.get("id") for servo in walk.rig.robot.servos if not servo.torque]
+        if session.watch.armed:
+            for servo in off or [6]:
+                session.watch._guard(servo)
+        disarmed.extend(session.watch.disarmed)
+
+    walk = Walk(253, duration=2.0, act=look)
+    assert walk.rig.session.turns.forgotten == 12
+    assert not disarmed

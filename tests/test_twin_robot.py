@@ -8,14 +8,19 @@ from typing import cast
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from pydantic import ValidationError
 
+from antennate.controller import ARMS, Arm, Controller
 from antennate.experiments.passage import Passage
 from antennate.experiments.tunnel import TunnelConfig, prepare
 from antennate.experiments.twin import Decisions, on_twin, simulated
+from antennate.gait import targets
 from antennate.hardware.joints import Joints, PoseError
+from antennate.params import ControllerParams
 from antennate.params.layout import LayoutParams
-from antennate.records import Maneuver, Pose
+from antennate.records import AntennaFrame, Maneuver, Pose
 from antennate.sim.world import World
 from antennate.twin.robot import TwinRobot
 
@@ -79,6 +84,59 @@ def test_B14_a_pose_of_two_robots_is_refused() -> None:
     two = Pose(np.zeros((2, 5)), np.zeros((2, 6, 2)), np.zeros((2, 2)))
     with pytest.raises(PoseError, match="19"):
         Joints(LAYOUT).ticks(two)
+
+
+def test_B14_a_yaw_or_an_antenna_beyond_its_limit_is_refused_as_a_whole() -> None:
+    narrow = LayoutParams.model_validate(
+        {
+            "yaw": {**LAYOUT.yaw.model_dump(), "limit": 1.0},
+            "antennae": {**LAYOUT.antennae.model_dump(), "limit": 0.5},
+        }
+    )
+    joints = Joints(narrow)
+    joints.ticks(pose(yaw=-1.0))
+    with pytest.raises(PoseError, match=r"within 1 rad for servo 1, found -1\.001"):
+        joints.ticks(pose(yaw=-1.001))
+    sent = pose()
+    sent.antenna[0, 1] = 0.501
+    with pytest.raises(PoseError, match=r"within 0\.5 rad for servo 19, found 0\.501"):
+        joints.ticks(sent)
+
+
+@given(
+    angles=st.lists(st.floats(-2.0, 2.0) | st.floats(), min_size=19, max_size=19),
+    layout=st.sampled_from([LAYOUT, MIRRORED]),
+)
+def test_B14_what_is_not_refused_lies_within_one_turn_but_for_legs(
+    angles: list[float], layout: LayoutParams
+) -> None:
+    said = np.array(angles)
+    one = Pose(yaw=said[None, :5], leg=said[None, 5:17].reshape(1, 6, 2), antenna=said[None, 17:])
+    fit = all(abs(a) <= math.pi / 2 for i, a in enumerate(angles) if not 5 <= i < 17)
+    try:
+        ticks = Joints(layout).ticks(one)
+    except PoseError:
+        edge = any(abs(a) > 1.57 for i, a in enumerate(angles) if not 5 <= i < 17)
+        assert edge or not all(abs(a) <= 1600 for a in angles)
+        return
+    body = np.delete(ticks, range(5, 17))
+    assert fit
+    assert ((body >= 0) & (body <= 4095)).all()
+    assert (abs(ticks[5:17]) <= 1_048_575).all()
+
+
+@pytest.mark.parametrize("arm", ARMS)
+def test_no_pose_of_a_gait_is_beyond_the_limits(arm: Arm) -> None:
+    joints, params = Joints(LAYOUT), ControllerParams()
+    offset = max(params.gait.turn_offset, params.escape.turn_offset)
+    for sign in (-1.0, 1.0):
+        for phase in np.linspace(0.0, 2 * math.pi, 100):
+            joints.ticks(targets(params.gait, np.array([phase]), np.array([sign * offset])))
+    mind = Controller(params, arm)
+    rng = np.random.default_rng(3)
+    for tick in range(1000):
+        counts = rng.uniform(0.0, 4095.0, (1, 2))
+        joints.ticks(mind.step(AntennaFrame(t=np.array([0.01 * tick]), counts=counts)))
 
 
 @pytest.mark.parametrize("layout", [LAYOUT, MIRRORED])

@@ -54,6 +54,7 @@ class Cause(Enum):
     SERVO_ERROR = (State.FAULT, "servos report a hardware error")
     BUS_ERROR = (State.FAULT, "the servo bus does not work")
     WATCHDOG = (State.FAULT, "watchdogs of servos have stopped them")
+    DISARMED = (State.FAULT, "servos have lost their torque or their watchdog, as by a restart")
     NOT_READY = (State.FAULT, "something speaks against arming")
     PAUSE = (State.FAULT, "the loop stood still, or its clock did")
     SUPPLY_OFF = (State.OFF, "the supply is empty")
@@ -85,7 +86,7 @@ DATA = frozenset(
 """Losses of data: they end after enough fresh valid samples in a row."""
 OF_MIND = frozenset({Cause.FAILED, Cause.UNDECIDED, Cause.BAD_ACTION, Cause.UNKNOWN_CONTACT})
 """Causes in the controller: they end as soon as it decides well again."""
-CURED_BY_ARMING = frozenset({Cause.UNKNOWN_CONTACT, Cause.WATCHDOG})
+CURED_BY_ARMING = frozenset({Cause.UNKNOWN_CONTACT, Cause.WATCHDOG, Cause.DISARMED})
 """Causes that do not stand against an arm event."""
 OF_FINDING = {
     Finding.OUT_OF_CAL: Cause.OUT_OF_CAL,
@@ -120,6 +121,7 @@ class Inputs:
         servo_errors: Hardware errors in words, by servo id.
         bus_error: What is wrong with the bus as a whole, empty if nothing is.
         watchdogs: Ids of servos stopped by their watchdog.
+        disarmed: Ids of servos that have lost their torque or their watchdog while armed.
         supply: Voltage of the supply [V], NaN if unknown.
         drift: How far resting readings have drifted, empty if not far.
         objections: What speaks against arming, such as a failed touch check or foreign firmware.
@@ -144,6 +146,7 @@ class Inputs:
     servo_errors: Mapping[int, str] = field(default_factory=dict[int, str])
     bus_error: str = ""
     watchdogs: tuple[int, ...] = ()
+    disarmed: tuple[int, ...] = ()
     drift: str = ""
     objections: tuple[str, ...] = ()
     stop: bool = False

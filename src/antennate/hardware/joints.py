@@ -32,31 +32,36 @@ class Joints:
         self.models = roster.models(layout)
         self._sign: Floats = np.array(layout.directions, float)
         self._zero: Floats = np.array(layout.zeros, float)
+        self._limit: Floats = np.array(layout.limits)
+        self._fastest: Floats = np.array(layout.fastest)
 
     def ticks(self, pose: Pose) -> Ints:
         """Goal positions [ticks] of a pose of one robot, shape (19,).
 
         Raises:
-            PoseError: It is not one robot's, not finite, or beyond what servos count. It is refused
-                as a whole.
+            PoseError: It is not one robot's, not finite, or beyond a limit or what servos count.
+                It is refused as a whole.
         """
         angles = np.concatenate([pose.yaw.ravel(), pose.leg.ravel(), pose.antenna.ravel()])
         if angles.shape != self._sign.shape:
             raise PoseError(f"expected {len(self.ids)} joint angles, found {len(angles)}")
-        exact = self.positions(angles)
-        bad = ~(abs(exact) <= MOST_TICKS)
+        with np.errstate(over="ignore"):  # infinite then, and refused
+            ticks = np.rint(self.positions(angles))
+        turning = np.isinf(self._limit)
+        counted = np.where(turning, abs(ticks) <= MOST_TICKS, (ticks >= 0) & (ticks < TICKS_A_TURN))
+        bad = ~counted | (abs(angles) > self._limit)
         if bad.any():
             first = int(np.argmax(bad))
+            within = "256 turns" if turning[first] else f"{self._limit[first]:.4g} rad"
             raise PoseError(
-                f"expected a finite angle within 256 turns for servo {self.ids[first]}, found "
+                f"expected a finite angle within {within} for servo {self.ids[first]}, found "
                 f"{angles[first]}"
             )
-        return np.rint(exact).astype(np.int64)
+        return ticks.astype(np.int64)
 
-    @staticmethod
-    def reach(angle: float) -> float:
-        """Ticks of an angle [rad]."""
-        return angle / _STEP
+    def reach(self, time: float) -> Floats:
+        """Ticks that each joint may go in a time [s], shape (19,)."""
+        return self._fastest * time / _STEP
 
     def align(self, ticks: Ints | Floats, pose: Pose) -> None:
         """Count whole turns of legs so that a pose is nearest to where they stand [ticks]."""

@@ -13,12 +13,14 @@ watchdogs armed and goals set to where the servos stand, as with the first.
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 
 from antennate.body import Clock
+from antennate.errors import AntennateError
 from antennate.hardware.board import Board
 from antennate.hardware.body import HardwareBody
 from antennate.hardware.causes import Inputs, Outputs
@@ -36,9 +38,6 @@ from antennate.hardware.turns import Turns
 from antennate.hardware.watch import ServoWatch
 from antennate.params import ConditioningParams, DiagnosisParams, SupervisorParams
 from antennate.records import AntennaFrame, Floats, Ints, Pose
-
-FASTEST = 4.5
-"""Fastest that goals move [rad/s]; two thirds of an unloaded XC430-W240 at 11.1 V."""
 
 
 class Decider(Protocol):
@@ -215,6 +214,7 @@ class Session:
             self.watch.bus_error = str(error)
             self._lost |= not isinstance(error, PoseError)
             return
+        self.watch.loose = self.turns.loose
         if out.feed_watchdog or not out.torque:  # any packet would feed the watchdogs
             self.watch.step()
         self._lost |= self._dead(self._limits.silent_answers)
@@ -248,6 +248,7 @@ class Session:
         left = bringup.disable(self.bus, self.joints.ids)
         self._goals = None
         self.turns.reset()
+        self.watch.arm(False)
         return left
 
     def stand(self, time: float) -> None:
@@ -282,6 +283,7 @@ class Session:
             servo_errors=watch.errors,
             bus_error=watch.bus_error,
             watchdogs=watch.watchdogs,
+            disarmed=watch.disarmed,
             supply=watch.supply,
             drift=self.trust.drifted,
             objections=() if self._goals is not None else self.trust.objections,
@@ -290,17 +292,27 @@ class Session:
         )
 
     def _arm(self, pose: Pose) -> None:
-        """Torque on where everything stands; legs count their turns from there."""
+        """Torque on where everything stands, for all servos or for none."""
         self.touched = True
-        self.turns.reset()
-        bringup.require_models(self.bus, self.joints.models)
-        bringup.arm_watchdogs(self.bus, self.joints.ids)
-        self.watch.watchdogs = ()
-        present = bringup.enable(self.bus, self.joints.ids)
-        here = np.array([present[servo] for servo in self.joints.ids], float)
-        self.joints.align(here, pose)
-        self._goals = here
+        try:
+            self._goals = self._enable(pose)
+        except AntennateError:
+            with suppress(PortError):
+                self.release()
+            raise
+        self.watch.arm(True)
         self._lost = False
+
+    def _enable(self, pose: Pose) -> Floats:
+        """Torque on: where everything stands [ticks]; legs count their turns from there."""
+        bus, ids = self.bus, self.joints.ids
+        self.turns.reset()
+        bringup.require_models(bus, self.joints.models)
+        bringup.arm_watchdogs(bus, ids)
+        stood = bringup.hold_here(bus, ids)
+        self.joints.align(np.array([stood[servo] for servo in ids], float), pose)
+        present = bringup.enable(bus, ids)
+        return np.array([present[servo] for servo in ids], float)
 
     def _forget_turns(self, may_begin: bool) -> None:
         if self._goals is None:
@@ -315,7 +327,7 @@ class Session:
         if goals is None:
             return
         if pose is not None:
-            reach = self.joints.reach(FASTEST * self.period)
+            reach = self.joints.reach(self.period)
             wanted = self.joints.ticks(pose) - goals
             self.tally.limited += int((abs(wanted) > reach).sum())
             goals = goals + np.clip(wanted, -reach, reach)

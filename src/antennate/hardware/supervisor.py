@@ -162,6 +162,7 @@ class Supervisor:
         _name(found, Cause.LATE_ANSWERS, late)
         _name(found, Cause.SILENT_SERVO, silent)
         _name(found, Cause.WATCHDOG, inputs.watchdogs)
+        _name(found, Cause.DISARMED, inputs.disarmed)
         if inputs.servo_errors:
             found[Cause.SERVO_ERROR] = _words(inputs.servo_errors)
         if inputs.bus_error:
@@ -217,7 +218,8 @@ class Supervisor:
         return tuple(sorted(against - CURED_BY_ARMING, key=lambda c: (-c.severity, c.name)))
 
     def _rearm(self, present: dict[Cause, str]) -> None:
-        present.pop(Cause.WATCHDOG, None)
+        for cured in (Cause.WATCHDOG, Cause.DISARMED):
+            present.pop(cured, None)
         self._latched.clear()
         for repeats in (self._holds, self._failures, self._reboots):
             repeats.clear()

@@ -61,6 +61,12 @@ class Turns:
         """Whether the robot has to stand still for it."""
         return bool(self._left)
 
+    @property
+    def loose(self) -> int | None:
+        """Id of the leg whose torque may be off for it, None if there is none."""
+        begun = self.standing and (self._stage or self._tried)
+        return self._joints.ids[self._left[0]] if begun else None
+
     def time(self, t: Floats) -> Floats:
         """The controller's time [s], which stands still with the robot; call once a tick."""
         now = float(t[0])

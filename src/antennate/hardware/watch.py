@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from itertools import cycle
 
 from antennate.hardware.dynamixel.answers import POSITION, Answer, Span, Value
+from antennate.hardware.dynamixel.bringup import WATCHDOG_COUNTS
 from antennate.hardware.dynamixel.bus import Bus
 from antennate.hardware.dynamixel.tables import XC430_W240, hardware_errors
 from antennate.hardware.port import PortError
 
 _ERRORS = Span(XC430_W240["hardware_error_status"].address, 1)
 _WATCHDOG = XC430_W240["bus_watchdog"]
+_TORQUE = XC430_W240["torque_enable"]
 _VOLTAGE = XC430_W240["present_input_voltage"]
 _POSITION = XC430_W240["present_position"]
 _VOLT = 0.1
@@ -20,10 +22,12 @@ _ALONE = 0.003
 """Time for one servo asked alone [s]."""
 _PATIENCE = 10
 """Ticks after which watchdogs and supply are looked at even if time is short."""
+_OLD = 4.0
+"""Age from which on the supply is not known [s]; twice what a round of all takes at the slowest."""
 
 
 class ServoWatch:
-    """Reads all positions every tick, and one servo's watchdog and the supply in turn.
+    """Reads all positions every tick, and one servo's watchdog, torque and the supply in turn.
 
     Args:
         bus: The bus.
@@ -36,7 +40,10 @@ class ServoWatch:
         missed: Answers missed in a row, by id.
         errors: Hardware errors in words, by id.
         watchdogs: Ids stopped by their watchdog.
-        supply: Voltage [V], NaN before it was read.
+        armed: Whether torque and watchdogs are to be on; see `arm`.
+        loose: Id of a servo whose torque is off on purpose, None if there is none.
+        disarmed: Ids that have lost their torque or their watchdog while armed.
+        supply: Voltage [V], NaN before it was read and when it was not for a while.
         bus_error: What is wrong with the bus as a whole, empty if nothing is.
     """
 
@@ -57,8 +64,20 @@ class ServoWatch:
         self.missed: dict[int, int] = dict.fromkeys(ids, 0)
         self.errors: dict[int, str] = {}
         self.watchdogs: tuple[int, ...] = ()
+        self.armed = False
+        self.loose: int | None = None
+        self.disarmed: tuple[int, ...] = ()
         self.supply = math.nan
+        self._weighed = -math.inf
         self.bus_error = ""
+
+    def arm(self, armed: bool) -> None:
+        """From now on torque and watchdogs are on, or off on purpose."""
+        self.armed = armed
+        self.loose = None
+        self.disarmed = ()
+        if armed:
+            self.watchdogs = ()
 
     def step(self) -> None:
         """One tick's share. A dead wire is noted, not raised."""
@@ -68,6 +87,8 @@ class ServoWatch:
         except PortError as error:
             self.bus_error = str(error)
             self.missed = {servo: count + 1 for servo, count in self.missed.items()}
+        if self._clock() - self._weighed > _OLD:
+            self.supply = math.nan
 
     def _look(self) -> None:
         end = self._clock() + self._budget
@@ -83,13 +104,25 @@ class ServoWatch:
         servo = self._ids[at]
         if self.missed[servo]:
             return
-        watchdog = self._one(servo, Span(_WATCHDOG.address, _WATCHDOG.size))
-        if watchdog is not None:
-            tripped = _WATCHDOG.decode(watchdog) < 0
-            others = tuple(i for i in self.watchdogs if i != servo)
-            self.watchdogs = (*others, servo) if tripped else others
+        self._guard(servo)
         if at == 0 and (volts := self._one(servo, Span(_VOLTAGE.address, 2))) is not None:
             self.supply = _VOLT * _VOLTAGE.decode(volts)
+            self._weighed = self._clock()
+
+    def _guard(self, servo: int) -> None:
+        """Whether a servo still has the watchdog and the torque that it was given."""
+        said = self._one(servo, Span(_WATCHDOG.address, _WATCHDOG.size))
+        if said is None:
+            return
+        watchdog = _WATCHDOG.decode(said)
+        self.watchdogs = _with(self.watchdogs, servo, watchdog < 0)
+        if not self.armed or servo == self.loose:
+            return
+        lost = 0 <= watchdog != WATCHDOG_COUNTS
+        torque = self._one(servo, Span(_TORQUE.address, _TORQUE.size, spare=1))
+        if torque is not None or lost:
+            lost |= torque is not None and not _TORQUE.decode(torque)
+            self.disarmed = _with(self.disarmed, servo, lost)
 
     def _note(self, servo: int, said: Answer, dead: bool) -> None:
         if not isinstance(
@@ -110,3 +143,8 @@ class ServoWatch:
     def _one(self, servo: int, span: Span) -> bytes | None:
         said = self._bus.read_all([servo], span, _ALONE)[servo]
         return said.data if isinstance(said, Value) else None
+
+
+def _with(ids: Iterable[int], servo: int, is_in: bool) -> tuple[int, ...]:
+    others = tuple(i for i in ids if i != servo)
+    return (*others, servo) if is_in else others

@@ -11,7 +11,7 @@ from antennate.params.base import Params, number
 from antennate.params.bench import BenchVariationParams, WallParams
 from antennate.params.doctor import DoctorParams
 from antennate.params.endurance import DriftParams, TurnsParams
-from antennate.params.layout import JointsParams, LayoutParams
+from antennate.params.layout import BasesParams, JointsParams, LayoutParams, YawsParams
 from antennate.params.log import LogParams
 from antennate.params.mind import (
     ConditioningParams,
@@ -49,6 +49,7 @@ from antennate.params.twin import BatteryParams
 __all__ = [
     "N_MM_PER_DEG",
     "AntennaParams",
+    "BasesParams",
     "BatteryParams",
     "BenchPhysicsParams",
     "BenchVariationParams",
@@ -90,5 +91,6 @@ __all__ = [
     "TurnsParams",
     "VariationParams",
     "WallParams",
+    "YawsParams",
     "number",
 ]

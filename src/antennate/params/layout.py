@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+import math
+from typing import Annotated, Literal, TypeVar
 
 from pydantic import Field, model_validator
 
@@ -18,11 +19,15 @@ TICKS_A_TURN = 4096
 """Datasheet of both models: 4096 pulses a revolution."""
 _STRAIGHT = 2048
 _QUARTER = 1024
+_LIMIT = 0.5 * math.pi
+_RPM = 2.0 * math.pi / 60.0
+_XC430, _XL330 = 65.0 * _RPM, 103.0 * _RPM
+"""Speeds unloaded [rad/s], datasheets: XC430-W240 at 11.1 V, XL330-M288 at 5 V."""
 _FIRST_LEG, _FIRST_ANTENNA = YAW_COUNT + 1, YAW_COUNT + len(LEGS) + 1
 
 
 class JointsParams(Params):
-    """Servos of one group of joints, in the order of the robot's anatomy."""
+    """Servos of one group of joints, in the order of the robot's anatomy; legs have no limit."""
 
     ids: tuple[_Id, ...] = number((), "1", "assumed: set by hand", "ids on the bus")
     directions: tuple[_Direction, ...] = number(
@@ -31,10 +36,55 @@ class JointsParams(Params):
     zeros: tuple[_Zero, ...] = number(
         (), "ticks", "assumed: the middle of a turn", "position at the angle 0"
     )
+    fastest: float = number(
+        4.5,
+        "rad/s",
+        "assumed: two thirds of an unloaded XC430-W240 at 11.1 V, 6.8 rad/s (datasheet)",
+        "fastest that goals move",
+        gt=0,
+        le=_XC430,
+    )
 
 
-def _group(first: int, count: int) -> JointsParams:
-    return JointsParams(
+class YawsParams(JointsParams):
+    """Servos of the yaw joints."""
+
+    limit: float = number(
+        _LIMIT,
+        "rad",
+        "assumed: links at a right angle nearly meet; the gaits stay within 0.96",
+        "largest angle either way",
+        gt=0,
+        le=_LIMIT,
+    )
+
+
+class BasesParams(JointsParams):
+    """Servos of the antenna bases."""
+
+    fastest: float = number(
+        4.5,
+        "rad/s",
+        "assumed: as the other joints; an unloaded XL330-M288 makes 10.8 rad/s at 5 V (datasheet)",
+        "fastest that goals move",
+        gt=0,
+        le=_XL330,
+    )
+    limit: float = number(
+        _LIMIT,
+        "rad",
+        "assumed: further outwards an antenna lies along the body, inwards it crosses the other",
+        "largest angle either way from the mounting angle",
+        gt=0,
+        le=_LIMIT,
+    )
+
+
+_Group = TypeVar("_Group", bound=JointsParams)
+
+
+def _group(kind: type[_Group], first: int, count: int) -> _Group:
+    return kind(
         ids=tuple(range(first, first + count)),
         directions=(1,) * count,
         zeros=(_STRAIGHT,) * count,
@@ -50,9 +100,9 @@ class LayoutParams(Params):
         "assumed: write and read of 19 servos then take 4.3 of 10 ms",
         "bus speed",
     )
-    yaw: JointsParams = _group(1, YAW_COUNT)
-    legs: JointsParams = _group(_FIRST_LEG, len(LEGS))
-    antennae: JointsParams = _group(_FIRST_ANTENNA, 2)
+    yaw: YawsParams = _group(YawsParams, 1, YAW_COUNT)
+    legs: JointsParams = _group(JointsParams, _FIRST_LEG, len(LEGS))
+    antennae: BasesParams = _group(BasesParams, _FIRST_ANTENNA, 2)
 
     @model_validator(mode="after")
     def _agree(self) -> LayoutParams:
@@ -86,3 +136,15 @@ class LayoutParams(Params):
     def zeros(self) -> tuple[int, ...]:
         """Zeros of all 19 [ticks]."""
         return self.yaw.zeros + self.legs.zeros + self.antennae.zeros
+
+    @property
+    def limits(self) -> tuple[float, ...]:
+        """Largest angles of all 19 either way [rad], inf for legs."""
+        yaws, bases = (self.yaw.limit,) * YAW_COUNT, (self.antennae.limit,) * 2
+        return yaws + (math.inf,) * len(LEGS) + bases
+
+    @property
+    def fastest(self) -> tuple[float, ...]:
+        """Fastest that the goals of all 19 move [rad/s]."""
+        groups = (self.yaw, self.legs, self.antennae)
+        return tuple(group.fastest for group in groups for _ in group.ids)
