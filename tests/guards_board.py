@@ -58,8 +58,8 @@ def first(one: Any, other: Any) -> Any:
     return one
 
 
-def unclamped(old: Any, self: Any, counts: float) -> float:
-    return counts
+def railed(old: Any, self: Any, finding: Any) -> float:
+    return float(self._good)
 
 
 LIE = (lambda n: n * 10_000 + 3_600_000_000, Verdict.AHEAD)
@@ -195,11 +195,9 @@ FILMS = [
         partial(test_diagnosis.test_S6_more_than_a_fifth_bad_is_degraded_or_worse, 0.3),
     ),
     Guard(
-        "clamping to the calibrated range",
-        around(diagnosis.ChannelDiagnosis, "_clamp", unclamped),
-        partial(
-            test_diagnosis.test_S11_beyond_the_calibrated_range_is_clamped_and_flagged, 0.3, True
-        ),
+        "a film at the rail is bent, not more",
+        around(diagnosis.ChannelDiagnosis, "_used", railed),
+        test_diagnosis.test_S3_a_saturated_film_is_flagged_and_still_contact,
     ),
     Guard(
         "readings far beyond the range",

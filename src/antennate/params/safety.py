@@ -111,8 +111,7 @@ class DiagnosisParams(Params):
         0.8,
         "1",
         "measured: simulated films bend up to 0.70 spans beyond; a tenth for drift",
-        "distance from the calibrated range up to which a reading is clamped and not refused, in "
-        "spans",
+        "distance from the calibrated range up to which a reading is believed, in spans",
         ge=0,
         le=2,
     )
