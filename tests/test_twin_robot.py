@@ -58,6 +58,13 @@ def test_a_layout_that_no_robot_can_have_is_refused(change: dict[str, object], s
         LayoutParams.model_validate(change)
 
 
+def test_a_layout_needs_only_what_differs() -> None:
+    ids = (101, 102, 103, 104, 105)
+    found = LayoutParams.model_validate({"yaw": {"ids": ids}})
+    assert found.yaw == LAYOUT.yaw.model_copy(update={"ids": ids})
+    assert (found.legs, found.antennae) == (LAYOUT.legs, LAYOUT.antennae)
+
+
 @pytest.mark.parametrize("layout", [LAYOUT, MIRRORED])
 def test_ticks_and_back_lose_half_a_tick_at_most(layout: LayoutParams) -> None:
     joints, rng = Joints(layout), np.random.default_rng(5)

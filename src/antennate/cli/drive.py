@@ -18,6 +18,7 @@ from antennate.cli.progress import terminate_as_interrupt
 from antennate.cli.tables import Cell, number, show
 from antennate.errors import ConfigError
 from antennate.hardware.causes import State
+from antennate.hardware.doctor.ports import same
 from antennate.hardware.drive import DriveConfig, connect, drive
 from antennate.hardware.film import calibrated
 from antennate.hardware.priority import Priority, urgent
@@ -64,6 +65,8 @@ def command(argv: Sequence[str]) -> int:
     for name in ("esp32", "bus"):
         if not getattr(orders, name):
             raise ConfigError(f"--{name}: expected a serial port, found none")
+    if same(orders.esp32, orders.bus):
+        raise ConfigError(f"--esp32 and --bus: expected two ports, found {orders.bus} twice")
     if config.calibration is not None:
         mind, film = calibrated(config.mind, Path(config.calibration), config.sensor_id)
         config = config.model_copy(update={"mind": mind, "sensor_id": film.sensor_id})

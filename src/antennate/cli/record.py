@@ -7,6 +7,7 @@ import os
 import select
 import shlex
 import sys
+import termios
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -149,6 +150,8 @@ def ask(status: Status) -> Callable[[str], Callable[[], bool]]:
     """Ask on stderr, and hear Enter on stdin without waiting for it."""
 
     def asked(text: str) -> Callable[[], bool]:
+        if sys.stdin.isatty():  # an Enter that was typed too early confirms nothing
+            termios.tcflush(sys.stdin, termios.TCIFLUSH)
         sys.stderr.write(f"\n{text}\n")
         sys.stderr.flush()
         status.said = text

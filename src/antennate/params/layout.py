@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Literal, TypeVar
+from typing import Annotated, Literal, TypeVar, cast
 
 from pydantic import Field, model_validator
 
@@ -103,6 +103,20 @@ class LayoutParams(Params):
     yaw: YawsParams = _group(YawsParams, 1, YAW_COUNT)
     legs: JointsParams = _group(JointsParams, _FIRST_LEG, len(LEGS))
     antennae: BasesParams = _group(BasesParams, _FIRST_ANTENNA, 2)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _complete(cls, data: object) -> object:
+        """A table with some keys of a group leaves the others as they are by default."""
+        if not isinstance(data, dict):
+            return data
+        given = dict(cast("dict[str, object]", data))
+        for name in ("yaw", "legs", "antennae"):
+            group = given.get(name)
+            if isinstance(group, dict):
+                known: JointsParams = cls.model_fields[name].default
+                given[name] = known.model_dump() | cast("dict[str, object]", group)
+        return given
 
     @model_validator(mode="after")
     def _agree(self) -> LayoutParams:
