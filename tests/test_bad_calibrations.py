@@ -139,7 +139,7 @@ def test_S9_a_bad_file_is_refused_with_field_and_reason(
     said = str(refusal.value)
     assert said.startswith(f"{path}: ")
     assert field in said.removeprefix(f"{path}: ").split(": ")[0] or field in said
-    words = ["drive", "--esp32", "/nowhere", "--bus", "/nowhere", "--calibration", str(path)]
+    words = ["drive", "--esp32", "/nowhere", "--bus", "/nothing", "--calibration", str(path)]
     assert main(words) == 2
     told = capsys.readouterr().err
     assert told.count("\n") == 1

@@ -81,11 +81,16 @@ def test_L15_a_second_program_is_told_the_pid_of_the_first() -> None:
 def test_every_command_says_it_and_ends_with_2(
     command: str, path: str, said: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    words = [command, "--bus", path, *(["--esp32", path] if command == "drive" else [])]
-    assert main(words) == BAD_INPUT
+    both = ["--esp32", path, "--bus", "/dev/another"]
+    assert main([command, *(both if command == "drive" else ["--bus", path])]) == BAD_INPUT
     told = capsys.readouterr()
     assert said in told.out + told.err
     assert "Traceback" not in told.err
+
+
+def test_L14_one_port_for_both_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["drive", "--esp32", "/dev/null", "--bus", "/dev/null"]) == BAD_INPUT
+    assert "expected two ports, found /dev/null twice" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
