@@ -216,7 +216,9 @@ def test_G1_a_killed_program_loses_no_tick_that_was_written(tmp_path: Path, kill
     assert len(results) == kills
     for returned, read, missing, bad, wrong in results:
         assert returned <= read <= returned + 1
-        assert (missing, bad, wrong) == (0, 0, 0)
+        cut = bad == 1 and read == returned  # the one that was being written
+        assert (missing, wrong) == (0, 0)
+        assert bad == 0 or cut
     assert max(returned for returned, *_ in results) > 10
 
 
