@@ -32,7 +32,7 @@ import numpy as np
 from antennate.hardware.dynamixel.answers import POSITION, Answer, Timing, Value
 from antennate.hardware.dynamixel.bus import Bus
 from antennate.hardware.dynamixel.tables import XC430_W240, XL330_M288
-from antennate.hardware.serial_port import SerialPort
+from antennate.hardware.ports.serial_port import SerialPort
 from antennate.twin.bus import Fault, ServoBus, Trouble
 from antennate.twin.pty import PtyServer
 from antennate.twin.registers import Servo

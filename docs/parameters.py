@@ -41,7 +41,7 @@ def commands() -> list[type[params.Params]]:
     """Return the classes that hold the top level of a command's parameters."""
     names = sorted(module.name for module in pkgutil.iter_modules(experiments.__path__))
     modules = [importlib.import_module(f"{experiments.__name__}.{name}") for name in names]
-    modules.append(importlib.import_module("antennate.hardware.drive"))
+    modules.append(importlib.import_module("antennate.hardware.driving.drive"))
     modules.append(importlib.import_module("antennate.telemetry.replay"))
     return [group for module in modules for group in groups(module)]
 

@@ -8,7 +8,7 @@ import time
 from antennate.hardware.dynamixel import bringup
 from antennate.hardware.dynamixel.answers import MOTION, Timing
 from antennate.hardware.dynamixel.bus import Bus
-from antennate.hardware.serial_port import SerialPort
+from antennate.hardware.ports.serial_port import SerialPort
 
 IDS = range(1, 20)
 

@@ -9,7 +9,7 @@ from antennate.experiments.twin import TwinConfig, build
 from antennate.hardware.doctor.checkup import Checkup, Robot, examine
 from antennate.hardware.doctor.fix import apply, plan
 from antennate.hardware.doctor.rows import Row
-from antennate.hardware.port import Port
+from antennate.hardware.ports.port import Port
 from antennate.twin.faults import Faults, read
 from antennate.twin.lockstep import BoardPort, LockstepClock
 from antennate.twin.robot import TwinRobot

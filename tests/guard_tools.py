@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
-from antennate.hardware.causes import Outputs
-from antennate.hardware.supervisor import Supervisor
+from antennate.hardware.safety.causes import Outputs
+from antennate.hardware.safety.supervisor import Supervisor
 
 Patch = pytest.MonkeyPatch
 Off = Callable[[Patch], None]

@@ -22,13 +22,9 @@ from guard_tools import Guard, after, around, before, constant, put
 from hardware_rig import BAND
 
 from antennate import conditioning, contact, maneuver
-from antennate.hardware import (
-    board,
-    diagnosis,
-    touch_check,
-)
-from antennate.hardware.esp32 import clock, decoder, frame
+from antennate.hardware.esp32 import board, clock, decoder, frame
 from antennate.hardware.esp32.clock import DeviceClock, Verdict
+from antennate.hardware.safety import diagnosis, touch_check
 from antennate.records import Maneuver
 
 

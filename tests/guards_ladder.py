@@ -14,12 +14,9 @@ import test_touch_check
 from guard_tools import Guard, after, around, before, blind, constant, put
 from hardware_rig import PERIOD
 
-from antennate.hardware import (
-    diagnosis,
-    rate,
-)
-from antennate.hardware.causes import Cause, Outputs
-from antennate.hardware.supervisor import Supervisor
+from antennate.hardware.safety import diagnosis, rate
+from antennate.hardware.safety.causes import Cause, Outputs
+from antennate.hardware.safety.supervisor import Supervisor
 from antennate.records import Contact, Maneuver
 
 

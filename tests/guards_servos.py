@@ -21,20 +21,18 @@ import test_twin_robot
 from guard_tools import Guard, after, around, constant, put
 
 from antennate import loop
-from antennate.hardware import (
-    joints,
-    serial_port,
-    session,
-    watch,
-)
-from antennate.hardware.causes import Outputs
+from antennate.hardware import joints
+from antennate.hardware.driving import session
+from antennate.hardware.driving.turns import Turns
 from antennate.hardware.dynamixel import bringup, bus, packets, parser
 from antennate.hardware.dynamixel.answers import Value
 from antennate.hardware.dynamixel.doubts import Doubts
 from antennate.hardware.dynamixel.tables import XC430_W240
-from antennate.hardware.port import PortError
-from antennate.hardware.supervisor import Supervisor
-from antennate.hardware.turns import Turns
+from antennate.hardware.ports import serial_port
+from antennate.hardware.ports.port import PortError
+from antennate.hardware.safety import watch
+from antennate.hardware.safety.causes import Outputs
+from antennate.hardware.safety.supervisor import Supervisor
 from antennate.params import LayoutParams
 from antennate.twin.link import Link
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from antennate.hardware.causes import Cause, Outputs
-from antennate.hardware.diagnosis import Finding
+from antennate.hardware.safety.causes import Cause, Outputs
+from antennate.hardware.safety.diagnosis import Finding
 from antennate.records import Contact
 
 BAD: dict[Cause, dict[str, Any]] = {

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from antennate.controller import Arm, Controller
-from antennate.hardware.causes import Inputs, Outputs, State
-from antennate.hardware.diagnosis import Band, ChannelDiagnosis, Finding
-from antennate.hardware.supervisor import Supervisor
+from antennate.hardware.safety.causes import Inputs, Outputs, State
+from antennate.hardware.safety.diagnosis import Band, ChannelDiagnosis, Finding
+from antennate.hardware.safety.supervisor import Supervisor
 from antennate.params import (
     ConditioningParams,
     ControllerParams,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from antennate.hardware.port import PortError
+from antennate.hardware.ports.port import PortError
 
 
 class Pieces:

@@ -10,12 +10,12 @@ import numpy as np
 from esp32_streams import hello
 from hardware_rig import BAND, BENT, FREE, LIMIT, PERIOD
 
-from antennate.hardware.board import Board
-from antennate.hardware.body import HardwareBody
-from antennate.hardware.causes import Cause, Inputs, Outputs, State
-from antennate.hardware.diagnosis import ChannelDiagnosis
+from antennate.hardware.driving.body import HardwareBody
 from antennate.hardware.esp32 import frame
-from antennate.hardware.supervisor import Supervisor
+from antennate.hardware.esp32.board import Board
+from antennate.hardware.safety.causes import Cause, Inputs, Outputs, State
+from antennate.hardware.safety.diagnosis import ChannelDiagnosis
+from antennate.hardware.safety.supervisor import Supervisor
 from antennate.params import DiagnosisParams, SupervisorParams
 from antennate.records import Contact, Maneuver
 

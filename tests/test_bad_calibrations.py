@@ -14,7 +14,7 @@ from antennate.calibration import Calibration
 from antennate.cli import main
 from antennate.errors import AntennateError, CalibrationError, ConfigError
 from antennate.experiments.twin import TwinConfig, rig
-from antennate.hardware.film import calibrated, require_film
+from antennate.hardware.esp32.film import calibrated, require_film
 from antennate.params import ConditioningParams, ControllerParams, RuleParams
 
 GOOD = Calibration(

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from esp32_streams import BOOT, encoded, framed, hello, made
 
-from antennate.hardware.board import Board, counts_of
 from antennate.hardware.esp32 import frame
+from antennate.hardware.esp32.board import Board, counts_of
 
 
 class Wire:

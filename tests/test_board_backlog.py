@@ -5,7 +5,7 @@ from __future__ import annotations
 from esp32_streams import encoded, hello, made
 from port_pieces import Pieces
 
-from antennate.hardware.board import KEPT, Board
+from antennate.hardware.esp32.board import KEPT, Board
 from antennate.hardware.esp32.frame import SAMPLE_FRAME_SIZE, config_hash, encode_hello
 
 

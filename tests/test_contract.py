@@ -17,7 +17,7 @@ import pytest
 from worlds import TICKS, WORLDS, World, recorded, replayed, session, simulated, twin
 
 from antennate.controller import ARMS
-from antennate.hardware.body import HardwareBody
+from antennate.hardware.driving.body import HardwareBody
 from antennate.hardware.esp32.clock import Timed
 from antennate.hardware.esp32.wire import Sample
 from antennate.loop import run_loop

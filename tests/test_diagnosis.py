@@ -15,8 +15,8 @@ from pydantic import ValidationError
 from scipy.stats import binom, norm
 
 from antennate.errors import CalibrationError
-from antennate.hardware.causes import Cause, State
-from antennate.hardware.diagnosis import Band, ChannelDiagnosis, Finding, Reading
+from antennate.hardware.safety.causes import Cause, State
+from antennate.hardware.safety.diagnosis import Band, ChannelDiagnosis, Finding, Reading
 from antennate.params import (
     DiagnosisParams,
     SensorParams,

@@ -13,7 +13,7 @@ from antennate.hardware.doctor.fix import Change, apply, plan
 from antennate.hardware.doctor.pace import latency_row
 from antennate.hardware.doctor.rows import grouped, ids_text, worst
 from antennate.hardware.dynamixel.bringup import BringUpError
-from antennate.hardware.port_errors import OpenError
+from antennate.hardware.ports.errors import OpenError
 from antennate.params import DoctorParams, SupervisorParams
 from antennate.twin.registers import Servo
 

@@ -8,10 +8,10 @@ from hardware_rig import BAND, PERIOD, Ticker, armed
 
 from antennate.conditioning import bending_level
 from antennate.contact import classify
-from antennate.hardware.causes import Cause, State
-from antennate.hardware.diagnosis import Finding, Reading
-from antennate.hardware.drift import Drift
-from antennate.hardware.trust import Trust
+from antennate.hardware.safety.causes import Cause, State
+from antennate.hardware.safety.diagnosis import Finding, Reading
+from antennate.hardware.safety.drift import Drift
+from antennate.hardware.safety.trust import Trust
 from antennate.params import ConditioningParams, DriftParams, RuleParams, SensorParams
 from antennate.records import Contact, Floats
 from antennate.sensor import reading_noise

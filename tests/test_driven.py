@@ -9,7 +9,7 @@ import pytest
 from antennate.controller import Arm
 from antennate.experiments.driven import driven, simulated_alike
 from antennate.experiments.tunnel import TunnelConfig
-from antennate.hardware.causes import State
+from antennate.hardware.safety.causes import State
 from antennate.params.layout import LayoutParams
 from antennate.records import Maneuver
 

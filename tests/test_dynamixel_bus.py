@@ -23,8 +23,8 @@ from antennate.hardware.dynamixel.bringup import BringUpError
 from antennate.hardware.dynamixel.bus import Bus
 from antennate.hardware.dynamixel.packets import Status, StatusError
 from antennate.hardware.dynamixel.tables import XL330_M288
-from antennate.hardware.port import PortError
-from antennate.hardware.watch import ServoWatch
+from antennate.hardware.ports.port import PortError
+from antennate.hardware.safety.watch import ServoWatch
 from antennate.twin.bus import Fault, ServoBus, Trouble
 from antennate.twin.link import Link
 from antennate.twin.registers import Servo

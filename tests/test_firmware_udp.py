@@ -23,7 +23,7 @@ from antennate.hardware.esp32 import datagram, frame
 from antennate.hardware.esp32.decoder import FrameDecoder
 from antennate.hardware.esp32.verifier import Verifier
 from antennate.hardware.esp32.wire import Hello, Sample
-from antennate.hardware.udp_port import UdpPort
+from antennate.hardware.ports.udp_port import UdpPort
 from antennate.params import NetworkParams
 
 Run = Callable[[Radio, int], None]

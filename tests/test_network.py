@@ -18,10 +18,10 @@ from antennate.errors import BadInputError
 from antennate.experiments.twin import TwinConfig, rig
 from antennate.hardware.esp32.decoder import FrameDecoder
 from antennate.hardware.esp32.wire import Hello, Sample
-from antennate.hardware.keys import read_key
-from antennate.hardware.port import Port, PortError
-from antennate.hardware.ports import finder
-from antennate.hardware.udp_port import UdpPort
+from antennate.hardware.ports.finder import finder
+from antennate.hardware.ports.keys import read_key
+from antennate.hardware.ports.port import Port, PortError
+from antennate.hardware.ports.udp_port import UdpPort
 from antennate.params import LayoutParams, NetworkParams
 from antennate.twin.faults import Faults
 from antennate.twin.serve import TwinServer

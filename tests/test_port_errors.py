@@ -13,9 +13,9 @@ from pathlib import Path
 import pytest
 
 from antennate.cli import BAD_INPUT, main
-from antennate.hardware.port_errors import explain
-from antennate.hardware.port_holder import holders
-from antennate.hardware.serial_port import SerialPort
+from antennate.hardware.ports.errors import explain
+from antennate.hardware.ports.holder import holders
+from antennate.hardware.ports.serial_port import SerialPort
 
 
 @pytest.fixture

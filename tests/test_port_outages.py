@@ -10,11 +10,11 @@ import pytest
 
 from antennate.errors import BadInputError
 from antennate.experiments.twin import Rig, TwinConfig, rig
-from antennate.hardware.causes import State
-from antennate.hardware.drive import DriveConfig, drive, prepare, require_servos
+from antennate.hardware.driving.drive import DriveConfig, drive, prepare, require_servos
+from antennate.hardware.driving.session import Session
 from antennate.hardware.dynamixel.bringup import BringUpError
-from antennate.hardware.port import Port, PortError
-from antennate.hardware.session import Session
+from antennate.hardware.ports.port import Port, PortError
+from antennate.hardware.safety.causes import State
 from antennate.loop import run_loop
 from antennate.params.layout import LayoutParams
 from antennate.twin.lockstep import BoardPort

@@ -19,20 +19,20 @@ import pytest
 from esp32_streams import encoded, hello, made
 from port_pieces import Pieces
 
-from antennate.hardware import reconnecting
-from antennate.hardware.board import Board
-from antennate.hardware.drive import await_board
+from antennate.hardware.driving.drive import await_board
+from antennate.hardware.esp32.board import Board
 from antennate.hardware.esp32.frame import encode_request
-from antennate.hardware.port import PortError
-from antennate.hardware.reconnecting import RETRY, Reconnecting
+from antennate.hardware.ports import reconnecting
+from antennate.hardware.ports.port import PortError
+from antennate.hardware.ports.reconnecting import RETRY, Reconnecting
 
 pytest.importorskip("serial")
 
 import serial
 
-from antennate.hardware import serial_finder
-from antennate.hardware.serial_finder import Identity, SerialFinder, find, identity
-from antennate.hardware.serial_port import SerialPort
+from antennate.hardware.ports import serial_finder
+from antennate.hardware.ports.serial_finder import Identity, SerialFinder, find, identity
+from antennate.hardware.ports.serial_port import SerialPort
 
 OFF, ON = False, True
 RUNS = {(OFF, OFF), (ON, ON)}
@@ -137,7 +137,7 @@ def test_L15_the_second_program_on_a_port_is_refused_and_told_the_pid_of_the_fir
     plug()
     path = str(tmp_path / "port")
     program = (
-        "import sys\nfrom antennate.hardware.serial_port import SerialPort\n"
+        "import sys\nfrom antennate.hardware.ports.serial_port import SerialPort\n"
         f"line = SerialPort({path!r}, 115200)\nprint('open', flush=True)\nsys.stdin.read()"
     )
     with subprocess.Popen(

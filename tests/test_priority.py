@@ -13,8 +13,8 @@ from typing import Any
 
 import pytest
 
-from antennate.hardware.priority import Priority, urgent
-from antennate.hardware.signals import STOPS, StopOnce
+from antennate.hardware.driving.priority import Priority, urgent
+from antennate.hardware.driving.signals import STOPS, StopOnce
 
 
 def scheduling() -> int:

@@ -16,8 +16,8 @@ from antennate.errors import BadInputError, OutputError
 from antennate.experiments.calibrate import CalibrateConfig, run
 from antennate.experiments.recording import RecordingParams
 from antennate.hardware.esp32 import frame
+from antennate.hardware.esp32.recorder import Recorder
 from antennate.hardware.esp32.stream import Stream
-from antennate.hardware.recorder import Recorder
 from antennate.params import RecordParams
 
 

@@ -12,13 +12,13 @@ import pytest
 from hardware_rig import Ticker
 from servo_rig import IDS, Rig, positions, servos
 
-from antennate.hardware.causes import Cause, State
 from antennate.hardware.dynamixel import packets
 from antennate.hardware.dynamixel.answers import POSITION, Value
 from antennate.hardware.dynamixel.bus import Bus
 from antennate.hardware.dynamixel.packets import LONGEST, Packet
 from antennate.hardware.dynamixel.parser import Parser
-from antennate.hardware.watch import ServoWatch
+from antennate.hardware.safety.causes import Cause, State
+from antennate.hardware.safety.watch import ServoWatch
 from antennate.twin.bus import ServoBus
 from antennate.twin.link import Link
 from antennate.twin.registers import Servo

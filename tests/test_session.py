@@ -11,15 +11,21 @@ import pytest
 
 from antennate.errors import BadInputError, ConfigError
 from antennate.experiments.twin import Rig, TwinConfig, rig
-from antennate.hardware.causes import Cause, State
-from antennate.hardware.drive import DriveConfig, await_board, decider, drive, require_servos
+from antennate.hardware.driving.drive import (
+    DriveConfig,
+    await_board,
+    decider,
+    drive,
+    require_servos,
+)
+from antennate.hardware.driving.report import Report
+from antennate.hardware.driving.session import Session
+from antennate.hardware.driving.signals import STOPS
 from antennate.hardware.dynamixel.bringup import BringUpError
 from antennate.hardware.dynamixel.packets import Instruction, StatusError
 from antennate.hardware.dynamixel.parser import Parser
-from antennate.hardware.port import PortError
-from antennate.hardware.report import Report
-from antennate.hardware.session import Session
-from antennate.hardware.signals import STOPS
+from antennate.hardware.ports.port import PortError
+from antennate.hardware.safety.causes import Cause, State
 from antennate.params.layout import LayoutParams
 from antennate.records import AntennaFrame, Maneuver, Pose
 from antennate.twin.bus import Fault, Trouble
@@ -618,7 +624,7 @@ def test_B13_a_sagging_supply_warns_then_holds_then_switches_off() -> None:
 
 
 def test_L15_B16_a_second_program_on_a_port_is_refused() -> None:
-    serial_port = pytest.importorskip("antennate.hardware.serial_port")
+    serial_port = pytest.importorskip("antennate.hardware.ports.serial_port")
     with PtyServer(rig(TwinConfig()).robot.bus) as server:
         first = serial_port.SerialPort(server.path, 1_000_000)
         with pytest.raises(PortError, match=server.path):

@@ -12,8 +12,8 @@ from hardware_faults import BAD, causes, together
 from hardware_rig import Ticker, armed, healthy
 from pydantic import ValidationError
 
-from antennate.hardware.causes import Cause, State
-from antennate.hardware.diagnosis import Finding
+from antennate.hardware.safety.causes import Cause, State
+from antennate.hardware.safety.diagnosis import Finding
 from antennate.params import SupervisorParams
 from antennate.records import Contact, Maneuver
 

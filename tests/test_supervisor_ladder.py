@@ -13,8 +13,8 @@ from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
 
-from antennate.hardware.causes import DATA, Cause, Inputs, Outputs, State
-from antennate.hardware.supervisor import Supervisor
+from antennate.hardware.safety.causes import DATA, Cause, Inputs, Outputs, State
+from antennate.hardware.safety.supervisor import Supervisor
 from antennate.params import SupervisorParams
 from antennate.records import Contact, Maneuver
 

@@ -12,9 +12,9 @@ from hardware_faults import causes
 from hardware_rig import BENT, FREE, LIMIT, PERIOD, Rig, armed, pose_change
 
 from antennate.controller import Controller
-from antennate.hardware.causes import Cause, Outputs, State
 from antennate.hardware.esp32.clock import DeviceClock, Verdict
 from antennate.hardware.esp32.wire import Hello, Reset
+from antennate.hardware.safety.causes import Cause, Outputs, State
 from antennate.params import ControllerParams
 from antennate.records import Maneuver
 

@@ -11,7 +11,7 @@ import pytest
 
 import antennate
 from antennate.errors import ConfigError
-from antennate.hardware.timing import LoopTiming
+from antennate.hardware.driving.timing import LoopTiming
 
 PERIOD = 0.01
 LIBRARY = Path(antennate.__path__[0])

@@ -9,9 +9,9 @@ import pytest
 from hardware_rig import BAND, BENT, FREE, Ticker
 from pydantic import ValidationError
 
-from antennate.hardware.causes import Cause
-from antennate.hardware.diagnosis import Band
-from antennate.hardware.touch_check import Ask, TouchCheck
+from antennate.hardware.safety.causes import Cause
+from antennate.hardware.safety.diagnosis import Band
+from antennate.hardware.safety.touch_check import Ask, TouchCheck
 from antennate.params import TouchCheckParams
 
 RISING = Band(500.0, 2500.0, 1)

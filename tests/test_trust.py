@@ -8,9 +8,9 @@ import pytest
 
 from antennate.errors import BadInputError
 from antennate.experiments.twin import Rig, TwinConfig, rig
-from antennate.hardware.causes import Cause, State
-from antennate.hardware.drive import DriveConfig, Report, drive
-from antennate.hardware.session import Session
+from antennate.hardware.driving.drive import DriveConfig, Report, drive
+from antennate.hardware.driving.session import Session
+from antennate.hardware.safety.causes import Cause, State
 from antennate.params import ConditioningParams, TouchCheckParams
 from antennate.twin.hand import Hand
 

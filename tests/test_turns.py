@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from antennate.experiments.twin import Rig, TwinConfig, rig
-from antennate.hardware.causes import State
-from antennate.hardware.drive import DriveConfig, drive
-from antennate.hardware.session import Session
+from antennate.hardware.driving.drive import DriveConfig, drive
+from antennate.hardware.driving.session import Session
+from antennate.hardware.safety.causes import State
 from antennate.records import AntennaFrame, Pose
 from antennate.twin.bus import Fault, Trouble
 

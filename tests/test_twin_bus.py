@@ -19,7 +19,7 @@ from antennate.hardware.dynamixel.bus import Bus
 from antennate.hardware.dynamixel.packets import Instruction, Status, StatusError
 from antennate.hardware.dynamixel.parser import Parser
 from antennate.hardware.dynamixel.tables import TABLES, XC430_W240, XL330_M288, Table
-from antennate.hardware.port import PortError
+from antennate.hardware.ports.port import PortError
 from antennate.twin.bus import Fault, ServoBus, Trouble
 from antennate.twin.pty import PtyServer
 from antennate.twin.registers import BOOT_TIME, Servo
@@ -397,7 +397,7 @@ def test_the_sdk_hears_refusals_alerts_and_reboots(
 
 def test_our_master_over_a_serial_line(server: PtyServer) -> None:
     """Patience is for a busy machine here; what is measured is that every value comes."""
-    serial_port = pytest.importorskip("antennate.hardware.serial_port")
+    serial_port = pytest.importorskip("antennate.hardware.ports.serial_port")
     port = serial_port.SerialPort(server.path, 1_000_000)
     try:
         bus = Bus(port, Timing(gap=0.1, doubt=0.5))
@@ -412,7 +412,7 @@ def test_our_master_over_a_serial_line(server: PtyServer) -> None:
 
 
 def test_L12_a_line_that_goes_away_is_a_port_error() -> None:
-    serial_port = pytest.importorskip("antennate.hardware.serial_port")
+    serial_port = pytest.importorskip("antennate.hardware.ports.serial_port")
     with PtyServer(ServoBus(servos())) as server:
         port = serial_port.SerialPort(server.path, 1_000_000)
         bus = Bus(port)

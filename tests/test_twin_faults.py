@@ -9,11 +9,11 @@ import pytest
 
 from antennate.errors import BadInputError
 from antennate.experiments.twin import Rig, TwinConfig, build, rig
-from antennate.hardware.causes import State
-from antennate.hardware.drive import DriveConfig, drive
+from antennate.hardware.driving.drive import DriveConfig, drive
+from antennate.hardware.driving.session import Session
 from antennate.hardware.dynamixel.packets import Instruction
 from antennate.hardware.dynamixel.parser import Parser
-from antennate.hardware.session import Session
+from antennate.hardware.safety.causes import State
 from antennate.params import BatteryParams, LayoutParams
 from antennate.twin.faults import Faults, read
 from antennate.twin.noise import Noise

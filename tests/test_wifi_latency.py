@@ -11,13 +11,13 @@ from esp32_streams import hello
 from hardware_rig import LIMIT
 
 from antennate.experiments.twin import Rig, TwinConfig, rig
-from antennate.hardware.board import Board
-from antennate.hardware.body import HardwareBody
-from antennate.hardware.causes import State
-from antennate.hardware.drive import DriveConfig, drive
+from antennate.hardware.driving.body import HardwareBody
+from antennate.hardware.driving.drive import DriveConfig, drive
+from antennate.hardware.driving.session import Session
 from antennate.hardware.esp32 import datagram, frame
+from antennate.hardware.esp32.board import Board
 from antennate.hardware.esp32.verifier import Verifier
-from antennate.hardware.session import Session
+from antennate.hardware.safety.causes import State
 from antennate.params import NetworkParams
 
 KEY = bytes(range(32))

@@ -11,8 +11,8 @@ import tyro
 
 from antennate.cli.arguments import FromFile
 from antennate.errors import ConfigError
-from antennate.hardware.keys import read_key
-from antennate.hardware.ports import is_udp
+from antennate.hardware.ports.finder import is_udp
+from antennate.hardware.ports.keys import read_key
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ from antennate.hardware.doctor.checkup import Checkup, Robot, examine
 from antennate.hardware.doctor.fix import Change, apply, plan
 from antennate.hardware.doctor.ports import opener_of, same
 from antennate.hardware.doctor.rows import Opener, worst
-from antennate.hardware.drive import DriveConfig
+from antennate.hardware.driving.drive import DriveConfig
 from antennate.hardware.host_clock import HostClock
 
 DESCRIPTION = """\

@@ -17,12 +17,12 @@ from antennate.cli.folder import LOG, RunFolder, to_json
 from antennate.cli.progress import terminate_as_interrupt
 from antennate.cli.tables import Cell, number, show
 from antennate.errors import ConfigError
-from antennate.hardware.causes import State
 from antennate.hardware.doctor.ports import same
-from antennate.hardware.drive import DriveConfig, connect, drive
-from antennate.hardware.film import calibrated
-from antennate.hardware.priority import Priority, urgent
-from antennate.hardware.session import Session
+from antennate.hardware.driving.drive import DriveConfig, connect, drive
+from antennate.hardware.driving.priority import Priority, urgent
+from antennate.hardware.driving.session import Session
+from antennate.hardware.esp32.film import calibrated
+from antennate.hardware.safety.causes import State
 from antennate.telemetry.feed import Feed
 from antennate.telemetry.header import Header
 from antennate.telemetry.ticks import Tick

@@ -22,11 +22,11 @@ from antennate.cli.addresses import RobotOrders, key_of
 from antennate.cli.arguments import parse_with
 from antennate.cli.progress import terminate_as_interrupt
 from antennate.errors import BadInputError, ConfigError, OutputError
-from antennate.hardware.board import BOARD_BAUD
 from antennate.hardware.doctor.ports import opener_of
+from antennate.hardware.esp32.board import BOARD_BAUD
+from antennate.hardware.esp32.recorder import Recorder
 from antennate.hardware.esp32.stream import Reading, Stream
 from antennate.hardware.host_clock import HostClock
-from antennate.hardware.recorder import Recorder
 from antennate.params import RecordParams
 
 DESCRIPTION = """\

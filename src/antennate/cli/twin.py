@@ -18,8 +18,8 @@ from antennate.cli.arguments import FromFile, parse_with
 from antennate.cli.progress import terminate_as_interrupt
 from antennate.errors import ConfigError
 from antennate.experiments.twin import TwinConfig, watched
-from antennate.hardware.keys import read_key
-from antennate.hardware.priority import LEVEL, urgent
+from antennate.hardware.driving.priority import LEVEL, urgent
+from antennate.hardware.ports.keys import read_key
 from antennate.twin.faults import Faults, read
 from antennate.twin.serve import End, TwinServer
 from antennate.twin.tcp import TcpEnd

@@ -24,10 +24,10 @@ from antennate.body import Clock
 from antennate.controller import Arm
 from antennate.experiments.tunnel import TunnelConfig
 from antennate.experiments.twin import Watch
-from antennate.hardware.drive import DriveConfig, drive, prepare
+from antennate.hardware.driving.drive import DriveConfig, drive, prepare
+from antennate.hardware.driving.report import Report
+from antennate.hardware.driving.session import Session
 from antennate.hardware.joints import Joints
-from antennate.hardware.report import Report
-from antennate.hardware.session import Session
 from antennate.loop import run_loop
 from antennate.params.layout import LayoutParams
 from antennate.records import AntennaFrame, Floats, Ints, Pose

@@ -17,15 +17,15 @@ from antennate.controller import Arm, Controller
 from antennate.experiments.judge import Judge
 from antennate.experiments.passage import Passage
 from antennate.experiments.tunnel import TunnelConfig, prepare
-from antennate.hardware.board import Board
-from antennate.hardware.body import HardwareBody
-from antennate.hardware.drive import DOUBT
+from antennate.hardware.driving.body import HardwareBody
+from antennate.hardware.driving.drive import DOUBT
+from antennate.hardware.driving.session import Session
 from antennate.hardware.dynamixel import bringup
 from antennate.hardware.dynamixel.answers import Timing
 from antennate.hardware.dynamixel.bus import Bus
+from antennate.hardware.esp32.board import Board
 from antennate.hardware.joints import Joints
-from antennate.hardware.session import Session
-from antennate.hardware.trust import Trust
+from antennate.hardware.safety.trust import Trust
 from antennate.loop import run_loop
 from antennate.params import Params, SupervisorParams, TouchCheckParams, number
 from antennate.params.base import GATHERED

@@ -15,7 +15,7 @@ import numpy as np
 
 from antennate.anatomy import LEGS, SIDES, YAW_JOINTS
 from antennate.errors import LogError
-from antennate.hardware.session import Session
+from antennate.hardware.driving.session import Session
 from antennate.records import AntennaFrame, Ints, Pose
 from antennate.telemetry.framing import SCHEMA, Kind
 

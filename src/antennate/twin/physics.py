@@ -7,7 +7,7 @@ import sys
 from concurrent.futures import Future, ThreadPoolExecutor
 from types import TracebackType
 
-from antennate.hardware.priority import claim
+from antennate.hardware.driving.priority import claim
 from antennate.records import Floats
 from antennate.twin.robot import TwinRobot
 

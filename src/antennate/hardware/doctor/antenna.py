@@ -9,14 +9,14 @@ import numpy as np
 
 from antennate.conditioning import bending_level
 from antennate.errors import CalibrationError
-from antennate.hardware.board import BOARD_BAUD
-from antennate.hardware.diagnosis import Band, ChannelDiagnosis, Finding
 from antennate.hardware.doctor.rows import Opener, Row, Verdict, row
 from antennate.hardware.doctor.survey import master
 from antennate.hardware.esp32 import frame
+from antennate.hardware.esp32.board import BOARD_BAUD
 from antennate.hardware.esp32.decoder import Counters
 from antennate.hardware.esp32.stream import Reading, Stream
 from antennate.hardware.esp32.wire import Hello, Reset, objections
+from antennate.hardware.safety.diagnosis import Band, ChannelDiagnosis, Finding
 from antennate.params import ControllerParams, DiagnosisParams, DoctorParams, SupervisorParams
 from antennate.params.layout import LayoutParams
 from antennate.records import Floats

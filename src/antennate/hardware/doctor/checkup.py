@@ -14,7 +14,7 @@ from antennate.hardware.doctor.ports import port_row
 from antennate.hardware.doctor.rows import Opener, Row, worst
 from antennate.hardware.doctor.servos import bus_rows
 from antennate.hardware.doctor.survey import Survey, survey
-from antennate.hardware.port import PortError
+from antennate.hardware.ports.port import PortError
 from antennate.params import ControllerParams, DoctorParams, Params, SupervisorParams
 from antennate.params.layout import LayoutParams
 

@@ -6,12 +6,12 @@ import contextlib
 import os
 from collections.abc import Iterator
 
-from antennate.hardware.board import BOARD_BAUD
 from antennate.hardware.doctor.rows import Opener, Row, row
-from antennate.hardware.port import Port
-from antennate.hardware.port_errors import OpenError
-from antennate.hardware.port_holder import holders
-from antennate.hardware.ports import finder
+from antennate.hardware.esp32.board import BOARD_BAUD
+from antennate.hardware.ports.errors import OpenError
+from antennate.hardware.ports.finder import finder
+from antennate.hardware.ports.holder import holders
+from antennate.hardware.ports.port import Port
 
 
 def opener_of(path: str, flag: str, key: bytes | None = None) -> Opener:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from itertools import groupby
 from typing import Literal, TypeVar
 
-from antennate.hardware.port import Port
+from antennate.hardware.ports.port import Port
 
 Verdict = Literal["ok", "warn", "bad"]
 Opener = Callable[[int], AbstractContextManager[Port]]

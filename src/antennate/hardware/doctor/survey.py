@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 from statistics import median
 from typing import Literal
 
-from antennate.hardware.board import BOARD_BAUD
 from antennate.hardware.doctor.rows import Opener
 from antennate.hardware.dynamixel import packets
 from antennate.hardware.dynamixel.answers import MOTION, Span, Timing, Value
@@ -19,8 +18,9 @@ from antennate.hardware.dynamixel.tables import (
     XC430_W240,
     Register,
 )
+from antennate.hardware.esp32.board import BOARD_BAUD
 from antennate.hardware.esp32.decoder import FrameDecoder
-from antennate.hardware.port import Port
+from antennate.hardware.ports.port import Port
 from antennate.params import DoctorParams
 from antennate.params.layout import LayoutParams
 

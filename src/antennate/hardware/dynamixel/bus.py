@@ -31,7 +31,7 @@ from antennate.hardware.dynamixel.doubts import Doubts
 from antennate.hardware.dynamixel.packets import HEADER, OVERHEAD, Packet, Status, StatusError
 from antennate.hardware.dynamixel.parser import Parser
 from antennate.hardware.dynamixel.turns import in_turn
-from antennate.hardware.port import Port, PortError
+from antennate.hardware.ports.port import Port, PortError
 
 CHUNK = 1024
 PING_DATA = 3

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from antennate.hardware.esp32.clock import DeviceClock, Timed, Verdict
 from antennate.hardware.esp32.decoder import FrameDecoder
 from antennate.hardware.esp32.wire import Hello, Sample, objections
-from antennate.hardware.port import Port
+from antennate.hardware.ports.port import Port
 
 _CHUNK = 4096
 

@@ -15,7 +15,7 @@ from antennate.hardware.esp32.frame import (
     encode_request,
 )
 from antennate.hardware.esp32.wire import Hello, Refused, Sample, objections
-from antennate.hardware.port import Port, PortError
+from antennate.hardware.ports.port import Port, PortError
 from antennate.records import Floats
 
 BOARD_BAUD = 115_200

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum, IntEnum
 
-from antennate.hardware.diagnosis import Finding
+from antennate.hardware.safety.diagnosis import Finding
 from antennate.records import Contact, Maneuver
 
 

@@ -21,21 +21,21 @@ import numpy as np
 
 from antennate.body import Clock
 from antennate.errors import AntennateError
-from antennate.hardware.board import Board
-from antennate.hardware.body import HardwareBody
-from antennate.hardware.causes import Inputs, Outputs
-from antennate.hardware.diagnosis import Band, ChannelDiagnosis
+from antennate.hardware.driving.body import HardwareBody
+from antennate.hardware.driving.timing import LoopTiming
+from antennate.hardware.driving.tracebacks import Tracebacks
+from antennate.hardware.driving.turns import Turns
 from antennate.hardware.dynamixel import bringup
 from antennate.hardware.dynamixel.bringup import BringUpError
 from antennate.hardware.dynamixel.bus import Bus
+from antennate.hardware.esp32.board import Board
 from antennate.hardware.joints import Joints, PoseError
-from antennate.hardware.port import PortError
-from antennate.hardware.supervisor import Supervisor
-from antennate.hardware.timing import LoopTiming
-from antennate.hardware.tracebacks import Tracebacks
-from antennate.hardware.trust import Trust
-from antennate.hardware.turns import Turns
-from antennate.hardware.watch import ServoWatch
+from antennate.hardware.ports.port import PortError
+from antennate.hardware.safety.causes import Inputs, Outputs
+from antennate.hardware.safety.diagnosis import Band, ChannelDiagnosis
+from antennate.hardware.safety.supervisor import Supervisor
+from antennate.hardware.safety.trust import Trust
+from antennate.hardware.safety.watch import ServoWatch
 from antennate.params import ConditioningParams, DiagnosisParams, SupervisorParams
 from antennate.records import AntennaFrame, Floats, Ints, Pose
 

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from urllib.parse import urlsplit
 
 from antennate.errors import BadInputError, ConfigError
-from antennate.hardware.reconnecting import Line
+from antennate.hardware.ports.reconnecting import Line
 from antennate.params.network import NetworkParams
 
 
@@ -34,7 +34,7 @@ def finder(
         return _serial(address, baud, flag)
     host, port = _place(address)
     if scheme == "tcp":
-        from antennate.hardware.tcp_port import TcpPort
+        from antennate.hardware.ports.tcp_port import TcpPort
 
         return lambda: TcpPort(host, port)
     if scheme != "udp":
@@ -44,7 +44,7 @@ def finder(
             f"{address}: expected the key of the board; give --key FILE, or --insecure-udp for a "
             "board without one, which anybody on the network can feign"
         )
-    from antennate.hardware.udp_port import UdpPort
+    from antennate.hardware.ports.udp_port import UdpPort
 
     return lambda: UdpPort(host, port, key, network)
 
@@ -70,7 +70,7 @@ def _place(address: str) -> tuple[str, int]:
 
 def _serial(path: str, baud: int, flag: str) -> Callable[[], Line]:
     try:
-        from antennate.hardware.serial_finder import SerialFinder
+        from antennate.hardware.ports.serial_finder import SerialFinder
     except ModuleNotFoundError as error:
         raise ConfigError(
             f"expected pyserial for real ports, found no module {error.name}; install "

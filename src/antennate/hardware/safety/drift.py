@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from antennate.hardware.diagnosis import Band
+from antennate.hardware.safety.diagnosis import Band
 from antennate.params import DriftParams
 
 _LONGEST = 0.1

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from antennate.hardware.diagnosis import Band, Finding, Reading
-from antennate.hardware.drift import Drift
-from antennate.hardware.touch_check import Ask, TouchCheck
+from antennate.hardware.safety.diagnosis import Band, Finding, Reading
+from antennate.hardware.safety.drift import Drift
+from antennate.hardware.safety.touch_check import Ask, TouchCheck
 from antennate.params import ConditioningParams, DriftParams, TouchCheckParams
 from antennate.records import Contact
 

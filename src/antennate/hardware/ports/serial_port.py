@@ -24,8 +24,8 @@ from contextlib import contextmanager
 
 import serial
 
-from antennate.hardware.port import PortError
-from antennate.hardware.port_errors import explain
+from antennate.hardware.ports.errors import explain
+from antennate.hardware.ports.port import PortError
 
 
 class SerialPort:

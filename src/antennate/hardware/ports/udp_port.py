@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable
 
 from antennate.hardware.esp32.verifier import Bucket, Tally, Verifier
-from antennate.hardware.port import PortError
+from antennate.hardware.ports.port import PortError
 from antennate.params.network import NetworkParams
 
 _LONGEST = 256

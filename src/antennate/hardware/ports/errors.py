@@ -6,8 +6,8 @@ import errno
 import os
 from pathlib import Path
 
-from antennate.hardware.port import PortError
-from antennate.hardware.port_holder import holders
+from antennate.hardware.ports.holder import holders
+from antennate.hardware.ports.port import PortError
 
 _BUSY = (errno.EBUSY, errno.EAGAIN)
 _DENIED = (errno.EACCES, errno.EPERM)

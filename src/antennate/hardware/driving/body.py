@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from antennate.body import Clock
-from antennate.hardware.board import Board, counts_of
 from antennate.hardware.dynamixel.bus import Bus
 from antennate.hardware.dynamixel.tables import XC430_W240
+from antennate.hardware.esp32.board import Board, counts_of
 from antennate.hardware.esp32.clock import Timed
 from antennate.hardware.joints import Joints
 from antennate.records import AntennaFrame, Floats, Ints, Pose

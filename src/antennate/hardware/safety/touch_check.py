@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from enum import Enum
 
-from antennate.hardware.diagnosis import Band
+from antennate.hardware.safety.diagnosis import Band
 from antennate.params import TouchCheckParams
 
 _NAMES = ("left", "right")

@@ -7,7 +7,7 @@ import socket
 from collections.abc import Generator
 from contextlib import contextmanager
 
-from antennate.hardware.port import PortError
+from antennate.hardware.ports.port import PortError
 
 _OPENING_TIME = 3.0
 """Longest wait for a connection [s]."""

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from queue import Empty, SimpleQueue
 from typing import Protocol
 
-from antennate.hardware.port import Port, PortError
+from antennate.hardware.ports.port import Port, PortError
 
 RETRY = 0.2
 """Time between two looks for a port that is gone [s]."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from antennate.hardware.trust import Trust
+from antennate.hardware.safety.trust import Trust
 
 
 class DryRun:

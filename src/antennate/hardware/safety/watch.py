@@ -10,7 +10,7 @@ from antennate.hardware.dynamixel.answers import POSITION, Answer, Span, Value
 from antennate.hardware.dynamixel.bringup import WATCHDOG_COUNTS
 from antennate.hardware.dynamixel.bus import Bus
 from antennate.hardware.dynamixel.tables import XC430_W240, hardware_errors
-from antennate.hardware.port import PortError
+from antennate.hardware.ports.port import PortError
 
 _ERRORS = Span(XC430_W240["hardware_error_status"].address, 1)
 _WATCHDOG = XC430_W240["bus_watchdog"]

@@ -8,7 +8,7 @@ from pathlib import Path
 from antennate import calibration
 from antennate.calibration import Calibration
 from antennate.errors import CalibrationError, ConfigError
-from antennate.hardware.board import Board
+from antennate.hardware.esp32.board import Board
 from antennate.params import ConditioningParams, ControllerParams
 
 _SERIAL = re.compile("[0-9a-f]{16}")

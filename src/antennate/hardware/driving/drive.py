@@ -11,24 +11,24 @@ from typing import Any, cast
 from antennate.controller import ARMS, Controller
 from antennate.errors import BadInputError, ConfigError
 from antennate.hardware import roster
-from antennate.hardware.board import BOARD_BAUD, Board
-from antennate.hardware.causes import State
-from antennate.hardware.dry_run import DryRun
+from antennate.hardware.driving.dry_run import DryRun
+from antennate.hardware.driving.report import Report
+from antennate.hardware.driving.session import Decider, Session
+from antennate.hardware.driving.signals import StopOnce
 from antennate.hardware.dynamixel import bringup
 from antennate.hardware.dynamixel.answers import Timing
 from antennate.hardware.dynamixel.bringup import BringUpError
 from antennate.hardware.dynamixel.bus import Bus
 from antennate.hardware.dynamixel.tables import XC430_W240
-from antennate.hardware.film import require_film
+from antennate.hardware.esp32.board import BOARD_BAUD, Board
+from antennate.hardware.esp32.film import require_film
 from antennate.hardware.host_clock import HostClock
 from antennate.hardware.joints import Joints
-from antennate.hardware.port import Port, PortError
-from antennate.hardware.ports import finder
-from antennate.hardware.reconnecting import Reconnecting
-from antennate.hardware.report import Report
-from antennate.hardware.session import Decider, Session
-from antennate.hardware.signals import StopOnce
-from antennate.hardware.trust import Trust
+from antennate.hardware.ports.finder import finder
+from antennate.hardware.ports.port import Port, PortError
+from antennate.hardware.ports.reconnecting import Reconnecting
+from antennate.hardware.safety.causes import State
+from antennate.hardware.safety.trust import Trust
 from antennate.loop import run_loop
 from antennate.params import (
     ControllerParams,

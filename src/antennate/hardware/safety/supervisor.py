@@ -10,7 +10,7 @@ import math
 from collections import deque
 from collections.abc import Iterable, Mapping
 
-from antennate.hardware.causes import (
+from antennate.hardware.safety.causes import (
     CURED_BY_ARMING,
     DATA,
     OF_FINDING,
@@ -21,7 +21,7 @@ from antennate.hardware.causes import (
     Outputs,
     State,
 )
-from antennate.hardware.rate import RateMeter
+from antennate.hardware.safety.rate import RateMeter
 from antennate.params import SupervisorParams
 from antennate.records import Contact, Maneuver
 

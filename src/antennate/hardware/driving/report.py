@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from antennate.hardware.causes import State
-from antennate.hardware.session import Session
-from antennate.hardware.timing import TimingReport
+from antennate.hardware.driving.session import Session
+from antennate.hardware.driving.timing import TimingReport
+from antennate.hardware.safety.causes import State
 
 
 @dataclass(slots=True)

@@ -1,0 +1,1 @@
+"""A robot that walks: one session between bytes and a controller, from dry run to torque off."""
