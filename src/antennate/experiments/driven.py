@@ -5,7 +5,8 @@ diagnosis of the antennae and its limit of the goals' speed, all through bytes, 
 lock-step. Nothing of that exists in pure simulation. To compare the two from the first reading that
 the controller gets, the simulation begins where the session stands then, and no later:
 
-- its controller is first asked without readings, at the times at which the session's was;
+- its controller is first given what the session's was before the physics began: no readings, or
+  one of the standing twin;
 - its physics runs the ticks that arming took, with every joint held where it stood;
 - its goals are rounded to ticks, as servos take them.
 
@@ -27,6 +28,7 @@ from antennate.experiments.twin import Watch
 from antennate.hardware.driving.drive import DriveConfig, drive, prepare
 from antennate.hardware.driving.report import Report
 from antennate.hardware.driving.session import Session
+from antennate.hardware.esp32.board import Board
 from antennate.hardware.joints import Joints
 from antennate.loop import run_loop
 from antennate.params.layout import LayoutParams
@@ -39,19 +41,22 @@ _DRY_RUN = 0.5
 """Time before the arm event [s]."""
 
 
+_NOTHING = AntennaFrame(t=np.full(1, math.nan), counts=np.full((1, 2), math.nan))
+
+
 @dataclass(slots=True)
 class Start:
-    """Where a session stood when its controller got the first reading.
+    """Where a session stood when its controller got the first reading that the physics follows.
 
     Attributes:
-        blind: Times of the ticks in which it got none [s].
-        standing: Ticks of the physics by then.
-        t: Time of that reading [s].
+        before: What it got until then.
+        standing: Ticks of the physics before that reading.
+        first: That reading; made by the standing twin, noise included, if `standing` is 0.
     """
 
-    blind: list[float] = field(default_factory=list[float])
+    before: list[AntennaFrame] = field(default_factory=list[AntennaFrame])
     standing: int = 0
-    t: float = math.nan
+    first: AntennaFrame = _NOTHING
 
 
 @dataclass(slots=True)
@@ -99,9 +104,22 @@ class Driven:
 
 
 def driven(
-    config: TunnelConfig, arm: Arm, trial: int, layout: LayoutParams, ticks: float = math.inf
+    config: TunnelConfig,
+    arm: Arm,
+    trial: int,
+    layout: LayoutParams,
+    ticks: float = math.inf,
+    phase: float = 0.0,
 ) -> Driven:
     """The trial by `drive`, until it is decided or for so many ticks.
+
+    Args:
+        config: The trial's world.
+        arm: Its controller.
+        trial: Its number.
+        layout: Servos of the robot.
+        ticks: How many at most, from the first reading on.
+        phase: Time that the loop begins later [s], which moves its ticks against the board's.
 
     Raises:
         BringUpError: The servos did not come up.
@@ -115,16 +133,16 @@ def driven(
     )
     session = prepare(orders, BoardPort(robot, clock), clock, clock)
     session.decider = watch.controller
+    clock.sleep(phase)
 
     def on_tick(session: Session, now: float) -> None:
-        t, counts = float(session.frame.t[0]), session.frame.counts
         if session.orders.stop:
             return
-        if not walk.readings and np.isnan(counts).all():
-            start.blind.append(t)
-            return
         if not walk.readings:
-            start.standing, start.t = round(watch.body.now() / period), t
+            start.standing, start.first = _taken(session.board) - robot.stood, session.frame
+            if start.standing < 0 or np.isnan(session.frame.counts).all():
+                start.before.append(session.frame)
+                return
         goals = tuple(servo.get("goal_position") for servo in robot.servos)
         walk.note(session.frame, int(watch.controller.maneuver[0]), session.pose, goals)
         more = watch.go_on(session.frame, session.pose)
@@ -146,8 +164,8 @@ def simulated_alike(
     """The trial in pure simulation, begun alike."""
     watch, walk = Watch(config, arm, trial), Walk()
     period, mind = config.controller.period, watch.controller
-    for t in start.blind:
-        mind.step(AntennaFrame(t=np.array([t]), counts=np.full((1, 2), math.nan)))
+    for frame in start.before:
+        mind.step(frame)
     body = _Begun(watch.body, layout, period, start)
 
     def go_on(frame: AntennaFrame, pose: Pose) -> bool:
@@ -159,6 +177,12 @@ def simulated_alike(
     return walk
 
 
+def _taken(board: Board) -> int:
+    """The board's tick in which its newest sample was taken."""
+    newest = board.clock.newest
+    return -1 if newest is None else newest.sample.seq
+
+
 class _Begun:
     """A simulated body whose joints were held for a while, and whose goals are those of servos.
 
@@ -168,14 +192,16 @@ class _Begun:
 
     def __init__(self, body: SimBody, layout: LayoutParams, period: float, start: Start) -> None:
         self._body, self._joints = body, Joints(layout)
-        self._ahead = start.t - start.standing * period
+        self._ahead = float(start.first.t[0]) - start.standing * period
         self.sent: tuple[int, ...] = ()
-        self._frame: AntennaFrame | None = body.read()
+        self._frame: AntennaFrame | None = self._stamped(body.read())
         stood = np.rint(self._joints.positions(body.world(0).drives()))
         for tick in range(start.standing):
             self._send(stood)
             body.sleep_until((tick + 1) * period)
-            self._frame = body.read()
+            self._frame = self._stamped(body.read())
+        if not start.standing:
+            self._frame = start.first
 
     @property
     def clock(self) -> Clock:
@@ -183,10 +209,13 @@ class _Begun:
         return self._body.clock
 
     def read(self) -> AntennaFrame:
-        """Read, stamped in whole microseconds as by the board."""
-        frame, self._frame = self._frame or self._body.read(), None
-        t = 1e-6 * np.rint(1e6 * (frame.t + self._ahead))
-        return AntennaFrame(t=t, counts=frame.counts)
+        """Read; the first time what was read when it began."""
+        frame, self._frame = self._frame or self._stamped(self._body.read()), None
+        return frame
+
+    def _stamped(self, frame: AntennaFrame) -> AntennaFrame:
+        """Stamped in whole microseconds as by the board."""
+        return AntennaFrame(t=1e-6 * np.rint(1e6 * (frame.t + self._ahead)), counts=frame.counts)
 
     def write(self, pose: Pose) -> None:
         """Round, then command."""

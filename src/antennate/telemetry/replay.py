@@ -89,14 +89,17 @@ class ReplayBody:
 
 
 class _Guarded:
-    """A controller whose exceptions give a pose of NaN, as in a session."""
+    """A controller asked when it was then, whose exceptions give a pose of NaN, as in a session."""
 
-    def __init__(self, decider: Decider) -> None:
-        self._decider = decider
+    def __init__(self, decider: Decider, body: ReplayBody) -> None:
+        self._decider, self._body = decider, body
         self.failures = 0
 
     def step(self, frame: AntennaFrame) -> Pose:
         """The pose of this tick."""
+        tick, pose = self._body.tick, self._body.pose
+        if tick is not None and pose is not None and not tick.asked:
+            return pose
         try:
             return self._decider.step(frame)
         except Exception:  # noqa: BLE001 a plugged-in controller may raise anything
@@ -169,7 +172,8 @@ def replay(ticks: Iterable[Tick], decider: Decider, period: float) -> Replayed:
         decider: The controller.
         period: Its period [s].
     """
-    body, mind, found = ReplayBody(ticks), _Guarded(decider), Replayed()
+    body, found = ReplayBody(ticks), Replayed()
+    mind = _Guarded(decider, body)
 
     def go_on(frame: AntennaFrame, pose: Pose) -> bool:
         if body.tick is not None:

@@ -152,6 +152,11 @@ class TwinRobot:
         """What ended the physics, if anything did."""
         return self._body.failure(0)
 
+    @property
+    def stood(self) -> int:
+        """Ticks before the physics began, or so far."""
+        return self._ticks - self._walked
+
     def advance(self, t: float) -> None:
         """Let everything happen until t."""
         while self.due <= t + _ROUNDING:

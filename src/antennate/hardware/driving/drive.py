@@ -11,6 +11,7 @@ from typing import Any, cast
 from antennate.controller import ARMS, Controller
 from antennate.errors import BadInputError, ConfigError
 from antennate.hardware import roster
+from antennate.hardware.driving.adapter import require_quick
 from antennate.hardware.driving.dry_run import DryRun
 from antennate.hardware.driving.report import Report
 from antennate.hardware.driving.session import Decider, Session
@@ -135,14 +136,20 @@ def connect(
             line = Reconnecting(finder(address, baud, flag, key, config.network))
             stack.callback(line.close)
             lines.append(line)
-        yield prepare(config, lines[0], lines[1], HostClock())
+        yield prepare(config, lines[0], lines[1], HostClock(), bus)
 
 
-def prepare(config: DriveConfig, esp32: Port, bus: Port, clock: Any) -> Session:
-    """A session before two open ports, after both sides have said who they are."""
+def prepare(
+    config: DriveConfig, esp32: Port, bus: Port, clock: Any, path: str = "the bus"
+) -> Session:
+    """A session before two open ports, after both sides have said who they are.
+
+    `path` is what the bus is called, for errors.
+    """
     board = Board(esp32, config.limits.stale_age)
     await_board(board, clock, bus)
     require_film(board, config.sensor_id)
+    require_quick(bus, config.layout.ids[:3], config.layout.baud, clock.now, path)
     master = Bus(bus, Timing(config.layout.baud, doubt=DOUBT), clock=clock.now)
     require_servos(master, config.layout)
     board.count_anew(clock.now())

@@ -31,7 +31,7 @@ from antennate.hardware.dynamixel.bus import Bus
 from antennate.hardware.esp32.board import Board
 from antennate.hardware.joints import Joints, PoseError
 from antennate.hardware.ports.port import PortError
-from antennate.hardware.safety.causes import Inputs, Outputs
+from antennate.hardware.safety.causes import Cause, Inputs, Outputs
 from antennate.hardware.safety.diagnosis import Band, ChannelDiagnosis
 from antennate.hardware.safety.supervisor import Supervisor
 from antennate.hardware.safety.trust import Trust
@@ -68,6 +68,7 @@ class Orders:
 class _Thought:
     """What the mind did in this tick."""
 
+    asked: bool = True
     decided_at: float = -math.inf
     finite: bool = True
     failure: str = ""
@@ -152,7 +153,13 @@ class Session:
         self._goals: Floats | None = None
         self._pose: Pose | None = None
         self._used = self._refused = 0
+        self._owed = 0.0
         self._lost = self.touched = False
+
+    @property
+    def asked(self) -> bool:
+        """Whether the controller was asked in the last tick."""
+        return self._thought.asked
 
     @property
     def mute(self) -> bool:
@@ -182,8 +189,14 @@ class Session:
         if self.outputs is None or not self.outputs.clear:
             said = [math.nan, math.nan]
         self._mark("read")
-        self.frame = AntennaFrame(t=self.turns.time(frame.t), counts=np.array([said]))
+        self.frame = AntennaFrame(t=self.turns.time(frame.t, self._rate()), counts=np.array([said]))
         return self.frame
+
+    def _rate(self) -> float:
+        """How fast the controller's time goes, 1 as the clock: slower while the supply is low."""
+        causes = () if self.outputs is None else self.outputs.causes
+        empty = any(active.cause is Cause.SUPPLY_WARN for active in causes)
+        return self._limits.slow_rate if empty else 1.0
 
     def write(self, pose: Pose) -> None:
         """Let the supervisor judge this tick, and do what it says; then look at the servos."""
@@ -225,11 +238,11 @@ class Session:
         """The controller's pose; an exception of it is a cause, not the end.
 
         While legs forget their turns the controller is not asked, and its time stands still: to
-        stand is the session's own decision.
+        stand is the session's own decision. So it is to go slowly, which asks it less often.
         """
         thought = self._thought = _Thought()
-        if self.turns.standing and self._pose is not None:
-            thought.decided_at = self.clock.now()
+        if self._pose is not None and (self.turns.standing or not self._due()):
+            thought.asked, thought.decided_at = False, self.clock.now()
             return self._pose
         try:
             pose = self.decider.step(frame)
@@ -243,9 +256,19 @@ class Session:
         self._pose = pose
         return pose
 
+    def _due(self) -> bool:
+        """Whether a period of the controller's own time has passed; call once a tick."""
+        self._owed += self._rate()
+        if self._owed < 1.0:
+            return False
+        self._owed -= 1.0
+        return True
+
     def release(self) -> list[int]:
         """Torque off, verified: ids that did not confirm it."""
-        left = bringup.disable(self.bus, self.joints.ids)
+        left: list[int] = []
+        for group in self.joints.in_order_of_release:
+            left += bringup.disable(self.bus, group)
         self._goals = None
         self.turns.reset()
         self.watch.arm(False)
