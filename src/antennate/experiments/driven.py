@@ -17,6 +17,7 @@ speed never acts: the twin's legs stand where its gait begins, and none is asked
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -54,9 +55,9 @@ class Start:
         first: That reading; made by the standing twin, noise included, if `standing` is 0.
     """
 
-    before: list[AntennaFrame] = field(default_factory=list[AntennaFrame])
-    standing: int = 0
-    first: AntennaFrame = _NOTHING
+    before: list[AntennaFrame]
+    standing: int
+    first: AntennaFrame
 
 
 @dataclass(slots=True)
@@ -124,33 +125,26 @@ def driven(
     Raises:
         BringUpError: The servos did not come up.
     """
-    watch, walk, start = Watch(config, arm, trial), Walk(), Start()
-    period = config.controller.period
+    watch, walk, period = Watch(config, arm, trial), Walk(), config.controller.period
     robot = TwinRobot(watch.body, layout, period, boot_id=trial + 1, standing_noise=True)
     clock = LockstepClock(robot)
     orders = DriveConfig(
         controller=arm, dry_run=_DRY_RUN, touch_check=False, layout=layout, mind=config.controller
     )
     session = prepare(orders, BoardPort(robot, clock), clock, clock)
-    session.decider = watch.controller
+    mind = session.decider = _Judged(watch, lambda: _taken(session.board) - robot.stood)
     clock.sleep(phase)
 
     def on_tick(session: Session, now: float) -> None:
-        if session.orders.stop:
+        if mind.first is None or session.orders.stop:
             return
-        if not walk.readings:
-            start.standing, start.first = _taken(session.board) - robot.stood, session.frame
-            if start.standing < 0 or np.isnan(session.frame.counts).all():
-                start.before.append(session.frame)
-                return
         goals = tuple(servo.get("goal_position") for servo in robot.servos)
-        walk.note(session.frame, int(watch.controller.maneuver[0]), session.pose, goals)
-        more = watch.go_on(session.frame, session.pose)
-        session.orders.stop = not more or len(walk.readings) >= ticks
+        walk.note(session.frame, int(mind.maneuver[0]), session.pose, goals)
+        session.orders.stop = bool(watch.status) or len(walk.readings) >= ticks
 
     report = drive(session, orders, arm=True, on_tick=on_tick)
     walk.status = watch.status
-    return Driven(walk, start, report)
+    return Driven(walk, Start(mind.before, mind.standing, mind.first or _NOTHING), report)
 
 
 def simulated_alike(
@@ -181,6 +175,42 @@ def _taken(board: Board) -> int:
     """The board's tick in which its newest sample was taken."""
     newest = board.clock.newest
     return -1 if newest is None else newest.sample.seq
+
+
+class _Judged:
+    """The controller of a trial, judged as in simulation: before its goals are sent.
+
+    Args:
+        watch: Controller and judge.
+        standing: Ticks of the physics before the newest reading; negative before it begins.
+
+    Attributes:
+        before: What it got before the first reading that the physics follows.
+        standing: Ticks of the physics before that reading.
+        first: That reading, None so far.
+    """
+
+    def __init__(self, watch: Watch, standing: Callable[[], int]) -> None:
+        self._watch, self._standing = watch, standing
+        self.maneuver, self.contact = watch.controller.maneuver, watch.controller.contact
+        self.before: list[AntennaFrame] = []
+        self.standing = 0
+        self.first: AntennaFrame | None = None
+
+    def step(self, frame: AntennaFrame) -> Pose:
+        """The pose of this tick."""
+        mind = self._watch.controller
+        pose = mind.step(frame)
+        self.maneuver, self.contact = mind.maneuver, mind.contact
+        if self.first is None:
+            self.standing = self._standing()
+            if self.standing < 0 or np.isnan(frame.counts).all():
+                self.before.append(frame)
+                return pose
+            self.first = frame
+        if not self._watch.status:
+            self._watch.go_on(frame, pose)
+        return pose
 
 
 class _Begun:
