@@ -16,6 +16,7 @@ speed never acts: the twin's legs stand where its gait begins, and none is asked
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -98,10 +99,29 @@ class Driven:
     report: Report
 
 
+def in_process(orders: DriveConfig, robot: TwinRobot) -> Session:
+    """A session before a twin in lock-step, with calls in place of wires."""
+    clock = LockstepClock(robot)
+    return prepare(orders, BoardPort(robot, clock), clock, clock)
+
+
 def driven(
-    config: TunnelConfig, arm: Arm, trial: int, layout: LayoutParams, ticks: float = math.inf
+    config: TunnelConfig,
+    arm: Arm,
+    trial: int,
+    layout: LayoutParams,
+    ticks: float = math.inf,
+    wired: Callable[[DriveConfig, TwinRobot], Session] = in_process,
 ) -> Driven:
     """The trial by `drive`, until it is decided or for so many ticks.
+
+    Args:
+        config: The trial's world.
+        arm: Its controller.
+        trial: Its number.
+        layout: Servos of the robot.
+        ticks: Most ticks from the first reading on.
+        wired: Puts a session before the twin.
 
     Raises:
         BringUpError: The servos did not come up.
@@ -109,11 +129,10 @@ def driven(
     watch, walk, start = Watch(config, arm, trial), Walk(), Start()
     period = config.controller.period
     robot = TwinRobot(watch.body, layout, period, boot_id=trial + 1, standing_noise=True)
-    clock = LockstepClock(robot)
     orders = DriveConfig(
         controller=arm, dry_run=_DRY_RUN, touch_check=False, layout=layout, mind=config.controller
     )
-    session = prepare(orders, BoardPort(robot, clock), clock, clock)
+    session = wired(orders, robot)
     session.decider = watch.controller
 
     def on_tick(session: Session, now: float) -> None:
