@@ -6,13 +6,15 @@ import random
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from queue import SimpleQueue
 
 import numpy as np
 
 from antennate.controller import Controller
 from antennate.experiments.tunnel import TunnelConfig, prepare
+from antennate.hardware.ports.finder import finder
+from antennate.hardware.ports.port import PortError
 from antennate.params import ControllerParams, LayoutParams
 from antennate.twin.ends import End, Terminal
 from antennate.twin.faults import Faults, read
@@ -29,7 +31,7 @@ class Closed(Controller):
 
 
 class Late:
-    """A wire whose every few bytes come late, each way, by chance."""
+    """A wire some of whose bytes come late, each way, by chance."""
 
     def __init__(self, end: End, longest: float) -> None:
         self._end, self._longest = end, longest
@@ -43,7 +45,7 @@ class Late:
         return self._end.taken
 
     def read(self) -> bytes:
-        time.sleep(self._chance.uniform(0.0, self._longest))
+        self._dawdle()
         return self._end.read()
 
     def write(self, data: bytes) -> int:
@@ -71,8 +73,12 @@ class Late:
 
     def _deliver(self) -> None:
         while part := self._said.get():
-            time.sleep(self._chance.uniform(0.0, self._longest))
+            self._dawdle()
             self._end.write(part)
+
+    def _dawdle(self) -> None:
+        if self._chance.random() < 0.05:
+            time.sleep(self._chance.uniform(0.0, self._longest))
 
 
 def terminals() -> list[End]:
@@ -96,4 +102,8 @@ def served(
             yield server.paths
         finally:
             over.set()
+            with suppress(PortError):  # a word wakes it
+                line = finder(server.paths["clock"], 115_200)()
+                line.write(b"\n")
+                line.close()
             thread.join()

@@ -19,14 +19,15 @@ class ClockParams(Params):
     patience: float = number(
         30.0,
         "s",
-        "assumed: a hundred steps of the physics on a machine ten times too busy",
-        "real time after which the other end counts as hung; one that is gone is noticed at once",
+        "assumed: a stride of the physics on a machine ten times too busy",
+        "real time without an answer after which a twin counts as hung; one that is gone is "
+        "noticed at once",
         gt=0,
     )
-    greeting: float = number(
-        3.0,
+    arrival: float = number(
+        5.0,
         "s",
-        "assumed: a connection that was made before is accepted within",
-        "real time within which the board's and the bus's clients have to be there",
+        "assumed: far more than a wire takes, and short for who has swapped two wires",
+        "real time within which a client connects, and bytes that were sent arrive",
         gt=0,
     )

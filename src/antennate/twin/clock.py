@@ -103,7 +103,7 @@ class ClockServer:
 
     def _begin(self) -> None:
         """Time is the client's from here on; what was on the wires before is gone."""
-        end = time.monotonic() + self._params.greeting
+        end = time.monotonic() + self._params.arrival
         for name in WIRES:
             wire = self._wires[name]
             wire.clear()
@@ -122,7 +122,7 @@ class ClockServer:
     def _take(self, sent: Sent) -> None:
         """Give the robot what the client has sent, once all of it has come."""
         wire, bus = self._wires[sent.wire], self._robot.bus
-        end = time.monotonic() + self._params.patience
+        end = time.monotonic() + self._params.arrival
         while len(self._came[sent.wire]) < sent.count and self._ready(wire, end):
             self._came[sent.wire] += wire.read()
         came = self._came[sent.wire]

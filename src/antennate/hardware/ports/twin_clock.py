@@ -177,7 +177,7 @@ class TwinClock:
                 raise PortError(f"expected a time from {self._t!r} s on, found {at.t!r}")
             self._heard, self._asked, self._t = rest, False, at.t
             for port, count in zip((self.esp32, self.bus), at.counts, strict=True):
-                port.fetch(count, self._params.patience)
+                port.fetch(count, self._params.arrival)
 
     @contextlib.contextmanager
     def _mapped(self) -> Iterator[None]:
