@@ -194,6 +194,21 @@ def test_every_bit_of_a_time_comes_back(t: float) -> None:
     assert words.answer(f"at {t!r} 1 2".encode()) == words.At(t, (1, 2))
 
 
+def test_whoever_greets_at_time_0_gets_all_that_the_board_says() -> None:
+    robot = build(TwinConfig(), 5)
+    said = robot.take()
+    robot.advance(0.1)
+    with served(build(TwinConfig(), 5)) as paths:
+        lines = [SerialPort(paths[name], 115_200) for name in ("clock", "esp32", "bus")]
+        clock = TwinClock(*lines)
+        assert clock.esp32.read(4096, 0.0) == said
+        clock.sleep_until(0.1)
+        assert clock.now() == 0.1
+        assert clock.esp32.read(4096, 0.0) == robot.take()
+        for line in lines:
+            line.close()
+
+
 def test_bytes_that_a_wire_swallows_are_missed_and_there_is_no_way_back() -> None:
     nobody = Terminal()
     with served(build(TwinConfig(), 5)) as paths:
@@ -232,29 +247,31 @@ def test_a_clock_is_refused_for_what_can_be_no_twin(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("flags", "busy"), [((), 0), (("--tcp", "0"), 4)])
-def test_M7_drive_by_the_command_line_decides_as_the_pure_simulation_for_a_whole_trial(
-    flags: tuple[str, ...], busy: int, tmp_path: Path
+@pytest.mark.parametrize(
+    ("flags", "busy", "most"), [((), 0, 10_000), (("--tcp", "0"), 4, 400)], ids=["alone", "busy"]
+)
+def test_M7_drive_by_the_command_line_decides_as_the_pure_simulation(
+    flags: tuple[str, ...], busy: int, most: int, tmp_path: Path
 ) -> None:
-    """Two processes, alone and beside four busy ones; the log is compared to the simulation."""
+    """Two processes: a whole trial alone, and the begin of one beside four busy processes."""
     start = driven(CONFIG, "closed", 0, LAYOUT, 1).start
-    alone = simulated_alike(CONFIG, "closed", 0, LAYOUT, start)
-    length = 0.01 * len(alone.maneuvers) + 0.5
+    simulated = simulated_alike(CONFIG, "closed", 0, LAYOUT, start, most)
+    count = len(simulated.maneuvers)
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join((str(SOURCE), str(HERE)))}
     with ExitStack() as stack, twin(*flags) as (_, addresses):
         for _ in range(busy):
             stack.callback(stack.enter_context(subprocess.Popen(BUSY)).kill)
         argv = [*PROGRAM, "drive", *addresses, "--arm", "--no-touch-check", "--dry-run", "0.5"]
-        argv += ["--duration", str(length), "--controller", "ticked_rig:Closed"]
-        argv += ["--out", str(tmp_path), "--overwrite"]
-        assert (
-            subprocess.run(argv, env=environment, capture_output=True, check=False).returncode == 0
-        )
-    ticks = list(LogReader(tmp_path / "drive.log"))
+        argv += ["--duration", str(0.01 * count + 0.5), "--controller", "ticked_rig:Closed"]
+        argv += ["--out", str(tmp_path), "--overwrite", "--json"]
+        said = subprocess.run(argv, env=environment, capture_output=True, check=True).stdout
+    assert json.loads(said)["log_complete"]
+    with LogReader(tmp_path / "drive.log") as log:
+        ticks = list(log)
     first = next(at for at, tick in enumerate(ticks) if not np.isnan(tick.counts).all())
-    ticks = ticks[first : first + len(alone.maneuvers)]
-    assert alone.status == "success"
-    assert len(ticks) == len(alone.maneuvers) > 1000
-    assert [(tick.t, *tick.counts) for tick in ticks] == alone.readings
-    assert [tick.maneuver for tick in ticks] == alone.maneuvers
-    assert [np.array(tick.angles).tobytes() for tick in ticks] == alone.poses
+    ticks = ticks[first : first + count]
+    assert len(ticks) == count
+    assert simulated.status == ("" if busy else "success")
+    assert [(tick.t, *tick.counts) for tick in ticks] == simulated.readings
+    assert [tick.maneuver for tick in ticks] == simulated.maneuvers
+    assert [np.array(tick.angles).tobytes() for tick in ticks] == simulated.poses
