@@ -155,6 +155,7 @@ class TwinClock:
             raise PortError(self._broken)
 
     def _ask(self, line: str) -> None:
+        self.check()
         if self._asked:  # a signal came before the answer to the last question
             self._await()
         self._asked = True
