@@ -200,7 +200,7 @@ def test_whoever_greets_at_time_0_gets_all_that_the_board_says() -> None:
     robot.advance(0.1)
     with served(build(TwinConfig(), 5)) as paths:
         lines = [SerialPort(paths[name], 115_200) for name in ("clock", "esp32", "bus")]
-        clock = TwinClock(*lines)
+        clock = TwinClock(lines[0], lines[1], lines[2])
         assert clock.esp32.read(4096, 0.0) == said
         clock.sleep_until(0.1)
         assert clock.now() == 0.1
@@ -216,7 +216,7 @@ def test_bytes_that_a_wire_swallows_are_missed_and_there_is_no_way_back() -> Non
         with pytest.raises(
             PortError, match="from the twin on --esp32, found 0; are --esp32, --bus"
         ):
-            TwinClock(*lines, ClockParams(arrival=0.2))
+            TwinClock(lines[0], lines[1], lines[2], ClockParams(arrival=0.2))
         for line in lines:
             line.close()
     nobody.close()
