@@ -19,7 +19,7 @@ LAYOUT = LayoutParams()
 
 def same(arm: Arm, trial: int, ticks: float, phase: float = 0.0) -> tuple[set[int], int, str]:
     """Both ways agree in every tick; the maneuvers, the number of ticks and the end."""
-    one = driven(CONFIG, arm, trial, LAYOUT, ticks, phase)
+    one = driven(CONFIG, arm, trial, LAYOUT, ticks, phase=phase)
     other = simulated_alike(CONFIG, arm, trial, LAYOUT, one.start, ticks)
     assert one.walk.maneuvers == other.maneuvers
     assert one.walk.poses == other.poses

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
@@ -33,7 +34,7 @@ twin. An address is the path of a serial port, tcp://HOST:PORT, or, for a board 
 udp://HOST:PORT with the key it was given. First a dry run: everything is read and nothing written.
 Then, with --arm only, torque comes on with every servo where it stands. Ctrl-C or SIGTERM ends it:
 pose held, torque off, verified. A lost board or servo makes it hold; the watchdogs of the servos
-stop it if this program dies."""
+stop it if this program dies. --clock is for a twin in lock-step alone, never for a robot."""
 
 
 @dataclass(frozen=True)
@@ -42,6 +43,7 @@ class Orders(RobotOrders):
 
     Attributes:
         bus: serial port of the servo bus, or tcp://HOST:PORT
+        clock: address of the clock of `antennate twin --pace lockstep`: time is the twin's
         arm: torque on after the dry run
         out: folder for log and result, runs/drive-N if not given
         overwrite: replace the results that the folder holds
@@ -49,6 +51,7 @@ class Orders(RobotOrders):
     """
 
     bus: Annotated[str, tyro.conf.arg(metavar="PORT")] = ""
+    clock: Annotated[str, tyro.conf.arg(metavar="PORT")] = ""
     arm: bool = False
     out: Annotated[Path | None, tyro.conf.arg(metavar="FOLDER")] = None
     overwrite: bool = False
@@ -67,6 +70,8 @@ def command(argv: Sequence[str]) -> int:
             raise ConfigError(f"--{name}: expected a serial port, found none")
     if same(orders.esp32, orders.bus):
         raise ConfigError(f"--esp32 and --bus: expected two ports, found {orders.bus} twice")
+    if orders.clock and any(same(orders.clock, one) for one in (orders.esp32, orders.bus)):
+        raise ConfigError(f"--clock: expected a port of its own, found {orders.clock} twice")
     if config.calibration is not None:
         mind, film = calibrated(config.mind, Path(config.calibration), config.sensor_id)
         config = config.model_copy(update={"mind": mind, "sensor_id": film.sensor_id})
@@ -74,8 +79,9 @@ def command(argv: Sequence[str]) -> int:
     key = key_of(orders)
     with RunFolder.open("drive", orders.out, orders.overwrite) as folder:
         folder.describe("drive", argv, config)
-        with connect(config, orders.esp32, orders.bus, key) as session, terminate_as_interrupt():
-            result = _carry_out(config, session, orders.arm, folder.path / LOG)
+        wires = connect(config, orders.esp32, orders.bus, key, orders.clock)
+        with wires as session, terminate_as_interrupt():
+            result = _carry_out(config, session, orders, folder.path / LOG)
         folder.finish(result, ())
         if orders.json:
             sys.stdout.write(to_json(result))
@@ -87,19 +93,23 @@ def command(argv: Sequence[str]) -> int:
     return BAD_INPUT if fault or stays_on or result["refusal"] else OK
 
 
-def _carry_out(config: DriveConfig, session: Session, arm: bool, log: Path) -> dict[str, Any]:
-    """Drive, with the log and the status line in a process of their own."""
+def _carry_out(config: DriveConfig, session: Session, orders: Orders, log: Path) -> dict[str, Any]:
+    """Drive, with the log and the status line in a process of their own.
+
+    In a twin's time nothing is urgent, and the log is waited for.
+    """
     header = Header(controller=config.controller, params=config.mind, layout=config.layout)
     viewer = [sys.executable, "-m", "antennate.cli.viewer", str(log)]
-    feed = Feed(viewer, header.pack())
+    feed = Feed(viewer, header.pack(), waits=bool(orders.clock))
 
     def keep(session: Session, t: float) -> None:
         feed.send(Tick.of(session, t).pack())
 
-    with feed, urgent() as priority:
-        report = drive(session, config, arm, keep)
-    head = {"schema": 1, "command": "drive", "controller": config.controller, "armed": arm}
+    with feed, nullcontext(Priority.ORDINARY) if orders.clock else urgent() as priority:
+        report = drive(session, config, orders.arm, keep)
+    head = {"schema": 1, "command": "drive", "controller": config.controller, "armed": orders.arm}
     tail = {
+        "clock": "twin" if orders.clock else "host",
         "priority": priority.value,
         "unlogged": feed.dropped,
         "log_complete": not (feed.failed or feed.dropped),
@@ -121,7 +131,9 @@ def _note(result: Mapping[str, Any]) -> str:
         note += "A dry run: nothing was written to the servos; --arm lets it walk.\n"
     if result["refusal"]:
         note += f"Not armed: {result['refusal']}; --no-touch-check arms without the check.\n"
-    if result["priority"] == Priority.ORDINARY.value:
+    if result["clock"] == "twin":
+        note += "Time was the twin's.\n"
+    elif result["priority"] == Priority.ORDINARY.value:
         note += "Real-time priority was not allowed; a busy machine will make it miss ticks.\n"
     if not result["log_complete"]:
         note += "The log is not complete.\n"

@@ -104,12 +104,19 @@ class Driven:
     report: Report
 
 
+def in_process(orders: DriveConfig, robot: TwinRobot) -> Session:
+    """A session before a twin in lock-step, with calls in place of wires."""
+    clock = LockstepClock(robot)
+    return prepare(orders, BoardPort(robot, clock), clock, clock)
+
+
 def driven(
     config: TunnelConfig,
     arm: Arm,
     trial: int,
     layout: LayoutParams,
     ticks: float = math.inf,
+    wired: Callable[[DriveConfig, TwinRobot], Session] = in_process,
     phase: float = 0.0,
 ) -> Driven:
     """The trial by `drive`, until it is decided or for so many ticks.
@@ -119,7 +126,8 @@ def driven(
         arm: Its controller.
         trial: Its number.
         layout: Servos of the robot.
-        ticks: How many at most, from the first reading on.
+        ticks: Most ticks from the first reading on.
+        wired: Puts a session before the twin.
         phase: Time that the loop begins later [s], which moves its ticks against the board's.
 
     Raises:
@@ -127,13 +135,12 @@ def driven(
     """
     watch, walk, period = Watch(config, arm, trial), Walk(), config.controller.period
     robot = TwinRobot(watch.body, layout, period, boot_id=trial + 1, standing_noise=True)
-    clock = LockstepClock(robot)
     orders = DriveConfig(
         controller=arm, dry_run=_DRY_RUN, touch_check=False, layout=layout, mind=config.controller
     )
-    session = prepare(orders, BoardPort(robot, clock), clock, clock)
+    session = wired(orders, robot)
     mind = session.decider = _Judged(watch, lambda: _taken(session.board) - robot.stood)
-    clock.sleep(phase)
+    session.clock.sleep_until(session.clock.now() + phase)
 
     def on_tick(session: Session, now: float) -> None:
         if mind.first is None or session.orders.stop:

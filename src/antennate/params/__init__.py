@@ -9,6 +9,7 @@ properties, computed here and never typed.
 from antennate.params.antenna import N_MM_PER_DEG, AntennaParams
 from antennate.params.base import Params, number
 from antennate.params.bench import BenchVariationParams, WallParams
+from antennate.params.clock import ClockParams
 from antennate.params.doctor import DoctorParams
 from antennate.params.endurance import DriftParams, TurnsParams
 from antennate.params.layout import BasesParams, JointsParams, LayoutParams, YawsParams
@@ -54,6 +55,7 @@ __all__ = [
     "BenchPhysicsParams",
     "BenchVariationParams",
     "BouldersWallParams",
+    "ClockParams",
     "ConditioningParams",
     "ControllerParams",
     "CornerWallParams",

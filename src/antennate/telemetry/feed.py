@@ -2,8 +2,8 @@
 
 A message is the content of a record behind its length and how many were dropped before it. The
 loop writes it to a pipe at once or not at all: what the other process cannot take is dropped and
-counted. The content of no bytes says that the loop has ended in order; a pipe that closes without
-it means that the loop was killed.
+counted; in a twin's time, which stands still meanwhile, it waits. The content of no bytes says that
+the loop has ended in order; a pipe that closes without it means that the loop was killed.
 """
 
 from __future__ import annotations
@@ -48,14 +48,15 @@ class Feed:
     Args:
         words: Command line of a process that reads messages from its standard input.
         first: The content of the first message, of any length.
+        waits: Wait for room instead of dropping, where the loop's time is not the host's.
 
     Attributes:
         dropped: Ticks that found no room.
         failed: The other process is gone, or ended with an error.
     """
 
-    def __init__(self, words: Sequence[str], first: bytes) -> None:
-        self._words, self._first = words, first
+    def __init__(self, words: Sequence[str], first: bytes, waits: bool = False) -> None:
+        self._words, self._first, self._waits = words, first, waits
         self._process: subprocess.Popen[bytes] | None = None
         self._pipe = -1
         self.dropped = 0
@@ -71,7 +72,7 @@ class Feed:
             fcntl.fcntl(self._pipe, fcntl.F_SETPIPE_SZ, _ROOM)
         with contextlib.suppress(BrokenPipeError):  # it has gone already; `send` will notice
             os.write(self._pipe, _HEAD.pack(len(self._first), 0) + self._first)
-        os.set_blocking(self._pipe, False)
+        os.set_blocking(self._pipe, self._waits)
         return self
 
     def __exit__(

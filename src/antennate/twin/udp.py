@@ -63,7 +63,7 @@ class UdpEnd:
                 self._say(answer, sender)
         return b""
 
-    def write(self, data: bytes) -> None:
+    def write(self, data: bytes) -> int:
         """Send whole frames; a greeting is kept for whoever asks."""
         now = time.monotonic()
         self._spoke = now
@@ -78,6 +78,15 @@ class UdpEnd:
                 signed = self._speaker.sign(whole, round(1e3 * now))
                 if signed is not None:
                     self._say(signed, self._speaker.listener)
+        return len(data)
+
+    @property
+    def taken(self) -> bool:
+        """Always: whoever asks is sent frames."""
+        return True
+
+    def clear(self) -> None:
+        """Nothing: what was sent is on its way."""
 
     def close(self) -> None:
         """Let the port go."""
