@@ -16,7 +16,6 @@ import subprocess
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from select import PIPE_BUF
-from types import TracebackType
 from typing import BinaryIO
 
 from antennate.errors import LogError
@@ -74,12 +73,7 @@ class Feed:
         os.set_blocking(self._pipe, False)
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         process, self._process = self._process, None
         if process is None:
             return

@@ -12,7 +12,6 @@ import termios
 import time
 import tty
 from collections.abc import Callable
-from types import TracebackType
 from typing import Protocol
 
 from antennate.hardware.dynamixel.tables import BAUD_RATES
@@ -125,12 +124,7 @@ class TwinServer:
     def __enter__(self) -> TwinServer:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._bus.close()
         self._board.close()
 

@@ -14,6 +14,7 @@ from antennate.hardware.doctor.ports import port_row
 from antennate.hardware.doctor.rows import Opener, Row, worst
 from antennate.hardware.doctor.servos import bus_rows
 from antennate.hardware.doctor.survey import Survey, survey
+from antennate.hardware.esp32.board import BOARD_BAUD
 from antennate.hardware.ports.port import PortError
 from antennate.params import ControllerParams, DoctorParams, Params, SupervisorParams
 from antennate.params.layout import LayoutParams
@@ -73,50 +74,34 @@ def examine(
     """
     found, params = Checkup(), params or DoctorParams()
     if bus is not None:
-        _examine_bus(found, robot, *bus, params, now)
+
+        def look(opener: Opener) -> list[Row]:
+            found.survey = seen = survey(opener, robot.layout, params, now)
+            latency = latency_row(bus[0], slow_adapter(seen, params), params)
+            return [latency, *bus_rows(seen, robot.layout, robot.limits, params)]
+
+        found.rows += _examined("bus", *bus, robot.layout.baud, look)
     if esp32 is not None:
-        _examine_board(found, robot, *esp32, params, now)
+
+        def hear(opener: Opener) -> list[Row]:
+            found.heard = listen(opener, robot.layout, params, now)
+            return board_rows(found.heard, robot.mind, robot.limits, params)
+
+        found.rows += _examined("esp32", *esp32, BOARD_BAUD, hear)
     return found
 
 
-def _examine_bus(
-    found: Checkup,
-    robot: Robot,
-    path: str,
-    opener: Opener,
-    params: DoctorParams,
-    now: Callable[[], float],
-) -> None:
-    found.rows.append(first := port_row("bus", path, opener, robot.layout.baud))
+def _examined(
+    part: str, path: str, opener: Opener, baud: int, look: Callable[[Opener], list[Row]]
+) -> list[Row]:
+    """Rows of a port, and of what is behind it if it opens."""
+    first = port_row(part, path, opener, baud)
     if first.verdict == "bad":
-        return
+        return [first]
     try:
-        found.survey = survey(opener, robot.layout, params, now)
+        return [first, *look(opener)]
     except PortError as error:
-        found.rows.append(_lost("bus", path, error))
-        return
-    slow = slow_adapter(found.survey, params)
-    found.rows.append(latency_row(path, slow, params))
-    found.rows += bus_rows(found.survey, robot.layout, robot.limits, params)
-
-
-def _examine_board(
-    found: Checkup,
-    robot: Robot,
-    path: str,
-    opener: Opener,
-    params: DoctorParams,
-    now: Callable[[], float],
-) -> None:
-    found.rows.append(first := port_row("esp32", path, opener))
-    if first.verdict == "bad":
-        return
-    try:
-        found.heard = listen(opener, robot.layout, params, now)
-    except PortError as error:
-        found.rows.append(_lost("esp32", path, error))
-        return
-    found.rows += board_rows(found.heard, robot.mind, robot.limits, params)
+        return [first, _lost(part, path, error)]
 
 
 def _lost(part: str, path: str, error: PortError) -> Row:
