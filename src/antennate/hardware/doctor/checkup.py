@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from antennate.hardware.doctor.antenna import Heard, board_rows, listen
+from antennate.hardware.doctor.antenna import board_rows, film_rows
+from antennate.hardware.doctor.hearing import Heard, listen
 from antennate.hardware.doctor.pace import latency_row, slow_adapter
 from antennate.hardware.doctor.ports import port_row
 from antennate.hardware.doctor.rows import Opener, Row, worst
@@ -16,16 +17,14 @@ from antennate.hardware.doctor.servos import bus_rows
 from antennate.hardware.doctor.survey import Survey, survey
 from antennate.hardware.esp32.board import BOARD_BAUD
 from antennate.hardware.ports.port import PortError
-from antennate.params import ControllerParams, DoctorParams, Params, SupervisorParams
-from antennate.params.layout import LayoutParams
+from antennate.hardware.robot import RobotConfig
+from antennate.params import DoctorParams
 
 
-class Robot(Params):
-    """What doctor needs to know of a robot; a part of what robot.toml holds."""
+class DoctorConfig(RobotConfig):
+    """The robot, and what is good."""
 
-    layout: LayoutParams = LayoutParams()
-    mind: ControllerParams = ControllerParams()
-    limits: SupervisorParams = SupervisorParams()
+    doctor: DoctorParams = DoctorParams()
 
 
 @dataclass(slots=True)
@@ -57,22 +56,20 @@ class Checkup:
 
 
 def examine(
-    robot: Robot,
+    robot: DoctorConfig,
     bus: tuple[str, Opener] | None,
     esp32: tuple[str, Opener] | None,
     now: Callable[[], float],
-    params: DoctorParams | None = None,
 ) -> Checkup:
     """Examine a robot at rest; nothing is written to it and nothing moves.
 
     Args:
-        robot: What is expected.
+        robot: What is expected, its calibration already in place.
         bus: Path and opener of the bus, None to leave it out.
         esp32: The same of the antenna board.
         now: Monotonic time [s].
-        params: What is good.
     """
-    found, params = Checkup(), params or DoctorParams()
+    found, params = Checkup(), robot.doctor
     if bus is not None:
 
         def look(opener: Opener) -> list[Row]:
@@ -85,7 +82,8 @@ def examine(
 
         def hear(opener: Opener) -> list[Row]:
             found.heard = listen(opener, robot.layout, params, now)
-            return board_rows(found.heard, robot.mind, robot.limits, params)
+            rows = board_rows(found.heard, robot.mind, robot.limits, params)
+            return rows + film_rows(found.heard.hello, robot.sensor_id)
 
         found.rows += _examined("esp32", *esp32, BOARD_BAUD, hear)
     return found

@@ -27,19 +27,11 @@ from antennate.hardware.joints import Joints
 from antennate.hardware.ports.finder import finder
 from antennate.hardware.ports.port import Port, PortError
 from antennate.hardware.ports.reconnecting import Reconnecting
+from antennate.hardware.robot import RobotConfig
 from antennate.hardware.safety.causes import State
 from antennate.hardware.safety.trust import Trust
 from antennate.loop import run_loop
-from antennate.params import (
-    ControllerParams,
-    DoctorParams,
-    DriftParams,
-    NetworkParams,
-    Params,
-    SupervisorParams,
-    TouchCheckParams,
-    number,
-)
+from antennate.params import DoctorParams, DriftParams, TouchCheckParams, number
 from antennate.params.layout import LayoutParams
 from antennate.records import AntennaFrame, Pose
 
@@ -55,8 +47,8 @@ DOUBT = 0.07
 """Longest that a late answer is waited for [s]: less than the watchdogs' 100 ms."""
 
 
-class DriveConfig(Params):
-    """The robot, its controller, and how long it runs: what robot.toml holds."""
+class DriveConfig(RobotConfig):
+    """The robot, its controller, and how long it runs."""
 
     controller: str = number(
         "closed", "1", "assumed: our best", "open, paper, closed, or MODULE:CLASS of your own"
@@ -66,18 +58,6 @@ class DriveConfig(Params):
     )
     duration: float | None = number(
         None, "s", "assumed: until it is stopped", "time from torque on to off", gt=0
-    )
-    calibration: str | None = number(
-        None,
-        "1",
-        "assumed: the numbers of mind.conditioning",
-        "file of `antennate calibrate`, for both antennae, in place of mind.conditioning",
-    )
-    sensor_id: str | None = number(
-        None,
-        "1",
-        "assumed: that of the calibration file",
-        "name of the film; 16 hexadecimal digits name the board it is soldered to",
     )
     touch_check: bool = number(
         True,
@@ -103,10 +83,6 @@ class DriveConfig(Params):
         ge=0,
         le=600,
     )
-    layout: LayoutParams = LayoutParams()
-    mind: ControllerParams = ControllerParams()
-    limits: SupervisorParams = SupervisorParams()
-    network: NetworkParams = NetworkParams()
 
 
 @contextlib.contextmanager
@@ -142,7 +118,7 @@ def prepare(config: DriveConfig, esp32: Port, bus: Port, clock: Any) -> Session:
     """A session before two open ports, after both sides have said who they are."""
     board = Board(esp32, config.limits.stale_age)
     await_board(board, clock, bus)
-    require_film(board, config.sensor_id)
+    require_film(board.hello, config.sensor_id)
     master = Bus(bus, Timing(config.layout.baud, doubt=DOUBT), clock=clock.now)
     require_servos(master, config.layout)
     board.count_anew(clock.now())
