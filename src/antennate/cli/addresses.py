@@ -85,7 +85,7 @@ def key_of(orders: RobotOrders) -> bytes | None:
     if not is_udp(orders.esp32):
         return None
     if not orders.insecure_udp:
-        return read_key(orders.key)
+        return read_key(orders.key, "or give --insecure-udp for a board without one")
     if orders.key is not None:
         raise ConfigError("--insecure-udp: expected no --key beside it, found both")
     warning = "UDP without a key: anybody on this network can feign the antenna board"
