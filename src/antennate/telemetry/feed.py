@@ -19,11 +19,12 @@ from select import PIPE_BUF
 from typing import BinaryIO
 
 from antennate.errors import LogError
+from antennate.params import HostParams
 
 _HEAD = struct.Struct("<II")
 _ROOM = 1 << 20
 """Bytes that the pipe may hold: half a minute of ticks."""
-_PATIENCE = 5.0
+_PATIENCE = HostParams().log_patience
 """Time for the other process to write the last ticks [s]."""
 _LONGEST = 1 << 17
 

@@ -15,13 +15,14 @@ from collections.abc import Callable
 from typing import Protocol
 
 from antennate.hardware.dynamixel.tables import BAUD_RATES
+from antennate.params import TwinParams
 from antennate.twin.faults import Faults
 from antennate.twin.physics import Physics
 from antennate.twin.robot import TwinRobot
 
 _CHUNK = 4096
 _LONGEST = 1.0
-_LUMP = 0.00025
+_LUMP = TwinParams().lump
 """Answers leave in lumps of this time [s], as those of a fast USB adapter do."""
 _SPEEDS: dict[int, int] = {
     getattr(termios, f"B{baud}"): baud for baud in BAUD_RATES if hasattr(termios, f"B{baud}")

@@ -21,7 +21,7 @@ from antennate.hardware.dynamixel.tables import (
 from antennate.hardware.esp32.board import BOARD_BAUD
 from antennate.hardware.esp32.decoder import FrameDecoder
 from antennate.hardware.ports.port import Port
-from antennate.params import DoctorParams
+from antennate.params import BoardParams, BusParams, DoctorParams
 from antennate.params.layout import LayoutParams
 
 BAUDS = (57_600, 115_200, 1_000_000, 2_000_000, 3_000_000, 4_000_000)
@@ -46,14 +46,10 @@ REGISTERS = (
 )
 """Read of every servo; at the same addresses in both models."""
 
-_PATIENCE = 0.05
-"""Silence after which an answer is given up [s]: more than any adapter keeps one back."""
-_BUDGET = 0.25
-"""Time for one reading of all [s]."""
-_TRIES = 3
-"""Of one reading of all."""
-_SAMPLE_TIME = 0.3
-"""Time in which an antenna board on the wrong port says thirty samples [s]."""
+_PATIENCE = BusParams().patient_gap
+_BUDGET = BusParams().patient_budget
+_TRIES = BusParams().patient_tries
+_SAMPLE_TIME = BoardParams().misplaced
 
 
 @dataclass(slots=True)

@@ -31,20 +31,13 @@ from antennate.hardware.robot import RobotConfig
 from antennate.hardware.safety.causes import State
 from antennate.hardware.safety.trust import Trust
 from antennate.loop import run_loop
-from antennate.params import DoctorParams, DriftParams, TouchCheckParams, number
+from antennate.params import BusParams, DoctorParams, DriftParams, TouchCheckParams, number
 from antennate.params.layout import LayoutParams
 from antennate.records import AntennaFrame, Pose
 
 _GREETING_TIME = DoctorParams().greeting
-_EVIDENCE_TIME = 1.5
-"""Silence on --esp32 while --bus speaks unasked that shows the two swapped [s]."""
-_ARMING_TIME = 1.0
-"""Time after which torque must have come on, or the drive ends [s]."""
-_STAND = 0.3
-"""Time that the robot holds its pose before the torque goes off [s]."""
 _PATIENCE = 0.05
-DOUBT = 0.07
-"""Longest that a late answer is waited for [s]: less than the watchdogs' 100 ms."""
+DOUBT = BusParams().doubt_walking
 
 
 class DriveConfig(RobotConfig):
@@ -83,6 +76,22 @@ class DriveConfig(RobotConfig):
         ge=0,
         le=600,
     )
+    stand: float = number(
+        0.3,
+        "s",
+        "assumed: a step at half a hertz comes to rest",
+        "time that the robot holds its pose before the torque goes off",
+        ge=0,
+        le=60,
+    )
+    swapped: float = number(
+        1.5,
+        "s",
+        "assumed: half of the wait for a greeting, and no servo speaks unasked",
+        "silence of the board, while the bus speaks unasked, that shows the two ports swapped",
+        gt=0,
+        le=60,
+    )
 
 
 @contextlib.contextmanager
@@ -117,7 +126,7 @@ def connect(
 def prepare(config: DriveConfig, esp32: Port, bus: Port, clock: Any) -> Session:
     """A session before two open ports, after both sides have said who they are."""
     board = Board(esp32, config.limits.stale_age)
-    await_board(board, clock, bus)
+    await_board(board, clock, bus, config.swapped)
     require_film(board.hello, config.sensor_id)
     master = Bus(bus, Timing(config.layout.baud, doubt=DOUBT), clock=clock.now)
     require_servos(master, config.layout)
@@ -137,7 +146,9 @@ def prepare(config: DriveConfig, esp32: Port, bus: Port, clock: Any) -> Session:
     )
 
 
-def await_board(board: Board, clock: Any, bus: Port | None = None) -> None:
+def await_board(
+    board: Board, clock: Any, bus: Port | None = None, swapped: float = math.inf
+) -> None:
     """Wait for a greeting and samples; what the bus says unasked is read, and nothing written.
 
     Raises:
@@ -148,7 +159,7 @@ def await_board(board: Board, clock: Any, bus: Port | None = None) -> None:
     while board.clock.newest is None:
         unasked += 0 if bus is None else _unasked(bus)
         silent = not board.decoder.counters.received
-        if silent and unasked and clock.now() > begin + _EVIDENCE_TIME:
+        if silent and unasked and clock.now() > begin + swapped:
             raise BadInputError(
                 f"--esp32: expected an antenna board, found silence, and {unasked} bytes on --bus "
                 "that no servo was asked for; --esp32 and --bus are swapped"
@@ -251,7 +262,11 @@ def drive(
         """After a fault and a time to look at it: torque can be taken off now, or never."""
         nonlocal failed_at
         out = session.outputs
-        if out is not None and t > dry.over + _ARMING_TIME and out.state >= State.FAULT:
+        if (
+            out is not None
+            and t > dry.over + config.limits.longest_arming
+            and out.state >= State.FAULT
+        ):
             failed_at = min(failed_at, t)
         if out is not None and out.state is State.OFF and t > failed_at:
             return True
@@ -277,16 +292,16 @@ def drive(
                 stop.deaf = True
         finally:
             report.timing = None if session.timing is None else session.timing.report()
-            report.on = _off(session)
+            report.on = _off(session, config.stand)
     return report
 
 
-def _off(session: Session) -> list[int] | None:
+def _off(session: Session, stand: float) -> list[int] | None:
     """Stand for a moment, then torque off: ids that did not confirm it, None if it never was on."""
     if not session.touched:
         return None
     with contextlib.suppress(PortError):
-        session.stand(_STAND)
+        session.stand(stand)
     try:
         return session.release()
     except PortError:

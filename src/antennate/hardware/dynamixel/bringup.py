@@ -19,13 +19,13 @@ from antennate.hardware.dynamixel.tables import (
     XC430_W240,
     Register,
 )
+from antennate.params import BusParams
 
-WATCHDOG_COUNTS = 5
+WATCHDOG_COUNTS = BusParams().watchdog
 """Bus watchdog: a servo stops 100 ms after the last packet."""
 
-_TRIES = 5
-_BUDGET = 0.1
-"""Time for one reading of all, outside the control loop [s]."""
+_TRIES = BusParams().tries
+_BUDGET = BusParams().budget
 _COMMON = XC430_W240.registers
 """Both models have the registers used here at the same addresses."""
 

@@ -9,11 +9,10 @@ from typing import Literal
 from antennate.hardware.dynamixel.answers import Answer, Span, Value
 from antennate.hardware.dynamixel.bus import PING_DATA, Bus
 from antennate.hardware.dynamixel.tables import XC430_W240, Register
+from antennate.params import BusParams
 
-PINGS = 3
-"""Pings until an id is taken for silent."""
-_READS = 6
-"""Reads until a servo that answers pings is taken for one that answers nothing else whole."""
+PINGS = BusParams().pings
+_READS = BusParams().reads
 _TICKS = Span(XC430_W240["realtime_tick"].address, 16)
 """What differs between two servos of one id: the tick and the position, in both models."""
 

@@ -15,12 +15,13 @@ from antennate.hardware.esp32.frame import (
 )
 from antennate.hardware.esp32.listener import CHUNK, Listener
 from antennate.hardware.ports.port import Port, PortError
+from antennate.params import BoardParams
 from antennate.records import Floats
 
-BOARD_BAUD = 115_200
+BOARD_BAUD = BoardParams().baud
 """Bits per second of the board's port."""
-KEPT = 64 * SAMPLE_FRAME_SIZE
-"""Most bytes of a backlog that are looked at, the newest: 64 samples."""
+KEPT = BoardParams().backlog * SAMPLE_FRAME_SIZE
+"""Most bytes of a backlog that are looked at, the newest."""
 _CHUNKS = 64
 """Most chunks read at once: more than Linux keeps for a line."""
 _RAILS = (FLAG_LEFT_RAIL, FLAG_RIGHT_RAIL)
