@@ -103,7 +103,7 @@ def finite_goals(old: Any, self: Any, angles: Any) -> Any:
 
 
 def careless(old: Any, self: Any, frame_: Any) -> Any:
-    self._thought = session._Thought(decided_at=self.clock.now())
+    self._thought = session.Thought(decided_at=self.clock.now())
     return self.decider.step(frame_)
 
 

@@ -11,9 +11,10 @@ from typing import Any, cast
 from antennate.controller import ARMS, Controller
 from antennate.errors import BadInputError, ConfigError
 from antennate.hardware import roster
+from antennate.hardware.driving.decider import Decider
 from antennate.hardware.driving.dry_run import DryRun
 from antennate.hardware.driving.report import Report
-from antennate.hardware.driving.session import Decider, Session
+from antennate.hardware.driving.session import Session
 from antennate.hardware.driving.signals import StopOnce
 from antennate.hardware.dynamixel import bringup
 from antennate.hardware.dynamixel.answers import Timing
