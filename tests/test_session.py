@@ -352,6 +352,7 @@ def test_B19_a_signal_holds_the_pose_and_takes_torque_off_within_2_s(number: int
     stand = made.session.stand
 
     def again(time: float) -> None:
+        assert time == 0.4
         signal.raise_signal(number)
         goals = [servo.get("goal_position") for servo in made.robot.servos]
         stand(time)
@@ -359,7 +360,8 @@ def test_B19_a_signal_holds_the_pose_and_takes_torque_off_within_2_s(number: int
         signal.raise_signal(number)
 
     made.session.stand = again
-    report = drive(made.session, CONFIG, arm=True, on_tick=stop)
+    config = CONFIG.model_copy(update={"stand": 0.4})
+    report = drive(made.session, config, arm=True, on_tick=stop)
     assert made.clock.now() - 2.0 <= 2.0
     assert report.safe
     assert not any(servo.torque for servo in made.robot.servos)

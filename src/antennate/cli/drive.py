@@ -12,8 +12,7 @@ from typing import Annotated, Any
 import tyro
 
 from antennate.cli import BAD_INPUT, OK
-from antennate.cli.addresses import RobotOrders, key_of, require_lossless
-from antennate.cli.arguments import parse_with
+from antennate.cli.addresses import RobotOrders, key_of, parse_robot, require_lossless
 from antennate.cli.folder import LOG, RunFolder, to_json
 from antennate.cli.progress import terminate_as_interrupt
 from antennate.cli.tables import Cell, number, show
@@ -22,7 +21,7 @@ from antennate.hardware.doctor.ports import same
 from antennate.hardware.driving.drive import DriveConfig, connect, drive
 from antennate.hardware.driving.priority import Priority, urgent
 from antennate.hardware.driving.session import Session
-from antennate.hardware.esp32.film import calibrated
+from antennate.hardware.robot_file import RobotFile
 from antennate.hardware.safety.causes import State
 from antennate.telemetry.feed import Feed
 from antennate.telemetry.header import Header
@@ -64,7 +63,7 @@ def command(argv: Sequence[str]) -> int:
     Raises:
         AntennateError: A port, a servo or the board is not what is needed; nothing moved then.
     """
-    config, orders = parse_with("drive", DESCRIPTION, DriveConfig, argv, Orders())
+    config, orders = parse_robot("drive", DESCRIPTION, RobotFile.for_drive, argv, Orders())
     for name in ("esp32", "bus"):
         if not getattr(orders, name):
             raise ConfigError(f"--{name}: expected a serial port, found none")
@@ -72,9 +71,7 @@ def command(argv: Sequence[str]) -> int:
         raise ConfigError(f"--esp32 and --bus: expected two ports, found {orders.bus} twice")
     if orders.clock and any(same(orders.clock, one) for one in (orders.esp32, orders.bus)):
         raise ConfigError(f"--clock: expected a port of its own, found {orders.clock} twice")
-    if config.calibration is not None:
-        mind, film = calibrated(config.mind, Path(config.calibration), config.sensor_id)
-        config = config.model_copy(update={"mind": mind, "sensor_id": film.sensor_id})
+    config = config.calibrated()
     require_lossless(orders.bus)
     key = key_of(orders)
     with RunFolder.open("drive", orders.out, orders.overwrite) as folder:

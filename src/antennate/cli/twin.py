@@ -16,7 +16,7 @@ import tyro
 
 from antennate.cli import OK
 from antennate.cli.arguments import FromFile, parse_with
-from antennate.cli.progress import terminate_as_interrupt
+from antennate.cli.progress import end_at_first
 from antennate.errors import ConfigError
 from antennate.experiments.twin import TwinConfig, watched
 from antennate.hardware.driving.priority import LEVEL, urgent
@@ -68,16 +68,21 @@ def command(argv: Sequence[str]) -> int:
     Raises:
         AntennateError: Something given cannot be used.
     """
+    with end_at_first():
+        return _serve(argv)
+
+
+def _serve(argv: Sequence[str]) -> int:
     config, places = parse_with("twin", DESCRIPTION, TwinConfig, argv, Places())
     faults = Faults([read(text) for text in config.fault], config.layout.ids)
     real = places.pace == "real"
     robot, passage = watched(config, boot_id=secrets.randbits(32) if real else None)
     end = float("inf") if config.duration is None else config.duration
     with TwinServer(robot, faults, *_ends(places)) as server:
-        sys.stdout.write(json.dumps(server.paths) + "\n")
-        sys.stdout.flush()
         try:
-            with terminate_as_interrupt(), urgent(LEVEL + 1) if real else nullcontext():
+            sys.stdout.write(json.dumps(server.paths) + "\n")
+            sys.stdout.flush()
+            with urgent(LEVEL + 1) if real else nullcontext():
                 serve = server.run if real else server.run_lockstep
                 serve(lambda t: t < end and robot.failure is None)
         finally:

@@ -116,7 +116,10 @@ class LayoutParams(Params):
     @model_validator(mode="before")
     @classmethod
     def _complete(cls, data: object) -> object:
-        """A table with some keys of a group leaves the others as they are by default."""
+        """A table with some keys of a group leaves the others as they are by default.
+
+        Lists become tuples here: what a "before" has touched is no longer judged as JSON.
+        """
         if not isinstance(data, dict):
             return data
         given = dict(cast("dict[str, object]", data))
@@ -124,7 +127,10 @@ class LayoutParams(Params):
             group = given.get(name)
             if isinstance(group, dict):
                 known: JointsParams = cls.model_fields[name].default
-                given[name] = known.model_dump() | cast("dict[str, object]", group)
+                given[name] = known.model_dump() | {
+                    key: tuple(cast("list[object]", value)) if isinstance(value, list) else value
+                    for key, value in cast("dict[str, object]", group).items()
+                }
         return given
 
     @model_validator(mode="after")

@@ -16,15 +16,15 @@ import subprocess
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from select import PIPE_BUF
-from types import TracebackType
 from typing import BinaryIO
 
 from antennate.errors import LogError
+from antennate.params import HostParams
 
 _HEAD = struct.Struct("<II")
 _ROOM = 1 << 20
 """Bytes that the pipe may hold: half a minute of ticks."""
-_PATIENCE = 5.0
+_PATIENCE = HostParams().log_patience
 """Time for the other process to write the last ticks [s]."""
 _LONGEST = 1 << 17
 
@@ -75,12 +75,7 @@ class Feed:
         os.set_blocking(self._pipe, self._waits)
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         process, self._process = self._process, None
         if process is None:
             return

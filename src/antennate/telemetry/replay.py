@@ -11,9 +11,9 @@ import numpy as np
 
 from antennate.controller import ARMS, Controller
 from antennate.errors import LogError
+from antennate.hardware.driving.decider import Decider
 from antennate.hardware.driving.drive import DriveConfig
 from antennate.hardware.driving.drive import decider as named
-from antennate.hardware.driving.session import Decider
 from antennate.loop import run_loop
 from antennate.params import Params, number
 from antennate.records import AntennaFrame, Pose

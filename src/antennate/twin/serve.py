@@ -9,9 +9,9 @@ import math
 import select
 import time
 from collections.abc import Callable
-from types import TracebackType
 
 from antennate.hardware.ports.clock_words import Wire
+from antennate.params import TwinParams
 from antennate.twin.clock import ClockServer
 from antennate.twin.ends import End, Terminal
 from antennate.twin.faults import Faults
@@ -19,7 +19,7 @@ from antennate.twin.physics import Physics
 from antennate.twin.robot import TwinRobot
 
 _LONGEST = 1.0
-_LUMP = 0.00025
+_LUMP = TwinParams().lump
 """Answers leave in lumps of this time [s], as those of a fast USB adapter do."""
 
 
@@ -61,12 +61,7 @@ class TwinServer:
     def __enter__(self) -> TwinServer:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         for end in (self._bus, self._board, self._clock):
             if end is not None:
                 end.close()

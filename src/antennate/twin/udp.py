@@ -9,8 +9,9 @@ from typing import Any
 
 from antennate.errors import BadInputError
 from antennate.hardware.esp32 import datagram, frame
+from antennate.params import TwinParams
 
-_ALIVE = 0.1
+_ALIVE = TwinParams().udp_silence
 """A board that has been silent for longer [s] does not answer either."""
 
 

@@ -10,14 +10,9 @@ from antennate.hardware.dynamixel.answers import Timing, Value
 from antennate.hardware.dynamixel.bringup import BringUpError
 from antennate.hardware.dynamixel.bus import Bus
 from antennate.hardware.ports.port import Port
-from antennate.params import DoctorParams
+from antennate.params import BusParams, DoctorParams
 
-_PINGS = 5
-_PATIENCE = 0.05
-"""Longest wait for an answer here [s]; FTDI adapters keep bytes back for 16 ms by default."""
-SLOW = 0.004
-"""Median time to an answer above which an adapter is refused [s]: twice the longest silence that a
-bus waits for, so that a busy computer is not taken for a slow adapter."""
+_PARAMS = BusParams()
 
 
 def require_quick(
@@ -35,10 +30,14 @@ def require_quick(
     Raises:
         BringUpError: Answers come too late; with the command that cures it.
     """
-    bus = Bus(port, Timing(baud, gap=_PATIENCE, doubt=_PATIENCE), clock=clock)
+    bus = Bus(
+        port,
+        Timing(baud, gap=_PARAMS.adapter_patience, doubt=_PARAMS.adapter_patience),
+        clock=clock,
+    )
     times: list[float] = []
     for servo in ids:
-        while len(times) < _PINGS:
+        while len(times) < _PARAMS.adapter_pings:
             begin = clock()
             if not isinstance(bus.ping(servo), Value):
                 break
@@ -48,10 +47,10 @@ def require_quick(
     if not times:
         return None
     found = median(times)
-    if found > SLOW:
+    if found > _PARAMS.slow_adapter:
         cure = latency_row(path, True, DoctorParams()).cure
         raise BringUpError(
-            f"--bus: expected answers within {1e3 * SLOW:g} ms, found {1e3 * found:.1f} ms: the "
+            f"--bus: expected answers within {1e3 * _PARAMS.slow_adapter:g} ms, found {1e3 * found:.1f} ms: the "
             f"adapter keeps bytes back; {cure}"
         )
     return found

@@ -12,9 +12,10 @@ from antennate.controller import ARMS, Controller
 from antennate.errors import BadInputError, ConfigError
 from antennate.hardware import roster
 from antennate.hardware.driving.adapter import require_quick
+from antennate.hardware.driving.decider import Decider
 from antennate.hardware.driving.dry_run import DryRun
 from antennate.hardware.driving.report import Report
-from antennate.hardware.driving.session import Decider, Session
+from antennate.hardware.driving.session import Session
 from antennate.hardware.driving.signals import StopOnce
 from antennate.hardware.dynamixel import bringup
 from antennate.hardware.dynamixel.answers import Timing
@@ -29,36 +30,21 @@ from antennate.hardware.ports.finder import finder
 from antennate.hardware.ports.port import Port, PortError
 from antennate.hardware.ports.reconnecting import Reconnecting
 from antennate.hardware.ports.twin_clock import twin_clock
+from antennate.hardware.robot import RobotConfig
 from antennate.hardware.safety.causes import State
 from antennate.hardware.safety.trust import Trust
 from antennate.loop import run_loop
-from antennate.params import (
-    ControllerParams,
-    DoctorParams,
-    DriftParams,
-    NetworkParams,
-    Params,
-    SupervisorParams,
-    TouchCheckParams,
-    number,
-)
+from antennate.params import BusParams, DoctorParams, DriftParams, TouchCheckParams, number
 from antennate.params.layout import LayoutParams
 from antennate.records import AntennaFrame, Pose
 
 _GREETING_TIME = DoctorParams().greeting
-_EVIDENCE_TIME = 1.5
-"""Silence on --esp32 while --bus speaks unasked that shows the two swapped [s]."""
-_ARMING_TIME = 1.0
-"""Time after which torque must have come on, or the drive ends [s]."""
-_STAND = 0.3
-"""Time that the robot holds its pose before the torque goes off [s]."""
 _PATIENCE = 0.05
-DOUBT = 0.07
-"""Longest that a late answer is waited for [s]: less than the watchdogs' 100 ms."""
+DOUBT = BusParams().doubt_walking
 
 
-class DriveConfig(Params):
-    """The robot, its controller, and how long it runs: what robot.toml holds."""
+class DriveConfig(RobotConfig):
+    """The robot, its controller, and how long it runs."""
 
     controller: str = number(
         "closed", "1", "assumed: our best", "open, paper, closed, or MODULE:CLASS of your own"
@@ -68,18 +54,6 @@ class DriveConfig(Params):
     )
     duration: float | None = number(
         None, "s", "assumed: until it is stopped", "time from torque on to off", gt=0
-    )
-    calibration: str | None = number(
-        None,
-        "1",
-        "assumed: the numbers of mind.conditioning",
-        "file of `antennate calibrate`, for both antennae, in place of mind.conditioning",
-    )
-    sensor_id: str | None = number(
-        None,
-        "1",
-        "assumed: that of the calibration file",
-        "name of the film; 16 hexadecimal digits name the board it is soldered to",
     )
     touch_check: bool = number(
         True,
@@ -105,10 +79,22 @@ class DriveConfig(Params):
         ge=0,
         le=600,
     )
-    layout: LayoutParams = LayoutParams()
-    mind: ControllerParams = ControllerParams()
-    limits: SupervisorParams = SupervisorParams()
-    network: NetworkParams = NetworkParams()
+    stand: float = number(
+        0.3,
+        "s",
+        "assumed: a step at half a hertz comes to rest",
+        "time that the robot holds its pose before the torque goes off",
+        ge=0,
+        le=60,
+    )
+    swapped: float = number(
+        1.5,
+        "s",
+        "assumed: half of the wait for a greeting, and no servo speaks unasked",
+        "silence of the board, while the bus speaks unasked, that shows the two ports swapped",
+        gt=0,
+        le=60,
+    )
 
 
 @contextlib.contextmanager
@@ -154,8 +140,8 @@ def prepare(
     `path` is what the bus is called, for errors.
     """
     board = Board(esp32, config.limits.stale_age)
-    await_board(board, clock, bus)
-    require_film(board, config.sensor_id)
+    await_board(board, clock, bus, config.swapped)
+    require_film(board.hello, config.sensor_id)
     require_quick(bus, config.layout.ids[:3], config.layout.baud, clock.now, path)
     master = Bus(bus, Timing(config.layout.baud, doubt=DOUBT), clock=clock.now)
     require_servos(master, config.layout)
@@ -175,7 +161,9 @@ def prepare(
     )
 
 
-def await_board(board: Board, clock: Any, bus: Port | None = None) -> None:
+def await_board(
+    board: Board, clock: Any, bus: Port | None = None, swapped: float = math.inf
+) -> None:
     """Wait for a greeting and samples; what the bus says unasked is read, and nothing written.
 
     Raises:
@@ -186,7 +174,7 @@ def await_board(board: Board, clock: Any, bus: Port | None = None) -> None:
     while board.clock.newest is None:
         unasked += 0 if bus is None else _unasked(bus)
         silent = not board.decoder.counters.received
-        if silent and unasked and clock.now() > begin + _EVIDENCE_TIME:
+        if silent and unasked and clock.now() > begin + swapped:
             raise BadInputError(
                 f"--esp32: expected an antenna board, found silence, and {unasked} bytes on --bus "
                 "that no servo was asked for; --esp32 and --bus are swapped"
@@ -289,7 +277,11 @@ def drive(
         """After a fault and a time to look at it: torque can be taken off now, or never."""
         nonlocal failed_at
         out = session.outputs
-        if out is not None and t > dry.over + _ARMING_TIME and out.state >= State.FAULT:
+        if (
+            out is not None
+            and t > dry.over + config.limits.longest_arming
+            and out.state >= State.FAULT
+        ):
             failed_at = min(failed_at, t)
         if out is not None and out.state is State.OFF and t > failed_at:
             return True
@@ -315,16 +307,16 @@ def drive(
                 stop.deaf = True
         finally:
             report.timing = None if session.timing is None else session.timing.report()
-            report.on = _off(session)
+            report.on = _off(session, config.stand)
     return report
 
 
-def _off(session: Session) -> list[int] | None:
+def _off(session: Session, stand: float) -> list[int] | None:
     """Stand for a moment, then torque off: ids that did not confirm it, None if it never was on."""
     if not session.touched:
         return None
     with contextlib.suppress(PortError):
-        session.stand(_STAND)
+        session.stand(stand)
     try:
         return session.release()
     except PortError:

@@ -14,14 +14,14 @@ from __future__ import annotations
 
 import math
 from contextlib import suppress
-from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
 from antennate.body import Clock
 from antennate.errors import AntennateError
 from antennate.hardware.driving.body import HardwareBody
+from antennate.hardware.driving.decider import Decider, Thought, nowhere
+from antennate.hardware.driving.orders import Orders, Tally
 from antennate.hardware.driving.timing import LoopTiming
 from antennate.hardware.driving.tracebacks import Tracebacks
 from antennate.hardware.driving.turns import Turns
@@ -37,56 +37,7 @@ from antennate.hardware.safety.supervisor import Supervisor
 from antennate.hardware.safety.trust import Trust
 from antennate.hardware.safety.watch import ServoWatch
 from antennate.params import ConditioningParams, DiagnosisParams, SupervisorParams
-from antennate.records import AntennaFrame, Floats, Ints, Pose
-
-
-class Decider(Protocol):
-    """A controller of one robot."""
-
-    maneuver: Ints
-    contact: Ints
-
-    def step(self, frame: AntennaFrame) -> Pose:
-        """The pose of this tick."""
-        ...
-
-
-@dataclass(slots=True)
-class Orders:
-    """What the operator wants.
-
-    Attributes:
-        arm: Torque on; only the change to True counts.
-        stop: Torque off.
-    """
-
-    arm: bool = False
-    stop: bool = False
-
-
-@dataclass(slots=True)
-class _Thought:
-    """What the mind did in this tick."""
-
-    asked: bool = True
-    decided_at: float = -math.inf
-    finite: bool = True
-    failure: str = ""
-
-
-@dataclass(slots=True)
-class Tally:
-    """What a session has done.
-
-    Attributes:
-        ticks: Ticks run.
-        sent: Poses sent to the servos.
-        limited: Goals that moved slower than asked.
-    """
-
-    ticks: int = 0
-    sent: int = 0
-    limited: int = 0
+from antennate.records import AntennaFrame, Floats, Pose
 
 
 class Session:
@@ -147,9 +98,9 @@ class Session:
         self.timing: LoopTiming | None = None
         self.outputs: Outputs | None = None
         self.frame = AntennaFrame(t=np.zeros(1), counts=np.full((1, 2), math.nan))
-        self.pose = _nowhere()
+        self.pose = nowhere()
         self._body = HardwareBody(board, bus, joints, clock)
-        self._thought = _Thought()
+        self._thought = Thought()
         self._goals: Floats | None = None
         self._pose: Pose | None = None
         self._used = self._refused = 0
@@ -240,7 +191,7 @@ class Session:
         While legs forget their turns the controller is not asked, and its time stands still: to
         stand is the session's own decision. So it is to go slowly, which asks it less often.
         """
-        thought = self._thought = _Thought()
+        thought = self._thought = Thought()
         if self._pose is not None and (self.turns.standing or not self._due()):
             thought.asked, thought.decided_at = False, self.clock.now()
             return self._pose
@@ -249,7 +200,7 @@ class Session:
         except Exception as error:  # noqa: BLE001 a plugged-in controller may raise anything
             thought.failure = f"{type(error).__name__}: {error}"
             self.tracebacks.keep(self.clock.now(), error)
-            return _nowhere()
+            return nowhere()
         angles = (pose.yaw, pose.leg, pose.antenna)
         thought.finite = all(bool(np.isfinite(a).all()) for a in angles)
         thought.decided_at = self.clock.now()
@@ -357,7 +308,3 @@ class Session:
             self.tally.sent += 1
         self._body.send(goals)
         self._goals = goals
-
-
-def _nowhere() -> Pose:
-    return Pose(*(np.full(shape, math.nan) for shape in ((1, 5), (1, 6, 2), (1, 2))))
