@@ -91,6 +91,13 @@ def _group(kind: type[_Group], first: int, count: int) -> _Group:
     )
 
 
+def _with_tuples(table: dict[str, object]) -> dict[str, object]:
+    return {
+        key: tuple(cast("list[object]", value)) if isinstance(value, list) else value
+        for key, value in table.items()
+    }
+
+
 _GroupName = Literal["yaw", "legs", "antennae"]
 
 
@@ -122,15 +129,12 @@ class LayoutParams(Params):
         """
         if not isinstance(data, dict):
             return data
-        given = dict(cast("dict[str, object]", data))
+        given = _with_tuples(cast("dict[str, object]", data))
         for name in ("yaw", "legs", "antennae"):
             group = given.get(name)
             if isinstance(group, dict):
                 known: JointsParams = cls.model_fields[name].default
-                given[name] = known.model_dump() | {
-                    key: tuple(cast("list[object]", value)) if isinstance(value, list) else value
-                    for key, value in cast("dict[str, object]", group).items()
-                }
+                given[name] = known.model_dump() | _with_tuples(cast("dict[str, object]", group))
         return given
 
     @model_validator(mode="after")
