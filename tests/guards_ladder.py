@@ -66,6 +66,7 @@ SUPERVISOR = [
     Guard("dead bus", blind(bus_error=""), told(Cause.BUS_ERROR)),
     Guard("tripped watchdog", blind(watchdogs=()), told(Cause.WATCHDOG)),
     Guard("servo without torque or watchdog", blind(disarmed=()), told(Cause.DISARMED)),
+    Guard("record that is required", blind(unrecorded=False), told(Cause.NO_RECORD)),
     Guard("supply", blind(supply=12.0), told(Cause.SUPPLY_OFF)),
     Guard("stop by the operator", blind(stop=False), told(Cause.STOPPED)),
     Guard("exception of the controller", blind(failure=""), told(Cause.FAILED)),

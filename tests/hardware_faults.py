@@ -27,6 +27,7 @@ BAD: dict[Cause, dict[str, Any]] = {
     Cause.UNDECIDED: {"decided_at": 0.0},
     Cause.BAD_ACTION: {"maneuver": 5},
     Cause.UNKNOWN_CONTACT: {"contact": (Contact.FREE, Contact.UNKNOWN)},
+    Cause.NO_RECORD: {"unrecorded": True},
     Cause.SUPPLY_HOLD: {"supply": 10.1},
     Cause.SILENT_SERVO: {"missed": {3: 5, 11: 9}},
     Cause.SERVO_ERROR: {"servo_errors": {7: "overload"}},

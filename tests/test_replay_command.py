@@ -21,6 +21,7 @@ from antennate.params import ControllerParams
 from antennate.records import Contact, Maneuver
 from antennate.telemetry.framing import framed
 from antennate.telemetry.header import Header
+from antennate.telemetry.reader import LogReader
 from antennate.telemetry.replay import ReplayBody, recorded_decider, replay
 from antennate.telemetry.ticks import JOINTS
 from antennate.telemetry.writer import LogWriter
@@ -55,6 +56,31 @@ def test_G7_the_same_code_decides_the_same(log: Path, capsys: pytest.CaptureFixt
     assert result["controller"] == result["recorded_controller"] == "paper"
     assert (result["seed"], result["trial"]) == (0, 0)
     assert result["closed"]
+
+
+def test_G6_all_files_of_a_log_are_replayed_as_one(
+    log: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The second one was never begun; the first was cut by a kill, the third was closed."""
+    first, third = tmp_path / "drive.log", tmp_path / "drive-3.log"
+    with LogReader(log) as reader:
+        ticks = list(reader)
+    cut = LogWriter(first, reader.header)
+    for tick in ticks[:120]:
+        cut.write(tick)
+    with LogWriter(third, reader.header) as writer:
+        for tick in ticks[120:]:
+            writer.write(tick)
+    result = said(capsys, str(first))
+    assert result["parts"] == ["drive.log", "drive-3.log"]
+    assert (result["ticks"], result["different"], result["different_poses"]) == (TICKS, 0, 0)
+    assert result["closed"]
+    data = third.read_bytes()
+    third.write_bytes(data[:-200] + bytes([data[-200] ^ 1]) + data[-199:])
+    assert main(["replay", str(first), "--json"]) == 2
+    out, err = capsys.readouterr()
+    assert (json.loads(out)["missing"], json.loads(out)["damaged"]) == (1, 1)
+    assert "of drive-3.log" in err
 
 
 def test_another_controller_is_compared(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -152,8 +178,6 @@ def test_an_empty_log_is_replayed(tmp_path: Path, capsys: pytest.CaptureFixture[
 
 
 def test_a_controller_that_raises_is_counted_and_does_not_end_the_replay(log: Path) -> None:
-    from antennate.telemetry.reader import LogReader
-
     with LogReader(log) as reader:
         sound = recorded_decider(reader.header)
 

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 
 import tyro
 
-from antennate.cli import BAD_INPUT, OK
+from antennate.cli import BAD_INPUT, OK, viewer
 from antennate.cli.addresses import RobotOrders, key_of, require_lossless
 from antennate.cli.arguments import parse_with
 from antennate.cli.folder import LOG, RunFolder, to_json
@@ -25,6 +25,7 @@ from antennate.hardware.esp32.film import calibrated
 from antennate.hardware.safety.causes import State
 from antennate.telemetry.feed import Feed
 from antennate.telemetry.header import Header
+from antennate.telemetry.parts import part, parts
 from antennate.telemetry.ticks import Tick
 
 DESCRIPTION = """\
@@ -90,11 +91,16 @@ def command(argv: Sequence[str]) -> int:
 def _carry_out(config: DriveConfig, session: Session, arm: bool, log: Path) -> dict[str, Any]:
     """Drive, with the log and the status line in a process of their own."""
     header = Header(controller=config.controller, params=config.mind, layout=config.layout)
-    viewer = [sys.executable, "-m", "antennate.cli.viewer", str(log)]
-    feed = Feed(viewer, header.pack())
+    required = [viewer.REQUIRED] if config.record_required else []
+
+    def words(number: int) -> list[str]:
+        return [sys.executable, "-m", viewer.__name__, str(part(log, number)), *required]
+
+    feed = Feed(words, header.pack())
 
     def keep(session: Session, t: float) -> None:
         feed.send(Tick.of(session, t).pack())
+        session.unrecorded = config.record_required and not feed.keeps
 
     with feed, urgent() as priority:
         report = drive(session, config, arm, keep)
@@ -102,7 +108,8 @@ def _carry_out(config: DriveConfig, session: Session, arm: bool, log: Path) -> d
     tail = {
         "priority": priority.value,
         "unlogged": feed.dropped,
-        "log_complete": not (feed.failed or feed.dropped),
+        "log_complete": feed.complete,
+        "logs": [each.name for each in parts(log) if each.exists()],
     }
     return head | report.result(session) | tail
 
@@ -124,7 +131,7 @@ def _note(result: Mapping[str, Any]) -> str:
     if result["priority"] == Priority.ORDINARY.value:
         note += "Real-time priority was not allowed; a busy machine will make it miss ticks.\n"
     if not result["log_complete"]:
-        note += "The log is not complete.\n"
+        note += f"The log is not complete; its files: {', '.join(result['logs']) or 'none'}.\n"
     return note
 
 

@@ -79,6 +79,12 @@ class DriveConfig(Params):
         "assumed: that of the calibration file",
         "name of the film; 16 hexadecimal digits name the board it is soldered to",
     )
+    record_required: bool = number(
+        False,
+        "1",
+        "assumed: a robot that walks matters more than its log",
+        "whether the robot holds while no log of it is kept",
+    )
     touch_check: bool = number(
         True,
         "1",

@@ -115,6 +115,7 @@ class Session:
         frame: What the controller got in the last tick.
         pose: What it said.
         touched: Whether anything was written to the servos.
+        unrecorded: Whether a record that is required is not kept; the robot holds meanwhile.
     """
 
     def __init__(
@@ -152,7 +153,7 @@ class Session:
         self._goals: Floats | None = None
         self._pose: Pose | None = None
         self._used = self._refused = 0
-        self._lost = self.touched = False
+        self._lost = self.touched = self.unrecorded = False
 
     @property
     def mute(self) -> bool:
@@ -287,6 +288,7 @@ class Session:
             supply=watch.supply,
             drift=self.trust.drifted,
             objections=() if self._goals is not None else self.trust.objections,
+            unrecorded=self.unrecorded,
             arm=self.orders.arm,
             stop=self.orders.stop,
         )

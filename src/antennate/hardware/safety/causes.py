@@ -46,6 +46,7 @@ class Cause(Enum):
     UNDECIDED = (State.HOLD, "the controller took no decision in this tick")
     BAD_ACTION = (State.HOLD, "the controller asked for what does not exist")
     UNKNOWN_CONTACT = (State.HOLD, "contact is not known")
+    NO_RECORD = (State.HOLD, "no log is kept, and one is required")
     SUPPLY_HOLD = (State.HOLD, "the supply is too low to walk")
     REPEATED_HOLDS = (State.FAULT, "too many holds in a short time")
     REPEATED_FAILURES = (State.FAULT, "the controller failed too often in a short time")
@@ -125,6 +126,7 @@ class Inputs:
         supply: Voltage of the supply [V], NaN if unknown.
         drift: How far resting readings have drifted, empty if not far.
         objections: What speaks against arming, such as a failed touch check or foreign firmware.
+        unrecorded: Whether a record that is required is not kept.
         stop: Whether the operator wants the torque off.
         arm: Whether the operator wants it on; only the change to True in FAULT or OFF counts.
     """
@@ -149,6 +151,7 @@ class Inputs:
     disarmed: tuple[int, ...] = ()
     drift: str = ""
     objections: tuple[str, ...] = ()
+    unrecorded: bool = False
     stop: bool = False
     arm: bool = False
 

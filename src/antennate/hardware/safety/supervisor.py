@@ -143,8 +143,7 @@ class Supervisor:
             found[Cause.DRIFT] = inputs.drift
         if inputs.objections:
             found[Cause.NOT_READY] = "; ".join(inputs.objections)
-        if inputs.stop:
-            found[Cause.STOPPED] = ""
+        _wishes(inputs, found)
         return found
 
     def _boots(self, now: float, inputs: Inputs, found: dict[Cause, str]) -> None:
@@ -252,6 +251,14 @@ def _name(found: dict[Cause, str], cause: Cause, ids: Iterable[int]) -> None:
     listed = ", ".join(str(i) for i in sorted(ids))
     if listed:
         found[cause] = f"servo {listed}"
+
+
+def _wishes(inputs: Inputs, found: dict[Cause, str]) -> None:
+    """Causes that the operator asked for."""
+    if inputs.unrecorded:
+        found[Cause.NO_RECORD] = ""
+    if inputs.stop:
+        found[Cause.STOPPED] = ""
 
 
 def _words(errors: Mapping[int, str]) -> str:
