@@ -72,10 +72,11 @@ SUPERVISOR = [
     Guard("exception of the controller", blind(failure=""), told(Cause.FAILED)),
     Guard("action that does not exist", blind(maneuver=Maneuver.HOLD), told(Cause.BAD_ACTION)),
     Guard(
-        "pose that is not finite",
-        blind(finite=True),
+        "pose that was refused",
+        blind(bad_pose=""),
         partial(
-            test_supervisor.test_S5_a_pose_or_maneuver_that_is_none_is_not_sent, {"finite": False}
+            test_supervisor.test_S5_a_pose_or_maneuver_that_is_none_is_not_sent,
+            {"bad_pose": "nan"},
         ),
     ),
     Guard(

@@ -166,5 +166,6 @@ _ROWS: list[tuple[str, Cell]] = [
         for name in ("frames", "crc_errors", "lost_samples", "missed_answers", "stale_answers")
     ),
     ("poses sent", lambda result: number(result["poses_sent"], "d")),
+    ("poses refused", lambda result: number(result["poses_refused"], "d")),
     ("priority", lambda result: result["priority"]),
 ]

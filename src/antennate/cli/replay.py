@@ -196,7 +196,7 @@ def _rows(ticks: Iterable[Tick], replayed: Sequence[int]) -> Iterator[dict[str, 
         values = [
             *(tick.number, tick.t, tick.now, *(value for pair in pairs for value in pair)),
             *(tick.maneuver, tick.phase, *tick.angles, tick.age, tick.missed, tick.frames),
-            *(tick.crc, tick.lost, tick.misses, tick.stale, tick.sent),
+            *(tick.crc, tick.lost, tick.misses, tick.stale, tick.sent, tick.refused),
         ]
         row = dict(zip(FIELDS[2:-1], values, strict=True))
         yield row | {

@@ -56,7 +56,7 @@ def line(tick: Tick, dropped: int) -> str:
         f"{tick.now:7.1f} s {state}{why} {_name(tick.maneuver)} counts={left},{right} "
         f"age={1e3 * tick.age:.0f}ms {tick.note} missed_ticks={tick.missed} "
         f"missed_answers={tick.misses} stale={tick.stale} frames={tick.frames} crc={tick.crc} "
-        f"lost={tick.lost} sent={tick.sent} unlogged={dropped}"
+        f"lost={tick.lost} sent={tick.sent} refused={tick.refused} unlogged={dropped}"
     )
 
 

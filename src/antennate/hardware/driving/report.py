@@ -63,6 +63,7 @@ class Report:
             "stale_answers": bus.stale,
             "poses_sent": session.tally.sent,
             "poses_limited": session.tally.limited,
+            "poses_refused": session.tally.refused,
             "tracebacks": list(session.tracebacks.kept),
         }
 

@@ -69,7 +69,7 @@ class _Thought:
     """What the mind did in this tick."""
 
     decided_at: float = -math.inf
-    finite: bool = True
+    bad_pose: str = ""
     failure: str = ""
 
 
@@ -81,11 +81,13 @@ class Tally:
         ticks: Ticks run.
         sent: Poses sent to the servos.
         limited: Goals that moved slower than asked.
+        refused: Poses of the controller that must not be sent.
     """
 
     ticks: int = 0
     sent: int = 0
     limited: int = 0
+    refused: int = 0
 
 
 class Session:
@@ -238,10 +240,14 @@ class Session:
             thought.failure = f"{type(error).__name__}: {error}"
             self.tracebacks.keep(self.clock.now(), error)
             return _nowhere()
-        angles = (pose.yaw, pose.leg, pose.antenna)
-        thought.finite = all(bool(np.isfinite(a).all()) for a in angles)
         thought.decided_at = self.clock.now()
-        self._pose = pose
+        try:
+            self.joints.ticks(pose)
+        except PoseError as error:
+            thought.bad_pose = str(error)
+            self.tally.refused += 1
+        else:
+            self._pose = pose
         return pose
 
     def release(self) -> list[int]:
@@ -275,7 +281,7 @@ class Session:
             decided_at=thought.decided_at,
             maneuver=int(self.decider.maneuver[0]),
             contact=(int(contact[0]), int(contact[1])),
-            finite=thought.finite,
+            bad_pose=thought.bad_pose,
             failure=thought.failure,
             resets=clock.resets,
             reset_reason="" if clock.last_reset is None else clock.last_reset.name,

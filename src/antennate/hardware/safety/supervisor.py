@@ -27,6 +27,7 @@ from antennate.records import Contact, Maneuver
 
 _ACTIONS = frozenset(Maneuver)
 _CONTACTS = frozenset({Contact.FREE, Contact.CONTACT})
+_FAILURES = frozenset({Cause.FAILED, Cause.BAD_ACTION, Cause.BAD_POSE})
 _SUPPLY = (Cause.SUPPLY_WARN, Cause.SUPPLY_HOLD, Cause.SUPPLY_OFF)
 
 
@@ -185,15 +186,15 @@ class Supervisor:
             found[Cause.FAILED] = inputs.failure
         elif not decided:
             found[Cause.UNDECIDED] = ""
-        elif inputs.maneuver not in _ACTIONS or not inputs.finite:
-            found[Cause.BAD_ACTION] = (
-                f"maneuver {inputs.maneuver}" if inputs.finite else "pose not finite"
-            )
+        elif inputs.maneuver not in _ACTIONS:
+            found[Cause.BAD_ACTION] = f"maneuver {inputs.maneuver}"
+        elif inputs.bad_pose:
+            found[Cause.BAD_POSE] = inputs.bad_pose
         elif not _CONTACTS.issuperset(inputs.contact):
             found[Cause.UNKNOWN_CONTACT] = ""
-        failed = Cause.FAILED in found or Cause.BAD_ACTION in found
+        failed = _FAILURES & found.keys()
         if failed and self._failures.add(now):
-            found[Cause.REPEATED_FAILURES] = inputs.failure
+            found[Cause.REPEATED_FAILURES] = inputs.failure or inputs.bad_pose
         return found
 
     def _recover(self, inputs: Inputs, present: Mapping[Cause, str]) -> None:
