@@ -22,7 +22,7 @@ class DoctorParams(Params):
     silence: float = number(
         1.9,
         "s",
-        "assumed: a board that runs sends every 10 ms, one that starts says so at once, and one on a "
+        "assumed: a board that runs sends every 10 ms, one that starts says so at once, one on a "
         "network is asked seven times meanwhile",
         "silence of a port after which no board is there",
         gt=0,
@@ -39,7 +39,7 @@ class DoctorParams(Params):
     unasked: int = number(
         32,
         "byte",
-        "assumed: two samples of a board, more than a plug that goes in",
+        "assumed: more than one sample of a board, and than a plug that goes in brings",
         "bytes in that time that nobody asked for, from which on servos are not alone on the bus",
         ge=1,
         le=1000,
