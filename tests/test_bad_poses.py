@@ -112,7 +112,7 @@ BAD = {
 
 
 @pytest.mark.parametrize("kind", list(BAD))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=25, deadline=None)
 @given(data=st.data())
 def test_B14_a_bad_pose_is_refused_as_a_whole_and_counted_and_the_goal_held(
     kind: str, data: st.DataObject

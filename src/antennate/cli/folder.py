@@ -111,6 +111,7 @@ class RunFolder:
         with _writing(path):
             path.parent.mkdir(exist_ok=True)
             try:
+                fresh.unlink(missing_ok=True)  # of a program with this number that was killed
                 with fresh.open("xb") as file:
                     file.write(data)
                     file.flush()
