@@ -17,6 +17,15 @@ Every physical number of the project: its default, its unit, what it means and w
 A source begins with `paper` (arXiv:2603.07795), `datasheet`, `measured`, `fitted` or `assumed`.
 This page is generated: change `src/antennate/params/`, then run `python docs/parameters.py`.
 """
+OTHERS = (
+    "antennate.hardware.robot_file",
+    "antennate.hardware.robot",
+    "antennate.hardware.driving.drive",
+    "antennate.hardware.doctor.checkup",
+    "antennate.hardware.esp32.recorder",
+    "antennate.telemetry.replay",
+)
+"""Modules beside the experiments that hold the parameters of a command."""
 COMMANDS = """\
 # Parameters of commands
 
@@ -41,8 +50,7 @@ def commands() -> list[type[params.Params]]:
     """Return the classes that hold the top level of a command's parameters."""
     names = sorted(module.name for module in pkgutil.iter_modules(experiments.__path__))
     modules = [importlib.import_module(f"{experiments.__name__}.{name}") for name in names]
-    modules.append(importlib.import_module("antennate.hardware.driving.drive"))
-    modules.append(importlib.import_module("antennate.telemetry.replay"))
+    modules += map(importlib.import_module, OTHERS)
     return [group for module in modules for group in groups(module)]
 
 

@@ -6,7 +6,7 @@ import contextlib
 from collections.abc import Iterator
 
 from antennate.experiments.twin import TwinConfig, build
-from antennate.hardware.doctor.checkup import Checkup, Robot, examine
+from antennate.hardware.doctor.checkup import Checkup, DoctorConfig, examine
 from antennate.hardware.doctor.fix import apply, plan
 from antennate.hardware.doctor.rows import Row
 from antennate.hardware.ports.port import Port
@@ -14,7 +14,7 @@ from antennate.twin.faults import Faults, read
 from antennate.twin.lockstep import BoardPort, LockstepClock
 from antennate.twin.robot import TwinRobot
 
-ROBOT = Robot()
+ROBOT = DoctorConfig()
 
 
 class Patient:

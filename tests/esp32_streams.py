@@ -64,10 +64,16 @@ def frames_of(samples: list[Sample]) -> Bytes:
     return np.frombuffer(joined, dtype=np.uint8).reshape(len(samples), -1)
 
 
-def hello(boot: int = BOOT, rate: int = 100, tick_bits: int = 30, reset: int = 1) -> bytes:
+def hello(
+    boot: int = BOOT,
+    rate: int = 100,
+    tick_bits: int = 30,
+    reset: int = 1,
+    device: bytes = b"\x24\x0a\xc4\x01\x02\x03",
+) -> bytes:
     """Frame of a greeting."""
     config = frame.config_hash(rate, *BOARD_SETTINGS)
-    return frame.encode_hello(boot, reset, config, b"\x24\x0a\xc4\x01\x02\x03", rate, tick_bits)
+    return frame.encode_hello(boot, reset, config, device, rate, tick_bits)
 
 
 def with_bit_errors(stream: Bytes, rate: float, rng: np.random.Generator) -> Bytes:

@@ -22,7 +22,7 @@ from guard_tools import Guard, after, around, before, constant, put
 from hardware_rig import BAND
 
 from antennate import conditioning, contact, maneuver
-from antennate.hardware.esp32 import board, clock, decoder, frame
+from antennate.hardware.esp32 import board, clock, decoder, frame, listener
 from antennate.hardware.esp32.clock import DeviceClock, Verdict
 from antennate.hardware.safety import diagnosis, touch_check
 from antennate.records import Maneuver
@@ -92,7 +92,7 @@ STREAM = [
             "at most 4095",
         ),
     ),
-    Guard("firmware", put(board, "objections", constant(())), OLD_FIRMWARE),
+    Guard("firmware", put(listener, "objections", constant(())), OLD_FIRMWARE),
     Guard(
         "flag of a reading at a rail",
         put(board, "_RAILS", (0, 0)),

@@ -103,7 +103,7 @@ def finite_goals(old: Any, self: Any, angles: Any) -> Any:
 
 
 def careless(old: Any, self: Any, frame_: Any) -> Any:
-    self._thought = session._Thought(decided_at=self.clock.now())
+    self._thought = session.Thought(decided_at=self.clock.now())
     return self.decider.step(frame_)
 
 
@@ -225,7 +225,7 @@ BUS = [
 SERVOS = [
     Guard(
         "duplicate id",
-        put(bringup, "_patient", constant(Value(b"x", alert=False))),
+        put(bus.Bus, "read", constant(Value(b"x", alert=False))),
         test_bus.test_B15_missing_wrong_double_and_strange_servos_are_named_within_3_s,
     ),
     Guard(
@@ -235,13 +235,7 @@ SERVOS = [
     ),
     Guard(
         "model of a servo",
-        around(
-            bringup,
-            "_look",
-            lambda old, master, i, model: old(
-                master, i, bringup._model(bringup._data(master.ping(i)))[0] or model
-            ),
-        ),
+        around(bringup, "_verdict", lambda old, found, model: old(found, found.model or model)),
         test_bus.test_B15_missing_wrong_double_and_strange_servos_are_named_within_3_s,
     ),
     Guard(

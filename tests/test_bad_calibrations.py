@@ -155,16 +155,16 @@ def test_S9_the_file_of_another_sensor_is_refused(tmp_path: Path) -> None:
 
 
 def test_S9_the_file_of_another_board_is_refused() -> None:
-    require_film(rig(TwinConfig()).session.board, "0" * 16)  # it has not greeted yet
+    require_film(rig(TwinConfig()).session.board.hello, "0" * 16)  # it has not greeted yet
     made = rig(TwinConfig())
     made.clock.sleep(0.1)
     made.session.board.poll(made.clock.now())
     twin = b"twin\0\0\0\0".hex()
-    require_film(made.session.board, twin)
-    require_film(made.session.board, "left-1")
-    require_film(made.session.board, None)
+    require_film(made.session.board.hello, twin)
+    require_film(made.session.board.hello, "left-1")
+    require_film(made.session.board.hello, None)
     with pytest.raises(CalibrationError, match=f"expected the board {'0' * 16} .* {twin}"):
-        require_film(made.session.board, "0" * 16)
+        require_film(made.session.board.hello, "0" * 16)
 
 
 def test_S9_a_bad_recording_keeps_the_calibration_that_is_there(

@@ -6,14 +6,14 @@ from esp32_streams import encoded, hello, made
 from port_pieces import Pieces
 
 from antennate.hardware.esp32.board import KEPT, Board
-from antennate.hardware.esp32.frame import SAMPLE_FRAME_SIZE, config_hash, encode_hello
+from antennate.hardware.esp32.frame import SAMPLE_FRAME_SIZE
 
 
 def test_L13_another_board_is_refused_and_its_samples_are_not_used() -> None:
     port = Pieces(hello() + encoded(made(0)))
     board = Board(port, 0.05)
     assert board.poll(0.0) == 1
-    stranger = encode_hello(9, 1, config_hash(100, 15, 34, 35), b"stranger", 100)
+    stranger = hello(boot=9, device=b"stranger")
     port.data = stranger + encoded(made(1, boot=9))
     assert board.poll(0.01) == 0
     assert "found another one" in board.refusals[-1]

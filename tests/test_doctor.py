@@ -7,9 +7,10 @@ from pathlib import Path
 import pytest
 from doctor_rig import ROBOT, Patient, wrong
 
-from antennate.hardware.doctor.antenna import Heard, board_rows
+from antennate.hardware.doctor.antenna import board_rows
 from antennate.hardware.doctor.checkup import examine
 from antennate.hardware.doctor.fix import Change, apply, plan
+from antennate.hardware.doctor.hearing import Heard
 from antennate.hardware.doctor.pace import latency_row
 from antennate.hardware.doctor.rows import grouped, ids_text, worst
 from antennate.hardware.dynamixel.bringup import BringUpError

@@ -413,6 +413,14 @@ def test_B15_missing_wrong_double_and_strange_servos_are_named_within_3_s() -> N
     assert not any(servo.torque for servo in rig.twin.servos)
 
 
+def test_B15_two_models_with_one_id_are_not_called_silent() -> None:
+    rig = Rig()
+    assert rig.servo(3).table is not XL330_M288
+    rig.twin.servos.append(Servo(XL330_M288, 3))
+    with pytest.raises(BringUpError, match="id 3: answers are never whole: two servos"):
+        bringup.require(rig.bus, MODELS)
+
+
 def test_B10_torque_goes_on_without_a_jump() -> None:
     rng = np.random.default_rng(10)
     for _ in range(20):

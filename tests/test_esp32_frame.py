@@ -136,7 +136,7 @@ def test_E8_old_firmware_and_other_settings_are_objected_to() -> None:
     (board,) = FrameDecoder().feed(hello())
     assert isinstance(board, Hello)
     assert objections(board) == ()
-    assert objections(board, frame.config_hash(100, 15, 34, 35)) == ()
+    assert objections(board, board.config_hash) == ()
     (settings_differ,) = objections(board, 0xDEADBEEF)
     assert "deadbeef" in settings_differ
     assert f"{board.config_hash:08x}" in settings_differ

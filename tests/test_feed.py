@@ -87,7 +87,7 @@ def test_G5_a_reader_that_stands_still_costs_no_time_and_what_it_misses_is_count
 
 def test_G6_a_reader_that_dies_ends_nothing() -> None:
     """It dies at once, and so do those that follow: after three of them no more is started."""
-    with Feed(script("pass"), b"first", LogParams(restarts=3)) as feed:
+    with Feed(script("pass"), b"first", params=LogParams(restarts=3)) as feed:
         until(lambda: feed.failed, feed)
         assert not feed.send(b"tick")
         assert not feed.keeps

@@ -302,5 +302,5 @@ def test_a_header_of_defaults_names_its_fields() -> None:
     content = Header(controller="open", params=ControllerParams()).pack()
     said = json.loads(content[2:])
     assert said["version"] == antennate.__version__
-    assert said["fields"][:5] == ["schema", "kind", "number", "t", "now"]
+    assert said["fields"][:5] == ["schema", "kind", "number", "asked", "t"]
     assert said["params"]["gait"]["frequency"] == 0.5

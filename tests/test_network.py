@@ -148,8 +148,22 @@ def test_X16_a_key_comes_from_a_private_file_or_the_environment(
     monkeypatch.setenv("ANTENNATE_KEY", KEY.hex())
     assert read_key(None) == KEY
     monkeypatch.delenv("ANTENNATE_KEY")
-    with pytest.raises(BadInputError, match="ANTENNATE_KEY set; make one with"):
+    with pytest.raises(BadInputError, match="ANTENNATE_KEY set; make one with") as refusal:
         read_key(None)
+    assert "--insecure-udp" not in str(refusal.value)
+
+
+@pytest.mark.parametrize("command", ["drive", "doctor", "record"])
+def test_X16_without_a_key_both_ways_out_are_named(
+    command: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.delenv("ANTENNATE_KEY", raising=False)
+    place = ["--out", "left.csv"] if command == "record" else ["--bus", "/dev/null"]
+    assert main([command, "--esp32", "udp://127.0.0.1:9", *place]) == 2
+    told = capsys.readouterr().err
+    assert "make one with" in told
+    assert "--insecure-udp" in told
+    assert told.count("\n") == 1
 
 
 @pytest.mark.parametrize("mode", [0o644, 0o640, 0o604, 0o620, 0o602, 0o666, 0o777, 0o610, 0o601])

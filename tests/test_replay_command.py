@@ -18,7 +18,7 @@ from antennate.figures import style
 from antennate.figures.replay import Course
 from antennate.figures.replay import replay as draw
 from antennate.params import ControllerParams
-from antennate.records import Contact, Maneuver
+from antennate.records import Contact, Maneuver, Pose
 from antennate.telemetry.framing import framed
 from antennate.telemetry.header import Header
 from antennate.telemetry.reader import LogReader
@@ -210,3 +210,26 @@ def test_the_figure_shows_every_stretch_and_repeats_its_bytes() -> None:
     bars = [len(panel.collections) for panel in figure.axes]
     assert bars == [0, 0, 2, 5]  # one unknown, one contact; 2 recorded, 1 known replayed, 2 states
     assert style.render(figure) == style.render(draw(course))
+
+
+def test_G7_a_tick_without_a_decision_keeps_the_last_pose_that_was_not_refused(log: Path) -> None:
+    """As a session does: the second pose was refused, and the third tick kept the first."""
+
+    class Turning:
+        maneuver, contact = np.zeros(1, int), np.zeros((1, 2), int)
+        yaw = 0.0
+
+        def step(self, frame: object) -> Pose:
+            self.yaw += 0.1
+            return Pose(np.full((1, 5), self.yaw), np.zeros((1, 6, 2)), np.zeros((1, 2)))
+
+    with LogReader(log) as reader:
+        first, second, third, *_ = reader
+    angles = [(yaw,) * 5 + (0.0,) * 14 for yaw in (0.1, 0.2)]
+    ticks = [
+        dataclasses.replace(first, angles=angles[0], maneuver=0),
+        dataclasses.replace(second, angles=angles[1], maneuver=0, refused=1),
+        dataclasses.replace(third, angles=angles[0], maneuver=0, refused=1, asked=False),
+    ]
+    found = replay(ticks, Turning(), 0.01)
+    assert (found.poses, found.different) == (0, 0)

@@ -9,8 +9,10 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from antennate.controller import Controller
 from antennate.errors import BadInputError, ConfigError
 from antennate.experiments.twin import Rig, TwinConfig, rig
+from antennate.hardware.driving.adapter import require_quick
 from antennate.hardware.driving.drive import (
     DriveConfig,
     await_board,
@@ -26,8 +28,11 @@ from antennate.hardware.dynamixel.packets import Instruction, StatusError
 from antennate.hardware.dynamixel.parser import Parser
 from antennate.hardware.ports.port import PortError
 from antennate.hardware.safety.causes import Cause, State
+from antennate.params import ControllerParams
 from antennate.params.layout import LayoutParams
 from antennate.records import AntennaFrame, Maneuver, Pose
+from antennate.telemetry.replay import replay
+from antennate.telemetry.ticks import Tick
 from antennate.twin.bus import Fault, Trouble
 from antennate.twin.faults import Faults, read
 from antennate.twin.pty import PtyServer
@@ -365,6 +370,7 @@ def test_B19_a_signal_holds_the_pose_and_takes_torque_off_within_2_s(number: int
     stand = made.session.stand
 
     def again(time: float) -> None:
+        assert time == 0.4
         signal.raise_signal(number)
         goals = [servo.get("goal_position") for servo in made.robot.servos]
         stand(time)
@@ -372,7 +378,8 @@ def test_B19_a_signal_holds_the_pose_and_takes_torque_off_within_2_s(number: int
         signal.raise_signal(number)
 
     made.session.stand = again
-    report = drive(made.session, CONFIG, arm=True, on_tick=stop)
+    config = CONFIG.model_copy(update={"stand": 0.4})
+    report = drive(made.session, config, arm=True, on_tick=stop)
     assert made.clock.now() - 2.0 <= 2.0
     assert report.safe
     assert not any(servo.torque for servo in made.robot.servos)
@@ -639,6 +646,57 @@ def test_B13_a_sagging_supply_warns_then_holds_then_switches_off() -> None:
     assert not any(Cause.SERVO_ERROR in causes for causes in log.causes)
     assert not any(servo.torque for servo in log.rig.robot.servos)
     assert not any(servo.get("hardware_error_status") for servo in log.rig.robot.servos)
+
+
+def test_B13_below_the_first_level_it_walks_at_half_the_pace_and_replays_alike() -> None:
+    """The published gait turns each leg once in 2 s."""
+    made, ticks = rig(TwinConfig()), list[Tick]()
+
+    def on_tick(session: Session, now: float) -> None:
+        if made.clock.now() >= 4.5:
+            made.robot.servos[0].set("present_input_voltage", 105)
+        ticks.append(Tick.of(session, now))
+
+    drive(made.session, DriveConfig(dry_run=0.5, duration=7.5), arm=True, on_tick=on_tick)
+    legs = {tick.number: np.array(tick.angles)[5:17] for tick in ticks}
+    assert {Cause.SUPPLY_WARN} <= {active.cause for active in made.session.outputs.causes}
+    assert legs[450] - legs[250] == pytest.approx(np.full(12, 2 * math.pi), rel=0.03)
+    assert legs[790] - legs[590] == pytest.approx(np.full(12, math.pi), rel=0.03)
+    found = replay(ticks, Controller(ControllerParams()), 0.01)
+    assert (len(found.maneuvers), found.different, found.poses) == (len(ticks), 0, 0)
+
+
+def test_B19_torque_goes_off_in_the_configured_order() -> None:
+    layout = LayoutParams(release=("legs", "antennae", "yaw"))
+    made = rig(TwinConfig(layout=layout))
+    begun: list[int] = []
+    receive = made.robot.bus.receive
+
+    def listen(t: float, data: bytes) -> None:
+        packets = [p for p in Parser().feed(data) if p.instruction == Instruction.SYNC_WRITE]
+        begun.extend(p.params[4] for p in packets if p.params[:2] == b"\x40\0")
+        receive(t, data)
+
+    config = DriveConfig(dry_run=0.5, duration=0.5, layout=layout)
+    made.robot.bus.receive = listen
+    report = drive(made.session, config, arm=True)
+    assert begun[-3:] == [6, 18, 1]
+    assert report.safe
+    assert not any(servo.torque for servo in made.robot.servos)
+    with pytest.raises(ValueError, match="each group once"):
+        LayoutParams(release=("legs", "legs", "yaw"))
+
+
+@pytest.mark.parametrize("latency", [0.0, 0.016])
+def test_B17_an_adapter_that_keeps_bytes_back_is_refused_with_its_cure(latency: float) -> None:
+    made = rig(TwinConfig())
+    made.clock.latency = latency
+    words = (made.clock, (1, 2), 1_000_000, made.clock.now, "/dev/ttyUSB1")
+    if latency:
+        with pytest.raises(BringUpError, match=r"found 16\.\d ms.*echo 1 \| sudo tee .*ttyUSB1/"):
+            require_quick(*words)
+    else:
+        assert require_quick(*words) == pytest.approx(0.0005, abs=0.0005)
 
 
 def test_L15_B16_a_second_program_on_a_port_is_refused() -> None:

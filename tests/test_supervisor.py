@@ -34,6 +34,14 @@ def test_every_cause_is_named_dated_and_as_severe_as_it_says(cause: Cause) -> No
     assert all(a.since < ticker.now for a in later.causes if a.cause is cause)
 
 
+def test_causes_that_are_alike_are_listed_by_name() -> None:
+    ticker = Ticker()
+    outputs = ticker.step(**together(Cause.STALE, Cause.UNKNOWN_CONTACT, Cause.STUCK, Cause.LOST))
+    held = [a.cause.name for a in outputs.causes if a.cause.severity is State.HOLD]
+    assert held == sorted(held)
+    assert len(held) > 2
+
+
 def test_details_name_sides_servos_and_reasons() -> None:
     ticker = armed()
     changes = together(Cause.SILENT_SERVO, Cause.SERVO_ERROR, Cause.WATCHDOG, Cause.SUPPLY_HOLD)

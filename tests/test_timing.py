@@ -25,7 +25,10 @@ WALL = {
     "datetime": {"now", "utcnow", "today"},
 }
 """What asks for the time of day, by the module it belongs to."""
-PURE = ("causes", "diagnosis", "rate", "supervisor", "timing", "touch_check")
+PURE = (
+    *(f"safety/{name}" for name in ("causes", "diagnosis", "rate", "supervisor", "touch_check")),
+    "driving/timing",
+)
 
 
 def run(delays: dict[int, tuple[str, float]], ticks: int, start: float = 5.0):

@@ -8,11 +8,15 @@ from typing import Any
 import numpy as np
 import pytest
 
+from antennate.controller import Controller
 from antennate.experiments.twin import Rig, TwinConfig, rig
 from antennate.hardware.driving.drive import DriveConfig, drive
 from antennate.hardware.driving.session import Session
 from antennate.hardware.safety.causes import State
+from antennate.params import ControllerParams
 from antennate.records import AntennaFrame, Pose
+from antennate.telemetry.replay import replay
+from antennate.telemetry.ticks import Tick
 from antennate.twin.bus import Fault, Trouble
 
 LEGS = slice(5, 17)
@@ -33,6 +37,7 @@ class Walk:
         self.states: list[State] = []
         self.frames: list[float] = []
         self.maneuvers: list[int] = []
+        self.ticks: list[Tick] = []
         self._act = act
         session = self.rig.session
         think = session.decider.step
@@ -50,6 +55,7 @@ class Walk:
 
     def _note(self, session: Session, t: float) -> None:
         assert session.outputs is not None
+        self.ticks.append(Tick.of(session, t))
         if session.outputs.torque:
             servos = self.rig.robot.servos
             self.goals.append([servo.get("goal_position") for servo in servos])
@@ -90,6 +96,11 @@ def test_one_leg_at_a_time_is_without_torque_and_all_have_it_afterwards(far: Wal
     assert np.array(far.torque)[:, :5].all()
     assert off[-1] == 0
     assert far.report.safe
+
+
+def test_G7_its_log_replays_alike_for_the_controller_was_not_asked_meanwhile(far: Walk) -> None:
+    found = replay(far.ticks, Controller(ControllerParams()), 0.01)
+    assert (len(found.maneuvers), found.different, found.poses) == (len(far.ticks), 0, 0)
 
 
 def test_the_maneuvers_are_those_of_a_walk_without_it(far: Walk) -> None:

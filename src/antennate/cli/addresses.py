@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, TypeVar
 
 import tyro
 
-from antennate.cli.arguments import FromFile
+from antennate.cli.arguments import Config, FromFile, parse_with, read_file
 from antennate.errors import ConfigError
 from antennate.hardware.ports.finder import is_udp
 from antennate.hardware.ports.keys import read_key
+from antennate.hardware.robot_file import RobotFile
 
 
 @dataclass(frozen=True)
@@ -20,8 +22,8 @@ class RobotOrders(FromFile):
     """The robot.
 
     Attributes:
-        config: TOML file with the parameters below as keys and tables; flags override it
-        robot: another name of --config
+        config: another name of --robot
+        robot: TOML file of the robot, the same for drive, doctor and record; flags override it
         esp32: serial port of the antenna board, tcp://HOST:PORT or udp://HOST:PORT
         key: file with the key of a board behind udp://, mode 0600; else ANTENNATE_KEY is read
         insecure_udp: the board has no key; anybody on the network can feign it
@@ -44,6 +46,35 @@ class RobotOrders(FromFile):
         return self.robot or self.config
 
 
+Orders = TypeVar("Orders", bound=RobotOrders)
+
+
+def parse_robot(
+    command: str,
+    description: str,
+    take: Callable[[RobotFile], Config],
+    argv: Sequence[str],
+    orders: Orders,
+) -> tuple[Config, Orders]:
+    """Read the words of a command that talks to a robot.
+
+    Args:
+        command: Its name.
+        description: What it does.
+        take: What it takes of a robot's file.
+        argv: Its words.
+        orders: Its other options, by their defaults.
+
+    Raises:
+        ConfigError: A flag, the file or a value cannot be used.
+        SystemExit: Help was asked for and has been printed.
+    """
+    model = type(take(RobotFile()))
+    return parse_with(
+        command, description, model, argv, orders, lambda path: take(read_file(path, RobotFile))
+    )
+
+
 def key_of(orders: RobotOrders) -> bytes | None:
     """The key for a board behind udp://, None if there is no such board.
 
@@ -54,7 +85,7 @@ def key_of(orders: RobotOrders) -> bytes | None:
     if not is_udp(orders.esp32):
         return None
     if not orders.insecure_udp:
-        return read_key(orders.key)
+        return read_key(orders.key, "or give --insecure-udp for a board without one")
     if orders.key is not None:
         raise ConfigError("--insecure-udp: expected no --key beside it, found both")
     warning = "UDP without a key: anybody on this network can feign the antenna board"

@@ -11,7 +11,7 @@ import io
 import json
 import re
 import tomllib
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Generic, TypeVar, cast
@@ -130,12 +130,20 @@ def parse(
 
 
 def parse_with(
-    command: str, description: str, model: type[Config], argv: Sequence[str], options: Chosen
+    command: str,
+    description: str,
+    model: type[Config],
+    argv: Sequence[str],
+    options: Chosen,
+    read: Callable[[Path], Config] | None = None,
 ) -> tuple[Config, Chosen]:
-    """The same with options of another kind, given by their defaults."""
+    """The same with options of another kind, given by their defaults.
+
+    A file that holds more than this configuration is read by `read`.
+    """
     call = _words(command, description, model(), argv, options)
     if (file := call.options.file) is not None:
-        base = read_file(file, model)
+        base = read_file(file, model) if read is None else read(file)
         call = _words(command, description, base, argv, options)
     try:
         return model.model_validate(call.parameters), call.options

@@ -11,18 +11,17 @@ from typing import Annotated
 import tyro
 
 from antennate.cli import BAD_INPUT, OK
-from antennate.cli.addresses import RobotOrders, key_of, require_lossless
-from antennate.cli.arguments import parse_with
+from antennate.cli.addresses import RobotOrders, key_of, parse_robot, require_lossless
 from antennate.cli.checks import show_rows
 from antennate.cli.folder import RunFolder, to_json
 from antennate.cli.progress import terminate_as_interrupt
 from antennate.errors import ConfigError
-from antennate.hardware.doctor.checkup import Checkup, Robot, examine
+from antennate.hardware.doctor.checkup import Checkup, DoctorConfig, examine
 from antennate.hardware.doctor.fix import Change, apply, plan
 from antennate.hardware.doctor.ports import opener_of, same
 from antennate.hardware.doctor.rows import Opener, worst
-from antennate.hardware.driving.drive import DriveConfig
 from antennate.hardware.host_clock import HostClock
+from antennate.hardware.robot_file import RobotFile
 
 DESCRIPTION = """\
 Examine the antenna board and the servo bus of a robot at rest, or of its twin: one line for each
@@ -60,15 +59,16 @@ def command(argv: Sequence[str]) -> int:
     Raises:
         AntennateError: Something given cannot be used, or a change did not succeed.
     """
-    config, orders = parse_with("doctor", DESCRIPTION, DriveConfig, argv, Orders())
+    config, orders = parse_robot("doctor", DESCRIPTION, RobotFile.for_doctor, argv, Orders())
     _check(orders)
+    robot = config.calibrated()
     key = key_of(orders)
     if orders.out is None:
-        checkup, changes = _examine(config, orders, key)
+        checkup, changes = _examine(robot, orders, key)
     else:
         with RunFolder.open("doctor", orders.out, orders.overwrite) as folder:
             folder.describe("doctor", argv, config)
-            checkup, changes = _examine(config, orders, key)
+            checkup, changes = _examine(robot, orders, key)
             folder.finish(checkup.result(changes), ())
             sys.stderr.write(f"written to {folder.path}\n")
     if orders.json:
@@ -92,11 +92,13 @@ def _check(orders: Orders) -> None:
         raise ConfigError("--fix: expected a terminal to ask on, found none; or give --yes")
 
 
-def _examine(config: DriveConfig, orders: Orders, key: bytes | None) -> tuple[Checkup, list[str]]:
+def _examine(robot: DoctorConfig, orders: Orders, key: bytes | None) -> tuple[Checkup, list[str]]:
     """The examination, the last one if something was changed, and the changes."""
-    robot = Robot(layout=config.layout, mind=config.mind, limits=config.limits)
-    bus = (orders.bus, opener_of(orders.bus, "--bus")) if orders.bus else None
-    esp32 = (orders.esp32, opener_of(orders.esp32, "--esp32", key)) if orders.esp32 else None
+    bus = esp32 = None
+    if orders.bus:
+        bus = (orders.bus, opener_of(orders.bus, "--bus"))
+    if orders.esp32:
+        esp32 = (orders.esp32, opener_of(orders.esp32, "--esp32", key, robot.network))
     now = HostClock().now
     with terminate_as_interrupt():
         checkup = examine(robot, bus, esp32, now)
@@ -112,7 +114,7 @@ def _examine(config: DriveConfig, orders: Orders, key: bytes | None) -> tuple[Ch
 
 
 def _fix(
-    robot: Robot,
+    robot: DoctorConfig,
     bus: tuple[str, Opener],
     yes: bool,
     now: Callable[[], float],

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
@@ -11,8 +12,7 @@ from typing import Annotated, Any
 import tyro
 
 from antennate.cli import BAD_INPUT, OK, viewer
-from antennate.cli.addresses import RobotOrders, key_of, require_lossless
-from antennate.cli.arguments import parse_with
+from antennate.cli.addresses import RobotOrders, key_of, parse_robot, require_lossless
 from antennate.cli.folder import LOG, RunFolder, to_json
 from antennate.cli.progress import terminate_as_interrupt
 from antennate.cli.tables import Cell, number, show
@@ -21,7 +21,7 @@ from antennate.hardware.doctor.ports import same
 from antennate.hardware.driving.drive import DriveConfig, connect, drive
 from antennate.hardware.driving.priority import Priority, urgent
 from antennate.hardware.driving.session import Session
-from antennate.hardware.esp32.film import calibrated
+from antennate.hardware.robot_file import RobotFile
 from antennate.hardware.safety.causes import State
 from antennate.telemetry.feed import Feed
 from antennate.telemetry.header import Header
@@ -34,7 +34,7 @@ twin. An address is the path of a serial port, tcp://HOST:PORT, or, for a board 
 udp://HOST:PORT with the key it was given. First a dry run: everything is read and nothing written.
 Then, with --arm only, torque comes on with every servo where it stands. Ctrl-C or SIGTERM ends it:
 pose held, torque off, verified. A lost board or servo makes it hold; the watchdogs of the servos
-stop it if this program dies."""
+stop it if this program dies. --clock is for a twin in lock-step alone, never for a robot."""
 
 
 @dataclass(frozen=True)
@@ -43,6 +43,7 @@ class Orders(RobotOrders):
 
     Attributes:
         bus: serial port of the servo bus, or tcp://HOST:PORT
+        clock: address of the clock of `antennate twin --pace lockstep`: time is the twin's
         arm: torque on after the dry run
         out: folder for log and result, runs/drive-N if not given
         overwrite: replace the results that the folder holds
@@ -50,6 +51,7 @@ class Orders(RobotOrders):
     """
 
     bus: Annotated[str, tyro.conf.arg(metavar="PORT")] = ""
+    clock: Annotated[str, tyro.conf.arg(metavar="PORT")] = ""
     arm: bool = False
     out: Annotated[Path | None, tyro.conf.arg(metavar="FOLDER")] = None
     overwrite: bool = False
@@ -62,21 +64,22 @@ def command(argv: Sequence[str]) -> int:
     Raises:
         AntennateError: A port, a servo or the board is not what is needed; nothing moved then.
     """
-    config, orders = parse_with("drive", DESCRIPTION, DriveConfig, argv, Orders())
+    config, orders = parse_robot("drive", DESCRIPTION, RobotFile.for_drive, argv, Orders())
     for name in ("esp32", "bus"):
         if not getattr(orders, name):
             raise ConfigError(f"--{name}: expected a serial port, found none")
     if same(orders.esp32, orders.bus):
         raise ConfigError(f"--esp32 and --bus: expected two ports, found {orders.bus} twice")
-    if config.calibration is not None:
-        mind, film = calibrated(config.mind, Path(config.calibration), config.sensor_id)
-        config = config.model_copy(update={"mind": mind, "sensor_id": film.sensor_id})
+    if orders.clock and any(same(orders.clock, one) for one in (orders.esp32, orders.bus)):
+        raise ConfigError(f"--clock: expected a port of its own, found {orders.clock} twice")
+    config = config.calibrated()
     require_lossless(orders.bus)
     key = key_of(orders)
     with RunFolder.open("drive", orders.out, orders.overwrite) as folder:
         folder.describe("drive", argv, config)
-        with connect(config, orders.esp32, orders.bus, key) as session, terminate_as_interrupt():
-            result = _carry_out(config, session, orders.arm, folder.path / LOG)
+        wires = connect(config, orders.esp32, orders.bus, key, orders.clock)
+        with wires as session, terminate_as_interrupt():
+            result = _carry_out(config, session, orders, folder.path / LOG)
         folder.finish(result, ())
         if orders.json:
             sys.stdout.write(to_json(result))
@@ -88,24 +91,28 @@ def command(argv: Sequence[str]) -> int:
     return BAD_INPUT if fault or stays_on or result["refusal"] else OK
 
 
-def _carry_out(config: DriveConfig, session: Session, arm: bool, log: Path) -> dict[str, Any]:
-    """Drive, with the log and the status line in a process of their own."""
+def _carry_out(config: DriveConfig, session: Session, orders: Orders, log: Path) -> dict[str, Any]:
+    """Drive, with the log and the status line in a process of their own.
+
+    In a twin's time nothing is urgent, and the log is waited for.
+    """
     header = Header(controller=config.controller, params=config.mind, layout=config.layout)
     required = [viewer.REQUIRED] if config.record_required else []
 
     def words(number: int) -> list[str]:
         return [sys.executable, "-m", viewer.__name__, str(part(log, number)), *required]
 
-    feed = Feed(words, header.pack())
+    feed = Feed(words, header.pack(), waits=bool(orders.clock))
 
     def keep(session: Session, t: float) -> None:
         feed.send(Tick.of(session, t).pack())
         session.unrecorded = config.record_required and not feed.keeps
 
-    with feed, urgent() as priority:
-        report = drive(session, config, arm, keep)
-    head = {"schema": 1, "command": "drive", "controller": config.controller, "armed": arm}
+    with feed, nullcontext(Priority.ORDINARY) if orders.clock else urgent() as priority:
+        report = drive(session, config, orders.arm, keep)
+    head = {"schema": 1, "command": "drive", "controller": config.controller, "armed": orders.arm}
     tail = {
+        "clock": "twin" if orders.clock else "host",
         "priority": priority.value,
         "unlogged": feed.dropped,
         "log_complete": feed.complete,
@@ -128,7 +135,9 @@ def _note(result: Mapping[str, Any]) -> str:
         note += "A dry run: nothing was written to the servos; --arm lets it walk.\n"
     if result["refusal"]:
         note += f"Not armed: {result['refusal']}; --no-touch-check arms without the check.\n"
-    if result["priority"] == Priority.ORDINARY.value:
+    if result["clock"] == "twin":
+        note += "Time was the twin's.\n"
+    elif result["priority"] == Priority.ORDINARY.value:
         note += "Real-time priority was not allowed; a busy machine will make it miss ticks.\n"
     if not result["log_complete"]:
         note += f"The log is not complete; its files: {', '.join(result['logs']) or 'none'}.\n"

@@ -18,8 +18,7 @@ from typing import Annotated
 import tyro
 
 from antennate.cli import OK
-from antennate.cli.addresses import RobotOrders, key_of
-from antennate.cli.arguments import parse_with
+from antennate.cli.addresses import RobotOrders, key_of, parse_robot
 from antennate.cli.progress import terminate_as_interrupt
 from antennate.errors import BadInputError, ConfigError, OutputError
 from antennate.hardware.doctor.ports import opener_of
@@ -27,6 +26,7 @@ from antennate.hardware.esp32.board import BOARD_BAUD
 from antennate.hardware.esp32.recorder import Recorder
 from antennate.hardware.esp32.stream import Reading, Stream
 from antennate.hardware.host_clock import HostClock
+from antennate.hardware.robot_file import RobotFile
 from antennate.params import RecordParams
 
 DESCRIPTION = """\
@@ -56,13 +56,14 @@ def command(argv: Sequence[str]) -> int:
     Raises:
         AntennateError: Something given cannot be used, or the board is silent.
     """
-    params, orders = parse_with("record", DESCRIPTION, RecordParams, argv, Orders())
+    params, orders = parse_robot("record", DESCRIPTION, RobotFile.for_record, argv, Orders())
     if not orders.esp32:
         raise ConfigError("--esp32: expected a serial port, found none")
     if orders.out is None:
         raise ConfigError("--out: expected a CSV file to make, found none")
     key, now = key_of(orders), HostClock().now
-    with opener_of(orders.esp32, "--esp32", key)(BOARD_BAUD) as port:
+    opener = opener_of(orders.esp32, "--esp32", key, params.network)
+    with opener(BOARD_BAUD) as port:
         stream = Stream(port, now)
         status = Status(stream, params, now)
         with Lines(orders.out) as lines, terminate_as_interrupt():

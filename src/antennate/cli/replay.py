@@ -192,13 +192,7 @@ def _keep(folder: RunFolder, path: Path, found: Replayed) -> None:
 def _rows(ticks: Iterable[Tick], replayed: Sequence[int]) -> Iterator[dict[str, Any]]:
     """One row a tick; numbers as they are, so that they come back exactly."""
     for tick, maneuver in zip(ticks, replayed, strict=True):
-        pairs = (tick.counts, tick.reading, tick.b, tick.contact)
-        values = [
-            *(tick.number, tick.t, tick.now, *(value for pair in pairs for value in pair)),
-            *(tick.maneuver, tick.phase, *tick.angles, tick.age, tick.missed, tick.frames),
-            *(tick.crc, tick.lost, tick.misses, tick.stale, tick.sent, tick.refused),
-        ]
-        row = dict(zip(FIELDS[2:-1], values, strict=True))
+        row = dict(zip(FIELDS[2:-1], tick.values, strict=True))
         yield row | {
             "replayed": maneuver,
             "state": tick.state,

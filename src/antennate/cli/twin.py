@@ -7,6 +7,7 @@ import re
 import secrets
 import sys
 from collections.abc import Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
@@ -15,21 +16,22 @@ import tyro
 
 from antennate.cli import OK
 from antennate.cli.arguments import FromFile, parse_with
-from antennate.cli.progress import terminate_as_interrupt
+from antennate.cli.progress import end_at_first
 from antennate.errors import ConfigError
 from antennate.experiments.twin import TwinConfig, watched
 from antennate.hardware.driving.priority import LEVEL, urgent
 from antennate.hardware.ports.keys import read_key
+from antennate.twin.ends import End, Terminal
 from antennate.twin.faults import Faults, read
-from antennate.twin.serve import End, TwinServer
+from antennate.twin.serve import TwinServer
 from antennate.twin.tcp import TcpEnd
 from antennate.twin.udp import UdpEnd
 
-_LAST_PORT = 65_534
+_LAST_PORT = 65_533
 
 DESCRIPTION = """\
 Serve the simulated robot in a tunnel as real bytes on two pseudo-terminals: the frames of the
-antenna board, and a DYNAMIXEL bus of 19 servos. Prints one JSON line with both paths when ready.
+antenna board, and a DYNAMIXEL bus of 19 servos. Prints one JSON line with the paths when ready.
 With --tcp both are TCP ports, with --udp the board is a UDP port that signs as the firmware does.
 Physics begins when the first servo gets torque. Faults, each with @Ts for its time:
 servo:ID=silent, bad_crc, truncated, late:SECONDS, doubled, wrong_id, oversized, voltage, overheat,
@@ -47,10 +49,11 @@ class Places(FromFile):
     Attributes:
         config: TOML file with the parameters below as keys and tables; flags override it
         tcp: both on TCP ports of this host, 127.0.0.1 if not given; 0 takes any, else PORT is the
-            board's and PORT+1 the bus's
+            board's, PORT+1 the bus's, and PORT+2 the clock's
         udp: the board on a UDP port instead, likewise
         key: file with the key for --udp, mode 0600; else ANTENNATE_KEY is read
-        pace: real time, or lockstep: a control period passes with each sync write of all goals
+        pace: real time, or lockstep: time passes as the client of the clock wants (`antennate drive
+            --clock`), or, without one, a control period with each sync write of all goals
     """
 
     tcp: Annotated[str, tyro.conf.arg(metavar="[HOST:]PORT")] = ""
@@ -65,16 +68,22 @@ def command(argv: Sequence[str]) -> int:
     Raises:
         AntennateError: Something given cannot be used.
     """
+    with end_at_first():
+        return _serve(argv)
+
+
+def _serve(argv: Sequence[str]) -> int:
     config, places = parse_with("twin", DESCRIPTION, TwinConfig, argv, Places())
     faults = Faults([read(text) for text in config.fault], config.layout.ids)
-    robot, passage = watched(config, boot_id=secrets.randbits(32))
+    real = places.pace == "real"
+    robot, passage = watched(config, boot_id=secrets.randbits(32) if real else None)
     end = float("inf") if config.duration is None else config.duration
     with TwinServer(robot, faults, *_ends(places)) as server:
-        sys.stdout.write(json.dumps(server.paths) + "\n")
-        sys.stdout.flush()
         try:
-            with terminate_as_interrupt(), urgent(LEVEL + 1):
-                serve = server.run if places.pace == "real" else server.run_lockstep
+            sys.stdout.write(json.dumps(server.paths) + "\n")
+            sys.stdout.flush()
+            with urgent(LEVEL + 1) if real else nullcontext():
+                serve = server.run if real else server.run_lockstep
                 serve(lambda t: t < end and robot.failure is None)
         finally:
             invalid = f"physics became invalid: {robot.failure}; " if robot.failure else ""
@@ -83,16 +92,18 @@ def command(argv: Sequence[str]) -> int:
     return OK
 
 
-def _ends(places: Places) -> tuple[End | None, End | None]:
-    """Ends of the board and of the bus; None for a pseudo-terminal."""
-    board = bus = None
+def _ends(places: Places) -> tuple[End | None, End | None, End | None]:
+    """Ends of the board and of the bus, None for a pseudo-terminal; and of the clock, if any."""
+    board = bus = clock = None
+    lockstep = places.pace == "lockstep"
     if places.udp:
         board = UdpEnd(*_place("--udp", places.udp), read_key(places.key))
     if places.tcp:
         host, port = _place("--tcp", places.tcp)
         board = board or TcpEnd(host, port)
         bus = TcpEnd(host, port and port + 1)
-    return board, bus
+        clock = TcpEnd(host, port and port + 2) if lockstep else None
+    return board, bus, clock or (Terminal() if lockstep else None)
 
 
 def _place(flag: str, text: str) -> tuple[str, int]:

@@ -5,7 +5,8 @@ diagnosis of the antennae and its limit of the goals' speed, all through bytes, 
 lock-step. Nothing of that exists in pure simulation. To compare the two from the first reading that
 the controller gets, the simulation begins where the session stands then, and no later:
 
-- its controller is first asked without readings, at the times at which the session's was;
+- its controller is first given what the session's was before the physics began: no readings, or
+  one of the standing twin;
 - its physics runs the ticks that arming took, with every joint held where it stood;
 - its goals are rounded to ticks, as servos take them.
 
@@ -16,6 +17,7 @@ speed never acts: the twin's legs stand where its gait begins, and none is asked
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -27,6 +29,7 @@ from antennate.experiments.twin import Watch
 from antennate.hardware.driving.drive import DriveConfig, drive, prepare
 from antennate.hardware.driving.report import Report
 from antennate.hardware.driving.session import Session
+from antennate.hardware.esp32.board import Board
 from antennate.hardware.joints import Joints
 from antennate.loop import run_loop
 from antennate.params.layout import LayoutParams
@@ -39,19 +42,22 @@ _DRY_RUN = 0.5
 """Time before the arm event [s]."""
 
 
+_NOTHING = AntennaFrame(t=np.full(1, math.nan), counts=np.full((1, 2), math.nan))
+
+
 @dataclass(slots=True)
 class Start:
-    """Where a session stood when its controller got the first reading.
+    """Where a session stood when its controller got the first reading that the physics follows.
 
     Attributes:
-        blind: Times of the ticks in which it got none [s].
-        standing: Ticks of the physics by then.
-        t: Time of that reading [s].
+        before: What it got until then.
+        standing: Ticks of the physics before that reading.
+        first: That reading; made by the standing twin, noise included, if `standing` is 0.
     """
 
-    blind: list[float] = field(default_factory=list[float])
-    standing: int = 0
-    t: float = math.nan
+    before: list[AntennaFrame]
+    standing: int
+    first: AntennaFrame
 
 
 @dataclass(slots=True)
@@ -98,41 +104,54 @@ class Driven:
     report: Report
 
 
+def in_process(orders: DriveConfig, robot: TwinRobot) -> Session:
+    """A session before a twin in lock-step, with calls in place of wires."""
+    clock = LockstepClock(robot)
+    return prepare(orders, BoardPort(robot, clock), clock, clock)
+
+
 def driven(
-    config: TunnelConfig, arm: Arm, trial: int, layout: LayoutParams, ticks: float = math.inf
+    config: TunnelConfig,
+    arm: Arm,
+    trial: int,
+    layout: LayoutParams,
+    ticks: float = math.inf,
+    wired: Callable[[DriveConfig, TwinRobot], Session] = in_process,
+    phase: float = 0.0,
 ) -> Driven:
     """The trial by `drive`, until it is decided or for so many ticks.
+
+    Args:
+        config: The trial's world.
+        arm: Its controller.
+        trial: Its number.
+        layout: Servos of the robot.
+        ticks: Most ticks from the first reading on.
+        wired: Puts a session before the twin.
+        phase: Time that the loop begins later [s], which moves its ticks against the board's.
 
     Raises:
         BringUpError: The servos did not come up.
     """
-    watch, walk, start = Watch(config, arm, trial), Walk(), Start()
-    period = config.controller.period
+    watch, walk, period = Watch(config, arm, trial), Walk(), config.controller.period
     robot = TwinRobot(watch.body, layout, period, boot_id=trial + 1, standing_noise=True)
-    clock = LockstepClock(robot)
     orders = DriveConfig(
         controller=arm, dry_run=_DRY_RUN, touch_check=False, layout=layout, mind=config.controller
     )
-    session = prepare(orders, BoardPort(robot, clock), clock, clock)
-    session.decider = watch.controller
+    session = wired(orders, robot)
+    mind = session.decider = _Judged(watch, lambda: _taken(session.board) - robot.stood)
+    session.clock.sleep_until(session.clock.now() + phase)
 
     def on_tick(session: Session, now: float) -> None:
-        t, counts = float(session.frame.t[0]), session.frame.counts
-        if session.orders.stop:
+        if mind.first is None or session.orders.stop:
             return
-        if not walk.readings and np.isnan(counts).all():
-            start.blind.append(t)
-            return
-        if not walk.readings:
-            start.standing, start.t = round(watch.body.now() / period), t
         goals = tuple(servo.get("goal_position") for servo in robot.servos)
-        walk.note(session.frame, int(watch.controller.maneuver[0]), session.pose, goals)
-        more = watch.go_on(session.frame, session.pose)
-        session.orders.stop = not more or len(walk.readings) >= ticks
+        walk.note(session.frame, int(mind.maneuver[0]), session.pose, goals)
+        session.orders.stop = bool(watch.status) or len(walk.readings) >= ticks
 
     report = drive(session, orders, arm=True, on_tick=on_tick)
     walk.status = watch.status
-    return Driven(walk, start, report)
+    return Driven(walk, Start(mind.before, mind.standing, mind.first or _NOTHING), report)
 
 
 def simulated_alike(
@@ -146,8 +165,8 @@ def simulated_alike(
     """The trial in pure simulation, begun alike."""
     watch, walk = Watch(config, arm, trial), Walk()
     period, mind = config.controller.period, watch.controller
-    for t in start.blind:
-        mind.step(AntennaFrame(t=np.array([t]), counts=np.full((1, 2), math.nan)))
+    for frame in start.before:
+        mind.step(frame)
     body = _Begun(watch.body, layout, period, start)
 
     def go_on(frame: AntennaFrame, pose: Pose) -> bool:
@@ -159,6 +178,48 @@ def simulated_alike(
     return walk
 
 
+def _taken(board: Board) -> int:
+    """The board's tick in which its newest sample was taken."""
+    newest = board.clock.newest
+    return -1 if newest is None else newest.sample.seq
+
+
+class _Judged:
+    """The controller of a trial, judged as in simulation: before its goals are sent.
+
+    Args:
+        watch: Controller and judge.
+        standing: Ticks of the physics before the newest reading; negative before it begins.
+
+    Attributes:
+        before: What it got before the first reading that the physics follows.
+        standing: Ticks of the physics before that reading.
+        first: That reading, None so far.
+    """
+
+    def __init__(self, watch: Watch, standing: Callable[[], int]) -> None:
+        self._watch, self._standing = watch, standing
+        self.maneuver, self.contact = watch.controller.maneuver, watch.controller.contact
+        self.before: list[AntennaFrame] = []
+        self.standing = 0
+        self.first: AntennaFrame | None = None
+
+    def step(self, frame: AntennaFrame) -> Pose:
+        """The pose of this tick."""
+        mind = self._watch.controller
+        pose = mind.step(frame)
+        self.maneuver, self.contact = mind.maneuver, mind.contact
+        if self.first is None:
+            self.standing = self._standing()
+            if self.standing < 0 or np.isnan(frame.counts).all():
+                self.before.append(frame)
+                return pose
+            self.first = frame
+        if not self._watch.status:
+            self._watch.go_on(frame, pose)
+        return pose
+
+
 class _Begun:
     """A simulated body whose joints were held for a while, and whose goals are those of servos.
 
@@ -168,14 +229,16 @@ class _Begun:
 
     def __init__(self, body: SimBody, layout: LayoutParams, period: float, start: Start) -> None:
         self._body, self._joints = body, Joints(layout)
-        self._ahead = start.t - start.standing * period
+        self._ahead = float(start.first.t[0]) - start.standing * period
         self.sent: tuple[int, ...] = ()
-        self._frame: AntennaFrame | None = body.read()
+        self._frame: AntennaFrame | None = self._stamped(body.read())
         stood = np.rint(self._joints.positions(body.world(0).drives()))
         for tick in range(start.standing):
             self._send(stood)
             body.sleep_until((tick + 1) * period)
-            self._frame = body.read()
+            self._frame = self._stamped(body.read())
+        if not start.standing:
+            self._frame = start.first
 
     @property
     def clock(self) -> Clock:
@@ -183,10 +246,13 @@ class _Begun:
         return self._body.clock
 
     def read(self) -> AntennaFrame:
-        """Read, stamped in whole microseconds as by the board."""
-        frame, self._frame = self._frame or self._body.read(), None
-        t = 1e-6 * np.rint(1e6 * (frame.t + self._ahead))
-        return AntennaFrame(t=t, counts=frame.counts)
+        """Read; the first time what was read when it began."""
+        frame, self._frame = self._frame or self._stamped(self._body.read()), None
+        return frame
+
+    def _stamped(self, frame: AntennaFrame) -> AntennaFrame:
+        """Stamped in whole microseconds as by the board."""
+        return AntennaFrame(t=1e-6 * np.rint(1e6 * (frame.t + self._ahead)), counts=frame.counts)
 
     def write(self, pose: Pose) -> None:
         """Round, then command."""

@@ -26,11 +26,13 @@ class Joints:
     Attributes:
         ids: Ids of their servos.
         models: Model numbers by id.
+        in_order_of_release: Ids of the groups in the order in which they lose their torque.
     """
 
     def __init__(self, layout: LayoutParams) -> None:
         self.ids = layout.ids
         self.models = roster.models(layout)
+        self.in_order_of_release = layout.in_order_of_release
         self._sign: Floats = np.array(layout.directions, float)
         self._zero: Floats = np.array(layout.zeros, float)
         self._limit: Floats = np.array(layout.limits)

@@ -9,8 +9,10 @@ properties, computed here and never typed.
 from antennate.params.antenna import N_MM_PER_DEG, AntennaParams
 from antennate.params.base import Params, number
 from antennate.params.bench import BenchVariationParams, WallParams
+from antennate.params.clock import ClockParams
 from antennate.params.doctor import DoctorParams
 from antennate.params.endurance import DriftParams, TurnsParams
+from antennate.params.host import HostParams
 from antennate.params.layout import BasesParams, JointsParams, LayoutParams, YawsParams
 from antennate.params.log import LogParams
 from antennate.params.mind import (
@@ -44,7 +46,8 @@ from antennate.params.touch import (
     StepWallParams,
     TouchWallsParams,
 )
-from antennate.params.twin import BatteryParams
+from antennate.params.twin import BatteryParams, TwinParams
+from antennate.params.wires import BoardParams, BusParams, PortParams
 
 __all__ = [
     "N_MM_PER_DEG",
@@ -53,7 +56,10 @@ __all__ = [
     "BatteryParams",
     "BenchPhysicsParams",
     "BenchVariationParams",
+    "BoardParams",
     "BouldersWallParams",
+    "BusParams",
+    "ClockParams",
     "ConditioningParams",
     "ControllerParams",
     "CornerWallParams",
@@ -66,12 +72,14 @@ __all__ = [
     "FlatWallParams",
     "GaitParams",
     "GapWallParams",
+    "HostParams",
     "JointsParams",
     "LayoutParams",
     "LogParams",
     "NetworkParams",
     "Params",
     "PhysicsParams",
+    "PortParams",
     "RecordParams",
     "RepetitionParams",
     "RobotParams",
@@ -89,6 +97,7 @@ __all__ = [
     "TouchWallsParams",
     "TunnelParams",
     "TurnsParams",
+    "TwinParams",
     "VariationParams",
     "WallParams",
     "YawsParams",

@@ -91,6 +91,9 @@ def _group(kind: type[_Group], first: int, count: int) -> _Group:
     )
 
 
+_GroupName = Literal["yaw", "legs", "antennae"]
+
+
 class LayoutParams(Params):
     """All servos of a robot: 5 yaw joints, 12 legs, 2 antenna bases."""
 
@@ -103,11 +106,20 @@ class LayoutParams(Params):
     yaw: YawsParams = _group(YawsParams, 1, YAW_COUNT)
     legs: JointsParams = _group(JointsParams, _FIRST_LEG, len(LEGS))
     antennae: BasesParams = _group(BasesParams, _FIRST_ANTENNA, 2)
+    release: tuple[_GroupName, _GroupName, _GroupName] = number(
+        ("antennae", "yaw", "legs"),
+        "1",
+        "assumed: what carries the robot goes last",
+        "order in which the groups lose their torque",
+    )
 
     @model_validator(mode="before")
     @classmethod
     def _complete(cls, data: object) -> object:
-        """A table with some keys of a group leaves the others as they are by default."""
+        """A table with some keys of a group leaves the others as they are by default.
+
+        Lists become tuples here: what a "before" has touched is no longer judged as JSON.
+        """
         if not isinstance(data, dict):
             return data
         given = dict(cast("dict[str, object]", data))
@@ -115,7 +127,10 @@ class LayoutParams(Params):
             group = given.get(name)
             if isinstance(group, dict):
                 known: JointsParams = cls.model_fields[name].default
-                given[name] = known.model_dump() | cast("dict[str, object]", group)
+                given[name] = known.model_dump() | {
+                    key: tuple(cast("list[object]", value)) if isinstance(value, list) else value
+                    for key, value in cast("dict[str, object]", group).items()
+                }
         return given
 
     @model_validator(mode="after")
@@ -132,9 +147,16 @@ class LayoutParams(Params):
                         f"{name}.zeros must leave a quarter turn to both sides, {_QUARTER} to "
                         f"{TICKS_A_TURN - _QUARTER} ticks, got {zero}"
                     )
+        if len(set(self.release)) < len(self.release):
+            raise ValueError(f"release must name each group once, got {', '.join(self.release)}")
         if doubled := sorted({i for i in self.ids if self.ids.count(i) > 1}):
             raise ValueError(f"ids must differ, got {', '.join(map(str, doubled))} more than once")
         return self
+
+    @property
+    def in_order_of_release(self) -> tuple[tuple[int, ...], ...]:
+        """Ids of the groups in the order in which they lose their torque."""
+        return tuple(getattr(self, name).ids for name in self.release)
 
     @property
     def ids(self) -> tuple[int, ...]:

@@ -14,7 +14,7 @@ class LogParams(Params):
     least_free: float = number(
         1e9,
         "byte",
-        "assumed: room for eight hours of ticks at 100 Hz, 34 kB a second",
+        "assumed: room for seven hours of ticks at 100 Hz, 40 kB a second",
         "free space below which no log is begun",
         ge=0,
     )

@@ -228,6 +228,14 @@ class SupervisorParams(Params):
         gt=0,
         le=100,
     )
+    slow_rate: float = number(
+        0.5,
+        "1",
+        "assumed: half the strides a second, about half the current",
+        "how fast the gait goes below supply_warn",
+        gt=0,
+        le=1,
+    )
     supply_hold: float = number(
         10.2,
         "V",

@@ -2,8 +2,8 @@
 
 A message is the content of a record behind its length and how many were dropped before it. The
 loop writes it to a pipe at once or not at all: what the other process cannot take is dropped and
-counted. The content of no bytes says that the loop has ended in order; a pipe that closes without
-it means that the loop was killed.
+counted; in a twin's time, which stands still meanwhile, it waits. The content of no bytes says that
+the loop has ended in order; a pipe that closes without it means that the loop was killed.
 """
 
 from __future__ import annotations
@@ -18,16 +18,15 @@ import threading
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from select import PIPE_BUF
-from types import TracebackType
 from typing import BinaryIO
 
 from antennate.errors import LogError
-from antennate.params import LogParams
+from antennate.params import HostParams, LogParams
 
 _HEAD = struct.Struct("<II")
 _ROOM = 1 << 20
 """Bytes that the pipe may hold: half a minute of ticks."""
-_PATIENCE = 5.0
+_PATIENCE = HostParams().log_patience
 """Time for the other process to write the last ticks [s]."""
 _LONGEST = 1 << 17
 
@@ -55,6 +54,7 @@ class Feed:
         words: The command line of the n-th process, 1 the first. It reads messages from its
             standard input, and writes anything to its standard output once it keeps them.
         first: The content of the first message, of any length.
+        waits: Wait for room instead of dropping, where the loop's time is not the host's.
         params: How many processes may follow the first.
 
     Attributes:
@@ -65,9 +65,13 @@ class Feed:
     """
 
     def __init__(
-        self, words: Callable[[int], Sequence[str]], first: bytes, params: LogParams | None = None
+        self,
+        words: Callable[[int], Sequence[str]],
+        first: bytes,
+        waits: bool = False,
+        params: LogParams | None = None,
     ) -> None:
-        self._words, self._first = words, first
+        self._words, self._first, self._waits = words, first, waits
         self._most = 1 + (params or LogParams()).restarts
         self._process: subprocess.Popen[bytes] | None = None
         self._pipe = -1
@@ -92,12 +96,7 @@ class Feed:
         self._keeper.start()
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         with self._lock:
             self._ending = True
         with contextlib.suppress(OSError):  # one that takes nothing is not waited for
@@ -150,7 +149,7 @@ class Feed:
             with contextlib.suppress(OSError, AttributeError):  # less room where not allowed
                 fcntl.fcntl(ours, fcntl.F_SETPIPE_SZ, _ROOM)
             os.write(ours, _HEAD.pack(len(self._first), self.dropped) + self._first)
-            os.set_blocking(ours, False)
+            os.set_blocking(ours, self._waits)
             if self._pipe < 0:
                 self._pipe = os.dup(ours)
             else:

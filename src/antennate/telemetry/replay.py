@@ -11,9 +11,9 @@ import numpy as np
 
 from antennate.controller import ARMS, Controller
 from antennate.errors import LogError
+from antennate.hardware.driving.decider import Decider
 from antennate.hardware.driving.drive import DriveConfig
 from antennate.hardware.driving.drive import decider as named
-from antennate.hardware.driving.session import Decider
 from antennate.loop import run_loop
 from antennate.params import Params, number
 from antennate.records import AntennaFrame, Pose
@@ -89,16 +89,24 @@ class ReplayBody:
 
 
 class _Guarded:
-    """A controller whose exceptions give a pose of NaN, as in a session."""
+    """A controller asked when it was then, whose exceptions give a pose of NaN, as in a session."""
 
-    def __init__(self, decider: Decider) -> None:
-        self._decider = decider
-        self.failures = 0
+    def __init__(self, decider: Decider, body: ReplayBody) -> None:
+        self._decider, self._body = decider, body
+        self._kept: Pose | None = None
+        self._refused = self.failures = 0
 
     def step(self, frame: AntennaFrame) -> Pose:
         """The pose of this tick."""
+        tick = self._body.tick
+        if tick is not None and self._kept is not None and not tick.asked:
+            return self._kept
+        refused, self._refused = self._refused, 0 if tick is None else tick.refused
         try:
-            return self._decider.step(frame)
+            pose = self._decider.step(frame)
+            if self._refused <= refused:
+                self._kept = pose
+            return pose
         except Exception:  # noqa: BLE001 a plugged-in controller may raise anything
             self.failures += 1
             return Pose(*(np.full(shape, math.nan) for shape in ((1, 5), (1, 6, 2), (1, 2))))
@@ -169,7 +177,8 @@ def replay(ticks: Iterable[Tick], decider: Decider, period: float) -> Replayed:
         decider: The controller.
         period: Its period [s].
     """
-    body, mind, found = ReplayBody(ticks), _Guarded(decider), Replayed()
+    body, found = ReplayBody(ticks), Replayed()
+    mind = _Guarded(decider, body)
 
     def go_on(frame: AntennaFrame, pose: Pose) -> bool:
         if body.tick is not None:

@@ -21,10 +21,10 @@ from antennate.telemetry.framing import SCHEMA, Kind
 
 JOINTS = (*YAW_JOINTS, *LEGS, *(f"antenna_{side}" for side in SIDES))
 """The order of angles."""
-LAYOUT = f"<BBQ8d3q{len(JOINTS) + 2}d8QI"
+LAYOUT = f"<BBQ?8d3q{len(JOINTS) + 2}d8QI"
 """For `struct`: all fields but the text, whose length in bytes comes last."""
 FIELDS = (
-    *("schema", "kind", "number", "t", "now"),
+    *("schema", "kind", "number", "asked", "t", "now"),
     *("counts_l", "counts_r", "reading_l", "reading_r", "b_l", "b_r"),
     *("contact_l", "contact_r", "maneuver", "phase", *JOINTS, "age"),
     *("missed", "frames", "crc", "lost", "misses", "stale", "sent", "refused", "text"),
@@ -67,6 +67,7 @@ class Tick:
         angles: Joint targets decided [rad] in the order of JOINTS; NaN if it failed.
         state: The supervisor's state, empty without one.
         causes: Its causes in force, the most severe first.
+        asked: Whether the controller was asked; if not, its last pose was kept.
         note: What the operator should know or do, in one line.
         age: Age of the newest sample [s], NaN in simulation.
         missed: Ticks left out so far.
@@ -91,6 +92,7 @@ class Tick:
     angles: tuple[float, ...]
     state: str = ""
     causes: tuple[str, ...] = ()
+    asked: bool = True
     note: str = ""
     age: float = math.nan
     missed: int = 0
@@ -112,6 +114,7 @@ class Tick:
             **_thought(session.decider, session.frame, session.pose),
             number=session.tally.ticks,
             now=t,
+            asked=session.asked,
             reading=(left, right),
             state="" if out is None else out.state.name,
             causes=() if out is None else tuple(_clean(cause.text) for cause in out.causes),
@@ -133,6 +136,16 @@ class Tick:
         thought = _thought(mind, frame, pose)
         return cls(**thought, number=number, now=now, reading=thought["counts"])
 
+    @property
+    def values(self) -> tuple[float, ...]:
+        """All numbers, in the order of FIELDS without schema, kind and text."""
+        return (
+            *(self.number, int(self.asked), self.t, self.now),
+            *(*self.counts, *self.reading, *self.b, *self.contact, self.maneuver, self.phase),
+            *(*self.angles, self.age, self.missed, self.frames, self.crc, self.lost),
+            *(self.misses, self.stale, self.sent, self.refused),
+        )
+
     def frame(self) -> AntennaFrame:
         """What the controller got."""
         return AntennaFrame(t=np.array([self.t]), counts=np.array([self.counts]))
@@ -145,12 +158,7 @@ class Tick:
         """
         text = "\n".join((self.state, self.note, *self.causes)).encode("utf-8", "backslashreplace")
         try:
-            fixed = _STRUCT.pack(
-                *(SCHEMA, Kind.TICK, self.number, self.t, self.now),
-                *(*self.counts, *self.reading, *self.b, *self.contact, self.maneuver, self.phase),
-                *(*self.angles, self.age, self.missed, self.frames, self.crc, self.lost),
-                *(self.misses, self.stale, self.sent, self.refused, len(text)),
-            )
+            fixed = _STRUCT.pack(SCHEMA, Kind.TICK, *self.values, len(text))
         except struct.error as error:
             raise LogError(f"expected a tick of numbers that fit, found: {error}") from None
         return fixed + text
@@ -164,7 +172,7 @@ class Tick:
         """
         if len(content) < _STRUCT.size or content[:2] != bytes((SCHEMA, Kind.TICK)):
             raise LogError(f"expected a tick of schema {SCHEMA}, found {len(content)} other bytes")
-        _, _, number, t, now, *rest, length = _STRUCT.unpack_from(content)
+        _, _, number, asked, t, now, *rest, length = _STRUCT.unpack_from(content)
         if len(content) != _STRUCT.size + length:
             raise LogError(f"expected a text of {length} bytes, found another length")
         try:
@@ -177,7 +185,7 @@ class Tick:
         health = dict(zip(FIELDS[-10:-1], rest, strict=True))
         return cls(
             *(number, t, now, counts, reading, b, contact, maneuver, phase, angles),
-            *(state, tuple(causes), note),
+            *(state, tuple(causes), asked, note),
             **health,
         )
 

@@ -10,7 +10,6 @@ import contextlib
 import os
 import shutil
 from pathlib import Path
-from types import TracebackType
 
 from antennate.errors import LogError
 from antennate.params import LogParams
@@ -81,12 +80,7 @@ class LogWriter:
     def __enter__(self) -> LogWriter:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def _put(self, content: bytes) -> None:

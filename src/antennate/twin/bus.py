@@ -22,11 +22,11 @@ from antennate.hardware.dynamixel import packets
 from antennate.hardware.dynamixel.packets import BROADCAST, Instruction, Packet, Status, StatusError
 from antennate.hardware.dynamixel.parser import Parser
 from antennate.hardware.dynamixel.tables import BAUD_RATES, RETURN_DELAY_UNIT, XC430_W240
+from antennate.params import TwinParams
 from antennate.twin.noise import Noise
 from antennate.twin.registers import Servo
 
-_GIVE_UP = 0.01
-"""Silence after which servos forget half a packet [s]."""
+_GIVE_UP = TwinParams().packet_patience
 _GOAL = XC430_W240["goal_position"]
 _CLEAR = b"\x01\x44\x58\x4c\x22"
 

@@ -13,13 +13,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from antennate.errors import BadInputError
-from antennate.params import ConditioningParams
+from antennate.params import ConditioningParams, TwinParams
 from antennate.records import Floats
 
-DEPTH = 0.6
-"""Change of the reading [spans]; twice what the check by touch asks for."""
-LENGTH = 1.0
-"""Time for which an antenna is kept bent [s]."""
+DEPTH = TwinParams().hand_depth
+LENGTH = TwinParams().hand_time
 _FORM = re.compile(r"(left|right)@([0-9]+(?:\.[0-9]+)?)s")
 
 

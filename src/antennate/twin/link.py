@@ -35,13 +35,16 @@ class Link:
 
     def read(self, most: int, timeout: float) -> bytes:
         """What has come by now, or first comes within `timeout` [s]."""
+        self.listen(self._t + timeout)
+        came, self._came = self._came[:most], self._came[most:]
+        return came
+
+    def listen(self, end: float) -> None:
+        """Let time pass until there is something to be read, at most until `end` [s]."""
         self._collect()
-        end = self._t + timeout
         while not self._came and self._t < end:
             due = self.bus.next_time()
             self._until(end if due is None else max(self._t, min(due + self.latency, end)))
-        came, self._came = self._came[:most], self._came[most:]
-        return came
 
     def drain(self) -> int:
         """Throw away what has come; how many bytes."""

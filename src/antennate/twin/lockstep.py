@@ -11,7 +11,7 @@ class LockstepClock(Link):
 
     def __init__(self, robot: TwinRobot) -> None:
         super().__init__(robot.bus)
-        self._robot = robot
+        self._robot, self._t = robot, robot.t
 
     def sleep_until(self, t: float) -> None:
         """Let time pass until t [s], if it has not yet."""

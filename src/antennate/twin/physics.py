@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import sys
 from concurrent.futures import Future, ThreadPoolExecutor
-from types import TracebackType
 
 from antennate.hardware.driving.priority import claim
 from antennate.records import Floats
@@ -33,12 +32,7 @@ class Physics:
         sys.setswitchinterval(_SWITCH)
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._thread.shutdown()
         sys.setswitchinterval(self._switch)
         os.close(self.bell)

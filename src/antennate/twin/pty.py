@@ -8,7 +8,6 @@ import termios
 import threading
 import time
 import tty
-from types import TracebackType
 
 from antennate.twin.bus import ServoBus
 
@@ -40,12 +39,7 @@ class PtyServer:
         self._thread.start()
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         os.write(self._waker, b"x")
         self._thread.join()
         for handle in (self._master, self._slave, self._wake, self._waker):

@@ -21,9 +21,9 @@ from antennate.hardware.dynamixel.tables import (
     Register,
     Table,
 )
+from antennate.params import TwinParams
 
-BOOT_TIME = 0.25
-"""Time after a reboot in which a servo hears nothing [s]; assumed."""
+BOOT_TIME = TwinParams().servo_boot
 
 _POSITION_MODES = (3, 4, 5)
 _VELOCITY_MODE = 1

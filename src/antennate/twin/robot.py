@@ -24,6 +24,7 @@ from antennate.hardware.dynamixel.tables import (
 )
 from antennate.hardware.esp32 import frame
 from antennate.hardware.joints import Joints
+from antennate.params import TwinParams
 from antennate.params.layout import TICKS_A_TURN, LayoutParams
 from antennate.params.twin import BatteryParams
 from antennate.records import Floats
@@ -35,14 +36,11 @@ from antennate.twin.hand import Hand
 from antennate.twin.noise import Noise
 from antennate.twin.registers import Servo
 
-GREETING_PERIOD = 1.0
-"""Time between greetings of the board [s]."""
+GREETING_PERIOD = TwinParams().greeting_period
 BOARD_SETTINGS = (15, 34, 35)
 """Burst and pins of firmware/config.py."""
-BOOT_TICKS = 50
-"""Samples that a starting board does not send."""
-_STANDING_NOISE = 2.5
-"""Noise of a resting film [counts], as while walking."""
+BOOT_TICKS = TwinParams().boot_samples
+_STANDING_NOISE = TwinParams().standing_noise
 _DEVICE = b"twin\0\0\0\0"
 _ROUNDING = 1e-9
 
@@ -151,6 +149,11 @@ class TwinRobot:
     def failure(self) -> SimulationError | None:
         """What ended the physics, if anything did."""
         return self._body.failure(0)
+
+    @property
+    def stood(self) -> int:
+        """Ticks before the physics began, or so far."""
+        return self._ticks - self._walked
 
     def advance(self, t: float) -> None:
         """Let everything happen until t."""

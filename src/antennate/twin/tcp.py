@@ -58,16 +58,25 @@ class TcpEnd:
         self._ready.register(client, selectors.EVENT_READ)
         return came
 
-    def write(self, data: bytes) -> None:
+    def write(self, data: bytes) -> int:
         """Say it; what finds no room because nobody listens is lost, as on a real line."""
         if self._client is None:
-            return
+            return 0
         try:
-            self._client.send(data)
+            return self._client.send(data)
         except BlockingIOError:
-            return
+            return 0
         except OSError:
             self._part(self._client)
+            return 0
+
+    @property
+    def taken(self) -> bool:
+        """A client is connected."""
+        return self._client is not None
+
+    def clear(self) -> None:
+        """Nothing: a connection begins empty."""
 
     def close(self) -> None:
         """Client and listener."""

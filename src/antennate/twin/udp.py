@@ -9,8 +9,9 @@ from typing import Any
 
 from antennate.errors import BadInputError
 from antennate.hardware.esp32 import datagram, frame
+from antennate.params import TwinParams
 
-_ALIVE = 0.1
+_ALIVE = TwinParams().udp_silence
 """A board that has been silent for longer [s] does not answer either."""
 
 
@@ -63,7 +64,7 @@ class UdpEnd:
                 self._say(answer, sender)
         return b""
 
-    def write(self, data: bytes) -> None:
+    def write(self, data: bytes) -> int:
         """Send whole frames; a greeting is kept for whoever asks."""
         now = time.monotonic()
         self._spoke = now
@@ -78,6 +79,15 @@ class UdpEnd:
                 signed = self._speaker.sign(whole, round(1e3 * now))
                 if signed is not None:
                     self._say(signed, self._speaker.listener)
+        return len(data)
+
+    @property
+    def taken(self) -> bool:
+        """Always: whoever asks is sent frames."""
+        return True
+
+    def clear(self) -> None:
+        """Nothing: what was sent is on its way."""
 
     def close(self) -> None:
         """Let the port go."""

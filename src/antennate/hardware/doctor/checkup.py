@@ -8,23 +8,23 @@ from typing import Any
 
 import numpy as np
 
-from antennate.hardware.doctor.antenna import Heard, board_rows, listen
+from antennate.hardware.doctor.antenna import board_rows, film_rows
+from antennate.hardware.doctor.hearing import Heard, listen
 from antennate.hardware.doctor.pace import latency_row, slow_adapter
 from antennate.hardware.doctor.ports import port_row
 from antennate.hardware.doctor.rows import Opener, Row, worst
 from antennate.hardware.doctor.servos import bus_rows
 from antennate.hardware.doctor.survey import Survey, survey
+from antennate.hardware.esp32.board import BOARD_BAUD
 from antennate.hardware.ports.port import PortError
-from antennate.params import ControllerParams, DoctorParams, Params, SupervisorParams
-from antennate.params.layout import LayoutParams
+from antennate.hardware.robot import RobotConfig
+from antennate.params import DoctorParams
 
 
-class Robot(Params):
-    """What doctor needs to know of a robot; a part of what robot.toml holds."""
+class DoctorConfig(RobotConfig):
+    """The robot, and what is good."""
 
-    layout: LayoutParams = LayoutParams()
-    mind: ControllerParams = ControllerParams()
-    limits: SupervisorParams = SupervisorParams()
+    doctor: DoctorParams = DoctorParams()
 
 
 @dataclass(slots=True)
@@ -56,67 +56,50 @@ class Checkup:
 
 
 def examine(
-    robot: Robot,
+    robot: DoctorConfig,
     bus: tuple[str, Opener] | None,
     esp32: tuple[str, Opener] | None,
     now: Callable[[], float],
-    params: DoctorParams | None = None,
 ) -> Checkup:
     """Examine a robot at rest; nothing is written to it and nothing moves.
 
     Args:
-        robot: What is expected.
+        robot: What is expected, its calibration already in place.
         bus: Path and opener of the bus, None to leave it out.
         esp32: The same of the antenna board.
         now: Monotonic time [s].
-        params: What is good.
     """
-    found, params = Checkup(), params or DoctorParams()
+    found, params = Checkup(), robot.doctor
     if bus is not None:
-        _examine_bus(found, robot, *bus, params, now)
+
+        def look(opener: Opener) -> list[Row]:
+            found.survey = seen = survey(opener, robot.layout, params, now)
+            latency = latency_row(bus[0], slow_adapter(seen, params), params)
+            return [latency, *bus_rows(seen, robot.layout, robot.limits, params)]
+
+        found.rows += _examined("bus", *bus, robot.layout.baud, look)
     if esp32 is not None:
-        _examine_board(found, robot, *esp32, params, now)
+
+        def hear(opener: Opener) -> list[Row]:
+            found.heard = listen(opener, robot.layout, params, now)
+            rows = board_rows(found.heard, robot.mind, robot.limits, params)
+            return rows + film_rows(found.heard.hello, robot.sensor_id)
+
+        found.rows += _examined("esp32", *esp32, BOARD_BAUD, hear)
     return found
 
 
-def _examine_bus(
-    found: Checkup,
-    robot: Robot,
-    path: str,
-    opener: Opener,
-    params: DoctorParams,
-    now: Callable[[], float],
-) -> None:
-    found.rows.append(first := port_row("bus", path, opener, robot.layout.baud))
+def _examined(
+    part: str, path: str, opener: Opener, baud: int, look: Callable[[Opener], list[Row]]
+) -> list[Row]:
+    """Rows of a port, and of what is behind it if it opens."""
+    first = port_row(part, path, opener, baud)
     if first.verdict == "bad":
-        return
+        return [first]
     try:
-        found.survey = survey(opener, robot.layout, params, now)
+        return [first, *look(opener)]
     except PortError as error:
-        found.rows.append(_lost("bus", path, error))
-        return
-    slow = slow_adapter(found.survey, params)
-    found.rows.append(latency_row(path, slow, params))
-    found.rows += bus_rows(found.survey, robot.layout, robot.limits, params)
-
-
-def _examine_board(
-    found: Checkup,
-    robot: Robot,
-    path: str,
-    opener: Opener,
-    params: DoctorParams,
-    now: Callable[[], float],
-) -> None:
-    found.rows.append(first := port_row("esp32", path, opener))
-    if first.verdict == "bad":
-        return
-    try:
-        found.heard = listen(opener, robot.layout, params, now)
-    except PortError as error:
-        found.rows.append(_lost("esp32", path, error))
-        return
-    found.rows += board_rows(found.heard, robot.mind, robot.limits, params)
+        return [first, _lost(part, path, error)]
 
 
 def _lost(part: str, path: str, error: PortError) -> Row:

@@ -12,10 +12,13 @@ from antennate.hardware.ports.errors import OpenError
 from antennate.hardware.ports.finder import finder
 from antennate.hardware.ports.holder import holders
 from antennate.hardware.ports.port import Port
+from antennate.params import NetworkParams
 
 
-def opener_of(path: str, flag: str, key: bytes | None = None) -> Opener:
-    """Opens a port at any speed; `key` is that of a board behind udp://.
+def opener_of(
+    path: str, flag: str, key: bytes | None = None, network: NetworkParams | None = None
+) -> Opener:
+    """Opens a port at any speed; `key` and `network` are those of a board behind udp://.
 
     Raises:
         ConfigError: pyserial is not installed.
@@ -23,7 +26,7 @@ def opener_of(path: str, flag: str, key: bytes | None = None) -> Opener:
 
     @contextlib.contextmanager
     def opened(baud: int) -> Iterator[Port]:
-        line = finder(path, baud, flag, key)()
+        line = finder(path, baud, flag, key, network)()
         try:
             yield line
         finally:

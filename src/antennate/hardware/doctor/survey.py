@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from statistics import median
-from typing import Literal
 
 from antennate.hardware.doctor.rows import Opener
-from antennate.hardware.dynamixel import packets
-from antennate.hardware.dynamixel.answers import MOTION, Span, Timing, Value
+from antennate.hardware.dynamixel import inquiry, packets
+from antennate.hardware.dynamixel.answers import MOTION, Timing, Value
 from antennate.hardware.dynamixel.bus import PING_DATA, Bus
+from antennate.hardware.dynamixel.inquiry import PINGS, State
 from antennate.hardware.dynamixel.packets import OVERHEAD
 from antennate.hardware.dynamixel.tables import (
     RETURN_DELAY_UNIT,
@@ -21,7 +21,7 @@ from antennate.hardware.dynamixel.tables import (
 from antennate.hardware.esp32.board import BOARD_BAUD
 from antennate.hardware.esp32.decoder import FrameDecoder
 from antennate.hardware.ports.port import Port
-from antennate.params import DoctorParams
+from antennate.params import BoardParams, BusParams, DoctorParams
 from antennate.params.layout import LayoutParams
 
 BAUDS = (57_600, 115_200, 1_000_000, 2_000_000, 3_000_000, 4_000_000)
@@ -46,16 +46,10 @@ REGISTERS = (
 )
 """Read of every servo; at the same addresses in both models."""
 
-_PATIENCE = 0.05
-"""Silence after which an answer is given up [s]: more than any adapter keeps one back."""
-_BUDGET = 0.25
-"""Time for one reading of all [s]."""
-_TRIES = 3
-_SAMPLE_TIME = 0.3
-"""Time in which an antenna board on the wrong port says thirty samples [s]."""
-_TICKS = Span(XC430_W240["realtime_tick"].address, 16)
-
-State = Literal["ok", "broken", "collides", "mute"]
+_PATIENCE = BusParams().patient_gap
+_BUDGET = BusParams().patient_budget
+_TRIES = BusParams().patient_tries
+_SAMPLE_TIME = BoardParams().misplaced
 
 
 @dataclass(slots=True)
@@ -67,8 +61,7 @@ class Seen:
         baud: Bits per second at which it answers.
         model: Model number, None if no ping came back whole.
         firmware: Firmware version, None likewise.
-        state: "ok"; "broken", no answer is whole; "collides", pings are whole but other answers are
-            not, as of two servos with one id; "mute", it answers pings and no reads.
+        state: What its answers are like, as `inquiry.look` says.
         registers: Value by name, of those that could be read.
         ping_time: Shortest time to its answer beyond wire and return delay [s], None if not
             measured.
@@ -149,20 +142,17 @@ def master(port: Port, baud: int, now: Callable[[], float]) -> Bus:
 def who(bus: Bus, expected: Iterable[int]) -> dict[int, Seen]:
     """Ids heard, in rising order."""
     heard = {status.id for status in bus.scan()}
-    tries = _TRIES if heard else 1
-    looked = {servo: look(bus, servo, tries) for servo in sorted({*heard, *expected})}
+    pings = PINGS if heard else 1
+    looked = {servo: look(bus, servo, pings) for servo in sorted({*heard, *expected})}
     return {servo: seen for servo, seen in looked.items() if seen is not None}
 
 
-def look(bus: Bus, servo: int, tries: int = _TRIES) -> Seen | None:
+def look(bus: Bus, servo: int, pings: int = PINGS) -> Seen | None:
     """One id, None if it is silent."""
-    data, broken = _tried(bus, lambda: bus.ping(servo), tries)
-    if data is None:
-        return Seen(servo, bus.timing.baud, None, None, "broken") if broken else None
-    model, firmware = int.from_bytes(data[:2], "little"), data[2]
-    read, broken = _tried(bus, lambda: bus.read(servo, _TICKS), 2 * _TRIES)
-    state: State = "ok" if read is not None else "collides" if broken else "mute"
-    return Seen(servo, bus.timing.baud, model, firmware, state)
+    found = inquiry.look(bus, servo, pings)
+    if found is None:
+        return None
+    return Seen(servo, bus.timing.baud, found.model, found.firmware, found.state)
 
 
 def read_registers(bus: Bus, ids: Iterable[int]) -> dict[int, dict[str, int]]:
@@ -176,17 +166,7 @@ def read_registers(bus: Bus, ids: Iterable[int]) -> dict[int, dict[str, int]]:
 
 def read_some(bus: Bus, ids: Iterable[int], register: Register) -> dict[int, int]:
     """One register of those servos that answer."""
-    values: dict[int, int] = {}
-    left = list(ids)
-    for _ in range(_TRIES):
-        if not left:
-            break
-        said = bus.read_all(left, Span(register.address, register.size), _BUDGET)
-        values |= {i: register.decode(a.data) for i, a in said.items() if isinstance(a, Value)}
-        left = [servo for servo in left if servo not in values]
-        if left:
-            bus.settle()
-    return values
+    return inquiry.read_some(bus, ids, register, _TRIES, _BUDGET)
 
 
 def antenna_board(opener: Opener, now: Callable[[], float]) -> bool:
@@ -197,17 +177,6 @@ def antenna_board(opener: Opener, now: Callable[[], float]) -> bool:
         while now() < end:
             decoder.feed(port.read(4096, _PATIENCE))
     return decoder.counters.good + decoder.counters.refused > 0
-
-
-def _tried(bus: Bus, ask: Callable[[], object], tries: int) -> tuple[bytes | None, bool]:
-    """Data of the first answer, or None; and whether anything came that was not whole."""
-    before = bus.tally.bad_crc + bus.tally.stale
-    for _ in range(tries):
-        said = ask()
-        if isinstance(said, Value):
-            return said.data, False
-        bus.settle()
-    return None, bus.tally.bad_crc + bus.tally.stale > before
 
 
 def _elsewhere(opener: Opener, layout: LayoutParams, now: Callable[[], float]) -> list[Seen]:
@@ -225,7 +194,7 @@ def _time_pings(bus: Bus, here: Mapping[int, Seen], now: Callable[[], float]) ->
     wire = bus.timing.wire(len(packets.ping(1)) + OVERHEAD + PING_DATA)
     for servo, seen in here.items():
         times: list[float] = []
-        for _ in range(_TRIES):
+        for _ in range(PINGS):
             begin = now()
             if isinstance(bus.ping(servo), Value):
                 times.append(now() - begin)

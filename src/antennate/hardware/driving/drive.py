@@ -11,9 +11,11 @@ from typing import Any, cast
 from antennate.controller import ARMS, Controller
 from antennate.errors import BadInputError, ConfigError
 from antennate.hardware import roster
+from antennate.hardware.driving.adapter import require_quick
+from antennate.hardware.driving.decider import Decider
 from antennate.hardware.driving.dry_run import DryRun
 from antennate.hardware.driving.report import Report
-from antennate.hardware.driving.session import Decider, Session
+from antennate.hardware.driving.session import Session
 from antennate.hardware.driving.signals import StopOnce
 from antennate.hardware.dynamixel import bringup
 from antennate.hardware.dynamixel.answers import Timing
@@ -27,36 +29,22 @@ from antennate.hardware.joints import Joints
 from antennate.hardware.ports.finder import finder
 from antennate.hardware.ports.port import Port, PortError
 from antennate.hardware.ports.reconnecting import Reconnecting
+from antennate.hardware.ports.twin_clock import twin_clock
+from antennate.hardware.robot import RobotConfig
 from antennate.hardware.safety.causes import State
 from antennate.hardware.safety.trust import Trust
 from antennate.loop import run_loop
-from antennate.params import (
-    ControllerParams,
-    DoctorParams,
-    DriftParams,
-    NetworkParams,
-    Params,
-    SupervisorParams,
-    TouchCheckParams,
-    number,
-)
+from antennate.params import BusParams, DoctorParams, DriftParams, TouchCheckParams, number
 from antennate.params.layout import LayoutParams
 from antennate.records import AntennaFrame, Pose
 
 _WHO = DoctorParams()
-_EVIDENCE_TIME = 1.5
-"""Silence on --esp32 while --bus speaks unasked that shows the two swapped [s]."""
-_ARMING_TIME = 1.0
-"""Time after which torque must have come on, or the drive ends [s]."""
-_STAND = 0.3
-"""Time that the robot holds its pose before the torque goes off [s]."""
 _PATIENCE = 0.05
-DOUBT = 0.07
-"""Longest that a late answer is waited for [s]: less than the watchdogs' 100 ms."""
+DOUBT = BusParams().doubt_walking
 
 
-class DriveConfig(Params):
-    """The robot, its controller, and how long it runs: what robot.toml holds."""
+class DriveConfig(RobotConfig):
+    """The robot, its controller, and how long it runs."""
 
     controller: str = number(
         "closed", "1", "assumed: our best", "open, paper, closed, or MODULE:CLASS of your own"
@@ -66,18 +54,6 @@ class DriveConfig(Params):
     )
     duration: float | None = number(
         None, "s", "assumed: until it is stopped", "time from torque on to off", gt=0
-    )
-    calibration: str | None = number(
-        None,
-        "1",
-        "assumed: the numbers of mind.conditioning",
-        "file of `antennate calibrate`, for both antennae, in place of mind.conditioning",
-    )
-    sensor_id: str | None = number(
-        None,
-        "1",
-        "assumed: that of the calibration file",
-        "name of the film; 16 hexadecimal digits name the board it is soldered to",
     )
     record_required: bool = number(
         False,
@@ -109,15 +85,27 @@ class DriveConfig(Params):
         ge=0,
         le=600,
     )
-    layout: LayoutParams = LayoutParams()
-    mind: ControllerParams = ControllerParams()
-    limits: SupervisorParams = SupervisorParams()
-    network: NetworkParams = NetworkParams()
+    stand: float = number(
+        0.3,
+        "s",
+        "assumed: a step at half a hertz comes to rest",
+        "time that the robot holds its pose before the torque goes off",
+        ge=0,
+        le=60,
+    )
+    swapped: float = number(
+        1.5,
+        "s",
+        "assumed: half of the wait for a greeting, and no servo speaks unasked",
+        "silence of the board, while the bus speaks unasked, that shows the two ports swapped",
+        gt=0,
+        le=60,
+    )
 
 
 @contextlib.contextmanager
 def connect(
-    config: DriveConfig, esp32: str, bus: str, key: bytes | None = None
+    config: DriveConfig, esp32: str, bus: str, key: bytes | None = None, clock: str = ""
 ) -> Iterator[Session]:
     """Open both ports, find who is there, and close them again afterwards.
 
@@ -126,13 +114,19 @@ def connect(
         esp32: Address of the antenna board, as `finder` takes it.
         bus: Address of the servo bus.
         key: Of a board behind udp://; empty for one without a key.
+        clock: Address of the clock of a twin in lock-step; the host's time is taken if not given.
 
     Raises:
+        ConfigError: A clock is given, but a port can be no twin's.
         PortError: A port cannot be opened.
         BadInputError: No antenna board speaks, or it is refused.
         BringUpError: The servos are not those expected.
     """
     with contextlib.ExitStack() as stack:
+        if clock:
+            twin = stack.enter_context(twin_clock(esp32, bus, clock, config.layout.baud))
+            yield prepare(config, twin.esp32, twin.bus, twin)
+            return
         lines: list[Port] = []
         for flag, address, baud in (
             ("--esp32", esp32, BOARD_BAUD),
@@ -141,14 +135,20 @@ def connect(
             line = Reconnecting(finder(address, baud, flag, key, config.network))
             stack.callback(line.close)
             lines.append(line)
-        yield prepare(config, lines[0], lines[1], HostClock())
+        yield prepare(config, lines[0], lines[1], HostClock(), bus)
 
 
-def prepare(config: DriveConfig, esp32: Port, bus: Port, clock: Any) -> Session:
-    """A session before two open ports, after both sides have said who they are."""
+def prepare(
+    config: DriveConfig, esp32: Port, bus: Port, clock: Any, path: str = "the bus"
+) -> Session:
+    """A session before two open ports, after both sides have said who they are.
+
+    `path` is what the bus is called, for errors.
+    """
     board = Board(esp32, config.limits.stale_age)
-    await_board(board, clock, bus)
-    require_film(board, config.sensor_id)
+    await_board(board, clock, bus, config.swapped)
+    require_film(board.hello, config.sensor_id)
+    require_quick(bus, config.layout.ids[:3], config.layout.baud, clock.now, path)
     master = Bus(bus, Timing(config.layout.baud, doubt=DOUBT), clock=clock.now)
     require_servos(master, config.layout)
     board.count_anew(clock.now())
@@ -167,7 +167,9 @@ def prepare(config: DriveConfig, esp32: Port, bus: Port, clock: Any) -> Session:
     )
 
 
-def await_board(board: Board, clock: Any, bus: Port | None = None) -> None:
+def await_board(
+    board: Board, clock: Any, bus: Port | None = None, swapped: float = math.inf
+) -> None:
     """Wait for a greeting and samples; what the bus says unasked is read, and nothing written.
 
     A silent port is given up earlier than one on which a board may be starting.
@@ -179,7 +181,7 @@ def await_board(board: Board, clock: Any, bus: Port | None = None) -> None:
     while board.clock.newest is None:
         unasked += 0 if bus is None else _unasked(bus)
         silent = not board.decoder.counters.received
-        if silent and unasked and clock.now() > begin + _EVIDENCE_TIME:
+        if silent and unasked and clock.now() > begin + swapped:
             raise BadInputError(
                 f"--esp32: expected an antenna board, found silence, and {unasked} bytes on --bus "
                 "that no servo was asked for; --esp32 and --bus are swapped"
@@ -297,7 +299,11 @@ def drive(
         """After a fault and a time to look at it: torque can be taken off now, or never."""
         nonlocal failed_at
         out = session.outputs
-        if out is not None and t > dry.over + _ARMING_TIME and out.state >= State.FAULT:
+        if (
+            out is not None
+            and t > dry.over + config.limits.longest_arming
+            and out.state >= State.FAULT
+        ):
             failed_at = min(failed_at, t)
         if out is not None and out.state is State.OFF and t > failed_at:
             return True
@@ -323,16 +329,16 @@ def drive(
                 stop.deaf = True
         finally:
             report.timing = None if session.timing is None else session.timing.report()
-            report.on = _off(session)
+            report.on = _off(session, config.stand)
     return report
 
 
-def _off(session: Session) -> list[int] | None:
+def _off(session: Session, stand: float) -> list[int] | None:
     """Stand for a moment, then torque off: ids that did not confirm it, None if it never was on."""
     if not session.touched:
         return None
     with contextlib.suppress(PortError):
-        session.stand(_STAND)
+        session.stand(stand)
     try:
         return session.release()
     except PortError:

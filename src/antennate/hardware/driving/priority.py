@@ -13,8 +13,9 @@ import os
 from collections.abc import Iterator
 from enum import Enum
 
-LEVEL = 20
-"""Real-time level of a control loop, of 1 to 99; the kernel's interrupt threads stand at 50."""
+from antennate.params import HostParams
+
+LEVEL = HostParams().priority
 _LINUX = hasattr(os, "sched_setscheduler")
 
 

@@ -14,14 +14,14 @@ from __future__ import annotations
 
 import math
 from contextlib import suppress
-from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
 from antennate.body import Clock
 from antennate.errors import AntennateError
 from antennate.hardware.driving.body import HardwareBody
+from antennate.hardware.driving.decider import Decider, Thought, nowhere
+from antennate.hardware.driving.orders import Orders, Tally
 from antennate.hardware.driving.timing import LoopTiming
 from antennate.hardware.driving.tracebacks import Tracebacks
 from antennate.hardware.driving.turns import Turns
@@ -31,63 +31,13 @@ from antennate.hardware.dynamixel.bus import Bus
 from antennate.hardware.esp32.board import Board
 from antennate.hardware.joints import Joints, PoseError
 from antennate.hardware.ports.port import PortError
-from antennate.hardware.safety.causes import Inputs, Outputs
+from antennate.hardware.safety.causes import Cause, Inputs, Outputs
 from antennate.hardware.safety.diagnosis import Band, ChannelDiagnosis
 from antennate.hardware.safety.supervisor import Supervisor
 from antennate.hardware.safety.trust import Trust
 from antennate.hardware.safety.watch import ServoWatch
 from antennate.params import ConditioningParams, DiagnosisParams, SupervisorParams
-from antennate.records import AntennaFrame, Floats, Ints, Pose
-
-
-class Decider(Protocol):
-    """A controller of one robot."""
-
-    maneuver: Ints
-    contact: Ints
-
-    def step(self, frame: AntennaFrame) -> Pose:
-        """The pose of this tick."""
-        ...
-
-
-@dataclass(slots=True)
-class Orders:
-    """What the operator wants.
-
-    Attributes:
-        arm: Torque on; only the change to True counts.
-        stop: Torque off.
-    """
-
-    arm: bool = False
-    stop: bool = False
-
-
-@dataclass(slots=True)
-class _Thought:
-    """What the mind did in this tick."""
-
-    decided_at: float = -math.inf
-    bad_pose: str = ""
-    failure: str = ""
-
-
-@dataclass(slots=True)
-class Tally:
-    """What a session has done.
-
-    Attributes:
-        ticks: Ticks run.
-        sent: Poses sent to the servos.
-        limited: Goals that moved slower than asked.
-        refused: Poses of the controller that must not be sent.
-    """
-
-    ticks: int = 0
-    sent: int = 0
-    limited: int = 0
-    refused: int = 0
+from antennate.records import AntennaFrame, Floats, Pose
 
 
 class Session:
@@ -149,13 +99,19 @@ class Session:
         self.timing: LoopTiming | None = None
         self.outputs: Outputs | None = None
         self.frame = AntennaFrame(t=np.zeros(1), counts=np.full((1, 2), math.nan))
-        self.pose = _nowhere()
+        self.pose = nowhere()
         self._body = HardwareBody(board, bus, joints, clock)
-        self._thought = _Thought()
+        self._thought = Thought()
         self._goals: Floats | None = None
         self._pose: Pose | None = None
         self._used = self._refused = 0
+        self._owed = 0.0
         self._lost = self.touched = self.unrecorded = False
+
+    @property
+    def asked(self) -> bool:
+        """Whether the controller was asked in the last tick."""
+        return self._thought.asked
 
     @property
     def mute(self) -> bool:
@@ -185,8 +141,14 @@ class Session:
         if self.outputs is None or not self.outputs.clear:
             said = [math.nan, math.nan]
         self._mark("read")
-        self.frame = AntennaFrame(t=self.turns.time(frame.t), counts=np.array([said]))
+        self.frame = AntennaFrame(t=self.turns.time(frame.t, self._rate()), counts=np.array([said]))
         return self.frame
+
+    def _rate(self) -> float:
+        """How fast the controller's time goes, 1 as the clock: slower while the supply is low."""
+        causes = () if self.outputs is None else self.outputs.causes
+        empty = any(active.cause is Cause.SUPPLY_WARN for active in causes)
+        return self._limits.slow_rate if empty else 1.0
 
     def write(self, pose: Pose) -> None:
         """Let the supervisor judge this tick, and do what it says; then look at the servos."""
@@ -228,18 +190,18 @@ class Session:
         """The controller's pose; an exception of it is a cause, not the end.
 
         While legs forget their turns the controller is not asked, and its time stands still: to
-        stand is the session's own decision.
+        stand is the session's own decision. So it is to go slowly, which asks it less often.
         """
-        thought = self._thought = _Thought()
-        if self.turns.standing and self._pose is not None:
-            thought.decided_at = self.clock.now()
+        thought = self._thought = Thought()
+        if self._pose is not None and (self.turns.standing or not self._due()):
+            thought.asked, thought.decided_at = False, self.clock.now()
             return self._pose
         try:
             pose = self.decider.step(frame)
         except Exception as error:  # noqa: BLE001 a plugged-in controller may raise anything
             thought.failure = f"{type(error).__name__}: {error}"
             self.tracebacks.keep(self.clock.now(), error)
-            return _nowhere()
+            return nowhere()
         thought.decided_at = self.clock.now()
         try:
             self.joints.ticks(pose)
@@ -250,9 +212,19 @@ class Session:
             self._pose = pose
         return pose
 
+    def _due(self) -> bool:
+        """Whether a period of the controller's own time has passed; call once a tick."""
+        self._owed += self._rate()
+        if self._owed < 1.0:
+            return False
+        self._owed -= 1.0
+        return True
+
     def release(self) -> list[int]:
         """Torque off, verified: ids that did not confirm it."""
-        left = bringup.disable(self.bus, self.joints.ids)
+        left: list[int] = []
+        for group in self.joints.in_order_of_release:
+            left += bringup.disable(self.bus, group)
         self._goals = None
         self.turns.reset()
         self.watch.arm(False)
@@ -342,7 +314,3 @@ class Session:
             self.tally.sent += 1
         self._body.send(goals)
         self._goals = goals
-
-
-def _nowhere() -> Pose:
-    return Pose(*(np.full(shape, math.nan) for shape in ((1, 5), (1, 6, 2), (1, 2))))

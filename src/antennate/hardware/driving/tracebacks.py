@@ -6,7 +6,9 @@ import math
 import traceback
 from collections import deque
 
-EVERY = 1.0
+from antennate.params import HostParams
+
+EVERY = HostParams().traceback_period
 """Shortest time between two that are kept [s]."""
 _KEPT = 16
 

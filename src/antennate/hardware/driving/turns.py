@@ -67,11 +67,16 @@ class Turns:
         begun = self.standing and (self._stage or self._tried)
         return self._joints.ids[self._left[0]] if begun else None
 
-    def time(self, t: Floats) -> Floats:
-        """The controller's time [s], which stands still with the robot; call once a tick."""
+    def time(self, t: Floats, rate: float = 1.0) -> Floats:
+        """The controller's time [s], which stands still with the robot; call once a tick.
+
+        Args:
+            t: Time of the frame [s], shape (1,).
+            rate: How fast it goes otherwise, 1 as the clock.
+        """
         now = float(t[0])
-        if self.standing:
-            self._stood += now - self._seen
+        if self.standing or rate < 1.0:
+            self._stood += (now - self._seen) * (1.0 if self.standing else 1.0 - rate)
         self._seen = now
         return t - self._stood
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from antennate.hardware.dynamixel.packets import OVERHEAD, Status, StatusError
+from antennate.params import BusParams
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,9 +78,9 @@ class Timing:
     """
 
     baud: int = 1_000_000
-    gap: float = 0.002
-    quiet: float = 0.002
-    doubt: float = 0.1
+    gap: float = BusParams().gap
+    quiet: float = BusParams().gap
+    doubt: float = BusParams().doubt
 
     def wire(self, count: int) -> float:
         """Time of so many bytes on the wire [s]."""

@@ -9,22 +9,23 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from antennate.errors import AntennateError
-from antennate.hardware.dynamixel.answers import Answer, Span, Value
+from antennate.hardware.dynamixel import inquiry
+from antennate.hardware.dynamixel.answers import Span, Value
 from antennate.hardware.dynamixel.bus import Bus
+from antennate.hardware.dynamixel.inquiry import Present, State
 from antennate.hardware.dynamixel.tables import (
     EXTENDED_MODE,
     TABLES,
     XC430_W240,
     Register,
 )
+from antennate.params import BusParams
 
-WATCHDOG_COUNTS = 5
+WATCHDOG_COUNTS = BusParams().watchdog
 """Bus watchdog: a servo stops 100 ms after the last packet."""
 
-_TRIES = 5
-_PINGS = 3
-_BUDGET = 0.1
-"""Time for one reading of all, outside the control loop [s]."""
+_TRIES = BusParams().tries
+_BUDGET = BusParams().budget
 _COMMON = XC430_W240.registers
 """Both models have the registers used here at the same addresses."""
 
@@ -51,15 +52,11 @@ class Found:
 
 
 def inventory(bus: Bus, expected: Mapping[int, int]) -> list[Found]:
-    """What is on the bus, next to the model numbers expected by id; asks nobody to move.
-
-    Two servos of one id and model answer a ping with the same bytes at the same time. Only what
-    differs between them, the tick and the position, comes back broken.
-    """
+    """What is on the bus, next to the model numbers expected by id; asks nobody to move."""
     table = [_look(bus, servo, model) for servo, model in expected.items()]
     strangers = {status.id: status.data for status in bus.scan() if status.id not in expected}
     for servo, data in sorted(strangers.items()):
-        table.append(Found(servo, *_model(data), "not expected"))
+        table.append(Found(servo, *inquiry.model_of(data), "not expected"))
     return table
 
 
@@ -165,16 +162,10 @@ def read_register(bus: Bus, ids: Sequence[int], register: Register) -> dict[int,
     Raises:
         BringUpError: A servo did not answer after several tries.
     """
-    values: dict[int, int] = {}
-    left = list(ids)
-    for _ in range(_TRIES):
-        said = bus.read_all(left, Span(register.address, register.size), _BUDGET)
-        values |= {i: register.decode(a.data) for i, a in said.items() if isinstance(a, Value)}
-        left = [i for i in ids if i not in values]
-        if not left:
-            return values
-        bus.settle()
-    raise BringUpError(f"could not read {register.name} of servos {left}")
+    values = inquiry.read_some(bus, ids, register, _TRIES, _BUDGET)
+    if left := [servo for servo in ids if servo not in values]:
+        raise BringUpError(f"could not read {register.name} of servos {left}")
+    return values
 
 
 def _write_checked(bus: Bus, register: Register, values: Mapping[int, int]) -> None:
@@ -185,30 +176,22 @@ def _write_checked(bus: Bus, register: Register, values: Mapping[int, int]) -> N
 
 
 def _look(bus: Bus, servo: int, model: int) -> Found:
-    found = firmware = None
-    for _ in range(_PINGS):
-        found, firmware = _model(_data(bus.ping(servo)))
-        if found is not None:
-            break
-    ticks = Span(_COMMON["realtime_tick"].address, 16)
+    found = inquiry.look(bus, servo)
     if found is None:
         return Found(servo, None, None, "silent")
-    if found != model:
+    return Found(servo, found.model, found.firmware, _verdict(found, model))
+
+
+def _verdict(found: Present, model: int) -> str:
+    if found.model not in (None, model):
         name = TABLES[model].name if model in TABLES else str(model)
-        return Found(servo, found, firmware, f"expected model {name}, found number {found}")
-    if all(_data(_patient(bus, servo, ticks)) == b"" for _ in range(_TRIES)):
-        return Found(servo, found, firmware, "answers collide: two servos with this id?")
-    return Found(servo, found, firmware, "ok")
+        return f"expected model {name}, found number {found.model}"
+    return _STATES[found.state]
 
 
-def _patient(bus: Bus, servo: int, span: Span) -> Answer:
-    bus.settle()
-    return bus.read(servo, span)
-
-
-def _data(answer: Answer) -> bytes:
-    return answer.data if isinstance(answer, Value) else b""
-
-
-def _model(data: bytes) -> tuple[int | None, int | None]:
-    return (int.from_bytes(data[:2], "little"), data[2]) if len(data) == 3 else (None, None)
+_STATES: Mapping[State, str] = {
+    "ok": "ok",
+    "broken": "answers are never whole: two servos with this id, or a bad cable?",
+    "collides": "answers collide: two servos with this id?",
+    "mute": "answers pings alone: switch its supply off and on",
+}

@@ -32,16 +32,17 @@ from antennate.hardware.dynamixel.packets import HEADER, OVERHEAD, Packet, Statu
 from antennate.hardware.dynamixel.parser import Parser
 from antennate.hardware.dynamixel.turns import in_turn
 from antennate.hardware.ports.port import Port, PortError
+from antennate.params import BusParams
 
 CHUNK = 1024
 PING_DATA = 3
 """Bytes of the answer to a ping: model number and firmware version."""
-FAST_TRIES = 3
+FAST_TRIES = BusParams().fast_tries
 """Fast reads without any answer, but answers to a slow one, after which fast ones are given up."""
 
-ALONE = 2
+ALONE = BusParams().alone
 """Misses in a row after which a servo no longer holds up the others."""
-BUSY = 0.010
+BUSY = BusParams().busy
 """How long goals wait for a quiet bus [s]."""
 
 

@@ -1,4 +1,4 @@
-"""The antenna board behind its port: bytes in, the newest trustworthy reading out."""
+"""The antenna board behind its port, for a loop that never waits: its newest reading."""
 
 from __future__ import annotations
 
@@ -6,54 +6,45 @@ import math
 
 import numpy as np
 
-from antennate.hardware.esp32.clock import DeviceClock, Timed, Verdict
-from antennate.hardware.esp32.decoder import FrameDecoder
+from antennate.hardware.esp32.clock import Timed
 from antennate.hardware.esp32.frame import (
     FLAG_LEFT_RAIL,
     FLAG_RIGHT_RAIL,
     SAMPLE_FRAME_SIZE,
     encode_request,
 )
-from antennate.hardware.esp32.wire import Hello, Refused, Sample, objections
+from antennate.hardware.esp32.listener import CHUNK, Listener
 from antennate.hardware.ports.port import Port, PortError
+from antennate.params import BoardParams
 from antennate.records import Floats
 
-BOARD_BAUD = 115_200
+BOARD_BAUD = BoardParams().baud
 """Bits per second of the board's port."""
-KEPT = 64 * SAMPLE_FRAME_SIZE
-"""Most bytes of a backlog that are looked at, the newest: 64 samples."""
-_CHUNK = 4096
+KEPT = BoardParams().backlog * SAMPLE_FRAME_SIZE
+"""Most bytes of a backlog that are looked at, the newest."""
 _CHUNKS = 64
 """Most chunks read at once: more than Linux keeps for a line."""
 _RAILS = (FLAG_LEFT_RAIL, FLAG_RIGHT_RAIL)
 
 
-class Board:
-    """Reads one antenna board, always the same one. If its port is gone, it is merely silent.
+class Board(Listener):
+    """Reads what has come from a board. If its port is gone, it is merely silent.
 
     Args:
         port: Its wire.
         age_limit: Readings older than this are not to be acted upon [s].
 
     Attributes:
-        decoder: With the counters of its bytes.
-        clock: With the verdicts on its samples.
-        hello: The newest greeting, None before the first.
-        refusals: Why a board or its frames were refused, newest last, at most 8.
         skipped: Bytes of backlogs that were not looked at.
         trouble: What is wrong with its port, empty if nothing is.
     """
 
     def __init__(self, port: Port, age_limit: float) -> None:
-        self.decoder = FrameDecoder()
-        self.clock = DeviceClock()
-        self.hello: Hello | None = None
-        self.refusals: list[str] = []
+        super().__init__()
         self.skipped = 0
         self.trouble = ""
         self._port = port
         self._limit = age_limit
-        self._first: Hello | None = None
         self._lost_before = 0
 
     @property
@@ -68,14 +59,14 @@ class Board:
 
     def poll(self, now: float) -> int:
         """Take the newest of what has come by now [s]; how many usable samples that were."""
-        return sum(self._take(frame, now) for frame in self.decoder.feed(self._read()))
+        return len(self.hear(self._read(), now))
 
     def _read(self) -> bytes:
         """What has come, of a backlog the end; a board that is back is asked to greet."""
         came = b""
         try:
             for _ in range(_CHUNKS):
-                part = self._port.read(_CHUNK, 0.0)
+                part = self._port.read(CHUNK, 0.0)
                 if self.trouble:
                     self._port.write(encode_request())
                     self.trouble = ""
@@ -91,29 +82,6 @@ class Board:
     def newest(self, now: float) -> Timed | None:
         """The newest usable sample, or None if it is too old or its age is not known."""
         return self.clock.newest if self.clock.age(now) <= self._limit else None
-
-    def _take(self, frame: Hello | Sample | Refused, now: float) -> bool:
-        if isinstance(frame, Sample):
-            return self.clock.take(frame, now) is Verdict.USED
-        reasons = (frame.reason,) if isinstance(frame, Refused) else self._objections(frame)
-        if isinstance(frame, Hello) and not reasons:
-            self._first = self._first or frame
-            self.clock.greet(frame)
-            self.hello = frame
-        self.refusals = [*self.refusals, *reasons][-8:]
-        return False
-
-    def _objections(self, hello: Hello) -> tuple[str, ...]:
-        """What speaks against a board, also that it is not the one that greeted first."""
-        first = self._first
-        if first is None:
-            return objections(hello)
-        if hello.device_id != first.device_id:
-            return (
-                f"expected the board {first.device_id} that greeted first, found another one, "
-                f"{hello.device_id}; begin anew with it",
-            )
-        return objections(hello, first.config_hash)
 
 
 def counts_of(timed: Timed | None) -> Floats:

@@ -15,16 +15,13 @@ from dataclasses import dataclass
 from enum import Enum, auto
 
 from antennate.hardware.esp32.wire import Hello, Reset, Sample
+from antennate.params import BoardParams
 
-DRIFT = 250e-6
-"""Most by which the clocks run apart [s/s], assumed: two crystals within 200 ppm, and a margin."""
-SETTLE_SAMPLES = 10
-SETTLE_TIME = 0.05
-"""Samples and time [s] that a new lowest difference must last until ages are believed."""
-SETTLE_FALL = 0.005
-"""How far it may fall meanwhile [s]; a backlog that drains makes it fall faster."""
-EARLY = 0.02
-"""How much earlier than expected a sample may arrive; after a lie, also how much later [s]."""
+DRIFT = BoardParams().drift
+SETTLE_SAMPLES = BoardParams().settle_samples
+SETTLE_TIME = BoardParams().settle_time
+SETTLE_FALL = BoardParams().settle_fall
+EARLY = BoardParams().early
 RETIRED_BOOTS = 8
 
 _SEQ = 1 << 32

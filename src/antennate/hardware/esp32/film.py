@@ -8,7 +8,7 @@ from pathlib import Path
 from antennate import calibration
 from antennate.calibration import Calibration
 from antennate.errors import CalibrationError, ConfigError
-from antennate.hardware.esp32.board import Board
+from antennate.hardware.esp32.wire import Hello
 from antennate.params import ConditioningParams, ControllerParams
 
 _SERIAL = re.compile("[0-9a-f]{16}")
@@ -45,16 +45,20 @@ def calibrated(
     return mind.model_copy(update={"conditioning": curve}), found
 
 
-def require_film(board: Board, sensor_id: str | None) -> None:
+def require_film(hello: Hello | None, sensor_id: str | None) -> None:
     """Refuse a board to which the calibrated film is not soldered, where its id names a board.
+
+    Args:
+        hello: What the board has said of itself.
+        sensor_id: That of the calibration.
 
     Raises:
         CalibrationError: Says both serial numbers.
     """
-    if sensor_id is None or not _SERIAL.fullmatch(sensor_id) or board.hello is None:
+    if sensor_id is None or not _SERIAL.fullmatch(sensor_id) or hello is None:
         return
-    if board.hello.device_id != sensor_id:
+    if hello.device_id != sensor_id:
         raise CalibrationError(
             f"--calibration: expected the board {sensor_id} of its sensor_id, found board "
-            f"{board.hello.device_id}; calibrate the films of this board"
+            f"{hello.device_id}; calibrate the films of this board"
         )

@@ -11,7 +11,7 @@ from typing import TypeAlias
 
 from antennate.errors import BadInputError
 from antennate.hardware.esp32.stream import Reading, Stream
-from antennate.params import DoctorParams, RecordParams
+from antennate.params import DoctorParams, NetworkParams, RecordParams
 
 Ask: TypeAlias = Callable[[str], Callable[[], bool]]
 """Tells a person what to do; the function it returns says whether that has been confirmed."""
@@ -21,6 +21,12 @@ SILENCE = DoctorParams().greeting
 _PATIENCE = 0.02
 _MICROSECOND = 1e-6
 """What the board counts; sums of its times are no rounder [s]."""
+
+
+class RecordConfig(RecordParams):
+    """What is recorded, and how the board is reached."""
+
+    network: NetworkParams = NetworkParams()
 
 
 class Recorder:

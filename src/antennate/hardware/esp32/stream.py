@@ -5,12 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from antennate.hardware.esp32.clock import DeviceClock, Timed, Verdict
-from antennate.hardware.esp32.decoder import FrameDecoder
-from antennate.hardware.esp32.wire import Hello, Sample, objections
+from antennate.hardware.esp32.clock import Timed
+from antennate.hardware.esp32.listener import CHUNK, Listener
 from antennate.hardware.ports.port import Port
-
-_CHUNK = 4096
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,48 +23,25 @@ class Reading:
     now: float
 
 
-class Stream:
-    """Reads a board's port.
+class Stream(Listener):
+    """Reads a board's port, and waits for what comes.
 
     Args:
         port: Its wire.
         now: Monotonic time [s].
-
-    Attributes:
-        decoder: With the counters of its bytes.
-        clock: With the verdicts on its samples.
-        hello: Its newest greeting, None before the first.
-        refusals: Boards and frames refused since the beginning, each reason once.
     """
 
     def __init__(self, port: Port, now: Callable[[], float]) -> None:
-        self.decoder = FrameDecoder()
-        self.clock = DeviceClock()
-        self.hello: Hello | None = None
-        self.refusals: list[str] = []
+        super().__init__()
         self._port = port
         self._now = now
 
     def take(self, timeout: float) -> list[Reading]:
-        """Readings that have come, or come within `timeout` [s]."""
-        data = self._port.read(_CHUNK, timeout)
-        now, readings = self._now(), list[Reading]()
-        for frame in self.decoder.feed(data):
-            if isinstance(frame, Hello):
-                self._greet(frame)
-            elif not isinstance(frame, Sample):
-                self._refuse(frame.reason)
-            elif self.clock.take(frame, now) is Verdict.USED and self.clock.newest is not None:
-                readings.append(Reading(self.clock.newest, now))
-        return readings
+        """Readings that have come, or come within `timeout` [s].
 
-    def _greet(self, hello: Hello) -> None:
-        """Take a greeting; of a board that is refused no sample is ever used."""
-        self.hello = hello
-        if found := objections(hello):
-            self._refuse(*found)
-            return
-        self.clock.greet(hello)
-
-    def _refuse(self, *reasons: str) -> None:
-        self.refusals += [reason for reason in reasons if reason not in self.refusals]
+        Raises:
+            PortError: The port is gone.
+        """
+        data = self._port.read(CHUNK, timeout)
+        now = self._now()
+        return [Reading(timed, now) for timed in self.hear(data, now)]

@@ -17,8 +17,12 @@ _MAKE = (
 )
 
 
-def read_key(path: Path | None) -> bytes:
+def read_key(path: Path | None, way_out: str = "") -> bytes:
     """The key in a file, or in the environment variable ANTENNATE_KEY if there is no file.
+
+    Args:
+        path: The file.
+        way_out: What else can be done without a key, for the error.
 
     Raises:
         BadInputError: There is none, others may read the file, or it holds no key.
@@ -26,7 +30,8 @@ def read_key(path: Path | None) -> bytes:
     if path is None:
         text = os.environ.get(ENVIRONMENT)
         if text is None:
-            raise BadInputError(f"--key: expected a file, or {ENVIRONMENT} set; {_MAKE}")
+            cures = f"{_MAKE}; {way_out}" if way_out else _MAKE
+            raise BadInputError(f"--key: expected a file, or {ENVIRONMENT} set; {cures}")
         return _parse(text, ENVIRONMENT)
     return _parse(_private(path), f"--key {path}")
 

@@ -10,10 +10,11 @@ from queue import Empty, SimpleQueue
 from typing import Protocol
 
 from antennate.hardware.ports.port import Port, PortError
+from antennate.params import PortParams
 
-RETRY = 0.2
+RETRY = PortParams().retry
 """Time between two looks for a port that is gone [s]."""
-_FAREWELL = 1.0
+_FAREWELL = PortParams().farewell
 """Longest that closing waits for a look that is under way [s]."""
 
 

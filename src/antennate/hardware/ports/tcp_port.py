@@ -8,10 +8,11 @@ from collections.abc import Generator
 from contextlib import contextmanager
 
 from antennate.hardware.ports.port import PortError
+from antennate.params import PortParams
 
-_OPENING_TIME = 3.0
+_OPENING_TIME = PortParams().opening_time
 """Longest wait for a connection [s]."""
-_WRITING_TIME = 0.1
+_WRITING_TIME = PortParams().writing_time
 """Longest wait until all is sent [s], as of a serial line."""
 
 

@@ -106,7 +106,9 @@ class Supervisor:
         self, state: State, decided: bool, arming: bool, refusal: tuple[Cause, ...]
     ) -> Outputs:
         torque = state < State.OFF
-        order = sorted(self._active.values(), key=lambda a: (-a.cause.severity, a.since))
+        order = sorted(
+            self._active.values(), key=lambda a: (-a.cause.severity, a.since, a.cause.name)
+        )
         waits = {a.cause for a in order if a.cause.severity >= State.HOLD}
         return Outputs(
             state=state,

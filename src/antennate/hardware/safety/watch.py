@@ -11,6 +11,7 @@ from antennate.hardware.dynamixel.bringup import WATCHDOG_COUNTS
 from antennate.hardware.dynamixel.bus import Bus
 from antennate.hardware.dynamixel.tables import XC430_W240, hardware_errors
 from antennate.hardware.ports.port import PortError
+from antennate.params import BusParams
 
 _ERRORS = Span(XC430_W240["hardware_error_status"].address, 1)
 _WATCHDOG = XC430_W240["bus_watchdog"]
@@ -18,12 +19,9 @@ _TORQUE = XC430_W240["torque_enable"]
 _VOLTAGE = XC430_W240["present_input_voltage"]
 _POSITION = XC430_W240["present_position"]
 _VOLT = 0.1
-_ALONE = 0.003
-"""Time for one servo asked alone [s]."""
-_PATIENCE = 10
-"""Ticks after which watchdogs and supply are looked at even if time is short."""
-_OLD = 4.0
-"""Age from which on the supply is not known [s]; twice what a round of all takes at the slowest."""
+_ALONE = BusParams().single_budget
+_PATIENCE = BusParams().look_every
+_OLD = BusParams().supply_age
 
 
 class ServoWatch:
@@ -52,7 +50,7 @@ class ServoWatch:
         bus: Bus,
         ids: tuple[int, ...],
         clock: Callable[[], float],
-        budget: float = 0.007,
+        budget: float = BusParams().motion_budget,
     ) -> None:
         self._bus = bus
         self._clock = clock

@@ -1,0 +1,51 @@
+"""Draw docs/images/replay.png: a drive of a twin, in invented time, and its log replayed.
+
+A hand bends both antennae in the dry run, the robot walks by `closed`, the board is silent for
+half a second, and `paper` decides again upon the log.
+"""
+
+import shutil
+import sys
+import tempfile
+from pathlib import Path
+
+from antennate.cli import main as antennate
+from antennate.experiments.twin import TwinConfig, rig
+from antennate.hardware.driving.drive import DriveConfig, drive
+from antennate.hardware.driving.session import Session
+from antennate.params import TouchCheckParams
+from antennate.telemetry.header import Header
+from antennate.telemetry.ticks import Tick
+from antennate.telemetry.writer import LogWriter
+
+PICTURE = Path(__file__).parent / "images" / "replay.png"
+CONFIG = DriveConfig(dry_run=6.0, duration=18.0)
+SILENT, AGAIN = 16.0, 16.5
+"""Times from and to which the board is silent [s]."""
+
+
+def log(path: Path) -> None:
+    """Write the log of the drive."""
+    made = rig(TwinConfig(touch=("left@1s", "right@3s"), trial=1), "closed", TouchCheckParams())
+    header = Header(controller="closed", params=CONFIG.mind, layout=CONFIG.layout)
+    with LogWriter(path, header) as writer:
+
+        def on_tick(session: Session, now: float) -> None:
+            made.robot.board_silent = SILENT <= now < AGAIN
+            writer.write(Tick.of(session, now))
+
+        drive(made.session, CONFIG, arm=True, on_tick=on_tick)
+
+
+def main() -> int:
+    """Write the picture; return the exit status."""
+    with tempfile.TemporaryDirectory() as folder:
+        path, out = Path(folder) / "drive.log", Path(folder) / "replayed"
+        log(path)
+        status = antennate(["replay", str(path), "--controller", "paper", "--out", str(out)])
+        shutil.copyfile(out / "figures" / PICTURE.name, PICTURE)
+    return status
+
+
+if __name__ == "__main__":
+    sys.exit(main())

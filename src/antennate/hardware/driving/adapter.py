@@ -1,0 +1,56 @@
+"""Whether the adapter of a servo bus hands bytes over at once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from statistics import median
+
+from antennate.hardware.doctor.pace import latency_row
+from antennate.hardware.dynamixel.answers import Timing, Value
+from antennate.hardware.dynamixel.bringup import BringUpError
+from antennate.hardware.dynamixel.bus import Bus
+from antennate.hardware.ports.port import Port
+from antennate.params import BusParams, DoctorParams
+
+_PARAMS = BusParams()
+
+
+def require_quick(
+    port: Port, ids: Sequence[int], baud: int, clock: Callable[[], float], path: str
+) -> float | None:
+    """Ping a servo that answers a few times; the median time to its answer [s], None without any.
+
+    Args:
+        port: The wire; nobody else uses it meanwhile.
+        ids: Servos to try, in this order.
+        baud: Bits per second.
+        clock: Monotonic time [s].
+        path: What the port is called, for the cure.
+
+    Raises:
+        BringUpError: Answers come too late; with the command that cures it.
+    """
+    bus = Bus(
+        port,
+        Timing(baud, gap=_PARAMS.adapter_patience, doubt=_PARAMS.adapter_patience),
+        clock=clock,
+    )
+    times: list[float] = []
+    for servo in ids:
+        while len(times) < _PARAMS.adapter_pings:
+            begin = clock()
+            if not isinstance(bus.ping(servo), Value):
+                break
+            times.append(clock() - begin)
+        if times:
+            break
+    if not times:
+        return None
+    found = median(times)
+    if found > _PARAMS.slow_adapter:
+        cure = latency_row(path, True, DoctorParams()).cure
+        raise BringUpError(
+            f"--bus: expected answers within {1e3 * _PARAMS.slow_adapter:g} ms, found "
+            f"{1e3 * found:.1f} ms: the adapter keeps bytes back; {cure}"
+        )
+    return found

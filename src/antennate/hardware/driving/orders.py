@@ -1,0 +1,35 @@
+"""What an operator tells a session, and what it counts for him."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(slots=True)
+class Orders:
+    """What the operator wants.
+
+    Attributes:
+        arm: Torque on; only the change to True counts.
+        stop: Torque off.
+    """
+
+    arm: bool = False
+    stop: bool = False
+
+
+@dataclass(slots=True)
+class Tally:
+    """What a session has done.
+
+    Attributes:
+        ticks: Ticks run.
+        sent: Poses sent to the servos.
+        limited: Goals that moved slower than asked.
+        refused: Poses of the controller that must not be sent.
+    """
+
+    ticks: int = 0
+    sent: int = 0
+    limited: int = 0
+    refused: int = 0

@@ -1,0 +1,84 @@
+"""Asking servos until they answer, with time to spare: for before and after the control loop."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import Literal
+
+from antennate.hardware.dynamixel.answers import Answer, Span, Value
+from antennate.hardware.dynamixel.bus import PING_DATA, Bus
+from antennate.hardware.dynamixel.tables import XC430_W240, Register
+from antennate.params import BusParams
+
+PINGS = BusParams().pings
+_READS = BusParams().reads
+_TICKS = Span(XC430_W240["realtime_tick"].address, 16)
+"""What differs between two servos of one id: the tick and the position, in both models."""
+
+State = Literal["ok", "broken", "collides", "mute"]
+
+
+@dataclass(frozen=True, slots=True)
+class Present:
+    """One id that was heard.
+
+    Attributes:
+        servo: The id.
+        model: Model number, None if no ping came back whole.
+        firmware: Firmware version, None likewise.
+        state: "ok"; "broken", no answer is whole; "collides", pings are whole but other answers are
+            not, as of two servos with one id; "mute", it answers pings and no reads.
+    """
+
+    servo: int
+    model: int | None
+    firmware: int | None
+    state: State
+
+
+def look(bus: Bus, servo: int, pings: int = PINGS) -> Present | None:
+    """One id, None if it is silent.
+
+    Two servos of one id and model answer a ping with the same bytes at the same time. Only what
+    differs between them comes back broken.
+    """
+    data, broken = _tried(bus, lambda: bus.ping(servo), pings)
+    if data is None:
+        return Present(servo, None, None, "broken") if broken else None
+    read, broken = _tried(bus, lambda: bus.read(servo, _TICKS), _READS)
+    state: State = "ok" if read is not None else "collides" if broken else "mute"
+    return Present(servo, *model_of(data), state)
+
+
+def model_of(data: bytes) -> tuple[int | None, int | None]:
+    """Model number and firmware version in the answer to a ping, None if it is of another form."""
+    return (int.from_bytes(data[:2], "little"), data[2]) if len(data) == PING_DATA else (None, None)
+
+
+def read_some(
+    bus: Bus, ids: Iterable[int], register: Register, tries: int, budget: float
+) -> dict[int, int]:
+    """One register of those servos that answer, each try within a budget [s]."""
+    values: dict[int, int] = {}
+    left = list(ids)
+    for _ in range(tries):
+        if not left:
+            break
+        said = bus.read_all(left, Span(register.address, register.size), budget)
+        values |= {i: register.decode(a.data) for i, a in said.items() if isinstance(a, Value)}
+        left = [servo for servo in left if servo not in values]
+        if left:
+            bus.settle()
+    return values
+
+
+def _tried(bus: Bus, ask: Callable[[], Answer], tries: int) -> tuple[bytes | None, bool]:
+    """Data of the first answer, or None; and whether anything came that was not whole."""
+    before = bus.tally.bad_crc + bus.tally.stale
+    for _ in range(tries):
+        said = ask()
+        if isinstance(said, Value):
+            return said.data, False
+        bus.settle()
+    return None, bus.tally.bad_crc + bus.tally.stale > before

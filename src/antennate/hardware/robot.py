@@ -1,0 +1,50 @@
+"""What every command must know of a robot before it talks to it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Self
+
+from antennate.hardware.esp32.film import calibrated
+from antennate.params import (
+    ControllerParams,
+    NetworkParams,
+    Params,
+    SupervisorParams,
+    number,
+)
+from antennate.params.layout import LayoutParams
+
+
+class RobotConfig(Params):
+    """One robot: its servos, its films, its controller's numbers and its network."""
+
+    calibration: str | None = number(
+        None,
+        "1",
+        "assumed: the numbers of mind.conditioning",
+        "file of `antennate calibrate`, for both antennae, in place of mind.conditioning",
+    )
+    sensor_id: str | None = number(
+        None,
+        "1",
+        "assumed: that of the calibration file",
+        "name of the film; 16 hexadecimal digits name the board it is soldered to",
+    )
+    layout: LayoutParams = LayoutParams()
+    mind: ControllerParams = ControllerParams()
+    limits: SupervisorParams = SupervisorParams()
+    network: NetworkParams = NetworkParams()
+
+    def calibrated(self) -> Self:
+        """The same with the curve and the film of the calibration file in place of its name.
+
+        Raises:
+            CalibrationError: The file cannot be used.
+            ConfigError: There is another curve beside it.
+        """
+        if self.calibration is None:
+            return self
+        mind, film = calibrated(self.mind, Path(self.calibration), self.sensor_id)
+        known = {"mind": mind, "sensor_id": film.sensor_id, "calibration": None}
+        return self.model_copy(update=known)

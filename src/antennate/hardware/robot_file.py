@@ -1,0 +1,35 @@
+"""robot.toml: one file for every command that talks to a robot; each takes what it needs."""
+
+from __future__ import annotations
+
+from typing import TypeVar
+
+from antennate.hardware.doctor.checkup import DoctorConfig
+from antennate.hardware.driving.drive import DriveConfig
+from antennate.hardware.esp32.recorder import RecordConfig
+from antennate.hardware.robot import RobotConfig
+from antennate.params import DoctorParams, RecordParams
+
+_Config = TypeVar("_Config", bound=RobotConfig)
+
+
+class RobotFile(DriveConfig):
+    """What robot.toml may hold: what `drive` takes, and a table each for `doctor` and `record`."""
+
+    doctor: DoctorParams = DoctorParams()
+    record: RecordParams = RecordParams()
+
+    def for_drive(self) -> DriveConfig:
+        """What `antennate drive` takes: all but the two tables."""
+        return self._part(DriveConfig)
+
+    def for_doctor(self) -> DoctorConfig:
+        """What `antennate doctor` takes: the robot, and its own table."""
+        return self._part(DoctorConfig)
+
+    def for_record(self) -> RecordConfig:
+        """What `antennate record` takes: its own table, and the network."""
+        return RecordConfig(**dict(self.record), network=self.network)
+
+    def _part(self, model: type[_Config]) -> _Config:
+        return model(**{name: getattr(self, name) for name in model.model_fields})

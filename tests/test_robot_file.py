@@ -1,0 +1,121 @@
+"""One robot.toml for drive, doctor and record: the very one that docs/hardware.md shows."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from doctor_rig import Patient, wrong
+from test_bad_calibrations import GOOD
+
+from antennate import calibration
+from antennate.cli import BAD_INPUT, main
+from antennate.cli.addresses import RobotOrders, parse_robot
+from antennate.cli.arguments import read_file
+from antennate.cli.toml import to_toml
+from antennate.hardware.doctor.checkup import examine
+from antennate.hardware.robot_file import RobotFile
+
+PAGE = Path(__file__).parents[1] / "docs" / "hardware.md"
+TAKE: dict[str, Callable[[RobotFile], Any]] = {
+    "drive": RobotFile.for_drive,
+    "doctor": RobotFile.for_doctor,
+    "record": RobotFile.for_record,
+}
+
+
+@pytest.fixture
+def file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The file of the page, and the calibration that it names."""
+    (text,) = re.findall(r"```toml\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
+    (tmp_path / "robot.toml").write_text(text)
+    (tmp_path / "left").mkdir()
+    made = GOOD.model_copy(update={"sensor_id": "left"})
+    calibration.save(made, tmp_path / "left" / "calibration.json")
+    monkeypatch.chdir(tmp_path)
+    return Path("robot.toml")
+
+
+@pytest.mark.parametrize("name", TAKE)
+def test_the_file_of_the_page_serves_each_command(name: str, file: Path) -> None:
+    robot = read_file(file, RobotFile)
+    config, _ = parse_robot(name, "", TAKE[name], ["--robot", str(file)], RobotOrders())
+    assert config == TAKE[name](robot)
+    assert config.network == robot.network
+    known = robot.record if name == "record" else robot
+    for field in set(type(config).model_fields) - {"network"}:
+        assert getattr(config, field) == getattr(known, field)
+
+
+def test_each_command_takes_its_own_numbers_and_a_flag_counts_more(file: Path) -> None:
+    def parsed(name: str, *words: str) -> Any:
+        return parse_robot(name, "", TAKE[name], ["--robot", str(file), *words], RobotOrders())[0]
+
+    tables = "[doctor]\nlisten = 1.5\n[record]\nmarks = [0.0, 10.0]\nduration = 9.0\n"
+    file.write_text("duration = 60.0\n" + tables)
+    assert parsed("drive").duration == 60.0
+    assert parsed("doctor").doctor.listen == 1.5
+    assert (parsed("record").marks, parsed("record").duration) == ((0.0, 10.0), 9.0)
+    assert parsed("record", "--marks", "0", "5").marks == (0.0, 5.0)
+
+
+@pytest.mark.parametrize("name", TAKE)
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("[layout]\nbuad = 1\n", "layout.buad: expected a known key of layout (did you mean"),
+        ("[record]\nmark = [0, 1]\n", "record.mark: expected a known key of record"),
+        ("marks = [0, 1]\n", "marks: expected a known key, found 'marks'"),
+        ("[doctor]\nlisten = 0.0\n", "doctor.listen: expected a number above 0"),
+    ],
+)
+def test_a_key_that_none_of_them_knows_is_an_error_in_all(
+    name: str, text: str, said: str, file: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file.write_text(text)
+    assert main([name, "--robot", str(file)]) == BAD_INPUT
+    told = capsys.readouterr().err
+    assert f"robot.toml: {said}" in told
+    assert told.count("\n") == 1
+
+
+def test_doctor_judges_the_antennae_by_the_calibration_file(file: Path) -> None:
+    robot = read_file(file, RobotFile).for_doctor().calibrated()
+    patient = Patient()
+    patient.robot.hold(0, 1700.0)
+    checkup = examine(robot, None, ("/dev/esp32", patient.esp32), patient.clock.now)
+    rows = {row.check: row for row in checkup.rows}
+    low, high = GOOD.counts_low, GOOD.counts_high
+    assert rows["left at rest"].expected.startswith(f"{low - 20:.0f} to {high + 20:.0f} counts")
+    assert rows["left at rest"].verdict == "bad"
+
+
+def test_S9_doctor_names_the_board_to_which_the_films_do_not_belong(file: Path) -> None:
+    patient = Patient()
+    robot = RobotFile(sensor_id="0" * 16).for_doctor()
+    row = wrong(examine(robot, None, ("/dev/esp32", patient.esp32), patient.clock.now))[
+        "esp32: films"
+    ]
+    assert row.expected == f"on board {'0' * 16}"
+    assert row.found == f"board {b'twin'.hex()}00000000"
+
+
+def test_what_a_run_keeps_is_a_robot_file_that_needs_no_calibration_file(file: Path) -> None:
+    robot = read_file(file, RobotFile)
+    for config in (robot.for_drive().calibrated(), robot.for_doctor().calibrated()):
+        kept = Path("kept.toml")
+        kept.write_text(to_toml(config))
+        again = read_file(kept, RobotFile)
+        assert again._part(type(config)).calibrated() == config
+        assert again.mind.conditioning.counts_low == GOOD.counts_low
+
+
+def test_record_with_the_file_of_drive_gets_as_far_as_the_port(
+    file: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["record", "--robot", str(file), "--esp32", "/dev/null", "--out", "left.csv"]
+    assert main(words) == BAD_INPUT
+    assert "/dev/null: not a serial port" in capsys.readouterr().err
