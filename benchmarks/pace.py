@@ -23,6 +23,20 @@ from typing import Any
 
 PROGRAM = [sys.executable, "-c", "import sys; from antennate.cli import main; sys.exit(main())"]
 BUSY = [sys.executable, "-c", "while True: sum(range(10_000))"]
+VIEWER = """
+import sys
+from pathlib import Path
+from antennate.errors import LogError
+from antennate.telemetry.reader import LogReader
+while True:
+    try:
+        with LogReader(Path(sys.argv[1])) as log:
+            for tick in log:
+                pass
+    except LogError:  # it has not begun yet
+        pass
+"""
+"""Reads the growing log again and again, without a pause."""
 TOUCH = ("left@4s", "right@6s")
 DRY_RUN = 7.0
 """Time that both touches take [s]."""
@@ -39,7 +53,7 @@ def running(words: list[str], **how: Any) -> Iterator[subprocess.Popen[str]]:
         process.wait()
 
 
-def walk(seconds: float, busy: int) -> dict[str, Any]:
+def walk(seconds: float, busy: int, viewers: int = 0) -> dict[str, Any]:
     """One drive against a twin of its own; the content of its result.json."""
     with ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
@@ -50,6 +64,9 @@ def walk(seconds: float, busy: int) -> dict[str, Any]:
         paths = json.loads(server.stdout.readline())
         for _ in range(busy):
             stack.enter_context(running(BUSY))
+        for _ in range(viewers):
+            log = str(folder / "run" / "drive.log")
+            stack.enter_context(running([sys.executable, "-c", VIEWER, log]))
         words = [*PROGRAM, "drive", "--esp32", paths["esp32"], "--bus", paths["bus"], "--arm"]
         words += ["--json", "--out", str(folder / "run")]
         words += ["--dry-run", str(DRY_RUN), "--duration", str(seconds)]
@@ -81,9 +98,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seconds", type=float, default=30.0, help="time of each walk")
     parser.add_argument("--busy", type=int, nargs="*", default=[0, 4], help="busy processes beside")
+    parser.add_argument("--viewers", type=int, nargs="*", default=[], help="viewers of the log")
     parser.add_argument("--json", action="store_true", help="print one JSON object and no table")
     args = parser.parse_args()
     rows = {f"busy_{count}": summary(walk(args.seconds, count)) for count in args.busy}
+    rows |= {f"viewers_{count}": summary(walk(args.seconds, 0, count)) for count in args.viewers}
     result = {"cores": os.cpu_count(), "seconds": args.seconds, **rows}
     if args.json:
         print(json.dumps(result))

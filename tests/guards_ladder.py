@@ -66,15 +66,17 @@ SUPERVISOR = [
     Guard("dead bus", blind(bus_error=""), told(Cause.BUS_ERROR)),
     Guard("tripped watchdog", blind(watchdogs=()), told(Cause.WATCHDOG)),
     Guard("servo without torque or watchdog", blind(disarmed=()), told(Cause.DISARMED)),
+    Guard("record that is required", blind(unrecorded=False), told(Cause.NO_RECORD)),
     Guard("supply", blind(supply=12.0), told(Cause.SUPPLY_OFF)),
     Guard("stop by the operator", blind(stop=False), told(Cause.STOPPED)),
     Guard("exception of the controller", blind(failure=""), told(Cause.FAILED)),
     Guard("action that does not exist", blind(maneuver=Maneuver.HOLD), told(Cause.BAD_ACTION)),
     Guard(
-        "pose that is not finite",
-        blind(finite=True),
+        "pose that was refused",
+        blind(bad_pose=""),
         partial(
-            test_supervisor.test_S5_a_pose_or_maneuver_that_is_none_is_not_sent, {"finite": False}
+            test_supervisor.test_S5_a_pose_or_maneuver_that_is_none_is_not_sent,
+            {"bad_pose": "nan"},
         ),
     ),
     Guard(

@@ -131,6 +131,27 @@ def test_B3_a_servo_that_never_gets_it_right_is_silent(fast: bool) -> None:
     assert rig.bus.tally.bad_crc > 0
 
 
+@pytest.mark.parametrize("fast", [True, False])
+def test_B3_L1_answers_broken_by_turned_bits_are_counted(fast: bool) -> None:
+    """One in a thousand bits: every answer that is hit counts once, or twice if its CRC is."""
+    rig = Rig(fast)
+    rig.twin.noise.ber = 1e-3
+    hit, transmit = 0, rig.twin.transmit
+
+    def watched(t: float) -> bytes:
+        nonlocal hit
+        before = rig.twin.noise.wrong
+        data = transmit(t)
+        hit += rig.twin.noise.wrong > before
+        return data
+
+    rig.twin.transmit = watched  # type: ignore[method-assign]
+    for _ in range(300):
+        rig.cycle()
+    assert hit > 100
+    assert 0.7 * hit <= rig.bus.tally.bad_crc <= 1.5 * hit
+
+
 @pytest.mark.parametrize("delay", [0.003, 0.020, 0.040, 0.060])
 @pytest.mark.parametrize("fast", [True, False])
 def test_B4_no_late_answer_is_taken_for_a_new_one(delay: float, fast: bool) -> None:

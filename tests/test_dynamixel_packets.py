@@ -230,6 +230,24 @@ def test_B3_a_flipped_bit_in_a_fast_reply_spoils_two_values_at_most_and_makes_no
         assert values.items() <= true.items()
 
 
+def test_broken_parts_of_a_fast_reply_are_counted() -> None:
+    """A bit in a part breaks it, one in its CRC the next part too, one in the header all."""
+    said = [Status(i, StatusError.NONE, False, bytes([i] * 4)) for i in FAST_IDS]
+    whole = b"".join(packets.fast_reply(len(FAST_IDS), said, 4))
+    for cut in range(len(whole) + 1):
+        good = len(packets.split_fast_reply(whole[:cut], FAST_IDS, 4))
+        header = 0 < cut < 8
+        assert packets.broken_fast_reply(whole[:cut], len(FAST_IDS), 4, good) == header
+    for bit in range(8 * len(whole)):
+        hurt = bytearray(whole)
+        hurt[bit // 8] ^= 1 << bit % 8
+        good = len(packets.split_fast_reply(bytes(hurt), FAST_IDS, 4))
+        broken = packets.broken_fast_reply(bytes(hurt), len(FAST_IDS), 4, good)
+        part, place = divmod(bit // 8 - 8, 8)
+        twice = place >= 6 and part < len(FAST_IDS) - 1
+        assert broken == (1 if part < 0 or not twice else 2)
+
+
 def test_B2_a_lost_part_of_a_fast_reply_costs_itself_and_the_next() -> None:
     ids = list(range(1, 20))
     said = [Status(i, StatusError.NONE, False, bytes([i, 0xFF, 0xFD, i])) for i in ids]

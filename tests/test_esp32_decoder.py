@@ -6,6 +6,7 @@ import math
 import sys
 import time
 import tracemalloc
+from collections.abc import Iterator
 from itertools import pairwise
 
 import numpy as np
@@ -214,22 +215,28 @@ def test_L6_mutated_frames_raise_nothing() -> None:
     assert closed(decoder.counters, decoder.held)
 
 
-def flood(megabytes: int) -> float:
-    """Noise, damaged frames and storms of delimiters by turns; speed [MB/s] of the slowest."""
+SAMPLES = [made(i) for i in range(30_000)]
+
+
+def hostile(megabytes: int) -> Iterator[bytes]:
+    """Noise, damaged frames and storms of delimiters by turns, a megabyte each."""
     rng = np.random.default_rng(9)
-    samples = [made(i) for i in range(30_000)]
-    whole, known = frames_of(samples).reshape(-1), set(samples)
-    decoder = FrameDecoder()
-    slowest = math.inf
+    whole = frames_of(SAMPLES).reshape(-1)
     for number in range(megabytes):
         if number % 3 == 0:
-            piece = rng.bytes(1_000_000)
+            yield rng.bytes(1_000_000)
         elif number % 3 == 1:
             hit = rng.random(whole.size) < rng.uniform(0.001, 0.2)
             piece = np.where(hit, rng.integers(0, 256, whole.size), whole).astype(np.uint8)
-            piece = piece.tobytes()[:1_000_000].ljust(1_000_000, b"\1")
+            yield piece.tobytes()[:1_000_000].ljust(1_000_000, b"\1")
         else:
-            piece = rng.choice(np.array([0, 0, 1, 2, 12, 255], np.uint8), 1_000_000).tobytes()
+            yield rng.choice(np.array([0, 0, 1, 2, 12, 255], np.uint8), 1_000_000).tobytes()
+
+
+def flood(megabytes: int) -> float:
+    """Speed of the slowest megabyte [MB/s]."""
+    known, decoder, slowest = set(SAMPLES), FrameDecoder(), math.inf
+    for piece in hostile(megabytes):
         begin = time.process_time()
         delivered = decoder.feed(piece)
         slowest = min(slowest, 1.0 / max(time.process_time() - begin, 1e-9))
@@ -251,6 +258,26 @@ def test_L6_a_hundred_million_hostile_bytes() -> None:
     slowest = flood(100)
     sys.stdout.write(f"slowest {slowest:.2f} MB/s\n")
     assert slowest >= 0.2
+
+
+@pytest.mark.parametrize("megabytes", [3, pytest.param(30, marks=pytest.mark.slow)])
+def test_L6_decoding_allocates_at_most_64_KiB(megabytes: int) -> None:
+    """In pieces as a port is read, a quarter of them; what is delivered is included."""
+    decoder, worst = FrameDecoder(), 0
+    tracemalloc.start()
+    try:
+        for whole in hostile(megabytes):
+            for at in range(0, len(whole), 4 * 4096):
+                piece = whole[at : at + 4096]
+                tracemalloc.reset_peak()
+                before, _ = tracemalloc.get_traced_memory()
+                decoder.feed(piece)
+                worst = max(worst, tracemalloc.get_traced_memory()[1] - before)
+            decoder.take_text()
+    finally:
+        tracemalloc.stop()
+    sys.stdout.write(f"at most {worst} bytes\n")
+    assert 4096 < worst <= 65_536
 
 
 @given(st.binary(min_size=2, max_size=100))

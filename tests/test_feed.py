@@ -8,14 +8,17 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
+from antennate.cli.viewer import REQUIRED
 from antennate.errors import LogError
-from antennate.params import ControllerParams
+from antennate.params import ControllerParams, LogParams
 from antennate.telemetry.feed import Feed, messages
 from antennate.telemetry.header import Header
+from antennate.telemetry.parts import part
 from antennate.telemetry.reader import LogReader
 from antennate.telemetry.ticks import Tick
 
@@ -30,8 +33,27 @@ def tick(number: int) -> Tick:
     )  # fmt: skip
 
 
-def viewer(path: Path) -> list[str]:
-    return [sys.executable, "-m", "antennate.cli.viewer", str(path)]
+def viewer(path: Path, *words: str) -> Callable[[int], list[str]]:
+    """The viewer that keeps a log, as `antennate drive` starts it."""
+    begin = [sys.executable, "-m", "antennate.cli.viewer"]
+    return lambda number: [*begin, str(part(path, number)), *words]
+
+
+def script(source: str) -> Callable[[int], list[str]]:
+    return lambda number: [sys.executable, "-c", source]
+
+
+def until(true: Callable[[], object], feed: Feed, begin: int = 1) -> tuple[int, float]:
+    """Send a tick every 10 ms until something is true: the next number, the longest sending."""
+    number, worst, end = begin, 0.0, time.monotonic() + 30.0
+    while not true() and time.monotonic() < end:
+        before = time.thread_time()
+        feed.send(tick(number).pack())
+        worst = max(worst, time.thread_time() - before)
+        number += 1
+        time.sleep(0.01)
+    assert true()
+    return number, worst
 
 
 def test_the_viewer_keeps_every_tick_in_order(
@@ -52,7 +74,7 @@ def test_the_viewer_keeps_every_tick_in_order(
 def test_G5_a_reader_that_stands_still_costs_no_time_and_what_it_misses_is_counted() -> None:
     """A pipe holds 1 MiB at most, 400 bytes a tick: 3000 ticks do not fit twice."""
     count = "import sys; print(len(sys.stdin.buffer.read()))"
-    feed = Feed([sys.executable, "-c", f"import time; time.sleep(1.0); {count}"], b"first")
+    feed = Feed(script(f"import time; time.sleep(1.0); {count}"), b"first")
     content = bytes(400)
     with feed:
         begin = time.monotonic()
@@ -64,19 +86,53 @@ def test_G5_a_reader_that_stands_still_costs_no_time_and_what_it_misses_is_count
 
 
 def test_G6_a_reader_that_dies_ends_nothing() -> None:
-    with Feed([sys.executable, "-c", "pass"], b"first") as feed:
-        end = time.monotonic() + 10.0
-        while feed.send(b"tick") and time.monotonic() < end:
-            time.sleep(0.01)
+    """It dies at once, and so do those that follow: after three of them no more is started."""
+    with Feed(script("pass"), b"first", params=LogParams(restarts=3)) as feed:
+        until(lambda: feed.failed, feed)
         assert not feed.send(b"tick")
-    assert feed.failed
+        assert not feed.keeps
+    assert feed.started == 4
+    assert not feed.complete
+
+
+def test_G6_a_recorder_that_is_killed_is_followed_by_one_with_a_new_file(tmp_path: Path) -> None:
+    first, second = tmp_path / "drive.log", tmp_path / "drive-2.log"
+    with Feed(viewer(first), HEADER.pack()) as feed:
+        number, _ = until(lambda: _holds_a_tick(first), feed)
+        assert feed.keeps
+        assert feed.pid is not None
+        os.kill(feed.pid, signal.SIGKILL)
+        killed = number
+        number, worst = until(lambda: _holds_a_tick(second), feed, number)
+        assert worst < 0.01, "the loop must not do the work of starting it"
+        number, _ = until(lambda: feed.keeps, feed, number)
+    assert (feed.started, feed.failed, feed.complete) == (2, False, False)
+    with LogReader(first) as log:
+        numbers = [each.number for each in log]
+        assert (log.parts, log.header, log.bad) == ((first, second), HEADER, 0)
+    gap = [n for n in range(1, number) if n not in numbers]
+    assert numbers == sorted(numbers)
+    assert len(gap) == log.missing <= killed
+    assert number - 1 in numbers, "what is sent while the new one starts waits for it"
+
+
+def test_G6_a_record_that_is_required_is_given_up_with_its_process(tmp_path: Path) -> None:
+    """So that the loop hears of a disk that fails, not only of a process that dies."""
+    taken = tmp_path / "drive.log"
+    taken.write_text("another drive")
+    with Feed(viewer(taken, REQUIRED), HEADER.pack()) as feed:
+        assert not feed.keeps
+        until(lambda: feed.keeps, feed)
+        assert feed.started == 2
+    with LogReader(tmp_path / "drive-2.log") as log:
+        assert log.header == HEADER
 
 
 def test_a_killed_loop_is_told_from_one_that_ended(tmp_path: Path) -> None:
     log = tmp_path / "drive.log"
     loop = (
         "import os, signal, sys, time\nfrom antennate.telemetry.feed import Feed\n"
-        f"feed = Feed({viewer(log)!r}, {HEADER.pack()!r})\nfeed.__enter__()\n"
+        f"feed = Feed(lambda n: {viewer(log)(1)!r}, {HEADER.pack()!r})\nfeed.__enter__()\n"
         f"feed.send({tick(1).pack()!r})\ntime.sleep(0.2)\nos.kill(os.getpid(), signal.SIGKILL)"
     )
     with subprocess.Popen(
@@ -117,13 +173,10 @@ def test_ctrl_c_does_not_end_the_viewer_before_the_loop(tmp_path: Path) -> None:
     with Feed(viewer(log), HEADER.pack()) as feed:
         feed.send(tick(1).pack())
         end = time.monotonic() + 20.0
-        while (
-            not (log.exists() and log.stat().st_size > len(HEADER.pack()) + 100)
-            and time.monotonic() < end
-        ):
+        while not _holds_a_tick(log) and time.monotonic() < end:
             time.sleep(0.01)
-        assert feed._process is not None  # pyright: ignore[reportPrivateUsage]
-        os.kill(feed._process.pid, signal.SIGINT)  # pyright: ignore[reportPrivateUsage]
+        assert feed.pid is not None
+        os.kill(feed.pid, signal.SIGINT)
         feed.send(tick(2).pack())
     assert not feed.failed
     with LogReader(log) as kept:

@@ -13,6 +13,7 @@ from antennate.experiments.twin import Rig, TwinConfig, rig
 from antennate.hardware.driving.drive import DriveConfig, drive, prepare, require_servos
 from antennate.hardware.driving.session import Session
 from antennate.hardware.dynamixel.bringup import BringUpError
+from antennate.hardware.esp32.frame import SAMPLE_FRAME_SIZE
 from antennate.hardware.ports.port import Port, PortError
 from antennate.hardware.safety.causes import State
 from antennate.loop import run_loop
@@ -191,6 +192,49 @@ def test_L14_swapped_ports_are_refused_by_name_and_no_servo_hears_a_byte(patienc
     assert patience < made.clock.now() - begin <= patience + 0.2
     assert not bus.sent
     assert not board.sent
+
+
+class Speaks:
+    """A board on the port of the bus: a frame every 10 ms, whatever it is asked."""
+
+    def __init__(self, now: Callable[[], float]) -> None:
+        self._now, self._told = now, 0
+
+    def drain(self) -> int:
+        told, self._told = self._told, SAMPLE_FRAME_SIZE * int(100 * self._now())
+        return self._told - told
+
+    def read(self, most: int, timeout: float) -> bytes:
+        return bytes(min(self.drain(), most))
+
+    def write(self, data: bytes) -> None:
+        raise AssertionError("nothing may be written")
+
+
+def test_L14_boards_on_both_ports_are_refused_within_2_s() -> None:
+    made = rig(TwinConfig())
+    board = Cable(BoardPort(made.robot, made.clock))
+    begin = made.clock.now()
+    with pytest.raises(BadInputError, match=r"--bus: expected servos.* another antenna board"):
+        prepare(DriveConfig(), esp32=board, bus=Speaks(made.clock.now), clock=made.clock)
+    assert made.clock.now() - begin <= 2.0
+    assert not board.sent
+
+
+@pytest.mark.parametrize("what", ["nothing", "servos"])
+def test_L14_a_port_without_a_board_is_refused_within_2_s(what: str) -> None:
+    """Servos on both ports say nothing either, nor does the one without a board."""
+    made, other = rig(TwinConfig()), rig(TwinConfig())
+    made.robot.board_silent = True
+    made.robot.take()
+    wrong = Cable(other.clock if what == "servos" else BoardPort(made.robot, made.clock))
+    bus = Cable(made.clock)
+    begin = made.clock.now()
+    with pytest.raises(BadInputError, match=r"--esp32: expected an antenna board within 1\.9 s"):
+        prepare(DriveConfig(), esp32=wrong, bus=bus, clock=made.clock)
+    assert made.clock.now() - begin <= 2.0
+    assert not wrong.sent
+    assert not bus.sent
 
 
 def test_L14_a_board_on_the_port_of_the_bus_is_refused_by_name() -> None:

@@ -18,9 +18,10 @@ from antennate.figures import style
 from antennate.figures.replay import Course
 from antennate.figures.replay import replay as draw
 from antennate.params import ControllerParams
-from antennate.records import Contact, Maneuver
+from antennate.records import Contact, Maneuver, Pose
 from antennate.telemetry.framing import framed
 from antennate.telemetry.header import Header
+from antennate.telemetry.reader import LogReader
 from antennate.telemetry.replay import ReplayBody, recorded_decider, replay
 from antennate.telemetry.ticks import JOINTS
 from antennate.telemetry.writer import LogWriter
@@ -55,6 +56,31 @@ def test_G7_the_same_code_decides_the_same(log: Path, capsys: pytest.CaptureFixt
     assert result["controller"] == result["recorded_controller"] == "paper"
     assert (result["seed"], result["trial"]) == (0, 0)
     assert result["closed"]
+
+
+def test_G6_all_files_of_a_log_are_replayed_as_one(
+    log: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The second one was never begun; the first was cut by a kill, the third was closed."""
+    first, third = tmp_path / "drive.log", tmp_path / "drive-3.log"
+    with LogReader(log) as reader:
+        ticks = list(reader)
+    cut = LogWriter(first, reader.header)
+    for tick in ticks[:120]:
+        cut.write(tick)
+    with LogWriter(third, reader.header) as writer:
+        for tick in ticks[120:]:
+            writer.write(tick)
+    result = said(capsys, str(first))
+    assert result["parts"] == ["drive.log", "drive-3.log"]
+    assert (result["ticks"], result["different"], result["different_poses"]) == (TICKS, 0, 0)
+    assert result["closed"]
+    data = third.read_bytes()
+    third.write_bytes(data[:-200] + bytes([data[-200] ^ 1]) + data[-199:])
+    assert main(["replay", str(first), "--json"]) == 2
+    out, err = capsys.readouterr()
+    assert (json.loads(out)["missing"], json.loads(out)["damaged"]) == (1, 1)
+    assert "of drive-3.log" in err
 
 
 def test_another_controller_is_compared(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -152,8 +178,6 @@ def test_an_empty_log_is_replayed(tmp_path: Path, capsys: pytest.CaptureFixture[
 
 
 def test_a_controller_that_raises_is_counted_and_does_not_end_the_replay(log: Path) -> None:
-    from antennate.telemetry.reader import LogReader
-
     with LogReader(log) as reader:
         sound = recorded_decider(reader.header)
 
@@ -186,3 +210,26 @@ def test_the_figure_shows_every_stretch_and_repeats_its_bytes() -> None:
     bars = [len(panel.collections) for panel in figure.axes]
     assert bars == [0, 0, 2, 5]  # one unknown, one contact; 2 recorded, 1 known replayed, 2 states
     assert style.render(figure) == style.render(draw(course))
+
+
+def test_G7_a_tick_without_a_decision_keeps_the_last_pose_that_was_not_refused(log: Path) -> None:
+    """As a session does: the second pose was refused, and the third tick kept the first."""
+
+    class Turning:
+        maneuver, contact = np.zeros(1, int), np.zeros((1, 2), int)
+        yaw = 0.0
+
+        def step(self, frame: object) -> Pose:
+            self.yaw += 0.1
+            return Pose(np.full((1, 5), self.yaw), np.zeros((1, 6, 2)), np.zeros((1, 2)))
+
+    with LogReader(log) as reader:
+        first, second, third, *_ = reader
+    angles = [(yaw,) * 5 + (0.0,) * 14 for yaw in (0.1, 0.2)]
+    ticks = [
+        dataclasses.replace(first, angles=angles[0], maneuver=0),
+        dataclasses.replace(second, angles=angles[1], maneuver=0, refused=1),
+        dataclasses.replace(third, angles=angles[0], maneuver=0, refused=1, asked=False),
+    ]
+    found = replay(ticks, Turning(), 0.01)
+    assert (found.poses, found.different) == (0, 0)

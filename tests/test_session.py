@@ -319,6 +319,24 @@ def test_B8_a_controller_that_fails_does_not_feed_the_watchdogs() -> None:
     assert log.first(Cause.REPEATED_FAILURES) - failed <= 0.1
 
 
+def test_G6_a_robot_whose_record_is_required_holds_while_none_is_kept() -> None:
+    """From 2.0 to 2.5 s; it walks on by itself."""
+
+    def lose(made: Rig, t: float) -> None:
+        made.session.unrecorded = 2.005 <= t < 2.505
+
+    made = rig(TwinConfig())
+    log = Log(made, lose)
+    report = drive(made.session, CONFIG, arm=True, on_tick=log)
+    t, states = np.array(log.t), np.array(log.state)
+    lost = (t > 2.015) & (t < 2.515)
+    assert (states[lost] == State.HOLD).all()
+    assert len({tuple(log.goals[i]) for i in np.flatnonzero(lost)[1:]}) == 1
+    assert (states[(t > 2.65) & (t < 3.9)] == State.OK).all()  # once the average is full
+    assert report.worst is State.HOLD
+    assert "one is required" in report.why
+
+
 @pytest.mark.parametrize("bad", [math.nan, math.inf])
 def test_S5_B14_a_pose_that_is_not_finite_never_reaches_the_bus(bad: float) -> None:
     made = rig(TwinConfig())
@@ -333,8 +351,8 @@ def test_S5_B14_a_pose_that_is_not_finite_never_reaches_the_bus(bad: float) -> N
     made.session.decider.step = step  # type: ignore[method-assign]
     log = Log(made)
     drive(made.session, CONFIG, arm=True, on_tick=log)
-    assert Cause.BAD_ACTION in set().union(*log.causes)
-    bad_since = log.first(Cause.BAD_ACTION)
+    assert Cause.BAD_POSE in set().union(*log.causes)
+    bad_since = log.first(Cause.BAD_POSE)
     sent = {tuple(g) for g, t in zip(log.goals, log.t, strict=True) if t >= bad_since}
     assert len(sent) == 1
 

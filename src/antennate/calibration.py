@@ -173,6 +173,7 @@ def save(calibration: Calibration, path: Path, overwrite: bool = False) -> None:
     """
     fresh = path.with_name(f".{path.name}.{os.getpid()}")
     try:
+        fresh.unlink(missing_ok=True)  # of a program with this number that was killed
         with fresh.open("x", encoding="utf-8") as file:
             file.write(to_json(calibration))
             file.flush()

@@ -11,7 +11,7 @@ from typing import Annotated, Any
 
 import tyro
 
-from antennate.cli import BAD_INPUT, OK
+from antennate.cli import BAD_INPUT, OK, viewer
 from antennate.cli.addresses import RobotOrders, key_of, parse_robot, require_lossless
 from antennate.cli.folder import LOG, RunFolder, to_json
 from antennate.cli.progress import terminate_as_interrupt
@@ -25,6 +25,7 @@ from antennate.hardware.robot_file import RobotFile
 from antennate.hardware.safety.causes import State
 from antennate.telemetry.feed import Feed
 from antennate.telemetry.header import Header
+from antennate.telemetry.parts import part, parts
 from antennate.telemetry.ticks import Tick
 
 DESCRIPTION = """\
@@ -96,11 +97,16 @@ def _carry_out(config: DriveConfig, session: Session, orders: Orders, log: Path)
     In a twin's time nothing is urgent, and the log is waited for.
     """
     header = Header(controller=config.controller, params=config.mind, layout=config.layout)
-    viewer = [sys.executable, "-m", "antennate.cli.viewer", str(log)]
-    feed = Feed(viewer, header.pack(), waits=bool(orders.clock))
+    required = [viewer.REQUIRED] if config.record_required else []
+
+    def words(number: int) -> list[str]:
+        return [sys.executable, "-m", viewer.__name__, str(part(log, number)), *required]
+
+    feed = Feed(words, header.pack(), waits=bool(orders.clock))
 
     def keep(session: Session, t: float) -> None:
         feed.send(Tick.of(session, t).pack())
+        session.unrecorded = config.record_required and not feed.keeps
 
     with feed, nullcontext(Priority.ORDINARY) if orders.clock else urgent() as priority:
         report = drive(session, config, orders.arm, keep)
@@ -109,7 +115,8 @@ def _carry_out(config: DriveConfig, session: Session, orders: Orders, log: Path)
         "clock": "twin" if orders.clock else "host",
         "priority": priority.value,
         "unlogged": feed.dropped,
-        "log_complete": not (feed.failed or feed.dropped),
+        "log_complete": feed.complete,
+        "logs": [each.name for each in parts(log) if each.exists()],
     }
     return head | report.result(session) | tail
 
@@ -133,7 +140,7 @@ def _note(result: Mapping[str, Any]) -> str:
     elif result["priority"] == Priority.ORDINARY.value:
         note += "Real-time priority was not allowed; a busy machine will make it miss ticks.\n"
     if not result["log_complete"]:
-        note += "The log is not complete.\n"
+        note += f"The log is not complete; its files: {', '.join(result['logs']) or 'none'}.\n"
     return note
 
 
@@ -168,5 +175,6 @@ _ROWS: list[tuple[str, Cell]] = [
         for name in ("frames", "crc_errors", "lost_samples", "missed_answers", "stale_answers")
     ),
     ("poses sent", lambda result: number(result["poses_sent"], "d")),
+    ("poses refused", lambda result: number(result["poses_refused"], "d")),
     ("priority", lambda result: result["priority"]),
 ]

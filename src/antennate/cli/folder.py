@@ -29,6 +29,8 @@ from antennate.cli import COMMANDS
 from antennate.cli.toml import to_toml
 from antennate.errors import OutputError
 from antennate.params import Params
+from antennate.params.log import MOST_PARTS
+from antennate.telemetry.parts import part
 
 RESULT, TABLE, PARTIAL = "result.json", "trials.csv", "trials.partial.jsonl"
 CONFIG, VERSIONS, COMMAND = "config.toml", "versions.json", "command.txt"
@@ -37,7 +39,8 @@ DRAWINGS = tuple(
     f"figures/{name}.{suffix}" for name in (*_MORE, *COMMANDS) for suffix in ("svg", "png")
 )
 CALIBRATION, LOG = "calibration.json", "drive.log"
-FILES = (CALIBRATION, "conditioning.toml", "recording.csv", "ticks.csv", LOG)
+LOGS = tuple(part(Path(LOG), number).name for number in range(1, MOST_PARTS + 1))
+FILES = (CALIBRATION, "conditioning.toml", "recording.csv", "ticks.csv", *LOGS)
 _NAMES = (RESULT, PARTIAL, TABLE, CONFIG, VERSIONS, COMMAND, *FILES, *DRAWINGS)
 """Every file that a run may write."""
 _CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f]+")
@@ -107,6 +110,7 @@ class RunFolder:
         with _writing(path):
             path.parent.mkdir(exist_ok=True)
             try:
+                fresh.unlink(missing_ok=True)  # of a program with this number that was killed
                 with fresh.open("xb") as file:
                     file.write(data)
                     file.flush()

@@ -19,7 +19,7 @@ from antennate.cli.messages import one_line
 from antennate.cli.tables import Cell, number, show
 from antennate.errors import ConfigError
 from antennate.records import Maneuver
-from antennate.telemetry.reader import LogReader
+from antennate.telemetry.reader import Damage, LogReader
 from antennate.telemetry.replay import ReplayConfig, Replayed, recorded_decider, replay
 from antennate.telemetry.ticks import FIELDS, Tick
 
@@ -79,7 +79,7 @@ def command(argv: Sequence[str]) -> int:
         _show(result)
     if not log.bad and not log.missing:
         return OK
-    place = f"; first at byte {log.damage[0].offset}: {log.damage[0].reason}" if log.bad else ""
+    place = f"; first at {_place(log.damage[0])}" if log.bad else ""
     sys.stderr.write(
         f"antennate replay: error: {path}: expected an undamaged log, found {log.bad} damaged "
         f"places and {log.missing} ticks missing; {log.ticks} ticks were read{place}\n"
@@ -87,11 +87,16 @@ def command(argv: Sequence[str]) -> int:
     return BAD_INPUT
 
 
+def _place(damage: Damage) -> str:
+    return f"byte {damage.offset} of {damage.path.name}: {damage.reason}"
+
+
 def _result(log: LogReader, found: Replayed, controller: str | None) -> dict[str, Any]:
     header, ticks = log.header, max(1, log.ticks)
     first = found.first
     return {
         "log": str(log.path),
+        "parts": [part.name for part in log.parts],
         "version": header.version,
         "recorded_controller": header.controller,
         "controller": controller or header.controller,
@@ -140,7 +145,8 @@ def _show(result: Mapping[str, Any]) -> None:
             ("exceptions", _count("failures")),
             ("ticks missing", _count("missing")),
         ],
-        f"{result['ticks']} ticks, {result['duration_s']:.2f} s.\n"
+        f"{result['ticks']} ticks, {result['duration_s']:.2f} s, in "
+        f"{one_line(', '.join(result['parts']))}.\n"
         f"Recorded by {one_line(result['recorded_controller'])}, antennate "
         f"{one_line(result['version'])}; "
         f"{'the log is complete' if result['closed'] else 'not ended: its program was killed'}.\n"

@@ -1,11 +1,14 @@
 """The other process of `antennate drive`: it keeps the log and shows one line.
 
-It reads from its standard input what a `Feed` sends, and nobody waits for it.
+It reads from its standard input what a `Feed` sends, and nobody waits for it. On its standard
+output it says once that the log has begun.
 """
 
 from __future__ import annotations
 
+import contextlib
 import math
+import os
 import shutil
 import signal
 import sys
@@ -19,6 +22,8 @@ from antennate.telemetry.header import Header
 from antennate.telemetry.ticks import Tick
 from antennate.telemetry.writer import LogWriter
 
+REQUIRED = "required"
+_STDOUT = 1
 _LINES_A_SECOND = 5
 
 
@@ -51,7 +56,7 @@ def line(tick: Tick, dropped: int) -> str:
         f"{tick.now:7.1f} s {state}{why} {_name(tick.maneuver)} counts={left},{right} "
         f"age={1e3 * tick.age:.0f}ms {tick.note} missed_ticks={tick.missed} "
         f"missed_answers={tick.misses} stale={tick.stale} frames={tick.frames} crc={tick.crc} "
-        f"lost={tick.lost} sent={tick.sent} unlogged={dropped}"
+        f"lost={tick.lost} sent={tick.sent} refused={tick.refused} unlogged={dropped}"
     )
 
 
@@ -61,19 +66,27 @@ def _name(maneuver: int) -> str:
 
 
 def main() -> int:
-    """Keep and show ticks until they end; 0 if all of them are kept."""
+    """Keep and show ticks until they end; 0 if all of them are kept.
+
+    With the word `required` after the log's path it ends with the log, and shows nothing more.
+    """
     for number in (signal.SIGINT, signal.SIGTERM):  # the other end decides when it is over
         signal.signal(number, signal.SIG_IGN)
     status = StatusLine()
-    kept = False
+    kept, required = False, REQUIRED in sys.argv[2:]
     stream = messages(sys.stdin.buffer)
     try:
         first = next(stream, None)
         log = None if first is None else _begin(Path(sys.argv[1]), first)
         kept = log is not None
+        if kept:
+            with contextlib.suppress(OSError):  # the other end is gone; the ticks tell it
+                os.write(_STDOUT, b"begun\n")
         for message in stream:
             status.show(message)
             kept = kept and _keep(log, message.content)
+            if required and not kept:
+                break
         if log is not None and kept:
             log.close()
     except LogError as error:

@@ -13,6 +13,7 @@ from antennate.params.layout import MOST_TICKS, TICKS_A_TURN, LayoutParams
 from antennate.records import Floats, Ints, Pose
 
 _STEP = 2.0 * math.pi / TICKS_A_TURN
+_SHAPES = {"yaw": (1, YAW_COUNT), "leg": (1, LINK_COUNT, 2), "antenna": (1, 2)}
 
 
 class PoseError(AntennateError):
@@ -41,12 +42,10 @@ class Joints:
         """Goal positions [ticks] of a pose of one robot, shape (19,).
 
         Raises:
-            PoseError: It is not one robot's, not finite, or beyond a limit or what servos count.
-                It is refused as a whole.
+            PoseError: It is no pose of one robot, not finite, or beyond a limit or what servos
+                count. It is refused as a whole.
         """
-        angles = np.concatenate([pose.yaw.ravel(), pose.leg.ravel(), pose.antenna.ravel()])
-        if angles.shape != self._sign.shape:
-            raise PoseError(f"expected {len(self.ids)} joint angles, found {len(angles)}")
+        angles = _angles(pose)
         with np.errstate(over="ignore"):  # infinite then, and refused
             ticks = np.rint(self.positions(angles))
         turning = np.isinf(self._limit)
@@ -83,3 +82,21 @@ class Joints:
         angles: Floats = (ticks - self._zero) * self._sign * _STEP
         legs = angles[YAW_COUNT:-2].reshape(1, LINK_COUNT, 2)
         return Pose(yaw=angles[None, :YAW_COUNT], leg=legs, antenna=angles[None, -2:])
+
+
+def _angles(pose: Pose) -> Floats:
+    """Its joint angles [rad], shape (19,); a controller of one's own may say anything."""
+    parts: list[Floats] = []
+    for name, shape in _SHAPES.items():
+        try:
+            part = np.asarray(getattr(pose, name), float)
+        except (AttributeError, TypeError, ValueError):
+            raise PoseError(
+                f"expected a Pose with numbers in {name}, found a {type(pose).__name__}"
+            ) from None
+        if part.shape != shape:
+            raise PoseError(
+                f"expected {name} of shape {shape} for 19 joints, found shape {part.shape}"
+            )
+        parts.append(part.ravel())
+    return np.concatenate(parts)

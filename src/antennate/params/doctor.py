@@ -19,6 +19,31 @@ class DoctorParams(Params):
         gt=0,
         le=60,
     )
+    silence: float = number(
+        1.9,
+        "s",
+        "assumed: a board that runs sends every 10 ms, one that starts says so at once, one on a "
+        "network is asked seven times meanwhile",
+        "silence of a port after which no board is there",
+        gt=0,
+        le=60,
+    )
+    quiet: float = number(
+        0.1,
+        "s",
+        "assumed: ten samples of a board; servos speak only if asked",
+        "time for which the bus is listened to before a servo is asked",
+        gt=0,
+        le=1,
+    )
+    unasked: int = number(
+        32,
+        "byte",
+        "assumed: more than one sample of a board, and than a plug that goes in brings",
+        "bytes in that time that nobody asked for, from which on servos are not alone on the bus",
+        ge=1,
+        le=1000,
+    )
     reads: int = number(
         20, "1", "assumed: enough for a median", "reads of all servos that are timed", ge=3, le=1000
     )

@@ -11,15 +11,17 @@ from __future__ import annotations
 import contextlib
 import fcntl
 import os
+import select
 import struct
 import subprocess
-from collections.abc import Iterator, Sequence
+import threading
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from select import PIPE_BUF
 from typing import BinaryIO
 
 from antennate.errors import LogError
-from antennate.params import HostParams
+from antennate.params import HostParams, LogParams
 
 _HEAD = struct.Struct("<II")
 _ROOM = 1 << 20
@@ -45,64 +47,120 @@ class Message:
 class Feed:
     """The sending end; as a context it starts the other process and waits for its end.
 
+    A process that dies is followed by a new one, which gets the first message and what is sent
+    from then on. A thread of its own looks after that, so that the loop never waits for it.
+
     Args:
-        words: Command line of a process that reads messages from its standard input.
+        words: The command line of the n-th process, 1 the first. It reads messages from its
+            standard input, and writes anything to its standard output once it keeps them.
         first: The content of the first message, of any length.
         waits: Wait for room instead of dropping, where the loop's time is not the host's.
+        params: How many processes may follow the first.
 
     Attributes:
-        dropped: Ticks that found no room.
-        failed: The other process is gone, or ended with an error.
+        dropped: Ticks that found no room, or nobody.
+        started: Processes started so far.
+        keeps: Whether one runs that has said that it keeps what it gets.
+        failed: The last one is gone for good, or ended with an error.
     """
 
-    def __init__(self, words: Sequence[str], first: bytes, waits: bool = False) -> None:
+    def __init__(
+        self,
+        words: Callable[[int], Sequence[str]],
+        first: bytes,
+        waits: bool = False,
+        params: LogParams | None = None,
+    ) -> None:
         self._words, self._first, self._waits = words, first, waits
+        self._most = 1 + (params or LogParams()).restarts
         self._process: subprocess.Popen[bytes] | None = None
         self._pipe = -1
-        self.dropped = 0
-        self.failed = False
+        self._ending = False
+        self._lock = threading.Lock()
+        self._keeper = threading.Thread(target=self._look_after, name="recorder", daemon=True)
+        self.dropped = self.started = 0
+        self.keeps = self.failed = False
+
+    @property
+    def pid(self) -> int | None:
+        """Id of the process that runs or ran last."""
+        return None if self._process is None else self._process.pid
+
+    @property
+    def complete(self) -> bool:
+        """Whether one process has kept every tick."""
+        return self.started == 1 and not (self.failed or self.dropped)
 
     def __enter__(self) -> Feed:
-        theirs, self._pipe = os.pipe()
-        try:
-            self._process = subprocess.Popen(self._words, stdin=theirs)  # noqa: S603 our own words
-        finally:
-            os.close(theirs)
-        with contextlib.suppress(OSError, AttributeError):  # less room where not allowed or known
-            fcntl.fcntl(self._pipe, fcntl.F_SETPIPE_SZ, _ROOM)
-        with contextlib.suppress(BrokenPipeError):  # it has gone already; `send` will notice
-            os.write(self._pipe, _HEAD.pack(len(self._first), 0) + self._first)
-        os.set_blocking(self._pipe, self._waits)
+        self._start()
+        self._keeper.start()
         return self
 
     def __exit__(self, *_: object) -> None:
-        process, self._process = self._process, None
-        if process is None:
-            return
-        os.set_blocking(self._pipe, True)
-        with contextlib.suppress(OSError):
-            os.write(self._pipe, _HEAD.pack(0, self.dropped))
+        with self._lock:
+            self._ending = True
+        with contextlib.suppress(OSError):  # one that takes nothing is not waited for
+            if select.select((), (self._pipe,), (), _PATIENCE)[1]:
+                os.write(self._pipe, _HEAD.pack(0, self.dropped))
         os.close(self._pipe)
-        try:
-            self.failed |= process.wait(_PATIENCE) != 0
-        except subprocess.TimeoutExpired:
-            process.kill()
-            process.wait()
-            self.failed = True
+        self._keeper.join(_PATIENCE)
+        if self._keeper.is_alive() and self._process is not None:
+            self._process.kill()
+            self._keeper.join()
 
     def send(self, content: bytes) -> bool:
         """Hand over one record; False if it was dropped."""
         message = _HEAD.pack(len(content), self.dropped) + content
-        done = not self.failed and len(message) <= PIPE_BUF  # more may be taken in part
+        done = len(message) <= PIPE_BUF  # more may be taken in part
         try:
             if done:
                 os.write(self._pipe, message)
-        except BlockingIOError:
+        except OSError:  # full, or nobody reads
             done = False
-        except OSError:
-            self.failed, done = True, False
         self.dropped += not done
         return done
+
+    def _look_after(self) -> None:
+        """Whenever the process dies, start the next one."""
+        while True:
+            process = self._process
+            if process is None or process.stdout is None:
+                return
+            with process.stdout as said:
+                self.keeps = bool(said.read(1))
+                while said.read(4096):
+                    pass
+            died = process.wait() != 0
+            self.keeps = False
+            with self._lock:
+                if self._ending or self.started >= self._most:
+                    self.failed = died or not self._ending
+                    return
+                try:
+                    self._start()
+                except OSError:
+                    self.failed = True
+                    return
+
+    def _start(self) -> None:
+        """Start a process; what is sent goes to it from now on."""
+        theirs, ours = os.pipe()
+        try:
+            with contextlib.suppress(OSError, AttributeError):  # less room where not allowed
+                fcntl.fcntl(ours, fcntl.F_SETPIPE_SZ, _ROOM)
+            os.write(ours, _HEAD.pack(len(self._first), self.dropped) + self._first)
+            os.set_blocking(ours, self._waits)
+            if self._pipe < 0:
+                self._pipe = os.dup(ours)
+            else:
+                os.dup2(ours, self._pipe, inheritable=False)  # at once: the loop may be writing
+            self.started += 1
+            self._process = subprocess.Popen(  # noqa: S603 our own words
+                self._words(self.started), stdin=theirs, stdout=subprocess.PIPE
+            )
+        finally:
+            os.close(theirs)
+            os.close(ours)
 
 
 def messages(stream: BinaryIO) -> Iterator[Message]:

@@ -1,4 +1,4 @@
-"""Reads one log. What is damaged is left out and counted; what follows it is still read."""
+"""Reads one log, all its files. What is damaged is left out and counted; the rest is read."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from pathlib import Path
 from antennate.errors import LogError
 from antennate.telemetry.framing import SCHEMA, Kind, opened, pieces
 from antennate.telemetry.header import Header
+from antennate.telemetry.parts import parts
 from antennate.telemetry.ticks import Tick
 
 _LISTED = 100
@@ -22,20 +23,23 @@ class Damage:
     Attributes:
         offset: Where it begins in the file [bytes].
         reason: What is wrong.
+        path: The file.
     """
 
     offset: int
     reason: str
+    path: Path
 
 
 class LogReader:
-    """The ticks of a file, one after the other; iterate once.
+    """The ticks of a log, one after the other; iterate once.
 
     Args:
-        path: The log.
+        path: Its first file; those that continue it are read too.
 
     Attributes:
-        path: The log.
+        path: The first file.
+        parts: All files.
         header: Its header.
         ticks: Ticks read so far.
         first: Number of the first tick read, 0 before it.
@@ -57,6 +61,8 @@ class LogReader:
             self._file = path.open("rb")
         except OSError as error:
             raise LogError(f"expected a log, found {path}: {error.strerror}") from None
+        self.parts = parts(path)
+        self._part, self._before = path, 0
         self._records = self._read()
         try:
             self.header = self._header()
@@ -81,7 +87,9 @@ class LogReader:
             if content is None:
                 self._note(offset, "damaged record")
             elif content[0] == SCHEMA and content[1] == Kind.END and len(content) == 10:
-                self.end = int.from_bytes(content[2:], "little")
+                self.end = self._before + int.from_bytes(content[2:], "little")
+            elif self._part != self.path and content == self._first:
+                continue
             else:
                 try:
                     tick = Tick.unpack(content)
@@ -103,14 +111,20 @@ class LogReader:
 
     def _read(self) -> Iterator[tuple[int, bytes | None]]:
         try:
-            yield from pieces(self._file)
+            for path in self.parts:
+                if path != self.path:
+                    self._file.close()
+                    self._part, self._before, self.end = path, self.ticks, None
+                    self._file = path.open("rb")
+                yield from pieces(self._file)
         except OSError as error:
-            raise LogError(f"expected to read {self.path}, found: {error.strerror}") from None
+            raise LogError(f"expected to read {self._part}, found: {error.strerror}") from None
 
     def _header(self) -> Header:
         _, piece = next(self._records, (0, b""))
         content = None if piece is None else opened(piece)
         if content is not None:
+            self._first = content
             try:
                 return Header.unpack(content)
             except LogError as error:
@@ -124,4 +138,4 @@ class LogReader:
     def _note(self, offset: int, reason: str) -> None:
         self.bad += 1
         if self.bad <= _LISTED:
-            self.damage.append(Damage(offset, reason))
+            self.damage.append(Damage(offset, reason, self._part))

@@ -93,15 +93,20 @@ class _Guarded:
 
     def __init__(self, decider: Decider, body: ReplayBody) -> None:
         self._decider, self._body = decider, body
-        self.failures = 0
+        self._kept: Pose | None = None
+        self._refused = self.failures = 0
 
     def step(self, frame: AntennaFrame) -> Pose:
         """The pose of this tick."""
-        tick, pose = self._body.tick, self._body.pose
-        if tick is not None and pose is not None and not tick.asked:
-            return pose
+        tick = self._body.tick
+        if tick is not None and self._kept is not None and not tick.asked:
+            return self._kept
+        refused, self._refused = self._refused, 0 if tick is None else tick.refused
         try:
-            return self._decider.step(frame)
+            pose = self._decider.step(frame)
+            if self._refused <= refused:
+                self._kept = pose
+            return pose
         except Exception:  # noqa: BLE001 a plugged-in controller may raise anything
             self.failures += 1
             return Pose(*(np.full(shape, math.nan) for shape in ((1, 5), (1, 6, 2), (1, 2))))

@@ -21,13 +21,13 @@ from antennate.telemetry.framing import SCHEMA, Kind
 
 JOINTS = (*YAW_JOINTS, *LEGS, *(f"antenna_{side}" for side in SIDES))
 """The order of angles."""
-LAYOUT = f"<BBQ?8d3q{len(JOINTS) + 2}d7QI"
+LAYOUT = f"<BBQ?8d3q{len(JOINTS) + 2}d8QI"
 """For `struct`: all fields but the text, whose length in bytes comes last."""
 FIELDS = (
     *("schema", "kind", "number", "asked", "t", "now"),
     *("counts_l", "counts_r", "reading_l", "reading_r", "b_l", "b_r"),
     *("contact_l", "contact_r", "maneuver", "phase", *JOINTS, "age"),
-    *("missed", "frames", "crc", "lost", "misses", "stale", "sent", "text"),
+    *("missed", "frames", "crc", "lost", "misses", "stale", "sent", "refused", "text"),
 )
 
 _STRUCT = struct.Struct(LAYOUT)
@@ -77,6 +77,7 @@ class Tick:
         misses: Answers that servos did not give so far.
         stale: Late answers thrown away so far.
         sent: Poses sent so far.
+        refused: Poses refused so far.
     """
 
     number: int
@@ -101,6 +102,7 @@ class Tick:
     misses: int = 0
     stale: int = 0
     sent: int = 0
+    refused: int = 0
 
     @classmethod
     def of(cls, session: Session, t: float) -> Tick:
@@ -125,6 +127,7 @@ class Tick:
             misses=bus.misses,
             stale=bus.stale,
             sent=session.tally.sent,
+            refused=session.tally.refused,
         )
 
     @classmethod
@@ -140,7 +143,7 @@ class Tick:
             *(self.number, int(self.asked), self.t, self.now),
             *(*self.counts, *self.reading, *self.b, *self.contact, self.maneuver, self.phase),
             *(*self.angles, self.age, self.missed, self.frames, self.crc, self.lost),
-            *(self.misses, self.stale, self.sent),
+            *(self.misses, self.stale, self.sent, self.refused),
         )
 
     def frame(self) -> AntennaFrame:
@@ -179,7 +182,7 @@ class Tick:
         counts, reading, b, contact = (tuple(rest[i : i + 2]) for i in (0, 2, 4, 6))
         maneuver, phase, *rest = rest[8:]
         angles, rest = tuple(rest[: len(JOINTS)]), rest[len(JOINTS) :]
-        health = dict(zip(FIELDS[-9:-1], rest, strict=True))
+        health = dict(zip(FIELDS[-10:-1], rest, strict=True))
         return cls(
             *(number, t, now, counts, reading, b, contact, maneuver, phase, angles),
             *(state, tuple(causes), asked, note),
@@ -193,7 +196,7 @@ def angles_of(pose: Pose) -> tuple[float, ...]:
         angles = np.concatenate(
             [np.asarray(part, float).ravel() for part in (pose.yaw, pose.leg, pose.antenna)]
         ).tolist()
-    except (TypeError, ValueError):
+    except (AttributeError, TypeError, ValueError):
         return _NOWHERE
     return tuple(angles) if len(angles) == len(JOINTS) else _NOWHERE
 

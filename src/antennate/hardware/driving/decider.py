@@ -28,7 +28,7 @@ class Thought:
 
     asked: bool = True
     decided_at: float = -math.inf
-    finite: bool = True
+    bad_pose: str = ""
     failure: str = ""
 
 

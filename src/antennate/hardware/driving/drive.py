@@ -38,7 +38,7 @@ from antennate.params import BusParams, DoctorParams, DriftParams, TouchCheckPar
 from antennate.params.layout import LayoutParams
 from antennate.records import AntennaFrame, Pose
 
-_GREETING_TIME = DoctorParams().greeting
+_WHO = DoctorParams()
 _PATIENCE = 0.05
 DOUBT = BusParams().doubt_walking
 
@@ -54,6 +54,12 @@ class DriveConfig(RobotConfig):
     )
     duration: float | None = number(
         None, "s", "assumed: until it is stopped", "time from torque on to off", gt=0
+    )
+    record_required: bool = number(
+        False,
+        "1",
+        "assumed: a robot that walks matters more than its log",
+        "whether the robot holds while no log of it is kept",
     )
     touch_check: bool = number(
         True,
@@ -166,11 +172,12 @@ def await_board(
 ) -> None:
     """Wait for a greeting and samples; what the bus says unasked is read, and nothing written.
 
+    A silent port is given up earlier than one on which a board may be starting.
+
     Raises:
-        BadInputError: None came; says what came instead.
+        BadInputError: None came, and says what came instead; or the bus speaks unasked.
     """
     begin, unasked = clock.now(), 0
-    end = begin + _GREETING_TIME
     while board.clock.newest is None:
         unasked += 0 if bus is None else _unasked(bus)
         silent = not board.decoder.counters.received
@@ -179,7 +186,8 @@ def await_board(
                 f"--esp32: expected an antenna board, found silence, and {unasked} bytes on --bus "
                 "that no servo was asked for; --esp32 and --bus are swapped"
             )
-        if clock.now() > end:
+        patience = _WHO.silence if silent else _WHO.greeting
+        if clock.now() > begin + patience:
             came = board.decoder.counters
             why = (
                 board.refusals[-1]
@@ -191,10 +199,24 @@ def await_board(
                 )
             )
             raise BadInputError(
-                f"--esp32: expected an antenna board within {_GREETING_TIME:g} s, found {why}"
+                f"--esp32: expected an antenna board within {patience:g} s, found {why}"
             )
         clock.sleep_until(clock.now() + _PATIENCE)
         board.poll(clock.now())
+    if bus is not None:
+        _require_quiet(bus, clock)
+
+
+def _require_quiet(bus: Port, clock: Any) -> None:
+    """No servo speaks unasked; an antenna board does."""
+    _unasked(bus)
+    clock.sleep_until(clock.now() + _WHO.quiet)
+    if (count := _unasked(bus)) >= _WHO.unasked:
+        raise BadInputError(
+            f"--bus: expected servos, which speak only if asked, found {count} bytes in "
+            f"{_WHO.quiet:g} s that nobody asked for; is it the port of another antenna board, or "
+            "has the bus another master?"
+        )
 
 
 def _unasked(bus: Port) -> int:

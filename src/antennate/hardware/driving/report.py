@@ -61,8 +61,10 @@ class Report:
             "lost_samples": board.lost,
             "missed_answers": bus.misses,
             "stale_answers": bus.stale,
+            "broken_answers": bus.bad_crc,
             "poses_sent": session.tally.sent,
             "poses_limited": session.tally.limited,
+            "poses_refused": session.tally.refused,
             "tracebacks": list(session.tracebacks.kept),
         }
 

@@ -67,6 +67,7 @@ class Session:
         frame: What the controller got in the last tick.
         pose: What it said.
         touched: Whether anything was written to the servos.
+        unrecorded: Whether a record that is required is not kept; the robot holds meanwhile.
     """
 
     def __init__(
@@ -105,7 +106,7 @@ class Session:
         self._pose: Pose | None = None
         self._used = self._refused = 0
         self._owed = 0.0
-        self._lost = self.touched = False
+        self._lost = self.touched = self.unrecorded = False
 
     @property
     def asked(self) -> bool:
@@ -201,10 +202,14 @@ class Session:
             thought.failure = f"{type(error).__name__}: {error}"
             self.tracebacks.keep(self.clock.now(), error)
             return nowhere()
-        angles = (pose.yaw, pose.leg, pose.antenna)
-        thought.finite = all(bool(np.isfinite(a).all()) for a in angles)
         thought.decided_at = self.clock.now()
-        self._pose = pose
+        try:
+            self.joints.ticks(pose)
+        except PoseError as error:
+            thought.bad_pose = str(error)
+            self.tally.refused += 1
+        else:
+            self._pose = pose
         return pose
 
     def _due(self) -> bool:
@@ -248,7 +253,7 @@ class Session:
             decided_at=thought.decided_at,
             maneuver=int(self.decider.maneuver[0]),
             contact=(int(contact[0]), int(contact[1])),
-            finite=thought.finite,
+            bad_pose=thought.bad_pose,
             failure=thought.failure,
             resets=clock.resets,
             reset_reason="" if clock.last_reset is None else clock.last_reset.name,
@@ -261,6 +266,7 @@ class Session:
             supply=watch.supply,
             drift=self.trust.drifted,
             objections=() if self._goals is not None else self.trust.objections,
+            unrecorded=self.unrecorded,
             arm=self.orders.arm,
             stop=self.orders.stop,
         )

@@ -98,7 +98,7 @@ class Tally:
     Attributes:
         misses: Requests to one servo without a right answer.
         stale: Answers that were right but not to the request, and were thrown away.
-        bad_crc: Packets with a wrong CRC.
+        bad_crc: Packets with a wrong CRC, and broken parts of replies to fast sync reads.
         drained: Bytes thrown away before a request.
     """
 

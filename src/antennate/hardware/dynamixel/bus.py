@@ -212,6 +212,7 @@ class Bus:
             wait = self.timing.answer(length)
         found = packets.split_fast_reply(received, ids, length)
         good = {status.id: answer(status) for status in found}
+        self.tally.bad_crc += packets.broken_fast_reply(received, len(ids), length, len(good))
         self._finish(ids, length, good, len(received) == size)
         return cut(good, span.length)
 

@@ -254,6 +254,18 @@ def split_fast_reply(received: bytes, ids: Sequence[int], length: int) -> list[S
     return answers
 
 
+def broken_fast_reply(received: bytes, count: int, length: int, good: int) -> int:
+    """How many parts came whole, but broken: all but the `good` ones; 1 if the header is.
+
+    One damaged CRC breaks two parts.
+    """
+    start = received.find(_fast_header(count, length))
+    if start < 0:
+        return int(bool(received))
+    whole = (len(received) - start - fast_reply_size(0, length)) // (length + 4)
+    return max(min(whole, count) - good, 0)
+
+
 def _status(servo: int, error_byte: int, data: bytes) -> Status:
     number = error_byte & ~ALERT
     error = StatusError(number) if number <= StatusError.ACCESS else StatusError.UNKNOWN

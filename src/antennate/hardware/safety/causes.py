@@ -45,7 +45,9 @@ class Cause(Enum):
     FAILED = (State.HOLD, "the controller raised an exception")
     UNDECIDED = (State.HOLD, "the controller took no decision in this tick")
     BAD_ACTION = (State.HOLD, "the controller asked for what does not exist")
+    BAD_POSE = (State.HOLD, "a pose of the controller was refused")
     UNKNOWN_CONTACT = (State.HOLD, "contact is not known")
+    NO_RECORD = (State.HOLD, "no log is kept, and one is required")
     SUPPLY_HOLD = (State.HOLD, "the supply is too low to walk")
     REPEATED_HOLDS = (State.FAULT, "too many holds in a short time")
     REPEATED_FAILURES = (State.FAULT, "the controller failed too often in a short time")
@@ -84,7 +86,15 @@ DATA = frozenset(
     }
 )
 """Losses of data: they end after enough fresh valid samples in a row."""
-OF_MIND = frozenset({Cause.FAILED, Cause.UNDECIDED, Cause.BAD_ACTION, Cause.UNKNOWN_CONTACT})
+OF_MIND = frozenset(
+    {
+        Cause.FAILED,
+        Cause.UNDECIDED,
+        Cause.BAD_ACTION,
+        Cause.BAD_POSE,
+        Cause.UNKNOWN_CONTACT,
+    }
+)
 """Causes in the controller: they end as soon as it decides well again."""
 CURED_BY_ARMING = frozenset({Cause.UNKNOWN_CONTACT, Cause.WATCHDOG, Cause.DISARMED})
 """Causes that do not stand against an arm event."""
@@ -112,7 +122,7 @@ class Inputs:
         decided_at: Time at which the controller finished its newest decision [s].
         maneuver: That decision.
         contact: What it rests on, left and right.
-        finite: Whether every number of its pose is finite.
+        bad_pose: Why its pose must not be sent, empty if it may.
         failure: Text of an exception of the controller in this tick, empty if none.
         resets: Restarts of the antenna board so far.
         reset_reason: Why it last restarted, as far as it can tell.
@@ -125,6 +135,7 @@ class Inputs:
         supply: Voltage of the supply [V], NaN if unknown.
         drift: How far resting readings have drifted, empty if not far.
         objections: What speaks against arming, such as a failed touch check or foreign firmware.
+        unrecorded: Whether a record that is required is not kept.
         stop: Whether the operator wants the torque off.
         arm: Whether the operator wants it on; only the change to True in FAULT or OFF counts.
     """
@@ -136,7 +147,7 @@ class Inputs:
     supply: float
     maneuver: int = Maneuver.HOLD
     contact: tuple[int, int] = (Contact.UNKNOWN, Contact.UNKNOWN)
-    finite: bool = True
+    bad_pose: str = ""
     failure: str = ""
     refused: int = 0
     resets: int = 0
@@ -149,6 +160,7 @@ class Inputs:
     disarmed: tuple[int, ...] = ()
     drift: str = ""
     objections: tuple[str, ...] = ()
+    unrecorded: bool = False
     stop: bool = False
     arm: bool = False
 

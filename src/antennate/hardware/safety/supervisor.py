@@ -27,6 +27,7 @@ from antennate.records import Contact, Maneuver
 
 _ACTIONS = frozenset(Maneuver)
 _CONTACTS = frozenset({Contact.FREE, Contact.CONTACT})
+_FAILURES = frozenset({Cause.FAILED, Cause.BAD_ACTION, Cause.BAD_POSE})
 _SUPPLY = (Cause.SUPPLY_WARN, Cause.SUPPLY_HOLD, Cause.SUPPLY_OFF)
 
 
@@ -145,8 +146,7 @@ class Supervisor:
             found[Cause.DRIFT] = inputs.drift
         if inputs.objections:
             found[Cause.NOT_READY] = "; ".join(inputs.objections)
-        if inputs.stop:
-            found[Cause.STOPPED] = ""
+        _wishes(inputs, found)
         return found
 
     def _boots(self, now: float, inputs: Inputs, found: dict[Cause, str]) -> None:
@@ -188,15 +188,15 @@ class Supervisor:
             found[Cause.FAILED] = inputs.failure
         elif not decided:
             found[Cause.UNDECIDED] = ""
-        elif inputs.maneuver not in _ACTIONS or not inputs.finite:
-            found[Cause.BAD_ACTION] = (
-                f"maneuver {inputs.maneuver}" if inputs.finite else "pose not finite"
-            )
+        elif inputs.maneuver not in _ACTIONS:
+            found[Cause.BAD_ACTION] = f"maneuver {inputs.maneuver}"
+        elif inputs.bad_pose:
+            found[Cause.BAD_POSE] = inputs.bad_pose
         elif not _CONTACTS.issuperset(inputs.contact):
             found[Cause.UNKNOWN_CONTACT] = ""
-        failed = Cause.FAILED in found or Cause.BAD_ACTION in found
+        failed = _FAILURES & found.keys()
         if failed and self._failures.add(now):
-            found[Cause.REPEATED_FAILURES] = inputs.failure
+            found[Cause.REPEATED_FAILURES] = inputs.failure or inputs.bad_pose
         return found
 
     def _recover(self, inputs: Inputs, present: Mapping[Cause, str]) -> None:
@@ -254,6 +254,14 @@ def _name(found: dict[Cause, str], cause: Cause, ids: Iterable[int]) -> None:
     listed = ", ".join(str(i) for i in sorted(ids))
     if listed:
         found[cause] = f"servo {listed}"
+
+
+def _wishes(inputs: Inputs, found: dict[Cause, str]) -> None:
+    """Causes that the operator asked for."""
+    if inputs.unrecorded:
+        found[Cause.NO_RECORD] = ""
+    if inputs.stop:
+        found[Cause.STOPPED] = ""
 
 
 def _words(errors: Mapping[int, str]) -> str:
