@@ -149,3 +149,38 @@ def test_B14_poses_refused_again_and_again_are_a_fault_that_says_so() -> None:
     assert states == [State.HOLD, State.HOLD, State.FAULT]
     assert made.session.outputs is not None
     assert "found shape (1, 12)" in made.session.outputs.causes[0].text
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("contact", np.zeros(2, int)),
+        ("contact", np.zeros((1, 3), int)),
+        ("contact", np.array([[0, 3]])),
+        ("contact", "none"),
+        ("maneuver", 0),
+        ("maneuver", np.array([5])),
+        ("maneuver", np.array([math.nan])),
+        ("maneuver", None),
+    ],
+)
+def test_a_decision_that_is_none_is_a_failure_of_the_controller(name: str, said: Any) -> None:
+    made = Robot(SupervisorParams())
+    decision, pose = made.session.decision, made.sound
+
+    class Odd:
+        maneuver, contact = np.array([0]), np.array([[0, 0]])
+
+        def step(self, frame: Any) -> Pose:
+            return pose
+
+    setattr(Odd, name, said)
+    made.session.decider = Odd()
+    made.session.write(made.session.step(made.session.read()))
+    out = made.session.outputs
+    assert out is not None
+    assert out.state >= State.HOLD
+    assert out.causes[0].cause is Cause.FAILED
+    assert f"expected {name} of shape (1," in out.causes[0].text
+    assert made.session.decision == decision
+    assert Tick.of(made.session, 1.0).maneuver == decision.maneuver

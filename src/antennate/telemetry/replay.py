@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -11,7 +10,7 @@ import numpy as np
 
 from antennate.controller import ARMS, Controller
 from antennate.errors import LogError
-from antennate.hardware.driving.decider import Decider
+from antennate.hardware.driving.decider import Decider, Decision, decision, nowhere
 from antennate.hardware.driving.drive import DriveConfig
 from antennate.hardware.driving.drive import decider as named
 from antennate.loop import run_loop
@@ -95,6 +94,7 @@ class _Guarded:
         self._decider, self._body = decider, body
         self._kept: Pose | None = None
         self._refused = self.failures = 0
+        self.decision = Decision()
 
     def step(self, frame: AntennaFrame) -> Pose:
         """The pose of this tick."""
@@ -104,12 +104,13 @@ class _Guarded:
         refused, self._refused = self._refused, 0 if tick is None else tick.refused
         try:
             pose = self._decider.step(frame)
+            self.decision = decision(self._decider)
             if self._refused <= refused:
                 self._kept = pose
             return pose
         except Exception:  # noqa: BLE001 a plugged-in controller may raise anything
             self.failures += 1
-            return Pose(*(np.full(shape, math.nan) for shape in ((1, 5), (1, 6, 2), (1, 2))))
+            return nowhere()
 
 
 @dataclass(frozen=True, slots=True)
@@ -182,7 +183,7 @@ def replay(ticks: Iterable[Tick], decider: Decider, period: float) -> Replayed:
 
     def go_on(frame: AntennaFrame, pose: Pose) -> bool:
         if body.tick is not None:
-            found.note(body.tick, int(decider.maneuver[0]), pose)
+            found.note(body.tick, mind.decision.maneuver, pose)
         return body.more
 
     if body.tick is not None:

@@ -9,14 +9,15 @@ from __future__ import annotations
 import math
 import struct
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
 from antennate.anatomy import LEGS, SIDES, YAW_JOINTS
 from antennate.errors import LogError
+from antennate.hardware.driving.decider import Decided, Decision, decision
 from antennate.hardware.driving.session import Session
-from antennate.records import AntennaFrame, Ints, Pose
+from antennate.records import AntennaFrame, Pose
 from antennate.telemetry.framing import SCHEMA, Kind
 
 JOINTS = (*YAW_JOINTS, *LEGS, *(f"antenna_{side}" for side in SIDES))
@@ -36,18 +37,6 @@ _NOWHERE = (math.nan,) * len(JOINTS)
 _NEITHER = (math.nan, math.nan)
 
 Pair = tuple[float, float]
-
-
-class Decided(Protocol):
-    """A controller after its step; `b` [(1, 2)] and `gait.phase` [(1,)] are kept where it has them.
-
-    Attributes:
-        maneuver: `Maneuver`, shape (1,).
-        contact: `Contact`, shape (1, 2).
-    """
-
-    maneuver: Ints
-    contact: Ints
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,7 +100,7 @@ class Tick:
         left, right = (channel.reading.counts for channel in session.channels)
         bytes_ = session.board.decoder.counters
         return cls(
-            **_thought(session.decider, session.frame, session.pose),
+            **_thought(session.decider, session.decision, session.frame, session.pose),
             number=session.tally.ticks,
             now=t,
             asked=session.asked,
@@ -132,8 +121,12 @@ class Tick:
 
     @classmethod
     def plain(cls, mind: Decided, frame: AntennaFrame, pose: Pose, number: int, now: float) -> Tick:
-        """A tick of a controller without supervisor, as in simulation."""
-        thought = _thought(mind, frame, pose)
+        """A tick of a controller without supervisor, as in simulation.
+
+        Raises:
+            BadInputError: The controller decides otherwise than a `Decider` does.
+        """
+        thought = _thought(mind, decision(mind), frame, pose)
         return cls(**thought, number=number, now=now, reading=thought["counts"])
 
     @property
@@ -201,16 +194,15 @@ def angles_of(pose: Pose) -> tuple[float, ...]:
     return tuple(angles) if len(angles) == len(JOINTS) else _NOWHERE
 
 
-def _thought(mind: Decided, frame: AntennaFrame, pose: Pose) -> dict[str, Any]:
-    """The fields that every world has."""
-    left, right = mind.contact[0].tolist()
+def _thought(mind: Decided, said: Decision, frame: AntennaFrame, pose: Pose) -> dict[str, Any]:
+    """The fields that every world has; b of shape (1, 2) and gait.phase of (1,) where there are."""
     phase = _numbers(getattr(getattr(mind, "gait", None), "phase", None), 1)
     return {
         "t": float(frame.t[0]),
         "counts": tuple(frame.counts[0].tolist()),
         "b": _numbers(getattr(mind, "b", None), 2) or _NEITHER,
-        "contact": (int(left), int(right)),
-        "maneuver": int(mind.maneuver[0]),
+        "contact": said.contact,
+        "maneuver": said.maneuver,
         "phase": phase[0] if phase else math.nan,
         "angles": angles_of(pose),
     }

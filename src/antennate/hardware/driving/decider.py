@@ -8,18 +8,68 @@ from typing import Protocol
 
 import numpy as np
 
-from antennate.records import AntennaFrame, Ints, Pose
+from antennate.errors import BadInputError
+from antennate.records import AntennaFrame, Contact, Ints, Maneuver, Pose
 
 
-class Decider(Protocol):
-    """A controller of one robot."""
+class Decided(Protocol):
+    """A controller after its step.
+
+    Attributes:
+        maneuver: `Maneuver`, shape (1,).
+        contact: `Contact`, shape (1, 2).
+    """
 
     maneuver: Ints
     contact: Ints
 
+
+class Decider(Decided, Protocol):
+    """A controller of one robot."""
+
     def step(self, frame: AntennaFrame) -> Pose:
         """The pose of this tick."""
         ...
+
+
+@dataclass(frozen=True, slots=True)
+class Decision:
+    """What a controller has decided, nothing before it was asked.
+
+    Attributes:
+        maneuver: A `Maneuver`.
+        contact: A `Contact` a side.
+    """
+
+    maneuver: int = int(Maneuver.HOLD)
+    contact: tuple[int, int] = (int(Contact.UNKNOWN), int(Contact.UNKNOWN))
+
+
+def decision(decider: Decided) -> Decision:
+    """What it says after its step.
+
+    Raises:
+        BadInputError: It says it otherwise than a `Decider` does.
+    """
+    (maneuver,) = _members(decider, "maneuver", (1,), Maneuver)
+    left, right = _members(decider, "contact", (1, 2), Contact)
+    return Decision(maneuver, (left, right))
+
+
+def _members(
+    decider: Decided, name: str, shape: tuple[int, ...], kind: type[Contact] | type[Maneuver]
+) -> list[int]:
+    said: object = getattr(decider, name, None)
+    try:
+        found = np.asarray(said)
+        if found.shape == shape:
+            return [int(kind(one)) for one in found.ravel().tolist()]
+    except (TypeError, ValueError):
+        pass
+    numbers = f"{min(kind):d} to {max(kind):d}"
+    raise BadInputError(
+        f"expected {name} of shape {shape} with numbers {numbers} ({kind.__name__}), found {said!r}"
+    )
 
 
 @dataclass(slots=True)

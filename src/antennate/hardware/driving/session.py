@@ -20,7 +20,7 @@ import numpy as np
 from antennate.body import Clock
 from antennate.errors import AntennateError
 from antennate.hardware.driving.body import HardwareBody
-from antennate.hardware.driving.decider import Decider, Thought, nowhere
+from antennate.hardware.driving.decider import Decider, Decision, Thought, decision, nowhere
 from antennate.hardware.driving.orders import Orders, Tally
 from antennate.hardware.driving.timing import LoopTiming
 from antennate.hardware.driving.tracebacks import Tracebacks
@@ -66,6 +66,7 @@ class Session:
         timing: Whether the loop keeps its pace, None before the first tick.
         frame: What the controller got in the last tick.
         pose: What it said.
+        decision: What it decided, whenever it was asked last without failing.
         touched: Whether anything was written to the servos.
         unrecorded: Whether a record that is required is not kept; the robot holds meanwhile.
     """
@@ -100,6 +101,7 @@ class Session:
         self.outputs: Outputs | None = None
         self.frame = AntennaFrame(t=np.zeros(1), counts=np.full((1, 2), math.nan))
         self.pose = nowhere()
+        self.decision = Decision()
         self._body = HardwareBody(board, bus, joints, clock)
         self._thought = Thought()
         self._goals: Floats | None = None
@@ -136,7 +138,7 @@ class Session:
         t = float(frame.t[0])
         raw = frame.counts[0].tolist()
         found = [channel.step(t, c) for channel, c in zip(self.channels, raw, strict=True)]
-        self.trust.step(t, raw, found, self.decider.contact[0].tolist())
+        self.trust.step(t, raw, found, self.decision.contact)
         said = [reading.counts for reading in found]
         if self.outputs is None or not self.outputs.clear:
             said = [math.nan, math.nan]
@@ -198,6 +200,7 @@ class Session:
             return self._pose
         try:
             pose = self.decider.step(frame)
+            self.decision = decision(self.decider)
         except Exception as error:  # noqa: BLE001 a plugged-in controller may raise anything
             thought.failure = f"{type(error).__name__}: {error}"
             self.tracebacks.keep(self.clock.now(), error)
@@ -244,15 +247,14 @@ class Session:
     def _inputs(self, now: float) -> Inputs:
         clock, watch, thought = self.board.clock, self.watch, self._thought
         left, right = self.channels
-        contact = self.decider.contact[0].tolist()
         return Inputs(
             age=clock.age(now),
             valid=self._used,
             refused=self._refused,
             findings=(left.reading.finding, right.reading.finding),
             decided_at=thought.decided_at,
-            maneuver=int(self.decider.maneuver[0]),
-            contact=(int(contact[0]), int(contact[1])),
+            maneuver=self.decision.maneuver,
+            contact=self.decision.contact,
             bad_pose=thought.bad_pose,
             failure=thought.failure,
             resets=clock.resets,
