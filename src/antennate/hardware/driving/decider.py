@@ -46,30 +46,25 @@ class Decision:
 
 
 def decision(decider: Decided) -> Decision:
-    """What it says after its step.
+    """What it says after its step; whether there are such maneuvers the supervisor judges.
 
     Raises:
         BadInputError: It says it otherwise than a `Decider` does.
     """
-    (maneuver,) = _members(decider, "maneuver", (1,), Maneuver)
-    left, right = _members(decider, "contact", (1, 2), Contact)
+    (maneuver,) = _whole(decider, "maneuver", (1,))
+    left, right = _whole(decider, "contact", (1, 2))
     return Decision(maneuver, (left, right))
 
 
-def _members(
-    decider: Decided, name: str, shape: tuple[int, ...], kind: type[Contact] | type[Maneuver]
-) -> list[int]:
+def _whole(decider: Decided, name: str, shape: tuple[int, ...]) -> list[int]:
     said: object = getattr(decider, name, None)
-    try:
-        found = np.asarray(said)
-        if found.shape == shape:
-            return [int(kind(one)) for one in found.ravel().tolist()]
-    except (TypeError, ValueError):
-        pass
-    numbers = f"{min(kind):d} to {max(kind):d}"
-    raise BadInputError(
-        f"expected {name} of shape {shape} with numbers {numbers} ({kind.__name__}), found {said!r}"
-    )
+    found = np.asarray(said)
+    if found.shape != shape or found.dtype.kind not in "iu":
+        raise BadInputError(
+            f"expected {name} of shape {shape}, whole numbers, found {said!r}; see "
+            f"antennate.records.{name.capitalize()}"
+        )
+    return [int(one) for one in found.ravel()]
 
 
 @dataclass(slots=True)

@@ -39,7 +39,10 @@ class Cause(Enum):
     REBOOT = (State.HOLD, "the antenna board has restarted")
     LOST = (State.HOLD, "no good reading for too long")
     STUCK = (State.HOLD, "a channel repeats one reading")
-    OPEN = (State.HOLD, "a channel floats, its wire is open")
+    OPEN = (
+        State.HOLD,
+        "a channel floats: its wire is open, or its film bent far beyond its calibration",
+    )
     SHORT_LO = (State.HOLD, "a channel is shorted to ground, or its film torn off")
     SHORT_HI = (State.HOLD, "a channel is shorted to the supply")
     FAILED = (State.HOLD, "the controller raised an exception")
