@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import csv
 import itertools
 import math
+from collections import defaultdict
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -23,6 +26,7 @@ from antennate.params import (
 )
 from antennate.sensor import reading_noise
 
+RECORDED = Path(__file__).parents[2] / "shared/data/flex_static_12bit/derived/flex_static.csv"
 DAY = 8_640_000
 """Readings of a channel in 24 h."""
 RISING = Band(1200.0, 3900.0, 1)
@@ -219,6 +223,26 @@ def test_S4_false_alarms_on_quiet_data_are_below_one_a_day() -> None:
     assert 2 * DAY * beyond < 1
     # a jump, and all that rests on it, needs more than the margin
     assert params.jump * (BAND.high - BAND.low) > 2 * params.margin
+
+
+@pytest.mark.skipif(not RECORDED.exists(), reason="recordings not present")
+def test_S4_a_real_film_held_still_gives_no_alarm_in_24_hours() -> None:
+    """500 readings of 12 bits at each of ten angles; by SOURCE.md their noise is white.
+
+    So that a day of it may be drawn from them.
+    """
+    with RECORDED.open() as file:
+        rows = list(csv.DictReader(file))
+    held = defaultdict[str, list[float]](list)
+    for row in rows:
+        held[row["angle_deg"]].append(float(row["adc12_if_3v3"]))
+    assert [len(readings) for readings in held.values()] == [500] * 10
+    for readings in held.values():
+        found = feed(channel(Band(200.0, 390.0, 1)), readings)
+        assert {reading.finding for reading in found[3:]} == {Finding.OK}
+        drawn = np.random.default_rng(1).choice(readings, DAY // 10)
+        changes = np.flatnonzero(np.diff(drawn))
+        assert np.diff(changes).max() < DiagnosisParams().stuck / 4
 
 
 def test_S4_noise_of_a_third_of_a_count_is_enough_to_be_alive() -> None:
