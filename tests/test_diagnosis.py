@@ -225,6 +225,12 @@ def test_S4_false_alarms_on_quiet_data_are_below_one_a_day() -> None:
     assert params.jump * (BAND.high - BAND.low) > 2 * params.margin
 
 
+def test_S1_readings_that_do_not_come_are_no_open_wire() -> None:
+    found = {reading.finding for reading in after_rest([math.nan] * 60)}
+    assert Finding.LOST in found
+    assert Finding.OPEN not in found
+
+
 @pytest.mark.skipif(not RECORDED.exists(), reason="recordings not present")
 def test_S4_a_real_film_held_still_gives_no_alarm_in_24_hours() -> None:
     """500 readings of 12 bits at each of ten angles; by SOURCE.md their noise is white.

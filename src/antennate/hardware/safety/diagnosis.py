@@ -180,7 +180,7 @@ class ChannelDiagnosis:
             self._share_bad -= self._share[0]
         self._share.append(not good)
         self._share_bad += not good
-        self._bad.append(not good)
+        self._bad.append(not good and not math.isnan(counts))
 
     def _find(self) -> Finding:
         params = self._params
