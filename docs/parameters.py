@@ -20,7 +20,7 @@ This page is generated: change `src/antennate/params/`, then run `python docs/pa
 OTHERS = (
     "antennate.hardware.robot_file",
     "antennate.hardware.robot",
-    "antennate.hardware.driving.drive",
+    "antennate.hardware.driving.config",
     "antennate.hardware.doctor.checkup",
     "antennate.hardware.esp32.recorder",
     "antennate.telemetry.replay",

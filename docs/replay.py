@@ -11,7 +11,8 @@ from pathlib import Path
 
 from antennate.cli import main as antennate
 from antennate.experiments.twin import TwinConfig, rig
-from antennate.hardware.driving.drive import DriveConfig, drive
+from antennate.hardware.driving.config import DriveConfig
+from antennate.hardware.driving.drive import drive
 from antennate.hardware.driving.session import Session
 from antennate.params import TouchCheckParams
 from antennate.telemetry.header import Header

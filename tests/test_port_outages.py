@@ -10,7 +10,9 @@ import pytest
 
 from antennate.errors import BadInputError
 from antennate.experiments.twin import Rig, TwinConfig, rig
-from antennate.hardware.driving.drive import DriveConfig, drive, prepare, require_servos
+from antennate.hardware.driving.config import DriveConfig
+from antennate.hardware.driving.connect import prepare, require_servos
+from antennate.hardware.driving.drive import drive
 from antennate.hardware.driving.session import Session
 from antennate.hardware.dynamixel.bringup import BringUpError
 from antennate.hardware.esp32.frame import SAMPLE_FRAME_SIZE

@@ -19,7 +19,7 @@ import pytest
 from esp32_streams import encoded, hello, made
 from port_pieces import Pieces
 
-from antennate.hardware.driving.drive import await_board
+from antennate.hardware.driving.connect import await_board
 from antennate.hardware.esp32.board import Board
 from antennate.hardware.esp32.frame import encode_request
 from antennate.hardware.ports import reconnecting

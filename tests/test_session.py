@@ -13,13 +13,10 @@ from antennate.controller import Controller
 from antennate.errors import BadInputError, ConfigError
 from antennate.experiments.twin import Rig, TwinConfig, rig
 from antennate.hardware.driving.adapter import require_quick
-from antennate.hardware.driving.drive import (
-    DriveConfig,
-    await_board,
-    decider,
-    drive,
-    require_servos,
-)
+from antennate.hardware.driving.config import DriveConfig
+from antennate.hardware.driving.connect import await_board, require_servos
+from antennate.hardware.driving.decider import chosen
+from antennate.hardware.driving.drive import drive
 from antennate.hardware.driving.report import Report
 from antennate.hardware.driving.session import Session
 from antennate.hardware.driving.signals import STOPS
@@ -461,11 +458,11 @@ def test_B15_servos_that_are_not_as_expected_are_refused(
 @pytest.mark.parametrize("name", ["clsoed", "antennate.controller:Nobody", "no_such_module:X"])
 def test_a_controller_that_does_not_exist_is_refused(name: str) -> None:
     with pytest.raises(ConfigError, match="--controller"):
-        decider(DriveConfig(controller=name))
+        chosen(name, ControllerParams())
 
 
 def test_a_controller_of_ones_own_is_taken() -> None:
-    made = decider(DriveConfig(controller="antennate.controller:Controller"))
+    made = chosen("antennate.controller:Controller", ControllerParams())
     assert int(made.maneuver[0]) == Maneuver.FORWARD
 
 

@@ -13,7 +13,9 @@ from esp32_streams import BOOT, encoded, hello
 from hardware_rig import FREE
 from servo_rig import servos
 
-from antennate.hardware.driving.drive import DriveConfig, drive, prepare
+from antennate.hardware.driving.config import DriveConfig
+from antennate.hardware.driving.connect import prepare
+from antennate.hardware.driving.drive import drive
 from antennate.hardware.driving.priority import claim, urgent
 from antennate.hardware.driving.session import Session
 from antennate.hardware.dynamixel.tables import EXTENDED_MODE

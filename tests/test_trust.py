@@ -8,7 +8,9 @@ import pytest
 
 from antennate.errors import BadInputError
 from antennate.experiments.twin import Rig, TwinConfig, rig
-from antennate.hardware.driving.drive import DriveConfig, Report, drive
+from antennate.hardware.driving.config import DriveConfig
+from antennate.hardware.driving.drive import drive
+from antennate.hardware.driving.report import Report
 from antennate.hardware.driving.session import Session
 from antennate.hardware.safety.causes import Cause, State
 from antennate.params import ConditioningParams, TouchCheckParams

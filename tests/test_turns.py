@@ -10,7 +10,8 @@ import pytest
 
 from antennate.controller import Controller
 from antennate.experiments.twin import Rig, TwinConfig, rig
-from antennate.hardware.driving.drive import DriveConfig, drive
+from antennate.hardware.driving.config import DriveConfig
+from antennate.hardware.driving.drive import drive
 from antennate.hardware.driving.session import Session
 from antennate.hardware.safety.causes import State
 from antennate.params import ControllerParams

@@ -24,7 +24,8 @@ from antennate.errors import BadInputError
 from antennate.experiments.driven import Driven, driven, simulated_alike
 from antennate.experiments.tunnel import TunnelConfig
 from antennate.experiments.twin import TwinConfig, build
-from antennate.hardware.driving.drive import DriveConfig, connect, prepare
+from antennate.hardware.driving.config import DriveConfig
+from antennate.hardware.driving.connect import connect, prepare
 from antennate.hardware.driving.session import Session
 from antennate.hardware.ports import clock_words as words
 from antennate.hardware.ports.port import PortError

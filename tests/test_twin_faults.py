@@ -9,7 +9,8 @@ import pytest
 
 from antennate.errors import BadInputError
 from antennate.experiments.twin import Rig, TwinConfig, build, rig
-from antennate.hardware.driving.drive import DriveConfig, drive
+from antennate.hardware.driving.config import DriveConfig
+from antennate.hardware.driving.drive import drive
 from antennate.hardware.driving.session import Session
 from antennate.hardware.dynamixel.packets import Instruction
 from antennate.hardware.dynamixel.parser import Parser

@@ -12,7 +12,8 @@ from hardware_rig import LIMIT
 
 from antennate.experiments.twin import Rig, TwinConfig, rig
 from antennate.hardware.driving.body import HardwareBody
-from antennate.hardware.driving.drive import DriveConfig, drive
+from antennate.hardware.driving.config import DriveConfig
+from antennate.hardware.driving.drive import drive
 from antennate.hardware.driving.session import Session
 from antennate.hardware.esp32 import datagram, frame
 from antennate.hardware.esp32.board import Board

@@ -12,7 +12,7 @@ from antennate.body import Body, Clock
 from antennate.controller import Arm
 from antennate.experiments.tunnel import TunnelConfig
 from antennate.experiments.twin import Stage, TwinConfig, before_twin, rig, simulation
-from antennate.hardware.driving.drive import await_board
+from antennate.hardware.driving.connect import await_board
 from antennate.loop import run_loop
 from antennate.params.layout import LayoutParams
 from antennate.records import AntennaFrame, Pose

@@ -18,7 +18,9 @@ from antennate.cli.progress import terminate_as_interrupt
 from antennate.cli.tables import Cell, number, show
 from antennate.errors import ConfigError
 from antennate.hardware.doctor.ports import same
-from antennate.hardware.driving.drive import DriveConfig, connect, drive
+from antennate.hardware.driving.config import DriveConfig
+from antennate.hardware.driving.connect import connect
+from antennate.hardware.driving.drive import drive
 from antennate.hardware.driving.priority import Priority, urgent
 from antennate.hardware.driving.session import Session
 from antennate.hardware.robot_file import RobotFile

@@ -26,7 +26,9 @@ from antennate.body import Clock
 from antennate.controller import Arm
 from antennate.experiments.tunnel import TunnelConfig
 from antennate.experiments.twin import Watch
-from antennate.hardware.driving.drive import DriveConfig, drive, prepare
+from antennate.hardware.driving.config import DriveConfig
+from antennate.hardware.driving.connect import prepare
+from antennate.hardware.driving.drive import drive
 from antennate.hardware.driving.report import Report
 from antennate.hardware.driving.session import Session
 from antennate.hardware.esp32.board import Board

@@ -18,7 +18,7 @@ from antennate.experiments.judge import Judge
 from antennate.experiments.passage import Passage
 from antennate.experiments.tunnel import TunnelConfig, prepare
 from antennate.hardware.driving.body import HardwareBody
-from antennate.hardware.driving.drive import DOUBT
+from antennate.hardware.driving.connect import DOUBT
 from antennate.hardware.driving.session import Session
 from antennate.hardware.dynamixel import bringup
 from antennate.hardware.dynamixel.answers import Timing

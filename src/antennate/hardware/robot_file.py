@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TypeVar
 
 from antennate.hardware.doctor.checkup import DoctorConfig
-from antennate.hardware.driving.drive import DriveConfig
+from antennate.hardware.driving.config import DriveConfig
 from antennate.hardware.esp32.recorder import RecordConfig
 from antennate.hardware.robot import RobotConfig
 from antennate.params import DoctorParams, RecordParams

@@ -10,9 +10,7 @@ import numpy as np
 
 from antennate.controller import ARMS, Controller
 from antennate.errors import LogError
-from antennate.hardware.driving.decider import Decider, Decision, decision, nowhere
-from antennate.hardware.driving.drive import DriveConfig
-from antennate.hardware.driving.drive import decider as named
+from antennate.hardware.driving.decider import Decider, Decision, chosen, decision, nowhere
 from antennate.loop import run_loop
 from antennate.params import Params, number
 from antennate.records import AntennaFrame, Pose
@@ -199,13 +197,13 @@ def recorded_decider(header: Header, name: str | None = None) -> Decider:
         LogError: It is code outside this package, and only the log names it.
         ConfigError: There is none of that name.
     """
-    chosen = header.controller if name is None else name
-    if name is None and chosen not in ARMS:
+    wanted = header.controller if name is None else name
+    if name is None and wanted not in ARMS:
         raise LogError(
-            f"expected a controller of {', '.join(ARMS)} in the log, found {chosen!r}; give "
+            f"expected a controller of {', '.join(ARMS)} in the log, found {wanted!r}; give "
             "--controller with this name if its code may run"
         )
-    made = named(DriveConfig(controller=chosen, mind=header.params))
+    made = chosen(wanted, header.params)
     if isinstance(made, Controller):
         made.reset(np.array([0]), header.phase)
     return made

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import importlib
 import math
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, cast
 
 import numpy as np
 
-from antennate.errors import BadInputError
+from antennate.controller import ARMS, Controller
+from antennate.errors import BadInputError, ConfigError
+from antennate.params import ControllerParams
 from antennate.records import AntennaFrame, Contact, Ints, Maneuver, Pose
 
 
@@ -30,6 +33,28 @@ class Decider(Decided, Protocol):
     def step(self, frame: AntennaFrame) -> Pose:
         """The pose of this tick."""
         ...
+
+
+def chosen(name: str, params: ControllerParams) -> Decider:
+    """The controller of a name, one of ours or MODULE:CLASS.
+
+    Raises:
+        ConfigError: There is none of that name.
+    """
+    if name in ARMS:
+        return Controller(params, name)
+    module, _, made = name.partition(":")
+    if not made:
+        raise ConfigError(
+            f"--controller: expected one of {', '.join(ARMS)} or MODULE:CLASS, found {name!r}"
+        )
+    try:
+        return cast(Decider, getattr(importlib.import_module(module), made)(params))
+    except Exception as error:
+        raise ConfigError(
+            f"--controller: expected a class that takes ControllerParams, found {name!r}: "
+            f"{type(error).__name__}: {error}"
+        ) from error
 
 
 @dataclass(frozen=True, slots=True)

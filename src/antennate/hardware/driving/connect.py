@@ -1,0 +1,179 @@
+"""From two ports to a session, once both sides have said who they are."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+from collections.abc import Iterator
+from typing import Any
+
+from antennate.errors import BadInputError
+from antennate.hardware import roster
+from antennate.hardware.driving.adapter import require_quick
+from antennate.hardware.driving.config import DriveConfig
+from antennate.hardware.driving.decider import chosen
+from antennate.hardware.driving.session import Session
+from antennate.hardware.dynamixel import bringup
+from antennate.hardware.dynamixel.answers import Timing
+from antennate.hardware.dynamixel.bringup import BringUpError
+from antennate.hardware.dynamixel.bus import Bus
+from antennate.hardware.dynamixel.tables import XC430_W240
+from antennate.hardware.esp32.board import BOARD_BAUD, Board
+from antennate.hardware.esp32.film import require_film
+from antennate.hardware.host_clock import HostClock
+from antennate.hardware.joints import Joints
+from antennate.hardware.ports.finder import finder
+from antennate.hardware.ports.port import Port, PortError
+from antennate.hardware.ports.reconnecting import Reconnecting
+from antennate.hardware.ports.twin_clock import twin_clock
+from antennate.hardware.safety.trust import Trust
+from antennate.params import BusParams, DoctorParams
+from antennate.params.layout import LayoutParams
+
+_WHO = DoctorParams()
+_PATIENCE = 0.05
+DOUBT = BusParams().doubt_walking
+
+
+@contextlib.contextmanager
+def connect(
+    config: DriveConfig, esp32: str, bus: str, key: bytes | None = None, clock: str = ""
+) -> Iterator[Session]:
+    """Open both ports, find who is there, and close them again afterwards.
+
+    Args:
+        config: The robot.
+        esp32: Address of the antenna board, as `finder` takes it.
+        bus: Address of the servo bus.
+        key: Of a board behind udp://; empty for one without a key.
+        clock: Address of the clock of a twin in lock-step; the host's time is taken if not given.
+
+    Raises:
+        ConfigError: A clock is given, but a port can be no twin's.
+        PortError: A port cannot be opened.
+        BadInputError: No antenna board speaks, or it is refused.
+        BringUpError: The servos are not those expected.
+    """
+    with contextlib.ExitStack() as stack:
+        if clock:
+            twin = stack.enter_context(twin_clock(esp32, bus, clock, config.layout.baud))
+            yield prepare(config, twin.esp32, twin.bus, twin)
+            return
+        lines: list[Port] = []
+        for flag, address, baud in (
+            ("--esp32", esp32, BOARD_BAUD),
+            ("--bus", bus, config.layout.baud),
+        ):
+            line = Reconnecting(finder(address, baud, flag, key, config.network))
+            stack.callback(line.close)
+            lines.append(line)
+        yield prepare(config, lines[0], lines[1], HostClock(), bus)
+
+
+def prepare(
+    config: DriveConfig, esp32: Port, bus: Port, clock: Any, path: str = "the bus"
+) -> Session:
+    """A session before two open ports, after both sides have said who they are.
+
+    `path` is what the bus is called, for errors.
+    """
+    board = Board(esp32, config.limits.stale_age)
+    await_board(board, clock, bus, config.swapped)
+    require_film(board.hello, config.sensor_id)
+    require_quick(bus, config.layout.ids[:3], config.layout.baud, clock.now, path)
+    master = Bus(bus, Timing(config.layout.baud, doubt=DOUBT), clock=clock.now)
+    require_servos(master, config.layout)
+    board.count_anew(clock.now())
+    return Session(
+        board=board,
+        bus=master,
+        joints=Joints(config.layout),
+        clock=clock,
+        decider=chosen(config.controller, config.mind),
+        period=config.mind.period,
+        conditioning=config.mind.conditioning,
+        limits=config.limits,
+        trust=Trust(
+            config.mind.conditioning, config.drift, config.touch if config.touch_check else None
+        ),
+    )
+
+
+def await_board(
+    board: Board, clock: Any, bus: Port | None = None, swapped: float = math.inf
+) -> None:
+    """Wait for a greeting and samples; what the bus says unasked is read, and nothing written.
+
+    A silent port is given up earlier than one on which a board may be starting.
+
+    Raises:
+        BadInputError: None came, and says what came instead; or the bus speaks unasked.
+    """
+    begin, unasked = clock.now(), 0
+    while board.clock.newest is None:
+        unasked += 0 if bus is None else _unasked(bus)
+        silent = not board.decoder.counters.received
+        if silent and unasked and clock.now() > begin + swapped:
+            raise BadInputError(
+                f"--esp32: expected an antenna board, found silence, and {unasked} bytes on --bus "
+                "that no servo was asked for; --esp32 and --bus are swapped"
+            )
+        patience = _WHO.silence if silent else _WHO.greeting
+        if clock.now() > begin + patience:
+            came = board.decoder.counters
+            why = (
+                board.refusals[-1]
+                if board.refusals
+                else (
+                    f"{came.received} bytes and {came.good} frames; is it the right port, with the "
+                    "firmware on the board? Perhaps --esp32 and --bus are swapped; over UDP a "
+                    "board does not answer to a wrong key"
+                )
+            )
+            raise BadInputError(
+                f"--esp32: expected an antenna board within {patience:g} s, found {why}"
+            )
+        clock.sleep_until(clock.now() + _PATIENCE)
+        board.poll(clock.now())
+    if bus is not None:
+        _require_quiet(bus, clock)
+
+
+def _require_quiet(bus: Port, clock: Any) -> None:
+    """No servo speaks unasked; an antenna board does."""
+    _unasked(bus)
+    clock.sleep_until(clock.now() + _WHO.quiet)
+    if (count := _unasked(bus)) >= _WHO.unasked:
+        raise BadInputError(
+            f"--bus: expected servos, which speak only if asked, found {count} bytes in "
+            f"{_WHO.quiet:g} s that nobody asked for; is it the port of another antenna board, or "
+            "has the bus another master?"
+        )
+
+
+def _unasked(bus: Port) -> int:
+    with contextlib.suppress(PortError):  # the bus has its own check
+        return bus.drain()
+    return 0
+
+
+def require_servos(bus: Bus, layout: LayoutParams) -> None:
+    """All servos are there, of the right model and in the right mode.
+
+    Raises:
+        BringUpError: Otherwise; names each id that is not, and the cure.
+    """
+    try:
+        bringup.require(bus, roster.models(layout))
+    except BringUpError as error:
+        raise BringUpError(
+            f"--bus: {error}; check power, wiring, ids and baud {layout.baud}, or whether --esp32 "
+            "and --bus are swapped; `antennate doctor` tells more, slow adapters too"
+        ) from None
+    modes = bringup.read_register(bus, layout.ids, XC430_W240["operating_mode"])
+    wanted = roster.modes(layout)
+    if wrong := [i for i in layout.ids if modes[i] != wanted[i]]:
+        raise BringUpError(
+            f"--bus: expected operating mode 4 (extended position) of legs and 3 (position) of the "
+            f"others, found another in servos {wrong}; set register 11 with torque off"
+        )
