@@ -231,9 +231,10 @@ class SupervisorParams(Params):
     slow_rate: float = number(
         0.5,
         "1",
-        "assumed: half the strides a second, about half the current",
+        "assumed: half the strides a second, about half the current; never less, or more than one "
+        "tick in a row would pass without a decision",
         "how fast the gait goes below supply_warn",
-        gt=0,
+        ge=0.5,
         le=1,
     )
     supply_hold: float = number(

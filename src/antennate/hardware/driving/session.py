@@ -1,10 +1,11 @@
 """One robot driven from its bytes: what stands on both sides of the one loop.
 
 It is the body, which reads the board and writes goals, and the mind, a controller behind a
-supervisor. Nothing reaches the servos but what the supervisor lets through. Their watchdogs are fed
-by goals alone, and goals are sent only upon a decision of this very tick: the controller's, or the
-session's own to stand still while legs forget their turns, or for a moment before a release. Goals
-move at a limited speed, so that neither the first pose nor a broken controller makes a joint jump.
+supervisor. Nothing reaches the servos but what the supervisor lets through. Any packet feeds their
+watchdogs, and with torque on packets are sent only upon a decision of this very tick: the
+controller's, or the session's own to stand still while legs forget their turns or for a moment
+before a release, or to keep the pose for one tick after a sound decision at half pace. Goals move
+at a limited speed, so that neither the first pose nor a broken controller makes a joint jump.
 
 After the bus was lost no goal is sent until an arm event. With that one ids and models are checked,
 watchdogs armed and goals set to where the servos stand, as with the first.
@@ -37,7 +38,7 @@ from antennate.hardware.safety.supervisor import Supervisor
 from antennate.hardware.safety.trust import Trust
 from antennate.hardware.safety.watch import ServoWatch
 from antennate.params import ConditioningParams, DiagnosisParams, SupervisorParams
-from antennate.records import AntennaFrame, Floats, Pose
+from antennate.records import AntennaFrame, Floats, Maneuver, Pose
 
 
 class Session:
@@ -108,6 +109,7 @@ class Session:
         self._pose: Pose | None = None
         self._used = self._refused = 0
         self._owed = 0.0
+        self._sound = False
         self._lost = self.touched = self.unrecorded = False
 
     @property
@@ -192,12 +194,15 @@ class Session:
         """The controller's pose; an exception of it is a cause, not the end.
 
         While legs forget their turns the controller is not asked, and its time stands still: to
-        stand is the session's own decision. So it is to go slowly, which asks it less often.
+        stand is the session's own decision. So it is to go slowly, which leaves out single ticks, but
+        none after a failure.
         """
+        due = self._due() or not self._sound
         thought = self._thought = Thought()
-        if self._pose is not None and (self.turns.standing or not self._due()):
+        if self._pose is not None and (self.turns.standing or not due):
             thought.asked, thought.decided_at = False, self.clock.now()
             return self._pose
+        self._sound = False
         try:
             pose = self.decider.step(frame)
             self.decision = decision(self.decider)
@@ -213,6 +218,7 @@ class Session:
             self.tally.refused += 1
         else:
             self._pose = pose
+            self._sound = self.decision.maneuver in set(Maneuver)
         return pose
 
     def _due(self) -> bool:
