@@ -194,8 +194,8 @@ class Session:
         """The controller's pose; an exception of it is a cause, not the end.
 
         While legs forget their turns the controller is not asked, and its time stands still: to
-        stand is the session's own decision. So it is to go slowly, which leaves out single ticks, but
-        none after a failure.
+        stand is the session's own decision. So it is to go slowly, which leaves out single ticks,
+        but none after a failure.
         """
         due = self._due() or not self._sound
         thought = self._thought = Thought()
