@@ -233,8 +233,26 @@ def test_the_rig_gives_the_same_on_one_and_two_workers_and_from_its_own_recordin
     assert one.result() == two.result()
     file = tmp_path / "recording.csv"
     file.write_text(write(one.raw))
-    again = run(RIG.model_copy(update={"recording": str(file)}))
+    again = run(RIG.model_copy(update={"recording": str(file), "sensor_id": "simulated"}))
     assert again.calibration == one.calibration
+    unnamed = run(RIG.model_copy(update={"recording": str(file)}))
+    assert unnamed.calibration.sensor_id == "unnamed"
+
+
+@pytest.mark.parametrize("noise", [0.02, 0.25])
+def test_a_poor_curve_is_warned_of(
+    noise: float, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Noise of a quarter of the range leaves much of the bend unexplained."""
+    rng = np.random.default_rng(3)
+    bend = np.tile(np.linspace(0.0, 1.0, 200), 2)
+    counts = 1500.0 - 400.0 * bend + rng.normal(0.0, 400.0 * noise, len(bend))
+    file = tmp_path / "poor.csv"
+    rows = [f"{n},{c:.1f},{b:.4f}" for n, (c, b) in enumerate(zip(counts, bend, strict=True))]
+    file.write_text("\n".join(["time,counts,bend", *rows]) + "\n")
+    words = ["--draws", "20", "--out", str(tmp_path / "out")]
+    assert main(["calibrate", "--recording", str(file), *words]) == 0
+    assert ("Record again" in capsys.readouterr().out) == (noise > 0.1)
 
 
 def test_the_rig_sees_readings_fall_as_the_rod_goes_in() -> None:

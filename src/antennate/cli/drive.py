@@ -79,6 +79,7 @@ def command(argv: Sequence[str]) -> int:
     key = key_of(orders)
     with RunFolder.open("drive", orders.out, orders.overwrite) as folder:
         folder.describe("drive", argv, config)
+        folder.without_trials()
         wires = connect(config, orders.esp32, orders.bus, key, orders.clock)
         with wires as session, terminate_as_interrupt():
             result = _carry_out(config, session, orders, folder.path / LOG)

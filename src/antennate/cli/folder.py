@@ -87,6 +87,10 @@ class RunFolder:
         self.write(VERSIONS, to_json(_versions()))
         self.write(COMMAND, shlex.join(["antennate", command, *argv]) + "\n")
 
+    def without_trials(self) -> None:
+        """Say that this run has none, so that no empty file of them is left if it is killed."""
+        self._drop_partial()
+
     def append(self, row: Any) -> None:
         """Keep one finished trial, a dataclass, at once."""
         with _writing(self.path / PARTIAL):

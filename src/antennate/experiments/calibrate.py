@@ -70,8 +70,12 @@ class CalibrateConfig(Params):
         None, "1", "assumed: no recording", "CSV file to calibrate from; the rig if not given"
     )
     columns: RecordingParams = RecordingParams()
-    sensor_id: str = number(
-        "simulated", "1", "assumed: the rig", "name of the film", pattern=r"^[A-Za-z0-9._-]{1,64}$"
+    sensor_id: str | None = number(
+        None,
+        "1",
+        "assumed: `simulated` for the rig, `unnamed` for a recording",
+        "name of the film",
+        pattern=r"^[A-Za-z0-9._-]{1,64}$",
     )
     averaging_time: float = number(
         0.0,
@@ -270,7 +274,7 @@ def run(
     used = averaged(raw, config.averaging_time)
     found = fitting.fit(
         used.samples,
-        config.sensor_id,
+        config.sensor_id or ("unnamed" if config.recording else "simulated"),
         raw.sha256,
         config.threshold,
         config.full_scale,
