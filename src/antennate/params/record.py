@@ -50,7 +50,13 @@ class RecordParams(Params):
     @model_validator(mode="after")
     def _one_kind(self) -> RecordParams:
         if self.marks and self.speed is not None:
-            raise ValueError(f"expected marks or speed, got both {self.marks} and {self.speed}")
+            raise ValueError(
+                f"expected marks or speed, got marks {_said(self.marks)} and speed {self.speed:g}"
+            )
         if self.marks and len(set(self.marks)) < 2:
-            raise ValueError(f"marks must be two different values or more, got {self.marks}")
+            raise ValueError(f"marks must be two different values or more, got {_said(self.marks)}")
         return self
+
+
+def _said(numbers: tuple[float, ...]) -> str:
+    return " ".join(f"{number:g}" for number in numbers)

@@ -68,8 +68,11 @@ def _ids(survey: Survey, layout: LayoutParams) -> Row:
     if lone:
         cures.append(f"{_FIX} to give the lone one its id or speed")
     elif missing:
+        doubled = [i for i, seen in survey.here.items() if seen.state in ("collides", "broken")]
+        perhaps = f"perhaps a servo that answers as {ids_text(doubled)} is one; else "
         cures.append(
-            "plug in the missing ones; if all behind one place are missing, check that cable"
+            f"{perhaps if doubled else ''}plug in the missing ones; if all behind one place are "
+            "missing, check that cable"
         )
     if extra and not lone:
         cures.append("unplug those that are not expected, or name them in layout")
@@ -85,7 +88,8 @@ def _whole(survey: Survey) -> Row:
         (
             "collides",
             "doubled",
-            "two servos have this id: give one its own with DYNAMIXEL Wizard, alone on the bus",
+            "two servos have this id: give one its own, alone on the bus, with the manufacturer's "
+            "program DYNAMIXEL Wizard 2.0",
         ),
         ("broken", "never whole from", "two servos of one id, or a bad cable or plug there"),
         ("mute", "pings only from", "status return level 0: switch the supply off and on"),

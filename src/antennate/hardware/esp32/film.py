@@ -33,8 +33,8 @@ def calibrated(
     plain = ConditioningParams(averaging_time=mind.conditioning.averaging_time)
     if mind.conditioning != plain:
         raise ConfigError(
-            "mind.conditioning: expected no curve beside a calibration file, found one; give "
-            "averaging_time alone"
+            f"mind.conditioning: expected no curve beside the calibration file {path}, found one; "
+            "give averaging_time alone"
         )
     if mind.rule.threshold != found.threshold:
         raise ConfigError(

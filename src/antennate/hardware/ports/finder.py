@@ -32,13 +32,13 @@ def finder(
     scheme, separator, _ = address.partition("://")
     if not separator:
         return _serial(address, baud, flag)
-    host, port = _place(address)
+    host, port = _place(address, flag)
     if scheme == "tcp":
         from antennate.hardware.ports.tcp_port import TcpPort
 
         return lambda: TcpPort(host, port)
     if scheme != "udp":
-        raise BadInputError(f"expected a path, tcp:// or udp://, found {address!r}")
+        raise BadInputError(f"{flag}: expected a path, tcp:// or udp://, found {address!r}")
     if key is None:
         raise BadInputError(
             f"{address}: expected the key of the board; give --key FILE, or --insecure-udp for a "
@@ -54,8 +54,9 @@ def is_udp(address: str) -> bool:
     return address.startswith("udp://")
 
 
-def _place(address: str) -> tuple[str, int]:
-    wanted = "expected SCHEME://HOST:PORT such as udp://192.168.4.2:4210"
+def _place(address: str, flag: str) -> tuple[str, int]:
+    scheme = address.partition("://")[0]
+    wanted = f"{flag}: expected {scheme}://HOST:PORT such as {scheme}://192.168.4.2:4210"
     try:
         parts = urlsplit(address)
         host, port = parts.hostname, parts.port
