@@ -85,9 +85,9 @@ def _off(session: Session, stand: float) -> list[int] | None:
     """Stand for a moment, then torque off: ids that did not confirm it, None if it never was on."""
     if not session.touched:
         return None
-    with contextlib.suppress(PortError):
-        session.stand(stand)
     try:
-        return session.release()
-    except PortError:
-        return list(session.joints.ids)
+        with contextlib.suppress(PortError):
+            session.stand(stand)
+    finally:
+        left = session.release()
+    return left

@@ -13,7 +13,6 @@ watchdogs armed and goals set to where the servos stand, as with the first.
 from __future__ import annotations
 
 import math
-from contextlib import suppress
 
 import numpy as np
 
@@ -36,8 +35,11 @@ from antennate.hardware.safety.diagnosis import Band, ChannelDiagnosis
 from antennate.hardware.safety.supervisor import Supervisor
 from antennate.hardware.safety.trust import Trust
 from antennate.hardware.safety.watch import ServoWatch
-from antennate.params import ConditioningParams, DiagnosisParams, SupervisorParams
+from antennate.params import BusParams, ConditioningParams, DiagnosisParams, SupervisorParams
 from antennate.records import AntennaFrame, Floats, Pose
+
+_AGAIN = BusParams().motion_budget
+"""Time for the answers of servos told again in a tick to let go [s]."""
 
 
 class Session:
@@ -69,6 +71,7 @@ class Session:
         decision: What it decided, whenever it was asked last without failing.
         touched: Whether anything was written to the servos.
         unrecorded: Whether a record that is required is not kept; the robot holds meanwhile.
+        unreleased: Ids that did not confirm that their torque is off.
     """
 
     def __init__(
@@ -109,6 +112,7 @@ class Session:
         self._used = self._refused = 0
         self._owed = 0.0
         self._lost = self.touched = self.unrecorded = False
+        self.unreleased: list[int] = []
 
     @property
     def asked(self) -> bool:
@@ -177,6 +181,8 @@ class Session:
                 self._send(pose if out.move and not self.turns.standing else None)
             if not out.torque and self._goals is not None:
                 self.release()
+            elif self._goals is None and self.unreleased:
+                self._release_again()
         except (PortError, PoseError, BringUpError) as error:
             self.watch.bus_error = str(error)
             self._lost |= not isinstance(error, PoseError)
@@ -224,14 +230,22 @@ class Session:
         return True
 
     def release(self) -> list[int]:
-        """Torque off, verified: ids that did not confirm it."""
-        left: list[int] = []
-        for group in self.joints.in_order_of_release:
-            left += bringup.disable(self.bus, group)
+        """Torque off, verified: ids that did not confirm it; they are told again in each tick."""
         self._goals = None
         self.turns.reset()
         self.watch.arm(False)
-        return left
+        self.unreleased = []
+        for group in self.joints.in_order_of_release:
+            try:
+                self.unreleased += bringup.disable(self.bus, group)
+            except Exception as error:  # noqa: BLE001 the next group has its turn whatever happens
+                self.unreleased += group
+                self.tracebacks.keep(self.clock.now(), error)
+        return list(self.unreleased)
+
+    def _release_again(self) -> None:
+        """One short try at those that did not confirm."""
+        self.unreleased = bringup.disable(self.bus, self.unreleased, 1, _AGAIN)
 
     def stand(self, time: float) -> None:
         """Hold the last goals for a time [s], so that the robot comes to rest before a release.
@@ -279,9 +293,9 @@ class Session:
         try:
             self._goals = self._enable(pose)
         except AntennateError:
-            with suppress(PortError):
-                self.release()
+            self.release()
             raise
+        self.unreleased = []
         self.watch.arm(True)
         self._lost = False
 
