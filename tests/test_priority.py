@@ -1,11 +1,10 @@
-"""Scheduling and signals around the control loop."""
+"""Scheduling of the control loop."""
 
 from __future__ import annotations
 
 import gc
 import json
 import os
-import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -14,7 +13,6 @@ from typing import Any
 import pytest
 
 from antennate.hardware.driving.priority import Priority, urgent
-from antennate.hardware.driving.signals import STOPS, StopOnce
 
 
 def scheduling() -> int:
@@ -44,21 +42,6 @@ def test_T3_who_may_not_be_real_time_goes_on_as_an_ordinary_process(
         patch.setattr(os, "sched_setscheduler", refuse)
         with urgent() as got:
             assert got is Priority.ORDINARY
-
-
-@pytest.mark.parametrize("number", STOPS)
-def test_B19_only_the_first_of_the_signals_that_end_a_program_is_heard(number: int) -> None:
-    before = [signal.getsignal(other) for other in STOPS]
-    with StopOnce() as stop:
-        with pytest.raises(KeyboardInterrupt):
-            signal.raise_signal(number)
-        for other in STOPS:
-            signal.raise_signal(other)
-        assert stop.deaf
-    assert [signal.getsignal(other) for other in STOPS] == before
-    with StopOnce() as stop:
-        stop.deaf = True
-        signal.raise_signal(number)
 
 
 @pytest.mark.slow

@@ -32,9 +32,8 @@ def writes(made: Rig) -> list[tuple[float, bytes, bytes]]:
     receive = made.robot.bus.receive
 
     def listen(t: float, data: bytes) -> None:
-        for packet in Parser().feed(data):
-            if packet.instruction == Instruction.SYNC_WRITE:
-                seen.append((made.clock.now(), packet.params[:2], packet.params[4:]))
+        packets = [p for p in Parser().feed(data) if p.instruction == Instruction.SYNC_WRITE]
+        seen.extend((made.clock.now(), p.params[:2], p.params[4:]) for p in packets)
         receive(t, data)
 
     made.robot.bus.receive = listen
