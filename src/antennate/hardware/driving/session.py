@@ -22,13 +22,13 @@ from antennate.hardware.driving.body import HardwareBody
 from antennate.hardware.driving.decider import Decider, Decision, Thought, decision, nowhere
 from antennate.hardware.driving.orders import Orders, Tally
 from antennate.hardware.driving.timing import LoopTiming
-from antennate.hardware.driving.tracebacks import Tracebacks
+from antennate.hardware.driving.tracebacks import Tracebacks, said
 from antennate.hardware.driving.turns import Turns
 from antennate.hardware.dynamixel import bringup
 from antennate.hardware.dynamixel.bringup import BringUpError
 from antennate.hardware.dynamixel.bus import Bus
 from antennate.hardware.esp32.board import Board
-from antennate.hardware.joints import Joints, PoseError
+from antennate.hardware.joints import Joints, PoseError, plain
 from antennate.hardware.ports.port import PortError
 from antennate.hardware.safety.causes import Cause, Inputs, Outputs
 from antennate.hardware.safety.diagnosis import Band, ChannelDiagnosis
@@ -143,11 +143,13 @@ class Session:
         raw = frame.counts[0].tolist()
         found = [channel.step(t, c) for channel, c in zip(self.channels, raw, strict=True)]
         self.trust.step(t, raw, found, self.decision.contact)
-        said = [reading.counts for reading in found]
+        counts = [reading.counts for reading in found]
         if self.outputs is None or not self.outputs.clear:
-            said = [math.nan, math.nan]
+            counts = [math.nan, math.nan]
         self._mark("read")
-        self.frame = AntennaFrame(t=self.turns.time(frame.t, self._rate()), counts=np.array([said]))
+        self.frame = AntennaFrame(
+            t=self.turns.time(frame.t, self._rate()), counts=np.array([counts])
+        )
         return self.frame
 
     def _rate(self) -> float:
@@ -205,14 +207,18 @@ class Session:
             thought.asked, thought.decided_at = False, self.clock.now()
             return self._pose
         try:
-            pose = self.decider.step(frame)
+            own = AntennaFrame(t=frame.t.copy(), counts=frame.counts.copy())
+            pose = self.decider.step(own)  # which it may change
             self.decision = decision(self.decider)
-        except Exception as error:  # noqa: BLE001 a plugged-in controller may raise anything
-            thought.failure = f"{type(error).__name__}: {error}"
+        except KeyboardInterrupt:
+            raise
+        except BaseException as error:  # noqa: BLE001 a plugged-in controller may raise anything
+            thought.failure = said(error)
             self.tracebacks.keep(self.clock.now(), error)
             return nowhere()
         thought.decided_at = self.clock.now()
         try:
+            pose = plain(pose)
             self.joints.ticks(pose)
         except PoseError as error:
             thought.bad_pose = str(error)
