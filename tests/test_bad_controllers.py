@@ -38,7 +38,15 @@ class NoText(Exception):
         return 3  # type: ignore[return-value]
 
 
-ANY = [SystemExit(0), GeneratorExit(), asyncio.CancelledError(), Wordless(), NoText()]
+class NoNotes(Exception):
+    """One that cannot be asked for the notes of a traceback."""
+
+    @property
+    def __notes__(self) -> list[str]:
+        raise SystemExit("no notes")
+
+
+ANY = [SystemExit(0), GeneratorExit(), asyncio.CancelledError(), Wordless(), NoText(), NoNotes()]
 
 
 class Plugin:

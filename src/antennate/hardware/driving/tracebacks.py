@@ -37,7 +37,9 @@ class Tracebacks:
         self._last = now
         try:
             text = "".join(traceback.format_exception(error))
-        except Exception:  # noqa: BLE001 it asks the error for its words, which may raise anything
+        except KeyboardInterrupt:
+            raise
+        except BaseException:  # noqa: BLE001 it asks the error for its notes, which may raise too
             text = said(error)
         self.kept.append(text)
 
