@@ -84,19 +84,29 @@ class Joints:
         return Pose(yaw=angles[None, :YAW_COUNT], leg=legs, antenna=angles[None, -2:])
 
 
+def plain(pose: Pose) -> Pose:
+    """A copy of the pose of one robot, which nobody else changes; it may have been anything.
+
+    Raises:
+        PoseError: It is no pose of one robot.
+    """
+    return Pose(**{name: _part(pose, name, shape) for name, shape in _SHAPES.items()})
+
+
 def _angles(pose: Pose) -> Floats:
-    """Its joint angles [rad], shape (19,); a controller of one's own may say anything."""
-    parts: list[Floats] = []
-    for name, shape in _SHAPES.items():
-        try:
-            part = np.asarray(getattr(pose, name), float)
-        except (AttributeError, TypeError, ValueError):
-            raise PoseError(
-                f"expected a Pose with numbers in {name}, found a {type(pose).__name__}"
-            ) from None
-        if part.shape != shape:
-            raise PoseError(
-                f"expected {name} of shape {shape} for 19 joints, found shape {part.shape}"
-            )
-        parts.append(part.ravel())
-    return np.concatenate(parts)
+    """Its joint angles [rad], shape (19,)."""
+    return np.concatenate([_part(pose, name, shape).ravel() for name, shape in _SHAPES.items()])
+
+
+def _part(pose: Pose, name: str, shape: tuple[int, ...]) -> Floats:
+    try:
+        part = np.array(getattr(pose, name), float)
+    except KeyboardInterrupt:
+        raise
+    except BaseException:  # noqa: BLE001 a controller of one's own may say anything
+        raise PoseError(
+            f"expected a Pose with numbers in {name}, found a {type(pose).__name__}"
+        ) from None
+    if part.shape != shape:
+        raise PoseError(f"expected {name} of shape {shape} for 19 joints, found shape {part.shape}")
+    return part

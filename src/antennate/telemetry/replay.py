@@ -106,7 +106,9 @@ class _Guarded:
             if self._refused <= refused:
                 self._kept = pose
             return pose
-        except Exception:  # noqa: BLE001 a plugged-in controller may raise anything
+        except KeyboardInterrupt:
+            raise
+        except BaseException:  # noqa: BLE001 a plugged-in controller may raise anything
             self.failures += 1
             return nowhere()
 

@@ -6,6 +6,7 @@ and infinities too.
 
 from __future__ import annotations
 
+import functools
 import math
 import struct
 from dataclasses import dataclass
@@ -185,36 +186,35 @@ class Tick:
 
 def angles_of(pose: Pose) -> tuple[float, ...]:
     """Joint targets of one robot [rad] in the order of JOINTS; NaN if they are not 19 numbers."""
-    try:
-        angles = np.concatenate(
-            [np.asarray(part, float).ravel() for part in (pose.yaw, pose.leg, pose.antenna)]
-        ).tolist()
-    except (AttributeError, TypeError, ValueError):
-        return _NOWHERE
-    return tuple(angles) if len(angles) == len(JOINTS) else _NOWHERE
+    parts = (_flat(pose, name) for name in ("yaw", "leg", "antenna"))
+    angles = tuple(angle for part in parts for angle in part)
+    return angles if len(angles) == len(JOINTS) else _NOWHERE
 
 
 def _thought(mind: Decided, said: Decision, frame: AntennaFrame, pose: Pose) -> dict[str, Any]:
     """The fields that every world has; b of shape (1, 2) and gait.phase of (1,) where there are."""
-    phase = _numbers(getattr(getattr(mind, "gait", None), "phase", None), 1)
+    phase = _flat(mind, "gait", "phase")
+    b = _flat(mind, "b")
     return {
         "t": float(frame.t[0]),
         "counts": tuple(frame.counts[0].tolist()),
-        "b": _numbers(getattr(mind, "b", None), 2) or _NEITHER,
+        "b": b if len(b) == 2 else _NEITHER,
         "contact": said.contact,
         "maneuver": said.maneuver,
-        "phase": phase[0] if phase else math.nan,
+        "phase": phase[0] if len(phase) == 1 else math.nan,
         "angles": angles_of(pose),
     }
 
 
-def _numbers(value: Any, count: int) -> tuple[float, ...]:
-    """Some numbers of a controller that may be anybody's; empty if it does not have them."""
+def _flat(owner: Any, *names: str) -> tuple[float, ...]:
+    """Numbers in an attribute of an attribute of what may be anybody's; empty if there are none."""
     try:
-        found = np.asarray(value, float).ravel().tolist()
-    except (TypeError, ValueError):
+        value = functools.reduce(getattr, names, owner)
+        return tuple(np.asarray(value, float).ravel().tolist())
+    except KeyboardInterrupt:
+        raise
+    except BaseException:  # noqa: BLE001 a property of anybody may raise anything
         return ()
-    return tuple(found) if len(found) == count else ()
 
 
 def _clean(cause: str) -> str:

@@ -11,8 +11,12 @@ import numpy as np
 
 from antennate.controller import ARMS, Controller
 from antennate.errors import BadInputError, ConfigError
+from antennate.hardware.driving.tracebacks import said
 from antennate.params import ControllerParams
 from antennate.records import AntennaFrame, Contact, Ints, Maneuver, Pose
+
+_MOST = (1 << 31) - 1
+"""Largest number of a decision that is looked at; a log keeps 64 bits of each."""
 
 
 class Decided(Protocol):
@@ -50,10 +54,12 @@ def chosen(name: str, params: ControllerParams) -> Decider:
         )
     try:
         return cast(Decider, getattr(importlib.import_module(module), made)(params))
-    except Exception as error:
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:
         raise ConfigError(
             f"--controller: expected a class that takes ControllerParams, found {name!r}: "
-            f"{type(error).__name__}: {error}"
+            f"{said(error)}"
         ) from error
 
 
@@ -82,14 +88,16 @@ def decision(decider: Decided) -> Decision:
 
 
 def _whole(decider: Decided, name: str, shape: tuple[int, ...]) -> list[int]:
-    said: object = getattr(decider, name, None)
-    found = np.asarray(said)
-    if found.shape != shape or found.dtype.kind not in "iu":
+    value: object = getattr(decider, name, None)
+    found = np.asarray(value)
+    whole = found.shape == shape and found.dtype.kind in "iu"
+    numbers = [int(one) for one in found.ravel()] if whole else []
+    if not numbers or max(map(abs, numbers)) > _MOST:
         raise BadInputError(
-            f"expected {name} of shape {shape}, whole numbers, found {said!r}; see "
+            f"expected {name} of shape {shape}, small whole numbers, found {value!r}; see "
             f"antennate.records.{name.capitalize()}"
         )
-    return [int(one) for one in found.ravel()]
+    return numbers
 
 
 @dataclass(slots=True)

@@ -65,7 +65,7 @@ def drive(
         report.refusal = dry.refusal
         report.watch(session)
         on_tick(session, clock.now())
-        return t < dry.end and not failed(t)
+        return not stop.heard and t < dry.end and not failed(t)
 
     with StopOnce() as stop:
         try:
@@ -76,8 +76,8 @@ def drive(
             finally:
                 stop.deaf = True
         finally:
-            report.timing = None if session.timing is None else session.timing.report()
             report.on = _off(session, config.stand)
+            report.timing = None if session.timing is None else session.timing.report()
     return report
 
 
@@ -85,9 +85,9 @@ def _off(session: Session, stand: float) -> list[int] | None:
     """Stand for a moment, then torque off: ids that did not confirm it, None if it never was on."""
     if not session.touched:
         return None
-    with contextlib.suppress(PortError):
-        session.stand(stand)
     try:
-        return session.release()
-    except PortError:
-        return list(session.joints.ids)
+        with contextlib.suppress(PortError):
+            session.stand(stand)
+    finally:
+        left = session.release()
+    return left

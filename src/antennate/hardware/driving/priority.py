@@ -59,7 +59,19 @@ def _restored() -> Iterator[None]:
         yield
     finally:
         if os.sched_getscheduler(0) != policy:
-            os.sched_setscheduler(0, policy, param)
+            _give_back(policy, param)
+
+
+def _give_back(policy: int, param: os.sched_param) -> None:
+    """As before as far as allowed.
+
+    SCHED_RESET_ON_FORK once set stays for whoever lacks CAP_SYS_NICE (sched(7)): what is started
+    later is then ordinary too, which is what it would be anyway.
+    """
+    for allowed in (policy, policy | os.SCHED_RESET_ON_FORK):
+        with contextlib.suppress(OSError):
+            os.sched_setscheduler(0, allowed, param)
+            return
 
 
 def claim(level: int = LEVEL) -> Priority:

@@ -14,7 +14,6 @@ watchdogs armed and goals set to where the servos stand, as with the first.
 from __future__ import annotations
 
 import math
-from contextlib import suppress
 
 import numpy as np
 
@@ -24,21 +23,24 @@ from antennate.hardware.driving.body import HardwareBody
 from antennate.hardware.driving.decider import Decider, Decision, Thought, decision, nowhere
 from antennate.hardware.driving.orders import Orders, Tally
 from antennate.hardware.driving.timing import LoopTiming
-from antennate.hardware.driving.tracebacks import Tracebacks
+from antennate.hardware.driving.tracebacks import Tracebacks, said
 from antennate.hardware.driving.turns import Turns
 from antennate.hardware.dynamixel import bringup
 from antennate.hardware.dynamixel.bringup import BringUpError
 from antennate.hardware.dynamixel.bus import Bus
 from antennate.hardware.esp32.board import Board
-from antennate.hardware.joints import Joints, PoseError
+from antennate.hardware.joints import Joints, PoseError, plain
 from antennate.hardware.ports.port import PortError
 from antennate.hardware.safety.causes import Cause, Inputs, Outputs
 from antennate.hardware.safety.diagnosis import Band, ChannelDiagnosis
 from antennate.hardware.safety.supervisor import Supervisor
 from antennate.hardware.safety.trust import Trust
 from antennate.hardware.safety.watch import ServoWatch
-from antennate.params import ConditioningParams, DiagnosisParams, SupervisorParams
+from antennate.params import BusParams, ConditioningParams, DiagnosisParams, SupervisorParams
 from antennate.records import AntennaFrame, Floats, Maneuver, Pose
+
+_AGAIN = BusParams().motion_budget
+"""Time for the answers of servos told again in a tick to let go [s]."""
 
 
 class Session:
@@ -70,6 +72,7 @@ class Session:
         decision: What it decided, whenever it was asked last without failing.
         touched: Whether anything was written to the servos.
         unrecorded: Whether a record that is required is not kept; the robot holds meanwhile.
+        unreleased: Ids that did not confirm that their torque is off.
     """
 
     def __init__(
@@ -111,6 +114,7 @@ class Session:
         self._owed = 0.0
         self._sound = False
         self._lost = self.touched = self.unrecorded = False
+        self.unreleased: list[int] = []
 
     @property
     def asked(self) -> bool:
@@ -141,11 +145,13 @@ class Session:
         raw = frame.counts[0].tolist()
         found = [channel.step(t, c) for channel, c in zip(self.channels, raw, strict=True)]
         self.trust.step(t, raw, found, self.decision.contact)
-        said = [reading.counts for reading in found]
+        counts = [reading.counts for reading in found]
         if self.outputs is None or not self.outputs.clear:
-            said = [math.nan, math.nan]
+            counts = [math.nan, math.nan]
         self._mark("read")
-        self.frame = AntennaFrame(t=self.turns.time(frame.t, self._rate()), counts=np.array([said]))
+        self.frame = AntennaFrame(
+            t=self.turns.time(frame.t, self._rate()), counts=np.array([counts])
+        )
         return self.frame
 
     def _rate(self) -> float:
@@ -179,6 +185,8 @@ class Session:
                 self._send(pose if out.move and not self.turns.standing else None)
             if not out.torque and self._goals is not None:
                 self.release()
+            elif self._goals is None and self.unreleased:
+                self._release_again()
         except (PortError, PoseError, BringUpError) as error:
             self.watch.bus_error = str(error)
             self._lost |= not isinstance(error, PoseError)
@@ -204,14 +212,18 @@ class Session:
             return self._pose
         self._sound = False
         try:
-            pose = self.decider.step(frame)
+            own = AntennaFrame(t=frame.t.copy(), counts=frame.counts.copy())
+            pose = self.decider.step(own)  # which it may change
             self.decision = decision(self.decider)
-        except Exception as error:  # noqa: BLE001 a plugged-in controller may raise anything
-            thought.failure = f"{type(error).__name__}: {error}"
+        except KeyboardInterrupt:
+            raise
+        except BaseException as error:  # noqa: BLE001 a plugged-in controller may raise anything
+            thought.failure = said(error)
             self.tracebacks.keep(self.clock.now(), error)
             return nowhere()
         thought.decided_at = self.clock.now()
         try:
+            pose = plain(pose)
             self.joints.ticks(pose)
         except PoseError as error:
             thought.bad_pose = str(error)
@@ -230,14 +242,22 @@ class Session:
         return True
 
     def release(self) -> list[int]:
-        """Torque off, verified: ids that did not confirm it."""
-        left: list[int] = []
-        for group in self.joints.in_order_of_release:
-            left += bringup.disable(self.bus, group)
+        """Torque off, verified: ids that did not confirm it; they are told again in each tick."""
         self._goals = None
         self.turns.reset()
         self.watch.arm(False)
-        return left
+        self.unreleased = []
+        for group in self.joints.in_order_of_release:
+            try:
+                self.unreleased += bringup.disable(self.bus, group)
+            except Exception as error:  # noqa: BLE001 the next group has its turn whatever happens
+                self.unreleased += group
+                self.tracebacks.keep(self.clock.now(), error)
+        return list(self.unreleased)
+
+    def _release_again(self) -> None:
+        """One short try at those that did not confirm."""
+        self.unreleased = bringup.disable(self.bus, self.unreleased, 1, _AGAIN)
 
     def stand(self, time: float) -> None:
         """Hold the last goals for a time [s], so that the robot comes to rest before a release.
@@ -285,9 +305,9 @@ class Session:
         try:
             self._goals = self._enable(pose)
         except AntennateError:
-            with suppress(PortError):
-                self.release()
+            self.release()
             raise
+        self.unreleased = []
         self.watch.arm(True)
         self._lost = False
 

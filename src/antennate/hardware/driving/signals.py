@@ -1,4 +1,8 @@
-"""Ctrl-C, SIGTERM and the loss of the terminal, while servos have torque."""
+"""Ctrl-C, SIGTERM and the loss of the terminal, while servos have torque.
+
+An exception alone would not do: a controller with a bare `except`, a destructor or a callback may
+swallow it. So what was heard is also kept, for the loop to look at.
+"""
 
 from __future__ import annotations
 
@@ -14,20 +18,23 @@ STOPS = tuple(
 
 
 class StopOnce:
-    """Inside the block the first of them raises KeyboardInterrupt, and no other is heard.
+    """Inside the block each of them raises KeyboardInterrupt, until it is made deaf.
 
-    Whoever presses Ctrl-C twice must not keep torque on.
+    Make it so before the torque goes off: whoever presses Ctrl-C twice must not keep it on. Outside
+    the main thread Python delivers no signals: the block then changes and hears nothing, and
+    whoever starts such a thread has to end it otherwise, as by `orders.stop`.
 
     Attributes:
-        deaf: None is heard any more.
+        heard: One came, whoever may have swallowed the exception.
+        deaf: None raises any more; for the block's owner to set.
     """
 
     def __init__(self) -> None:
-        self.deaf = False
+        self.heard = self.deaf = False
         self._before: dict[int, Any] = {}
 
     def __enter__(self) -> StopOnce:
-        if threading.current_thread() is threading.main_thread():  # others get no signals
+        if threading.current_thread() is threading.main_thread():
             self._before = {number: signal.signal(number, self._hear) for number in STOPS}
         return self
 
@@ -36,6 +43,6 @@ class StopOnce:
             signal.signal(number, handler)
 
     def _hear(self, number: int, frame: FrameType | None) -> None:
+        self.heard = True
         if not self.deaf:
-            self.deaf = True
             raise KeyboardInterrupt

@@ -1,4 +1,7 @@
-"""Where a controller has failed, for the one who wrote it; a failing one floods nothing."""
+"""What a controller has failed with, and where, for the one who wrote it.
+
+A failing one floods nothing, and its exceptions may themselves be broken.
+"""
 
 from __future__ import annotations
 
@@ -32,4 +35,21 @@ class Tracebacks:
             self.left_out += 1
             return
         self._last = now
-        self.kept.append("".join(traceback.format_exception(error)))
+        try:
+            text = "".join(traceback.format_exception(error))
+        except KeyboardInterrupt:
+            raise
+        except BaseException:  # noqa: BLE001 it asks the error for its notes, which may raise too
+            text = said(error)
+        self.kept.append(text)
+
+
+def said(error: BaseException) -> str:
+    """An exception in one line, with its type; of one that has no words the type alone."""
+    name = type(error).__name__
+    try:
+        return f"{name}: {' '.join(str(error).split())}"
+    except KeyboardInterrupt:
+        raise
+    except BaseException:  # noqa: BLE001 anybody's __str__ may raise anything
+        return name

@@ -5,6 +5,7 @@ Each step changes nothing unless all servos are fit for it, and what was written
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -19,6 +20,7 @@ from antennate.hardware.dynamixel.tables import (
     XC430_W240,
     Register,
 )
+from antennate.hardware.ports.port import PortError
 from antennate.params import BusParams
 
 WATCHDOG_COUNTS = BusParams().watchdog
@@ -28,6 +30,7 @@ _TRIES = BusParams().tries
 _BUDGET = BusParams().budget
 _COMMON = XC430_W240.registers
 """Both models have the registers used here at the same addresses."""
+_TORQUE = _COMMON["torque_enable"]
 
 
 class BringUpError(AntennateError):
@@ -137,22 +140,34 @@ def enable(bus: Bus, ids: Sequence[int]) -> dict[int, int]:
     return present
 
 
-def disable(bus: Bus, ids: Sequence[int]) -> list[int]:
-    """Torque off as well as can be: the ids that did not confirm it after several tries.
+def disable(
+    bus: Bus, ids: Sequence[int], tries: int = _TRIES, budget: float = _BUDGET
+) -> list[int]:
+    """Torque off as well as can be, whatever the bus does: the ids that did not confirm it.
 
     The watchdogs of the others are switched off, so that nobody takes the robot for one whose
-    program died.
+    program died; those that may have torque keep theirs. The last try writes into noise as well.
+
+    Args:
+        bus: The bus.
+        ids: The servos.
+        tries: How often they are told.
+        budget: Time for their answers, each time [s].
     """
-    torque, left = _COMMON["torque_enable"], list(ids)
-    for _ in range(_TRIES):
-        bus.write_all(torque.address, dict.fromkeys(left, b"\0"))
-        said = bus.read_all(left, Span(torque.address, 1, spare=1), _BUDGET)
-        left = [i for i in left if not isinstance(a := said[i], Value) or a.data != b"\0"]
+    left = list(ids)
+    for more in reversed(range(tries)):
+        with contextlib.suppress(PortError):
+            bus.write_all(_TORQUE.address, dict.fromkeys(left, b"\0"), anyway=not more)
+            said = bus.read_all(left, Span(_TORQUE.address, 1, spare=1), budget)
+            left = [i for i in left if not isinstance(a := said[i], Value) or a.data != b"\0"]
         if not left:
             break
-        bus.settle()
+        if more:
+            with contextlib.suppress(PortError):
+                bus.settle()
     if off := [i for i in ids if i not in left]:
-        bus.write_all(_COMMON["bus_watchdog"].address, dict.fromkeys(off, b"\0"))
+        with contextlib.suppress(PortError):
+            bus.write_all(_COMMON["bus_watchdog"].address, dict.fromkeys(off, b"\0"), anyway=True)
     return left
 
 

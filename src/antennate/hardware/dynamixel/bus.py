@@ -89,9 +89,18 @@ class Bus:
         return self._missed
 
     @in_turn
-    def write_all(self, address: int, data: Mapping[int, bytes]) -> None:
-        """Write equally many bytes to several servos at once; none answers."""
-        if not self._send(packets.sync_write(address, data), self._clock() + BUSY):
+    def write_all(self, address: int, data: Mapping[int, bytes], anyway: bool = False) -> None:
+        """Write equally many bytes to several servos at once; none answers.
+
+        Args:
+            address: Of the first byte.
+            data: Bytes by id.
+            anyway: Write into the noise as well, for what may be written again and again.
+
+        Raises:
+            PortError: The bus did not become quiet in time, or is gone.
+        """
+        if not self._send(packets.sync_write(address, data), self._clock() + BUSY, anyway):
             raise PortError(f"expected a quiet bus, found it busy for {1e3 * BUSY:g} ms")
         self._calm = True
 
@@ -167,9 +176,15 @@ class Bus:
 
     @in_turn
     def settle(self) -> None:
-        """Wait until no late answer can come any more, at most `doubt` seconds."""
+        """Wait until no late answer can come any more and noise is over, at most `doubt` seconds.
+
+        Raises:
+            PortError: The bus is gone.
+        """
+        end = self._clock() + self.timing.doubt
         while (left := self._doubts.longest()) > 0.0:
             self._listen(left, self._clock() + left)
+        self._quiet(end)
 
     # one request and its answers
 
@@ -274,14 +289,14 @@ class Bus:
         wire = self.timing.wire(2 * OVERHEAD + 3 + count + span.length + span.spare)
         return self._clock() + wire + 0.5 * self.timing.gap <= end
 
-    def _send(self, request: bytes, end: float) -> bool:
-        """Send once the bus is known to be quiet; False if it was not by `end`."""
+    def _send(self, request: bytes, end: float, anyway: bool = False) -> bool:
+        """Send once the bus is known to be quiet; False, unless `anyway`, if not by `end`."""
         calm, self._calm = self._calm, False
         dropped = self._port.drain()
         self.tally.drained += dropped
         if dropped:
             self._last_byte = self._clock()
-        if (dropped or not calm) and not self._quiet(end):
+        if (dropped or not calm) and not self._quiet(end) and not anyway:
             return False
         self._port.write(request)
         self._sent = max(self._sent, self._clock()) + self.timing.wire(len(request))

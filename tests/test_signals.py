@@ -1,0 +1,108 @@
+"""Signals that ask a drive to end, whatever a plugged-in controller makes of them."""
+
+from __future__ import annotations
+
+import contextlib
+import signal
+import threading
+from typing import Any
+
+import pytest
+
+from antennate.experiments.twin import Rig, TwinConfig, rig
+from antennate.hardware.driving.config import DriveConfig
+from antennate.hardware.driving.drive import drive
+from antennate.hardware.driving.signals import STOPS, StopOnce
+
+CONFIG = DriveConfig(dry_run=0.5, duration=4.0)
+
+
+@pytest.mark.parametrize("number", STOPS)
+def test_B19_each_signal_that_ends_a_program_is_heard_until_nobody_shall_hear(number: int) -> None:
+    before = [signal.getsignal(other) for other in STOPS]
+    with StopOnce() as stop:
+        assert not stop.heard
+        for other in (number, *STOPS):
+            with pytest.raises(KeyboardInterrupt):
+                signal.raise_signal(other)
+        assert stop.heard
+        stop.deaf = True
+        for other in STOPS:
+            signal.raise_signal(other)
+    assert [signal.getsignal(other) for other in STOPS] == before
+
+
+def test_signals_are_left_alone_outside_the_main_thread() -> None:
+    before, inside = [signal.getsignal(number) for number in STOPS], list[Any]()
+
+    def look() -> None:
+        with StopOnce():
+            inside.extend(signal.getsignal(number) for number in STOPS)
+
+    thread = threading.Thread(target=look)
+    thread.start()
+    thread.join()
+    assert inside == before
+
+
+def walk_until(made: Rig, said: Any) -> None:
+    """Replace what the controller does in one tick, the 50th of the walk and all after it."""
+    session = made.session
+    sound = session.decider.step
+
+    def step(frame: Any) -> Any:
+        if session.tally.sent >= 50:
+            said()
+        return sound(frame)
+
+    session.decider.step = step  # type: ignore[method-assign]
+
+
+@pytest.mark.parametrize("number", STOPS)
+def test_B19_a_signal_that_a_controller_swallows_ends_the_walk_all_the_same(number: int) -> None:
+    made = rig(TwinConfig())
+
+    def swallow() -> None:
+        with contextlib.suppress(BaseException):  # as a bare except does
+            signal.raise_signal(number)
+
+    walk_until(made, swallow)
+    report = drive(made.session, CONFIG, arm=True)
+    assert made.session.tally.sent <= 51
+    assert report.safe
+    assert not any(servo.torque for servo in made.robot.servos)
+
+
+def test_B19_a_controller_that_swallows_a_signal_and_hangs_hears_the_next_one() -> None:
+    made, tried = rig(TwinConfig()), list[int]()
+
+    def hang() -> None:
+        try:
+            signal.raise_signal(signal.SIGINT)
+        except KeyboardInterrupt:
+            tried.append(1)
+        signal.raise_signal(signal.SIGTERM)
+        tried.append(2)
+
+    walk_until(made, hang)
+    report = drive(made.session, CONFIG, arm=True)
+    assert tried == [1]
+    assert report.safe
+
+
+@pytest.mark.parametrize("during", ["stand", "release"])
+def test_B19_no_signal_is_heard_once_the_walk_is_over_of_itself(during: str) -> None:
+    made = rig(TwinConfig())
+    sound = getattr(made.session, during)
+
+    def again(*words: Any) -> Any:
+        for number in STOPS:
+            signal.raise_signal(number)
+        return sound(*words)
+
+    setattr(made.session, during, again)
+    report = drive(made.session, CONFIG.model_copy(update={"duration": 0.5}), arm=True)
+    assert made.session.tally.sent > 20
+    assert report.on == []
+    assert report.timing is not None
+    assert not any(servo.torque for servo in made.robot.servos)
