@@ -52,8 +52,11 @@ class DrivenServo(Servo):
     _ahead = 0.0
     """Ticks that it counts more than the shaft has turned."""
 
-    def turn(self, turns: int) -> None:
-        """Let it have counted some turns more, as after a long walk."""
+    def turn(self, turns: float) -> None:
+        """Let it have counted some turns more, as after a long walk or by a hand.
+
+        The joint stays where it is.
+        """
         self._ahead += turns * TICKS_A_TURN
         self.place(self.position + turns * TICKS_A_TURN)
 
