@@ -270,6 +270,11 @@ SERVOS = [
         test_bus.test_B10_torque_goes_on_without_a_jump,
     ),
     Guard(
+        "present goals before watchdogs are on",
+        put(bringup, "hold_here", constant({})),
+        test_bus.test_B9_watchdogs_are_rearmed_in_order_with_goals_where_servos_stand,
+    ),
+    Guard(
         "writes are read back",
         around(bringup, "_write_checked", unread),
         test_bus.test_B9_latched_watchdogs_are_seen_and_rearmed_in_place,
