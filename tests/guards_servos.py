@@ -16,13 +16,14 @@ import test_loop
 import test_loose_leg
 import test_servo_hours
 import test_session
+import test_settings
 import test_turns
 import test_twin_bus
 import test_twin_robot
 from guard_tools import Guard, after, around, constant, put
 
 from antennate import loop
-from antennate.hardware import joints
+from antennate.hardware import joints, settings
 from antennate.hardware.driving import session, turns
 from antennate.hardware.driving.turns import Turns
 from antennate.hardware.dynamixel import bringup, bus, packets, parser
@@ -263,6 +264,16 @@ SERVOS = [
             lambda robot: robot.servos[8].set("operating_mode", 3),
             r"mode .* \[9\]",
         ),
+    ),
+    Guard(
+        "settings of servos",
+        put(settings, "wrong", constant([])),
+        test_settings.test_all_that_is_wrong_is_said_at_once,
+    ),
+    Guard(
+        "speed limit on the servos",
+        put(bringup, "limit_speed", constant(None)),
+        test_settings.test_B10_profiles_that_another_program_left_are_set_before_torque,
     ),
     Guard(
         "present goals on torque-on",

@@ -291,6 +291,7 @@ class Session:
         self.turns.reset()
         bringup.require_models(bus, self.joints.models)
         bringup.arm_watchdogs(bus, ids)
+        bringup.limit_speed(bus, self.joints.profiles)
         stood = bringup.hold_here(bus, ids)
         self.joints.align(np.array([stood[servo] for servo in ids], float), pose)
         present = bringup.enable(bus, ids)
