@@ -13,16 +13,18 @@ import numpy as np
 import test_dynamixel_bus as test_bus
 import test_dynamixel_packets as test_packets
 import test_loop
+import test_loose_leg
 import test_servo_hours
 import test_session
+import test_settings
 import test_turns
 import test_twin_bus
 import test_twin_robot
 from guard_tools import Guard, after, around, constant, put
 
 from antennate import loop
-from antennate.hardware import joints
-from antennate.hardware.driving import session
+from antennate.hardware import joints, settings
+from antennate.hardware.driving import session, turns
 from antennate.hardware.driving.turns import Turns
 from antennate.hardware.dynamixel import bringup, bus, packets, parser
 from antennate.hardware.dynamixel.answers import Value
@@ -31,9 +33,9 @@ from antennate.hardware.dynamixel.tables import XC430_W240
 from antennate.hardware.ports import serial_port
 from antennate.hardware.ports.port import PortError
 from antennate.hardware.safety import watch
-from antennate.hardware.safety.causes import Outputs
+from antennate.hardware.safety.causes import Outputs, State
 from antennate.hardware.safety.supervisor import Supervisor
-from antennate.params import LayoutParams
+from antennate.params import LayoutParams, TurnsParams
 from antennate.twin.link import Link
 
 
@@ -105,6 +107,22 @@ def finite_goals(old: Any, self: Any, angles: Any) -> Any:
 def careless(old: Any, self: Any, frame_: Any) -> Any:
     self._thought = session.Thought(decided_at=self.clock.now())
     return self.decider.step(frame_)
+
+
+def goal_taken(old: Any, self: Any, servo: int, register: Any, value: int) -> bool:
+    return old(self, servo, register, value) or register is turns._GOAL
+
+
+def torque_off(old: Any, self: Any, servo: int, register: Any) -> Any:
+    return 0 if register is turns._TORQUE and self._stage == 1 else old(self, servo, register)
+
+
+def old_goal(old: Any, self: Any, at: int, goals: Any) -> bool:
+    return self._write(self._joints.ids[at], turns._TORQUE, 1)
+
+
+def no_fault(old: Any, self: Any, out: Outputs) -> None:
+    old(self, dataclasses.replace(out, state=State.HOLD))
 
 
 def no_line_of_errors(self: Any, what: str) -> Any:
@@ -248,9 +266,24 @@ SERVOS = [
         ),
     ),
     Guard(
+        "settings of servos",
+        put(settings, "wrong", constant([])),
+        test_settings.test_all_that_is_wrong_is_said_at_once,
+    ),
+    Guard(
+        "speed limit on the servos",
+        put(bringup, "limit_speed", constant(None)),
+        test_settings.test_B10_profiles_that_another_program_left_are_set_before_torque,
+    ),
+    Guard(
         "present goals on torque-on",
         around(bringup, "hold_here", where_goals_were),
         test_bus.test_B10_torque_goes_on_without_a_jump,
+    ),
+    Guard(
+        "present goals before watchdogs are on",
+        put(bringup, "hold_here", constant({})),
+        test_bus.test_B9_watchdogs_are_rearmed_in_order_with_goals_where_servos_stand,
     ),
     Guard(
         "writes are read back",
@@ -296,6 +329,47 @@ SERVOS = [
         "torque taken off on purpose",
         put(Turns, "loose", None),
         test_turns.test_a_leg_without_torque_to_forget_its_turns_is_not_reported,
+    ),
+    Guard(
+        "goal of a loose leg is read back",
+        around(Turns, "_write", goal_taken),
+        test_loose_leg.test_B10_a_leg_that_does_not_take_its_goal_gets_no_torque,
+    ),
+    Guard(
+        "goal of a loose leg is where it stands",
+        around(Turns, "_hold", old_goal),
+        partial(
+            test_loose_leg.test_B10_a_leg_that_was_turned_while_loose_gets_torque_where_it_stands,
+            600,
+        ),
+    ),
+    Guard(
+        "a loose leg after a fault",
+        around(session.Session, "_forget_turns", no_fault),
+        test_loose_leg.test_B10_after_a_pause_a_loose_leg_waits_for_an_arm_event,
+    ),
+    Guard(
+        "torque is off before turns are forgotten",
+        around(Turns, "_read", torque_off),
+        test_loose_leg.test_a_leg_whose_torque_came_back_is_not_cleared,
+    ),
+    Guard(
+        "turns are forgotten",
+        put(turns, "TurnsParams", partial(TurnsParams.model_construct, slack=300.0)),
+        test_loose_leg.test_a_leg_that_did_not_forget_gets_no_torque,
+    ),
+    Guard(
+        "turns that cannot be told",
+        put(turns, "TurnsParams", partial(TurnsParams.model_construct, slack=300.0)),
+        partial(
+            test_loose_leg.test_a_leg_turned_so_far_that_its_turns_cannot_be_told_gets_no_torque,
+            1300,
+        ),
+    ),
+    Guard(
+        "legs stand still before one is let go",
+        put(Turns, "_calm", constant(True)),
+        test_loose_leg.test_no_leg_loses_its_torque_before_all_have_stood_still_for_five_ticks,
     ),
     Guard(
         "supply read long ago",

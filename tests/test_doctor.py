@@ -29,7 +29,7 @@ def test_a_healthy_robot_has_no_row_that_is_not_ok_and_nothing_is_written() -> N
     before = memory(patient)
     checkup = patient.examine()
     assert wrong(checkup) == {}
-    assert len(checkup.rows) == 35
+    assert len(checkup.rows) == 36
     assert memory(patient) == before
     assert sum(servo.eeprom_writes for servo in patient.robot.servos) == 0
 
@@ -100,11 +100,12 @@ def test_a_bus_where_nobody_answers_says_power_and_wiring() -> None:
     ("fault", "check", "found", "verdict"),
     [
         ("servo:3=return_delay_time:250", "return delay", "500 us (3)", "warn"),
-        ("servo:3=homing_offset:7", "homing offset", "7 (3)", "warn"),
+        ("servo:3=homing_offset:7", "homing offset", "7 (3)", "bad"),
         ("servo:12=homing_offset:7", "homing offset", "7 (12)", "bad"),
-        ("servo:3=drive_mode:1", "drive mode", "reversed (3)", "warn"),
+        ("servo:3=drive_mode:1", "drive mode", "reversed (3)", "bad"),
         ("servo:3=drive_mode:8", "drive mode", "torque by goal (3)", "bad"),
-        ("servo:3=max_position_limit:2500", "position limits", "0 to 2500 (3)", "warn"),
+        ("servo:3=max_position_limit:2500", "position limits", "0 to 2500 (3)", "bad"),
+        ("servo:3=velocity_limit:200", "velocity limit", "200 (3)", "bad"),
         ("servo:3=shutdown:0", "shuts itself down at", "not all of these (3)", "warn"),
         ("servo:3=present_input_voltage:105", "supply", "10.5 V (3)", "warn"),
         ("servo:3=present_input_voltage:100", "supply", "10.0 V (3)", "bad"),
@@ -120,7 +121,10 @@ def test_a_bus_where_nobody_answers_says_power_and_wiring() -> None:
 def test_what_a_servo_says_of_itself_is_judged(
     fault: str, check: str, found: str, verdict: str
 ) -> None:
-    """Limits of both models are their manuals'; 2500 ticks are less than 2048 + 1024."""
+    """Limits of both models are their manuals'; 2500 ticks are less than 2048 + 1024.
+
+    4.5 rad/s are 188 counts of 0.229 rev/min, and 235 with a quarter more.
+    """
     rows = wrong(Patient(fault).examine(esp32=False))
     assert list(rows) == [f"bus: {check}"]
     row = rows[f"bus: {check}"]
@@ -208,6 +212,27 @@ def test_fix_gives_ids_speeds_modes_and_delays_and_writes_each_once() -> None:
     assert wrong(patient.examine()) == {}
     assert [servo.eeprom_writes for servo in patient.robot.servos] == [0] * 6 + [4] + [0] * 12
     assert not any(servo.torque for servo in patient.robot.servos)
+
+
+def test_fix_sets_what_drive_requires_and_says_what_has_to_follow() -> None:
+    patient = Patient(
+        "servo:3=min_position_limit:1900",
+        "servo:3=max_position_limit:2200",
+        "servo:7=max_position_limit:2200",
+        "servo:8=drive_mode:9",
+        "servo:9=homing_offset:500",
+        "servo:19=velocity_limit:100",
+    )
+    assert patient.fix() == [
+        "servo 3 (at 1000000): max position limit 2200 -> 4095",
+        "servo 3 (at 1000000): min position limit 1900 -> 0",
+        "servo 8 (at 1000000): drive mode 9 -> 0; see that its sign in layout.*.directions is "
+        "right",
+        "servo 9 (at 1000000): homing offset 500 -> 0; measure its place in layout.*.zeros anew",
+        "servo 19 (at 1000000): velocity limit 100 -> 445",
+    ]
+    assert wrong(patient.examine()) == {}
+    assert sum(servo.eeprom_writes for servo in patient.robot.servos) == 5
 
 
 def test_B18_fix_writes_nothing_where_nothing_differs() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
 
 import numpy as np
 import pytest
@@ -421,9 +422,10 @@ def test_B15_two_models_with_one_id_are_not_called_silent() -> None:
         bringup.require(rig.bus, MODELS)
 
 
-def test_B10_torque_goes_on_without_a_jump() -> None:
+def torque_on(times: int) -> None:
+    """Row B10: nobody's goal is far when torque comes on, and nobody moves for 50 ticks."""
     rng = np.random.default_rng(10)
-    for _ in range(20):
+    for _ in range(times):
         rig = Rig()
         for servo in rig.twin.servos:
             servo.set("goal_position", int(rng.integers(0, 4096)))
@@ -434,6 +436,15 @@ def test_B10_torque_goes_on_without_a_jump() -> None:
                 assert servo.torque
                 assert abs(servo.get("goal_position") - servo.position) <= 5
                 assert abs(servo.position - 100 * servo.get("id")) <= 5
+
+
+def test_B10_torque_goes_on_without_a_jump() -> None:
+    torque_on(20)
+
+
+@pytest.mark.slow
+def test_B10_torque_goes_on_without_a_jump_a_thousand_times() -> None:
+    torque_on(1000)
 
 
 def test_B9_latched_watchdogs_are_seen_and_rearmed_in_place() -> None:
@@ -451,6 +462,26 @@ def test_B9_latched_watchdogs_are_seen_and_rearmed_in_place() -> None:
     bringup.arm_watchdogs(rig.bus, IDS)
     assert [servo.get("bus_watchdog") for servo in rig.twin.servos] == [5] * 19
     assert [servo.position for servo in rig.twin.servos] == pytest.approx(before, abs=1.0)
+
+
+def test_B9_watchdogs_are_rearmed_in_order_with_goals_where_servos_stand() -> None:
+    """Off, goals where they stand, on: one whose watchdog is off would go on to its old goal."""
+    rig = Rig()
+    for servo in rig.twin.servos:
+        servo.set("goal_position", 4000)
+        servo.set("bus_watchdog", -1)
+    written: list[tuple[int, int]] = []
+    write_all = rig.bus.write_all
+
+    def note(address: int, data: Mapping[int, bytes]) -> None:
+        assert list(data) == IDS
+        written.append((address, int.from_bytes(data[7], "little", signed=True)))
+        write_all(address, data)
+
+    rig.bus.write_all = note  # type: ignore[method-assign]
+    bringup.arm_watchdogs(rig.bus, IDS)
+    assert written == [(98, 0), (116, 700), (98, 5)]
+    assert [servo.get("goal_position") for servo in rig.twin.servos] == [100 * i for i in IDS]
 
 
 def test_B9_extended_mode_with_an_offset_is_refused() -> None:

@@ -9,6 +9,7 @@ import numpy as np
 from antennate.anatomy import LINK_COUNT, YAW_COUNT
 from antennate.errors import AntennateError
 from antennate.hardware import roster
+from antennate.hardware.settings import profile_velocities
 from antennate.params.layout import MOST_TICKS, TICKS_A_TURN, LayoutParams
 from antennate.records import Floats, Ints, Pose
 
@@ -26,12 +27,14 @@ class Joints:
     Attributes:
         ids: Ids of their servos.
         models: Model numbers by id.
+        profiles: Profile velocities by id [0.229 rev/min], above what goals are moved at.
         in_order_of_release: Ids of the groups in the order in which they lose their torque.
     """
 
     def __init__(self, layout: LayoutParams) -> None:
         self.ids = layout.ids
         self.models = roster.models(layout)
+        self.profiles = profile_velocities(layout)
         self.in_order_of_release = layout.in_order_of_release
         self._sign: Floats = np.array(layout.directions, float)
         self._zero: Floats = np.array(layout.zeros, float)

@@ -53,6 +53,14 @@ class BusParams(Params):
         ge=1,
         le=127,
     )
+    profile_room: float = number(
+        1.25,
+        "1",
+        "assumed: goals are followed without delay, and a joint that lags catches up",
+        "profile velocity of a servo by the fastest that its goals move",
+        ge=1,
+        le=10,
+    )
     gap: float = number(
         0.002,
         "s",

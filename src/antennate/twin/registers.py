@@ -29,6 +29,8 @@ _POSITION_MODES = (3, 4, 5)
 _VELOCITY_MODE = 1
 _TICKS = 4096
 _SPEED_UNIT = VELOCITY_UNIT / POSITION_UNIT
+_TORQUE_BY_GOAL = 8
+"""Bit of Drive Mode."""
 _TRIPPED = -1
 _FIRMWARE = 48
 _VOLTS_MARGIN = 10
@@ -201,6 +203,7 @@ class Servo:
             return self.get("min_position_limit"), self.get("max_position_limit")
         limits = {
             "goal_velocity": "velocity_limit",
+            "profile_velocity": "velocity_limit",
             "goal_pwm": "pwm_limit",
             "goal_current": "current_limit",
         }
@@ -215,6 +218,8 @@ class Servo:
         if register.name in ("torque_enable", "bus_watchdog"):
             self._heard = max(self._heard, self._t)
         self.set(register.name, value)
+        if register.name in GOALS and self.get("drive_mode") & _TORQUE_BY_GOAL:
+            self.set("torque_enable", 1)
         if register.name == "operating_mode":
             self.set("goal_position", round(self._position))
 

@@ -43,6 +43,8 @@ BOOT_TICKS = TwinParams().boot_samples
 _STANDING_NOISE = TwinParams().standing_noise
 _DEVICE = b"twin\0\0\0\0"
 _ROUNDING = 1e-9
+_REVERSED = 1
+"""Bit of Drive Mode."""
 
 
 class DrivenServo(Servo):
@@ -52,14 +54,17 @@ class DrivenServo(Servo):
     _ahead = 0.0
     """Ticks that it counts more than the shaft has turned."""
 
-    def turn(self, turns: int) -> None:
-        """Let it have counted some turns more, as after a long walk."""
+    def turn(self, turns: float) -> None:
+        """Let it have counted some turns more, as after a long walk or by a hand.
+
+        The joint stays where it is.
+        """
         self._ahead += turns * TICKS_A_TURN
         self.place(self.position + turns * TICKS_A_TURN)
 
     def shaft(self, ticks: float) -> None:
         """Where the physics has turned the shaft [ticks]."""
-        self.place(ticks + self._ahead)
+        self.place(self._mirrored(ticks) + self._ahead)
 
     def clear_turns(self) -> StatusError:
         """Forget whole turns; the shaft stays."""
@@ -76,9 +81,14 @@ class DrivenServo(Servo):
         """
         if self.torque and not self._stopped:
             self._stood = None
-            return float(self.get("goal_position")) - self._ahead
-        self._stood = self.position - self._ahead if self._stood is None else self._stood
+            return self._mirrored(self.get("goal_position") - self._ahead)
+        if self._stood is None:
+            self._stood = self._mirrored(self.position - self._ahead)
         return self._stood
+
+    def _mirrored(self, ticks: float) -> float:
+        """From the shaft to what it counts, and back: Drive Mode may reverse it."""
+        return TICKS_A_TURN - ticks if self.get("drive_mode") & _REVERSED else ticks
 
     def heard(self, t: float) -> None:
         """An instruction packet was on the bus; all else waits for the next tick."""

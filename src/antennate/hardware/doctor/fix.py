@@ -1,4 +1,4 @@
-"""Puts right what doctor found: ids, speed, mode and delay, each change on its own and verified.
+"""Puts right what doctor found: ids, speed, settings, each change on its own and verified.
 
 Torque goes off first. EEPROM is written only where it differs, and read back.
 """
@@ -8,18 +8,24 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from antennate.hardware import roster
+from antennate.hardware import roster, settings
 from antennate.hardware.doctor.rows import Opener
 from antennate.hardware.doctor.survey import Seen, Survey, look, master, read_some
 from antennate.hardware.dynamixel import bringup
 from antennate.hardware.dynamixel.bringup import BringUpError
 from antennate.hardware.dynamixel.bus import Bus
 from antennate.hardware.dynamixel.tables import BAUD_RATES, XC430_W240
+from antennate.hardware.settings import Setting
 from antennate.params.layout import LayoutParams
 
 _ID, _BAUD = "id", "baud_rate"
 _MOVED = (_ID, _BAUD)
 """Registers after whose change a servo is found elsewhere."""
+_AFTER = {
+    "drive_mode": "see that its sign in layout.*.directions is right",
+    "homing_offset": "measure its place in layout.*.zeros anew",
+}
+"""What a person has to do after a change, by register."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +51,8 @@ class Change:
         values: tuple[object, object] = self.before, self.after
         if self.register == _BAUD:
             values = BAUD_RATES[self.before], BAUD_RATES[self.after]
-        return f"servo {self.servo} (at {self.baud}): {name} {values[0]} -> {values[1]}"
+        said = f"servo {self.servo} (at {self.baud}): {name} {values[0]} -> {values[1]}"
+        return f"{said}; {_AFTER[self.register]}" if self.register in _AFTER else said
 
 
 def plan(survey: Survey, layout: LayoutParams) -> list[Change]:
@@ -77,14 +84,17 @@ def _speed(baud: int) -> int:
 
 
 def _settings(survey: Survey, layout: LayoutParams) -> list[Change]:
-    wanted = {"operating_mode": roster.modes(layout), "return_delay_time": {}}
+    delay = dict.fromkeys(layout.ids, Setting(0, 0, 0))
+    wanted = {**settings.settings(layout), "return_delay_time": delay}
     return [
-        Change(servo, survey.baud, name, there[name], target)
+        Change(servo, survey.baud, name, there[name], setting.cure)
         for servo, seen in survey.here.items()
         if servo in layout.ids and seen.state == "ok"
         for there in (seen.registers,)
-        for name, values in wanted.items()
-        if name in there and there[name] != (target := values.get(servo, 0))
+        for name, of in wanted.items()
+        if name in there
+        and (setting := of.get(servo)) is not None
+        and not setting.allows(there[name])
     ]
 
 

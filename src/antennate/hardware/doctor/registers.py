@@ -8,13 +8,13 @@ from antennate.hardware import roster
 from antennate.hardware.doctor.rows import Row, Verdict, grouped, ids_text, row
 from antennate.hardware.doctor.survey import Survey, watchdog_text
 from antennate.hardware.dynamixel.tables import (
-    EXTENDED_MODE,
     RETURN_DELAY_UNIT,
     XC430_W240,
     hardware_errors,
 )
+from antennate.hardware.settings import Settings, settings
 from antennate.params import DoctorParams, SupervisorParams
-from antennate.params.layout import TICKS_A_TURN, LayoutParams
+from antennate.params.layout import LayoutParams
 
 _PART = "bus"
 _REVERSED, _TIMED, _TORQUE_BY_GOAL = 1, 4, 8
@@ -51,14 +51,18 @@ def _check(
 
 def settings_rows(known: Registers, layout: LayoutParams) -> list[Row]:
     """What lasts over power-off, and the status return level."""
-    modes, legs = roster.modes(layout), set(roster.legs(layout))
+    rules = settings(layout)
+
+    def judge(name: str) -> Callable[[int, int], Verdict | None]:
+        return lambda servo, value: None if rules[name][servo].allows(value) else "bad"
+
     return [
         _check(
             known,
             "operating_mode",
             "operating mode",
-            grouped(modes),
-            lambda servo, mode: "bad" if mode != modes[servo] else None,
+            grouped(roster.modes(layout)),
+            judge("operating_mode"),
             _FIX,
         ),
         _check(
@@ -83,20 +87,27 @@ def settings_rows(known: Registers, layout: LayoutParams) -> list[Row]:
             "homing_offset",
             "homing offset",
             "0",
-            lambda servo, value: ("bad" if servo in legs else "warn") if value else None,
-            "set register 20 of {ids} to 0 with DYNAMIXEL Wizard, then correct layout.*.zeros: "
-            f"in mode {EXTENDED_MODE} a watchdog would make the servo move",
+            judge("homing_offset"),
+            f"{_FIX}, then correct layout.*.zeros of {{ids}}",
         ),
         _check(
             known,
             "drive_mode",
             "drive mode",
             "normal",
-            lambda _, value: ("bad" if value & _TORQUE_BY_GOAL else "warn") if value else None,
-            "set register 10 of {ids} to 0 with DYNAMIXEL Wizard; layout.*.directions tells signs",
+            judge("drive_mode"),
+            f"{_FIX}; layout.*.directions of {{ids}} tells signs",
             _drive_mode,
         ),
-        _position_limits(known, layout),
+        _check(
+            known,
+            "velocity_limit",
+            "velocity limit",
+            "from layout.*.fastest on",
+            judge("velocity_limit"),
+            f"{_FIX}: {{ids}} would refuse their profile velocity",
+        ),
+        _position_limits(known, rules),
         _shutdown(known),
     ]
 
@@ -106,22 +117,18 @@ def _drive_mode(value: int) -> str:
     return " + ".join(word for bit, word in words if value & bit) or "normal"
 
 
-def _position_limits(known: Registers, layout: LayoutParams) -> Row:
-    quarter = TICKS_A_TURN // 4
-    zeros = dict(zip(layout.ids, layout.zeros, strict=True))
-    turning = set(roster.legs(layout))
+def _position_limits(known: Registers, rules: Settings) -> Row:
+    least, most = rules["min_position_limit"], rules["max_position_limit"]
     low, high = _of(known, "min_position_limit"), _of(known, "max_position_limit")
-    both = {i: (low[i], high[i]) for i in low if i in high and i not in turning}
-    wrong = [
-        i for i, (a, b) in both.items() if not a <= zeros[i] - quarter < zeros[i] + quarter <= b
-    ]
+    both = {i: (low[i], high[i]) for i in least if i in low and i in high}
+    wrong = [i for i, (a, b) in both.items() if not (least[i].allows(a) and most[i].allows(b))]
     return row(
         _PART,
         "position limits",
-        "at least a quarter turn about each zero",
+        "at least layout.*.limit about each zero",
         grouped(both, lambda ends: f"{ends[0]} to {ends[1]}"),
-        "warn" if wrong else None,
-        f"{ids_text(wrong)}: set registers 48 and 52 to 4095 and 0; goals beyond are refused",
+        "bad" if wrong else None,
+        f"{_FIX}: {ids_text(wrong)} would refuse goals",
     )
 
 

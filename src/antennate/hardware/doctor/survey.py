@@ -34,6 +34,7 @@ REGISTERS = (
     "temperature_limit",
     "max_voltage_limit",
     "min_voltage_limit",
+    "velocity_limit",
     "max_position_limit",
     "min_position_limit",
     "shutdown",

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from antennate.errors import BadInputError
-from antennate.hardware import roster
+from antennate.hardware import roster, settings
 from antennate.hardware.driving.adapter import require_quick
 from antennate.hardware.driving.config import DriveConfig
 from antennate.hardware.driving.decider import chosen
@@ -158,7 +158,7 @@ def _unasked(bus: Port) -> int:
 
 
 def require_servos(bus: Bus, layout: LayoutParams) -> None:
-    """All servos are there, of the right model and in the right mode.
+    """All servos are there, of the right model and set as they have to be.
 
     Raises:
         BringUpError: Otherwise; names each id that is not, and the cure.
@@ -170,10 +170,12 @@ def require_servos(bus: Bus, layout: LayoutParams) -> None:
             f"--bus: {error}; check power, wiring, ids and baud {layout.baud}, or whether --esp32 "
             "and --bus are swapped; `antennate doctor` tells more, slow adapters too"
         ) from None
-    modes = bringup.read_register(bus, layout.ids, XC430_W240["operating_mode"])
-    wanted = roster.modes(layout)
-    if wrong := [i for i in layout.ids if modes[i] != wanted[i]]:
+    rules = settings.settings(layout)
+    known = {
+        name: bringup.read_register(bus, list(of), XC430_W240[name]) for name, of in rules.items()
+    }
+    if wrong := settings.wrong(known, layout):
         raise BringUpError(
-            f"--bus: expected operating mode 4 (extended position) of legs and 3 (position) of the "
-            f"others, found another in servos {wrong}; set register 11 with torque off"
+            f"--bus: expected servos set for this robot, found {'; '.join(wrong)}; "
+            "`antennate doctor --fix` puts it right"
         )

@@ -31,7 +31,7 @@ from antennate.hardware.dynamixel.bus import Bus
 from antennate.hardware.esp32.board import Board
 from antennate.hardware.joints import Joints, PoseError, plain
 from antennate.hardware.ports.port import PortError
-from antennate.hardware.safety.causes import Cause, Inputs, Outputs
+from antennate.hardware.safety.causes import Cause, Inputs, Outputs, State
 from antennate.hardware.safety.diagnosis import Band, ChannelDiagnosis
 from antennate.hardware.safety.supervisor import Supervisor
 from antennate.hardware.safety.trust import Trust
@@ -181,7 +181,7 @@ class Session:
             if out.arming:
                 self._arm(pose)
             elif out.feed_watchdog and self._goals is not None and not self._lost:
-                self._forget_turns(out.move)
+                self._forget_turns(out)
                 self._send(pose if out.move and not self.turns.standing else None)
             if not out.torque and self._goals is not None:
                 self.release()
@@ -317,17 +317,19 @@ class Session:
         self.turns.reset()
         bringup.require_models(bus, self.joints.models)
         bringup.arm_watchdogs(bus, ids)
+        bringup.limit_speed(bus, self.joints.profiles)
         stood = bringup.hold_here(bus, ids)
         self.joints.align(np.array([stood[servo] for servo in ids], float), pose)
         present = bringup.enable(bus, ids)
         return np.array([present[servo] for servo in ids], float)
 
-    def _forget_turns(self, may_begin: bool) -> None:
-        if self._goals is None:
+    def _forget_turns(self, out: Outputs) -> None:
+        """A tick's share of it; after a fault a leg without torque waits for an arm event."""
+        if self._goals is None or out.state >= State.FAULT:
             return
-        if may_begin:
+        if out.move:
             self.turns.begin(self._goals)
-        self.turns.step(self._goals, self.watch.positions, may_begin)
+        self.turns.step(self._goals, self.watch.positions, out.move)
 
     def _send(self, pose: Pose | None) -> None:
         """Goals one tick nearer to a pose; where they are without one."""

@@ -2,8 +2,10 @@
 
 A servo counts 256 turns either way and then takes no goal. Before that the robot stands still, and
 one leg after the other forgets its turns: torque off, clear, the goal where it stands, torque on.
-Each step takes one tick and is read back before the next; a leg gets torque only after its goal was
-seen to be its position. The others keep their torque, and the gait goes on at the same phase.
+Each step takes one tick and is read back before the next. A leg without torque may be turned by
+weight or by hand, for as long as the program is stopped: it gets torque only after its position was
+read anew and its goal seen to be that. The others keep their torque, and the gait goes on at the
+same phase.
 Source of the instruction: https://emanual.robotis.com/docs/en/dxl/protocol2/#clear-0x10.
 """
 
@@ -144,7 +146,7 @@ class Turns:
         return True
 
     def _forget(self, at: int, goals: Floats) -> bool:
-        """Clear, and set the goal to where the leg stands, without torque."""
+        """Clear, without torque; from then on its turns are counted anew."""
         servo = self._joints.ids[at]
         if self._read(servo, _TORQUE) != 0:
             return False
@@ -154,15 +156,20 @@ class Turns:
         if place is None or not -slack <= place < TICKS_A_TURN + slack:
             return False
         shift = TICKS_A_TURN * round((place - self._place) / TICKS_A_TURN)
-        if abs(place - self._place - shift) > slack or not self._write(servo, _GOAL, place):
+        if abs(place - self._place - shift) > slack:
             return False
         self._joints.shift(at, shift)
         goals[at] = place
         return True
 
     def _hold(self, at: int, goals: Floats) -> bool:
-        servo, goal = self._joints.ids[at], round(float(goals[at]))
-        return self._read(servo, _GOAL) == goal and self._write(servo, _TORQUE, 1)
+        """The goal where the leg stands now, then torque."""
+        servo = self._joints.ids[at]
+        place = self._read(servo, _PRESENT)
+        if place is None or not self._write(servo, _GOAL, place):
+            return False
+        goals[at] = place
+        return self._write(servo, _TORQUE, 1)
 
     def _write(self, servo: int, register: Register, value: int) -> bool:
         self._bus.write_all(register.address, {servo: register.encode(value)})

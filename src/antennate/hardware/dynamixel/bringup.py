@@ -129,6 +129,18 @@ def arm_watchdogs(bus: Bus, ids: Sequence[int], counts: int = WATCHDOG_COUNTS) -
     _write_checked(bus, _COMMON["bus_watchdog"], dict.fromkeys(ids, counts))
 
 
+def limit_speed(bus: Bus, velocities: Mapping[int, int]) -> None:
+    """Give each servo its profile velocity [0.229 rev/min], and no profile acceleration.
+
+    Another program may have left others; after a restart there is none.
+
+    Raises:
+        BringUpError: A servo did not take it.
+    """
+    _write_checked(bus, _COMMON["profile_acceleration"], dict.fromkeys(velocities, 0))
+    _write_checked(bus, _COMMON["profile_velocity"], velocities)
+
+
 def enable(bus: Bus, ids: Sequence[int]) -> dict[int, int]:
     """Torque on, each servo where it stands: those positions [ticks].
 

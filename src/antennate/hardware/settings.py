@@ -1,0 +1,112 @@
+"""How servos have to be set before any of them gets torque: one rule for drive and doctor.
+
+Drive Mode has to be 0: the layout's `directions` mirror joints, and bit 3 would let a goal bring
+torque. With a homing offset a watchdog makes a servo in extended mode move, and zeros are not what
+the layout says. Position and velocity limits have to leave room for what is asked for; legs are in
+extended mode, where position limits do not act.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import NamedTuple
+
+from antennate.hardware import roster
+from antennate.hardware.dynamixel.tables import POSITION_UNIT, TABLES, VELOCITY_UNIT
+from antennate.params import BusParams
+from antennate.params.layout import TICKS_A_TURN, LayoutParams
+
+_ROOM = BusParams().profile_room
+
+
+class Setting(NamedTuple):
+    """What a register may hold.
+
+    Attributes:
+        low: Smallest value.
+        high: Largest.
+        cure: The value to set if it holds another.
+    """
+
+    low: int
+    high: int
+    cure: int
+
+    def allows(self, value: int) -> bool:
+        """The value may stay."""
+        return self.low <= value <= self.high
+
+    def __str__(self) -> str:
+        if self.low == self.high:
+            return str(self.low)
+        return f"at most {self.high}" if self.cure == self.low else f"at least {self.low}"
+
+
+Settings = Mapping[str, Mapping[int, Setting]]
+
+
+def settings(layout: LayoutParams) -> Settings:
+    """By register and id, in the order in which they are set."""
+    zero = dict.fromkeys(layout.ids, Setting(0, 0, 0))
+    low, high = _position_limits(layout)
+    return {
+        "operating_mode": {i: Setting(m, m, m) for i, m in roster.modes(layout).items()},
+        "drive_mode": zero,
+        "homing_offset": zero,
+        "velocity_limit": _velocity_limits(layout),
+        "max_position_limit": high,
+        "min_position_limit": low,
+    }
+
+
+def profile_velocities(layout: LayoutParams) -> dict[int, int]:
+    """Profile velocity by id [0.229 rev/min]: `fastest` of its group with some room."""
+    models = roster.models(layout)
+    return {
+        servo: min(math.ceil(_ROOM * fastest / VELOCITY_UNIT), _default_limit(models[servo]))
+        for servo, fastest in zip(layout.ids, layout.fastest, strict=True)
+    }
+
+
+def wrong(known: Mapping[str, Mapping[int, int]], layout: LayoutParams) -> list[str]:
+    """What is not as it has to be, in words.
+
+    Args:
+        known: Values by register and id.
+        layout: The servos.
+    """
+    found: dict[str, list[int]] = {}
+    for name, wanted in settings(layout).items():
+        for servo, setting in wanted.items():
+            value = known[name][servo]
+            if not setting.allows(value):
+                what = f"{name.replace('_', ' ')} {value} (expected {setting}) in servos"
+                found.setdefault(what, []).append(servo)
+    return [f"{what} {ids}" for what, ids in found.items()]
+
+
+def _default_limit(model: int) -> int:
+    return TABLES[model]["velocity_limit"].default or 0
+
+
+def _velocity_limits(layout: LayoutParams) -> dict[int, Setting]:
+    """A servo refuses a profile that is faster than its velocity limit."""
+    found: dict[int, Setting] = {}
+    models = roster.models(layout)
+    for servo, least in profile_velocities(layout).items():
+        register = TABLES[models[servo]]["velocity_limit"]
+        found[servo] = Setting(least, register.high or 0, _default_limit(models[servo]))
+    return found
+
+
+def _position_limits(layout: LayoutParams) -> tuple[dict[int, Setting], dict[int, Setting]]:
+    """Smallest and largest position limits, of joints that do not turn without end."""
+    low: dict[int, Setting] = {}
+    high: dict[int, Setting] = {}
+    for servo, zero, limit in zip(layout.ids, layout.zeros, layout.limits, strict=True):
+        if math.isfinite(limit):
+            reach, last = limit / POSITION_UNIT, TICKS_A_TURN - 1
+            low[servo] = Setting(0, max(round(zero - reach), 0), 0)
+            high[servo] = Setting(min(round(zero + reach), last), last, last)
+    return low, high
