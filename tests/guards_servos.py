@@ -5,26 +5,31 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import math
+import signal
 from functools import partial
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
+import test_bad_controllers
 import test_dynamixel_bus as test_bus
 import test_dynamixel_packets as test_packets
 import test_loop
 import test_loose_leg
+import test_release
 import test_servo_hours
 import test_session
 import test_settings
+import test_signals
 import test_turns
 import test_twin_bus
 import test_twin_robot
-from guard_tools import Guard, after, around, constant, put
+from guard_tools import Guard, after, around, before, constant, put
 
 from antennate import loop
 from antennate.hardware import joints, settings
 from antennate.hardware.driving import session, turns
+from antennate.hardware.driving.signals import StopOnce
 from antennate.hardware.driving.turns import Turns
 from antennate.hardware.dynamixel import bringup, bus, packets, parser
 from antennate.hardware.dynamixel.answers import Value
@@ -127,6 +132,25 @@ def no_fault(old: Any, self: Any, out: Outputs) -> None:
 
 def no_line_of_errors(self: Any, what: str) -> Any:
     return contextlib.nullcontext()
+
+
+def told_once(old: Any, master: Any, ids: Any, *words: Any) -> list[int]:
+    return old(master, ids, 1)
+
+
+def only_when_quiet(old: Any, self: Any, request: bytes, end: float, anyway: bool = False) -> bool:
+    return old(self, request, end)
+
+
+def an_exception_alone(old: Any, self: Any, number: int, frame: Any) -> None:
+    try:
+        old(self, number, frame)
+    finally:
+        self.heard = False
+
+
+def forget_the_loss(self: Any, time: float) -> None:
+    self._lost = False
 
 
 def shared(old: Any, *args: Any, exclusive: bool = True, **kwargs: Any) -> Any:
@@ -301,6 +325,18 @@ SERVOS = [
         test_bus.test_B19_torque_off_is_confirmed_and_what_did_not_is_named,
     ),
     Guard(
+        "torque off is told again",
+        around(bringup, "disable", told_once),
+        partial(test_release.test_B19_a_servo_is_told_five_times_to_let_go, 4, []),
+    ),
+    Guard(
+        "torque off through noise",
+        around(bus.Bus, "_send", only_when_quiet),
+        partial(
+            test_release.test_B19_noise_at_the_release_leaves_no_servo_with_torque_within_2_s, 60.0
+        ),
+    ),
+    Guard(
         "watchdogs armed",
         around(bringup, "arm_watchdogs", lambda old, master, ids: old(master, ids, 0)),
         test_session.test_B8_servos_stop_within_120_ms_when_only_the_controller_fails_and_the_loop_goes_on,
@@ -419,6 +455,40 @@ SESSION = [
         "no packet without a decision",
         around(session.Session, "_act", always_watch),
         test_session.test_B8_servos_stop_within_120_ms_when_only_the_controller_fails_and_the_loop_goes_on,
+    ),
+    Guard(
+        "servos that kept their torque",
+        put(session.Session, "_release_again", constant(None)),
+        test_release.test_B19_servos_that_kept_their_torque_in_off_are_told_again_until_they_let_go,
+    ),
+    Guard(
+        "pose held before the torque goes",
+        put(session.Session, "stand", constant(None)),
+        test_release.test_B19_the_pose_is_held_for_as_long_as_told_before_the_torque_goes,
+    ),
+    Guard(
+        "no goal before the release of a lost bus",
+        before(session.Session, "stand", forget_the_loss),
+        test_release.test_B6_B19_no_goal_is_sent_before_the_release_once_the_bus_was_lost,
+    ),
+    Guard(
+        "signals while the torque goes off",
+        before(StopOnce, "_hear", lambda self, *_: setattr(self, "deaf", False)),
+        partial(test_signals.test_B19_no_signal_is_heard_once_the_walk_is_over_of_itself, "stand"),
+        by=(KeyboardInterrupt,),
+    ),
+    Guard(
+        "signals that a controller swallows",
+        around(StopOnce, "_hear", an_exception_alone),
+        partial(
+            test_signals.test_B19_a_signal_that_a_controller_swallows_ends_the_walk_all_the_same,
+            signal.SIGINT,
+        ),
+    ),
+    Guard(
+        "poses that a controller changes later",
+        put(session, "plain", lambda pose: pose),
+        test_bad_controllers.test_B14_a_pose_that_a_controller_changes_later_stays_as_it_was_judged,
     ),
     Guard(
         "exceptions of the controller end nothing",

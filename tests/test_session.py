@@ -221,9 +221,6 @@ def drive_until(made: Rig, t: float) -> None:
 def test_T2_a_controller_that_hangs_stops_every_servo_within_120_ms_of_the_last_packet() -> None:
     """It never comes back from its decision: nobody sends, and nobody has to."""
 
-    class Ended(BaseException):
-        pass
-
     made = rig(TwinConfig())
     sound, servos, wait = made.session.decider.step, made.robot.servos, made.clock.sleep_until
     tripped: list[float] = []
@@ -237,17 +234,16 @@ def test_T2_a_controller_that_hangs_stops_every_servo_within_120_ms_of_the_last_
         while not all(servo.get("bus_watchdog") == -1 for servo in servos):
             wait(made.clock.now() + 0.001)
             if made.clock.now() > last + 1.0:
-                raise Ended
+                raise KeyboardInterrupt
         tripped.append(made.clock.now() - last)
         for _ in range(2):
             seen.append([servo.position for servo in servos])
             wait(made.clock.now() + 0.4)
-        raise Ended
+        raise KeyboardInterrupt
 
     made.session.decider.step = step  # type: ignore[method-assign]
     made.session.release = list  # type: ignore[method-assign]
-    with pytest.raises(Ended):
-        drive(made.session, CONFIG, arm=True)
+    drive(made.session, CONFIG, arm=True)
     assert tripped[0] <= 0.120
     walked, stopped = np.ptp(seen[-43:-2], axis=0), np.ptp(seen[-2:], axis=0)
     assert walked[5:17].min() > 700
