@@ -90,7 +90,8 @@ def command(argv: Sequence[str]) -> int:
         sys.stderr.write(f"written to {folder.path}\n")
     fault = result["worst_state"] in (State.FAULT.name, State.OFF.name)
     stays_on = result["torque_off"] is False
-    return BAD_INPUT if fault or stays_on or result["refusal"] else OK
+    idle = _idle(result)
+    return BAD_INPUT if fault or stays_on or result["refusal"] or idle else OK
 
 
 def _carry_out(config: DriveConfig, session: Session, orders: Orders, log: Path) -> dict[str, Any]:
@@ -123,6 +124,11 @@ def _carry_out(config: DriveConfig, session: Session, orders: Orders, log: Path)
     return head | report.result(session) | tail
 
 
+def _idle(result: Mapping[str, Any]) -> bool:
+    """It was to walk, and never did."""
+    return result["armed"] and not result["poses_sent"]
+
+
 def _show(result: Mapping[str, Any]) -> None:
     show("Drive", {result["controller"]: result}, _ROWS, _note(result))
 
@@ -136,7 +142,9 @@ def _note(result: Mapping[str, Any]) -> str:
     if not result["armed"]:
         note += "A dry run: nothing was written to the servos; --arm lets it walk.\n"
     if result["refusal"]:
-        note += f"Not armed: {result['refusal']}; --no-touch-check arms without the check.\n"
+        note += f"Not armed: {result['refusal']}.\n"
+    if _idle(result):
+        note += "It never walked: --arm was given, and no pose was sent.\n"
     if result["clock"] == "twin":
         note += "Time was the twin's.\n"
     elif result["priority"] == Priority.ORDINARY.value:
