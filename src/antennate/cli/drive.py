@@ -28,6 +28,7 @@ from antennate.hardware.safety.causes import State
 from antennate.telemetry.feed import Feed
 from antennate.telemetry.header import Header
 from antennate.telemetry.parts import part, parts
+from antennate.telemetry.reader import count
 from antennate.telemetry.ticks import Tick
 
 DESCRIPTION = """\
@@ -117,7 +118,7 @@ def _carry_out(config: DriveConfig, session: Session, orders: Orders, log: Path)
     tail = {
         "clock": "twin" if orders.clock else "host",
         "priority": priority.value,
-        "unlogged": feed.dropped,
+        "unlogged": 0 if feed.complete else feed.offered - count(log),
         "log_complete": feed.complete,
         "logs": [each.name for each in parts(log) if each.exists()],
     }
