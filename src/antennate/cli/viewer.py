@@ -24,7 +24,7 @@ from antennate.telemetry.ticks import Tick
 from antennate.telemetry.writer import LogWriter
 
 REQUIRED = "required"
-_STDOUT, _STDERR = 1, 2
+_STDOUT = 1
 _LINES_A_SECOND = 5
 
 
@@ -48,14 +48,10 @@ class StatusLine:
 
 
 def _write(text: str) -> None:
-    """Say it on stderr, or nowhere from now on if that is gone, as with a lost terminal."""
-    try:
+    """Say it on stderr, or nowhere if that is gone, as with a lost terminal."""
+    with contextlib.suppress(OSError):
         sys.stderr.write(text)
         sys.stderr.flush()
-    except OSError:
-        nowhere = os.open(os.devnull, os.O_WRONLY)
-        os.dup2(nowhere, _STDERR)  # what is not said yet would else fail again at the end
-        os.close(nowhere)
 
 
 def line(tick: Tick, dropped: int) -> str:
