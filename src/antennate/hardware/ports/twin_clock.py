@@ -258,11 +258,12 @@ def _require_twin(flag: str, address: str) -> None:
 
 def _require_own(places: tuple[str, ...], addresses: tuple[str, str]) -> None:
     """The wires are those that the twin names, so that no byte for a twin goes to a robot."""
-    given = tuple(words.place(address) for address in addresses)
-    for wire, named, found in zip(words.WIRES, places, given, strict=True):
-        if named != found:
+    given = [words.place(address) for address in addresses]
+    named = places or ("nothing",) * len(given)
+    for wire, wanted, found in zip(words.WIRES, named, given, strict=True):
+        if wanted != found:
             raise ConfigError(
-                f"--{wire}: expected {named}, which the twin of --clock names as its own, found "
+                f"--{wire}: expected {wanted}, which the twin of --clock names as its own, found "
                 f"{found}; --clock is for a twin alone, never for a robot"
             )
 
