@@ -118,7 +118,7 @@ def test_B13_torque_that_went_off_while_walking_is_the_worst() -> None:
 @pytest.mark.parametrize(
     ("when", "worst", "said"),
     [
-        ("1.3s", State.OK, "Not armed: HOLD STALE: no fresh sample"),
+        ("1.3s", State.OK, "Torque never came on. Not armed: HOLD STALE: no fresh sample"),
         ("1.55s", State.HOLD, "Worst state HOLD (HOLD STALE: no fresh sample"),
     ],
 )

@@ -136,10 +136,12 @@ def _show(result: Mapping[str, Any]) -> None:
 
 def _note(result: Mapping[str, Any]) -> str:
     why = f" ({result['why']})" if result["why"] else ""
-    note = f"Worst state {result['worst_state']}{why}.\n"
-    if result["torque_off"] is not None:
-        on = result["servos_on"]
-        note += f"Torque is {_power(on)}.\n"
+    if result["torque_off"] is None:
+        note = "Torque never came on.\n"
+    else:
+        note = (
+            f"Worst state {result['worst_state']}{why}.\nTorque is {_power(result['servos_on'])}.\n"
+        )
     if not result["armed"]:
         note += "A dry run: nothing was written to the servos; --arm lets it walk.\n"
     if result["refusal"]:
