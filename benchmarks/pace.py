@@ -3,9 +3,10 @@
 Twin and loop run on the same machine over two pseudo-terminals, in real time: dry run with a touch
 of both antennae, then a walk. A cycle is missed if the loop still runs when the next one is due.
 
-- `missed_share`: cycles missed of all, arming (about 0.1 s on the bus) included.
+- `missed_share`: cycles missed of all of the drive, those included that arming takes on the bus.
 - `walking_missed_share`: the same from the first pose on.
 - `worst_lateness_ms`: farthest that a tick began behind its time.
+- `fault`: causes of a FAULT or worse with their details, the first one first; empty without one.
 """
 
 from __future__ import annotations
@@ -78,10 +79,13 @@ def walk(seconds: float, busy: int, viewers: int = 0) -> dict[str, Any]:
 def summary(result: dict[str, Any]) -> dict[str, Any]:
     """What counts of one drive."""
     pace, walking = result.get("pace"), result.get("walking")
+    fault = result["why"] if result.get("worst_state") in ("FAULT", "OFF") else ""
     if pace is None or walking is None:
-        return {"walked": False, "why": result.get("why") or result.get("refusal") or "no result"}
+        why = result.get("why") or result.get("refusal") or "no result"
+        return {"walked": False, "fault": fault, "why": why}
     return {
         "walked": True,
+        "fault": fault,
         "missed_share": pace["missed_share"],
         "walking_missed_share": walking["missed_share"],
         "worst_lateness_ms": 1e3 * pace["worst_lateness_s"],

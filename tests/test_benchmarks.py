@@ -13,15 +13,28 @@ from antennate.params import TunnelParams
 FOLDER = Path(__file__).parents[1] / "benchmarks"
 
 
-@pytest.fixture(scope="module")
-def trial():
+def loaded(name):
     if not FOLDER.is_dir():
         pytest.skip("benchmarks are not part of this copy")
-    spec = importlib.util.spec_from_file_location("benchmark_trial", FOLDER / "trial.py")
+    spec = importlib.util.spec_from_file_location(f"benchmark_{name}", FOLDER / f"{name}.py")
     module = importlib.util.module_from_spec(spec)
     sys.modules[spec.name] = module
     spec.loader.exec_module(module)
     return module
+
+
+@pytest.fixture(scope="module")
+def trial():
+    return loaded("trial")
+
+
+def test_a_drive_that_ended_in_a_fault_says_its_causes():
+    pace = loaded("pace")
+    why = "FAULT SILENT_SERVO: servos do not answer (servo 7); HOLD STALE: no fresh sample"
+    ended = {"worst_state": "FAULT", "why": why, "pace": None, "walking": None}
+    assert pace.summary(ended) == {"walked": False, "fault": why, "why": why}
+    assert pace.summary({"worst_state": "HOLD", "why": "HOLD", "refusal": ""})["fault"] == ""
+    assert pace.summary({})["why"] == "no result"
 
 
 def test_replay_ends_on_the_same_bits(trial):

@@ -15,11 +15,12 @@ import pytest
 
 from antennate.cli.viewer import REQUIRED
 from antennate.errors import LogError
+from antennate.hardware.driving.signals import STOPS
 from antennate.params import ControllerParams, LogParams
 from antennate.telemetry.feed import Feed, messages
 from antennate.telemetry.header import Header
 from antennate.telemetry.parts import part
-from antennate.telemetry.reader import LogReader
+from antennate.telemetry.reader import LogReader, count
 from antennate.telemetry.ticks import Tick
 
 HEADER = Header(controller="paper", params=ControllerParams())
@@ -128,6 +129,58 @@ def test_G6_a_record_that_is_required_is_given_up_with_its_process(tmp_path: Pat
         assert log.header == HEADER
 
 
+def test_G6_a_record_that_is_required_is_not_kept_while_its_process_stands_still() -> None:
+    """It has said that it keeps what it gets, and then takes nothing more."""
+    stuck = "import os, time; os.write(1, b'b'); time.sleep(60)"
+    with Feed(script(stuck), b"first") as feed:
+        until(lambda: feed.keeps, feed)
+        while feed.send(bytes(400)):
+            pass
+        assert not feed.keeps
+        assert feed.pid is not None
+        os.kill(feed.pid, signal.SIGKILL)
+
+
+def test_G6_ticks_that_a_killed_process_had_not_kept_yet_are_counted(tmp_path: Path) -> None:
+    """It stood still with them in its pipe; none of them was dropped before."""
+    first, second = tmp_path / "drive.log", tmp_path / "drive-2.log"
+    with Feed(viewer(first), HEADER.pack()) as feed:
+        number, _ = until(lambda: _holds_a_tick(first), feed)
+        assert feed.pid is not None
+        os.kill(feed.pid, signal.SIGSTOP)
+        for waiting in range(number, number + 50):
+            assert feed.send(tick(waiting).pack())
+        os.kill(feed.pid, signal.SIGKILL)
+        number, _ = until(lambda: _holds_a_tick(second), feed, number + 50)
+    assert feed.offered == number - 1
+    assert feed.offered - count(first) >= 50
+    first.unlink()
+    with LogReader(second) as log:
+        assert count(first) == len(list(log))
+
+
+GONE = """
+import os, sys
+ours, theirs = os.pipe()
+os.close(ours)
+os.dup2(theirs, 2)
+from antennate.cli.viewer import main
+sys.argv[1:] = [sys.argv[1]]
+sys.exit(main())
+"""
+
+
+def test_G6_a_display_that_is_gone_costs_no_tick_of_the_log(tmp_path: Path) -> None:
+    log = tmp_path / "drive.log"
+    words = [sys.executable, "-c", GONE, str(log)]
+    with Feed(lambda number: words, HEADER.pack()) as feed:
+        for number in range(1, 301):
+            assert feed.send(tick(number).pack())
+    assert feed.complete
+    with LogReader(log) as kept:
+        assert (len(list(kept)), kept.end) == (300, 300)
+
+
 def test_a_killed_loop_is_told_from_one_that_ended(tmp_path: Path) -> None:
     log = tmp_path / "drive.log"
     loop = (
@@ -168,7 +221,8 @@ def test_a_log_that_cannot_be_written_is_said_once_and_the_status_line_goes_on(
     assert taken.read_text() == "another drive"
 
 
-def test_ctrl_c_does_not_end_the_viewer_before_the_loop(tmp_path: Path) -> None:
+@pytest.mark.parametrize("number", STOPS)
+def test_a_signal_does_not_end_the_viewer_before_the_loop(number: int, tmp_path: Path) -> None:
     log = tmp_path / "drive.log"
     with Feed(viewer(log), HEADER.pack()) as feed:
         feed.send(tick(1).pack())
@@ -176,7 +230,7 @@ def test_ctrl_c_does_not_end_the_viewer_before_the_loop(tmp_path: Path) -> None:
         while not _holds_a_tick(log) and time.monotonic() < end:
             time.sleep(0.01)
         assert feed.pid is not None
-        os.kill(feed.pid, signal.SIGINT)
+        os.kill(feed.pid, number)
         feed.send(tick(2).pack())
     assert not feed.failed
     with LogReader(log) as kept:

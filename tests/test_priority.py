@@ -13,6 +13,7 @@ from typing import Any
 import pytest
 
 from antennate.hardware.driving.priority import Priority, urgent
+from antennate.hardware.safety.causes import State
 
 
 def scheduling() -> int:
@@ -90,13 +91,29 @@ def test_T3_a_user_with_a_limit_alone_leaves_the_loop_as_an_ordinary_process() -
 
 @pytest.mark.slow
 def test_T3_beside_four_busy_processes_one_cycle_in_200_is_missed_at_most() -> None:
-    """In real time, so that it says something of this machine only."""
-    script = Path(__file__).parents[1] / "benchmarks" / "pace.py"
-    words = [sys.executable, str(script), "--json", "--busy", "4", "--seconds", "30"]
-    said = subprocess.run(words, capture_output=True, text=True, check=True, timeout=120).stdout
-    drive = json.loads(said)["busy_4"]
+    """In real time, so that it says something of this machine only.
+
+    Twin and loop share it with the busy processes and whatever else runs: a walk that ends in a
+    FAULT is repeated, twice at most, and its causes are printed. The last one has to pass.
+    """
+    for _ in range(3):
+        drive = beside_four()
+        if not drive["fault"]:
+            break
+        sys.stdout.write(f"ended in a FAULT: {drive['fault']}\n")
+    assert drive["walked"], drive["why"]
     assert drive["torque_off"]
     if drive["priority"] != Priority.REAL_TIME.value:
         pytest.skip("real-time priority is not allowed here")
+    assert State[drive["worst_state"]] < State.FAULT, drive["why"]
     assert drive["missed_share"] <= 0.005
+    assert drive["walking_missed_share"] <= 0.005
     assert drive["worst_lateness_ms"] <= 50.0
+
+
+def beside_four() -> dict[str, Any]:
+    """What counts of one walk beside four busy processes."""
+    script = Path(__file__).parents[1] / "benchmarks" / "pace.py"
+    words = [sys.executable, str(script), "--json", "--busy", "4", "--seconds", "30"]
+    said = subprocess.run(words, capture_output=True, text=True, check=True, timeout=120).stdout
+    return json.loads(said)["busy_4"]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import socket
 import subprocess
 import sys
 import threading
@@ -11,6 +12,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 import pytest
@@ -34,7 +36,7 @@ from antennate.hardware.ports.twin_clock import TwinClock
 from antennate.hardware.safety.causes import State
 from antennate.params import ClockParams, LayoutParams
 from antennate.telemetry.reader import LogReader
-from antennate.twin.clock import FaultyClock
+from antennate.twin.clock import ClockServer, FaultyClock
 from antennate.twin.ends import End, Terminal
 from antennate.twin.faults import Faults, read
 from antennate.twin.lockstep import BoardPort
@@ -43,6 +45,7 @@ from antennate.twin.tcp import TcpEnd
 
 CONFIG = TunnelConfig(seed=0)
 LAYOUT = LayoutParams()
+QUICK = ClockParams(arrival=0.2)
 SILENT = ("servo:7=silent@1.8s",)
 """Amid the ticks that are compared."""
 HERE = Path(__file__).parent
@@ -155,14 +158,14 @@ def test_a_drive_ends_in_one_line_at_once_when_its_twin_dies(
 
 
 REFUSED = {
-    b"until 1\n": b"error expected `hello antennate-clock 1` first, found another word\n",
-    b"\nhello antennate-clock 2\n": b"error expected `hello antennate-clock 1`, ",
-    b"hello antennate-clock 1\nuntil nan\n": b"found 'until nan'\n",
-    b"hello antennate-clock 1\nuntil 5\n": b"expected a time of 0.0 to 1 s later, found 5.0",
-    b"hello antennate-clock 1\nsent bus 0\n": b"expected 1 to 65536 bytes in one piece",
+    b"until 1\n": b"error expected `hello antennate-clock 2` first, found another word\n",
+    b"\nhello antennate-clock 3\n": b"error expected `hello antennate-clock 2`, ",
+    b"hello antennate-clock 2\nuntil nan\n": b"found 'until nan'\n",
+    b"hello antennate-clock 2\nuntil 5\n": b"expected a time of 0.0 to 1 s later, found 5.0",
+    b"hello antennate-clock 2\nsent bus 0\n": b"expected 1 to 65536 bytes in one piece",
     b"x" * 300: b"found 'xxx",
     b"\xff\0'`$(exit)`\n": b"error expected",
-    b"hello antennate-clock 1\nuntil 0.02\nuntil 0.01\n": b"expected a time of 0.02 to",
+    b"hello antennate-clock 2\nuntil 0.02\nuntil 0.01\n": b"expected a time of 0.02 to",
 }
 
 
@@ -175,7 +178,7 @@ def test_the_clock_refuses_in_a_line_what_it_does_not_know() -> None:
             while not (b"error" in heard and heard.endswith(b"\n")) and time.monotonic() < end:
                 heard += line.read(4096, 1.0)
             assert found in heard
-            line.write(b"\nhello antennate-clock 1\n")  # whoever greets anew may go on
+            line.write(b"\nhello antennate-clock 2\n")  # whoever greets anew may go on
             assert line.read(4096, 20.0).startswith(b"at 0.0")
         line.close()
 
@@ -194,6 +197,8 @@ def test_every_bit_of_a_time_comes_back(t: float) -> None:
     asked = words.request(words.go_on(t, listens=False).encode())
     assert asked == words.GoOn(t, listens=False)
     assert words.answer(f"at {t!r} 1 2".encode()) == words.At(t, (1, 2))
+    named = words.At(t, (1, 2), ("tcp:4001", "/dev/pts/3"))
+    assert words.answer(f"at {t!r} 1 2 tcp:4001 /dev/pts/3".encode()) == named
 
 
 def test_whoever_greets_at_time_0_gets_all_that_the_board_says() -> None:
@@ -222,6 +227,75 @@ def test_bytes_that_a_wire_swallows_are_missed_and_there_is_no_way_back() -> Non
         for line in lines:
             line.close()
     nobody.close()
+
+
+class Stuck:
+    """A wire on which every question is answered with the same time."""
+
+    def __init__(self) -> None:
+        self.questions = 0
+
+    def write(self, data: bytes) -> None:
+        self.questions += 1
+
+    def read(self, most: int, timeout: float) -> bytes:
+        return b"at 0.0 0 0\n"
+
+    def close(self) -> None: ...
+
+
+def test_a_twin_whose_time_stands_still_is_given_up() -> None:
+    line = Stuck()
+    clock = TwinClock(line, line, line)
+    with pytest.raises(PortError, match=r"go on until 0\.01 s, found 0\.0 s; start it anew"):
+        clock.sleep_until(0.01)
+    with pytest.raises(PortError, match="go on until"):
+        clock.bus.read(1, 0.01)
+    assert line.questions == 2
+
+
+class Chatter:
+    """A wire whose client never stops."""
+
+    path, taken = "tcp://127.0.0.1:1", True
+
+    def read(self) -> bytes:
+        return b"x"
+
+    def clear(self) -> None: ...
+
+
+def test_a_greeting_beside_a_client_that_never_stops_is_refused() -> None:
+    robot, end = build(TwinConfig(), 5), Terminal()
+    wire = cast(End, Chatter())
+    server = ClockServer(
+        robot, Faults([], LAYOUT.ids), {"esp32": wire, "bus": wire}, end, params=QUICK
+    )
+    line = SerialPort(end.path, 115_200)
+    line.write(words.HELLO.encode() + b"\n")
+    server.hear()
+    assert b"error expected silence on the wire esp32 before" in line.read(4096, 5.0)
+    line.close()
+    end.close()
+
+
+def test_a_clock_is_refused_with_a_bus_that_is_not_its_twins_before_a_byte_goes_there(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A real bus behind a TCP bridge, while another client has the twin's."""
+    monkeypatch.chdir(tmp_path)
+    bridge = socket.create_server(("127.0.0.1", 0))
+    port = bridge.getsockname()[1]
+    with served(build(TwinConfig(), 5), tcp_ports) as paths:
+        other = socket.create_connection(("127.0.0.1", int(paths["bus"].rpartition(":")[2])))
+        flags = ["--esp32", paths["esp32"], "--bus", f"tcp://127.0.0.1:{port}"]
+        said = refusal(capsys, *flags, "--clock", paths["clock"])
+        assert f"--bus: expected {words.place(paths['bus'])}, which the twin of --clock " in said
+        assert f"found tcp:{port}; --clock is for a twin alone, never for a robot" in said
+        heard, _ = bridge.accept()
+        assert heard.recv(1) == b""  # closed, and nothing before
+        for each in (other, heard, bridge):
+            each.close()
 
 
 def refusal(capsys: pytest.CaptureFixture[str], *flags: str) -> str:

@@ -28,6 +28,7 @@ from antennate.hardware.safety.causes import State
 from antennate.telemetry.feed import Feed
 from antennate.telemetry.header import Header
 from antennate.telemetry.parts import part, parts
+from antennate.telemetry.reader import count
 from antennate.telemetry.ticks import Tick
 
 DESCRIPTION = """\
@@ -91,7 +92,8 @@ def command(argv: Sequence[str]) -> int:
         sys.stderr.write(f"written to {folder.path}\n")
     fault = result["worst_state"] in (State.FAULT.name, State.OFF.name)
     stays_on = result["torque_off"] is False
-    return BAD_INPUT if fault or stays_on or result["refusal"] else OK
+    idle = _idle(result)
+    return BAD_INPUT if fault or stays_on or result["refusal"] or idle else OK
 
 
 def _carry_out(config: DriveConfig, session: Session, orders: Orders, log: Path) -> dict[str, Any]:
@@ -117,11 +119,16 @@ def _carry_out(config: DriveConfig, session: Session, orders: Orders, log: Path)
     tail = {
         "clock": "twin" if orders.clock else "host",
         "priority": priority.value,
-        "unlogged": feed.dropped,
+        "unlogged": 0 if feed.complete else feed.offered - count(log),
         "log_complete": feed.complete,
         "logs": [each.name for each in parts(log) if each.exists()],
     }
     return head | report.result(session) | tail
+
+
+def _idle(result: Mapping[str, Any]) -> bool:
+    """It was to walk, and never did."""
+    return result["armed"] and not result["poses_sent"]
 
 
 def _show(result: Mapping[str, Any]) -> None:
@@ -130,14 +137,18 @@ def _show(result: Mapping[str, Any]) -> None:
 
 def _note(result: Mapping[str, Any]) -> str:
     why = f" ({result['why']})" if result["why"] else ""
-    note = f"Worst state {result['worst_state']}{why}.\n"
-    if result["torque_off"] is not None:
-        on = result["servos_on"]
-        note += f"Torque is {_power(on)}.\n"
+    if result["torque_off"] is None:
+        note = "Torque never came on.\n"
+    else:
+        note = (
+            f"Worst state {result['worst_state']}{why}.\nTorque is {_power(result['servos_on'])}.\n"
+        )
     if not result["armed"]:
         note += "A dry run: nothing was written to the servos; --arm lets it walk.\n"
     if result["refusal"]:
-        note += f"Not armed: {result['refusal']}; --no-touch-check arms without the check.\n"
+        note += f"Not armed: {result['refusal']}.\n"
+    if _idle(result):
+        note += "It never walked: --arm was given, and no pose was sent.\n"
     if result["clock"] == "twin":
         note += "Time was the twin's.\n"
     elif result["priority"] == Priority.ORDINARY.value:

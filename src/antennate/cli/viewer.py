@@ -16,6 +16,7 @@ from pathlib import Path
 
 from antennate.cli.messages import one_line
 from antennate.errors import LogError
+from antennate.hardware.driving.signals import STOPS
 from antennate.records import Maneuver
 from antennate.telemetry.feed import Message, messages
 from antennate.telemetry.header import Header
@@ -36,15 +37,21 @@ class StatusLine:
         self._due = -math.inf
 
     def show(self, message: Message) -> None:
-        """Show a tick, if one is due."""
+        """Show a tick, if one is due; nobody needs to be there to see it."""
         tick = Tick.unpack(message.content)
         if tick.now >= self._due:
             self._due = tick.now + self._every
             said = line(tick, message.dropped)
             if self._terminal:  # a line that wraps could not be written over
                 said = "\r\x1b[K" + said[: shutil.get_terminal_size().columns - 1]
-            sys.stderr.write(said if self._terminal else said + "\n")
-            sys.stderr.flush()
+            _write(said if self._terminal else said + "\n")
+
+
+def _write(text: str) -> None:
+    """Say it on stderr, or nowhere if that is gone, as with a lost terminal."""
+    with contextlib.suppress(OSError):
+        sys.stderr.write(text)
+        sys.stderr.flush()
 
 
 def line(tick: Tick, dropped: int) -> str:
@@ -70,7 +77,7 @@ def main() -> int:
 
     With the word `required` after the log's path it ends with the log, and shows nothing more.
     """
-    for number in (signal.SIGINT, signal.SIGTERM):  # the other end decides when it is over
+    for number in STOPS:  # the other end decides when it is over
         signal.signal(number, signal.SIG_IGN)
     status = StatusLine()
     kept, required = False, REQUIRED in sys.argv[2:]
@@ -83,8 +90,8 @@ def main() -> int:
             with contextlib.suppress(OSError):  # the other end is gone; the ticks tell it
                 os.write(_STDOUT, b"begun\n")
         for message in stream:
-            status.show(message)
             kept = kept and _keep(log, message.content)
+            status.show(message)
             if required and not kept:
                 break
         if log is not None and kept:
@@ -114,7 +121,7 @@ def _keep(log: LogWriter | None, content: bytes) -> bool:
 
 
 def _say(error: LogError) -> bool:
-    sys.stderr.write(f"\nantennate drive: {one_line(str(error))}\n")
+    _write(f"\nantennate drive: {one_line(str(error))}\n")
     return False
 
 

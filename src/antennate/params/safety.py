@@ -161,7 +161,7 @@ class TouchCheckParams(Params):
         60.0,
         "s",
         "assumed: a person walks to the robot and bends both antennae",
-        "time by which the dry run is extended for the check",
+        "time by which the dry run is extended for the check, and then while torque is refused",
         ge=0,
         le=3600,
     )

@@ -58,9 +58,9 @@ class Feed:
         params: How many processes may follow the first.
 
     Attributes:
-        dropped: Ticks that found no room, or nobody.
+        offered: Ticks that were to be sent.
+        dropped: Those of them that found no room, or nobody.
         started: Processes started so far.
-        keeps: Whether one runs that has said that it keeps what it gets.
         failed: The last one is gone for good, or ended with an error.
     """
 
@@ -78,8 +78,14 @@ class Feed:
         self._ending = False
         self._lock = threading.Lock()
         self._keeper = threading.Thread(target=self._look_after, name="recorder", daemon=True)
-        self.dropped = self.started = 0
-        self.keeps = self.failed = False
+        self.offered = self.dropped = self.started = 0
+        self.failed = self._begun = False
+        self._taken = True
+
+    @property
+    def keeps(self) -> bool:
+        """Whether a process runs that has said that it keeps what it gets, and took the last."""
+        return self._begun and self._taken
 
     @property
     def pid(self) -> int | None:
@@ -117,7 +123,9 @@ class Feed:
                 os.write(self._pipe, message)
         except OSError:  # full, or nobody reads
             done = False
+        self.offered += 1
         self.dropped += not done
+        self._taken = done
         return done
 
     def _look_after(self) -> None:
@@ -127,11 +135,11 @@ class Feed:
             if process is None or process.stdout is None:
                 return
             with process.stdout as said:
-                self.keeps = bool(said.read(1))
+                self._begun = bool(said.read(1))
                 while said.read(4096):
                     pass
             died = process.wait() != 0
-            self.keeps = False
+            self._begun = False
             with self._lock:
                 if self._ending or self.started >= self._most:
                     self.failed = died or not self._ending

@@ -87,8 +87,10 @@ class ClockServer:
                 self._end.write(said.encode("ascii", "replace") + b"\n")
 
     def _obey(self, request: Hello | Sent | GoOn) -> str:
+        places = ""
         if isinstance(request, Hello):
             self._begin()
+            places = "".join(f" {words.place(self._wires[wire].path)}" for wire in WIRES)
         elif not self._greeted:
             raise BadInputError(f"expected `{words.HELLO}` first, found another word")
         elif isinstance(request, Sent):
@@ -99,7 +101,7 @@ class ClockServer:
         self._say("esp32", self._robot.take())
         self._say("bus", self._clock.read(words.MOST, 0.0))
         counts = " ".join(str(self._left[wire]) for wire in WIRES)
-        return f"at {self._clock.now()!r} {counts}"
+        return f"at {self._clock.now()!r} {counts}{places}"
 
     def _begin(self) -> None:
         """Time is the client's from here on; what was on the wires before is gone."""
@@ -108,7 +110,11 @@ class ClockServer:
             wire = self._wires[name]
             wire.clear()
             while wire.read() or (not wire.taken and self._ready(wire, end)):
-                pass
+                if time.monotonic() > end:
+                    raise BadInputError(
+                        f"expected silence on the wire {name} before the greeting is answered, "
+                        f"found bytes for {self._params.arrival:g} s; does another program use it?"
+                    )
             if not wire.taken:
                 raise BadInputError(f"expected a client on the wire {name}, found none")
         self._came, self._left = dict.fromkeys(WIRES, b""), dict.fromkeys(WIRES, 0)

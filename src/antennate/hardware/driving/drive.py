@@ -60,8 +60,8 @@ def drive(
 
     def go_on(frame: AntennaFrame, pose: Pose) -> bool:
         t = clock.now() - start
-        dry.step(t)
-        session.orders.arm = t >= dry.over
+        dry.step(t, session.outputs)
+        session.orders.arm = dry.asks
         report.refusal = dry.refusal
         report.watch(session)
         on_tick(session, clock.now())
@@ -77,7 +77,7 @@ def drive(
                 stop.deaf = True
         finally:
             report.on = _off(session, config.stand)
-            report.timing = None if session.timing is None else session.timing.report()
+            report.close(session)
     return report
 
 

@@ -4,40 +4,71 @@ from __future__ import annotations
 
 import math
 
+from antennate.hardware.safety.causes import Outputs
 from antennate.hardware.safety.trust import Trust
+
+_SKIP = "; --no-touch-check arms without the check"
 
 
 class DryRun:
-    """Lasts its time, and longer until the antennae are trusted.
+    """Lasts its time, and longer until the antennae are trusted and the supervisor allows torque.
 
     Args:
         trust: What is known of the antennae.
         length: Its time [s].
-        patience: By how much it is extended at most [s].
+        patience: By how much it is extended at most [s], by the check and by the supervisor each.
         arm: Whether torque is wanted afterwards.
         duration: Time from torque on to off [s].
 
     Attributes:
-        over: When torque may come on [s], inf while it may not.
+        over: When torque was last asked for [s], inf while it may not come on.
         end: When all is over [s], inf if not known yet.
-        refusal: Why it has ended without torque although that was wanted.
+        asks: Whether torque is asked for; the supervisor hears the change to True alone.
+        refusal: Why torque has not come on although it was wanted.
     """
 
     def __init__(
         self, trust: Trust, length: float, patience: float, arm: bool, duration: float
     ) -> None:
         self._trust, self._length, self._patience = trust, length, patience
-        self._arm, self._duration = arm, duration
+        self._waits, self._duration = arm, duration
+        self._first = math.inf
         self.over = math.inf
         self.end = math.inf if arm else length
+        self.asks = False
         self.refusal = ""
 
-    def step(self, t: float) -> None:
-        """Look at the antennae at a time [s] since the beginning."""
-        if not self._arm or self.over < math.inf or self.refusal:
+    def step(self, t: float, out: Outputs | None) -> None:
+        """Look at the antennae, and at what became of the question, once a tick.
+
+        Args:
+            t: Time since the beginning [s].
+            out: The supervisor's of this tick.
+        """
+        if not self._waits:
             return
-        late = t >= self._length + self._patience
-        if self._trust.refused or (late and self._trust.objections):
-            self.refusal, self.end = "; ".join(self._trust.objections), t
+        if self.asks:
+            self._hear(t, out)
+        elif self._first < math.inf:
+            self._ask(t)
+        elif self._trust.refused or (t >= self._length + self._patience and self._trust.objections):
+            self._give_up(t, "; ".join(self._trust.objections) + _SKIP)
         elif t >= self._length and not self._trust.objections:
-            self.over, self.end = t, t + self._duration
+            self._first = t
+            self._ask(t)
+
+    def _ask(self, t: float) -> None:
+        self.asks, self.over, self.end = True, t, t + self._duration
+
+    def _hear(self, t: float, out: Outputs | None) -> None:
+        """Torque comes on in this tick, or is asked for again in the next but one."""
+        if out is None or out.arming:
+            self._waits, self.refusal = False, ""
+            return
+        self.asks = False
+        self.refusal = "; ".join(a.text for a in out.causes if a.cause in out.refusal)
+        if t >= self._first + self._patience:
+            self._give_up(t, self.refusal)
+
+    def _give_up(self, t: float, why: str) -> None:
+        self._waits, self.refusal, self.end = False, why, t

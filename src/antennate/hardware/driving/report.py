@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from antennate.hardware.driving.session import Session
 from antennate.hardware.driving.timing import TimingReport
-from antennate.hardware.safety.causes import State
+from antennate.hardware.safety.causes import Cause, Outputs, State
 
 
 @dataclass(slots=True)
@@ -17,7 +17,8 @@ class Report:
     Attributes:
         timing: How well the pace was kept, None if no tick was run.
         before: The same up to the first tick with torque, None if it never came on.
-        worst: Worst state after the first pose, or a fault before it, and why.
+        worst: Worst state since torque came on, and why. The short wait for the first decision is
+            left out, unless no pose follows it.
         refusal: Why torque did not come on although it was wanted, empty if nothing forbade it.
         on: Servos that did not confirm that their torque is off; None if it never was on.
     """
@@ -28,6 +29,8 @@ class Report:
     why: str = ""
     refusal: str = ""
     on: list[int] | None = None
+    _torque: bool = False
+    _waits: str = field(default="", repr=False)
 
     @property
     def safe(self) -> bool:
@@ -37,13 +40,22 @@ class Report:
     def watch(self, session: Session) -> None:
         """Take note of a tick."""
         out = session.outputs
-        if out is None or not out.torque:
+        if out is None or not (self._torque or out.torque):
             return
+        self._torque = True
         if self.before is None and session.timing is not None and session.tally.sent:
             self.before = session.timing.report()
-        walked = self.before is not None  # until then it holds, for want of a first decision
-        if out.state > self.worst and (walked or out.state >= State.FAULT):
-            self.worst, self.why = out.state, "; ".join(c.text for c in out.causes)
+        why = "; ".join(active.text for active in out.causes)
+        if self.before is None and _only_undecided(out):
+            self._waits = why
+        elif out.state > self.worst and not _ordered(out):
+            self.worst, self.why = out.state, why
+
+    def close(self, session: Session) -> None:
+        """The last tick is over."""
+        self.timing = None if session.timing is None else session.timing.report()
+        if self.before is None and self._waits and self.worst < State.HOLD:
+            self.worst, self.why = State.HOLD, self._waits
 
     def result(self, session: Session) -> dict[str, Any]:
         """All of it as plain numbers and words, for result.json."""
@@ -67,6 +79,18 @@ class Report:
             "poses_refused": session.tally.refused,
             "tracebacks": list(session.tracebacks.kept),
         }
+
+
+def _only_undecided(out: Outputs) -> bool:
+    """Whether it holds for want of a decision and for nothing else, as it does when it begins."""
+    holds = {active.cause for active in out.causes if active.cause.severity is State.HOLD}
+    return out.state is State.HOLD and holds == {Cause.UNKNOWN_CONTACT}
+
+
+def _ordered(out: Outputs) -> bool:
+    """Whether torque is off by the operator's order and for no other reason."""
+    off = {active.cause for active in out.causes if active.cause.severity is State.OFF}
+    return off == {Cause.STOPPED}
 
 
 def _pace(timing: TimingReport | None) -> dict[str, Any] | None:

@@ -2,13 +2,15 @@
 
 | the client | the twin |
 |---|---|
-| `hello antennate-clock 1` | `at` its time; it counts its bytes from here on |
+| `hello antennate-clock 2` | `at` its time and its wires; it counts its bytes from here on |
 | `sent esp32 N`, `sent bus N` | nothing; it takes N bytes from that wire, now, in one piece |
 | `until T` | goes on until T [s], then `at` |
 | `listen T` | goes on until T, or until its bus has said something, then `at` |
 
 `at T N M`: it is T [s], and N bytes of the board and M of the bus have left since the greeting. A
-client that waits for so many has all that the twin said by T, whatever the wires' delays. Anything
+client that waits for so many has all that the twin said by T, whatever the wires' delays. After the
+greeting two words more, `at T N M BOARD BUS`, name its other wires: `tcp:PORT`, or the path of a
+pseudo-terminal. A client that was given others talks to something else, perhaps a robot. Anything
 else is answered with `error` and why, and the client has to greet anew. T is written so that every
 bit of it comes back.
 """
@@ -16,6 +18,7 @@ bit of it comes back.
 from __future__ import annotations
 
 import math
+import os
 import re
 from dataclasses import dataclass
 from typing import Literal
@@ -24,7 +27,7 @@ from antennate.errors import BadInputError
 
 Wire = Literal["esp32", "bus"]
 WIRES: tuple[Wire, Wire] = ("esp32", "bus")
-HELLO = "hello antennate-clock 1"
+HELLO = "hello antennate-clock 2"
 LONGEST = 200
 """Most bytes of a line."""
 MOST = 1 << 16
@@ -32,7 +35,9 @@ MOST = 1 << 16
 
 _TIME = r"([0-9]{1,9}(?:\.[0-9]{1,20})?(?:e-[0-9]{1,3})?)"
 _REQUEST = re.compile(rf"(until|listen) {_TIME}|sent (esp32|bus) ([0-9]{{1,6}})")
-_AT = re.compile(rf"at {_TIME} ([0-9]{{1,15}}) ([0-9]{{1,15}})")
+_AT = re.compile(
+    rf"at {_TIME} ([0-9]{{1,15}}) ([0-9]{{1,15}})(?: ([!-~]{{1,60}}) ([!-~]{{1,60}}))?"
+)
 _ERROR = re.compile(r"error ([ -~]+)")
 
 
@@ -74,10 +79,12 @@ class At:
     Attributes:
         t: Its time [s].
         counts: Bytes that have left on each wire since the greeting, in the order of WIRES.
+        places: Where those wires are, as `place` says it; after the greeting only.
     """
 
     t: float
     counts: tuple[int, int]
+    places: tuple[str, ...] = ()
 
 
 def request(line: bytes) -> Hello | Sent | GoOn:
@@ -111,10 +118,17 @@ def answer(line: bytes) -> At:
     """
     text = line.decode("ascii", "replace")
     if found := _AT.fullmatch(text):
-        return At(float(found[1]), (int(found[2]), int(found[3])))
+        t, board, bus, *places = found.groups()
+        return At(float(t), (int(board), int(bus)), tuple(filter(None, places)))
     if found := _ERROR.fullmatch(text):
         raise BadInputError(f"the twin refuses: {found[1]}")
     raise BadInputError(f"expected the clock of a twin, found one that says {text[:40]!a}")
+
+
+def place(address: str) -> str:
+    """What tells one wire of this host from another: the port of an address, or the device."""
+    scheme, separator, rest = address.partition("://")
+    return f"{scheme}:{rest.rpartition(':')[2]}" if separator else os.path.realpath(address)
 
 
 def go_on(t: float, listens: bool) -> str:

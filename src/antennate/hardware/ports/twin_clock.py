@@ -15,12 +15,13 @@ from pathlib import Path
 
 from antennate.errors import BadInputError, ConfigError
 from antennate.hardware.ports import clock_words as words
-from antennate.hardware.ports.clock_words import Wire
+from antennate.hardware.ports.clock_words import At, Wire
 from antennate.hardware.ports.finder import finder, is_udp
 from antennate.hardware.ports.port import PortError
 from antennate.hardware.ports.reconnecting import Line
 from antennate.params.clock import ClockParams
 
+_ROUNDING = 1e-9
 _MAJORS = range(136, 144)
 """Device numbers of Linux' pseudo-terminals (Documentation/admin-guide/devices.txt)."""
 
@@ -58,6 +59,11 @@ class TwinPort:
                 self._clock.go_on(end, self._name == "bus")
         came, self._came = self._came[:most], self._came[most:]
         return came
+
+    @property
+    def came(self) -> bool:
+        """Whether something has come that nobody has read."""
+        return bool(self._came)
 
     def drain(self) -> int:
         """Throw away what has come; how many bytes that was."""
@@ -97,6 +103,8 @@ class TwinClock:
         esp32: The board's wire.
         bus: The servos' wire.
         params: Limits.
+        addresses: Of `esp32` and `bus`, which have to be those that the twin names; not compared if
+            not given.
 
     Attributes:
         esp32: The board as a Port.
@@ -104,10 +112,16 @@ class TwinClock:
 
     Raises:
         PortError: It is no clock of a twin, or the wires are not those of that twin.
+        ConfigError: The addresses are not those of that twin; nothing was sent to them.
     """
 
     def __init__(
-        self, line: Line, esp32: Line, bus: Line, params: ClockParams | None = None
+        self,
+        line: Line,
+        esp32: Line,
+        bus: Line,
+        params: ClockParams | None = None,
+        addresses: tuple[str, str] | None = None,
     ) -> None:
         self._line, self._params = line, params or ClockParams()
         self._t = 0.0
@@ -115,7 +129,12 @@ class TwinClock:
         self._asked = False
         self._broken = ""
         self.esp32, self.bus = TwinPort(self, "esp32", esp32), TwinPort(self, "bus", bus)
-        self._ask(f"\n{words.HELLO}")
+        self._asked = True
+        self.say(f"\n{words.HELLO}")
+        at = self._hear()
+        if addresses is not None:
+            _require_own(at.places, addresses)
+        self._fetch(at)
 
     def now(self) -> float:
         """The twin's time [s]."""
@@ -135,9 +154,13 @@ class TwinClock:
         """Let it go on until t [s] or for one stride, or, if it listens, until the bus speaks.
 
         Raises:
-            PortError: The twin is gone.
+            PortError: The twin is gone, or its time stands still.
         """
-        self._ask(words.go_on(min(t, self._t + self._params.stride), listens))
+        until = min(t, self._t + self._params.stride)
+        self._ask(words.go_on(until, listens))
+        if self._t < until - _ROUNDING and not (listens and self.bus.came):
+            with self._mapped():
+                raise PortError(f"expected it to go on until {until!r} s, found {self._t!r} s")
 
     def say(self, line: str) -> None:
         """A word that is not answered.
@@ -157,13 +180,13 @@ class TwinClock:
     def _ask(self, line: str) -> None:
         self.check()
         if self._asked:  # a signal came before the answer to the last question
-            self._await()
+            self._fetch(self._hear())
         self._asked = True
         self.say(line)
-        self._await()
+        self._fetch(self._hear())
 
-    def _await(self) -> None:
-        """Take the answer, and all that it says has been sent."""
+    def _hear(self) -> At:
+        """Take the answer."""
         with self._mapped():
             while b"\n" not in self._heard:
                 part = self._line.read(words.LONGEST, self._params.patience)
@@ -177,6 +200,11 @@ class TwinClock:
             if at.t < self._t:
                 raise PortError(f"expected a time from {self._t!r} s on, found {at.t!r}")
             self._heard, self._asked, self._t = rest, False, at.t
+            return at
+
+    def _fetch(self, at: At) -> None:
+        """Take all that an answer says has been sent."""
+        with self._mapped():
             for port, count in zip((self.esp32, self.bus), at.counts, strict=True):
                 port.fetch(count, self._params.arrival)
 
@@ -212,7 +240,7 @@ def twin_clock(esp32: str, bus: str, clock: str, baud: int) -> Iterator[TwinCloc
             lines.append(finder(address, baud, flag)())
             stack.callback(_close, lines[-1])
         board, servos, line = lines
-        yield TwinClock(line, board, servos)
+        yield TwinClock(line, board, servos, addresses=(esp32, bus))
 
 
 def _require_twin(flag: str, address: str) -> None:
@@ -225,6 +253,18 @@ def _require_twin(flag: str, address: str) -> None:
         if os.major(Path(address).stat().st_rdev) not in _MAJORS:
             raise ConfigError(
                 f"{wanted}, found {address}, no pseudo-terminal; real adapters have no such clock"
+            )
+
+
+def _require_own(places: tuple[str, ...], addresses: tuple[str, str]) -> None:
+    """The wires are those that the twin names, so that no byte for a twin goes to a robot."""
+    given = [words.place(address) for address in addresses]
+    named = places or ("nothing",) * len(given)
+    for wire, wanted, found in zip(words.WIRES, named, given, strict=True):
+        if wanted != found:
+            raise ConfigError(
+                f"--{wire}: expected {wanted}, which the twin of --clock names as its own, found "
+                f"{found}; --clock is for a twin alone, never for a robot"
             )
 
 

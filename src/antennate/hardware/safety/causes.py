@@ -205,7 +205,8 @@ class Outputs:
             this very tick.
         clear: Whether data and actuators are well and the torque on. While it is False the
             controller gets NaN for counts in the next tick, so that its gait stands still.
-        causes: All causes in force, the most severe first, then the oldest.
+        causes: All causes in force, the most severe first. Of equal ones those that explain first:
+            losses of data, then others, then those of the mind; the oldest of each first.
         refusal: Why an arm event of this tick was not accepted, empty if it was or none came.
     """
 

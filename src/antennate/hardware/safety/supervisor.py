@@ -106,9 +106,7 @@ class Supervisor:
         self, state: State, decided: bool, arming: bool, refusal: tuple[Cause, ...]
     ) -> Outputs:
         torque = state < State.OFF
-        order = sorted(
-            self._active.values(), key=lambda a: (-a.cause.severity, a.since, a.cause.name)
-        )
+        order = sorted(self._active.values(), key=_rank)
         waits = {a.cause for a in order if a.cause.severity >= State.HOLD}
         return Outputs(
             state=state,
@@ -247,6 +245,12 @@ class Supervisor:
         self.transitions += state is not self.state
         self.state = state
         return state
+
+
+def _rank(active: Active) -> tuple[int, bool, bool, float, str]:
+    """The order in which causes are listed."""
+    cause = active.cause
+    return -cause.severity, cause in OF_MIND, cause not in DATA, active.since, cause.name
 
 
 def _name(found: dict[Cause, str], cause: Cause, ids: Iterable[int]) -> None:

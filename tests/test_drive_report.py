@@ -1,0 +1,139 @@
+"""What a drive says of itself: one that did not walk is never called well."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from ticked_rig import served
+
+from antennate.cli import main
+from antennate.experiments.twin import Rig, TwinConfig, build, rig
+from antennate.hardware.driving.config import DriveConfig
+from antennate.hardware.driving.drive import drive
+from antennate.hardware.driving.report import Report
+from antennate.hardware.driving.session import Session
+from antennate.hardware.safety.causes import Cause, State
+from antennate.params import TouchCheckParams
+from antennate.records import AntennaFrame, Contact, Pose
+
+CONFIG = DriveConfig(dry_run=0.5, duration=2.0, touch=TouchCheckParams(patience=3.0))
+
+Act = Callable[[Rig, float], None]
+
+
+def driven(act: Act, made: Rig | None = None) -> tuple[Rig, Report]:
+    made = made or rig(TwinConfig())
+
+    def on_tick(session: Session, t: float) -> None:
+        act(made, t)
+
+    return made, drive(made.session, CONFIG, arm=True, on_tick=on_tick)
+
+
+def silent(begin: float, end: float = 1e9) -> Act:
+    """Let the board be silent for a time [s]."""
+
+    def act(made: Rig, t: float) -> None:
+        made.robot.board_silent = begin < t < end
+
+    return act
+
+
+def nothing(made: Rig, t: float) -> None:
+    pass
+
+
+def test_a_walk_without_trouble_is_no_hold_although_it_waits_for_its_first_decision() -> None:
+    made, report = driven(nothing)
+    assert report.worst <= State.DEGRADED
+    assert "HOLD" not in report.why
+    assert report.refusal == ""
+    assert made.session.tally.sent > 150
+
+
+def test_L8_torque_that_was_refused_is_asked_for_again_and_comes_when_the_board_does() -> None:
+    made, report = driven(silent(0.4, 2.0))
+    assert report.refusal == ""
+    assert made.session.tally.sent > 150  # all of the duration, from torque on
+    assert made.clock.now() == pytest.approx(2.2 + CONFIG.duration + CONFIG.stand, abs=0.3)
+
+
+def test_L8_torque_that_is_refused_for_too_long_is_given_up_with_the_reason() -> None:
+    made, report = driven(silent(0.4))
+    assert "HOLD STALE: no fresh sample" in report.refusal
+    assert made.clock.now() == pytest.approx(0.5 + 3.0, abs=0.2)
+    assert report.on is None
+    assert not made.session.touched
+
+
+def test_L8_a_board_that_falls_silent_before_the_first_pose_is_a_hold() -> None:
+    made, report = driven(silent(0.55))
+    assert made.session.tally.sent == 0
+    assert report.worst is State.HOLD
+    assert report.why.startswith("HOLD STALE: no fresh sample")
+    assert made.session.outputs is not None
+    causes = [active.cause for active in made.session.outputs.causes]
+    assert causes.index(Cause.STALE) < causes.index(Cause.UNKNOWN_CONTACT)
+
+
+class Unsure:
+    """Never knows whether it touches anything."""
+
+    contact = np.full((1, 2), int(Contact.UNKNOWN))
+
+    def __init__(self, sound: object) -> None:
+        self._sound = sound
+
+    def step(self, frame: AntennaFrame) -> Pose:
+        pose = self._sound.step(frame)  # type: ignore[attr-defined]
+        self.maneuver = self._sound.maneuver  # type: ignore[attr-defined]
+        return pose
+
+
+def test_a_controller_that_never_decides_is_a_hold() -> None:
+    made = rig(TwinConfig())
+    made.session.decider = Unsure(made.session.decider)
+    made, report = driven(nothing, made)
+    assert made.session.tally.sent == 0
+    assert report.worst is State.HOLD
+    assert "UNKNOWN_CONTACT" in report.why
+
+
+def test_B13_torque_that_went_off_while_walking_is_the_worst() -> None:
+    def drain(made: Rig, t: float) -> None:
+        if t > 1.2:
+            for servo in made.robot.servos:
+                servo.set("present_input_voltage", 90)
+
+    made, report = driven(drain)
+    assert made.session.tally.sent > 10
+    assert report.worst is State.OFF
+    assert "SUPPLY_OFF" in report.why
+
+
+@pytest.mark.parametrize(
+    ("when", "worst", "said"),
+    [
+        ("1.3s", State.OK, "Torque never came on. Not armed: HOLD STALE: no fresh sample"),
+        ("1.55s", State.HOLD, "Worst state HOLD (HOLD STALE: no fresh sample"),
+    ],
+)
+def test_L8_a_drive_that_sent_no_pose_ends_with_2_and_says_so(
+    when: str, worst: State, said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with served(build(TwinConfig(), 5), faults=(f"esp32=silent@{when}",)) as paths:
+        addresses = [word for name, at in paths.items() for word in (f"--{name}", at)]
+        argv = ["drive", *addresses, "--arm", "--no-touch-check", "--dry-run", "0.5"]
+        argv += ["--duration", "1", "--touch.patience", "0.5", "--out", str(tmp_path)]
+        assert main([*argv, "--overwrite"]) == 2
+    text = " ".join(capsys.readouterr().out.split())
+    assert said in text
+    assert "It never walked: --arm was given, and no pose was sent." in text
+    result = json.loads((tmp_path / "result.json").read_text())
+    assert result["worst_state"] == worst.name
+    assert result["poses_sent"] == 0
+    assert ("STALE" in result["refusal"]) == (worst is State.OK)
