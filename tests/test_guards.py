@@ -1,6 +1,7 @@
 """Each guard between bytes and motion, switched off alone, makes a test fail that passes with it.
 
-The list is in `guards_board.py`, `guards_ladder.py` and `guards_servos.py`.
+The list is in `guards_board.py`, `guards_ladder.py`, `guards_servos.py` and
+`guards_session.py`.
 """
 
 from __future__ import annotations
@@ -9,7 +10,8 @@ import pytest
 from guard_tools import Guard
 from guards_board import CLOCK, FILMS, STREAM
 from guards_ladder import SUPERVISOR
-from guards_servos import BUS, SERVOS, SESSION
+from guards_servos import BUS, SERVOS
+from guards_session import SESSION
 
 GUARDS = [*STREAM, *CLOCK, *FILMS, *SUPERVISOR, *BUS, *SERVOS, *SESSION]
 

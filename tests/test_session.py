@@ -251,7 +251,7 @@ def test_T2_a_controller_that_hangs_stops_every_servo_within_120_ms_of_the_last_
 
 
 @pytest.mark.parametrize("volts", [11.1, 10.5])
-def test_B8_servos_stop_within_120_ms_when_only_the_controller_fails_and_the_loop_goes_on(
+def test_B8_servos_stop_within_120_ms_when_only_the_controller_fails(
     volts: float,
 ) -> None:
     """The loop still reads the board in every tick; a packet to any servo would feed them all."""

@@ -1,0 +1,153 @@
+"""Guards of the session: what may be sent, and what a controller may do."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import signal
+from functools import partial
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import test_bad_controllers
+import test_dynamixel_bus as test_bus
+import test_loop
+import test_release
+import test_session
+import test_signals
+import test_twin_robot
+from guard_tools import Guard, around, before, constant, put
+
+from antennate import loop
+from antennate.hardware import joints
+from antennate.hardware.driving import session
+from antennate.hardware.driving.signals import StopOnce
+from antennate.hardware.ports.port import PortError
+from antennate.hardware.safety import watch
+from antennate.hardware.safety.causes import Outputs
+from antennate.hardware.safety.supervisor import Supervisor
+
+controller_fails = test_session.test_B8_servos_stop_within_120_ms_when_only_the_controller_fails
+
+
+def always_watch(old: Any, self: Any, pose: Any) -> None:
+    old(self, pose)
+    if self.outputs.torque and not self.outputs.feed_watchdog:
+        self.watch.step()
+
+
+def cleared(old: Any, self: Any, now: float, inputs: Any) -> Outputs:
+    return dataclasses.replace(old(self, now, inputs), clear=True)
+
+
+def raising(self: Any) -> None:
+    self._look()
+
+
+def finite_goals(old: Any, self: Any, angles: Any) -> Any:
+    return old(self, np.nan_to_num(angles))
+
+
+def always_sound(old: Any, self: Any, frame_: Any) -> Any:
+    self._sound = True
+    return old(self, frame_)
+
+
+def careless(old: Any, self: Any, frame_: Any) -> Any:
+    self._thought = session.Thought(decided_at=self.clock.now())
+    return self.decider.step(frame_)
+
+
+def an_exception_alone(old: Any, self: Any, number: int, frame: Any) -> None:
+    try:
+        old(self, number, frame)
+    finally:
+        self.heard = False
+
+
+def forget_the_loss(self: Any, time: float) -> None:
+    self._lost = False
+
+
+SESSION = [
+    Guard(
+        "goals that are NaN",
+        around(joints.Joints, "positions", finite_goals),
+        partial(
+            test_twin_robot.test_B14_a_goal_that_is_not_finite_or_too_far_is_refused_as_a_whole,
+            math.nan,
+        ),
+    ),
+    Guard(
+        "speed of goals",
+        put(joints.Joints, "reach", constant(1e6)),
+        test_session.test_B10_torque_comes_on_with_goals_where_servos_stand_and_they_move_slowly,
+    ),
+    Guard(
+        "gait stands still while held",
+        around(Supervisor, "step", cleared),
+        test_session.test_L9_the_gait_stands_still_during_a_hold_so_that_no_leg_has_to_catch_up,
+    ),
+    Guard(
+        "every tick decided after a failure, at half pace too",
+        around(session.Session, "step", always_sound),
+        partial(controller_fails, 10.5),
+    ),
+    Guard(
+        "no packet without a decision",
+        around(session.Session, "_act", always_watch),
+        partial(controller_fails, 11.1),
+    ),
+    Guard(
+        "servos that kept their torque",
+        put(session.Session, "_release_again", constant(None)),
+        test_release.test_B19_servos_that_kept_their_torque_in_off_are_told_again_until_they_let_go,
+    ),
+    Guard(
+        "pose held before the torque goes",
+        put(session.Session, "stand", constant(None)),
+        test_release.test_B19_the_pose_is_held_for_as_long_as_told_before_the_torque_goes,
+    ),
+    Guard(
+        "no goal before the release of a lost bus",
+        before(session.Session, "stand", forget_the_loss),
+        test_release.test_B6_B19_no_goal_is_sent_before_the_release_once_the_bus_was_lost,
+    ),
+    Guard(
+        "signals while the torque goes off",
+        before(StopOnce, "_hear", lambda self, *_: setattr(self, "deaf", False)),
+        partial(test_signals.test_B19_no_signal_is_heard_once_the_walk_is_over_of_itself, "stand"),
+        by=(KeyboardInterrupt,),
+    ),
+    Guard(
+        "signals that a controller swallows",
+        around(StopOnce, "_hear", an_exception_alone),
+        partial(
+            test_signals.test_B19_a_signal_that_a_controller_swallows_ends_the_walk_all_the_same,
+            signal.SIGINT,
+        ),
+    ),
+    Guard(
+        "poses that a controller changes later",
+        put(session, "plain", lambda pose: pose),
+        test_bad_controllers.test_B14_a_pose_that_a_controller_changes_later_stays_as_it_was_judged,
+    ),
+    Guard(
+        "exceptions of the controller end nothing",
+        around(session.Session, "step", careless),
+        partial(controller_fails, 11.1),
+        by=(ValueError,),
+    ),
+    Guard(
+        "dead wire ends nothing",
+        put(watch.ServoWatch, "step", raising),
+        test_bus.test_a_dead_wire_is_noted_by_the_watch_and_ends_nothing,
+        by=(PortError,),
+    ),
+    Guard(
+        "no burst after an overrun",
+        put(loop, "math", SimpleNamespace(ceil=constant(0))),
+        test_loop.test_T1_an_overrun_leaves_out_the_ticks_it_covers_and_delays_none_after,
+    ),
+]
