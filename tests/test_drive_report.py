@@ -137,3 +137,13 @@ def test_L8_a_drive_that_sent_no_pose_ends_with_2_and_says_so(
     assert result["worst_state"] == worst.name
     assert result["poses_sent"] == 0
     assert ("STALE" in result["refusal"]) == (worst is State.OK)
+
+
+def test_a_controller_that_does_not_exist_is_named_before_a_port_is_opened(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    ports = ["--esp32", "/no/board", "--bus", "/no/bus", "--out", str(tmp_path / "run")]
+    assert main(["drive", *ports, "--controller", "clsoed"]) == 2
+    said = capsys.readouterr().err
+    assert "--controller: expected one of open, paper, closed or MODULE:CLASS" in said
+    assert "/no/board" not in said

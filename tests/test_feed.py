@@ -68,7 +68,7 @@ def test_the_viewer_keeps_every_tick_in_order(
         assert list(log) == [tick(number) for number in range(1, 301)]
         assert (log.header, log.end, log.bad) == (HEADER, 300, 0)
     said = capfd.readouterr().err
-    assert "OK FORWARD counts=1,2" in said
+    assert "OK maneuver=FORWARD counts=1,2" in said
     assert "touch=passed" in said
 
 

@@ -60,7 +60,7 @@ def line(tick: Tick, dropped: int) -> str:
     state = tick.state or "-"
     why = " (" + tick.causes[0].removeprefix(f"{state} ") + ")" if tick.causes else ""
     return (
-        f"{tick.now:7.1f} s {state}{why} {_name(tick.maneuver)} counts={left},{right} "
+        f"{tick.now:7.1f} s {state}{why} maneuver={_name(tick.maneuver)} counts={left},{right} "
         f"age={1e3 * tick.age:.0f}ms {tick.note} missed_ticks={tick.missed} "
         f"missed_answers={tick.misses} stale={tick.stale} frames={tick.frames} crc={tick.crc} "
         f"lost={tick.lost} sent={tick.sent} refused={tick.refused} unlogged={dropped}"

@@ -11,7 +11,7 @@ from antennate.errors import BadInputError
 from antennate.hardware import roster, settings
 from antennate.hardware.driving.adapter import require_quick
 from antennate.hardware.driving.config import DriveConfig
-from antennate.hardware.driving.decider import chosen
+from antennate.hardware.driving.decider import Decider, chosen
 from antennate.hardware.driving.session import Session
 from antennate.hardware.dynamixel import bringup
 from antennate.hardware.dynamixel.answers import Timing
@@ -49,15 +49,16 @@ def connect(
         clock: Address of the clock of a twin in lock-step; the host's time is taken if not given.
 
     Raises:
-        ConfigError: A clock is given, but a port can be no twin's.
+        ConfigError: There is no such controller; or a clock is given, but a port can be no twin's.
         PortError: A port cannot be opened.
         BadInputError: No antenna board speaks, or it is refused.
         BringUpError: The servos are not those expected.
     """
+    mind = chosen(config.controller, config.mind)
     with contextlib.ExitStack() as stack:
         if clock:
             twin = stack.enter_context(twin_clock(esp32, bus, clock, config.layout.baud))
-            yield prepare(config, twin.esp32, twin.bus, twin)
+            yield prepare(config, twin.esp32, twin.bus, twin, decider=mind)
             return
         lines: list[Port] = []
         for flag, address, baud in (
@@ -67,15 +68,20 @@ def connect(
             line = Reconnecting(finder(address, baud, flag, key, config.network))
             stack.callback(line.close)
             lines.append(line)
-        yield prepare(config, lines[0], lines[1], HostClock(), bus)
+        yield prepare(config, lines[0], lines[1], HostClock(), bus, mind)
 
 
 def prepare(
-    config: DriveConfig, esp32: Port, bus: Port, clock: Any, path: str = "the bus"
+    config: DriveConfig,
+    esp32: Port,
+    bus: Port,
+    clock: Any,
+    path: str = "the bus",
+    decider: Decider | None = None,
 ) -> Session:
     """A session before two open ports, after both sides have said who they are.
 
-    `path` is what the bus is called, for errors.
+    `path` is what the bus is called, for errors; the controller is the configured one if not given.
     """
     board = Board(esp32, config.limits.stale_age)
     await_board(board, clock, bus, config.swapped)
@@ -89,7 +95,7 @@ def prepare(
         bus=master,
         joints=Joints(config.layout),
         clock=clock,
-        decider=chosen(config.controller, config.mind),
+        decider=decider or chosen(config.controller, config.mind),
         period=config.mind.period,
         conditioning=config.mind.conditioning,
         limits=config.limits,
