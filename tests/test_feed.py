@@ -217,7 +217,7 @@ def test_a_log_that_cannot_be_written_is_said_once_and_the_status_line_goes_on(
     assert feed.failed
     said = capfd.readouterr().err
     assert said.count("does not exist yet") == 1
-    assert "OK FORWARD" in said
+    assert "OK maneuver=FORWARD" in said
     assert taken.read_text() == "another drive"
 
 
