@@ -17,7 +17,7 @@ from antennate.experiments.twin import TwinConfig, rig
 from antennate.hardware.driving.config import DriveConfig
 from antennate.hardware.driving.decider import chosen
 from antennate.hardware.driving.drive import drive
-from antennate.hardware.driving.tracebacks import Tracebacks
+from antennate.hardware.driving.tracebacks import Tracebacks, said
 from antennate.hardware.safety.causes import Active, Cause, State
 from antennate.params import ControllerParams, SupervisorParams
 from antennate.records import Pose
@@ -244,3 +244,11 @@ def test_a_controller_that_leaves_the_program_at_once_is_bad_input_in_one_line(
         chosen(f"{name}:C", ControllerParams())
     assert said in str(found.value)
     assert "\n" not in str(found.value)
+
+
+def test_an_exception_of_many_words_is_cut() -> None:
+    error = ValueError("word " * 100_000)
+    kept = Tracebacks()
+    kept.keep(1.0, error)
+    assert len(said(error)) == 300
+    assert len(kept.kept[0]) == 20_000

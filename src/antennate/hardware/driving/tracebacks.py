@@ -14,6 +14,8 @@ from antennate.params import HostParams
 EVERY = HostParams().traceback_period
 """Shortest time between two that are kept [s]."""
 _KEPT = 16
+_LONGEST_LINE, _LONGEST_TEXT = 300, 20_000
+"""Characters; an exception may quote anything."""
 
 
 class Tracebacks:
@@ -41,14 +43,14 @@ class Tracebacks:
             raise
         except BaseException:  # noqa: BLE001 it asks the error for its notes, which may raise too
             text = said(error)
-        self.kept.append(text)
+        self.kept.append(text[-_LONGEST_TEXT:])
 
 
 def said(error: BaseException) -> str:
     """An exception in one line, with its type; of one that has no words the type alone."""
     name = type(error).__name__
     try:
-        return f"{name}: {' '.join(str(error).split())}"
+        return f"{name}: {' '.join(str(error).split())}"[:_LONGEST_LINE]
     except KeyboardInterrupt:
         raise
     except BaseException:  # noqa: BLE001 anybody's __str__ may raise anything
