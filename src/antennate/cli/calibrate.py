@@ -19,9 +19,6 @@ rig that pushes one at several speeds. Fits one sigmoid, compares it with a line
 curve, and refuses data that cannot be calibrated. `calibration.json` in the run directory is the
 file to keep; `conditioning.toml` holds the same curve for `antennate tunnel --config`."""
 
-_GOOD_R2 = 0.9
-"""Below it a curve is warned of; three speeds share one with 0.98."""
-
 
 def show_result(result: Mapping[str, Any]) -> None:
     """Print the curve, its rivals and how it serves each speed."""
@@ -38,10 +35,10 @@ def show_result(result: Mapping[str, Any]) -> None:
         "all" if row["speed_m_s"] is None else f"{100 * row['speed_m_s']:g} cm/s": row
         for row in found["speeds"]
     }
-    show("The one curve at each speed", speeds, _SPEED_ROWS, _verdict(found))
+    show("The one curve at each speed", speeds, _SPEED_ROWS, _verdict(found, result["poor"]))
 
 
-def _verdict(found: Mapping[str, Any]) -> str:
+def _verdict(found: Mapping[str, Any], poor: bool) -> str:
     errors = found["cross_validated_rmse"]
     said = ", ".join(f"{model} {errors[model]:.4f}" for model in ("sigmoid", "line", "isotonic"))
     better = " and ".join(found["better_than_sigmoid"])
@@ -50,13 +47,13 @@ def _verdict(found: Mapping[str, Any]) -> str:
         if better
         else "None is better than the sigmoid by more than a standard error."
     )
-    poor = (
-        f"\nR² is below {_GOOD_R2:g}: look at the figure; perhaps marks and readings do not\n"
+    warning = (
+        f"\nR² is only {found['r2']:.2f}: look at the figure; perhaps marks and readings do not\n"
         "match, or the film slipped. Record again before a robot relies on it.\n"
-        if found["r2"] < _GOOD_R2
+        if poor
         else ""
     )
-    return f"Cross-validated error of b: {said}.\n{word}\n{poor}"
+    return f"Cross-validated error of b: {said}.\n{word}\n{warning}"
 
 
 _CURVE_ROWS: list[tuple[str, Cell]] = [

@@ -97,6 +97,9 @@ class CalibrateConfig(Params):
     least_r2: float = number(
         0.5, "1", "assumed: half of the bend explained", "a worse fit is refused", ge=0, lt=1
     )
+    good_r2: float = number(
+        0.9, "1", "assumed: our rig reaches 0.98", "a worse fit is warned of", ge=0, lt=1
+    )
     draws: int = number(500, "1", "assumed: usual", "bootstrap draws", ge=20, le=100000)
     seed: int = number(1, "1", "assumed: any", "seed of all chance", ge=0)
     rig: RigParams = RigParams()
@@ -143,6 +146,7 @@ class CalibrateOutcome:
             "command": "calibrate",
             "seed": self.config.seed,
             "source": "rig" if self.config.recording is None else "recording",
+            "poor": self.calibration.r2 < self.config.good_r2,
             "calibration": self.calibration.model_dump(mode="json"),
         }
 
