@@ -10,6 +10,7 @@ import dataclasses
 import json
 import os
 import random
+import shutil
 import signal
 import struct
 import sys
@@ -108,8 +109,10 @@ def main() -> None:
     old, new = outcome("old"), outcome("new")
     calibrated = {calibration.to_json(made.calibration).encode(): made for made in (old, new)}
     names = dict(zip(calibrated, ("old", "new"), strict=True))
-    folder.mkdir()
-    calibration.save(old.calibration, folder / NAME)
+    before = folder.with_name("before")  # all files of a run, so that each kill meets the same
+    before.mkdir()
+    killed(before, old, None, None)
+    shutil.copytree(before, folder)
     begin = time.monotonic()
     first, last, events = struct.unpack("<3I", killed(folder, new, None, None)[0])
     took = time.monotonic() - begin
@@ -118,7 +121,8 @@ def main() -> None:
     points = [*inside, *outside][: max(len(inside), 3 * kills // 5)]
     left: list[str] = []
     for n in range(kills):
-        calibration.save(old.calibration, folder / NAME, overwrite=True)
+        shutil.rmtree(folder)
+        shutil.copytree(before, folder)
         point = points[n] if n < len(points) else None
         _, data = killed(folder, new, point, None if point else chance.uniform(0.0, took))
         try:
