@@ -99,8 +99,7 @@ def test_G6_a_reader_that_dies_ends_nothing() -> None:
 def test_G6_a_recorder_that_is_killed_is_followed_by_one_with_a_new_file(tmp_path: Path) -> None:
     first, second = tmp_path / "drive.log", tmp_path / "drive-2.log"
     with Feed(viewer(first), HEADER.pack()) as feed:
-        number, _ = until(lambda: _holds_a_tick(first), feed)
-        assert feed.keeps
+        number, _ = until(lambda: feed.keeps and _holds_a_tick(first), feed)
         assert feed.pid is not None
         os.kill(feed.pid, signal.SIGKILL)
         killed = number
@@ -145,7 +144,7 @@ def test_G6_ticks_that_a_killed_process_had_not_kept_yet_are_counted(tmp_path: P
     """It stood still with them in its pipe; none of them was dropped before."""
     first, second = tmp_path / "drive.log", tmp_path / "drive-2.log"
     with Feed(viewer(first), HEADER.pack()) as feed:
-        number, _ = until(lambda: _holds_a_tick(first), feed)
+        number, _ = until(lambda: feed.keeps and _holds_a_tick(first), feed)
         assert feed.pid is not None
         os.kill(feed.pid, signal.SIGSTOP)
         for waiting in range(number, number + 50):
