@@ -47,5 +47,6 @@ def test_M7_drive_decides_as_the_pure_simulation_for_a_whole_trial(
 ) -> None:
     met, ticks, status = same(arm, trial, math.inf, phase)
     assert {Maneuver.HOLD, Maneuver.FORWARD} <= met
+    assert Maneuver.REVERSE in met or (arm, trial) != ("closed", 0)
     assert ticks > 900
     assert status == "success"
