@@ -21,16 +21,17 @@ from unittest import mock
 import mujoco
 import numpy as np
 
-from antennate.experiments import tunnel as experiment
-from antennate.experiments.gait import GaitStudyConfig, walk_flat
-from antennate.experiments.judge import TrialResult
-from antennate.experiments.pace import measure
-from antennate.experiments.tunnel import TunnelConfig
-from antennate.params import GaitParams, PhysicsParams, RobotParams, TunnelParams
-from antennate.records import Floats, Maneuver
+from antennate.experiments.gait.pace import measure
+from antennate.experiments.gait.run import GaitStudyConfig, walk_flat
+from antennate.experiments.tunnel import run as experiment
+from antennate.experiments.tunnel.monitor import TrialResult
+from antennate.experiments.tunnel.run import TunnelConfig
+from antennate.params import GaitParams, PhysicsParams, TunnelParams
+from antennate.robots.body import RobotParams
 from antennate.sim.arena import Tunnel
 from antennate.sim.world import World, compile_world
-from antennate.trials.pool import core_count, run_tasks
+from antennate.studies.pool import core_count, run_tasks
+from antennate.types import Floats, Maneuver
 
 _CHOSEN = PhysicsParams()
 _PUSH = 0.3
@@ -117,7 +118,7 @@ def walk(engine: Engine) -> dict[str, float]:
         sunk.append(-float(self.data.contact.dist.min(initial=0.0)))
 
     with (
-        mock.patch("antennate.experiments.gait.compile_world", engine.compile),
+        mock.patch("antennate.experiments.gait.run.compile_world", engine.compile),
         mock.patch.object(World, "step", watched),
     ):
         before = time.process_time()

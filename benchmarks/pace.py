@@ -4,7 +4,7 @@ Twin and loop run on the same machine over two pseudo-terminals, in real time: d
 of both antennae, then a walk. A cycle is missed if the loop still runs when the next one is due.
 
 - `missed_share`: cycles missed of all of the drive, those included that arming takes on the bus.
-- `walking_missed_share`: the same from the first pose on.
+- `walking_missed_share`: the same from the first command on.
 - `worst_lateness_ms`: farthest that a tick began behind its time.
 - `fault`: causes of a FAULT or worse with their details, the first one first; empty without one.
 """

@@ -26,16 +26,16 @@ from unittest import mock
 import mujoco
 import numpy as np
 
-from antennate.controller import Arm
-from antennate.experiments import tunnel as experiment
-from antennate.experiments.tunnel import TunnelConfig
-from antennate.gait import Gait
-from antennate.loop import run_loop
+from antennate.control.controllers import Arm
+from antennate.control.gait import Gait
+from antennate.control.loop import run_loop
+from antennate.experiments.tunnel import run as experiment
+from antennate.experiments.tunnel.run import TunnelConfig
 from antennate.params import TunnelParams
-from antennate.records import AntennaFrame, Floats, Ints, Maneuver, Pose
 from antennate.sim import arena, geometry
-from antennate.sim.body import SimBody
+from antennate.sim.sim_robot import SimRobot
 from antennate.sim.world import World, compile_world
+from antennate.types import AntennaFrame, Floats, Ints, JointCommand, Maneuver
 
 ARM: Arm = "closed"
 LOCKSTEP = 6
@@ -154,12 +154,12 @@ def measure_trials(config: TunnelConfig, trials: int, repetitions: int) -> dict[
 
 
 class Pacing:
-    """A mind that walks to and fro."""
+    """A control that walks to and fro."""
 
     def __init__(self, config: TunnelConfig) -> None:
-        self._gait = Gait(config.controller.gait, 1, config.controller.period)
+        self._gait = Gait(config.control.gait, 1, config.control.period)
 
-    def step(self, frame: AntennaFrame) -> Pose:
+    def step(self, frame: AntennaFrame) -> JointCommand:
         back = int(frame.t[0] / _PACING) % 2
         return self._gait.step(np.array([int(Maneuver.REVERSE if back else Maneuver.FORWARD)]))
 
@@ -176,19 +176,19 @@ def long_tunnel(config: TunnelConfig) -> tuple[arena.Tunnel, Ints]:
 
 def seconds_with(config: TunnelConfig, drawn: arena.Tunnel, seconds: float) -> float:
     """CPU time of pacing for some simulated seconds in this tunnel."""
-    robot, period = config.robot, config.controller.period
+    robot, period = config.robot, config.control.period
     sensed = robot.sensor.covered_hinges(robot.antenna)
     world = World(compile_world(config.physics, robot, drawn), sensed)
     world.place(0.0, 0.0, 0.0, np.zeros(5), np.zeros((6, 2)))
-    body = SimBody(1, robot.sensor, period, config.physics.timestep)
+    body = SimRobot(1, robot.sensor, period, config.physics.timestep)
     chance = experiment.prepare(config, 0).chance
     body.load(0, world, chance)
-    mind = Pacing(config)
+    control = Pacing(config)
 
-    def go_on(frame: AntennaFrame, pose: Pose) -> bool:
+    def go_on(frame: AntennaFrame, command: JointCommand) -> bool:
         return world.t < seconds
 
-    return seconds_of(lambda: run_loop(body, mind, period, go_on))
+    return seconds_of(lambda: run_loop(body, control, period, go_on))
 
 
 def measure_growth(config: TunnelConfig, seconds: float, repetitions: int) -> dict[str, float]:

@@ -21,14 +21,14 @@ from typing import Any
 
 import numpy as np
 
-from antennate import calibration, fitting
+from antennate.antenna import calibration, fitting
+from antennate.antenna.fitting import Samples
 from antennate.cli.arguments import Options
 from antennate.cli.calibrate import STUDY
 from antennate.cli.folder import RunFolder
 from antennate.errors import CalibrationError
-from antennate.experiments.calibrate import CalibrateConfig, CalibrateOutcome
-from antennate.experiments.recording import Recording
-from antennate.fitting import Samples
+from antennate.experiments.calibrate.recording import Recording
+from antennate.experiments.calibrate.run import CalibrateConfig, CalibrateOutcome
 
 TOUCHING = {"open", "write", "flush", "fsync", "close", "replace", "rename", "unlink", "mkdir"}
 NAME = "calibration.json"

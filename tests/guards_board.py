@@ -21,11 +21,11 @@ import test_touch_check
 from guard_tools import Guard, after, around, before, constant, put
 from hardware_rig import BAND
 
-from antennate import conditioning, contact, maneuver
+from antennate.control import conditioning, contact, maneuver
 from antennate.hardware.esp32 import board, clock, decoder, frame, listener
 from antennate.hardware.esp32.clock import DeviceClock, Verdict
 from antennate.hardware.safety import diagnosis, touch_check
-from antennate.records import Maneuver
+from antennate.types import Maneuver
 
 
 def trusting(self: DeviceClock, sample: Any, now: float) -> None:

@@ -17,7 +17,7 @@ from hardware_rig import PERIOD
 from antennate.hardware.safety import diagnosis, rate
 from antennate.hardware.safety.causes import Cause, Outputs
 from antennate.hardware.safety.supervisor import Supervisor
-from antennate.records import Contact, Maneuver
+from antennate.types import Contact, Maneuver
 
 
 class Never:
@@ -72,11 +72,11 @@ SUPERVISOR = [
     Guard("exception of the controller", blind(failure=""), told(Cause.FAILED)),
     Guard("action that does not exist", blind(maneuver=Maneuver.HOLD), told(Cause.BAD_ACTION)),
     Guard(
-        "pose that was refused",
-        blind(bad_pose=""),
+        "command that was refused",
+        blind(bad_command=""),
         partial(
             test_supervisor.test_S5_a_pose_or_maneuver_that_is_none_is_not_sent,
-            {"bad_pose": "nan"},
+            {"bad_command": "nan"},
         ),
     ),
     Guard(

@@ -30,7 +30,8 @@ from antennate.hardware.dynamixel.tables import XC430_W240
 from antennate.hardware.ports import serial_port
 from antennate.hardware.safety import watch
 from antennate.hardware.safety.causes import Outputs, State
-from antennate.params import LayoutParams, TurnsParams
+from antennate.params import TurnsParams
+from antennate.robots.layout import LayoutParams
 from antennate.twin.link import Link
 
 controller_fails = test_session.test_B8_servos_stop_within_120_ms_when_only_the_controller_fails

@@ -19,7 +19,7 @@ import test_signals
 import test_twin_robot
 from guard_tools import Guard, around, before, constant, put
 
-from antennate import loop
+from antennate.control import loop
 from antennate.hardware import joints
 from antennate.hardware.driving import session
 from antennate.hardware.driving.signals import StopOnce
@@ -31,8 +31,8 @@ from antennate.hardware.safety.supervisor import Supervisor
 controller_fails = test_session.test_B8_servos_stop_within_120_ms_when_only_the_controller_fails
 
 
-def always_watch(old: Any, self: Any, pose: Any) -> None:
-    old(self, pose)
+def always_watch(old: Any, self: Any, command: Any) -> None:
+    old(self, command)
     if self.outputs.torque and not self.outputs.feed_watchdog:
         self.watch.step()
 
@@ -105,7 +105,7 @@ SESSION = [
         test_release.test_B19_servos_that_kept_their_torque_in_off_are_told_again_until_they_let_go,
     ),
     Guard(
-        "pose held before the torque goes",
+        "command held before the torque goes",
         put(session.Session, "stand", constant(None)),
         test_release.test_B19_the_pose_is_held_for_as_long_as_told_before_the_torque_goes,
     ),
@@ -129,8 +129,8 @@ SESSION = [
         ),
     ),
     Guard(
-        "poses that a controller changes later",
-        put(session, "plain", lambda pose: pose),
+        "commands that a controller changes later",
+        put(session, "plain", lambda command: command),
         test_bad_controllers.test_B14_a_pose_that_a_controller_changes_later_stays_as_it_was_judged,
     ),
     Guard(

@@ -8,17 +8,17 @@ from typing import Any
 
 import numpy as np
 
-from antennate.controller import Arm, Controller
+from antennate.control.controllers import Arm, Controller
 from antennate.hardware.safety.causes import Inputs, Outputs, State
 from antennate.hardware.safety.diagnosis import Band, ChannelDiagnosis, Finding
 from antennate.hardware.safety.supervisor import Supervisor
 from antennate.params import (
     ConditioningParams,
-    ControllerParams,
+    ControlParams,
     DiagnosisParams,
     SupervisorParams,
 )
-from antennate.records import AntennaFrame, Contact, Maneuver, Pose
+from antennate.types import AntennaFrame, Contact, JointCommand, Maneuver
 
 PERIOD = 0.01
 FREE, BENT = 1872.0, 1450.0
@@ -70,17 +70,17 @@ def armed(params: SupervisorParams | None = None) -> Ticker:
 
 
 class Rig:
-    """One tick after the other: readings in, pose sent out."""
+    """One tick after the other: readings in, command sent out."""
 
-    def __init__(self, arm: Arm = "paper", mind: Any = None) -> None:
-        self.mind = mind or Controller(ControllerParams(), arm)
+    def __init__(self, arm: Arm = "paper", control: Any = None) -> None:
+        self.control = control or Controller(ControlParams(), arm)
         self.films = [ChannelDiagnosis(DiagnosisParams(), BAND) for _ in range(2)]
         self.supervisor = Supervisor(SupervisorParams())
         self.n = -1
         self.newest = -math.inf
         self.clear = False
         self.used_ages: list[float] = []
-        self.sent: list[Pose] = []
+        self.sent: list[JointCommand] = []
         self.outputs: list[Outputs] = []
 
     @property
@@ -105,9 +105,9 @@ class Rig:
         frame = self._frame(age)
         failure = ""
         try:
-            pose = self.mind.step(frame)
+            command = self.control.step(frame)
         except RuntimeError as error:
-            failure, pose = str(error), None
+            failure, command = str(error), None
         known = {} if failure else self._known()
         outputs = self.supervisor.step(
             self.now,
@@ -127,10 +127,10 @@ class Rig:
         )
         self.clear = outputs.clear
         if outputs.move:
-            assert pose is not None
+            assert command is not None
             assert np.isfinite(frame.counts).all()
             self.used_ages.append(self.now - self.newest)
-        self.sent.append(pose if outputs.move and pose is not None else self.sent[-1])
+        self.sent.append(command if outputs.move and command is not None else self.sent[-1])
         self.outputs.append(outputs)
         return outputs
 
@@ -141,13 +141,13 @@ class Rig:
 
     def _known(self) -> dict[str, Any]:
         return {
-            "maneuver": int(self.mind.maneuver[0]),
-            "contact": tuple(self.mind.contact[0].tolist()),
+            "maneuver": int(self.control.maneuver[0]),
+            "contact": tuple(self.control.contact[0].tolist()),
         }
 
     def start(self, counts: tuple[float, float] = (FREE, FREE)) -> None:
         """Arm it and wait until it walks."""
-        self.sent.append(self.mind.gait.step(np.array([int(Maneuver.HOLD)])))
+        self.sent.append(self.control.gait.step(np.array([int(Maneuver.HOLD)])))
         self.go(30, counts)
         assert self.step([(self.now + PERIOD, *counts)], arm=True).arming
         self.go(30, counts)
@@ -162,11 +162,11 @@ class Rig:
             self.step([((self.n + 1) * PERIOD, left, right)], **changes)
 
     def pose_step(self) -> float:
-        """Largest change between the last two poses sent [rad]."""
+        """Largest change between the last two commands sent [rad]."""
         return pose_change(*self.sent[-2:])
 
 
-def pose_change(before: Pose, after: Pose) -> float:
+def pose_change(before: JointCommand, after: JointCommand) -> float:
     """Largest change of a joint [rad]."""
     return max(
         float(np.abs(after.yaw - before.yaw).max()), float(np.abs(after.leg - before.leg).max())

@@ -7,13 +7,14 @@ import random
 import struct
 from functools import lru_cache
 
-from antennate.params import ControllerParams, LayoutParams
+from antennate.params import ControlParams
+from antennate.robots.layout import LayoutParams
 from antennate.telemetry.header import Header
 from antennate.telemetry.ticks import JOINTS, Tick
 
 HEADER = Header(
     controller="closed",
-    params=ControllerParams.model_validate({"conditioning": {"midpoint": 0.1 + 0.2}}),
+    params=ControlParams.model_validate({"conditioning": {"midpoint": 0.1 + 0.2}}),
     layout=LayoutParams(),
     seed=7,
     trial=3,

@@ -10,14 +10,14 @@ import numpy as np
 from esp32_streams import hello
 from hardware_rig import BAND, BENT, FREE, LIMIT, PERIOD
 
-from antennate.hardware.driving.body import HardwareBody
+from antennate.hardware.driving.body import HardwareRobot
 from antennate.hardware.esp32 import frame
 from antennate.hardware.esp32.board import Board
 from antennate.hardware.safety.causes import Cause, Inputs, Outputs, State
 from antennate.hardware.safety.diagnosis import ChannelDiagnosis
 from antennate.hardware.safety.supervisor import Supervisor
 from antennate.params import DiagnosisParams, SupervisorParams
-from antennate.records import Contact, Maneuver
+from antennate.types import Contact, Maneuver
 
 DRIFT = 50e-6
 """The board's clock against the host's, [s/s]: ages at the ticks take every value in a day."""
@@ -147,7 +147,7 @@ class Soak:
         self._clock = Now()
         self._board = Board(self._source, SupervisorParams().stale_age)
         nobody: Any = None
-        self._body = HardwareBody(self._board, nobody, nobody, self._clock)
+        self._body = HardwareRobot(self._board, nobody, nobody, self._clock)
         self._films = [ChannelDiagnosis(DiagnosisParams(), BAND) for _ in range(2)]
         self._supervisor = Supervisor(SupervisorParams())
         self._events = events
@@ -265,7 +265,7 @@ class Soak:
 
     @property
     def share_of_motion(self) -> float:
-        """Share of ticks in which a pose was sent."""
+        """Share of ticks in which a command was sent."""
         return self.moves / max(1, self._n)
 
     @property

@@ -9,17 +9,17 @@ import pytest
 from esp32_streams import BOOT, encoded, hello
 from hardware_rig import BENT, FREE, PERIOD
 
-from antennate.controller import Controller
-from antennate.hardware.driving.body import HardwareBody
+from antennate.control.controllers import Controller
+from antennate.hardware.driving.body import HardwareRobot
 from antennate.hardware.esp32.board import Board
 from antennate.hardware.esp32.wire import Sample
-from antennate.params import ControllerParams, SupervisorParams
+from antennate.params import ControlParams, SupervisorParams
 
 WAY = 0.002
 """Of a frame to the host [s]."""
 WARM_UP = 2.0
 """Time until the board's clock is known [s]."""
-WINDOW = ControllerParams().conditioning.averaging_time
+WINDOW = ControlParams().conditioning.averaging_time
 
 
 class Stream:
@@ -59,15 +59,15 @@ def levels(rate: int, phase: float) -> tuple[np.ndarray, np.ndarray]:
     """Bending level and age of the frame [s] of each tick from that of the bend on."""
     stream, nobody = Stream(rate, phase), None
     board = Board(stream, SupervisorParams().stale_age)
-    body: Any = HardwareBody(board, nobody, nobody, stream)  # type: ignore[arg-type]
-    mind, found, stamps = Controller(ControllerParams(), "paper"), [], []
+    body: Any = HardwareRobot(board, nobody, nobody, stream)  # type: ignore[arg-type]
+    control, found, stamps = Controller(ControlParams(), "paper"), [], []
     for tick in range(round(WARM_UP / PERIOD) + 60):
         stream.sleep_until(tick * PERIOD)
         frame = body.read()
-        mind.step(frame)
+        control.step(frame)
         if tick == round(WARM_UP / PERIOD):
             stream.bend()
-        found.append(mind.b[0, 0])
+        found.append(control.b[0, 0])
         stamps.append(float(frame.t[0]))
     begin = round(WARM_UP / PERIOD)
     return np.array(found[begin:]), np.array(stamps[begin:])

@@ -9,13 +9,13 @@ from typing import Any
 
 import pytest
 
-from antennate import calibration
-from antennate.calibration import Calibration
+from antennate.antenna import calibration
+from antennate.antenna.calibration import Calibration
 from antennate.cli import main
 from antennate.errors import AntennateError, CalibrationError, ConfigError
 from antennate.experiments.twin import TwinConfig, rig
 from antennate.hardware.esp32.film import calibrated, require_film
-from antennate.params import ConditioningParams, ControllerParams, RuleParams
+from antennate.params import ConditioningParams, ControlParams, RuleParams
 
 GOOD = Calibration(
     made_by="antennate 0",
@@ -183,24 +183,24 @@ def test_S9_a_bad_recording_keeps_the_calibration_that_is_there(
 def test_a_calibration_file_gives_the_controller_its_curve(tmp_path: Path) -> None:
     path = tmp_path / "left.json"
     calibration.save(GOOD, path)
-    mind = ControllerParams(conditioning=ConditioningParams(averaging_time=0.05))
-    made, found = calibrated(mind, path, "left-1")
+    control = ControlParams(conditioning=ConditioningParams(averaging_time=0.05))
+    made, found = calibrated(control, path, "left-1")
     assert found == GOOD
     assert made.conditioning == GOOD.conditioning(0.05)
-    assert made.rule == mind.rule
+    assert made.rule == control.rule
 
 
 @pytest.mark.parametrize(
-    ("mind", "said"),
+    ("control", "said"),
     [
-        (ControllerParams(conditioning=ConditioningParams(slope=9.0)), "no curve beside"),
-        (ControllerParams(rule=RuleParams(threshold=0.6)), "expected theta"),
+        (ControlParams(conditioning=ConditioningParams(slope=9.0)), "no curve beside"),
+        (ControlParams(rule=RuleParams(threshold=0.6)), "expected theta"),
     ],
 )
 def test_a_curve_or_a_theta_beside_the_file_is_refused(
-    tmp_path: Path, mind: ControllerParams, said: str
+    tmp_path: Path, control: ControlParams, said: str
 ) -> None:
     path = tmp_path / "left.json"
     calibration.save(GOOD, path)
     with pytest.raises(ConfigError, match=said):
-        calibrated(mind, path)
+        calibrated(control, path)

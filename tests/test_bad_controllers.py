@@ -19,9 +19,9 @@ from antennate.hardware.driving.decider import chosen
 from antennate.hardware.driving.drive import drive
 from antennate.hardware.driving.tracebacks import Tracebacks, said
 from antennate.hardware.safety.causes import Active, Cause, State
-from antennate.params import ControllerParams, SupervisorParams
-from antennate.records import Pose
+from antennate.params import ControlParams, SupervisorParams
 from antennate.telemetry.ticks import Tick, angles_of
+from antennate.types import JointCommand
 
 
 class Wordless(Exception):
@@ -52,7 +52,7 @@ ANY = [SystemExit(0), GeneratorExit(), asyncio.CancelledError(), Wordless(), NoT
 class Plugin:
     """A controller around ours."""
 
-    def __init__(self, sound: Callable[[Any], Pose], owner: Any) -> None:
+    def __init__(self, sound: Callable[[Any], JointCommand], owner: Any) -> None:
         self._sound, self._owner = sound, owner
 
     @property
@@ -63,7 +63,7 @@ class Plugin:
     def contact(self) -> Any:
         return self._owner.contact
 
-    def step(self, frame: Any) -> Pose:
+    def step(self, frame: Any) -> JointCommand:
         return self._sound(frame)
 
 
@@ -99,7 +99,7 @@ class Driven:
 @pytest.mark.parametrize("error", ANY, ids=lambda error: type(error).__name__)
 def test_T6_whatever_a_controller_raises_is_a_failure_of_it(error: BaseException) -> None:
     class Raises(Plugin):
-        def step(self, frame: Any) -> Pose:
+        def step(self, frame: Any) -> JointCommand:
             raise error
 
     made = Driven(Raises)
@@ -115,7 +115,7 @@ def test_T6_a_controller_that_leaves_the_program_gets_the_torque_off_and_a_bad_e
     made = rig(TwinConfig())
     sound = made.session.decider.step
 
-    def step(frame: Any) -> Pose:
+    def step(frame: Any) -> JointCommand:
         if made.session.tally.sent >= 20:
             raise SystemExit(0)
         return sound(frame)
@@ -130,7 +130,7 @@ def test_T6_a_controller_that_leaves_the_program_gets_the_torque_off_and_a_bad_e
 
 def test_ctrl_c_in_a_controller_is_no_failure_of_it() -> None:
     class Interrupted(Plugin):
-        def step(self, frame: Any) -> Pose:
+        def step(self, frame: Any) -> JointCommand:
             raise KeyboardInterrupt
 
     made = Driven(Interrupted)
@@ -183,7 +183,7 @@ def test_B14_a_pose_that_raises_is_refused_as_a_pose(error: BaseException) -> No
             raise error
 
     class Poses(Plugin):
-        def step(self, frame: Any) -> Pose:
+        def step(self, frame: Any) -> JointCommand:
             self._sound(frame)
             return Odd()  # type: ignore[return-value]
 
@@ -198,10 +198,10 @@ def test_B14_a_pose_that_raises_is_refused_as_a_pose(error: BaseException) -> No
 
 def test_a_controller_that_changes_its_frame_changes_no_log() -> None:
     class Scribbles(Plugin):
-        def step(self, frame: Any) -> Pose:
-            pose = self._sound(frame)
+        def step(self, frame: Any) -> JointCommand:
+            command = self._sound(frame)
             frame.counts[:], frame.t[:] = 1234.0, 0.0
-            return pose
+            return command
 
     made = Driven(Scribbles)
     made.step()
@@ -212,18 +212,18 @@ def test_a_controller_that_changes_its_frame_changes_no_log() -> None:
 
 
 def test_B14_a_pose_that_a_controller_changes_later_stays_as_it_was_judged() -> None:
-    given: list[Pose] = []
+    given: list[JointCommand] = []
 
     class Keeps(Plugin):
-        def step(self, frame: Any) -> Pose:
+        def step(self, frame: Any) -> JointCommand:
             given.append(self._sound(frame))
             return given[-1]
 
     made = Driven(Keeps)
     made.step()
-    kept = angles_of(made.session.pose)
+    kept = angles_of(made.session.command)
     given[-1].leg[:] = 100.0
-    assert angles_of(made.session.pose) == kept
+    assert angles_of(made.session.command) == kept
 
 
 @pytest.mark.parametrize(
@@ -241,7 +241,7 @@ def test_a_controller_that_leaves_the_program_at_once_is_bad_input_in_one_line(
     (tmp_path / f"{name}.py").write_text(text)
     monkeypatch.syspath_prepend(tmp_path)
     with pytest.raises(ConfigError) as found:
-        chosen(f"{name}:C", ControllerParams())
+        chosen(f"{name}:C", ControlParams())
     assert said in str(found.value)
     assert "\n" not in str(found.value)
 

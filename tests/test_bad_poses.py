@@ -15,8 +15,8 @@ from antennate.experiments.twin import TwinConfig, rig
 from antennate.hardware.safety.causes import Cause, State
 from antennate.hardware.safety.supervisor import Supervisor
 from antennate.params import SupervisorParams
-from antennate.records import Pose
 from antennate.telemetry.ticks import JOINTS, Tick
+from antennate.types import JointCommand
 
 SHAPES = {"yaw": (1, 5), "leg": (1, 6, 2), "antenna": (1, 2)}
 LIMITED = [*range(5), 17, 18]
@@ -24,11 +24,11 @@ LIMITED = [*range(5), 17, 18]
 
 
 SOUND = object()
-"""In place of a pose: the controller's own."""
+"""In place of a command: the controller's own."""
 
 
 class Robot:
-    """An armed robot of whose poses one can be replaced."""
+    """An armed robot of whose commands one can be replaced."""
 
     def __init__(self, limits: SupervisorParams) -> None:
         made = rig(TwinConfig())
@@ -41,13 +41,13 @@ class Robot:
         for _ in range(50):
             self.step()
 
-    def step(self, pose: Any = SOUND) -> State:
-        """One tick, with a pose in place of the controller's if given."""
+    def step(self, command: Any = SOUND) -> State:
+        """One tick, with a command in place of the controller's if given."""
         session = self.session
 
         def said(frame: Any) -> Any:
             self.sound = self._sound(frame)
-            return self.sound if pose is SOUND else pose
+            return self.sound if command is SOUND else command
 
         session.decider.step = said
         begin = session.clock.now()
@@ -68,24 +68,24 @@ def robot() -> Robot:
 
 
 def sound_angles() -> np.ndarray:
-    pose = robot().sound
-    return np.concatenate([getattr(pose, name).ravel() for name in SHAPES])
+    command = robot().sound
+    return np.concatenate([getattr(command, name).ravel() for name in SHAPES])
 
 
-def pose_of(angles: Any, dtype: Any = float) -> Pose:
+def pose_of(angles: Any, dtype: Any = float) -> JointCommand:
     angles = np.asarray(angles, dtype)
-    return Pose(angles[None, :5], angles[None, 5:17].reshape(1, 6, 2), angles[None, 17:])
+    return JointCommand(angles[None, :5], angles[None, 5:17].reshape(1, 6, 2), angles[None, 17:])
 
 
-def one_changed(at: int, value: float) -> Pose:
+def one_changed(at: int, value: float) -> JointCommand:
     angles = sound_angles()
     angles[at] = value
     return pose_of(angles)
 
 
-def part_of_shape(name: str, shape: tuple[int, ...]) -> Pose:
+def part_of_shape(name: str, shape: tuple[int, ...]) -> JointCommand:
     parts = {n: np.zeros(s) for n, s in SHAPES.items()} | {name: np.zeros(shape)}
-    return Pose(**parts)
+    return JointCommand(**parts)
 
 
 anywhere = st.integers(0, 18)
@@ -100,14 +100,22 @@ wrong_shape = (
     .map(lambda drawn: part_of_shape(*drawn))
 )
 no_pose = st.sampled_from(
-    [None, 3.0, "pose", np.zeros(19), [0.0] * 19, Pose(None, None, None), Pose("a", "b", "c")]  # type: ignore[arg-type]
+    [
+        None,
+        3.0,
+        "command",
+        np.zeros(19),
+        [0.0] * 19,
+        JointCommand(None, None, None),
+        JointCommand("a", "b", "c"),
+    ]  # type: ignore[arg-type]
 )
 BAD = {
     "not finite": not_finite,
     "out of limits": out_of_limits,
     "too many turns": too_many_turns,
     "wrong shape": wrong_shape,
-    "no pose": no_pose,
+    "no command": no_pose,
 }
 
 
@@ -164,13 +172,13 @@ def test_B14_poses_refused_again_and_again_are_a_fault_that_says_so() -> None:
 )
 def test_a_decision_that_is_none_is_a_failure_of_the_controller(name: str, said: Any) -> None:
     made = Robot(SupervisorParams())
-    decision, pose = made.session.decision, made.sound
+    decision, command = made.session.decision, made.sound
 
     class Odd:
         maneuver, contact = np.array([0]), np.array([[0, 0]])
 
-        def step(self, frame: Any) -> Pose:
-            return pose
+        def step(self, frame: Any) -> JointCommand:
+            return command
 
     setattr(Odd, name, said)
     made.session.decider = Odd()

@@ -12,15 +12,11 @@ from hardware_rig import BENT, FREE, PERIOD
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from antennate.conditioning import bending_level
-from antennate.controller import Arm, Controller
-from antennate.params import (
-    ConditioningParams,
-    ControllerParams,
-    RuleParams,
-    SensorParams,
-)
-from antennate.records import AntennaFrame, Contact, Maneuver
+from antennate.control.conditioning import bending_level
+from antennate.control.controllers import Arm, Controller
+from antennate.params import ConditioningParams, ControlParams, RuleParams
+from antennate.robots.sensor import SensorParams
+from antennate.types import AntennaFrame, Contact, Maneuver
 
 
 @settings(max_examples=60, deadline=None)
@@ -34,20 +30,20 @@ from antennate.records import AntennaFrame, Contact, Maneuver
 )
 def test_S5_what_is_no_number_holds_and_never_reaches_a_pose(readings: list, arm) -> None:
     """NaN, infinities and None in counts: HOLD in the same tick, as long as the mean holds them."""
-    params = ControllerParams()
-    mind = Controller(params, arm)
+    params = ControlParams()
+    control = Controller(params, arm)
     length = round(params.conditioning.averaging_time / params.period)
     since = length
     for n, pair in enumerate(readings):
         counts = np.array([pair], dtype=float)
-        pose = mind.step(AntennaFrame(t=np.array([n * PERIOD]), counts=counts))
+        command = control.step(AntennaFrame(t=np.array([n * PERIOD]), counts=counts))
         since = since + 1 if np.isfinite(counts).all() else 0
-        assert np.isfinite(pose.yaw).all()
-        assert np.isfinite(pose.leg).all()
-        assert np.isfinite(pose.antenna).all()
-        assert (mind.maneuver[0] == Maneuver.HOLD) == (since < length)
+        assert np.isfinite(command.yaw).all()
+        assert np.isfinite(command.leg).all()
+        assert np.isfinite(command.antenna).all()
+        assert (control.maneuver[0] == Maneuver.HOLD) == (since < length)
         if since < length:
-            assert Contact.UNKNOWN in mind.contact
+            assert Contact.UNKNOWN in control.contact
 
 
 def test_S10_the_sigmoid_never_overflows() -> None:
@@ -68,15 +64,15 @@ def test_S10_the_sigmoid_never_overflows() -> None:
 @pytest.mark.parametrize("frequency", [1.0, 2.0, 3.3, 5.0, 10.0, 20.0, 33.0, 50.0])
 def test_S12_chatter_turns_the_robot_once_per_hold_at_most(frequency: float) -> None:
     """A square wave of contact for 20 s. FORWARD is not held: it may stand between two turns."""
-    params = ControllerParams()
-    mind = Controller(params, "paper")
+    params = ControlParams()
+    control = Controller(params, "paper")
     duration = 20.0
     seen = []
     for n in range(round(duration * params.rate)):
         t = n * PERIOD
         left = BENT if math.floor(2 * frequency * t + 1e-9) % 2 else FREE
-        mind.step(AntennaFrame(t=np.array([t]), counts=np.array([[left, FREE]])))
-        seen.append(int(mind.maneuver[0]))
+        control.step(AntennaFrame(t=np.array([t]), counts=np.array([[left, FREE]])))
+        seen.append(int(control.maneuver[0]))
     changes = [b for a, b in itertools.pairwise(seen) if a != b]
     bound = duration / params.rule.hold_time + 1
     assert sum(m != Maneuver.FORWARD for m in changes) <= bound
@@ -89,19 +85,19 @@ def test_S12_chatter_changes_the_action_as_often_as_the_page_says(
     arm: Arm, most: int, right: str
 ) -> None:
     """1 to 50 Hz in 20 s, where duration / T_hold + 1 is 11; all changes, FORWARD among them."""
-    params = ControllerParams()
+    params = ControlParams()
     frequency = np.repeat(np.arange(1.0, 50.1, 0.3), 2)
     start = np.tile([0.0, 0.21], len(frequency) // 2)
-    mind = Controller(params, arm, len(frequency))
-    changes, before = np.zeros(len(frequency), int), mind.maneuver
+    control = Controller(params, arm, len(frequency))
+    changes, before = np.zeros(len(frequency), int), control.maneuver
     for n in range(2000):
         touch = np.floor(2 * (frequency * n * PERIOD + start) + 1e-9) % 2 == 1
         left = np.where(touch, BENT, FREE)
         other = {"free": np.full_like(left, FREE), "like left": left}
         counts = np.stack([left, other.get(right, np.where(touch, FREE, BENT))], axis=1)
-        mind.step(AntennaFrame(t=np.full(len(frequency), n * PERIOD), counts=counts))
-        changes += mind.maneuver != before
-        before = mind.maneuver
+        control.step(AntennaFrame(t=np.full(len(frequency), n * PERIOD), counts=counts))
+        changes += control.maneuver != before
+        before = control.maneuver
     assert changes.max() <= most
     assert changes[frequency > 10].max() <= 11
 

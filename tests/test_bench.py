@@ -5,9 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from antennate.antenna.statics import Chain, shape
 from antennate.errors import SimulationError
-from antennate.mechanics import Chain, shape
-from antennate.params import AntennaParams, BenchPhysicsParams, SensorParams
+from antennate.params import BenchPhysicsParams
+from antennate.robots.antenna import AntennaParams
+from antennate.robots.sensor import SensorParams
 from antennate.sim.bench import Ball, Bar, Bench, compile_bench
 
 ANTENNA, SENSOR = AntennaParams(), SensorParams()

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from antennate.experiments.tunnel import TunnelConfig
+from antennate.experiments.tunnel.run import TunnelConfig
 from antennate.params import TunnelParams
 
 FOLDER = Path(__file__).parents[1] / "benchmarks"

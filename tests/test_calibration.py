@@ -10,14 +10,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from antennate import calibration, fitting
-from antennate.calibration import Calibration
+from antennate.antenna import calibration, fitting
+from antennate.antenna.calibration import Calibration
+from antennate.antenna.fitting import Samples
 from antennate.cli import main
 from antennate.errors import CalibrationError, OutputError
-from antennate.experiments.calibrate import CalibrateConfig, RigParams, averaged, run
-from antennate.experiments.recording import Recording, RecordingParams, read, write
-from antennate.fitting import Samples
-from antennate.records import Floats
+from antennate.experiments.calibrate.recording import Recording, RecordingParams, read, write
+from antennate.experiments.calibrate.run import CalibrateConfig, RigParams, averaged, run
+from antennate.types import Floats
 
 LOW, HIGH = 1300.0, 1900.0
 HASH = "0" * 64

@@ -12,7 +12,7 @@ import pytest
 from test_bad_calibrations import GOOD
 
 import antennate
-from antennate import calibration
+from antennate.antenna import calibration
 from antennate.cli.folder import RunFolder
 
 

@@ -21,8 +21,8 @@ from antennate.cli.folder import strict, to_csv
 from antennate.cli.messages import one_line
 from antennate.cli.toml import to_toml
 from antennate.errors import ConfigError
-from antennate.experiments.gait import GaitStudyConfig
-from antennate.experiments.tunnel import TunnelConfig
+from antennate.experiments.gait.run import GaitStudyConfig
+from antennate.experiments.tunnel.run import TunnelConfig
 from antennate.experiments.twin import TwinConfig
 from antennate.sim.world import World
 
@@ -80,7 +80,7 @@ def test_help_shows_every_flag_with_unit_and_default(capsys):
     )
     flags = re.findall(r"[| ]--[a-z][a-z.-]* [A-Z{[]", text)
     assert text.count("(default:") >= len(flags) > 80
-    for name in ("--controller.gait.frequency", "--robot.antenna.length", "--trials", "--out"):
+    for name in ("--control.gait.frequency", "--robot.antenna.length", "--trials", "--out"):
         assert f"{name} " in text
 
 
@@ -115,7 +115,7 @@ def test_the_door_opens_without_heavy_imports():
         (["tunnel", "--tunnel.free-width", "nan"], ["expected a finite number, found nan"]),
         (["tunnel", "--tunnel.free-width", "0.1"], ["at least robot.width, 0.2 m, got 0.1 m"]),
         (["tunnel", "--tunnel.strewn", "300"], ["tunnel.strewn asks for 300"]),
-        (["tunnel", "--controller.rate", "333"], ["whole fraction of the physics rate"]),
+        (["tunnel", "--control.rate", "333"], ["whole fraction of the physics rate"]),
         (["tunnel", "--config", "missing.toml"], ["found missing.toml: No such file"]),
         (["tunnel", "--config", "."], ["--config: expected a readable file"]),
         (["gait", "--cycles", "x"], ["antennate gait: error: --cycles: expected INT"]),
@@ -433,7 +433,7 @@ def test_gait_runs_and_writes_its_result(capsys, tmp_path):
 
 
 def test_gait_interrupted_leaves_nothing(capsys, tmp_path, monkeypatch):
-    from antennate.experiments import gait
+    from antennate.experiments.gait import run as gait
 
     def interrupted(*args):
         raise KeyboardInterrupt

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from antennate.conditioning import RunningMean, bending_level, deflection
+from antennate.control.conditioning import RunningMean, bending_level, deflection
 from antennate.params import ConditioningParams
 
 PLAIN = ConditioningParams(counts_low=0.0, counts_high=1.0, polarity=1)

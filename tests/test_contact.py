@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 
-from antennate.contact import ContactState, classify
+from antennate.control.contact import ContactState, classify
 from antennate.params import RuleParams
-from antennate.records import Contact
+from antennate.types import Contact
 
 PARAMS = RuleParams(threshold=0.5, hysteresis=0.1)
 

@@ -1,4 +1,4 @@
-"""One contract for all worlds: the mind cannot tell which it is in.
+"""One contract for all worlds: the control cannot tell which it is in.
 
 The rules take a world that has run for TICKS ticks and was blind from tick BLIND on; the decisions
 of all worlds are the same, bit by bit.
@@ -16,18 +16,18 @@ import numpy as np
 import pytest
 from worlds import TICKS, WORLDS, World, recorded, replayed, session, simulated, twin
 
-from antennate.controller import ARMS
-from antennate.hardware.driving.body import HardwareBody
+from antennate.control.controllers import ARMS
+from antennate.control.loop import run_loop
+from antennate.hardware.driving.body import HardwareRobot
 from antennate.hardware.esp32.clock import Timed
 from antennate.hardware.esp32.wire import Sample
-from antennate.loop import run_loop
-from antennate.params import ControllerParams, LogParams
-from antennate.records import AntennaFrame, Contact, Maneuver, Pose
+from antennate.params import ControlParams, LogParams
 from antennate.telemetry.header import Header
 from antennate.telemetry.reader import LogReader
 from antennate.telemetry.replay import recorded_decider, replay
 from antennate.telemetry.ticks import Tick
 from antennate.telemetry.writer import LogWriter
+from antennate.types import AntennaFrame, Contact, JointCommand, Maneuver
 
 BLIND = 220
 EMPTY = Sample(boot_id=1, seq=0, ticks=0, left=1800, right=1800, flags=0, drops=0)
@@ -80,7 +80,7 @@ def test_M7_a_sleep_until_the_past_never_turns_time_back(world: World) -> None:
 
 
 def test_M7_what_cannot_be_read_is_unknown_and_unknown_never_walks(world: World) -> None:
-    """Of all ticks: a NaN means HOLD, with the pose of the tick before."""
+    """Of all ticks: a NaN means HOLD, with the command of the tick before."""
     blind = [bool(np.isnan(seen.frame.counts).any()) for seen in world.seen]
     assert blind.index(True, BLIND) <= BLIND + 10
     walked = 0
@@ -98,15 +98,15 @@ def test_M7_what_cannot_be_read_is_unknown_and_unknown_never_walks(world: World)
 def test_M7_poses_have_one_shape_and_are_not_changed_by_the_world(world: World) -> None:
     for seen in world.seen:
         for name, shape in SHAPES.items():
-            part = getattr(seen.pose, name)
+            part = getattr(seen.command, name)
             assert part.shape == shape
             assert part.dtype == np.float64
             assert np.isfinite(part).all()
-    pose = world.seen[-1].pose
-    kept = copy.deepcopy(pose)
-    world.body.write(pose)
+    command = world.seen[-1].command
+    kept = copy.deepcopy(command)
+    world.body.write(command)
     for name in SHAPES:
-        np.testing.assert_array_equal(getattr(pose, name), getattr(kept, name))
+        np.testing.assert_array_equal(getattr(command, name), getattr(kept, name))
 
 
 def test_M7_time_of_a_board_follows_the_host_whatever_comes_and_never_goes_back() -> None:
@@ -130,7 +130,7 @@ def test_M7_time_of_a_board_follows_the_host_whatever_comes_and_never_goes_back(
             return Timed(EMPTY, self.epoch, 0, round(1e6 * self.taken), 0.0)
 
     clock = Wandering(0, 0.01)
-    body = HardwareBody(Chance(), None, None, clock)  # type: ignore[arg-type]
+    body = HardwareRobot(Chance(), None, None, clock)  # type: ignore[arg-type]
     times = []
     for tick in range(5000):
         clock.sleep_until(0.01 * tick)
@@ -178,7 +178,7 @@ def test_G7_a_session_with_a_silent_board_is_replayed_to_the_bit(tmp_path: Path)
     with LogReader(path) as log:
         found = replay(log, recorded_decider(log.header), log.header.params.period)
         assert (log.ticks, log.missing, log.bad, log.end) == (350, 0, 0, 350)
-    assert (found.different, found.poses, found.failures) == (0, 0, 0)
+    assert (found.different, found.commands, found.failures) == (0, 0, 0)
     assert {"OFF", "OK", "HOLD"} < set(found.states)
     with LogReader(path) as log:
         ticks = list(log)
@@ -221,7 +221,7 @@ class Wandering:
         counts = np.where(self._gone > 0, math.nan, np.rint(self._at))
         return AntennaFrame(t=np.array([self.now()]), counts=counts[None])
 
-    def write(self, pose: Pose) -> None:
+    def write(self, command: JointCommand) -> None:
         pass
 
 
@@ -234,22 +234,22 @@ def test_G7_logs_of_wandering_readings_are_replayed_to_the_bit(
     met: Counter[int] = Counter()
     for seed in range(logs):
         arm = ARMS[seed % len(ARMS)]
-        header = Header(controller=arm, params=ControllerParams(), seed=seed, phase=0.1 * seed)
-        mind = recorded_decider(header)
+        header = Header(controller=arm, params=ControlParams(), seed=seed, phase=0.1 * seed)
+        control = recorded_decider(header)
         body = Wandering(seed, header.params.period)
         path = tmp_path / str(seed)
         with LogWriter(path, header, LogParams(least_free=0.0)) as out:
 
-            def go_on(frame: AntennaFrame, pose: Pose) -> bool:
-                tick = Tick.plain(mind, frame, pose, out.written + 1, body.now())  # noqa: B023
+            def go_on(frame: AntennaFrame, command: JointCommand) -> bool:
+                tick = Tick.plain(control, frame, command, out.written + 1, body.now())  # noqa: B023
                 out.write(tick)
                 return out.written < ticks
 
-            run_loop(body, mind, header.params.period, go_on)
+            run_loop(body, control, header.params.period, go_on)
         with LogReader(path) as log:
             found = replay(log, recorded_decider(log.header), log.header.params.period)
             assert (log.ticks, log.missing, log.bad) == (ticks, 0, 0)
-        assert (found.different, found.poses) == (0, 0)
+        assert (found.different, found.commands) == (0, 0)
         met += found.recorded
     assert set(met) == set(Maneuver)
 
@@ -268,7 +268,7 @@ def test_G7_another_controller_differs_and_the_first_difference_is_named(tmp_pat
 
 
 def test_a_tick_of_a_controller_of_anybody_is_kept_too() -> None:
-    """It has no b and no phase, and its pose is of another robot."""
+    """It has no b and no phase, and its command is of another robot."""
 
     class Odd:
         maneuver = np.array([3])
@@ -276,8 +276,8 @@ def test_a_tick_of_a_controller_of_anybody_is_kept_too() -> None:
         gait = "none"
 
     seen = simulated(Path(), "open", 0).run(1)[0]
-    seen.pose.yaw.resize((1, 4), refcheck=False)
-    tick = Tick.plain(Odd(), seen.frame, seen.pose, 1, 0.5)
+    seen.command.yaw.resize((1, 4), refcheck=False)
+    tick = Tick.plain(Odd(), seen.frame, seen.command, 1, 0.5)
     assert (tick.maneuver, tick.contact) == (3, (0, 1))
     assert all(map(math.isnan, (*tick.b, tick.phase, *tick.angles)))
     assert Tick.unpack(tick.pack()).pack() == tick.pack()

@@ -1,4 +1,4 @@
-"""The composed mind: holds on bad readings, keeps rows apart, favours no side."""
+"""The composed control: holds on bad readings, keeps rows apart, favours no side."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ import math
 import numpy as np
 import pytest
 
-from antennate.controller import ARMS, Arm, Controller
+from antennate.control.controllers import ARMS, Arm, Controller
 from antennate.errors import ConfigError
-from antennate.params import ControllerParams
-from antennate.records import AntennaFrame, Maneuver
+from antennate.params import ControlParams
+from antennate.types import AntennaFrame, Maneuver
 
-PARAMS = ControllerParams()
+PARAMS = ControlParams()
 PERIOD = PARAMS.period
 STRAIGHT, BENT = 1872.0, 1399.0
 SWAP = np.array(
@@ -44,16 +44,16 @@ def streams(ticks: int, rows: int) -> np.ndarray:
 def run(arm: Arm, counts: np.ndarray, phase: float = 0.0) -> dict[str, np.ndarray]:
     """All that a fresh controller says to counts of shape (ticks, B, 2)."""
     batch = counts.shape[1]
-    mind = Controller(PARAMS, arm, batch)
-    mind.reset(np.arange(batch), phase)
+    control = Controller(PARAMS, arm, batch)
+    control.reset(np.arange(batch), phase)
     said: dict[str, list[np.ndarray]] = {"b": [], "maneuver": [], "yaw": [], "leg": []}
     for i, reading in enumerate(counts):
-        pose = mind.step(AntennaFrame(t=np.full(batch, i * PERIOD), counts=reading))
+        command = control.step(AntennaFrame(t=np.full(batch, i * PERIOD), counts=reading))
         for name, value in (
-            ("b", mind.b),
-            ("maneuver", mind.maneuver),
-            ("yaw", pose.yaw),
-            ("leg", pose.leg),
+            ("b", control.b),
+            ("maneuver", control.maneuver),
+            ("yaw", command.yaw),
+            ("leg", command.leg),
         ):
             said[name].append(value.copy())
     return {name: np.array(values) for name, values in said.items()}
@@ -146,16 +146,16 @@ def test_swapping_the_antennae_swaps_the_turns_and_mirrors_the_gait(arm: Arm) ->
 @pytest.mark.parametrize("arm", ARMS)
 def test_a_row_that_is_reset_says_what_a_new_controller_says(arm: Arm) -> None:
     counts = streams(900, 2)
-    mind = Controller(PARAMS, arm, 2)
-    mind.reset(np.arange(2))
+    control = Controller(PARAMS, arm, 2)
+    control.reset(np.arange(2))
     for i in range(777):  # any number that leaves the rings mid-way
-        mind.step(AntennaFrame(t=np.full(2, i * PERIOD), counts=np.full((2, 2), 100.0 + i)))
-    mind.reset(np.array([0]))
+        control.step(AntennaFrame(t=np.full(2, i * PERIOD), counts=np.full((2, 2), 100.0 + i)))
+    control.reset(np.array([0]))
     fresh = run(arm, counts)
     for i in range(900):
-        pose = mind.step(AntennaFrame(t=np.full(2, i * PERIOD), counts=counts[i]))
-        assert mind.maneuver[0] == fresh["maneuver"][i, 0]
-        assert np.array_equal(pose.yaw[0], fresh["yaw"][i, 0])
+        command = control.step(AntennaFrame(t=np.full(2, i * PERIOD), counts=counts[i]))
+        assert control.maneuver[0] == fresh["maneuver"][i, 0]
+        assert np.array_equal(command.yaw[0], fresh["yaw"][i, 0])
 
 
 @pytest.mark.parametrize("frequency", [1, 5, 20, 50])

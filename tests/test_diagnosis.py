@@ -17,14 +17,12 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 from scipy.stats import binom, norm
 
+from antennate.antenna.sensor import reading_noise
 from antennate.errors import CalibrationError
 from antennate.hardware.safety.causes import Cause, State
 from antennate.hardware.safety.diagnosis import Band, ChannelDiagnosis, Finding, Reading
-from antennate.params import (
-    DiagnosisParams,
-    SensorParams,
-)
-from antennate.sensor import reading_noise
+from antennate.params import DiagnosisParams
+from antennate.robots.sensor import SensorParams
 
 RECORDED = Path(__file__).parents[2] / "shared/data/flex_static_12bit/derived/flex_static.csv"
 DAY = 8_640_000
@@ -292,7 +290,7 @@ def maneuvers_of(readings: np.ndarray) -> tuple[list[int], Rig]:
     seen = []
     for pair in readings.tolist():
         rig.step([((rig.n + 1) * PERIOD, *pair)])
-        seen.append(int(rig.mind.maneuver[0]))
+        seen.append(int(rig.control.maneuver[0]))
     return [m for m, _ in itertools.groupby(seen)], rig
 
 

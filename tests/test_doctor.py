@@ -171,7 +171,7 @@ def test_a_board_that_speaks_another_language_is_quoted() -> None:
     text = Heard(text="MicroPython v1.24 on ESP32\r\n>>> ", received=40)
     other = Heard(refusals=["the board speaks protocol version 9"], received=40)
     for heard, said in ((text, "'MicroPython v1.24 on ESP32 >>>'"), (other, "version 9")):
-        rows = board_rows(heard, ROBOT.mind, SupervisorParams(), DoctorParams())
+        rows = board_rows(heard, ROBOT.control, SupervisorParams(), DoctorParams())
         assert len(rows) == 1
         assert said in rows[0].found
         assert "firmware/" in rows[0].cure

@@ -6,15 +6,16 @@ import numpy as np
 import pytest
 from hardware_rig import BAND, PERIOD, Ticker, armed
 
-from antennate.conditioning import bending_level
-from antennate.contact import classify
+from antennate.antenna.sensor import reading_noise
+from antennate.control.conditioning import bending_level
+from antennate.control.contact import classify
 from antennate.hardware.safety.causes import Cause, State
 from antennate.hardware.safety.diagnosis import Finding, Reading
 from antennate.hardware.safety.drift import Drift
 from antennate.hardware.safety.trust import Trust
-from antennate.params import ConditioningParams, DriftParams, RuleParams, SensorParams
-from antennate.records import Contact, Floats
-from antennate.sensor import reading_noise
+from antennate.params import ConditioningParams, DriftParams, RuleParams
+from antennate.robots.sensor import SensorParams
+from antennate.types import Contact, Floats
 
 SPAN = BAND.high - BAND.low
 MEAN = 10

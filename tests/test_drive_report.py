@@ -18,7 +18,7 @@ from antennate.hardware.driving.report import Report
 from antennate.hardware.driving.session import Session
 from antennate.hardware.safety.causes import Cause, State
 from antennate.params import TouchCheckParams
-from antennate.records import AntennaFrame, Contact, Pose
+from antennate.types import AntennaFrame, Contact, JointCommand
 
 CONFIG = DriveConfig(dry_run=0.5, duration=2.0, touch=TouchCheckParams(patience=3.0))
 
@@ -88,10 +88,10 @@ class Unsure:
     def __init__(self, sound: object) -> None:
         self._sound = sound
 
-    def step(self, frame: AntennaFrame) -> Pose:
-        pose = self._sound.step(frame)  # type: ignore[attr-defined]
+    def step(self, frame: AntennaFrame) -> JointCommand:
+        command = self._sound.step(frame)  # type: ignore[attr-defined]
         self.maneuver = self._sound.maneuver  # type: ignore[attr-defined]
-        return pose
+        return command
 
 
 def test_a_controller_that_never_decides_is_a_hold() -> None:
@@ -132,7 +132,7 @@ def test_L8_a_drive_that_sent_no_pose_ends_with_2_and_says_so(
         assert main([*argv, "--overwrite"]) == 2
     text = " ".join(capsys.readouterr().out.split())
     assert said in text
-    assert "It never walked: --arm was given, and no pose was sent." in text
+    assert "It never walked: --arm was given, and no command was sent." in text
     result = json.loads((tmp_path / "result.json").read_text())
     assert result["worst_state"] == worst.name
     assert result["poses_sent"] == 0

@@ -6,12 +6,12 @@ import math
 
 import pytest
 
-from antennate.controller import Arm
+from antennate.control.controllers import Arm
 from antennate.experiments.driven import driven, simulated_alike
-from antennate.experiments.tunnel import TunnelConfig
+from antennate.experiments.tunnel.run import TunnelConfig
 from antennate.hardware.safety.causes import State
-from antennate.params.layout import LayoutParams
-from antennate.records import Maneuver
+from antennate.robots.layout import LayoutParams
+from antennate.types import Maneuver
 
 CONFIG = TunnelConfig(seed=0)
 LAYOUT = LayoutParams()
@@ -22,7 +22,7 @@ def same(arm: Arm, trial: int, ticks: float, phase: float = 0.0) -> tuple[set[in
     one = driven(CONFIG, arm, trial, LAYOUT, ticks, phase=phase)
     other = simulated_alike(CONFIG, arm, trial, LAYOUT, one.start, ticks)
     assert one.walk.maneuvers == other.maneuvers
-    assert one.walk.poses == other.poses
+    assert one.walk.commands == other.commands
     assert one.walk.readings == other.readings
     assert one.walk.goals == other.goals
     assert one.walk.status == other.status

@@ -9,9 +9,9 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from antennate.escape import Escape
+from antennate.control.escape import Escape
 from antennate.params import EscapeParams
-from antennate.records import Maneuver
+from antennate.types import Maneuver
 
 PERIOD = 1 / 64
 PARAMS = EscapeParams(

@@ -16,14 +16,14 @@ import pytest
 from antennate.cli.viewer import REQUIRED
 from antennate.errors import LogError
 from antennate.hardware.driving.signals import STOPS
-from antennate.params import ControllerParams, LogParams
+from antennate.params import ControlParams, LogParams
 from antennate.telemetry.feed import Feed, messages
 from antennate.telemetry.header import Header
 from antennate.telemetry.parts import part
 from antennate.telemetry.reader import LogReader, count
 from antennate.telemetry.ticks import Tick
 
-HEADER = Header(controller="paper", params=ControllerParams())
+HEADER = Header(controller="paper", params=ControlParams())
 PAIR = (1.0, 2.0)
 
 

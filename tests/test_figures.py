@@ -5,10 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from antennate.anatomy import LINK_COUNT
-from antennate.controller import ARMS
-from antennate.figures import gait, style, tunnel
-from antennate.records import Maneuver
+from antennate import figures as style
+from antennate.control.controllers import ARMS
+from antennate.experiments.gait import figure as gait
+from antennate.experiments.tunnel import figure as tunnel
+from antennate.robots.anatomy import LINK_COUNT
+from antennate.types import Maneuver
 
 LIMIT = 50.0
 WALLS = (np.array([[0.0, 0.3], [2.0, 0.3]]), np.array([[0.0, -0.3], [2.0, -0.3]]))

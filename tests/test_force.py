@@ -9,17 +9,16 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from antennate import sensor
+from antennate.antenna import sensor
+from antennate.antenna.statics import Chain, equilibrium, shape, uniform_beam, with_profile
 from antennate.cli import main
 from antennate.errors import SimulationError
-from antennate.experiments import force, loads, post_traverse, reading
-from antennate.mechanics import Chain, equilibrium, shape, uniform_beam, with_profile
-from antennate.params import (
-    AntennaParams,
-    BenchPhysicsParams,
-    ConditioningParams,
-    SensorParams,
-)
+from antennate.experiments import reading
+from antennate.experiments.force import loads, post_traverse
+from antennate.experiments.force import run as force
+from antennate.params import BenchPhysicsParams, ConditioningParams
+from antennate.robots.antenna import AntennaParams
+from antennate.robots.sensor import SensorParams
 from antennate.sim.bench import Bench
 
 BARE = AntennaParams(film_stiffness_n_mm_per_deg=0.0)
@@ -63,7 +62,7 @@ def test_uniform_chains_without_film_differ_by_the_scale_of_force_alone():
         points, _ = loads.static_loads(config, profile, 0.3)
         chain = Chain.of(with_profile(BARE, SENSOR, profile), SENSOR)
         largest = loads.largest_force(chain, math.radians(30))
-        found.append(force.judge(points, "flex", 0.5, None, largest))
+        found.append(force.score(points, "flex", 0.5, None, largest))
     assert found[0]["r2"] == pytest.approx(found[1]["r2"], abs=1e-6)
     assert found[0]["rmse_percent"] == pytest.approx(found[1]["rmse_percent"], rel=1e-5)
     assert 0.3 < found[0]["r2"] < 0.95
@@ -72,9 +71,9 @@ def test_uniform_chains_without_film_differ_by_the_scale_of_force_alone():
 def test_a_known_place_tells_the_force_and_friction_blurs_it():
     config = loads.ForceConfig(loads=60)
     plain, rubbed = (loads.static_loads(config, "descending", mu)[0] for mu in (0.0, 1.0))
-    sure = force.judge(plain, "flex", 0.5, config.place_step, 1.0)["r2"]
-    blurred = force.judge(rubbed, "flex", 0.5, config.place_step, 1.0)["r2"]
-    blind = force.judge(plain, "flex", 0.5, None, 1.0)["r2"]
+    sure = force.score(plain, "flex", 0.5, config.place_step, 1.0)["r2"]
+    blurred = force.score(rubbed, "flex", 0.5, config.place_step, 1.0)["r2"]
+    blind = force.score(plain, "flex", 0.5, None, 1.0)["r2"]
     assert sure > 0.999
     assert sure > blurred > blind
 

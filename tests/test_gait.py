@@ -1,4 +1,4 @@
-"""The serpenoid wave and the legs: hand-computed poses, continuity, time reversal, steering."""
+"""The serpenoid wave and the legs: hand-computed commands, continuity, time reversal, steering."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from antennate.gait import Gait, targets
+from antennate.control.gait import Gait, targets
 from antennate.params import GaitParams
-from antennate.records import Maneuver, Pose
+from antennate.types import JointCommand, Maneuver
 
 PARAMS = GaitParams(
     frequency=0.5,
@@ -24,14 +24,14 @@ PARAMS = GaitParams(
 PERIOD = 0.01
 
 
-def pose_at(phase: float, offset: float = 0.0, params: GaitParams = PARAMS) -> Pose:
+def pose_at(phase: float, offset: float = 0.0, params: GaitParams = PARAMS) -> JointCommand:
     return targets(params, np.array([phase]), np.array([offset]))
 
 
 def walk(gait: Gait, maneuvers: list[Maneuver]) -> tuple[np.ndarray, np.ndarray]:
     """Yaw (n, 5) and leg (n, 6, 2) of one robot that is given these maneuvers."""
-    poses = [gait.step(np.array([m])) for m in maneuvers]
-    return np.array([p.yaw[0] for p in poses]), np.array([p.leg[0] for p in poses])
+    commands = [gait.step(np.array([m])) for m in maneuvers]
+    return np.array([p.yaw[0] for p in commands]), np.array([p.leg[0] for p in commands])
 
 
 def test_the_body_wave_agrees_with_hand_computed_angles() -> None:

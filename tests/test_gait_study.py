@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from antennate.experiments import gait as study
-from antennate.experiments.pace import Walk, measure, rolling_speed
-from antennate.params import GaitParams, RobotParams
-from antennate.records import Maneuver
+from antennate.experiments.gait import run as study
+from antennate.experiments.gait.pace import Walk, measure, rolling_speed
+from antennate.params import GaitParams
+from antennate.robots.body import RobotParams
+from antennate.types import Maneuver
 
 SHORT = study.GaitStudyConfig(cycles=2, settling_cycles=1, sweep_points=2)
 

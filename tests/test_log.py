@@ -18,7 +18,7 @@ from log_ticks import HEADER, ODD, tick
 
 import antennate
 from antennate.errors import AntennateError, LogError
-from antennate.params import ControllerParams, LogParams
+from antennate.params import ControlParams, LogParams
 from antennate.telemetry.framing import LONGEST, SCHEMA, framed, opened, pieces
 from antennate.telemetry.header import Header
 from antennate.telemetry.reader import LogReader
@@ -299,7 +299,7 @@ def test_what_is_no_tick_is_refused(content: bytes) -> None:
 
 
 def test_a_header_of_defaults_names_its_fields() -> None:
-    content = Header(controller="open", params=ControllerParams()).pack()
+    content = Header(controller="open", params=ControlParams()).pack()
     said = json.loads(content[2:])
     assert said["version"] == antennate.__version__
     assert said["fields"][:5] == ["schema", "kind", "number", "asked", "t"]

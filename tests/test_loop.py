@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from antennate.loop import run_loop
-from antennate.records import AntennaFrame, Pose
+from antennate.control.loop import run_loop
+from antennate.types import AntennaFrame, JointCommand
 
 PERIOD = 0.01
 
 
 class FakeWorld:
-    """A body, its clock and a mind in one; reading takes as long as it is told."""
+    """A body, its clock and a control in one; reading takes as long as it is told."""
 
     def __init__(self, start: float, durations: list[float]) -> None:
         self.time = start
@@ -39,13 +39,15 @@ class FakeWorld:
         self.time += self.durations[len(self.read_at) - 1]
         return AntennaFrame(t=np.array([self.time]), counts=np.zeros((1, 2)))
 
-    def step(self, frame: AntennaFrame) -> Pose:
+    def step(self, frame: AntennaFrame) -> JointCommand:
         self.calls.append("decide")
-        return Pose(yaw=np.full((1, 5), frame.t), leg=np.zeros((1, 6, 2)), antenna=np.zeros((1, 2)))
+        return JointCommand(
+            yaw=np.full((1, 5), frame.t), leg=np.zeros((1, 6, 2)), antenna=np.zeros((1, 2))
+        )
 
-    def write(self, pose: Pose) -> None:
+    def write(self, command: JointCommand) -> None:
         self.calls.append("write")
-        self.written = pose
+        self.written = command
 
     def run(self) -> int:
         return run_loop(self, self, PERIOD, lambda *_: len(self.read_at) < len(self.durations))
@@ -75,9 +77,9 @@ def test_it_ends_when_it_is_told_to_and_says_how_many_ticks_it_ran() -> None:
 
 def test_what_is_written_is_what_was_decided_on_what_was_read() -> None:
     world = FakeWorld(3.0, [0.004])
-    seen: list[tuple[AntennaFrame, Pose]] = []
-    run_loop(world, world, PERIOD, lambda frame, pose: bool(seen.append((frame, pose))))
-    frame, pose = seen[0]
-    assert pose is world.written
+    seen: list[tuple[AntennaFrame, JointCommand]] = []
+    run_loop(world, world, PERIOD, lambda frame, command: bool(seen.append((frame, command))))
+    frame, command = seen[0]
+    assert command is world.written
     assert frame.t == pytest.approx([3.004])
-    assert pose.yaw[0, 0] == pytest.approx(3.004)
+    assert command.yaw[0, 0] == pytest.approx(3.004)

@@ -16,9 +16,9 @@ from antennate.hardware.dynamixel.bringup import BringUpError
 from antennate.hardware.dynamixel.packets import StatusError
 from antennate.hardware.joints import Joints
 from antennate.hardware.safety.causes import Cause, State
-from antennate.params import LayoutParams
-from antennate.records import Floats
+from antennate.robots.layout import LayoutParams
 from antennate.twin.registers import Servo
+from antennate.types import Floats
 
 LEG = 6
 AT = LEG - 1

@@ -10,9 +10,9 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from antennate.maneuver import Hold, decide
+from antennate.control.maneuver import Hold, decide
 from antennate.params import RuleParams
-from antennate.records import Contact, Maneuver
+from antennate.types import Contact, Maneuver
 
 F, C, U = Contact.FREE, Contact.CONTACT, Contact.UNKNOWN
 FORWARD, TURN_L, TURN_R = Maneuver.FORWARD, Maneuver.TURN_L, Maneuver.TURN_R

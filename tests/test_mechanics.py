@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from antennate.mechanics import (
+from antennate.antenna.statics import (
     PROFILES,
     Chain,
     equilibrium,
@@ -19,9 +19,11 @@ from antennate.mechanics import (
     uniform_beam,
     with_profile,
 )
-from antennate.params import AntennaParams, BenchPhysicsParams, SensorParams
-from antennate.records import Floats
+from antennate.params import BenchPhysicsParams
+from antennate.robots.antenna import AntennaParams
+from antennate.robots.sensor import SensorParams
 from antennate.sim.bench import Bench, compile_bench
+from antennate.types import Floats
 
 ANTENNA, SENSOR = AntennaParams(), SensorParams()
 BARE = AntennaParams(length=0.1, film_stiffness_n_mm_per_deg=0.0)

@@ -22,7 +22,8 @@ from antennate.hardware.ports.finder import finder
 from antennate.hardware.ports.keys import read_key
 from antennate.hardware.ports.port import Port, PortError
 from antennate.hardware.ports.udp_port import UdpPort
-from antennate.params import LayoutParams, NetworkParams
+from antennate.params import NetworkParams
+from antennate.robots.layout import LayoutParams
 from antennate.twin.faults import Faults
 from antennate.twin.serve import TwinServer
 from antennate.twin.tcp import TcpEnd

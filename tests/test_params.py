@@ -8,17 +8,16 @@ import pytest
 from pydantic import ValidationError
 
 from antennate.params import (
-    AntennaParams,
     ConditioningParams,
-    ControllerParams,
+    ControlParams,
     GaitParams,
     Params,
     PhysicsParams,
-    RobotParams,
-    SensorParams,
-    ServoParams,
     TunnelParams,
 )
+from antennate.robots.antenna import AntennaParams
+from antennate.robots.body import RobotParams, ServoParams
+from antennate.robots.sensor import SensorParams
 
 SOURCES = ("paper", "datasheet", "measured", "fitted", "assumed")
 
@@ -70,9 +69,7 @@ def test_every_field_has_a_unit_and_a_source_of_a_known_kind(cls: type[Params], 
 
 
 def test_the_walk_over_all_groups_finds_the_known_ones() -> None:
-    assert {AntennaParams, GaitParams, PhysicsParams, RobotParams, ControllerParams} <= set(
-        groups()
-    )
+    assert {AntennaParams, GaitParams, PhysicsParams, RobotParams, ControlParams} <= set(groups())
 
 
 @pytest.mark.parametrize("cls", groups())
@@ -149,4 +146,4 @@ def test_a_tunnel_needs_one_turn_between_every_two_pieces() -> None:
 
 
 def test_the_control_period_is_ten_milliseconds() -> None:
-    assert ControllerParams().period == pytest.approx(0.01)
+    assert ControlParams().period == pytest.approx(0.01)

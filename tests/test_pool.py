@@ -6,7 +6,7 @@ import pytest
 from pool_tasks import die, divmod_task
 
 from antennate.errors import WorkerError
-from antennate.trials.pool import core_count, run_tasks
+from antennate.studies.pool import core_count, run_tasks
 
 
 @pytest.mark.parametrize("workers", [1, 2])

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from antennate.control.loop import run_loop
 from antennate.errors import BadInputError
 from antennate.experiments.twin import Rig, TwinConfig, rig
 from antennate.hardware.driving.config import DriveConfig
@@ -18,8 +19,7 @@ from antennate.hardware.dynamixel.bringup import BringUpError
 from antennate.hardware.esp32.frame import SAMPLE_FRAME_SIZE
 from antennate.hardware.ports.port import Port, PortError
 from antennate.hardware.safety.causes import State
-from antennate.loop import run_loop
-from antennate.params.layout import LayoutParams
+from antennate.robots.layout import LayoutParams
 from antennate.twin.lockstep import BoardPort
 
 ARM, OUT, BACK, AGAIN = 0.5, 1.2, 1.7, 2.2

@@ -13,8 +13,8 @@ from port_pieces import Pieces
 
 from antennate.cli import BAD_INPUT, main
 from antennate.errors import BadInputError, OutputError
-from antennate.experiments.calibrate import CalibrateConfig, run
-from antennate.experiments.recording import RecordingParams
+from antennate.experiments.calibrate.recording import RecordingParams
+from antennate.experiments.calibrate.run import CalibrateConfig, run
 from antennate.hardware.esp32 import frame
 from antennate.hardware.esp32.recorder import Recorder
 from antennate.hardware.esp32.stream import Stream

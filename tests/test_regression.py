@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from antennate.trials.regression import Curve, by_group, explained
+from antennate.studies.regression import Curve, by_group, explained
 
 
 def test_curve_through_rising_points_is_the_points():

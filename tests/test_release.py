@@ -1,4 +1,4 @@
-"""Torque off whatever the bus does, and the pose held before."""
+"""Torque off whatever the bus does, and the command held before."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import pytest
 from servo_rig import IDS
 from servo_rig import Rig as Servos
 
+from antennate.control.loop import run_loop
 from antennate.experiments.twin import Rig, TwinConfig, rig
 from antennate.hardware.driving.config import DriveConfig
 from antennate.hardware.driving.drive import drive
@@ -18,7 +19,6 @@ from antennate.hardware.dynamixel.packets import Instruction, StatusError
 from antennate.hardware.dynamixel.parser import Parser
 from antennate.hardware.ports.port import PortError
 from antennate.hardware.safety.causes import Cause, State
-from antennate.loop import run_loop
 from antennate.twin.bus import Fault, Trouble
 
 CONFIG = DriveConfig(dry_run=0.5, duration=0.5)

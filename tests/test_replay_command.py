@@ -12,19 +12,19 @@ import numpy as np
 import pytest
 from worlds import recorded, session, simulated
 
+from antennate import figures as style
 from antennate.cli import main
 from antennate.errors import LogError
-from antennate.figures import style
-from antennate.figures.replay import Course
-from antennate.figures.replay import replay as draw
-from antennate.params import ControllerParams
-from antennate.records import Contact, Maneuver, Pose
+from antennate.params import ControlParams
+from antennate.telemetry.figure import Course
+from antennate.telemetry.figure import replay as draw
 from antennate.telemetry.framing import framed
 from antennate.telemetry.header import Header
 from antennate.telemetry.reader import LogReader
 from antennate.telemetry.replay import ReplayBody, recorded_decider, replay
 from antennate.telemetry.ticks import JOINTS
 from antennate.telemetry.writer import LogWriter
+from antennate.types import Contact, JointCommand, Maneuver
 
 TICKS = 200
 
@@ -104,7 +104,9 @@ def test_it_leaves_a_table_and_a_figure(tmp_path: Path, capsys: pytest.CaptureFi
         rows = list(csv.DictReader(file))
     assert len(rows) == 180
     for row, seen in zip(rows, live.seen, strict=True):
-        angles = np.concatenate([seen.pose.yaw[0], seen.pose.leg.ravel(), seen.pose.antenna[0]])
+        angles = np.concatenate(
+            [seen.command.yaw[0], seen.command.leg.ravel(), seen.command.antenna[0]]
+        )
         assert [float(row[name]) for name in JOINTS] == angles.tolist()
         counts = np.array([float(row["counts_l"]), float(row["counts_r"])])
         np.testing.assert_array_equal(counts, seen.frame.counts[0])
@@ -159,7 +161,7 @@ def test_what_cannot_be_replayed_is_refused_in_one_line(
     argv: list[str], what: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / "text").write_text("not a log of anything\n")
-    own = Header(controller="this:Class", params=ControllerParams())
+    own = Header(controller="this:Class", params=ControlParams())
     (tmp_path / "own").write_bytes(framed(own.pack()))
     assert main(["replay", *argv]) == 2
     out, err = capsys.readouterr()
@@ -170,7 +172,7 @@ def test_what_cannot_be_replayed_is_refused_in_one_line(
 
 def test_an_empty_log_is_replayed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / "empty"
-    LogWriter(path, Header(controller="open", params=ControllerParams())).close()
+    LogWriter(path, Header(controller="open", params=ControlParams())).close()
     assert said(capsys, str(path), "--out", "out")["ticks"] == 0
     body = ReplayBody([])
     with pytest.raises(LogError, match="found the end of the log"):
@@ -189,10 +191,10 @@ def test_a_controller_that_raises_is_counted_and_does_not_end_the_replay(log: Pa
 
         ticks = list(reader)
     found = replay(ticks, Broken(), 0.01)  # type: ignore[arg-type]
-    assert (found.failures, found.poses, len(found.maneuvers)) == (TICKS, TICKS, TICKS)
+    assert (found.failures, found.commands, len(found.maneuvers)) == (TICKS, TICKS, TICKS)
     nowhere = (math.nan,) * len(JOINTS)
     failed = [dataclasses.replace(tick, angles=nowhere) for tick in ticks]
-    assert replay(failed, Broken(), 0.01).poses == 0  # type: ignore[arg-type]
+    assert replay(failed, Broken(), 0.01).commands == 0  # type: ignore[arg-type]
 
 
 def test_the_figure_shows_every_stretch_and_repeats_its_bytes() -> None:
@@ -213,15 +215,15 @@ def test_the_figure_shows_every_stretch_and_repeats_its_bytes() -> None:
 
 
 def test_G7_a_tick_without_a_decision_keeps_the_last_pose_that_was_not_refused(log: Path) -> None:
-    """As a session does: the second pose was refused, and the third tick kept the first."""
+    """As a session does: the second command was refused, and the third tick kept the first."""
 
     class Turning:
         maneuver, contact = np.zeros(1, int), np.zeros((1, 2), int)
         yaw = 0.0
 
-        def step(self, frame: object) -> Pose:
+        def step(self, frame: object) -> JointCommand:
             self.yaw += 0.1
-            return Pose(np.full((1, 5), self.yaw), np.zeros((1, 6, 2)), np.zeros((1, 2)))
+            return JointCommand(np.full((1, 5), self.yaw), np.zeros((1, 6, 2)), np.zeros((1, 2)))
 
     with LogReader(log) as reader:
         first, second, third, *_ = reader
@@ -232,4 +234,4 @@ def test_G7_a_tick_without_a_decision_keeps_the_last_pose_that_was_not_refused(l
         dataclasses.replace(third, angles=angles[0], maneuver=0, refused=1, asked=False),
     ]
     found = replay(ticks, Turning(), 0.01)
-    assert (found.poses, found.different) == (0, 0)
+    assert (found.commands, found.different) == (0, 0)

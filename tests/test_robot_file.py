@@ -11,7 +11,7 @@ import pytest
 from doctor_rig import Patient, wrong
 from test_bad_calibrations import GOOD
 
-from antennate import calibration
+from antennate.antenna import calibration
 from antennate.cli import BAD_INPUT, main
 from antennate.cli.addresses import RobotOrders, parse_robot
 from antennate.cli.arguments import read_file
@@ -110,7 +110,7 @@ def test_what_a_run_keeps_is_a_robot_file_that_needs_no_calibration_file(file: P
         kept.write_text(to_toml(config))
         again = read_file(kept, RobotFile)
         assert again._part(type(config)).calibrated() == config
-        assert again.mind.conditioning.counts_low == GOOD.counts_low
+        assert again.control.conditioning.counts_low == GOOD.counts_low
 
 
 def test_record_with_the_file_of_drive_gets_as_far_as_the_port(

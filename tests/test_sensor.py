@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from antennate import sensor
-from antennate.params import SensorParams
+from antennate.antenna import sensor
+from antennate.robots.sensor import SensorParams
 
 FLAT, GAIN = 10e3, 1.2 / math.pi
 

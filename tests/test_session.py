@@ -9,7 +9,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from antennate.controller import Controller
+from antennate.control.controllers import Controller
 from antennate.errors import BadInputError, ConfigError
 from antennate.experiments.twin import Rig, TwinConfig, rig
 from antennate.hardware.driving.adapter import require_quick
@@ -25,15 +25,15 @@ from antennate.hardware.dynamixel.packets import Instruction, StatusError
 from antennate.hardware.dynamixel.parser import Parser
 from antennate.hardware.ports.port import PortError
 from antennate.hardware.safety.causes import Cause, State
-from antennate.params import ControllerParams
-from antennate.params.layout import LayoutParams
-from antennate.records import AntennaFrame, Maneuver, Pose
+from antennate.params import ControlParams
+from antennate.robots.layout import LayoutParams
 from antennate.telemetry.replay import replay
 from antennate.telemetry.ticks import Tick
 from antennate.twin.bus import Fault, Trouble
 from antennate.twin.faults import Faults, read
 from antennate.twin.pty import PtyServer
 from antennate.twin.registers import Servo
+from antennate.types import AntennaFrame, JointCommand, Maneuver
 
 CONFIG = DriveConfig(dry_run=1.0, duration=3.0)
 
@@ -226,7 +226,7 @@ def test_T2_a_controller_that_hangs_stops_every_servo_within_120_ms_of_the_last_
     tripped: list[float] = []
     seen: list[list[float]] = []
 
-    def step(frame: AntennaFrame) -> Pose:
+    def step(frame: AntennaFrame) -> JointCommand:
         seen.append([servo.position for servo in servos])
         if made.clock.now() < 2.0:
             return sound(frame)
@@ -260,7 +260,7 @@ def test_B8_servos_stop_within_120_ms_when_only_the_controller_fails(
     heard: list[float] = []
     tripped: list[float] = []
 
-    def step(frame: AntennaFrame) -> Pose:
+    def step(frame: AntennaFrame) -> JointCommand:
         servos[0].set("present_input_voltage", round(10 * volts))  # at 10.5 V it goes at half pace
         if made.clock.now() < 1.6:
             heard[:] = [max(servo.last_heard for servo in servos)]
@@ -297,13 +297,13 @@ def test_B8_a_controller_that_fails_does_not_feed_the_watchdogs() -> None:
             self.maneuver, self.contact = sound.maneuver, sound.contact  # type: ignore[attr-defined]
             self.ticks = 0
 
-        def step(self, frame: AntennaFrame) -> Pose:
+        def step(self, frame: AntennaFrame) -> JointCommand:
             self.ticks += 1
             if self.ticks > 200:
                 raise ValueError("a bug")
-            pose = self._sound.step(frame)  # type: ignore[attr-defined]
+            command = self._sound.step(frame)  # type: ignore[attr-defined]
             self.maneuver, self.contact = self._sound.maneuver, self._sound.contact  # type: ignore[attr-defined]
-            return pose
+            return command
 
     made = rig(TwinConfig())
     made.session.decider = Broken(made.session.decider)
@@ -340,11 +340,11 @@ def test_S5_B14_a_pose_that_is_not_finite_never_reaches_the_bus(bad: float) -> N
     made = rig(TwinConfig())
     sound = made.session.decider.step
 
-    def step(frame: AntennaFrame) -> Pose:
-        pose = sound(frame)
+    def step(frame: AntennaFrame) -> JointCommand:
+        command = sound(frame)
         if made.clock.now() > 2.0:
-            pose.leg[0, 2, 1] = bad
-        return pose
+            command.leg[0, 2, 1] = bad
+        return command
 
     made.session.decider.step = step  # type: ignore[method-assign]
     log = Log(made)
@@ -456,14 +456,16 @@ def test_B15_servos_that_are_not_as_expected_are_refused(
         require_servos(made.session.bus, LayoutParams())
 
 
-@pytest.mark.parametrize("name", ["clsoed", "antennate.controller:Nobody", "no_such_module:X"])
+@pytest.mark.parametrize(
+    "name", ["clsoed", "antennate.control.controllers:Nobody", "no_such_module:X"]
+)
 def test_a_controller_that_does_not_exist_is_refused(name: str) -> None:
     with pytest.raises(ConfigError, match="--controller"):
-        chosen(name, ControllerParams())
+        chosen(name, ControlParams())
 
 
 def test_a_controller_of_ones_own_is_taken() -> None:
-    made = chosen("antennate.controller:Controller", ControllerParams())
+    made = chosen("antennate.control.controllers:Controller", ControlParams())
     assert int(made.maneuver[0]) == Maneuver.FORWARD
 
 
@@ -591,17 +593,17 @@ def test_B13_a_supply_that_cannot_be_read_any_more_is_not_known_after_4_s() -> N
     assert Cause.SUPPLY_UNKNOWN in log.causes[-1]
 
 
-@pytest.mark.parametrize("what", ["servo", "pose"])
+@pytest.mark.parametrize("what", ["servo", "command"])
 def test_B10_arming_that_fails_half_way_leaves_no_servo_with_torque(what: str) -> None:
     made = rig(TwinConfig())
     servos, sound = made.robot.servos, made.session.decider.step
     had_torque: list[int] = []
 
-    def step(frame: AntennaFrame) -> Pose:
-        pose = sound(frame)
-        if what == "pose":
-            pose.yaw[0, 2] = 2.0
-        return pose
+    def step(frame: AntennaFrame) -> JointCommand:
+        command = sound(frame)
+        if what == "command":
+            command.yaw[0, 2] = 2.0
+        return command
 
     def note(session: Session, t: float) -> None:
         had_torque.append(sum(servo.torque for servo in servos))
@@ -660,8 +662,8 @@ def test_B13_below_the_first_level_it_walks_at_half_the_pace_and_replays_alike()
     assert {Cause.SUPPLY_WARN} <= {active.cause for active in made.session.outputs.causes}
     assert legs[450] - legs[250] == pytest.approx(np.full(12, 2 * math.pi), rel=0.03)
     assert legs[790] - legs[590] == pytest.approx(np.full(12, math.pi), rel=0.03)
-    found = replay(ticks, Controller(ControllerParams()), 0.01)
-    assert (len(found.maneuvers), found.different, found.poses) == (len(ticks), 0, 0)
+    found = replay(ticks, Controller(ControlParams()), 0.01)
+    assert (len(found.maneuvers), found.different, found.commands) == (len(ticks), 0, 0)
 
 
 def test_B19_torque_goes_off_in_the_configured_order() -> None:

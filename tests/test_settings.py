@@ -16,7 +16,7 @@ from antennate.hardware.dynamixel.bringup import BringUpError
 from antennate.hardware.dynamixel.packets import StatusError
 from antennate.hardware.dynamixel.tables import XC430_W240
 from antennate.hardware.safety.causes import State
-from antennate.params import LayoutParams
+from antennate.robots.layout import LayoutParams
 from antennate.twin.registers import Servo
 from antennate.twin.robot import DrivenServo
 

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from antennate.errors import ArenaError
-from antennate.params import PhysicsParams, RobotParams, TunnelParams
+from antennate.params import PhysicsParams, TunnelParams
+from antennate.robots.body import RobotParams
 from antennate.sim import geometry
 from antennate.sim.arena import Tunnel, draw_tunnel
 from antennate.sim.world import World, compile_world

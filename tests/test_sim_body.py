@@ -8,14 +8,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from antennate.controller import Controller
-from antennate.loop import run_loop
-from antennate.params import ControllerParams, PhysicsParams, RobotParams, VariationParams
-from antennate.records import AntennaFrame, Maneuver, Pose
-from antennate.sim.body import Disturbance, SimBody
+from antennate.control.controllers import Controller
+from antennate.control.loop import run_loop
+from antennate.params import ControlParams, PhysicsParams, VariationParams
+from antennate.robots.body import RobotParams
+from antennate.sim.sim_robot import Disturbance, SimRobot
 from antennate.sim.world import PREFIX, World, compile_world
+from antennate.types import AntennaFrame, JointCommand, Maneuver
 
-ROBOT, MIND = RobotParams(), ControllerParams()
+ROBOT, MIND = RobotParams(), ControlParams()
 PERIOD = MIND.period
 QUIET = VariationParams(joint_bias=0.0, slip_log_sd=0.0)
 
@@ -32,26 +33,26 @@ def chance(seed: int, variation: VariationParams | None = None) -> Disturbance:
     )
 
 
-def body_of(*seeds: int | None) -> SimBody:
+def body_of(*seeds: int | None) -> SimRobot:
     """A batch on flat floors, one row a seed, empty where there is none."""
-    body = SimBody(len(seeds), ROBOT.sensor, PERIOD, PhysicsParams().timestep)
+    body = SimRobot(len(seeds), ROBOT.sensor, PERIOD, PhysicsParams().timestep)
     for row, seed in enumerate(seeds):
         if seed is not None:
             body.load(row, World(compile_world(PhysicsParams(), ROBOT), 5), chance(seed))
     return body
 
 
-def run(body: SimBody, batch: int, ticks: int, spoil_at: int | None = None) -> list[AntennaFrame]:
+def run(body: SimRobot, batch: int, ticks: int, spoil_at: int | None = None) -> list[AntennaFrame]:
     """Frames of some ticks; at one tick the world of row 0 is broken."""
-    mind, frames = Controller(MIND, "closed", batch), []
+    control, frames = Controller(MIND, "closed", batch), []
 
-    def go_on(frame: AntennaFrame, pose: Pose) -> bool:
+    def go_on(frame: AntennaFrame, command: JointCommand) -> bool:
         frames.append(frame)
         if len(frames) == spoil_at:
             body.world(0).data.qvel[0] = math.nan
         return len(frames) < ticks
 
-    run_loop(body, mind, PERIOD, go_on)
+    run_loop(body, control, PERIOD, go_on)
     return frames
 
 
@@ -83,12 +84,12 @@ def test_a_row_that_fails_reads_nan_and_the_others_go_on_as_if_alone() -> None:
 
 
 def test_an_empty_row_reads_nan_and_makes_the_mind_hold() -> None:
-    body, mind = body_of(1, None), Controller(MIND, "closed", 2)
+    body, control = body_of(1, None), Controller(MIND, "closed", 2)
     frame = body.read()
-    mind.step(frame)
+    control.step(frame)
     assert np.isnan(frame.counts[1]).all()
     assert np.isnan(frame.t[1])
-    assert mind.maneuver.tolist() == [Maneuver.FORWARD, Maneuver.HOLD]
+    assert control.maneuver.tolist() == [Maneuver.FORWARD, Maneuver.HOLD]
 
 
 def test_a_row_can_be_emptied_and_filled_again() -> None:
@@ -123,7 +124,7 @@ def test_a_command_that_is_no_number_fails_its_row_only() -> None:
     body.read()
     yaw = np.zeros((2, 5))
     yaw[0, 2] = math.nan
-    body.write(Pose(yaw=yaw, leg=np.zeros((2, 6, 2)), antenna=np.zeros((2, 2))))
+    body.write(JointCommand(yaw=yaw, leg=np.zeros((2, 6, 2)), antenna=np.zeros((2, 2))))
     assert "yaw3" in str(body.failure(0))
     assert body.failure(1) is None
     assert np.isnan(body.read().counts).tolist() == [[True, True], [False, False]]
@@ -131,7 +132,7 @@ def test_a_command_that_is_no_number_fails_its_row_only() -> None:
 
 def test_straight_antennae_read_the_divider_at_ten_kiloohms() -> None:
     readings = []
-    body = SimBody(1, ROBOT.sensor, PERIOD, PhysicsParams().timestep)
+    body = SimRobot(1, ROBOT.sensor, PERIOD, PhysicsParams().timestep)
     for seed in range(50):
         body.load(0, World(compile_world(PhysicsParams(), ROBOT), 5), chance(seed))
         readings.append(body.read().counts[0])
@@ -141,13 +142,13 @@ def test_straight_antennae_read_the_divider_at_ten_kiloohms() -> None:
 
 def test_flex_and_pose_reach_the_frame_and_the_joints_in_their_order() -> None:
     world = World(compile_world(PhysicsParams(), ROBOT), 5)
-    body = SimBody(1, ROBOT.sensor, PERIOD, PhysicsParams().timestep)
+    body = SimRobot(1, ROBOT.sensor, PERIOD, PhysicsParams().timestep)
     body.load(0, world, chance(0, QUIET))
     world.data.joint(PREFIX + "antenna_l_hinge0").qpos[0] = math.pi / 4
     left, right = body.read().counts[0]
     assert left < 1700 < right
     leg = np.arange(12.0).reshape(1, 6, 2)
-    body.write(Pose(yaw=np.full((1, 5), 0.1), leg=leg, antenna=np.array([[0.2, 0.3]])))
+    body.write(JointCommand(yaw=np.full((1, 5), 0.1), leg=leg, antenna=np.array([[0.2, 0.3]])))
     drive = world.data.actuator
     assert drive(PREFIX + "yaw4").ctrl[0] == pytest.approx(0.1)
     assert drive(PREFIX + "leg_l3").ctrl[0] == 6.0

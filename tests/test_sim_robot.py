@@ -8,8 +8,9 @@ import mujoco
 import numpy as np
 import pytest
 
-from antennate.anatomy import LEGS, LINKS, PITCH_JOINTS, YAW_JOINTS
-from antennate.params import PhysicsParams, RobotParams
+from antennate.params import PhysicsParams
+from antennate.robots.anatomy import LEGS, LINKS, PITCH_JOINTS, YAW_JOINTS
+from antennate.robots.body import RobotParams
 from antennate.sim.world import PREFIX, World, compile_world
 
 N_MM_PER_DEG = 1e-3 * 180 / math.pi

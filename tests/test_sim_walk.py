@@ -8,11 +8,12 @@ import mujoco
 import numpy as np
 import pytest
 
-from antennate.gait import Gait, targets
-from antennate.params import GaitParams, PhysicsParams, RobotParams, TunnelParams
-from antennate.records import Maneuver
+from antennate.control.gait import Gait, targets
+from antennate.params import GaitParams, PhysicsParams, TunnelParams
+from antennate.robots.body import RobotParams
 from antennate.sim.arena import draw_tunnel
 from antennate.sim.world import World, compile_world
+from antennate.types import Maneuver
 
 PERIOD, SUBSTEPS = 0.01, 5
 CYCLE = 200
@@ -34,14 +35,14 @@ def walk(
     start: tuple[float, float, float] = (0.0, 0.0, 0.0),
 ) -> tuple[np.ndarray, World]:
     """Head position and unwrapped heading (ticks, 4) under one maneuver, and the world after it."""
-    world, mind = World(model, sensed_hinges=5), Gait(gait, 1, PERIOD)
-    mind.reset(np.array([0]), phase)
-    pose = targets(gait, mind.phase, mind.offset)
-    world.place(*start, pose.yaw[0], pose.leg[0])
+    world, control = World(model, sensed_hinges=5), Gait(gait, 1, PERIOD)
+    control.reset(np.array([0]), phase)
+    command = targets(gait, control.phase, control.offset)
+    world.place(*start, command.yaw[0], command.leg[0])
     track = []
     for _ in range(ticks):
-        pose = mind.step(np.array([maneuver]))
-        world.command(np.concatenate([pose.yaw[0], pose.leg[0].ravel(), pose.antenna[0]]))
+        command = control.step(np.array([maneuver]))
+        world.command(np.concatenate([command.yaw[0], command.leg[0].ravel(), command.antenna[0]]))
         world.step(SUBSTEPS)
         track.append([*world.head, world.heading])
     found = np.array(track)

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from antennate.errors import SimulationError
-from antennate.params import PhysicsParams, RobotParams, TunnelParams
+from antennate.params import PhysicsParams, TunnelParams
+from antennate.robots.body import RobotParams
 from antennate.sim import world as world_module
 from antennate.sim.arena import draw_tunnel
 from antennate.sim.world import PREFIX, World, compile_world, new_spec

@@ -6,10 +6,11 @@ import math
 
 import pytest
 
-from antennate import springs
+from antennate.antenna import springs
 from antennate.errors import ConfigError
-from antennate.experiments.springs import run
-from antennate.params import N_MM_PER_DEG, SpringParams
+from antennate.experiments.springs.run import run
+from antennate.params import SpringParams
+from antennate.robots.antenna import N_MM_PER_DEG
 
 E = 193e9
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from antennate.trials import statistics
+from antennate.studies import statistics
 
 
 @pytest.mark.parametrize(

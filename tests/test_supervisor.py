@@ -15,7 +15,7 @@ from pydantic import ValidationError
 from antennate.hardware.safety.causes import Cause, State
 from antennate.hardware.safety.diagnosis import Finding
 from antennate.params import SupervisorParams
-from antennate.records import Contact, Maneuver
+from antennate.types import Contact, Maneuver
 
 
 @pytest.mark.parametrize("cause", list(BAD))
@@ -91,7 +91,7 @@ def test_S5_an_age_that_is_no_age_is_stale(age: float) -> None:
     assert Cause.STALE in causes(outputs)
 
 
-@pytest.mark.parametrize("changes", [{"bad_pose": "nan"}, {"maneuver": -1}, {"maneuver": 7}])
+@pytest.mark.parametrize("changes", [{"bad_command": "nan"}, {"maneuver": -1}, {"maneuver": 7}])
 def test_S5_a_pose_or_maneuver_that_is_none_is_not_sent(changes: dict[str, Any]) -> None:
     outputs = armed().step(**changes)
     assert outputs.state is State.HOLD

@@ -24,11 +24,11 @@ from antennate.hardware.safety.causes import (
 )
 from antennate.hardware.safety.supervisor import Supervisor
 from antennate.params import SupervisorParams
-from antennate.records import Contact, Maneuver
+from antennate.types import Contact, Maneuver
 
 
 def first_told(active: Active) -> tuple[int, int, float]:
-    """Of equal causes lost data explain what the mind makes of it, never the other way round."""
+    """Of equal causes lost data explain what the control makes of it, never the other way round."""
     cause = active.cause
     return -cause.severity, 0 if cause in DATA else 1 + (cause in OF_MIND), active.since
 

@@ -11,12 +11,12 @@ from esp32_streams import made
 from hardware_faults import causes
 from hardware_rig import BENT, FREE, LIMIT, PERIOD, Rig, armed, pose_change
 
-from antennate.controller import Controller
+from antennate.control.controllers import Controller
 from antennate.hardware.esp32.clock import DeviceClock, Verdict
 from antennate.hardware.esp32.wire import Hello, Reset
 from antennate.hardware.safety.causes import Cause, Outputs, State
-from antennate.params import ControllerParams
-from antennate.records import Maneuver
+from antennate.params import ControlParams
+from antennate.types import Maneuver
 
 
 def test_L8_silence_at_a_thousand_random_phases() -> None:
@@ -38,11 +38,11 @@ def test_L8_silence_at_a_thousand_random_phases() -> None:
 
 
 def test_L8_a_maneuver_that_is_held_does_not_delay_hold() -> None:
-    """The turn has 2 s to go when the samples end: the pose stands still within 70 ms."""
+    """The turn has 2 s to go when the samples end: the command stands still within 70 ms."""
     rig = Rig("paper")
     rig.start()
     rig.go(40, (BENT, FREE))
-    assert rig.mind.maneuver[0] == Maneuver.TURN_R
+    assert rig.control.maneuver[0] == Maneuver.TURN_R
     last = rig.now
     moved = last
     for _ in range(100):
@@ -89,10 +89,10 @@ def boot(number: int = 1) -> Hello:
 @pytest.mark.parametrize("stall", [0.1, 0.6, 2.0, 5.0])
 @pytest.mark.parametrize("behind", [0, 20])
 def test_L10_a_burst_of_old_frames_is_not_acted_upon(stall: float, behind: int) -> None:
-    """No pose rests on a sample older than 50 ms; it holds in time and walks again after."""
+    """No command rests on a sample older than 50 ms; it holds in time and walks again after."""
     rig, clock = Rig("paper"), DeviceClock()
     clock.greet(boot(made(0).boot_id))
-    rig.sent.append(rig.mind.gait.step(np.array([int(Maneuver.HOLD)])))
+    rig.sent.append(rig.control.gait.step(np.array([int(Maneuver.HOLD)])))
     rng = np.random.default_rng(10)
     stop, end = 200, 200 + round(stall * 100)
     holds = moves = 0
@@ -185,9 +185,9 @@ def test_L16_the_mean_covers_the_same_time_at_any_rate(rate: int) -> None:
         rig.step(
             [(n * PERIOD - k / rate, 1600.0 + k % 2, FREE + k % 2) for k in reversed(range(come))]
         )
-        settled.append(rig.mind.b[0, 0])
+        settled.append(rig.control.b[0, 0])
     reached = next(n for n, b in enumerate(settled) if abs(b - settled[-1]) < 0.01)
-    averaging = ControllerParams().conditioning.averaging_time
+    averaging = ControlParams().conditioning.averaging_time
     patience = max(1 / rate, 2 * PERIOD) * 3
     assert averaging - 2 * PERIOD <= (reached + 1) * PERIOD <= averaging + patience
 
@@ -208,7 +208,7 @@ class Moody:
     """A controller that raises in some ticks."""
 
     def __init__(self, bad: set[int]) -> None:
-        self._inner = Controller(ControllerParams(), "open")
+        self._inner = Controller(ControlParams(), "open")
         self._bad = bad
         self._n = 0
 
@@ -226,7 +226,7 @@ class Moody:
 def test_T6_an_exception_holds_in_the_same_tick_and_three_are_a_fault(seed: int) -> None:
     rng = np.random.default_rng(seed)
     bad = sorted((100 + rng.choice(500, 3, replace=False)).tolist())
-    rig = Rig(mind=Moody(set(bad)))
+    rig = Rig(control=Moody(set(bad)))
     rig.start()
     while rig.n < 700:
         tick = rig.n + 2

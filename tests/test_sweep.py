@@ -10,16 +10,18 @@ from pydantic import ValidationError
 
 from antennate.cli import main
 from antennate.errors import SimulationError
-from antennate.experiments import estimates, reach, sweep, sweeping
+from antennate.experiments.sweep import estimates, reach
+from antennate.experiments.sweep import run as sweep
+from antennate.experiments.sweep import scan as sweeping
 from antennate.params import (
-    AntennaParams,
     BenchPhysicsParams,
     ConditioningParams,
     EstimateParams,
-    SensorParams,
     ShapeParams,
     SweepParams,
 )
+from antennate.robots.antenna import AntennaParams
+from antennate.robots.sensor import SensorParams
 from antennate.sim.bench import Bench
 
 ANTENNA, SENSOR, SHAPE = AntennaParams(), SensorParams(), ShapeParams()

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from antennate import taper
+from antennate.antenna import taper
 from antennate.errors import BadInputError, ConfigError
-from antennate.experiments.taper import TaperConfig, run
+from antennate.experiments.taper.run import TaperConfig, run
 from antennate.params import TaperParams
 
 LINEAR = (

@@ -9,25 +9,23 @@ import pytest
 from pydantic import ValidationError
 from scipy import stats
 
-from antennate import mechanics
+from antennate import figures as style
+from antennate.antenna import statics as mechanics
 from antennate.cli import main
 from antennate.cli.folder import to_csv, to_json
 from antennate.errors import SimulationError
-from antennate.experiments import reading, sensing, touch, wall_traverse
-from antennate.experiments.episodes import match, merged, runs
-from antennate.experiments.sensing import Judgement, Verdict
-from antennate.experiments.touch import TouchConfig
-from antennate.experiments.touch_measures import Pool, roc
-from antennate.figures import style
-from antennate.figures import touch as figures
-from antennate.params import (
-    AntennaParams,
-    BenchPhysicsParams,
-    ConditioningParams,
-    RuleParams,
-    SensorParams,
-    TouchWallsParams,
-)
+from antennate.experiments import reading
+from antennate.experiments.touch import figure as figures
+from antennate.experiments.touch import run as touch
+from antennate.experiments.touch import sensing
+from antennate.experiments.touch import traverse as wall_traverse
+from antennate.experiments.touch.episodes import match, merged, runs
+from antennate.experiments.touch.measures import Pool, roc
+from antennate.experiments.touch.run import TouchConfig
+from antennate.experiments.touch.sensing import Judgement, Verdict
+from antennate.params import BenchPhysicsParams, ConditioningParams, RuleParams, TouchWallsParams
+from antennate.robots.antenna import AntennaParams
+from antennate.robots.sensor import SensorParams
 from antennate.sim import touch_wall
 from antennate.sim.bench import Ball, Bar, Bench, compile_bench
 

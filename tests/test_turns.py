@@ -8,17 +8,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from antennate.controller import Controller
+from antennate.control.controllers import Controller
 from antennate.experiments.twin import Rig, TwinConfig, rig
 from antennate.hardware.driving.config import DriveConfig
 from antennate.hardware.driving.drive import drive
 from antennate.hardware.driving.session import Session
 from antennate.hardware.safety.causes import State
-from antennate.params import ControllerParams
-from antennate.records import AntennaFrame, Pose
+from antennate.params import ControlParams
 from antennate.telemetry.replay import replay
 from antennate.telemetry.ticks import Tick
 from antennate.twin.bus import Fault, Trouble
+from antennate.types import AntennaFrame, JointCommand
 
 LEGS = slice(5, 17)
 REACH = math.ceil(4.5 * 0.01 / (2 * math.pi / 4096))
@@ -43,12 +43,12 @@ class Walk:
         session = self.rig.session
         think = session.decider.step
 
-        def step(frame: AntennaFrame) -> Pose:
-            pose = think(frame)
+        def step(frame: AntennaFrame) -> JointCommand:
+            command = think(frame)
             if session.outputs is not None and session.outputs.clear:
                 self.frames.append(float(frame.t[0]))
                 self.maneuvers.append(int(session.decider.maneuver[0]))
-            return pose
+            return command
 
         session.decider.step = step  # type: ignore[method-assign]
         config = CONFIG.model_copy(update={"duration": duration})
@@ -100,8 +100,8 @@ def test_one_leg_at_a_time_is_without_torque_and_all_have_it_afterwards(far: Wal
 
 
 def test_G7_its_log_replays_alike_for_the_controller_was_not_asked_meanwhile(far: Walk) -> None:
-    found = replay(far.ticks, Controller(ControllerParams()), 0.01)
-    assert (len(found.maneuvers), found.different, found.poses) == (len(far.ticks), 0, 0)
+    found = replay(far.ticks, Controller(ControlParams()), 0.01)
+    assert (len(found.maneuvers), found.different, found.commands) == (len(far.ticks), 0, 0)
 
 
 def test_the_maneuvers_are_those_of_a_walk_without_it(far: Walk) -> None:

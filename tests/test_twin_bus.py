@@ -298,7 +298,7 @@ def test_B7_every_servo_stops_by_itself_when_the_master_dies() -> None:
 
 
 def test_B7_any_packet_feeds_every_watchdog() -> None:
-    """The trap: a bus that is only polled keeps a dead mind's robot walking."""
+    """The trap: a bus that is only polled keeps a dead control's robot walking."""
     rig = Rig()
     put(rig.servo(1), "torque_enable", 1)
     put(rig.servo(1), "bus_watchdog", 5)

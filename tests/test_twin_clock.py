@@ -24,7 +24,7 @@ import antennate
 from antennate.cli import main
 from antennate.errors import BadInputError
 from antennate.experiments.driven import Driven, driven, simulated_alike
-from antennate.experiments.tunnel import TunnelConfig
+from antennate.experiments.tunnel.run import TunnelConfig
 from antennate.experiments.twin import TwinConfig, build
 from antennate.hardware.driving.config import DriveConfig
 from antennate.hardware.driving.connect import connect, prepare
@@ -34,7 +34,8 @@ from antennate.hardware.ports.port import PortError
 from antennate.hardware.ports.serial_port import SerialPort
 from antennate.hardware.ports.twin_clock import TwinClock
 from antennate.hardware.safety.causes import State
-from antennate.params import ClockParams, LayoutParams
+from antennate.params import ClockParams
+from antennate.robots.layout import LayoutParams
 from antennate.telemetry.reader import LogReader
 from antennate.twin.clock import ClockServer, FaultyClock
 from antennate.twin.ends import End, Terminal
@@ -101,7 +102,7 @@ def test_M7_drive_over_real_ports_is_bit_for_bit_that_without_ports(
     assert len(one.start.before) == len(whole.start.before)
     assert one.walk.readings == whole.walk.readings[:ticks]
     assert one.walk.maneuvers == whole.walk.maneuvers[:ticks]
-    assert one.walk.poses == whole.walk.poses[:ticks]
+    assert one.walk.commands == whole.walk.commands[:ticks]
     assert one.walk.goals == whole.walk.goals[:ticks]
     assert one.report == whole.report or ticks < 200
 
@@ -109,7 +110,7 @@ def test_M7_drive_over_real_ports_is_bit_for_bit_that_without_ports(
 def test_M7_a_silent_servo_costs_the_twins_time_alone_and_always_as_much() -> None:
     one, other = over(terminals, 60, SILENT), without_ports(60, SILENT)
     assert repr(one.walk.readings) == repr(other.walk.readings)  # NaN among them
-    assert one.walk.poses == other.walk.poses
+    assert one.walk.commands == other.walk.commands
     assert one.report == other.report
     assert one.report.worst == State.FAULT
     assert one.report.on == [7]
@@ -350,4 +351,4 @@ def test_M7_drive_by_the_command_line_decides_as_the_pure_simulation(
     assert simulated.status == ("" if busy else "success")
     assert [(tick.t, *tick.counts) for tick in ticks] == simulated.readings
     assert [tick.maneuver for tick in ticks] == simulated.maneuvers
-    assert [np.array(tick.angles).tobytes() for tick in ticks] == simulated.poses
+    assert [np.array(tick.angles).tobytes() for tick in ticks] == simulated.commands

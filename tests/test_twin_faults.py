@@ -15,7 +15,8 @@ from antennate.hardware.driving.session import Session
 from antennate.hardware.dynamixel.packets import Instruction
 from antennate.hardware.dynamixel.parser import Parser
 from antennate.hardware.safety.causes import State
-from antennate.params import BatteryParams, LayoutParams
+from antennate.params import BatteryParams
+from antennate.robots.layout import LayoutParams
 from antennate.twin.faults import Faults, read
 from antennate.twin.noise import Noise
 from antennate.twin.robot import TwinRobot

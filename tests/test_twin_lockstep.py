@@ -15,7 +15,7 @@ from antennate.hardware.dynamixel import packets
 from antennate.hardware.dynamixel.parser import Parser
 from antennate.hardware.esp32.decoder import FrameDecoder
 from antennate.hardware.esp32.wire import Sample
-from antennate.params import LayoutParams
+from antennate.robots.layout import LayoutParams
 from antennate.twin.faults import Faults, read
 from antennate.twin.lockstep import BoardPort, LockstepClock
 from antennate.twin.robot import TwinRobot

@@ -12,17 +12,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from antennate.controller import ARMS, Arm, Controller
-from antennate.experiments.passage import Passage
-from antennate.experiments.tunnel import TunnelConfig, prepare
+from antennate.control.controllers import ARMS, Arm, Controller
+from antennate.control.gait import targets
+from antennate.experiments.tunnel.passage import Passage
+from antennate.experiments.tunnel.run import TunnelConfig, prepare
 from antennate.experiments.twin import Decisions, on_twin, simulated
-from antennate.gait import targets
-from antennate.hardware.joints import Joints, PoseError
-from antennate.params import ControllerParams
-from antennate.params.layout import LayoutParams
-from antennate.records import AntennaFrame, Maneuver, Pose
+from antennate.hardware.joints import CommandError, Joints
+from antennate.params import ControlParams
+from antennate.robots.layout import LayoutParams
 from antennate.sim.world import World
 from antennate.twin.robot import TwinRobot
+from antennate.types import AntennaFrame, JointCommand, Maneuver
 
 LAYOUT = LayoutParams()
 MIRRORED = LayoutParams.model_validate(
@@ -34,15 +34,17 @@ MIRRORED = LayoutParams.model_validate(
 )
 
 
-def pose(yaw: float = 0.0, leg: float = 0.0) -> Pose:
-    return Pose(yaw=np.full((1, 5), yaw), leg=np.full((1, 6, 2), leg), antenna=np.zeros((1, 2)))
+def command(yaw: float = 0.0, leg: float = 0.0) -> JointCommand:
+    return JointCommand(
+        yaw=np.full((1, 5), yaw), leg=np.full((1, 6, 2), leg), antenna=np.zeros((1, 2))
+    )
 
 
 def test_a_quarter_turn_is_1024_ticks_from_the_middle_and_directions_count() -> None:
-    ticks = Joints(LAYOUT).ticks(pose(yaw=math.pi / 2, leg=4 * math.pi))
+    ticks = Joints(LAYOUT).ticks(command(yaw=math.pi / 2, leg=4 * math.pi))
     assert ticks[:5].tolist() == [3072] * 5
     assert ticks[5:17].tolist() == [2048 + 2 * 4096] * 12
-    assert Joints(MIRRORED).ticks(pose(yaw=math.pi / 2))[:5].tolist() == [1500 - 1024] * 5
+    assert Joints(MIRRORED).ticks(command(yaw=math.pi / 2))[:5].tolist() == [1500 - 1024] * 5
 
 
 @pytest.mark.parametrize(
@@ -68,12 +70,12 @@ def test_a_layout_needs_only_what_differs() -> None:
 @pytest.mark.parametrize("layout", [LAYOUT, MIRRORED])
 def test_ticks_and_back_lose_half_a_tick_at_most(layout: LayoutParams) -> None:
     joints, rng = Joints(layout), np.random.default_rng(5)
-    sent = Pose(
+    sent = JointCommand(
         yaw=rng.uniform(-1, 1, (1, 5)),
         leg=rng.uniform(-300, 300, (1, 6, 2)),
         antenna=rng.uniform(-1, 1, (1, 2)),
     )
-    back = joints.pose(joints.ticks(sent))
+    back = joints.command(joints.ticks(sent))
     half = math.pi / 4096 * (1 + 1e-9)
     for name in ("yaw", "leg", "antenna"):
         np.testing.assert_allclose(getattr(back, name), getattr(sent, name), atol=half, rtol=0)
@@ -81,15 +83,15 @@ def test_ticks_and_back_lose_half_a_tick_at_most(layout: LayoutParams) -> None:
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf, 1e4])
 def test_B14_a_goal_that_is_not_finite_or_too_far_is_refused_as_a_whole(bad: float) -> None:
-    sent = pose()
+    sent = command()
     sent.leg[0, 3, 1] = bad
-    with pytest.raises(PoseError, match="servo 13"):
+    with pytest.raises(CommandError, match="servo 13"):
         Joints(LAYOUT).ticks(sent)
 
 
 def test_B14_a_pose_of_two_robots_is_refused() -> None:
-    two = Pose(np.zeros((2, 5)), np.zeros((2, 6, 2)), np.zeros((2, 2)))
-    with pytest.raises(PoseError, match=r"found shape \(2, 5\)"):
+    two = JointCommand(np.zeros((2, 5)), np.zeros((2, 6, 2)), np.zeros((2, 2)))
+    with pytest.raises(CommandError, match=r"found shape \(2, 5\)"):
         Joints(LAYOUT).ticks(two)
 
 
@@ -101,12 +103,12 @@ def test_B14_a_yaw_or_an_antenna_beyond_its_limit_is_refused_as_a_whole() -> Non
         }
     )
     joints = Joints(narrow)
-    joints.ticks(pose(yaw=-1.0))
-    with pytest.raises(PoseError, match=r"within 1 rad for servo 1, found -1\.001"):
-        joints.ticks(pose(yaw=-1.001))
-    sent = pose()
+    joints.ticks(command(yaw=-1.0))
+    with pytest.raises(CommandError, match=r"within 1 rad for servo 1, found -1\.001"):
+        joints.ticks(command(yaw=-1.001))
+    sent = command()
     sent.antenna[0, 1] = 0.501
-    with pytest.raises(PoseError, match=r"within 0\.5 rad for servo 19, found 0\.501"):
+    with pytest.raises(CommandError, match=r"within 0\.5 rad for servo 19, found 0\.501"):
         joints.ticks(sent)
 
 
@@ -118,11 +120,13 @@ def test_B14_what_is_not_refused_lies_within_one_turn_but_for_legs(
     angles: list[float], layout: LayoutParams
 ) -> None:
     said = np.array(angles)
-    one = Pose(yaw=said[None, :5], leg=said[None, 5:17].reshape(1, 6, 2), antenna=said[None, 17:])
+    one = JointCommand(
+        yaw=said[None, :5], leg=said[None, 5:17].reshape(1, 6, 2), antenna=said[None, 17:]
+    )
     fit = all(abs(a) <= math.pi / 2 for i, a in enumerate(angles) if not 5 <= i < 17)
     try:
         ticks = Joints(layout).ticks(one)
-    except PoseError:
+    except CommandError:
         edge = any(abs(a) > 1.57 for i, a in enumerate(angles) if not 5 <= i < 17)
         assert edge or not all(abs(a) <= 1600 for a in angles)
         return
@@ -134,16 +138,16 @@ def test_B14_what_is_not_refused_lies_within_one_turn_but_for_legs(
 
 @pytest.mark.parametrize("arm", ARMS)
 def test_no_pose_of_a_gait_is_beyond_the_limits(arm: Arm) -> None:
-    joints, params = Joints(LAYOUT), ControllerParams()
+    joints, params = Joints(LAYOUT), ControlParams()
     offset = max(params.gait.turn_offset, params.escape.turn_offset)
     for sign in (-1.0, 1.0):
         for phase in np.linspace(0.0, 2 * math.pi, 100):
             joints.ticks(targets(params.gait, np.array([phase]), np.array([sign * offset])))
-    mind = Controller(params, arm)
+    control = Controller(params, arm)
     rng = np.random.default_rng(3)
     for tick in range(1000):
         counts = rng.uniform(0.0, 4095.0, (1, 2))
-        joints.ticks(mind.step(AntennaFrame(t=np.array([0.01 * tick]), counts=counts)))
+        joints.ticks(control.step(AntennaFrame(t=np.array([0.01 * tick]), counts=counts)))
 
 
 @pytest.mark.parametrize("layout", [LAYOUT, MIRRORED])
@@ -159,7 +163,7 @@ def test_a_whole_trial_through_bytes_is_decided_like_the_pure_simulation(
 
 
 def test_a_board_that_falls_silent_makes_the_robot_hold_within_100_ms() -> None:
-    """Row L8: UNKNOWN after 50 ms, decided at the next tick; the pose then stays."""
+    """Row L8: UNKNOWN after 50 ms, decided at the next tick; the command then stays."""
     config = TunnelConfig(seed=0, time_limit=2.0)
     ticks = 0
 

@@ -11,15 +11,15 @@ from pydantic import ValidationError
 
 from antennate.cli import main
 from antennate.errors import SimulationError
-from antennate.experiments import wall
-from antennate.experiments.wall import WallConfig, passage, run
-from antennate.experiments.wall_verdict import (
+from antennate.experiments.wall import run as wall
+from antennate.experiments.wall.outcome import (
     Traverse,
-    judge,
+    classify,
     least_advance,
     longest_gap,
     longest_stick,
 )
+from antennate.experiments.wall.run import WallConfig, passage, run
 
 PERIOD = 0.01
 SHORT = {"wall": {"travel": 0.03, "start": 0.005, "speed": 0.02}, "trials": 2}
@@ -39,7 +39,7 @@ def passed(tip_mm: list[float], touching: list[bool]) -> Traverse:
 
 def fate(tip_mm: list[float], touching: list[bool], **rest: float) -> tuple[str, str]:
     config = WallConfig.model_validate({"wall": {"travel": 0.1, "start": 0.04, **rest}})
-    row = judge(config.wall, "stiff", 0, passed(tip_mm, touching))
+    row = classify(config.wall, "stiff", 0, passed(tip_mm, touching))
     return row.fate, row.fate_after_start
 
 

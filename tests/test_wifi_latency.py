@@ -11,7 +11,7 @@ from esp32_streams import hello
 from hardware_rig import LIMIT
 
 from antennate.experiments.twin import Rig, TwinConfig, rig
-from antennate.hardware.driving.body import HardwareBody
+from antennate.hardware.driving.body import HardwareRobot
 from antennate.hardware.driving.config import DriveConfig
 from antennate.hardware.driving.drive import drive
 from antennate.hardware.driving.session import Session
@@ -77,7 +77,7 @@ def test_L11_no_decision_on_a_sample_that_power_saving_made_old(beacons: int) ->
     twin = rig(TwinConfig())
     session = twin.session
     session.board = Board(PowerSaving(twin, 0.1024 * beacons), LIMIT)
-    session._body = HardwareBody(session.board, session.bus, session.joints, twin.clock)
+    session._body = HardwareRobot(session.board, session.bus, session.joints, twin.clock)
     states: list[State] = []
     ages: list[float] = []
 

@@ -8,19 +8,18 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from antennate.body import Body, Clock
-from antennate.controller import Arm
-from antennate.experiments.tunnel import TunnelConfig
+from antennate.control.controllers import Arm
+from antennate.control.loop import run_loop
+from antennate.experiments.tunnel.run import TunnelConfig
 from antennate.experiments.twin import Stage, TwinConfig, before_twin, rig, simulation
 from antennate.hardware.driving.connect import await_board
-from antennate.loop import run_loop
-from antennate.params.layout import LayoutParams
-from antennate.records import AntennaFrame, Pose
+from antennate.robots.layout import LayoutParams
 from antennate.telemetry.header import Header
 from antennate.telemetry.reader import LogReader
 from antennate.telemetry.replay import ReplayBody, recorded_decider
 from antennate.telemetry.ticks import Tick
 from antennate.telemetry.writer import LogWriter
+from antennate.types import AntennaFrame, Clock, JointCommand, Robot
 
 CONFIG = TunnelConfig(seed=0)
 LAYOUT = LayoutParams()
@@ -35,51 +34,51 @@ class Seen:
     """One tick as seen from in front of the wall."""
 
     frame: AntennaFrame
-    pose: Pose
+    command: JointCommand
     maneuver: int
     contact: tuple[int, int]
     now: float
 
     def decision(self) -> tuple[int, bytes]:
-        angles = (self.pose.yaw, self.pose.leg, self.pose.antenna)
+        angles = (self.command.yaw, self.command.leg, self.command.antenna)
         return self.maneuver, b"".join(part.tobytes() for part in angles)
 
 
 @dataclass
 class World:
-    """A body with the mind that belongs to it, at its first tick."""
+    """A body with the control that belongs to it, at its first tick."""
 
     body: Any
-    mind: Any
+    control: Any
     header: Header
     decider: Any
-    go_on: Callable[[AntennaFrame, Pose], bool] = lambda frame, pose: True
-    tick_of: Callable[[AntennaFrame, Pose, int], Tick] | None = None
+    go_on: Callable[[AntennaFrame, JointCommand], bool] = lambda frame, command: True
+    tick_of: Callable[[AntennaFrame, JointCommand, int], Tick] | None = None
     seen: list[Seen] = field(default_factory=list)
     early: list[AntennaFrame] = field(default_factory=list)
 
     def run(self, ticks: float = math.inf, log: LogWriter | None = None) -> list[Seen]:
         """Run some ticks, or until the world ends; note them, and write them to a log."""
 
-        def go_on(frame: AntennaFrame, pose: Pose) -> bool:
+        def go_on(frame: AntennaFrame, command: JointCommand) -> bool:
             number, now = len(self.seen) + 1, self.body.clock.now()
             left, right = self.decider.contact[0].tolist()
             maneuver = int(self.decider.maneuver[0])
-            self.seen.append(Seen(frame, pose, maneuver, (left, right), now))
+            self.seen.append(Seen(frame, command, maneuver, (left, right), now))
             if log is not None:
                 own = self.tick_of
-                plain = Tick.plain(self.decider, frame, pose, number, now)
-                log.write(plain if own is None else own(frame, pose, number))
-            return self.go_on(frame, pose) and number < ticks
+                plain = Tick.plain(self.decider, frame, command, number, now)
+                log.write(plain if own is None else own(frame, command, number))
+            return self.go_on(frame, command) and number < ticks
 
-        run_loop(self.body, self.mind, self.header.params.period, go_on)
+        run_loop(self.body, self.control, self.header.params.period, go_on)
         return self.seen
 
 
 class Blinded:
     """A simulated body whose left antenna is gone from some tick on."""
 
-    def __init__(self, body: Body, after: float) -> None:
+    def __init__(self, body: Robot, after: float) -> None:
         self._body, self._left = body, after
 
     @property
@@ -93,20 +92,20 @@ class Blinded:
             frame.counts[0, 0] = math.nan
         return frame
 
-    def write(self, pose: Pose) -> None:
-        self._body.write(pose)
+    def write(self, command: JointCommand) -> None:
+        self._body.write(command)
 
 
 def _world(stage: Stage, arm: Arm, trial: int) -> World:
     header = Header(
         controller=arm,
-        params=CONFIG.controller,
+        params=CONFIG.control,
         layout=LAYOUT,
         seed=CONFIG.seed,
         trial=trial,
-        phase=float(stage.mind.gait.phase[0]),
+        phase=float(stage.control.gait.phase[0]),
     )
-    return World(stage.body, stage.mind, header, stage.mind, stage.go_on)
+    return World(stage.body, stage.control, header, stage.control, stage.go_on)
 
 
 def simulated(folder: Path, arm: Arm, trial: int, blind: float = math.inf) -> World:
@@ -121,10 +120,10 @@ def twin(folder: Path, arm: Arm, trial: int, blind: float = math.inf) -> World:
     stage = before_twin(CONFIG, arm, trial, LAYOUT)
     world = _world(stage, arm, trial)
 
-    def go_on(frame: AntennaFrame, pose: Pose) -> bool:
+    def go_on(frame: AntennaFrame, command: JointCommand) -> bool:
         assert stage.robot is not None
         stage.robot.board_silent = len(world.seen) >= blind
-        return stage.go_on(frame, pose)
+        return stage.go_on(frame, command)
 
     world.go_on = go_on
     return world
@@ -134,14 +133,14 @@ def session(folder: Path, arm: Arm, trial: int, blind: float = math.inf) -> Worl
     """The same with its supervisor; armed at tick ARMED_AT, blind for 30 ticks only."""
     made = rig(TwinConfig(world=CONFIG, trial=trial), arm)
     await_board(made.session.board, made.clock)
-    header = Header(controller=arm, params=CONFIG.controller, layout=LAYOUT)
+    header = Header(controller=arm, params=CONFIG.control, layout=LAYOUT)
 
-    def go_on(frame: AntennaFrame, pose: Pose) -> bool:
+    def go_on(frame: AntennaFrame, command: JointCommand) -> bool:
         made.session.orders.arm = len(world.seen) >= ARMED_AT
         made.robot.board_silent = blind <= len(world.seen) < blind + 30
         return True
 
-    def tick_of(frame: AntennaFrame, pose: Pose, number: int) -> Tick:
+    def tick_of(frame: AntennaFrame, command: JointCommand, number: int) -> Tick:
         tick = Tick.of(made.session, made.clock.now())
         assert tick.number == number
         return Tick.unpack(tick.pack())
@@ -160,8 +159,8 @@ def recorded(world: World, path: Path, ticks: float = math.inf) -> Path:
 def replayed(path: Path) -> World:
     """The world that a log is."""
     with LogReader(path) as log:
-        body, mind = ReplayBody(list(log)), recorded_decider(log.header)
-    return World(body, mind, log.header, mind, lambda frame, pose: body.more)
+        body, control = ReplayBody(list(log)), recorded_decider(log.header)
+    return World(body, control, log.header, control, lambda frame, command: body.more)
 
 
 def replay_of_simulation(folder: Path, arm: Arm, trial: int, blind: float = math.inf) -> World:

@@ -13,10 +13,10 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from antennate.experiments.tunnel import TunnelConfig, run
-from antennate.figures.map import success_map
-from antennate.figures.style import render
-from antennate.trials.pool import core_count
+from antennate.experiments.tunnel.map import success_map
+from antennate.experiments.tunnel.run import TunnelConfig, run
+from antennate.figures import render
+from antennate.studies.pool import core_count
 
 HERE = Path(__file__).parent
 EVALUATION_SEED = 20261123

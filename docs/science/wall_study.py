@@ -20,11 +20,11 @@ from typing import Any
 
 import numpy as np
 
-from antennate.experiments.wall import WallConfig, passage, run
-from antennate.figures.style import render
-from antennate.figures.wall import fate_map
-from antennate.figures.wall import sticks as stick_lines
-from antennate.trials.pool import core_count
+from antennate.experiments.wall.figure import fate_map
+from antennate.experiments.wall.figure import sticks as stick_lines
+from antennate.experiments.wall.run import WallConfig, passage, run
+from antennate.figures import render
+from antennate.studies.pool import core_count
 
 HERE = Path(__file__).parent
 MASSES_G = (0.5, 0.8, 1.0, 1.5)

@@ -29,7 +29,7 @@ from antennate.cli.messages import describe, dotted, flag, nearest, one_line, sh
 from antennate.errors import ConfigError
 from antennate.params import Params
 from antennate.params.base import GATHERED
-from antennate.trials.pool import core_count
+from antennate.studies.pool import core_count
 
 LARGEST_FILE = 1_000_000
 """Most bytes of a configuration file."""

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from antennate.calibration import to_json
+from antennate.antenna.calibration import to_json
 from antennate.cli.study import Keep, Step, Study
 from antennate.cli.tables import Cell, number, show, span
-from antennate.experiments import calibrate, recording
+from antennate.experiments.calibrate import recording
+from antennate.experiments.calibrate import run as calibrate
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -92,7 +93,7 @@ def _files(outcome: calibrate.CalibrateOutcome) -> Mapping[str, str]:
 
 
 def _draw(outcome: calibrate.CalibrateOutcome) -> Mapping[str, Figure]:
-    from antennate.figures.calibrate import calibrate as draw
+    from antennate.experiments.calibrate.figure import calibrate as draw
 
     s = outcome.recording.samples
     level = calibrate.levels(outcome)

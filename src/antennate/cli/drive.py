@@ -36,7 +36,7 @@ Let a controller walk the robot whose antenna board and servo bus hang on two se
 twin. An address is the path of a serial port, tcp://HOST:PORT, or, for a board on the network,
 udp://HOST:PORT with the key it was given. First a dry run: everything is read and nothing written.
 Then, with --arm only, torque comes on with every servo where it stands. Ctrl-C or SIGTERM ends it:
-pose held, torque off, verified. A lost board or servo makes it hold; the watchdogs of the servos
+command held, torque off, verified. A lost board or servo makes it hold; the watchdogs of the servos
 stop it if this program dies. --clock is for a twin in lock-step alone, never for a robot."""
 
 
@@ -101,7 +101,7 @@ def _carry_out(config: DriveConfig, session: Session, orders: Orders, log: Path)
 
     In a twin's time nothing is urgent, and the log is waited for.
     """
-    header = Header(controller=config.controller, params=config.mind, layout=config.layout)
+    header = Header(controller=config.controller, params=config.control, layout=config.layout)
     required = [viewer.REQUIRED] if config.record_required else []
 
     def words(number: int) -> list[str]:
@@ -148,7 +148,7 @@ def _note(result: Mapping[str, Any]) -> str:
     if result["refusal"]:
         note += f"Not armed: {result['refusal']}.\n"
     if _idle(result):
-        note += "It never walked: --arm was given, and no pose was sent.\n"
+        note += "It never walked: --arm was given, and no command was sent.\n"
     if result["clock"] == "twin":
         note += "Time was the twin's.\n"
     elif result["priority"] == Priority.ORDINARY.value:
@@ -188,7 +188,7 @@ _ROWS: list[tuple[str, Cell]] = [
         (name.replace("_", " "), lambda result, name=name: number(result[name], "d"))
         for name in ("frames", "crc_errors", "lost_samples", "missed_answers", "stale_answers")
     ),
-    ("poses sent", lambda result: number(result["poses_sent"], "d")),
-    ("poses refused", lambda result: number(result["poses_refused"], "d")),
+    ("commands sent", lambda result: number(result["poses_sent"], "d")),
+    ("commands refused", lambda result: number(result["poses_refused"], "d")),
     ("priority", lambda result: result["priority"]),
 ]

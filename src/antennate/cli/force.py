@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 from antennate.cli.study import Study
 from antennate.cli.tables import Cell, number, show
-from antennate.experiments import force
-from antennate.experiments.loads import ForceConfig
+from antennate.experiments.force import run as force
+from antennate.experiments.force.loads import ForceConfig
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -61,7 +61,7 @@ _PARTS = {
 
 
 def _draw(outcome: force.ForceOutcome) -> Mapping[str, Figure]:
-    from antennate.figures.force import study
+    from antennate.experiments.force.figure import study
 
     return {"force": study(outcome.result(), outcome.profiles)}
 

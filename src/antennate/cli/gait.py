@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from antennate.cli.study import Study
 from antennate.cli.tables import Cell, number, show
-from antennate.experiments import gait
+from antennate.experiments.gait import run as gait
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -26,7 +26,7 @@ def show_result(result: Mapping[str, Any]) -> None:
         "Maneuvers",
         result["maneuvers"],
         _ROWS,
-        f"Body length {result['body_length_m']:g} m, {result['frequency_hz']:g} cycles a second.\n"
+        f"Robot length {result['body_length_m']:g} m, {result['frequency_hz']:g} cycles a second.\n"
         f"Without the body wave {off['speed_m_s']:.3f} m/s, {100 * off['ratio']:.0f} % of legs "
         f"that roll without slip.\n"
         f"The chosen lead of {chosen:.0f} deg gives {100 * cost['chosen_over_best']:.0f} % of the "
@@ -44,7 +44,7 @@ _ROWS: list[tuple[str, Cell]] = [
 
 
 def _draw(outcome: gait.GaitOutcome) -> Mapping[str, Figure]:
-    from antennate.figures.gait import study
+    from antennate.experiments.gait.figure import study
 
     return {"gait": study(outcome.result(), outcome.maneuvers)}
 

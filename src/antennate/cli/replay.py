@@ -18,13 +18,13 @@ from antennate.cli.folder import RunFolder, to_csv, to_json
 from antennate.cli.messages import one_line
 from antennate.cli.tables import Cell, number, show
 from antennate.errors import ConfigError
-from antennate.records import Maneuver
 from antennate.telemetry.reader import Damage, LogReader
 from antennate.telemetry.replay import ReplayConfig, Replayed, recorded_decider, replay
 from antennate.telemetry.ticks import FIELDS, Tick
+from antennate.types import Maneuver
 
 if TYPE_CHECKING:
-    from antennate.figures.replay import Course
+    from antennate.telemetry.figure import Course
 
 DESCRIPTION = """\
 Let the controller of a log decide upon the recorded readings again, or another one in its place,
@@ -116,7 +116,7 @@ def _result(log: LogReader, found: Replayed, controller: str | None) -> dict[str
             "recorded": _name(first.recorded),
             "replayed": _name(first.replayed),
         },
-        "different_poses": found.poses,
+        "different_poses": found.commands,
         "failures": found.failures,
         "missing": log.missing,
         "damaged": log.bad,
@@ -141,7 +141,7 @@ def _show(result: Mapping[str, Any]) -> None:
                 for name in result["states"]
             ),
             ("maneuvers that differ", _count("different")),
-            ("poses that differ", _count("different_poses")),
+            ("commands that differ", _count("different_poses")),
             ("exceptions", _count("failures")),
             ("ticks missing", _count("missing")),
         ],
@@ -177,8 +177,8 @@ def _name(maneuver: int) -> str:
 
 def _keep(folder: RunFolder, path: Path, found: Replayed) -> None:
     """Write the table and the figure, in a second pass over the log."""
-    from antennate.figures import style
-    from antennate.figures.replay import replay as draw
+    from antennate import figures as style
+    from antennate.telemetry.figure import replay as draw
 
     with LogReader(path) as log:
         folder.write(TICKS, to_csv(_rows(log, found.maneuvers)))
@@ -202,7 +202,7 @@ def _rows(ticks: Iterable[Tick], replayed: Sequence[int]) -> Iterator[dict[str, 
 
 def _course(ticks: Iterable[Tick], replayed: Sequence[int]) -> Course:
     """What the figure shows: every tick of a short log, some of a long one."""
-    from antennate.figures.replay import Course
+    from antennate.telemetry.figure import Course
 
     every = -(-len(replayed) // _MOST_DRAWN)
     kept = [(tick, m) for tick, m in islice(zip(ticks, replayed, strict=True), 0, None, every)]

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from antennate.cli.study import Study
 from antennate.cli.tables import Cell, number, show
-from antennate.experiments import sensor
+from antennate.experiments.sensor import run as sensor
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -54,7 +54,7 @@ def _cell(row: Mapping[str, Any]) -> Cell:
 
 
 def _draw(outcome: sensor.SensorOutcome) -> Mapping[str, Figure]:
-    from antennate.figures.sensor import sensor as draw
+    from antennate.experiments.sensor.figure import sensor as draw
 
     return {
         "sensor": draw(

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from antennate.cli.study import Study
 from antennate.cli.tables import Cell, number, show
-from antennate.experiments import springs
+from antennate.experiments.springs import run as springs
 from antennate.params import SpringParams
 
 if TYPE_CHECKING:
@@ -74,7 +74,7 @@ _WINDING_ROWS: list[tuple[str, Cell]] = [
 
 
 def _draw(outcome: springs.SpringsOutcome) -> Mapping[str, Figure]:
-    from antennate.figures.springs import springs as draw
+    from antennate.experiments.springs.figure import springs as draw
 
     return {"springs": draw(outcome.result())}
 

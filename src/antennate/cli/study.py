@@ -79,7 +79,7 @@ class Study(Generic[Config, Outcome]):
         return OK
 
     def _draw(self, outcome: Outcome, folder: RunFolder) -> None:
-        from antennate.figures import style
+        from antennate import figures as style
 
         for name, figure in self.draw(outcome).items():
             for suffix, data in style.render(figure).items():

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from antennate.cli.study import Study
 from antennate.cli.tables import Cell, number, show
-from antennate.experiments import sweep
+from antennate.experiments.sweep import run as sweep
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -68,7 +68,7 @@ _CUES = [(cue.replace("_", " "), _error(cue)) for cue in sweep.CUES]
 
 
 def _draw(outcome: sweep.SweepOutcome) -> Mapping[str, Figure]:
-    from antennate.figures.sweep import study
+    from antennate.experiments.sweep.figure import study
 
     return {"sweep": study(outcome.result())}
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from antennate.cli.study import Study
 from antennate.cli.tables import Cell, number, show
-from antennate.experiments import taper
+from antennate.experiments.taper import run as taper
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -65,7 +65,7 @@ def _value(i: int) -> Cell:
 
 
 def _draw(outcome: taper.TaperOutcome) -> Mapping[str, Figure]:
-    from antennate.figures.taper import taper as draw
+    from antennate.experiments.taper.figure import taper as draw
 
     return {"taper": draw(outcome.result())}
 

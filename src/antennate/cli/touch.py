@@ -1,4 +1,4 @@
-"""`antennate touch`: does the mind know when the antenna touches a wall?"""
+"""`antennate touch`: does the control know when the antenna touches a wall?"""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING, Any
 
 from antennate.cli.study import Study
 from antennate.cli.tables import Cell, number, show, span
-from antennate.experiments import touch
-from antennate.experiments.touch import TouchConfig, TouchOutcome
+from antennate.experiments.touch import run as touch
+from antennate.experiments.touch.run import TouchConfig, TouchOutcome
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 DESCRIPTION = """\
-Move one antenna along structured walls and compare the contact that the mind senses with the
+Move one antenna along structured walls and compare the contact that the control senses with the
 contact of the physics engine, a hundred times a second. All walls, speeds and profiles meet the
 same overlaps, springs and noise. Definitions: docs/science/touch.md."""
 
@@ -127,7 +127,7 @@ def _run(config: TouchConfig, workers: int, on_step: Any, on_row: Any) -> TouchO
 
 
 def _draw(outcome: TouchOutcome) -> Mapping[str, Figure]:
-    from antennate.figures import touch as figures
+    from antennate.experiments.touch import figure as figures
 
     result, example = outcome.result(), outcome.example()
     drawn = {"touch": figures.measures(result), "touch_roc": figures.curves(result)}

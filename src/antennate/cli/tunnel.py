@@ -12,8 +12,8 @@ from antennate.cli.arguments import Options, parse
 from antennate.cli.folder import RunFolder, to_json
 from antennate.cli.progress import progress, terminate_as_interrupt
 from antennate.cli.tables import Cell, number, show, span
-from antennate.experiments import tunnel
-from antennate.experiments.judge import TrialPath, TrialResult
+from antennate.experiments.tunnel import run as tunnel
+from antennate.experiments.tunnel.monitor import TrialPath, TrialResult
 
 DESCRIPTION = """\
 Walk robots through a corridor of loose cylinders. The arms differ in one decision: `open` walks
@@ -67,8 +67,8 @@ def _run(config: tunnel.TunnelConfig, options: Options, folder: RunFolder) -> tu
 
 
 def _draw(outcome: tunnel.TunnelOutcome, folder: RunFolder) -> None:
-    from antennate.figures import style
-    from antennate.figures.tunnel import summary, trajectories
+    from antennate import figures as style
+    from antennate.experiments.tunnel.figure import summary, trajectories
 
     config = outcome.config
     trials = range(min(SHOWN_TRIALS, config.trials))

@@ -17,11 +17,11 @@ from pathlib import Path
 from antennate.cli.messages import one_line
 from antennate.errors import LogError
 from antennate.hardware.driving.signals import STOPS
-from antennate.records import Maneuver
 from antennate.telemetry.feed import Message, messages
 from antennate.telemetry.header import Header
 from antennate.telemetry.ticks import Tick
 from antennate.telemetry.writer import LogWriter
+from antennate.types import Maneuver
 
 REQUIRED = "required"
 _STDOUT = 1

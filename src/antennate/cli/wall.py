@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from antennate.cli.study import Study
 from antennate.cli.tables import Cell, number, show, span
-from antennate.experiments import wall
+from antennate.experiments.wall import run as wall
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -67,7 +67,7 @@ _PAIR_ROWS: list[tuple[str, Cell]] = [
 
 
 def _draw(outcome: wall.WallOutcome) -> Mapping[str, Figure]:
-    from antennate.figures.wall import fates, passages
+    from antennate.experiments.wall.figure import fates, passages
 
     figures = {"wall": fates(outcome.result())}
     if outcome.examples:

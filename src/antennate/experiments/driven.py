@@ -22,9 +22,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from antennate.body import Clock
-from antennate.controller import Arm
-from antennate.experiments.tunnel import TunnelConfig
+from antennate.control.controllers import Arm
+from antennate.control.loop import run_loop
+from antennate.experiments.tunnel.run import TunnelConfig
 from antennate.experiments.twin import Watch
 from antennate.hardware.driving.config import DriveConfig
 from antennate.hardware.driving.connect import prepare
@@ -33,12 +33,11 @@ from antennate.hardware.driving.report import Report
 from antennate.hardware.driving.session import Session
 from antennate.hardware.esp32.board import Board
 from antennate.hardware.joints import Joints
-from antennate.loop import run_loop
-from antennate.params.layout import LayoutParams
-from antennate.records import AntennaFrame, Floats, Ints, Pose
-from antennate.sim.body import SimBody
+from antennate.robots.layout import LayoutParams
+from antennate.sim.sim_robot import SimRobot
 from antennate.twin.lockstep import BoardPort, LockstepClock
 from antennate.twin.robot import TwinRobot
+from antennate.types import AntennaFrame, Clock, Floats, Ints, JointCommand
 
 _DRY_RUN = 0.5
 """Time before the arm event [s]."""
@@ -69,7 +68,7 @@ class Walk:
     Attributes:
         readings: Time [s] and counts of the left and the right antenna, as the controller got them.
         maneuvers: What it decided.
-        poses: What it asked for, as bytes.
+        commands: What it asked for, as bytes.
         goals: What the servos were then sent [ticks].
         status: How the trial ended, as in `trials.csv`; empty if it was cut short.
     """
@@ -78,16 +77,20 @@ class Walk:
         default_factory=list[tuple[float, float, float]]
     )
     maneuvers: list[int] = field(default_factory=list[int])
-    poses: list[bytes] = field(default_factory=list[bytes])
+    commands: list[bytes] = field(default_factory=list[bytes])
     goals: list[tuple[int, ...]] = field(default_factory=list[tuple[int, ...]])
     status: str = ""
 
-    def note(self, frame: AntennaFrame, maneuver: int, pose: Pose, goals: tuple[int, ...]) -> None:
+    def note(
+        self, frame: AntennaFrame, maneuver: int, command: JointCommand, goals: tuple[int, ...]
+    ) -> None:
         """Add a tick."""
         left, right = frame.counts[0].tolist()
         self.readings.append((float(frame.t[0]), left, right))
         self.maneuvers.append(maneuver)
-        self.poses.append(b"".join(a.tobytes() for a in (pose.yaw, pose.leg, pose.antenna)))
+        self.commands.append(
+            b"".join(a.tobytes() for a in (command.yaw, command.leg, command.antenna))
+        )
         self.goals.append(goals)
 
 
@@ -135,25 +138,25 @@ def driven(
     Raises:
         BringUpError: The servos did not come up.
     """
-    watch, walk, period = Watch(config, arm, trial), Walk(), config.controller.period
+    watch, walk, period = Watch(config, arm, trial), Walk(), config.control.period
     robot = TwinRobot(watch.body, layout, period, boot_id=trial + 1, standing_noise=True)
     orders = DriveConfig(
-        controller=arm, dry_run=_DRY_RUN, touch_check=False, layout=layout, mind=config.controller
+        controller=arm, dry_run=_DRY_RUN, touch_check=False, layout=layout, control=config.control
     )
     session = wired(orders, robot)
-    mind = session.decider = _Judged(watch, lambda: _taken(session.board) - robot.stood)
+    control = session.decider = _Judged(watch, lambda: _taken(session.board) - robot.stood)
     session.clock.sleep_until(session.clock.now() + phase)
 
     def on_tick(session: Session, now: float) -> None:
-        if mind.first is None or session.orders.stop:
+        if control.first is None or session.orders.stop:
             return
         goals = tuple(servo.get("goal_position") for servo in robot.servos)
-        walk.note(session.frame, int(mind.maneuver[0]), session.pose, goals)
+        walk.note(session.frame, int(control.maneuver[0]), session.command, goals)
         session.orders.stop = bool(watch.status) or len(walk.readings) >= ticks
 
     report = drive(session, orders, arm=True, on_tick=on_tick)
     walk.status = watch.status
-    return Driven(walk, Start(mind.before, mind.standing, mind.first or _NOTHING), report)
+    return Driven(walk, Start(control.before, control.standing, control.first or _NOTHING), report)
 
 
 def simulated_alike(
@@ -166,16 +169,16 @@ def simulated_alike(
 ) -> Walk:
     """The trial in pure simulation, begun alike."""
     watch, walk = Watch(config, arm, trial), Walk()
-    period, mind = config.controller.period, watch.controller
+    period, control = config.control.period, watch.controller
     for frame in start.before:
-        mind.step(frame)
+        control.step(frame)
     body = _Begun(watch.body, layout, period, start)
 
-    def go_on(frame: AntennaFrame, pose: Pose) -> bool:
-        walk.note(frame, int(mind.maneuver[0]), pose, body.sent)
-        return watch.go_on(frame, pose) and len(walk.readings) < ticks
+    def go_on(frame: AntennaFrame, command: JointCommand) -> bool:
+        walk.note(frame, int(control.maneuver[0]), command, body.sent)
+        return watch.go_on(frame, command) and len(walk.readings) < ticks
 
-    run_loop(body, mind, period, go_on)
+    run_loop(body, control, period, go_on)
     walk.status = watch.status
     return walk
 
@@ -190,7 +193,7 @@ class _Judged:
     """The controller of a trial, judged as in simulation: before its goals are sent.
 
     Args:
-        watch: Controller and judge.
+        watch: Controller and monitor.
         standing: Ticks of the physics before the newest reading; negative before it begins.
 
     Attributes:
@@ -206,20 +209,20 @@ class _Judged:
         self.standing = 0
         self.first: AntennaFrame | None = None
 
-    def step(self, frame: AntennaFrame) -> Pose:
-        """The pose of this tick."""
-        mind = self._watch.controller
-        pose = mind.step(frame)
-        self.maneuver, self.contact = mind.maneuver, mind.contact
+    def step(self, frame: AntennaFrame) -> JointCommand:
+        """The command of this tick."""
+        control = self._watch.controller
+        command = control.step(frame)
+        self.maneuver, self.contact = control.maneuver, control.contact
         if self.first is None:
             self.standing = self._standing()
             if self.standing < 0 or np.isnan(frame.counts).all():
                 self.before.append(frame)
-                return pose
+                return command
             self.first = frame
         if not self._watch.status:
-            self._watch.go_on(frame, pose)
-        return pose
+            self._watch.go_on(frame, command)
+        return command
 
 
 class _Begun:
@@ -229,7 +232,7 @@ class _Begun:
         sent: The newest goals [ticks].
     """
 
-    def __init__(self, body: SimBody, layout: LayoutParams, period: float, start: Start) -> None:
+    def __init__(self, body: SimRobot, layout: LayoutParams, period: float, start: Start) -> None:
         self._body, self._joints = body, Joints(layout)
         self._ahead = float(start.first.t[0]) - start.standing * period
         self.sent: tuple[int, ...] = ()
@@ -256,10 +259,10 @@ class _Begun:
         """Stamped in whole microseconds as by the board."""
         return AntennaFrame(t=1e-6 * np.rint(1e6 * (frame.t + self._ahead)), counts=frame.counts)
 
-    def write(self, pose: Pose) -> None:
+    def write(self, command: JointCommand) -> None:
         """Round, then command."""
-        self._send(self._joints.ticks(pose))
+        self._send(self._joints.ticks(command))
 
     def _send(self, goals: Floats | Ints) -> None:
         self.sent = tuple(goals.astype(int).tolist())
-        self._body.write(self._joints.pose(goals))
+        self._body.write(self._joints.command(goals))

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from antennate import sensor as film
-from antennate.conditioning import bending_level
-from antennate.params import ConditioningParams, SensorParams
-from antennate.records import Floats
+from antennate.antenna import sensor as film
+from antennate.control.conditioning import bending_level
+from antennate.params import ConditioningParams
+from antennate.robots.sensor import SensorParams
+from antennate.types import Floats
 
 
 def noise(sensor: SensorParams, rng: np.random.Generator, count: int) -> Floats:

@@ -12,12 +12,12 @@ from typing import Annotated
 
 import numpy as np
 
-from antennate.body import Body, Clock
-from antennate.controller import Arm, Controller
-from antennate.experiments.judge import Judge
-from antennate.experiments.passage import Passage
-from antennate.experiments.tunnel import TunnelConfig, prepare
-from antennate.hardware.driving.body import HardwareBody
+from antennate.control.controllers import Arm, Controller
+from antennate.control.loop import run_loop
+from antennate.experiments.tunnel.monitor import TrialMonitor
+from antennate.experiments.tunnel.passage import Passage
+from antennate.experiments.tunnel.run import TunnelConfig, prepare
+from antennate.hardware.driving.body import HardwareRobot
 from antennate.hardware.driving.connect import DOUBT
 from antennate.hardware.driving.session import Session
 from antennate.hardware.dynamixel import bringup
@@ -26,16 +26,15 @@ from antennate.hardware.dynamixel.bus import Bus
 from antennate.hardware.esp32.board import Board
 from antennate.hardware.joints import Joints
 from antennate.hardware.safety.trust import Trust
-from antennate.loop import run_loop
 from antennate.params import Params, SupervisorParams, TouchCheckParams, number
 from antennate.params.base import GATHERED
-from antennate.params.layout import LayoutParams
 from antennate.params.twin import BatteryParams
-from antennate.records import AntennaFrame, Pose
-from antennate.sim.body import SimBody
+from antennate.robots.layout import LayoutParams
+from antennate.sim.sim_robot import SimRobot
 from antennate.twin.hand import Hand
 from antennate.twin.lockstep import BoardPort, LockstepClock
 from antennate.twin.robot import TwinRobot
+from antennate.types import AntennaFrame, Clock, JointCommand, Robot
 
 _WARM_UP = 2.0
 """Longest time until the board's clock is known [s]."""
@@ -85,11 +84,11 @@ def build(config: TwinConfig, boot_id: int | None = None) -> TwinRobot:
 def watched(config: TwinConfig, boot_id: int | None = None) -> tuple[TwinRobot, Passage]:
     """The same, and how far it comes."""
     world, start = config.world, prepare(config.world, config.trial)
-    period = world.controller.period
-    body = SimBody(1, world.robot.sensor, period, world.physics.timestep)
+    period = world.control.period
+    body = SimRobot(1, world.robot.sensor, period, world.physics.timestep)
     body.load(0, start.world, start.chance)
     boot = config.trial + 1 if boot_id is None else boot_id
-    hand, passage = Hand(config.touch, world.controller.conditioning), Passage(start.tunnel)
+    hand, passage = Hand(config.touch, world.control.conditioning), Passage(start.tunnel)
     robot = TwinRobot(
         body,
         config.layout,
@@ -106,7 +105,7 @@ def watched(config: TwinConfig, boot_id: int | None = None) -> tuple[TwinRobot, 
 class _Rounded:
     """A simulated body whose servos take whole ticks and whose board stamps microseconds."""
 
-    def __init__(self, body: SimBody, joints: Joints) -> None:
+    def __init__(self, body: SimRobot, joints: Joints) -> None:
         self._body, self._joints = body, joints
 
     @property
@@ -119,27 +118,27 @@ class _Rounded:
         frame = self._body.read()
         return AntennaFrame(t=1e-6 * np.rint(1e6 * frame.t), counts=frame.counts)
 
-    def write(self, pose: Pose) -> None:
+    def write(self, command: JointCommand) -> None:
         """Round, then command."""
-        self._body.write(self._joints.pose(self._joints.ticks(pose)))
+        self._body.write(self._joints.command(self._joints.ticks(command)))
 
 
 class Watch:
-    """The judge of a trial, and what was decided."""
+    """The monitor of a trial, and what was decided."""
 
     def __init__(self, config: TunnelConfig, arm: Arm, trial: int) -> None:
         start = prepare(config, trial)
-        period = config.controller.period
-        self.body = SimBody(1, config.robot.sensor, period, config.physics.timestep)
+        period = config.control.period
+        self.body = SimRobot(1, config.robot.sensor, period, config.physics.timestep)
         self.body.load(0, start.world, start.chance)
-        self.controller = Controller(config.controller, arm)
+        self.controller = Controller(config.control, arm)
         self.controller.reset(np.array([0]), start.phase)
-        self._judge = Judge(arm, trial, start.tunnel, config.time_limit)
+        self._judge = TrialMonitor(arm, trial, start.tunnel, config.time_limit)
         self.maneuvers: list[int] = []
         self.counts: list[tuple[float, float]] = []
         self.status = ""
 
-    def go_on(self, frame: AntennaFrame, pose: Pose) -> bool:
+    def go_on(self, frame: AntennaFrame, command: JointCommand) -> bool:
         """Note one tick; False once the trial has ended."""
         maneuver = int(self.controller.maneuver[0])
         self.maneuvers.append(maneuver)
@@ -156,21 +155,21 @@ class Watch:
 
 @dataclass(frozen=True, slots=True)
 class Stage:
-    """A world with its mind at the first tick of a trial.
+    """A world with its control at the first tick of a trial.
 
     Attributes:
         body: The world.
-        mind: The controller, its phase that of the trial.
+        control: The controller, its phase that of the trial.
         period: Control period [s].
         go_on: For `run_loop`; False once the trial has ended.
         decisions: What was decided so far.
         robot: The twin, None in pure simulation.
     """
 
-    body: Body
-    mind: Controller
+    body: Robot
+    control: Controller
     period: float
-    go_on: Callable[[AntennaFrame, Pose], bool]
+    go_on: Callable[[AntennaFrame, JointCommand], bool]
     decisions: Callable[[], Decisions]
     robot: TwinRobot | None = None
 
@@ -179,14 +178,14 @@ def simulation(config: TunnelConfig, arm: Arm, trial: int, layout: LayoutParams)
     """The trial in pure simulation, goals rounded to ticks."""
     watch = Watch(config, arm, trial)
     body = _Rounded(watch.body, Joints(layout))
-    period = config.controller.period
+    period = config.control.period
     return Stage(body, watch.controller, period, watch.go_on, watch.decisions)
 
 
 def simulated(config: TunnelConfig, arm: Arm, trial: int, layout: LayoutParams) -> Decisions:
     """The whole trial in pure simulation."""
     stage = simulation(config, arm, trial, layout)
-    run_loop(stage.body, stage.mind, stage.period, stage.go_on)
+    run_loop(stage.body, stage.control, stage.period, stage.go_on)
     return stage.decisions()
 
 
@@ -201,7 +200,7 @@ class Rig:
 
 def rig(config: TwinConfig, arm: Arm = "closed", touch: TouchCheckParams | None = None) -> Rig:
     """A session before a twin robot, not yet armed; checked by touch if `touch` says how."""
-    robot, params = build(config), config.world.controller
+    robot, params = build(config), config.world.control
     clock = LockstepClock(robot)
     session = Session(
         board=Board(BoardPort(robot, clock), SupervisorParams().stale_age),
@@ -223,7 +222,7 @@ def before_twin(config: TunnelConfig, arm: Arm, trial: int, layout: LayoutParams
         BringUpError: The servos did not come up.
     """
     watch = Watch(config, arm, trial)
-    period = config.controller.period
+    period = config.control.period
     robot = TwinRobot(watch.body, layout, period, boot_id=trial + 1)
     clock = LockstepClock(robot)
     board = Board(BoardPort(robot, clock), SupervisorParams().stale_age)
@@ -235,7 +234,7 @@ def before_twin(config: TunnelConfig, arm: Arm, trial: int, layout: LayoutParams
     bringup.arm_watchdogs(bus, layout.ids)
     clock.sleep_until(period * np.ceil(clock.now() / period + 1.0))
     bringup.enable(bus, layout.ids)
-    body = HardwareBody(board, bus, Joints(layout), clock)
+    body = HardwareRobot(board, bus, Joints(layout), clock)
     return Stage(body, watch.controller, period, watch.go_on, watch.decisions, robot)
 
 
@@ -260,10 +259,10 @@ def on_twin(
     """
     stage = before_twin(config, arm, trial, layout)
 
-    def go_on(frame: AntennaFrame, pose: Pose) -> bool:
+    def go_on(frame: AntennaFrame, command: JointCommand) -> bool:
         if stage.robot is not None:
             on_tick(stage.robot)
-        return stage.go_on(frame, pose)
+        return stage.go_on(frame, command)
 
-    run_loop(stage.body, stage.mind, stage.period, go_on)
+    run_loop(stage.body, stage.control, stage.period, go_on)
     return stage.decisions()

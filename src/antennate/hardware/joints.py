@@ -6,19 +6,19 @@ import math
 
 import numpy as np
 
-from antennate.anatomy import LINK_COUNT, YAW_COUNT
 from antennate.errors import AntennateError
 from antennate.hardware import roster
 from antennate.hardware.settings import profile_velocities
-from antennate.params.layout import MOST_TICKS, TICKS_A_TURN, LayoutParams
-from antennate.records import Floats, Ints, Pose
+from antennate.robots.anatomy import LINK_COUNT, YAW_COUNT
+from antennate.robots.layout import MOST_TICKS, TICKS_A_TURN, LayoutParams
+from antennate.types import Floats, Ints, JointCommand
 
 _STEP = 2.0 * math.pi / TICKS_A_TURN
 _SHAPES = {"yaw": (1, YAW_COUNT), "leg": (1, LINK_COUNT, 2), "antenna": (1, 2)}
 
 
-class PoseError(AntennateError):
-    """A pose that no servo must be sent."""
+class CommandError(AntennateError):
+    """A command that no servo must be sent."""
 
 
 class Joints:
@@ -41,14 +41,14 @@ class Joints:
         self._limit: Floats = np.array(layout.limits)
         self._fastest: Floats = np.array(layout.fastest)
 
-    def ticks(self, pose: Pose) -> Ints:
-        """Goal positions [ticks] of a pose of one robot, shape (19,).
+    def ticks(self, command: JointCommand) -> Ints:
+        """Goal positions [ticks] of a command of one robot, shape (19,).
 
         Raises:
-            PoseError: It is no pose of one robot, not finite, or beyond a limit or what servos
+            CommandError: It is no command of one robot, not finite, or beyond a limit or what servos
                 count. It is refused as a whole.
         """
-        angles = _angles(pose)
+        angles = _angles(command)
         with np.errstate(over="ignore"):  # infinite then, and refused
             ticks = np.rint(self.positions(angles))
         turning = np.isinf(self._limit)
@@ -57,7 +57,7 @@ class Joints:
         if bad.any():
             first = int(np.argmax(bad))
             within = "256 turns" if turning[first] else f"{self._limit[first]:.4g} rad"
-            raise PoseError(
+            raise CommandError(
                 f"expected a finite angle within {within} for servo {self.ids[first]}, found "
                 f"{angles[first]}"
             )
@@ -67,9 +67,9 @@ class Joints:
         """Ticks that each joint may go in a time [s], shape (19,)."""
         return self._fastest * time / _STEP
 
-    def align(self, ticks: Ints | Floats, pose: Pose) -> None:
-        """Count whole turns of legs so that a pose is nearest to where they stand [ticks]."""
-        away = (ticks - self.ticks(pose))[YAW_COUNT:-2]
+    def align(self, ticks: Ints | Floats, command: JointCommand) -> None:
+        """Count whole turns of legs so that a command is nearest to where they stand [ticks]."""
+        away = (ticks - self.ticks(command))[YAW_COUNT:-2]
         self._zero[YAW_COUNT:-2] += TICKS_A_TURN * np.rint(away / TICKS_A_TURN)
 
     def shift(self, at: int, ticks: float) -> None:
@@ -80,36 +80,38 @@ class Joints:
         """Positions, not rounded [ticks], of joint angles [rad], both of shape (19,)."""
         return np.asarray(self._zero + self._sign * angles / _STEP)
 
-    def pose(self, ticks: Ints | Floats) -> Pose:
-        """The pose of one robot at these positions [ticks], shape (19,)."""
+    def command(self, ticks: Ints | Floats) -> JointCommand:
+        """The command of one robot at these positions [ticks], shape (19,)."""
         angles: Floats = (ticks - self._zero) * self._sign * _STEP
         legs = angles[YAW_COUNT:-2].reshape(1, LINK_COUNT, 2)
-        return Pose(yaw=angles[None, :YAW_COUNT], leg=legs, antenna=angles[None, -2:])
+        return JointCommand(yaw=angles[None, :YAW_COUNT], leg=legs, antenna=angles[None, -2:])
 
 
-def plain(pose: Pose) -> Pose:
-    """A copy of the pose of one robot, which nobody else changes; it may have been anything.
+def plain(command: JointCommand) -> JointCommand:
+    """A copy of the command of one robot, which nobody else changes; it may have been anything.
 
     Raises:
-        PoseError: It is no pose of one robot.
+        CommandError: It is no command of one robot.
     """
-    return Pose(**{name: _part(pose, name, shape) for name, shape in _SHAPES.items()})
+    return JointCommand(**{name: _part(command, name, shape) for name, shape in _SHAPES.items()})
 
 
-def _angles(pose: Pose) -> Floats:
+def _angles(command: JointCommand) -> Floats:
     """Its joint angles [rad], shape (19,)."""
-    return np.concatenate([_part(pose, name, shape).ravel() for name, shape in _SHAPES.items()])
+    return np.concatenate([_part(command, name, shape).ravel() for name, shape in _SHAPES.items()])
 
 
-def _part(pose: Pose, name: str, shape: tuple[int, ...]) -> Floats:
+def _part(command: JointCommand, name: str, shape: tuple[int, ...]) -> Floats:
     try:
-        part = np.array(getattr(pose, name), float)
+        part = np.array(getattr(command, name), float)
     except KeyboardInterrupt:
         raise
     except BaseException:  # noqa: BLE001 a controller of one's own may say anything
-        raise PoseError(
-            f"expected a Pose with numbers in {name}, found a {type(pose).__name__}"
+        raise CommandError(
+            f"expected a JointCommand with numbers in {name}, found a {type(command).__name__}"
         ) from None
     if part.shape != shape:
-        raise PoseError(f"expected {name} of shape {shape} for 19 joints, found shape {part.shape}")
+        raise CommandError(
+            f"expected {name} of shape {shape} for 19 joints, found shape {part.shape}"
+        )
     return part

@@ -7,13 +7,13 @@ from typing import Self
 
 from antennate.hardware.esp32.film import calibrated
 from antennate.params import (
-    ControllerParams,
+    ControlParams,
     NetworkParams,
     Params,
     SupervisorParams,
     number,
 )
-from antennate.params.layout import LayoutParams
+from antennate.robots.layout import LayoutParams
 
 
 class RobotConfig(Params):
@@ -22,8 +22,8 @@ class RobotConfig(Params):
     calibration: str | None = number(
         None,
         "1",
-        "assumed: the numbers of mind.conditioning",
-        "file of `antennate calibrate`, for both antennae, in place of mind.conditioning",
+        "assumed: the numbers of control.conditioning",
+        "file of `antennate calibrate`, for both antennae, in place of control.conditioning",
     )
     sensor_id: str | None = number(
         None,
@@ -32,7 +32,7 @@ class RobotConfig(Params):
         "name of the film; 16 hexadecimal digits name the board it is soldered to",
     )
     layout: LayoutParams = LayoutParams()
-    mind: ControllerParams = ControllerParams()
+    control: ControlParams = ControlParams()
     limits: SupervisorParams = SupervisorParams()
     network: NetworkParams = NetworkParams()
 
@@ -45,6 +45,6 @@ class RobotConfig(Params):
         """
         if self.calibration is None:
             return self
-        mind, film = calibrated(self.mind, Path(self.calibration), self.sensor_id)
-        known = {"mind": mind, "sensor_id": film.sensor_id, "calibration": None}
+        control, film = calibrated(self.control, Path(self.calibration), self.sensor_id)
+        known = {"control": control, "sensor_id": film.sensor_id, "calibration": None}
         return self.model_copy(update=known)

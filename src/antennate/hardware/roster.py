@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from antennate.anatomy import LEGS, YAW_COUNT
 from antennate.hardware.dynamixel.tables import EXTENDED_MODE, XC430_W240, XL330_M288
-from antennate.params.layout import LayoutParams
+from antennate.robots.anatomy import LEGS, YAW_COUNT
+from antennate.robots.layout import LayoutParams
 
 POSITION_MODE = 3
 """Operating mode: position within one turn."""

@@ -15,7 +15,7 @@ from typing import NamedTuple
 from antennate.hardware import roster
 from antennate.hardware.dynamixel.tables import POSITION_UNIT, TABLES, VELOCITY_UNIT
 from antennate.params import BusParams
-from antennate.params.layout import TICKS_A_TURN, LayoutParams
+from antennate.robots.layout import TICKS_A_TURN, LayoutParams
 
 _ROOM = BusParams().profile_room
 

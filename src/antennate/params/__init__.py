@@ -6,26 +6,23 @@ values out of bounds are refused. A source begins with one of `paper` (arXiv:260
 properties, computed here and never typed.
 """
 
-from antennate.params.antenna import N_MM_PER_DEG, AntennaParams
 from antennate.params.base import Params, number
 from antennate.params.bench import BenchVariationParams, WallParams
 from antennate.params.clock import ClockParams
-from antennate.params.doctor import DoctorParams
-from antennate.params.endurance import DriftParams, TurnsParams
-from antennate.params.host import HostParams
-from antennate.params.layout import BasesParams, JointsParams, LayoutParams, YawsParams
-from antennate.params.log import LogParams
-from antennate.params.mind import (
+from antennate.params.control import (
     ConditioningParams,
-    ControllerParams,
+    ControlParams,
     EscapeParams,
     GaitParams,
     RepetitionParams,
     RuleParams,
 )
+from antennate.params.doctor import DoctorParams
+from antennate.params.endurance import DriftParams, TurnsParams
+from antennate.params.host import HostParams
+from antennate.params.log import LogParams
 from antennate.params.network import NetworkParams
 from antennate.params.record import RecordParams
-from antennate.params.robot import RobotParams, ServoParams
 from antennate.params.safety import DiagnosisParams, SupervisorParams, TouchCheckParams
 from antennate.params.scene import (
     BenchPhysicsParams,
@@ -34,7 +31,6 @@ from antennate.params.scene import (
     TunnelParams,
     VariationParams,
 )
-from antennate.params.sensor import SensorParams
 from antennate.params.spring import SpringParams, TaperParams
 from antennate.params.sweep import EstimateParams, ShapeParams, SweepParams
 from antennate.params.touch import (
@@ -50,9 +46,6 @@ from antennate.params.twin import BatteryParams, TwinParams
 from antennate.params.wires import BoardParams, BusParams, PortParams
 
 __all__ = [
-    "N_MM_PER_DEG",
-    "AntennaParams",
-    "BasesParams",
     "BatteryParams",
     "BenchPhysicsParams",
     "BenchVariationParams",
@@ -61,7 +54,7 @@ __all__ = [
     "BusParams",
     "ClockParams",
     "ConditioningParams",
-    "ControllerParams",
+    "ControlParams",
     "CornerWallParams",
     "CylinderParams",
     "DiagnosisParams",
@@ -73,8 +66,6 @@ __all__ = [
     "GaitParams",
     "GapWallParams",
     "HostParams",
-    "JointsParams",
-    "LayoutParams",
     "LogParams",
     "NetworkParams",
     "Params",
@@ -82,10 +73,7 @@ __all__ = [
     "PortParams",
     "RecordParams",
     "RepetitionParams",
-    "RobotParams",
     "RuleParams",
-    "SensorParams",
-    "ServoParams",
     "ShapeParams",
     "SinusoidalWallParams",
     "SpringParams",
@@ -100,6 +88,5 @@ __all__ = [
     "TwinParams",
     "VariationParams",
     "WallParams",
-    "YawsParams",
     "number",
 ]

@@ -15,9 +15,10 @@ import mujoco
 import numpy as np
 
 from antennate.errors import ArenaError
-from antennate.params import CylinderParams, RobotParams, TunnelParams
-from antennate.records import Floats
+from antennate.params import CylinderParams, TunnelParams
+from antennate.robots.body import RobotParams
 from antennate.sim import geometry, layers
+from antennate.types import Floats
 
 _WALL_HALF_THICKNESS = 0.02
 _WALL_HEIGHT = 0.25

@@ -14,13 +14,14 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from antennate.anatomy import ANTENNA_BASE, ANTENNA_HINGES
 from antennate.errors import SimulationError
-from antennate.params import AntennaParams, PhysicsParams, SensorParams
-from antennate.records import Floats, Ints
-from antennate.sim import antenna as antenna_part
-from antennate.sim import layers
+from antennate.params import PhysicsParams
+from antennate.robots.anatomy import ANTENNA_BASE, ANTENNA_HINGES
+from antennate.robots.antenna import AntennaParams
+from antennate.robots.sensor import SensorParams
+from antennate.sim import antenna_part, layers
 from antennate.sim.world import new_spec
+from antennate.types import Floats, Ints
 
 PREFIX = "antenna/"
 _SLIDES = ("carriage_x", "carriage_y")

@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from antennate.params import TunnelParams
-from antennate.records import Floats
+from antennate.types import Floats
 
 
 def centre_line(params: TunnelParams) -> Floats:

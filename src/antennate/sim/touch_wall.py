@@ -15,8 +15,8 @@ import numpy as np
 
 from antennate.errors import ArenaError
 from antennate.params import TouchWallsParams
-from antennate.records import Floats
 from antennate.sim.bench import Ball, Bar
+from antennate.types import Floats
 
 WallKind = Literal["flat", "sinusoidal", "boulders", "step", "gap", "corner"]
 WALLS: tuple[WallKind, ...] = ("flat", "sinusoidal", "boulders", "step", "gap", "corner")

@@ -12,7 +12,9 @@ import math
 import mujoco
 import numpy as np
 
-from antennate.anatomy import (
+from antennate.errors import SimulationError
+from antennate.params import PhysicsParams
+from antennate.robots.anatomy import (
     ANTENNA_BASE,
     ANTENNA_HINGES,
     ANTENNA_PREFIXES,
@@ -21,10 +23,10 @@ from antennate.anatomy import (
     PITCH_JOINTS,
     YAW_JOINTS,
 )
-from antennate.errors import SimulationError
-from antennate.params import PhysicsParams, RobotParams
-from antennate.records import Floats, Ints
-from antennate.sim import arena, layers, robot
+from antennate.robots.body import RobotParams
+from antennate.sim import arena, layers
+from antennate.sim import robot_part as robot
+from antennate.types import Floats, Ints
 
 mujoco.set_mju_user_warning(lambda message: None)
 """The engine prints its warnings and writes them to a file; we read its counters instead."""

@@ -8,7 +8,8 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 
 from antennate import __version__
 from antennate.errors import LogError
-from antennate.params import ControllerParams, LayoutParams
+from antennate.params import ControlParams
+from antennate.robots.layout import LayoutParams
 from antennate.telemetry.framing import SCHEMA, Kind
 from antennate.telemetry.ticks import FIELDS, LAYOUT
 
@@ -34,7 +35,7 @@ class Header(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     controller: str
-    params: ControllerParams
+    params: ControlParams
     layout: LayoutParams | None = None
     seed: int | None = None
     trial: int | None = None

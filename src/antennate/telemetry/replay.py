@@ -1,4 +1,4 @@
-"""A log as a world: the mind gets what was read then, and says what it would do now."""
+"""A log as a world: the control gets what was read then, and says what it would do now."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from antennate.controller import ARMS, Controller
+from antennate.control.controllers import ARMS, Controller
+from antennate.control.loop import run_loop
 from antennate.errors import LogError
 from antennate.hardware.driving.decider import Decider, Decision, chosen, decision, nowhere
-from antennate.loop import run_loop
 from antennate.params import Params, number
-from antennate.records import AntennaFrame, Pose
 from antennate.telemetry.header import Header
 from antennate.telemetry.ticks import Tick, angles_of
+from antennate.types import AntennaFrame, JointCommand
 
 
 class ReplayConfig(Params):
@@ -40,13 +40,13 @@ class ReplayBody:
 
     Attributes:
         tick: The present tick, None after the last.
-        pose: What was written last, None before.
+        command: What was written last, None before.
     """
 
     def __init__(self, ticks: Iterable[Tick]) -> None:
         self._ticks = iter(ticks)
         self._now = 0.0
-        self.pose: Pose | None = None
+        self.command: JointCommand | None = None
         self.tick: Tick | None = next(self._ticks, None)
         self._next: Tick | None = next(self._ticks, None)
 
@@ -80,32 +80,32 @@ class ReplayBody:
             raise LogError("expected a tick to replay, found the end of the log")
         return self.tick.frame()
 
-    def write(self, pose: Pose) -> None:
-        """Keep a pose; nothing moves."""
-        self.pose = pose
+    def write(self, command: JointCommand) -> None:
+        """Keep a command; nothing moves."""
+        self.command = command
 
 
 class _Guarded:
-    """A controller asked when it was then, whose exceptions give a pose of NaN, as in a session."""
+    """A controller asked when it was then, whose exceptions give a command of NaN, as in a session."""
 
     def __init__(self, decider: Decider, body: ReplayBody) -> None:
         self._decider, self._body = decider, body
-        self._kept: Pose | None = None
+        self._kept: JointCommand | None = None
         self._refused = self.failures = 0
         self.decision = Decision()
 
-    def step(self, frame: AntennaFrame) -> Pose:
-        """The pose of this tick."""
+    def step(self, frame: AntennaFrame) -> JointCommand:
+        """The command of this tick."""
         tick = self._body.tick
         if tick is not None and self._kept is not None and not tick.asked:
             return self._kept
         refused, self._refused = self._refused, 0 if tick is None else tick.refused
         try:
-            pose = self._decider.step(frame)
+            command = self._decider.step(frame)
             self.decision = decision(self._decider)
             if self._refused <= refused:
-                self._kept = pose
-            return pose
+                self._kept = command
+            return command
         except KeyboardInterrupt:
             raise
         except BaseException:  # noqa: BLE001 a plugged-in controller may raise anything
@@ -141,7 +141,7 @@ class Replayed:
         start: The loop's time at the first tick [s].
         end: The loop's time at the last tick [s].
         different: Ticks whose maneuver differs.
-        poses: Ticks whose pose differs in any bit of its value.
+        commands: Ticks whose command differs in any bit of its value.
         failures: Ticks in which the controller raised an exception.
         first: The first tick whose maneuver differs, None if none does.
     """
@@ -152,11 +152,11 @@ class Replayed:
     start: float = 0.0
     end: float = 0.0
     different: int = 0
-    poses: int = 0
+    commands: int = 0
     failures: int = 0
     first: Difference | None = None
 
-    def note(self, tick: Tick, maneuver: int, pose: Pose) -> None:
+    def note(self, tick: Tick, maneuver: int, command: JointCommand) -> None:
         """Compare one tick."""
         if not self.maneuvers:
             self.start = tick.now
@@ -164,7 +164,7 @@ class Replayed:
         self.maneuvers.append(maneuver)
         self.recorded[tick.maneuver] += 1
         self.states[tick.state] += 1
-        self.poses += not np.array_equal(angles_of(pose), tick.angles, equal_nan=True)
+        self.commands += not np.array_equal(angles_of(command), tick.angles, equal_nan=True)
         if maneuver != tick.maneuver:
             self.different += 1
             self.first = self.first or Difference(tick.number, tick.now, tick.maneuver, maneuver)
@@ -179,16 +179,16 @@ def replay(ticks: Iterable[Tick], decider: Decider, period: float) -> Replayed:
         period: Its period [s].
     """
     body, found = ReplayBody(ticks), Replayed()
-    mind = _Guarded(decider, body)
+    control = _Guarded(decider, body)
 
-    def go_on(frame: AntennaFrame, pose: Pose) -> bool:
+    def go_on(frame: AntennaFrame, command: JointCommand) -> bool:
         if body.tick is not None:
-            found.note(body.tick, mind.decision.maneuver, pose)
+            found.note(body.tick, control.decision.maneuver, command)
         return body.more
 
     if body.tick is not None:
-        run_loop(body, mind, period, go_on)
-    found.failures = mind.failures
+        run_loop(body, control, period, go_on)
+    found.failures = control.failures
     return found
 
 

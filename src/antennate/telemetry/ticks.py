@@ -14,12 +14,12 @@ from typing import Any
 
 import numpy as np
 
-from antennate.anatomy import LEGS, SIDES, YAW_JOINTS
 from antennate.errors import LogError
 from antennate.hardware.driving.decider import Decided, Decision, decision
 from antennate.hardware.driving.session import Session
-from antennate.records import AntennaFrame, Pose
+from antennate.robots.anatomy import LEGS, SIDES, YAW_JOINTS
 from antennate.telemetry.framing import SCHEMA, Kind
+from antennate.types import AntennaFrame, JointCommand
 
 JOINTS = (*YAW_JOINTS, *LEGS, *(f"antenna_{side}" for side in SIDES))
 """The order of angles."""
@@ -57,7 +57,7 @@ class Tick:
         angles: Joint targets decided [rad] in the order of JOINTS; NaN if it failed.
         state: The supervisor's state, empty without one.
         causes: Its causes in force, the most severe first.
-        asked: Whether the controller was asked; if not, its last pose was kept.
+        asked: Whether the controller was asked; if not, its last command was kept.
         note: What the operator should know or do, in one line.
         age: Age of the newest sample [s], NaN in simulation.
         missed: Ticks left out so far.
@@ -101,7 +101,7 @@ class Tick:
         left, right = (channel.reading.counts for channel in session.channels)
         bytes_ = session.board.decoder.counters
         return cls(
-            **_thought(session.decider, session.decision, session.frame, session.pose),
+            **_thought(session.decider, session.decision, session.frame, session.command),
             number=session.tally.ticks,
             now=t,
             asked=session.asked,
@@ -121,13 +121,15 @@ class Tick:
         )
 
     @classmethod
-    def plain(cls, mind: Decided, frame: AntennaFrame, pose: Pose, number: int, now: float) -> Tick:
+    def plain(
+        cls, control: Decided, frame: AntennaFrame, command: JointCommand, number: int, now: float
+    ) -> Tick:
         """A tick of a controller without supervisor, as in simulation.
 
         Raises:
             BadInputError: The controller decides otherwise than a `Decider` does.
         """
-        thought = _thought(mind, decision(mind), frame, pose)
+        thought = _thought(control, decision(control), frame, command)
         return cls(**thought, number=number, now=now, reading=thought["counts"])
 
     @property
@@ -184,17 +186,19 @@ class Tick:
         )
 
 
-def angles_of(pose: Pose) -> tuple[float, ...]:
+def angles_of(command: JointCommand) -> tuple[float, ...]:
     """Joint targets of one robot [rad] in the order of JOINTS; NaN if they are not 19 numbers."""
-    parts = (_flat(pose, name) for name in ("yaw", "leg", "antenna"))
+    parts = (_flat(command, name) for name in ("yaw", "leg", "antenna"))
     angles = tuple(angle for part in parts for angle in part)
     return angles if len(angles) == len(JOINTS) else _NOWHERE
 
 
-def _thought(mind: Decided, said: Decision, frame: AntennaFrame, pose: Pose) -> dict[str, Any]:
+def _thought(
+    control: Decided, said: Decision, frame: AntennaFrame, command: JointCommand
+) -> dict[str, Any]:
     """The fields that every world has; b of shape (1, 2) and gait.phase of (1,) where there are."""
-    phase = _flat(mind, "gait", "phase")
-    b = _flat(mind, "b")
+    phase = _flat(control, "gait", "phase")
+    b = _flat(control, "b")
     return {
         "t": float(frame.t[0]),
         "counts": tuple(frame.counts[0].tolist()),
@@ -202,7 +206,7 @@ def _thought(mind: Decided, said: Decision, frame: AntennaFrame, pose: Pose) -> 
         "contact": said.contact,
         "maneuver": said.maneuver,
         "phase": phase[0] if len(phase) == 1 else math.nan,
-        "angles": angles_of(pose),
+        "angles": angles_of(command),
     }
 
 

@@ -6,9 +6,9 @@ import math
 from collections.abc import Sequence
 
 from antennate.hardware.dynamixel.tables import XC430_W240
-from antennate.params.layout import TICKS_A_TURN
-from antennate.params.robot import ServoParams
 from antennate.params.twin import BatteryParams
+from antennate.robots.body import ServoParams
+from antennate.robots.layout import TICKS_A_TURN
 from antennate.twin.registers import Servo
 
 _VOLTAGE_ERROR = 1

@@ -14,7 +14,7 @@ import numpy as np
 
 from antennate.errors import BadInputError
 from antennate.params import ConditioningParams, TwinParams
-from antennate.records import Floats
+from antennate.types import Floats
 
 DEPTH = TwinParams().hand_depth
 LENGTH = TwinParams().hand_time

@@ -7,8 +7,8 @@ import sys
 from concurrent.futures import Future, ThreadPoolExecutor
 
 from antennate.hardware.driving.priority import claim
-from antennate.records import Floats
 from antennate.twin.robot import TwinRobot
+from antennate.types import Floats
 
 _SWITCH = 0.00005
 """Longest time that one thread keeps the other from Python [s]; the physics itself does not."""

@@ -12,7 +12,6 @@ from collections.abc import Callable
 
 import numpy as np
 
-from antennate.anatomy import YAW_COUNT
 from antennate.errors import SimulationError
 from antennate.hardware.dynamixel.packets import StatusError
 from antennate.hardware.dynamixel.tables import (
@@ -25,16 +24,17 @@ from antennate.hardware.dynamixel.tables import (
 from antennate.hardware.esp32 import frame
 from antennate.hardware.joints import Joints
 from antennate.params import TwinParams
-from antennate.params.layout import TICKS_A_TURN, LayoutParams
 from antennate.params.twin import BatteryParams
-from antennate.records import Floats
-from antennate.sim.body import SimBody
+from antennate.robots.anatomy import YAW_COUNT
+from antennate.robots.layout import TICKS_A_TURN, LayoutParams
+from antennate.sim.sim_robot import SimRobot
 from antennate.sim.world import World
 from antennate.twin.battery import Battery
 from antennate.twin.bus import ServoBus
 from antennate.twin.hand import Hand
 from antennate.twin.noise import Noise
 from antennate.twin.registers import Servo
+from antennate.types import Floats
 
 GREETING_PERIOD = TwinParams().greeting_period
 BOARD_SETTINGS = (15, 34, 35)
@@ -123,7 +123,7 @@ class TwinRobot:
 
     def __init__(
         self,
-        body: SimBody,
+        body: SimRobot,
         layout: LayoutParams,
         period: float,
         boot_id: int,
@@ -193,7 +193,7 @@ class TwinRobot:
         """
         if goals is None:
             return None
-        self._body.write(self._joints.pose(goals))
+        self._body.write(self._joints.command(goals))
         self._walked += 1
         self._body.clock.sleep_until(self._walked * self._period)
         self._counts = self._body.read().counts[0]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from antennate.conditioning import bending_level
+from antennate.control.conditioning import bending_level
 from antennate.errors import CalibrationError
 from antennate.hardware.doctor.hearing import Heard
 from antennate.hardware.doctor.rows import Row, Verdict, row
@@ -12,7 +12,7 @@ from antennate.hardware.esp32 import frame
 from antennate.hardware.esp32.film import require_film
 from antennate.hardware.esp32.wire import Hello, Reset, objections
 from antennate.hardware.safety.diagnosis import Band, ChannelDiagnosis, Finding
-from antennate.params import ControllerParams, DiagnosisParams, DoctorParams, SupervisorParams
+from antennate.params import ControlParams, DiagnosisParams, DoctorParams, SupervisorParams
 
 _PART = "esp32"
 _LONGEST_TEXT = 60
@@ -22,7 +22,7 @@ _DEGRADED = (Finding.OUT_OF_CAL, Finding.SPIKY, Finding.SATURATED)
 
 def board_rows(
     heard: Heard,
-    mind: ControllerParams,
+    control: ControlParams,
     limits: SupervisorParams,
     params: DoctorParams,
     diagnosis: DiagnosisParams | None = None,
@@ -35,7 +35,7 @@ def board_rows(
     if heard.readings:
         rows += [_losses(heard), _crc(heard)]
         for side, name in enumerate(SIDES):
-            rows += _channel(heard, side, name, mind, params, diagnosis or DiagnosisParams())
+            rows += _channel(heard, side, name, control, params, diagnosis or DiagnosisParams())
     return rows
 
 
@@ -140,11 +140,11 @@ def _channel(
     heard: Heard,
     side: int,
     name: str,
-    mind: ControllerParams,
+    control: ControlParams,
     params: DoctorParams,
     diagnosis: DiagnosisParams,
 ) -> list[Row]:
-    counts, curve = heard.counts[:, side], mind.conditioning
+    counts, curve = heard.counts[:, side], control.conditioning
     noise, middle = float(counts.std()), float(np.median(counts))
     rows = [
         row(
@@ -187,7 +187,7 @@ def _channel(
         )
     )
     if finding.usable:
-        rows.append(_calibration(name, middle, mind, diagnosis.margin))
+        rows.append(_calibration(name, middle, control, diagnosis.margin))
     return rows
 
 
@@ -201,18 +201,18 @@ _CURES = {
 }
 
 
-def _calibration(name: str, counts: float, mind: ControllerParams, margin: float) -> Row:
-    curve = mind.conditioning
+def _calibration(name: str, counts: float, control: ControlParams, margin: float) -> Row:
+    curve = control.conditioning
     low, high = curve.counts_low - margin, curve.counts_high + margin
     level = float(bending_level(curve, np.array(counts)))
-    touched = level >= mind.rule.threshold
+    touched = level >= control.rule.threshold
     outside = not low <= counts <= high
     return row(
         _PART,
         f"{name} at rest",
-        f"{low:.0f} to {high:.0f} counts, b below {mind.rule.threshold:g}",
+        f"{low:.0f} to {high:.0f} counts, b below {control.rule.threshold:g}",
         f"{counts:.0f} counts, b = {level:.2f}",
         "bad" if touched else "warn" if outside else None,
         "straighten the antenna; if it is straight, `antennate record` and `antennate calibrate`, "
-        "and put the new curve into [mind.conditioning]",
+        "and put the new curve into [control.conditioning]",
     )

@@ -82,7 +82,7 @@ def examine(
 
         def hear(opener: Opener) -> list[Row]:
             found.heard = listen(opener, robot.layout, params, now)
-            rows = board_rows(found.heard, robot.mind, robot.limits, params)
+            rows = board_rows(found.heard, robot.control, robot.limits, params)
             return rows + film_rows(found.heard.hello, robot.sensor_id)
 
         found.rows += _examined("esp32", *esp32, BOARD_BAUD, hear)

@@ -16,7 +16,7 @@ from antennate.hardware.dynamixel.bringup import BringUpError
 from antennate.hardware.dynamixel.bus import Bus
 from antennate.hardware.dynamixel.tables import BAUD_RATES, XC430_W240
 from antennate.hardware.settings import Setting
-from antennate.params.layout import LayoutParams
+from antennate.robots.layout import LayoutParams
 
 _ID, _BAUD = "id", "baud_rate"
 _MOVED = (_ID, _BAUD)

@@ -14,8 +14,8 @@ from antennate.hardware.esp32.decoder import Counters
 from antennate.hardware.esp32.stream import Reading, Stream
 from antennate.hardware.esp32.wire import Hello
 from antennate.params import DoctorParams
-from antennate.params.layout import LayoutParams
-from antennate.records import Floats
+from antennate.robots.layout import LayoutParams
+from antennate.types import Floats
 
 _PATIENCE = 0.02
 

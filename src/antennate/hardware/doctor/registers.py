@@ -14,7 +14,7 @@ from antennate.hardware.dynamixel.tables import (
 )
 from antennate.hardware.settings import Settings, settings
 from antennate.params import DoctorParams, SupervisorParams
-from antennate.params.layout import LayoutParams
+from antennate.robots.layout import LayoutParams
 
 _PART = "bus"
 _REVERSED, _TIMED, _TORQUE_BY_GOAL = 1, 4, 8

@@ -11,7 +11,7 @@ from antennate.hardware.doctor.rows import Row, Verdict, grouped, ids_text, row
 from antennate.hardware.doctor.survey import Seen, Survey
 from antennate.hardware.dynamixel.tables import TABLES
 from antennate.params import DoctorParams, SupervisorParams
-from antennate.params.layout import LayoutParams
+from antennate.robots.layout import LayoutParams
 
 _PART = "bus"
 _FIX = "run doctor with --fix"

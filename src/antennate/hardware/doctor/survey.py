@@ -22,7 +22,7 @@ from antennate.hardware.esp32.board import BOARD_BAUD
 from antennate.hardware.esp32.decoder import FrameDecoder
 from antennate.hardware.ports.port import Port
 from antennate.params import BoardParams, BusParams, DoctorParams
-from antennate.params.layout import LayoutParams
+from antennate.robots.layout import LayoutParams
 
 BAUDS = (57_600, 115_200, 1_000_000, 2_000_000, 3_000_000, 4_000_000)
 """Bits per second at which servos are usually found."""

@@ -1,22 +1,21 @@
-"""The real robot as a Body: the newest reading of the board, goals to all servos at once."""
+"""The real robot as a Robot: the newest reading of the board, goals to all servos at once."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from antennate.body import Clock
 from antennate.hardware.dynamixel.bus import Bus
 from antennate.hardware.dynamixel.tables import XC430_W240
 from antennate.hardware.esp32.board import Board, counts_of
 from antennate.hardware.esp32.clock import Timed
 from antennate.hardware.joints import Joints
-from antennate.records import AntennaFrame, Floats, Ints, Pose
+from antennate.types import AntennaFrame, Clock, Floats, Ints, JointCommand
 
 _GOAL = XC430_W240["goal_position"]
 """At the same address in both models."""
 
 
-class HardwareBody:
+class HardwareRobot:
     """One robot behind the wall. A reading that is missing or too old is NaN.
 
     Frames are stamped with the board's own time since the first reading, so that neither its way to
@@ -69,14 +68,14 @@ class HardwareBody:
             return self._stamp_t
         return self._stamp_t + 1e-6 * (timed.elapsed_us - last.elapsed_us)
 
-    def write(self, pose: Pose) -> None:
+    def write(self, command: JointCommand) -> None:
         """Send goals to all servos.
 
         Raises:
-            PoseError: The pose must not be sent; nothing is.
+            CommandError: The command must not be sent; nothing is.
             PortError: The bus is gone.
         """
-        self.send(self._joints.ticks(pose))
+        self.send(self._joints.ticks(command))
 
     def send(self, goals: Ints | Floats) -> None:
         """Send goal positions [ticks], shape (19,), rounded.

@@ -52,7 +52,7 @@ class DriveConfig(RobotConfig):
         0.3,
         "s",
         "assumed: a step at half a hertz comes to rest",
-        "time that the robot holds its pose before the torque goes off",
+        "time that the robot holds its command before the torque goes off",
         ge=0,
         le=60,
     )

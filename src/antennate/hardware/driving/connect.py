@@ -28,7 +28,7 @@ from antennate.hardware.ports.reconnecting import Reconnecting
 from antennate.hardware.ports.twin_clock import twin_clock
 from antennate.hardware.safety.trust import Trust
 from antennate.params import BusParams, DoctorParams
-from antennate.params.layout import LayoutParams
+from antennate.robots.layout import LayoutParams
 
 _WHO = DoctorParams()
 _PATIENCE = 0.05
@@ -54,11 +54,11 @@ def connect(
         BadInputError: No antenna board speaks, or it is refused.
         BringUpError: The servos are not those expected.
     """
-    mind = chosen(config.controller, config.mind)
+    control = chosen(config.controller, config.control)
     with contextlib.ExitStack() as stack:
         if clock:
             twin = stack.enter_context(twin_clock(esp32, bus, clock, config.layout.baud))
-            yield prepare(config, twin.esp32, twin.bus, twin, decider=mind)
+            yield prepare(config, twin.esp32, twin.bus, twin, decider=control)
             return
         lines: list[Port] = []
         for flag, address, baud in (
@@ -68,7 +68,7 @@ def connect(
             line = Reconnecting(finder(address, baud, flag, key, config.network))
             stack.callback(line.close)
             lines.append(line)
-        yield prepare(config, lines[0], lines[1], HostClock(), bus, mind)
+        yield prepare(config, lines[0], lines[1], HostClock(), bus, control)
 
 
 def prepare(
@@ -95,12 +95,12 @@ def prepare(
         bus=master,
         joints=Joints(config.layout),
         clock=clock,
-        decider=decider or chosen(config.controller, config.mind),
-        period=config.mind.period,
-        conditioning=config.mind.conditioning,
+        decider=decider or chosen(config.controller, config.control),
+        period=config.control.period,
+        conditioning=config.control.conditioning,
         limits=config.limits,
         trust=Trust(
-            config.mind.conditioning, config.drift, config.touch if config.touch_check else None
+            config.control.conditioning, config.drift, config.touch if config.touch_check else None
         ),
     )
 

@@ -9,11 +9,11 @@ from typing import Protocol, cast
 
 import numpy as np
 
-from antennate.controller import ARMS, Controller
+from antennate.control.controllers import ARMS, Controller
 from antennate.errors import BadInputError, ConfigError
 from antennate.hardware.driving.tracebacks import said
-from antennate.params import ControllerParams
-from antennate.records import AntennaFrame, Contact, Ints, Maneuver, Pose
+from antennate.params import ControlParams
+from antennate.types import AntennaFrame, Contact, Ints, JointCommand, Maneuver
 
 _MOST = (1 << 31) - 1
 """Largest number of a decision that is looked at; a log keeps 64 bits of each."""
@@ -34,12 +34,12 @@ class Decided(Protocol):
 class Decider(Decided, Protocol):
     """A controller of one robot."""
 
-    def step(self, frame: AntennaFrame) -> Pose:
-        """The pose of this tick."""
+    def step(self, frame: AntennaFrame) -> JointCommand:
+        """The command of this tick."""
         ...
 
 
-def chosen(name: str, params: ControllerParams) -> Decider:
+def chosen(name: str, params: ControlParams) -> Decider:
     """The controller of a name, one of ours or MODULE:CLASS.
 
     Raises:
@@ -58,7 +58,7 @@ def chosen(name: str, params: ControllerParams) -> Decider:
         raise
     except BaseException as error:
         raise ConfigError(
-            f"--controller: expected a class that takes ControllerParams, found {name!r}: "
+            f"--controller: expected a class that takes ControlParams, found {name!r}: "
             f"{said(error)}"
         ) from error
 
@@ -95,21 +95,21 @@ def _whole(decider: Decided, name: str, shape: tuple[int, ...]) -> list[int]:
     if not numbers or max(map(abs, numbers)) > _MOST:
         raise BadInputError(
             f"expected {name} of shape {shape}, small whole numbers, found {value!r}; see "
-            f"antennate.records.{name.capitalize()}"
+            f"antennate.types.{name.capitalize()}"
         )
     return numbers
 
 
 @dataclass(slots=True)
 class Thought:
-    """What the mind did in this tick."""
+    """What the control did in this tick."""
 
     asked: bool = True
     decided_at: float = -math.inf
-    bad_pose: str = ""
+    bad_command: str = ""
     failure: str = ""
 
 
-def nowhere() -> Pose:
-    """The pose of a controller that said nothing."""
-    return Pose(*(np.full(shape, math.nan) for shape in ((1, 5), (1, 6, 2), (1, 2))))
+def nowhere() -> JointCommand:
+    """The command of a controller that said nothing."""
+    return JointCommand(*(np.full(shape, math.nan) for shape in ((1, 5), (1, 6, 2), (1, 2))))

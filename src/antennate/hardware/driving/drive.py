@@ -6,6 +6,7 @@ import contextlib
 import math
 from collections.abc import Callable
 
+from antennate.control.loop import run_loop
 from antennate.hardware.driving.config import DriveConfig
 from antennate.hardware.driving.dry_run import DryRun
 from antennate.hardware.driving.report import Report
@@ -13,8 +14,7 @@ from antennate.hardware.driving.session import Session
 from antennate.hardware.driving.signals import StopOnce
 from antennate.hardware.ports.port import PortError
 from antennate.hardware.safety.causes import State
-from antennate.loop import run_loop
-from antennate.records import AntennaFrame, Pose
+from antennate.types import AntennaFrame, JointCommand
 
 
 def drive(
@@ -58,7 +58,7 @@ def drive(
         wait = max(config.fault_time, config.bus_return if session.mute else 0.0)
         return t >= failed_at + wait
 
-    def go_on(frame: AntennaFrame, pose: Pose) -> bool:
+    def go_on(frame: AntennaFrame, command: JointCommand) -> bool:
         t = clock.now() - start
         dry.step(t, session.outputs)
         session.orders.arm = dry.asks

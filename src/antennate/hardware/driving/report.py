@@ -18,7 +18,7 @@ class Report:
         timing: How well the pace was kept, None if no tick was run.
         before: The same up to the first tick with torque, None if it never came on.
         worst: Worst state since torque came on, and why. The short wait for the first decision is
-            left out, unless no pose follows it.
+            left out, unless no command follows it.
         refusal: Why torque did not come on although it was wanted, empty if nothing forbade it.
         on: Servos that did not confirm that their torque is off; None if it never was on.
     """
@@ -110,7 +110,7 @@ def _pace(timing: TimingReport | None) -> dict[str, Any] | None:
 
 
 def _since(end: TimingReport | None, begin: TimingReport | None) -> dict[str, Any] | None:
-    """Ticks from the first pose that was sent; the time that arming takes is before it."""
+    """Ticks from the first command that was sent; the time that arming takes is before it."""
     if end is None or begin is None:
         return None
     ticks = end.ticks - begin.ticks

@@ -1,11 +1,11 @@
 """One robot driven from its bytes: what stands on both sides of the one loop.
 
-It is the body, which reads the board and writes goals, and the mind, a controller behind a
+It is the body, which reads the board and writes goals, and the control, a controller behind a
 supervisor. Nothing reaches the servos but what the supervisor lets through. Any packet feeds their
 watchdogs, and with torque on packets are sent only upon a decision of this very tick: the
 controller's, or the session's own to stand still while legs forget their turns or for a moment
-before a release, or to keep the pose for one tick after a sound decision at half pace. Goals move
-at a limited speed, so that neither the first pose nor a broken controller makes a joint jump.
+before a release, or to keep the command for one tick after a sound decision at half pace. Goals
+move at a limited speed, so that neither the first command nor a broken controller makes a joint jump.
 
 After the bus was lost no goal is sent until an arm event. With that one ids and models are checked,
 watchdogs armed and goals set to where the servos stand, as with the first.
@@ -17,9 +17,8 @@ import math
 
 import numpy as np
 
-from antennate.body import Clock
 from antennate.errors import AntennateError
-from antennate.hardware.driving.body import HardwareBody
+from antennate.hardware.driving.body import HardwareRobot
 from antennate.hardware.driving.decider import Decider, Decision, Thought, decision, nowhere
 from antennate.hardware.driving.orders import Orders, Tally
 from antennate.hardware.driving.timing import LoopTiming
@@ -29,7 +28,7 @@ from antennate.hardware.dynamixel import bringup
 from antennate.hardware.dynamixel.bringup import BringUpError
 from antennate.hardware.dynamixel.bus import Bus
 from antennate.hardware.esp32.board import Board
-from antennate.hardware.joints import Joints, PoseError, plain
+from antennate.hardware.joints import CommandError, Joints, plain
 from antennate.hardware.ports.port import PortError
 from antennate.hardware.safety.causes import Cause, Inputs, Outputs, State
 from antennate.hardware.safety.diagnosis import Band, ChannelDiagnosis
@@ -37,7 +36,7 @@ from antennate.hardware.safety.supervisor import Supervisor
 from antennate.hardware.safety.trust import Trust
 from antennate.hardware.safety.watch import ServoWatch
 from antennate.params import BusParams, ConditioningParams, DiagnosisParams, SupervisorParams
-from antennate.records import AntennaFrame, Floats, Maneuver, Pose
+from antennate.types import AntennaFrame, Clock, Floats, JointCommand, Maneuver
 
 _AGAIN = BusParams().motion_budget
 """Time for the answers of servos told again in a tick to let go [s]."""
@@ -68,7 +67,7 @@ class Session:
         tracebacks: Of the controller.
         timing: Whether the loop keeps its pace, None before the first tick.
         frame: What the controller got in the last tick.
-        pose: What it said.
+        command: What it said.
         decision: What it decided, whenever it was asked last without failing.
         touched: Whether anything was written to the servos.
         unrecorded: Whether a record that is required is not kept; the robot holds meanwhile.
@@ -104,12 +103,12 @@ class Session:
         self.timing: LoopTiming | None = None
         self.outputs: Outputs | None = None
         self.frame = AntennaFrame(t=np.zeros(1), counts=np.full((1, 2), math.nan))
-        self.pose = nowhere()
+        self.command = nowhere()
         self.decision = Decision()
-        self._body = HardwareBody(board, bus, joints, clock)
+        self._body = HardwareRobot(board, bus, joints, clock)
         self._thought = Thought()
         self._goals: Floats | None = None
-        self._pose: Pose | None = None
+        self._command: JointCommand | None = None
         self._used = self._refused = 0
         self._owed = 0.0
         self._sound = False
@@ -160,11 +159,11 @@ class Session:
         empty = any(active.cause is Cause.SUPPLY_WARN for active in causes)
         return self._limits.slow_rate if empty else 1.0
 
-    def write(self, pose: Pose) -> None:
+    def write(self, command: JointCommand) -> None:
         """Let the supervisor judge this tick, and do what it says; then look at the servos."""
         self._mark("decide")
-        self.pose = pose
-        self._act(pose)
+        self.command = command
+        self._act(command)
         self._mark("bus")
         if self.timing is not None:
             self.timing.finish(self.clock.now())
@@ -173,33 +172,33 @@ class Session:
         if self.timing is not None:
             self.timing.mark(stage, self.clock.now())
 
-    def _act(self, pose: Pose) -> None:
+    def _act(self, command: JointCommand) -> None:
         now = self.clock.now()
         self.outputs = out = self.supervisor.step(now, self._inputs(now))
         self.tally.ticks += 1
         try:
             if out.arming:
-                self._arm(pose)
+                self._arm(command)
             elif out.feed_watchdog and self._goals is not None and not self._lost:
                 self._forget_turns(out)
-                self._send(pose if out.move and not self.turns.standing else None)
+                self._send(command if out.move and not self.turns.standing else None)
             if not out.torque and self._goals is not None:
                 self.release()
             elif self._goals is None and self.unreleased:
                 self._release_again()
-        except (PortError, PoseError, BringUpError) as error:
+        except (PortError, CommandError, BringUpError) as error:
             self.watch.bus_error = str(error)
-            self._lost |= not isinstance(error, PoseError)
+            self._lost |= not isinstance(error, CommandError)
             return
         self.watch.loose = self.turns.loose
         if out.feed_watchdog or not out.torque:  # any packet would feed the watchdogs
             self.watch.step()
         self._lost |= self._dead(self._limits.silent_answers)
 
-    # the mind
+    # the control
 
-    def step(self, frame: AntennaFrame) -> Pose:
-        """The controller's pose; an exception of it is a cause, not the end.
+    def step(self, frame: AntennaFrame) -> JointCommand:
+        """The controller's command; an exception of it is a cause, not the end.
 
         While legs forget their turns the controller is not asked, and its time stands still: to
         stand is the session's own decision. So it is to go slowly, which leaves out single ticks,
@@ -207,13 +206,13 @@ class Session:
         """
         due = self._due() or not self._sound
         thought = self._thought = Thought()
-        if self._pose is not None and (self.turns.standing or not due):
+        if self._command is not None and (self.turns.standing or not due):
             thought.asked, thought.decided_at = False, self.clock.now()
-            return self._pose
+            return self._command
         self._sound = False
         try:
             own = AntennaFrame(t=frame.t.copy(), counts=frame.counts.copy())
-            pose = self.decider.step(own)  # which it may change
+            command = self.decider.step(own)  # which it may change
             self.decision = decision(self.decider)
         except KeyboardInterrupt:
             raise
@@ -223,15 +222,15 @@ class Session:
             return nowhere()
         thought.decided_at = self.clock.now()
         try:
-            pose = plain(pose)
-            self.joints.ticks(pose)
-        except PoseError as error:
-            thought.bad_pose = str(error)
+            command = plain(command)
+            self.joints.ticks(command)
+        except CommandError as error:
+            thought.bad_command = str(error)
             self.tally.refused += 1
         else:
-            self._pose = pose
+            self._command = command
             self._sound = self.decision.maneuver in set(Maneuver)
-        return pose
+        return command
 
     def _due(self) -> bool:
         """Whether a period of the controller's own time has passed; call once a tick."""
@@ -281,7 +280,7 @@ class Session:
             decided_at=thought.decided_at,
             maneuver=self.decision.maneuver,
             contact=self.decision.contact,
-            bad_pose=thought.bad_pose,
+            bad_command=thought.bad_command,
             failure=thought.failure,
             resets=clock.resets,
             reset_reason="" if clock.last_reset is None else clock.last_reset.name,
@@ -299,11 +298,11 @@ class Session:
             stop=self.orders.stop,
         )
 
-    def _arm(self, pose: Pose) -> None:
+    def _arm(self, command: JointCommand) -> None:
         """Torque on where everything stands, for all servos or for none."""
         self.touched = True
         try:
-            self._goals = self._enable(pose)
+            self._goals = self._enable(command)
         except AntennateError:
             self.release()
             raise
@@ -311,7 +310,7 @@ class Session:
         self.watch.arm(True)
         self._lost = False
 
-    def _enable(self, pose: Pose) -> Floats:
+    def _enable(self, command: JointCommand) -> Floats:
         """Torque on: where everything stands [ticks]; legs count their turns from there."""
         bus, ids = self.bus, self.joints.ids
         self.turns.reset()
@@ -319,7 +318,7 @@ class Session:
         bringup.arm_watchdogs(bus, ids)
         bringup.limit_speed(bus, self.joints.profiles)
         stood = bringup.hold_here(bus, ids)
-        self.joints.align(np.array([stood[servo] for servo in ids], float), pose)
+        self.joints.align(np.array([stood[servo] for servo in ids], float), command)
         present = bringup.enable(bus, ids)
         return np.array([present[servo] for servo in ids], float)
 
@@ -331,14 +330,14 @@ class Session:
             self.turns.begin(self._goals)
         self.turns.step(self._goals, self.watch.positions, out.move)
 
-    def _send(self, pose: Pose | None) -> None:
-        """Goals one tick nearer to a pose; where they are without one."""
+    def _send(self, command: JointCommand | None) -> None:
+        """Goals one tick nearer to a command; where they are without one."""
         goals = self._goals
         if goals is None:
             return
-        if pose is not None:
+        if command is not None:
             reach = self.joints.reach(self.period)
-            wanted = self.joints.ticks(pose) - goals
+            wanted = self.joints.ticks(command) - goals
             self.tally.limited += int((abs(wanted) > reach).sum())
             goals = goals + np.clip(wanted, -reach, reach)
             self.tally.sent += 1

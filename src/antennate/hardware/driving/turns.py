@@ -15,15 +15,15 @@ import math
 from collections import deque
 from collections.abc import Mapping
 
-from antennate.anatomy import YAW_COUNT
 from antennate.hardware.dynamixel.answers import Span, Value
 from antennate.hardware.dynamixel.bringup import BringUpError
 from antennate.hardware.dynamixel.bus import Bus
 from antennate.hardware.dynamixel.tables import XC430_W240, Register
 from antennate.hardware.joints import Joints
 from antennate.params import TurnsParams
-from antennate.params.layout import TICKS_A_TURN
-from antennate.records import Floats
+from antennate.robots.anatomy import YAW_COUNT
+from antennate.robots.layout import TICKS_A_TURN
+from antennate.types import Floats
 
 _TORQUE = XC430_W240["torque_enable"]
 _GOAL = XC430_W240["goal_position"]

@@ -16,7 +16,7 @@ from antennate.hardware.esp32.frame import (
 from antennate.hardware.esp32.listener import CHUNK, Listener
 from antennate.hardware.ports.port import Port, PortError
 from antennate.params import BoardParams
-from antennate.records import Floats
+from antennate.types import Floats
 
 BOARD_BAUD = BoardParams().baud
 """Bits per second of the board's port."""

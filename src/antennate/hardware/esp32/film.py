@@ -5,23 +5,23 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from antennate import calibration
-from antennate.calibration import Calibration
+from antennate.antenna import calibration
+from antennate.antenna.calibration import Calibration
 from antennate.errors import CalibrationError, ConfigError
 from antennate.hardware.esp32.wire import Hello
-from antennate.params import ConditioningParams, ControllerParams
+from antennate.params import ConditioningParams, ControlParams
 
 _SERIAL = re.compile("[0-9a-f]{16}")
 """A sensor id of this form is the serial number of a board."""
 
 
 def calibrated(
-    mind: ControllerParams, path: Path, sensor_id: str | None = None
-) -> tuple[ControllerParams, Calibration]:
+    control: ControlParams, path: Path, sensor_id: str | None = None
+) -> tuple[ControlParams, Calibration]:
     """The controller's numbers with the curve of a calibration file.
 
     Args:
-        mind: Its numbers, without a curve of their own.
+        control: Its numbers, without a curve of their own.
         path: The file; one curve serves both antennae.
         sensor_id: The film it has to belong to, None for any.
 
@@ -30,19 +30,19 @@ def calibrated(
         ConfigError: There is another curve, or another theta, beside it.
     """
     found = calibration.load(path, sensor_id)
-    plain = ConditioningParams(averaging_time=mind.conditioning.averaging_time)
-    if mind.conditioning != plain:
+    plain = ConditioningParams(averaging_time=control.conditioning.averaging_time)
+    if control.conditioning != plain:
         raise ConfigError(
-            f"mind.conditioning: expected no curve beside the calibration file {path}, found one; "
+            f"control.conditioning: expected no curve beside the calibration file {path}, found one; "
             "give averaging_time alone"
         )
-    if mind.rule.threshold != found.threshold:
+    if control.rule.threshold != found.threshold:
         raise ConfigError(
-            f"mind.rule.threshold: expected theta of {path}, {found.threshold:g}, found "
-            f"{mind.rule.threshold:g}; set it alike"
+            f"control.rule.threshold: expected theta of {path}, {found.threshold:g}, found "
+            f"{control.rule.threshold:g}; set it alike"
         )
-    curve = found.conditioning(mind.conditioning.averaging_time)
-    return mind.model_copy(update={"conditioning": curve}), found
+    curve = found.conditioning(control.conditioning.averaging_time)
+    return control.model_copy(update={"conditioning": curve}), found
 
 
 def require_film(hello: Hello | None, sensor_id: str | None) -> None:

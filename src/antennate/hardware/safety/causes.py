@@ -7,13 +7,13 @@ from dataclasses import dataclass, field
 from enum import Enum, IntEnum
 
 from antennate.hardware.safety.diagnosis import Finding
-from antennate.records import Contact, Maneuver
+from antennate.types import Contact, Maneuver
 
 
 class State(IntEnum):
     """The ladder; each state is safer than the one before.
 
-    DEGRADED walks. HOLD keeps the last pose with torque on. FAULT is a HOLD that only an arm event
+    DEGRADED walks. HOLD keeps the last command with torque on. FAULT is a HOLD that only an arm event
     ends. OFF has no torque and also needs an arm event.
     """
 
@@ -48,7 +48,7 @@ class Cause(Enum):
     FAILED = (State.HOLD, "the controller raised an exception")
     UNDECIDED = (State.HOLD, "the controller took no decision in this tick")
     BAD_ACTION = (State.HOLD, "the controller asked for what does not exist")
-    BAD_POSE = (State.HOLD, "a pose of the controller was refused")
+    BAD_POSE = (State.HOLD, "a command of the controller was refused")
     UNKNOWN_CONTACT = (State.HOLD, "contact is not known")
     NO_RECORD = (State.HOLD, "no log is kept, and one is required")
     SUPPLY_HOLD = (State.HOLD, "the supply is too low to walk")
@@ -125,7 +125,7 @@ class Inputs:
         decided_at: Time at which the controller finished its newest decision [s].
         maneuver: That decision.
         contact: What it rests on, left and right.
-        bad_pose: Why its pose must not be sent, empty if it may.
+        bad_command: Why its command must not be sent, empty if it may.
         failure: Text of an exception of the controller in this tick, empty if none.
         resets: Restarts of the antenna board so far.
         reset_reason: Why it last restarted, as far as it can tell.
@@ -150,7 +150,7 @@ class Inputs:
     supply: float
     maneuver: int = Maneuver.HOLD
     contact: tuple[int, int] = (Contact.UNKNOWN, Contact.UNKNOWN)
-    bad_pose: str = ""
+    bad_command: str = ""
     failure: str = ""
     refused: int = 0
     resets: int = 0
@@ -197,7 +197,7 @@ class Outputs:
 
     Attributes:
         state: Where on the ladder the robot is.
-        move: Whether the pose just decided may be sent; if not, the last one sent stays.
+        move: Whether the command just decided may be sent; if not, the last one sent stays.
         torque: Whether torque is on.
         arming: True in the one tick of an accepted arm event: clear the watchdogs, set all goals to
             the present positions, then switch the torque on.
@@ -206,7 +206,7 @@ class Outputs:
         clear: Whether data and actuators are well and the torque on. While it is False the
             controller gets NaN for counts in the next tick, so that its gait stands still.
         causes: All causes in force, the most severe first. Of equal ones those that explain first:
-            losses of data, then others, then those of the mind; the oldest of each first.
+            losses of data, then others, then those of the control; the oldest of each first.
         refusal: Why an arm event of this tick was not accepted, empty if it was or none came.
     """
 

@@ -15,9 +15,9 @@ from collections import deque
 from dataclasses import dataclass
 from enum import Enum
 
+from antennate.antenna.sensor import FULL_SCALE
 from antennate.errors import CalibrationError
 from antennate.params import DiagnosisParams
-from antennate.sensor import FULL_SCALE
 
 
 class Finding(Enum):

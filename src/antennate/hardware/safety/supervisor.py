@@ -23,7 +23,7 @@ from antennate.hardware.safety.causes import (
 )
 from antennate.hardware.safety.rate import RateMeter
 from antennate.params import SupervisorParams
-from antennate.records import Contact, Maneuver
+from antennate.types import Contact, Maneuver
 
 _ACTIONS = frozenset(Maneuver)
 _CONTACTS = frozenset({Contact.FREE, Contact.CONTACT})
@@ -188,13 +188,13 @@ class Supervisor:
             found[Cause.UNDECIDED] = ""
         elif inputs.maneuver not in _ACTIONS:
             found[Cause.BAD_ACTION] = f"maneuver {inputs.maneuver}"
-        elif inputs.bad_pose:
-            found[Cause.BAD_POSE] = inputs.bad_pose
+        elif inputs.bad_command:
+            found[Cause.BAD_POSE] = inputs.bad_command
         elif not _CONTACTS.issuperset(inputs.contact):
             found[Cause.UNKNOWN_CONTACT] = ""
         failed = _FAILURES & found.keys()
         if failed and self._failures.add(now):
-            found[Cause.REPEATED_FAILURES] = inputs.failure or inputs.bad_pose
+            found[Cause.REPEATED_FAILURES] = inputs.failure or inputs.bad_command
         return found
 
     def _recover(self, inputs: Inputs, present: Mapping[Cause, str]) -> None:

@@ -9,7 +9,7 @@ from antennate.hardware.safety.diagnosis import Band, Finding, Reading
 from antennate.hardware.safety.drift import Drift
 from antennate.hardware.safety.touch_check import Ask, TouchCheck
 from antennate.params import ConditioningParams, DriftParams, TouchCheckParams
-from antennate.records import Contact
+from antennate.types import Contact
 
 _SIDES = ("left", "right")
 _RESTING = {Finding.OK, Finding.OUT_OF_CAL}

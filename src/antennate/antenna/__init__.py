@@ -1,0 +1,1 @@
+"""The antenna as physics: springs, taper, statics, sensor, calibration."""

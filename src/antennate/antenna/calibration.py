@@ -1,0 +1,192 @@
+"""A calibration and its file: the curve from readings to bend, and what is needed to trust it."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from antennate.control.conditioning import bending_level
+from antennate.errors import CalibrationError, OutputError
+from antennate.params import ConditioningParams
+from antennate.types import Floats
+
+SCHEMA = 1
+FEWEST = 20
+"""Fewest readings."""
+NARROWEST_SPAN = 20.0
+"""Fewest counts between straight and bent that can be told from noise."""
+NARROWEST_RISE = 10.0
+"""Fewest counts over which the bend may rise from 0.1 to 0.9: four sigma of a reading's noise."""
+_RISE = 2.0 * math.log(9.0)
+"""That rise of a sigmoid in units of 1 / slope."""
+_FULL_SCALE = 4095
+_LARGEST_FILE = 1_000_000
+
+
+class _Strict(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+class SpeedFit(_Strict):
+    """How well the one curve serves one speed."""
+
+    speed_m_s: float | None
+    samples: int = Field(ge=1)
+    r2: float
+    rmse: float = Field(ge=0)
+
+
+class Calibration(_Strict):
+    """A curve with all that is needed to trust it; what a calibration file holds."""
+
+    schema_version: Literal[1] = SCHEMA
+    made_by: str = Field(max_length=64)
+    sensor_id: str = Field(pattern=r"^[A-Za-z0-9._-]{1,64}$")
+    data_sha256: str = Field(pattern=r"^[0-9a-f]{64}$")
+    polarity: Literal[-1, 1]
+    slope: float = Field(gt=0, le=1000)
+    slope_95: tuple[float, float]
+    midpoint: float = Field(gt=-1, lt=2)
+    midpoint_95: tuple[float, float]
+    counts_low: float = Field(ge=0, le=4095)
+    counts_high: float = Field(ge=0, le=4095)
+    threshold: float = Field(gt=0, lt=1)
+    valid_counts: tuple[float, float]
+    valid_bend: tuple[float, float]
+    samples: int = Field(ge=FEWEST)
+    trials: int = Field(ge=1)
+    r2: float = Field(le=1)
+    rmse: float = Field(ge=0)
+    speeds: tuple[SpeedFit, ...]
+    cross_validated_rmse: dict[Literal["sigmoid", "line", "isotonic"], float]
+    better_than_sigmoid: tuple[Literal["line", "isotonic"], ...]
+
+    def conditioning(self, averaging_time: float = 0.1) -> ConditioningParams:
+        """What the controller takes."""
+        return ConditioningParams(
+            averaging_time=averaging_time,
+            midpoint=self.midpoint,
+            slope=self.slope,
+            polarity=self.polarity,
+            counts_low=self.counts_low,
+            counts_high=self.counts_high,
+        )
+
+
+def level(calibration: Calibration, counts: Floats) -> Floats:
+    """Bending level of readings [counts], same shape."""
+    return bending_level(calibration.conditioning(), counts)
+
+
+def load(path: Path, sensor_id: str | None = None) -> Calibration:
+    """Read a calibration file.
+
+    Args:
+        path: The file.
+        sensor_id: The film it has to belong to, None for any.
+
+    Raises:
+        CalibrationError: It cannot be read; a field is missing, doubled, unknown or out of bounds;
+            or no film can have such a curve.
+    """
+    try:
+        with path.open("rb") as file:
+            data = file.read(_LARGEST_FILE + 1)
+    except OSError as error:
+        raise CalibrationError(f"{path}: expected a readable file: {error.strerror}") from None
+    if len(data) > _LARGEST_FILE:
+        raise CalibrationError(f"{path}: expected at most {_LARGEST_FILE} bytes, found more")
+    try:
+        found = Calibration.model_validate_json(data, strict=True)
+        json.loads(data, object_pairs_hook=_once)
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        field = ".".join(str(part) for part in first["loc"]) or "the file"
+        raise CalibrationError(f"{path}: {field}: {first['msg']}") from None
+    except CalibrationError as error:
+        raise CalibrationError(f"{path}: {error}") from None
+    if sensor_id is not None and found.sensor_id != sensor_id:
+        raise CalibrationError(
+            f"{path}: sensor_id: expected {sensor_id}, found {found.sensor_id}: the calibration of "
+            "another film"
+        )
+    if why := _impossible(found):
+        raise CalibrationError(f"{path}: {why}")
+    return found
+
+
+def _once(pairs: list[tuple[str, object]]) -> None:
+    """Refuse what pydantic lets pass: doubled keys, and truth values taken for numbers."""
+    keys = [key for key, _ in pairs]
+    if doubled := next((key for key in keys if keys.count(key) > 1), None):
+        raise CalibrationError(f"{doubled}: expected once, found {keys.count(doubled)} times")
+    if said := next((key for key, value in pairs if isinstance(value, bool)), None):
+        raise CalibrationError(f"{said}: expected no truth value, found one")
+
+
+def _impossible(found: Calibration) -> str:
+    """Why no film can have this curve, empty if one can; these bounds no file can widen."""
+    span = found.counts_high - found.counts_low
+    if span < NARROWEST_SPAN:
+        return (
+            f"counts_high: expected {NARROWEST_SPAN:g} counts more than counts_low or more, found "
+            f"{found.counts_low:g} and {found.counts_high:g}"
+        )
+    for field in ("slope_95", "midpoint_95", "valid_counts", "valid_bend"):
+        low, high = getattr(found, field)
+        if not low <= high:
+            return f"{field}: expected the lower end first, found {low:g} and {high:g}"
+    low, high = found.valid_counts
+    if not (0 <= low < high <= _FULL_SCALE):
+        return f"valid_counts: expected readings of 12 bits, found {low:g} to {high:g}"
+    if (width := _RISE * span / found.slope) < NARROWEST_RISE:
+        return (
+            f"slope: expected a bend that rises from 0.1 to 0.9 over {NARROWEST_RISE:g} counts or "
+            f"more, found {width:.3g}"
+        )
+    ends = level(found, np.array([found.counts_low, found.counts_high]))
+    straight, bent = ends if found.polarity > 0 else ends[::-1]
+    if not straight < found.threshold < bent:
+        return (
+            f"midpoint: expected a bend below the threshold {found.threshold:g} at the straight "
+            f"end and above it at the bent end, found {straight:.3g} and {bent:.3g}"
+        )
+    return ""
+
+
+def to_json(calibration: Calibration) -> str:
+    """The content of a calibration file."""
+    return json.dumps(calibration.model_dump(mode="json"), indent=2, allow_nan=False) + "\n"
+
+
+def save(calibration: Calibration, path: Path, overwrite: bool = False) -> None:
+    """Write a calibration file, whole or not at all.
+
+    Raises:
+        OutputError: There is a file already and it may not be replaced, or it cannot be written.
+    """
+    fresh = path.with_name(f".{path.name}.{os.getpid()}")
+    try:
+        fresh.unlink(missing_ok=True)  # of a program with this number that was killed
+        with fresh.open("x", encoding="utf-8") as file:
+            file.write(to_json(calibration))
+            file.flush()
+            os.fsync(file.fileno())
+        if overwrite:
+            fresh.replace(path)
+        else:
+            os.link(fresh, path)  # fails if there is one, even if it came this moment
+    except FileExistsError:
+        raise OutputError(
+            f"{path}: expected no such file, found one; choose another or give --overwrite"
+        ) from None
+    except OSError as error:
+        raise OutputError(f"{path}: expected to write it, found: {error.strerror}") from None
+    finally:
+        fresh.unlink(missing_ok=True)

@@ -1,0 +1,298 @@
+"""From readings with a known bend to a calibration: one sigmoid, its intervals, and its rivals.
+
+    b = 1 / (1 + exp(-s k (x - x0))),   x = (counts - low) / (high - low)
+
+b is the bend, 0 straight and 1 full; s the polarity, found from the data; x0 the midpoint and k the
+slope. The fit minimises the squared error of b. Data that cannot be calibrated are refused.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from scipy.optimize import isotonic_regression, least_squares
+
+from antennate import __version__
+from antennate.antenna.calibration import FEWEST, NARROWEST_SPAN, Calibration, SpeedFit
+from antennate.errors import CalibrationError
+from antennate.types import Bools, Floats, Ints
+
+MODELS = ("sigmoid", "line", "isotonic")
+REVERSAL = 0.15
+"""Share of the span by which mean readings may run backwards over the bend."""
+_BINS = 10
+_RAILS = (0.0, 4090.0)
+"""Readings at or beyond these say nothing about the bend [counts]."""
+_RAIL_SHARE = 0.2
+"""Share of such readings that is too much."""
+
+
+@dataclass(frozen=True)
+class Samples:
+    """Readings with their bends.
+
+    Attributes:
+        counts: Readings [counts], shape (n,).
+        bend: Bends, 0 straight and 1 full, shape (n,).
+        trial: Number of the push of each, shape (n,).
+        speed: Pushing speed [m/s], NaN where unknown, shape (n,).
+        row: Row of the file, for errors, shape (n,).
+    """
+
+    counts: Floats
+    bend: Floats
+    trial: Ints
+    speed: Floats
+    row: Ints
+
+    def __getitem__(self, chosen: Bools | Ints) -> Samples:
+        """Some of them."""
+        return Samples(
+            self.counts[chosen],
+            self.bend[chosen],
+            self.trial[chosen],
+            self.speed[chosen],
+            self.row[chosen],
+        )
+
+
+def check(samples: Samples) -> None:
+    """Refuse what cannot be calibrated.
+
+    Raises:
+        CalibrationError: Names the row and the cure.
+    """
+    counts, bend = samples.counts, samples.bend
+    if len(counts) < FEWEST:
+        raise CalibrationError(
+            f"row {samples.row[-1] if len(counts) else 1}: expected at least {FEWEST} readings, "
+            f"found {len(counts)}; record longer"
+        )
+    railed = (counts <= _RAILS[0]) | (counts >= _RAILS[1])
+    if railed.mean() > _RAIL_SHARE:
+        first = int(np.argmax(railed))
+        raise CalibrationError(
+            f"row {samples.row[first]}: expected readings between the rails, found "
+            f"{counts[first]:g} counts and {100 * railed.mean():.0f} % of all like it (saturated); "
+            "choose another divider resistor"
+        )
+    if np.ptp(bend) < 0.1:
+        raise CalibrationError(
+            f"row {samples.row[0]}: expected bends over at least a tenth of the full one, found "
+            f"{bend.min():.3g} to {bend.max():.3g}; bend farther or declare the full bend"
+        )
+    low, high = np.percentile(counts, [1, 99])
+    if high - low < NARROWEST_SPAN:
+        raise CalibrationError(
+            f"row {samples.row[0]}: expected readings that change by {NARROWEST_SPAN:g} counts or "
+            f"more, found {low:g} to {high:g} (constant); check the wiring and the divider"
+        )
+    _check_monotonic(samples, high - low)
+
+
+def _check_monotonic(samples: Samples, span: float) -> None:
+    edges = np.linspace(samples.bend.min(), samples.bend.max(), _BINS + 1)
+    place = np.clip(np.digitize(samples.bend, edges) - 1, 0, _BINS - 1)
+    held = [b for b in range(_BINS) if (place == b).any()]
+    means = np.array([samples.counts[place == b].mean() for b in held])
+    rising = polarity(samples) * means
+    worst = rising - np.maximum.accumulate(rising)
+    if worst.min() < -REVERSAL * span:
+        bad = held[int(np.argmin(worst))]
+        row = samples.row[np.flatnonzero(place == bad)[0]]
+        raise CalibrationError(
+            f"row {row}: expected readings that go one way with the bend, found them turning back "
+            f"by {-worst.min():.0f} of {span:.0f} counts near a bend of "
+            f"{samples.bend[place == bad].mean():.2f} (non-monotonic); check that the film is "
+            "fixed and that time and bend belong together"
+        )
+
+
+def polarity(samples: Samples) -> Literal[-1, 1]:
+    """+1 if readings rise with the bend."""
+    return 1 if float((samples.bend - samples.bend.mean()) @ samples.counts) >= 0 else -1
+
+
+def curve(z: Floats, slope: float, midpoint: float) -> Floats:
+    """The sigmoid of signed normalised readings."""
+    return 1.0 / (1.0 + np.exp(-np.clip(slope * (z - midpoint), -700.0, 700.0)))
+
+
+def fit_sigmoid(x: Floats, bend: Floats, sign: int) -> tuple[float, float]:
+    """Slope and midpoint of the least squared error of b.
+
+    Args:
+        x: Normalised readings, shape (n,).
+        bend: Bends, shape (n,).
+        sign: Polarity.
+    """
+    z = sign * x
+    start = (np.log(8.0), float(np.interp(0.5, *_sorted(bend, z))))
+
+    def error(p: Floats) -> Floats:
+        return curve(z, float(np.exp(p[0])), float(p[1])) - bend
+
+    found = least_squares(error, start, bounds=([-5.0, -3.0], [np.log(1000.0), 3.0])).x
+    return float(np.exp(found[0])), sign * float(found[1])
+
+
+def _sorted(by: Floats, other: Floats) -> tuple[Floats, Floats]:
+    order = np.argsort(by, kind="stable")
+    return by[order], other[order]
+
+
+def fit(
+    samples: Samples,
+    sensor_id: str,
+    data_sha256: str,
+    threshold: float = 0.5,
+    full_scale: bool = False,
+    least_r2: float = 0.5,
+    draws: int = 500,
+    seed: int = 0,
+) -> Calibration:
+    """Calibrate.
+
+    Args:
+        samples: The data.
+        sensor_id: Name of the film, of letters, digits, dots, hyphens and underscores.
+        data_sha256: Hash of the recording.
+        threshold: Bending level that counts as contact.
+        full_scale: Normalise readings by the converter's 0 to 4095 and not by the recording's ends.
+        least_r2: A worse fit is refused.
+        draws: Bootstrap draws.
+        seed: Seed of the bootstrap.
+
+    Raises:
+        CalibrationError: The data cannot be calibrated, or the sigmoid does not fit them.
+    """
+    check(samples)
+    sign = polarity(samples)
+    low, high = (0.0, 4095.0) if full_scale else _ends(samples)
+    x = (samples.counts - low) / (high - low)
+    slope, midpoint = fit_sigmoid(x, samples.bend, sign)
+    predicted = curve(sign * x, slope, sign * midpoint)
+    r2 = _r2(predicted, samples.bend)
+    if r2 < least_r2 or not -1 < midpoint < 2 or slope >= 999:
+        raise CalibrationError(
+            f"expected a sigmoid that explains at least {100 * least_r2:.0f} % of the bend, found "
+            f"{100 * r2:.0f} % with slope {slope:.3g} and midpoint {midpoint:.3g}; "
+            "check that time and bend belong together"
+        )
+    slopes, midpoints = _bootstrap(samples, x, sign, draws, seed)
+    errors = cross_validate(samples, x, sign)
+    rmse = {model: float(np.sqrt(np.mean(e**2))) for model, e in errors.items()}
+    return Calibration(
+        made_by=f"antennate {__version__}",
+        sensor_id=sensor_id,
+        data_sha256=data_sha256,
+        polarity=sign,
+        slope=slope,
+        slope_95=slopes,
+        midpoint=midpoint,
+        midpoint_95=midpoints,
+        counts_low=low,
+        counts_high=high,
+        threshold=threshold,
+        valid_counts=(float(samples.counts.min()), float(samples.counts.max())),
+        valid_bend=(float(samples.bend.min()), float(samples.bend.max())),
+        samples=len(x),
+        trials=len(np.unique(samples.trial)),
+        r2=r2,
+        rmse=_rmse(predicted, samples.bend),
+        speeds=tuple(_per_speed(samples, predicted)),
+        cross_validated_rmse=rmse,  # pyright: ignore[reportArgumentType]
+        better_than_sigmoid=_better(errors),
+    )
+
+
+def _ends(samples: Samples) -> tuple[float, float]:
+    """Readings that normalise to 0 and 1: the outermost ones, a few outliers apart."""
+    low, high = np.percentile(samples.counts, [0.5, 99.5])
+    return float(low), float(high)
+
+
+def _r2(predicted: Floats, bend: Floats) -> float:
+    spread = ((bend - bend.mean()) ** 2).sum()
+    return float(1.0 - ((predicted - bend) ** 2).sum() / spread) if spread > 0 else 0.0
+
+
+def _rmse(predicted: Floats, bend: Floats) -> float:
+    return float(np.sqrt(np.mean((predicted - bend) ** 2)))
+
+
+def _per_speed(samples: Samples, predicted: Floats) -> list[SpeedFit]:
+    keys = np.where(np.isnan(samples.speed), -1.0, samples.speed)
+    found = []
+    for speed in np.unique(keys).tolist():
+        here = keys == speed
+        found.append(
+            SpeedFit(
+                speed_m_s=None if speed < 0 else speed,
+                samples=int(here.sum()),
+                r2=_r2(predicted[here], samples.bend[here]),
+                rmse=_rmse(predicted[here], samples.bend[here]),
+            )
+        )
+    return found
+
+
+def _groups(samples: Samples) -> list[Ints]:
+    """What belongs together: trials, or blocks of a single one."""
+    trials = np.unique(samples.trial)
+    if len(trials) >= 3:
+        return [np.flatnonzero(samples.trial == trial) for trial in trials]
+    return [b for b in np.array_split(np.arange(len(samples.counts)), 10) if len(b)]
+
+
+def _bootstrap(
+    samples: Samples, x: Floats, sign: int, draws: int, seed: int
+) -> tuple[tuple[float, float], tuple[float, float]]:
+    """95 % intervals of slope and midpoint over whole trials drawn anew."""
+    groups, rng = _groups(samples), np.random.default_rng(seed)
+    found = []
+    for _ in range(draws):
+        rows = np.concatenate([groups[i] for i in rng.integers(0, len(groups), len(groups))])
+        found.append(fit_sigmoid(x[rows], samples.bend[rows], sign))
+    low, high = np.percentile(np.array(found), [2.5, 97.5], axis=0)
+    return (float(low[0]), float(high[0])), (float(low[1]), float(high[1]))
+
+
+def cross_validate(samples: Samples, x: Floats, sign: int) -> dict[str, Floats]:
+    """Root mean squared error of each model on groups it has not seen, shape (folds,)."""
+    groups = _groups(samples)
+    folds = [np.concatenate(part) for part in _deal(groups, 10)]
+    errors: dict[str, list[float]] = {model: [] for model in MODELS}
+    for held in folds:
+        rest = np.setdiff1d(np.arange(len(x)), held)
+        for model in MODELS:
+            predicted = _predict(model, x[rest], samples.bend[rest], x[held], sign)
+            errors[model].append(_rmse(predicted, samples.bend[held]))
+    return {model: np.array(e) for model, e in errors.items()}
+
+
+def _deal(groups: list[Ints], hands: int) -> list[list[Ints]]:
+    return [groups[i::hands] for i in range(min(hands, len(groups)))]
+
+
+def _predict(model: str, x: Floats, bend: Floats, at: Floats, sign: int) -> Floats:
+    if model == "sigmoid":
+        slope, midpoint = fit_sigmoid(x, bend, sign)
+        return curve(sign * at, slope, sign * midpoint)
+    if model == "line":
+        straight = np.polyval(np.polyfit(x, bend, 1), at)
+        return np.asarray(np.clip(straight, 0.0, 1.0), dtype=np.float64)
+    z, b = _sorted(sign * x, bend)
+    return np.asarray(np.interp(sign * at, z, isotonic_regression(b).x), dtype=np.float64)
+
+
+def _better(errors: dict[str, Floats]) -> tuple[Literal["line", "isotonic"], ...]:
+    """Models whose error is smaller than the sigmoid's by more than one standard error."""
+    found: list[Literal["line", "isotonic"]] = []
+    for model in ("line", "isotonic"):
+        gain = errors["sigmoid"] - errors[model]
+        if len(gain) > 1 and gain.mean() > gain.std(ddof=1) / np.sqrt(len(gain)):
+            found.append(model)
+    return tuple(found)

@@ -1,0 +1,165 @@
+"""Flex of the antenna to 12-bit counts: film, voltage divider, ESP32 converter.
+
+`counts` is the static curve. A real film also remembers: `SensorChain` adds hysteresis and creep of
+the bend it feels, both with the static curve as their mean.
+
+- Film: `flex`, resistance R0 (1 + a bend); or `fsr`, a pressure strip whose conductance rises in
+  proportion to the bend. It is the upper half of a divider, so counts fall with bending for `flex`
+  and rise for `fsr`.
+- Hysteresis: play operators (Prandtl-Ishlinskii). A play of half width r follows its input once the
+  slack is used up. Weights w and half widths r make a loop of the width 2 sum(w r).
+- Creep: a share c of the response follows with a time constant (Prony series).
+- Converter: the manufacturer's line fit at 11 dB up to 2880 counts and its table above; what is
+  below the line's offset reads zero.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from antennate.robots.sensor import (
+    CONVERTER_AT_1_0_V,
+    CONVERTER_AT_1_2_V,
+    CONVERTER_LINE_END,
+    CONVERTER_OFFSET,
+    CONVERTER_SLOPE,
+    CONVERTER_STEP,
+    SensorParams,
+)
+from antennate.types import Bools, Floats, Ints
+
+FULL_SCALE = 4095
+RIGHT_ANGLE = math.pi / 2
+"""The bend to which hysteresis and the pressed resistance refer [rad]."""
+
+_PLAY_SHARES = (0.25, 0.6, 1.0)
+"""Half widths of the play operators over the widest one."""
+_PLAY_WEIGHT = 0.2
+"""Weight of each; what is left follows at once."""
+
+
+def bend(params: SensorParams, flex: Floats) -> Floats:
+    """Bend that the film feels [rad], at least 0, same shape as flex [rad]."""
+    return np.abs(flex) if params.directions == "both" else np.maximum(flex, 0.0)
+
+
+def resistance(params: SensorParams, felt: Floats) -> Floats:
+    """Resistance of the film [Ohm] under a bend of at least 0 [rad], same shape."""
+    if params.kind == "flex":
+        return params.flat_resistance * (1.0 + params.bend_gain * felt)
+    idle, pressed = 1.0 / params.unloaded_resistance, 1.0 / params.pressed_resistance
+    return 1.0 / (idle + (pressed - idle) * felt / RIGHT_ANGLE)
+
+
+def divider(params: SensorParams, film: Floats) -> Floats:
+    """Voltage [V] over the fixed resistor below a film of this resistance [Ohm], same shape."""
+    return params.supply * params.divider_resistance / (film + params.divider_resistance)
+
+
+def transfer_curve(params: SensorParams) -> tuple[Floats, Floats]:
+    """Corners of the converter's curve: voltages [V] and readings [counts], both rising."""
+    share = (params.reference - 1.0) / 0.2
+    low, high = np.array(CONVERTER_AT_1_0_V), np.array(CONVERTER_AT_1_2_V)
+    table = 1e-3 * (low + share * (high - low))
+    line_end = CONVERTER_OFFSET + CONVERTER_SLOPE * params.reference * CONVERTER_LINE_END
+    volts = np.concatenate([[CONVERTER_OFFSET, line_end], table[1:]])
+    readings = CONVERTER_LINE_END + CONVERTER_STEP * np.arange(len(table))
+    return volts, np.concatenate([[0.0], readings])
+
+
+def counts(params: SensorParams, flex: Floats, noise: Floats | float = 0.0) -> Floats:
+    """Static reading [counts] at flex [rad]; noise [counts] comes before rounding and clipping."""
+    volts, readings = transfer_curve(params)
+    return _read(divider(params, resistance(params, bend(params, flex))), noise, volts, readings)
+
+
+def _read(voltage: Floats, noise: Floats | float, volts: Floats, readings: Floats) -> Floats:
+    exact = np.interp(voltage, volts, readings)
+    return np.minimum(np.maximum(np.rint(exact + noise), 0.0), FULL_SCALE)
+
+
+def reading_noise(params: SensorParams, rng: np.random.Generator, shape: tuple[int, ...]) -> Floats:
+    """Noise of readings [counts]: each is a mean of samples with common noise and spikes."""
+    noise = rng.normal(0.0, params.noise_counts, shape)
+    spikes = rng.binomial(params.oversampling, params.outlier_share, shape)
+    up = rng.binomial(spikes, 0.5)
+    return noise + params.outlier_counts * (2 * up - spikes) / params.oversampling
+
+
+class SensorChain:
+    """Films with memory, sampled at a steady rate.
+
+    Args:
+        params: The chain.
+        shape: Shape of the films, such as (B, 2).
+        period: Time between samples [s].
+    """
+
+    def __init__(self, params: SensorParams, shape: tuple[int, ...], period: float) -> None:
+        self._params = params
+        widest = params.hysteresis * RIGHT_ANGLE / (2.0 * _PLAY_WEIGHT * sum(_PLAY_SHARES))
+        tail = (1,) * len(shape)
+        self._slack: Floats = widest * np.array(_PLAY_SHARES).reshape(-1, *tail)
+        late = np.array(params.creep).reshape(-1, *tail)
+        self._late: Floats = late
+        self._prompt = 1.0 - float(late.sum())
+        self._pace: Floats = -np.expm1(-period / np.array(params.creep_time)).reshape(-1, *tail)
+        self._play: Floats = np.zeros((len(_PLAY_SHARES), *shape))
+        self._crept: Floats = np.zeros((len(params.creep), *shape))
+        self._volts, self._readings = transfer_curve(params)
+
+    def reset(self, rows: int | Ints | Bools) -> None:
+        """Let some rows of films forget: straight for long."""
+        self._play[:, rows] = 0.0
+        self._crept[:, rows] = 0.0
+
+    def step(self, flex: Floats, noise: Floats | float = 0.0) -> Floats:
+        """Sample all films once.
+
+        Args:
+            flex: Summed hinge angles under each film [rad], the shape given.
+            noise: Added before rounding and clipping [counts].
+
+        Returns:
+            Readings [counts], same shape.
+        """
+        felt = self.felt(bend(self._params, flex))
+        return _read(
+            divider(self._params, resistance(self._params, felt)),
+            noise,
+            self._volts,
+            self._readings,
+        )
+
+    def felt(self, bent: Floats) -> Floats:
+        """Bend with memory [rad], at least 0, after a sample of the true bend [rad]."""
+        self._play = np.maximum(bent - self._slack, np.minimum(bent + self._slack, self._play))
+        share = 1.0 - _PLAY_WEIGHT * len(_PLAY_SHARES)
+        slack = share * bent + _PLAY_WEIGHT * self._play.sum(axis=0)
+        self._crept += self._pace * (slack - self._crept)
+        return np.maximum(self._prompt * slack + (self._late * self._crept).sum(axis=0), 0.0)
+
+
+def best_divider(
+    params: SensorParams, largest_flex: float, candidates: Floats
+) -> tuple[float, Floats]:
+    """The fixed resistor that spreads readings farthest between straight and bent.
+
+    Args:
+        params: The chain; its own divider is not looked at.
+        largest_flex: The bend to be told apart from none [rad].
+        candidates: Resistors to choose from [Ohm], shape (n,).
+
+    Returns:
+        The best of them [Ohm] and the spread of each [counts], shape (n,).
+    """
+    ends = np.array([0.0, largest_flex])
+    spread = np.array(
+        [
+            abs(np.diff(counts(params.model_copy(update={"divider_resistance": r}), ends))[0])
+            for r in candidates.tolist()
+        ]
+    )
+    return float(candidates[int(np.argmax(spread))]), spread

@@ -1,0 +1,223 @@
+"""Statics of a chain of torsion springs under one point load, at any angle, bent as far as it goes.
+
+Hinge j turns by q_j against its spring k_j; link i points along u_i = (cos, sin) of the sum of the
+hinge angles up to it. A load F at distance s from the base acts on a point p(q), and at rest
+
+    k_j q_j = F . dp/dq_j,    dp/dq_j = sum over i >= j of d_i (-sin, cos)_i,
+
+where d_i is how much of link i lies before the load. Both this and its derivative are closed forms;
+Newton's method with a load that grows in steps follows the branch that begins straight. Loads are
+solved side by side over a leading batch axis.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from antennate.robots.antenna import AntennaParams
+from antennate.robots.sensor import SensorParams
+from antennate.types import Bools, Floats, Ints
+
+PROFILES: dict[str, tuple[float, ...] | None] = {
+    "stiff": (3, 3, 3, 3, 3, 3),
+    "descending": (3, 6, 6, 9, 9, 9),
+    "compliant": (9, 9, 9, 9, 9, 9),
+    "matched_uniform": None,
+    "ascending": (9, 9, 9, 6, 6, 3),
+}
+"""Active coils, base to tip. `matched_uniform` has six equal springs, wound so that its tip is as
+compliant as that of `descending`; it and `ascending` are controls that the paper lacks."""
+
+_LOAD_STEPS = 24
+_ITERATIONS = 40
+_TOLERANCE = 1e-10
+"""Residual torque over stiffness at which a load counts as solved [rad]."""
+_LARGEST_STEP = 0.3
+"""Most that one Newton step turns a hinge [rad]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Chain:
+    """A chain of links on hinges with torsion springs, straight along +x when unloaded.
+
+    Attributes:
+        lengths: Link lengths, base to tip [m], shape (n,).
+        stiffness: Spring of the hinge at the base of each link [N·m/rad], shape (n,).
+    """
+
+    lengths: Floats
+    stiffness: Floats
+
+    @classmethod
+    def of(cls, antenna: AntennaParams, sensor: SensorParams) -> Chain:
+        """The six springs of an antenna, stiffened by the film where it lies."""
+        stiffness = antenna.hinge_stiffness(sensor.covered_hinges(antenna))
+        return cls(np.full(len(stiffness), antenna.link_length), np.array(stiffness))
+
+    @property
+    def starts(self) -> Floats:
+        """Distance of each hinge from the base along the straight chain [m], shape (n,)."""
+        return np.concatenate([[0.0], np.cumsum(self.lengths)[:-1]])
+
+    @property
+    def length(self) -> float:
+        """Length [m]."""
+        return float(self.lengths.sum())
+
+
+@dataclass(frozen=True, slots=True)
+class Rest:
+    """A batch of loaded chains at rest.
+
+    Attributes:
+        angles: Hinge angles [rad], shape (m, n).
+        force: The load in the frame of the base [N], shape (m, 2); it turned with its link if it
+            was a follower.
+        solved: Whether equilibrium was found on the branch that begins straight, shape (m,).
+        stable: Whether that equilibrium is a minimum of the potential energy, shape (m,); a
+            follower load has no potential, and is judged by the same matrix.
+    """
+
+    angles: Floats
+    force: Floats
+    solved: Bools
+    stable: Bools
+
+
+def equilibrium(chain: Chain, place: Floats, force: Floats, follower: bool = False) -> Rest:
+    """Bend a chain by point loads.
+
+    Args:
+        chain: The chain.
+        place: Distance of each load from the base along the chain [m], shape (m,).
+        force: Loads [N], shape (m, 2), x along the straight chain. Fixed in direction, or, for a
+            follower, given in the frame of the loaded link: (0, f) is normal to it.
+        follower: Whether loads turn with their links.
+
+    Raises:
+        ValueError: A place lies off the chain, or the shapes do not fit.
+    """
+    place, force = np.asarray(place, float), np.asarray(force, float)
+    if place.ndim != 1 or force.shape != (len(place), 2):
+        raise ValueError(
+            f"expected places (m,) and loads (m, 2), found {place.shape} and {force.shape}"
+        )
+    if not ((place > 0) & (place <= chain.length * (1 + 1e-12))).all():
+        raise ValueError(f"expected places above 0 and up to {chain.length:g} m, found {place}")
+    arms = np.clip(place[:, None] - chain.starts, 0.0, chain.lengths)
+    loaded: Ints = np.count_nonzero(arms, axis=1) - 1
+    angles = np.zeros((len(place), len(chain.lengths)))
+    residual = angles
+    for share in np.arange(1, _LOAD_STEPS + 1) / _LOAD_STEPS:
+        for _ in range(_ITERATIONS):
+            residual, slope = _balance(chain, arms, loaded, share * force, angles, follower)
+            step = np.linalg.solve(slope, residual[..., None])[..., 0]
+            largest = abs(step).max(axis=1, keepdims=True)
+            angles = angles - step * np.minimum(1.0, _LARGEST_STEP / np.maximum(largest, 1e-300))
+            if (abs(residual) < _TOLERANCE * chain.stiffness).all():
+                break
+    residual, slope = _balance(chain, arms, loaded, force, angles, follower)
+    solved = np.all(abs(residual) < 100 * _TOLERANCE * chain.stiffness, axis=1)
+    symmetric = (slope + slope.swapaxes(1, 2)) / 2
+    stable = np.linalg.eigvalsh(symmetric)[:, 0] > 0
+    return Rest(angles, _turned(force, angles, loaded) if follower else force, solved, stable)
+
+
+def _balance(
+    chain: Chain, arms: Floats, loaded: Ints, force: Floats, angles: Floats, follower: bool
+) -> tuple[Floats, Floats]:
+    """Residual k q - F.dp/dq, shape (m, n), and its derivative, shape (m, n, n)."""
+    world = _turned(force, angles, loaded) if follower else force
+    along, across = _reach(arms, angles, world)
+    residual = chain.stiffness * angles - across
+    n = len(chain.lengths)
+    later = np.maximum.outer(np.arange(n), np.arange(n))
+    slope = np.diag(chain.stiffness) + along[:, later]
+    if follower:
+        normal = np.stack([-world[:, 1], world[:, 0]], axis=1)
+        turning = _reach(arms, angles, normal)[1]
+        before = np.arange(n) <= loaded[:, None]
+        slope = slope - turning[:, :, None] * before[:, None, :]
+    return residual, slope
+
+
+def _reach(arms: Floats, angles: Floats, force: Floats) -> tuple[Floats, Floats]:
+    """Sums over i >= j of d_i F.u_i and of d_i F.(-sin, cos)_i, each of shape (m, n)."""
+    heading = np.cumsum(angles, axis=1)
+    cosine, sine = np.cos(heading), np.sin(heading)
+    fx, fy = force[:, :1], force[:, 1:]
+    along = arms * (fx * cosine + fy * sine)
+    across = arms * (fy * cosine - fx * sine)
+    return _from_here(along), _from_here(across)
+
+
+def _from_here(values: Floats) -> Floats:
+    return np.cumsum(values[:, ::-1], axis=1)[:, ::-1]
+
+
+def _turned(force: Floats, angles: Floats, loaded: Ints) -> Floats:
+    """Loads given in the frame of their links, in the frame of the base."""
+    heading = np.cumsum(angles, axis=1)[np.arange(len(loaded)), loaded]
+    c, s = np.cos(heading), np.sin(heading)
+    return np.stack([c * force[:, 0] - s * force[:, 1], s * force[:, 0] + c * force[:, 1]], axis=1)
+
+
+def shape(chain: Chain, angles: Floats) -> Floats:
+    """Positions of the hinges and the tip [m], shape (m, n + 1, 2), for angles (m, n) [rad]."""
+    heading = np.cumsum(angles, axis=1)
+    steps = chain.lengths[:, None] * np.stack([np.cos(heading), np.sin(heading)], axis=-1)
+    origin = np.zeros((len(angles), 1, 2))
+    return np.concatenate([origin, np.cumsum(steps, axis=1)], axis=1)
+
+
+def torque(chain: Chain, angles: Floats) -> Floats:
+    """Torque of each spring [N·m], same shape as angles [rad]."""
+    return chain.stiffness * angles
+
+
+def tip_compliance(chain: Chain) -> float:
+    """Sideways give of the tip under a small load there [m/N]: sum of (L - s_i)^2 / k_i."""
+    return float(((chain.length - chain.starts) ** 2 / chain.stiffness).sum())
+
+
+def uniform_beam(length: float, bending_stiffness: float, count: int) -> Chain:
+    """A straight beam cut into `count` links, each of which bends in its middle.
+
+    Args:
+        length: Length of the beam [m].
+        bending_stiffness: E I [N·m²].
+        count: Number of pieces; the first half piece is rigid.
+    """
+    piece = length / count
+    lengths = np.full(count, piece)
+    lengths[-1] = piece / 2
+    return Chain(lengths, np.full(count, bending_stiffness / piece))
+
+
+def with_profile(antenna: AntennaParams, sensor: SensorParams, profile: str) -> AntennaParams:
+    """The antenna with the springs of a named profile.
+
+    Raises:
+        ValueError: There is no such profile.
+    """
+    if profile not in PROFILES:
+        raise ValueError(f"expected a profile of {', '.join(PROFILES)}, found {profile}")
+    coils = PROFILES[profile] or (_matched_coils(antenna, sensor),) * 6
+    return AntennaParams.model_validate(antenna.model_dump() | {"active_coils": coils})
+
+
+def _matched_coils(antenna: AntennaParams, sensor: SensorParams) -> float:
+    """Coils of six equal springs with the tip compliance of `descending`, by bisection."""
+    wanted = tip_compliance(Chain.of(with_profile(antenna, sensor, "descending"), sensor))
+    low, high = 0.1, 100.0
+    while high - low > 1e-12 * high:
+        middle = math.sqrt(low * high)
+        uniform = antenna.model_copy(update={"active_coils": (middle,) * 6})
+        if tip_compliance(Chain.of(uniform, sensor)) < wanted:
+            low = middle
+        else:
+            high = middle
+    return low

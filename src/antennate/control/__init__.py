@@ -1,0 +1,1 @@
+"""From readings to joint targets: conditioning, contact, decision, gait, and the one loop."""

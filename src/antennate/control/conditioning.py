@@ -1,0 +1,57 @@
+"""Counts to the bending level b in [0, 1]: a running mean over T_avg, then one sigmoid.
+
+A sample that is not finite makes its side NaN until the window has passed it: a side that cannot be
+trusted says so, and contact.py turns that into UNKNOWN.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from antennate.params import ConditioningParams
+from antennate.types import Bools, Floats, Ints
+
+
+def bending_level(params: ConditioningParams, counts: Floats) -> Floats:
+    """Sigmoid calibration, b = 1 / (1 + exp(-s k (x - x0))), s the polarity of the reading x.
+
+    Args:
+        params: Slope k, midpoint x0, polarity and normalisation.
+        counts: Readings [counts], any shape; NaN passes through.
+
+    Returns:
+        b in [0, 1], same shape.
+    """
+    x = (counts - params.counts_low) / (params.counts_high - params.counts_low)
+    z = np.minimum(
+        np.maximum(params.polarity * params.slope * (x - params.midpoint), -700.0), 700.0
+    )
+    return 1.0 / (1.0 + np.exp(-z))
+
+
+def deflection(params: ConditioningParams, counts: Floats) -> Floats:
+    """Normalised reading from the straight antenna on: 0 straight, 1 fully bent, same shape."""
+    x = (counts - params.counts_low) / (params.counts_high - params.counts_low)
+    return x if params.polarity > 0 else 1.0 - x
+
+
+class RunningMean:
+    """Mean of the last T_avg of counts, per row and side; of what there is while it fills."""
+
+    def __init__(self, params: ConditioningParams, batch: int, period: float) -> None:
+        self.length = max(1, round(params.averaging_time / period))
+        self._ring: Floats = np.zeros((self.length, batch, 2))
+        self._seen: Ints = np.zeros(batch, dtype=np.int64)
+        self._next = 0
+
+    def reset(self, rows: Ints | Bools) -> None:
+        """Forget what some rows have seen."""
+        self._seen[rows] = 0
+        self._ring[:, rows] = 0.0
+
+    def step(self, counts: Floats) -> Floats:
+        """Take one reading, shape (B, 2) [counts], and return the mean, same shape."""
+        self._ring[self._next] = np.where(np.isfinite(counts), counts, np.nan)
+        self._next = (self._next + 1) % self.length
+        self._seen = np.minimum(self._seen + 1, self.length)
+        return self._ring.sum(axis=0) / self._seen[:, None]

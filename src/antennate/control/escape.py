@@ -1,0 +1,114 @@
+"""What to do when stuck: back off, turn to one side, and to the other if that fails.
+
+The first turn goes away from the side that was touched more while walking, before it got stuck:
+what it feels since then says little about where the passage goes on. If the robot is stuck again
+soon after, it turns the other way and farther, past its first course: alternating like this, it
+searches both sides.
+
+A wrong turn can still lead back out of a passage. Whoever has turned and then touches nothing at
+all for a while has lost the walls: the robot turns round, back to where it last felt them.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from antennate.params import EscapeParams
+from antennate.robots.anatomy import LEFT, RIGHT
+from antennate.types import Bools, Floats, Ints, Maneuver
+
+
+class Escape:
+    """The state of one escape per row: what it does, until when, and which way it turned last."""
+
+    def __init__(self, params: EscapeParams, batch: int, period: float) -> None:
+        self._params = params
+        self._memory_gain = period / params.memory_time
+        self.maneuver: Ints = np.full(batch, int(Maneuver.FORWARD))
+        self._until: Floats = np.zeros(batch)
+        self._ended: Floats = np.full(batch, -np.inf)
+        self._right: Bools = np.zeros(batch, dtype=bool)
+        self._again: Bools = np.zeros(batch, dtype=bool)
+        self._turned: Bools = np.zeros(batch, dtype=bool)
+        self._felt: Floats = np.zeros(batch)
+        delay = max(1, round(params.memory_delay / period))
+        self._past: Floats = np.zeros((delay, batch, 2))
+        self._ticks = 0
+        self.touch: Floats = np.zeros((batch, 2))
+
+    def reset(self, rows: Ints | Bools) -> None:
+        """Some rows begin anew, walking, with no memory."""
+        self.maneuver[rows] = Maneuver.FORWARD
+        self._ended[rows] = -np.inf
+        self._turned[rows] = False
+        self._past[:, rows] = 0.0
+        self.touch[rows] = 0.0
+
+    def step(self, t: Floats, b: Floats, stuck: Bools, pressed: Bools) -> Ints:
+        """The maneuver of every row.
+
+        Args:
+            t: Time [s], shape (B,).
+            b: Bending levels, shape (B, 2); a row with NaN answers HOLD and keeps its state.
+            stuck: Rows found stuck, shape (B,).
+            pressed: Rows that feel anything at all, shape (B,).
+
+        Returns:
+            One `Maneuver` a row, shape (B,).
+        """
+        known = ~np.isnan(b).any(axis=1)
+        walking = known & (self.maneuver == int(Maneuver.FORWARD))
+        self.touch += np.where(walking[:, None], b - self.touch, 0.0) * self._memory_gain
+        before = self._remember()
+        self._felt = np.where(walking & ~pressed, self._felt, t)
+        over = known & ~walking & (t >= self._until)
+        if over.any():
+            backed = over & (self.maneuver == int(Maneuver.REVERSE))
+            self._to(over & ~backed, int(Maneuver.FORWARD), t)
+            self._turn(backed, t)
+        stuck = walking & stuck
+        if stuck.any():
+            self._back_off(stuck, before, t)
+        lost = walking & self._turned & (t - self._felt > self._params.lost_time)
+        if lost.any():
+            self._return(lost, t)
+        return np.where(known, self.maneuver, int(Maneuver.HOLD))
+
+    def _to(self, rows: Bools, maneuver: Ints | int, until: Floats) -> None:
+        self.maneuver = np.where(rows, maneuver, self.maneuver)
+        self._until = np.where(rows, until, self._until)
+
+    def _remember(self) -> Floats:
+        """Keep the memory of touch; return that of memory_delay ago, if it reaches so far."""
+        at = self._ticks % len(self._past)
+        self._ticks += 1
+        before = self._past[at].copy()
+        self._past[at] = self.touch
+        young = (before == 0.0).all(axis=1, keepdims=True)
+        return np.where(young, self.touch, before)
+
+    def _back_off(self, rows: Bools, touch: Floats, t: Floats) -> None:
+        params = self._params
+        again = (t - self._ended < params.retry_time) & params.alternate
+        away = touch[:, LEFT] >= touch[:, RIGHT]
+        if params.first_turn == "right":
+            away = np.ones_like(away)
+        self._right = np.where(rows, np.where(again, ~self._right, away), self._right)
+        self._again = np.where(rows, again, self._again)
+        self._to(rows, int(Maneuver.REVERSE), t + params.reverse_time)
+
+    def _turn(self, rows: Bools, t: Floats) -> None:
+        until = t + self._params.turn_time * np.where(self._again, self._params.second_turn, 1.0)
+        self._to(rows, _turn_to(self._right), until)
+        self._ended = np.where(rows, until, self._ended)
+        self._turned |= rows
+
+    def _return(self, rows: Bools, t: Floats) -> None:
+        """Turn round, unwinding the last turn, and remember it no longer."""
+        self._to(rows, _turn_to(~self._right), t + self._params.return_time)
+        self._ended = np.where(rows, -np.inf, self._ended)
+        self._turned &= ~rows
+
+
+def _turn_to(right: Bools) -> Ints:
+    return np.where(right, int(Maneuver.TURN_R), int(Maneuver.TURN_L))

@@ -1,0 +1,95 @@
+"""Maneuver and phase to joint targets.
+
+The body carries the serpenoid wave of the paper, alpha_j = A sin(2 pi xi j / 5 - P + delta) +
+offset
+with P the gait phase: as P grows the crest travels from head to tail and the robot advances. Leg i
+turns with P - 2 pi xi i / 6, the right one half a turn later. The lead delta of the body over the
+legs decides the speed: it is best where the feet are down on the side towards which the body bends.
+
+A positive offset bends every joint to the right-hand turn: joint j rotates the rear link against
+the front one, so the head points right of the tail.
+
+The antenna bases sweep by themselves, both alike: theta0 + A sin S, with S growing by 2 pi f a
+second in every maneuver but HOLD.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+
+import numpy as np
+
+from antennate.params import GaitParams
+from antennate.robots.anatomy import LINK_COUNT, YAW_COUNT
+from antennate.types import Bools, Floats, Ints, JointCommand
+
+_DIRECTION = np.array([1.0, 1.0, 1.0, -1.0, 0.0])
+"""Sense in which the phase runs in each maneuver: REVERSE runs body and legs backwards."""
+_STEER = np.array([0.0, -1.0, 1.0, 0.0, 0.0])
+"""Sign of the yaw offset in each maneuver."""
+_STEERS = np.array([1.0, 1.0, 1.0, 1.0, 0.0])
+"""Whether offset and antennae move in each maneuver."""
+_SIDES = np.array([0.0, math.pi])
+
+
+@lru_cache
+def _lags(wave_number: float, body_phase: float) -> tuple[Floats, Floats]:
+    """Phase of each yaw joint and lag of each link [rad], shapes (5,) and (6,)."""
+    lag = 2.0 * math.pi * wave_number
+    joints = lag * np.arange(1, YAW_COUNT + 1) / YAW_COUNT + body_phase
+    return joints, lag * np.arange(LINK_COUNT) / LINK_COUNT
+
+
+def targets(
+    params: GaitParams, phase: Floats, offset: Floats, sweep: Floats | None = None
+) -> JointCommand:
+    """Joint targets at a gait phase.
+
+    Args:
+        params: Wave and timing of the gait.
+        phase: Gait phase P [rad], shape (B,), unwrapped.
+        offset: Yaw offset [rad], shape (B,); positive turns right.
+        sweep: Phase S of the antenna bases [rad], shape (B,); 0 if absent.
+    """
+    joints, links = _lags(params.wave_number, params.body_phase)
+    yaw = params.amplitude * np.sin(joints - phase[:, None]) + offset[:, None]
+    leg = (phase[:, None] - links)[:, :, None] + _SIDES
+    antenna = np.full((phase.shape[0], 2), params.antenna_mean)
+    if sweep is not None:
+        antenna += params.antenna_amplitude * np.sin(sweep)[:, None]
+    return JointCommand(yaw=yaw, leg=leg, antenna=antenna)
+
+
+class Gait:
+    """The gait's memory: phases and offset. They are continuous whatever the maneuvers."""
+
+    def __init__(self, params: GaitParams, batch: int, period: float) -> None:
+        self.params = params
+        self.phase: Floats = np.zeros(batch)
+        self.offset: Floats = np.zeros(batch)
+        self.sweep: Floats = np.zeros(batch)
+        self._advance = 2.0 * math.pi * params.frequency * period
+        self._slew = params.offset_rate * period
+        self._swing = 2.0 * math.pi * params.antenna_frequency * period
+
+    def reset(self, rows: Ints | Bools, phase: Floats | float = 0.0) -> None:
+        """Start some rows anew at the given phase [rad], straight, antennae in the middle."""
+        self.phase[rows] = phase
+        self.sweep[rows] = 0.0
+        self.offset[rows] = 0.0
+
+    def step(self, maneuver: Ints, turn_offset: Floats | float | None = None) -> JointCommand:
+        """Advance one control period and return the targets.
+
+        Args:
+            maneuver: One `Maneuver` a row, shape (B,). HOLD keeps the command.
+            turn_offset: Yaw offset of the turns [rad], the gait's own if absent.
+        """
+        size = self.params.turn_offset if turn_offset is None else turn_offset
+        change = _STEER[maneuver] * size - self.offset
+        change = np.minimum(np.maximum(change, -self._slew), self._slew)
+        self.offset += change * _STEERS[maneuver]
+        self.phase += _DIRECTION[maneuver] * self._advance
+        self.sweep += _STEERS[maneuver] * self._swing
+        return targets(self.params, self.phase, self.offset, self.sweep)

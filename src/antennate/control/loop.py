@@ -1,0 +1,52 @@
+"""The one loop: read, decide, write, wait for the next tick. There is no other."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Protocol
+
+from antennate.types import AntennaFrame, JointCommand, Robot
+
+_ROUNDING = 1e-6
+
+
+class Controller(Protocol):
+    """Anything that turns a frame into a command."""
+
+    def step(self, frame: AntennaFrame) -> JointCommand:
+        """The joint targets for this tick."""
+        ...
+
+
+def run_loop(
+    body: Robot,
+    control: Controller,
+    period: float,
+    go_on: Callable[[AntennaFrame, JointCommand], bool],
+) -> int:
+    """Run until `go_on` says no.
+
+    The n-th tick is due at start + n * period: an overrun delays one tick and shifts none after it.
+    Ticks that have come due meanwhile are left out, never made up for in a burst.
+
+    Args:
+        body: The world.
+        control: The controller.
+        period: Control period [s].
+        go_on: Called after each write with what was read and written; False ends the loop.
+
+    Returns:
+        Number of ticks run.
+    """
+    start = body.clock.now()
+    ticks = due = 0
+    while True:
+        frame = body.read()
+        command = control.step(frame)
+        body.write(command)
+        ticks += 1
+        if not go_on(frame, command):
+            return ticks
+        due = max(due + 1, math.ceil((body.clock.now() - start) / period - _ROUNDING))
+        body.clock.sleep_until(start + due * period)

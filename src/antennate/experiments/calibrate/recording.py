@@ -1,0 +1,240 @@
+"""Recordings of a pushed antenna: CSV with declared columns and units, in and out."""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+import io
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from antennate.antenna.fitting import Samples
+from antennate.errors import CalibrationError
+from antennate.params import Params
+from antennate.params.base import number
+from antennate.types import Floats, Ints
+
+TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6}
+BEND_UNITS = {"1": 1.0, "rad": 1.0, "deg": math.pi / 180.0, "m": 1.0, "mm": 1e-3}
+_LARGEST_BEND = {"1": 1.05, "rad": 2 * math.pi, "deg": 360.0, "m": 1.0, "mm": 1000.0}
+"""Beyond these a value was hardly meant in its unit."""
+_LARGEST_FILE = 50_000_000
+_LONGEST_PERIOD = 10.0
+"""Readings lie closer together in time [s]."""
+COLUMNS = ("trial", "speed_m_s", "time", "counts", "bend")
+
+
+class RecordingParams(Params):
+    """Columns and units of a recording."""
+
+    time_column: str = number("time", "1", "assumed: plain", "column of time")
+    time_unit: Literal["s", "ms", "us"] = number("s", "1", "assumed: SI", "its unit")
+    counts_column: str = number("counts", "1", "assumed: plain", "column of readings [counts]")
+    bend_column: str = number("bend", "1", "assumed: plain", "column of bend or position")
+    bend_unit: Literal["1", "rad", "deg", "m", "mm"] = number(
+        "1", "1", "assumed: 0 straight, 1 full", "its unit"
+    )
+    bend_zero: float | None = number(
+        None, "unit of bend", "assumed: its smallest value", "value when straight"
+    )
+    bend_full: float | None = number(
+        None, "unit of bend", "assumed: its largest value", "value when fully bent"
+    )
+    trial_column: str = number("trial", "1", "assumed: plain", "column that numbers pushes, if any")
+    speed_column: str = number(
+        "speed_m_s", "1", "assumed: plain", "column of pushing speed [m/s], if any"
+    )
+
+
+@dataclass(frozen=True)
+class Recording:
+    """A recording and where it came from.
+
+    Attributes:
+        t: Time of each reading [s], shape (n,).
+        samples: Readings and bends.
+        sha256: Hash of the file's bytes.
+    """
+
+    t: Floats
+    samples: Samples
+    sha256: str
+
+
+def read(path: Path, params: RecordingParams) -> Recording:
+    """Read a recording.
+
+    Raises:
+        CalibrationError: Names the row and the cure.
+    """
+    data = _bytes(path)
+    rows = _rows(path, data, params)
+    table = np.array([values for _, values in rows])
+    lines = np.array([line for line, _ in rows], dtype=np.int64)
+    trial, speed, t, counts, raw = table.T
+    trial = np.where(np.isnan(trial), 0, trial).astype(np.int64)
+    t = t * TIME_UNITS[params.time_unit]
+    _check_time(path, t, trial, lines, params)
+    _check_counts(path, counts, lines)
+    bend = _normalised(path, raw, lines, params)
+    samples = Samples(counts, bend, trial, speed, lines)
+    return Recording(t, samples, hashlib.sha256(data).hexdigest())
+
+
+def _bytes(path: Path) -> bytes:
+    try:
+        with path.open("rb") as file:
+            data = file.read(_LARGEST_FILE + 1)
+    except OSError as error:
+        raise CalibrationError(
+            f"--recording: expected a readable file, found {path}: {error.strerror}"
+        ) from None
+    if len(data) > _LARGEST_FILE:
+        raise CalibrationError(f"{path}: expected at most {_LARGEST_FILE} bytes, found more")
+    if not data.endswith((b"\n", b"\r")):
+        last = data.count(b"\n") + 1
+        raise CalibrationError(
+            f"{path}: row {last}: expected a line break at its end, found none (truncated); "
+            "delete the last row, or add the line break if it is whole"
+        )
+    return data
+
+
+def _rows(path: Path, data: bytes, params: RecordingParams) -> list[tuple[int, list[float]]]:
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise CalibrationError(
+            f"{path}: expected UTF-8 text, found byte {data[error.start]:#04x} at {error.start}"
+        ) from None
+    reader = csv.reader(io.StringIO(text))
+    header = [name.strip() for name in next(reader, [])]
+    places = _places(path, header, params)
+    try:
+        rows = [
+            (reader.line_num, _values(path, reader.line_num, header, cells, places))
+            for cells in reader
+            if cells
+        ]
+    except csv.Error as error:
+        raise CalibrationError(
+            f"{path}: row {reader.line_num}: expected CSV, found {error}"
+        ) from None
+    if not rows:
+        raise CalibrationError(f"{path}: row 2: expected readings, found none; record longer")
+    return rows
+
+
+def _places(path: Path, header: list[str], params: RecordingParams) -> list[int | None]:
+    found: list[int | None] = []
+    needed = (params.time_column, params.counts_column, params.bend_column)
+    for name in (params.trial_column, params.speed_column, *needed):
+        if header.count(name) > 1:
+            raise CalibrationError(f"{path}: row 1: expected one column {name}, found several")
+        if name not in header and name in needed:
+            raise CalibrationError(
+                f"{path}: row 1: expected a column {name}, found "
+                f"{', '.join(header) or 'nothing'}; name yours with --columns.*-column"
+            )
+        found.append(header.index(name) if name in header else None)
+    return found
+
+
+def _values(
+    path: Path, line: int, header: list[str], cells: list[str], places: list[int | None]
+) -> list[float]:
+    if len(cells) != len(header):
+        raise CalibrationError(
+            f"{path}: row {line}: expected {len(header)} cells, found {len(cells)} (truncated); "
+            "delete the row"
+        )
+    values = []
+    for place in places:
+        if place is None:
+            values.append(math.nan)
+            continue
+        try:
+            value = float(cells[place])
+        except ValueError:
+            value = math.nan
+        if not math.isfinite(value):
+            raise CalibrationError(
+                f"{path}: row {line}: expected a finite number in {header[place]}, found "
+                f"{cells[place][:40]!r}; delete the row"
+            )
+        values.append(value)
+    return values
+
+
+def _check_time(path: Path, t: Floats, trial: Ints, lines: Ints, params: RecordingParams) -> None:
+    steps = np.diff(t)[np.diff(trial) == 0]
+    at = lines[1:][np.diff(trial) == 0]
+    if (steps <= 0).any():
+        row = at[int(np.argmax(steps <= 0))]
+        raise CalibrationError(
+            f"{path}: row {row}: expected time to rise within a push, found it standing or going "
+            "back; sort the rows, or number pushes in a column trial"
+        )
+    if len(steps) and np.median(steps) > _LONGEST_PERIOD:
+        raise CalibrationError(
+            f"{path}: row {at[0]}: expected readings less than {_LONGEST_PERIOD:g} s apart, found "
+            f"{np.median(steps):g} s; is {params.time_unit} the right --columns.time-unit?"
+        )
+
+
+def _check_counts(path: Path, counts: Floats, lines: Ints) -> None:
+    bad = (counts < 0) | (counts > 4095)
+    if bad.any():
+        i = int(np.argmax(bad))
+        raise CalibrationError(
+            f"{path}: row {lines[i]}: expected 0 to 4095 counts, found {counts[i]:g}; give raw "
+            "readings, not volts or percent"
+        )
+    if counts.max() <= 5 and (counts != np.round(counts)).any():
+        raise CalibrationError(
+            f"{path}: row {lines[0]}: expected raw counts, found {counts[0]:g} and none above 5; "
+            "are these volts? multiply by 4095 / 3.3"
+        )
+
+
+def _normalised(path: Path, raw: Floats, lines: Ints, params: RecordingParams) -> Floats:
+    unit = params.bend_unit
+    beyond = abs(raw) > _LARGEST_BEND[unit]
+    if beyond.any():
+        i = int(np.argmax(beyond))
+        raise CalibrationError(
+            f"{path}: row {lines[i]}: expected at most {_LARGEST_BEND[unit]:g} in unit {unit}, "
+            f"found {raw[i]:g}; is it the right --columns.bend-unit?"
+        )
+    zero = float(raw.min()) if params.bend_zero is None else params.bend_zero
+    full = float(raw.max()) if params.bend_full is None else params.bend_full
+    if unit == "1" and params.bend_zero is None and params.bend_full is None:
+        zero, full = 0.0, 1.0
+    if zero == full:
+        raise CalibrationError(
+            f"{path}: row {lines[0]}: expected a bend that changes, found {zero:g} throughout; "
+            "bend the antenna while recording"
+        )
+    return (raw - zero) / (full - zero)
+
+
+def write(recording: Recording) -> str:
+    """A recording as CSV with the default columns and units."""
+    file = io.StringIO()
+    writer = csv.writer(file, lineterminator="\n")
+    writer.writerow(COLUMNS)
+    s = recording.samples
+    for trial, speed, t, counts, bend in zip(
+        s.trial.tolist(),
+        s.speed.tolist(),
+        recording.t.tolist(),
+        s.counts.tolist(),
+        s.bend.tolist(),
+        strict=True,
+    ):
+        writer.writerow([trial, repr(speed), f"{t:.6f}", f"{counts:g}", repr(bend)])
+    return file.getvalue()

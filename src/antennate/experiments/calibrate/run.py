@@ -1,0 +1,285 @@
+"""Calibrate an antenna: from a recording, or from a rig that pushes a simulated one.
+
+On the rig a rod indents the antenna from the side, at several speeds, several times each. The bend
+is the rod's way from the first touch over its whole way: what an experimenter knows.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from antennate.antenna import fitting
+from antennate.antenna.calibration import Calibration
+from antennate.antenna.fitting import Samples
+from antennate.antenna.sensor import SensorChain, reading_noise
+from antennate.control.conditioning import bending_level
+from antennate.experiments.calibrate.recording import Recording, RecordingParams, read, write
+from antennate.params import BenchPhysicsParams, BenchVariationParams, Params
+from antennate.params.base import number
+from antennate.robots.antenna import AntennaParams
+from antennate.robots.sensor import SensorParams
+from antennate.sim.bench import Bench, compile_bench
+from antennate.studies.pool import run_tasks
+from antennate.types import Floats
+
+_Speed = Annotated[float, Field(gt=0, le=1)]
+_COMMAND_PERIOD = 0.001
+
+
+class RigParams(Params):
+    """The simulated rig."""
+
+    speeds: tuple[_Speed, ...] = number(
+        (0.05, 0.10, 0.15), "m/s", "paper: 5, 10 and 15 cm/s", "pushing speeds", min_length=1
+    )
+    pushes: int = number(
+        10,
+        "1",
+        "assumed: unpublished; enough for an interval",
+        "pushes at each speed",
+        ge=1,
+        le=1000,
+    )
+    place: float = number(
+        0.08, "m", "assumed: two thirds out; the rod stays on", "place of the rod", gt=0.01, le=0.4
+    )
+    depth: float = number(
+        0.05, "m", "assumed: bends the antenna to about a right angle", "full indentation", gt=0.002
+    )
+    rod_radius: float = number(0.006, "m", "assumed: a dowel", "radius of the rod", gt=1e-3, le=0.1)
+    start_spread: float = number(
+        0.0005, "m", "assumed: set by hand", "half range of the rod's first distance", ge=0
+    )
+
+
+class CalibrateConfig(Params):
+    """Everything that decides a calibration."""
+
+    recording: str | None = number(
+        None, "1", "assumed: no recording", "CSV file to calibrate from; the rig if not given"
+    )
+    columns: RecordingParams = RecordingParams()
+    sensor_id: str | None = number(
+        None,
+        "1",
+        "assumed: `simulated` for the rig, `unnamed` for a recording",
+        "name of the film",
+        pattern=r"^[A-Za-z0-9._-]{1,64}$",
+    )
+    averaging_time: float = number(
+        0.0,
+        "s",
+        "assumed: a curve belongs to the film; a mean over time adds lag that grows with speed",
+        "mean over readings before fitting",
+        ge=0,
+        le=5,
+    )
+    full_scale: bool = number(
+        False,
+        "1",
+        "assumed: the paper's numbers do not tell",
+        "normalise by 0 to 4095 counts and not by the recording's ends",
+    )
+    threshold: float = number(
+        0.5, "1", "assumed: unpublished; middle of the sigmoid", "theta of the file", gt=0, lt=1
+    )
+    least_r2: float = number(
+        0.5, "1", "assumed: half of the bend explained", "a worse fit is refused", ge=0, lt=1
+    )
+    good_r2: float = number(
+        0.9, "1", "assumed: our rig reaches 0.98", "a worse fit is warned of", ge=0, lt=1
+    )
+    draws: int = number(500, "1", "assumed: usual", "bootstrap draws", ge=20, le=100000)
+    seed: int = number(1, "1", "assumed: any", "seed of all chance", ge=0)
+    rig: RigParams = RigParams()
+    antenna: AntennaParams = AntennaParams()
+    sensor: SensorParams = SensorParams()
+    variation: BenchVariationParams = BenchVariationParams()
+    physics: BenchPhysicsParams = BenchPhysicsParams()
+
+    @model_validator(mode="after")
+    def _on_the_antenna(self) -> CalibrateConfig:
+        if self.rig.place + self.rig.rod_radius > self.antenna.length:
+            raise ValueError(
+                f"rig.place must leave room for the rod on the antenna of {self.antenna.length:g} "
+                f"m, got {self.rig.place:g} m"
+            )
+        if self.rig.depth > 0.9 * self.rig.place:
+            raise ValueError(
+                f"rig.depth must stay below 0.9 of rig.place, {0.9 * self.rig.place:g} m, got "
+                f"{self.rig.depth:g} m"
+            )
+        return self
+
+
+@dataclass(frozen=True)
+class CalibrateOutcome:
+    """A calibration and its data.
+
+    Attributes:
+        config: What was asked.
+        recording: The data, averaged as asked.
+        raw: The same before averaging.
+        calibration: The curve.
+    """
+
+    config: CalibrateConfig
+    recording: Recording
+    raw: Recording
+    calibration: Calibration
+
+    def result(self) -> dict[str, Any]:
+        """The content of result.json."""
+        return {
+            "schema": 1,
+            "command": "calibrate",
+            "seed": self.config.seed,
+            "source": "rig" if self.config.recording is None else "recording",
+            "poor": self.calibration.r2 < self.config.good_r2,
+            "calibration": self.calibration.model_dump(mode="json"),
+        }
+
+    def conditioning_toml(self) -> str:
+        """The curve as keys of a configuration file."""
+        found = self.calibration.conditioning()
+        keys = ("midpoint", "slope", "polarity", "counts_low", "counts_high")
+        lines = [f"{key} = {getattr(found, key)!r}" for key in keys]
+        return "\n".join(["[control.conditioning]", *lines]) + "\n"
+
+
+def push(config: CalibrateConfig, trial: int) -> Recording:
+    """One push of the rig.
+
+    Raises:
+        SimulationError: The physics became invalid.
+    """
+    rig = config.rig
+    speed = rig.speeds[trial // rig.pushes]
+    rng = np.random.default_rng([config.seed, trial])
+    factors = np.exp(rng.normal(0.0, config.variation.stiffness, 6))
+    gap = 2 * rig.start_spread * rng.uniform(0.0, 1.0)
+    bench = _bench(config, factors)
+    period = 1.0 / config.sensor.rate
+    touch = config.antenna.radius + rig.rod_radius
+    rate = config.sensor.rate
+    ticks = int(np.ceil((gap + rig.depth) / speed * rate)) + 1
+    noise = reading_noise(config.sensor, rng, (ticks,))
+    sensor = SensorChain(config.sensor, (), period)
+    bench.place(0.0, 0.0, 0.0)
+    bench.place_probe(rig.place, -touch - gap)
+    rows = []
+    for i in range(ticks):
+        at = float(bench.probe()[1]) + touch
+        counts = float(sensor.step(np.array(bench.flex()), float(noise[i])))
+        rows.append((i * period, counts, at / rig.depth))
+        for k in range(1, round(period / _COMMAND_PERIOD) + 1):
+            y = -touch - gap + speed * (i * period + k * _COMMAND_PERIOD)
+            bench.command_probe(rig.place, y, 0.0, speed)
+            bench.step(round(_COMMAND_PERIOD / config.physics.timestep))
+    t, counts, bend = np.array(rows).T
+    inside = (bend >= 0) & (bend <= 1)
+    n = int(inside.sum())
+    samples = Samples(
+        counts[inside],
+        bend[inside],
+        np.full(n, trial, dtype=np.int64),
+        np.full(n, speed),
+        np.zeros(n, dtype=np.int64),
+    )
+    return Recording(t[inside], samples, "")
+
+
+def _bench(config: CalibrateConfig, factors: Floats) -> Bench:
+    model = compile_bench(
+        config.physics, config.antenna, config.sensor, probe_radius=config.rig.rod_radius
+    )
+    for i, factor in enumerate(factors):
+        model.joint(f"antenna/hinge{i}").stiffness *= factor
+    return Bench(model, config.sensor.covered_hinges(config.antenna))
+
+
+def _run_task(task: tuple[CalibrateConfig, int], emit: Callable[[Any], None]) -> None:
+    emit((task[1], push(*task)))
+
+
+def record(
+    config: CalibrateConfig,
+    workers: int = 1,
+    on_step: Callable[[int, int], None] = lambda done, total: None,
+) -> Recording:
+    """All pushes of the rig, as one recording.
+
+    Raises:
+        SimulationError: The physics became invalid; from a worker it comes as a WorkerError.
+    """
+    tasks = [(config, trial) for trial in range(len(config.rig.speeds) * config.rig.pushes)]
+    found: dict[int, Recording] = {}
+
+    def take(item: tuple[int, Recording]) -> None:
+        found[item[0]] = item[1]
+        on_step(len(found), len(tasks))
+
+    run_tasks(_run_task, tasks, workers, take)
+    parts = [found[trial] for trial in sorted(found)]
+    fields = ("counts", "bend", "trial", "speed", "row")
+    joined = [np.concatenate([getattr(p.samples, f) for p in parts]) for f in fields]
+    joined[-1] = np.arange(2, len(joined[0]) + 2)
+    whole = Recording(np.concatenate([p.t for p in parts]), Samples(*joined), "")
+    return Recording(whole.t, whole.samples, hashlib.sha256(write(whole).encode()).hexdigest())
+
+
+def averaged(recording: Recording, averaging_time: float) -> Recording:
+    """Readings replaced by the mean of those of the last averaging_time [s] of their push."""
+    if averaging_time == 0:
+        return recording
+    s = recording.samples
+    counts = s.counts.copy()
+    for trial in np.unique(s.trial):
+        rows = np.flatnonzero(s.trial == trial)
+        t, total = recording.t[rows], np.concatenate([[0.0], np.cumsum(s.counts[rows])])
+        first = np.searchsorted(t, t - averaging_time + 1e-9)
+        ends = np.arange(1, len(rows) + 1)
+        counts[rows] = (total[ends] - total[first]) / (ends - first)
+    samples = Samples(counts, s.bend, s.trial, s.speed, s.row)
+    return Recording(recording.t, samples, recording.sha256)
+
+
+def levels(outcome: CalibrateOutcome) -> Floats:
+    """Bending levels that the calibration gives its own data, shape (n,)."""
+    return bending_level(outcome.calibration.conditioning(), outcome.recording.samples.counts)
+
+
+def run(
+    config: CalibrateConfig,
+    workers: int = 1,
+    on_step: Callable[[int, int], None] = lambda done, total: None,
+) -> CalibrateOutcome:
+    """Calibrate from the recording, or from the rig if there is none.
+
+    Raises:
+        CalibrationError: The recording cannot be used or calibrated.
+        SimulationError: The physics became invalid; from a worker it comes as a WorkerError.
+    """
+    if config.recording is None:
+        raw = record(config, workers, on_step)
+    else:
+        raw = read(Path(config.recording), config.columns)
+    used = averaged(raw, config.averaging_time)
+    found = fitting.fit(
+        used.samples,
+        config.sensor_id or ("unnamed" if config.recording else "simulated"),
+        raw.sha256,
+        config.threshold,
+        config.full_scale,
+        config.least_r2,
+        config.draws,
+        config.seed,
+    )
+    return CalibrateOutcome(config, used, raw, found)

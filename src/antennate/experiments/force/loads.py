@@ -1,0 +1,195 @@
+"""Contacts to learn from: point loads at rest within the cone of friction, and traverses."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from pydantic import model_validator
+
+from antennate.antenna import sensor as film
+from antennate.antenna.statics import PROFILES, Chain, equilibrium, with_profile
+from antennate.experiments import reading
+from antennate.experiments.force.post_traverse import Traverse
+from antennate.params import BenchPhysicsParams, ConditioningParams, Params, number
+from antennate.robots.antenna import AntennaParams
+from antennate.robots.sensor import SensorParams
+from antennate.types import Bools, Floats, Ints
+
+Profile = Literal["stiff", "descending", "compliant", "matched_uniform", "ascending"]
+
+
+class ForceConfig(Params):
+    """Everything that decides the outcome of `antennate force`."""
+
+    seed: int = number(0, "1", "assumed: any", "seed of all chance", ge=0)
+    profiles: tuple[Profile, ...] = number(
+        tuple(PROFILES),
+        "1",
+        "assumed: the paper's three and both controls",
+        "profiles",
+        min_length=1,
+    )
+    nearest: float = number(
+        0.25, "1", "assumed: nearer contacts hardly bend the film", "nearest place", gt=0, lt=1
+    )
+    from_place: float = number(
+        0.5,
+        "1",
+        "assumed: as in the study to confirm, between half and full length",
+        "nearest place of the question, over the length",
+        gt=0,
+        lt=1,
+    )
+    place_step: float = number(
+        0.05, "1", "assumed: under a third of a link", "distance of places", gt=0, le=0.5
+    )
+    loads: int = number(
+        60,
+        "1",
+        "assumed: the same number again monitors the curves",
+        "loads at every place to fit curves to",
+        ge=2,
+        le=10000,
+    )
+    hinge_limit_deg: float = number(
+        30.0,
+        "deg",
+        "paper: deflection of a spring below 30 deg",
+        "largest hinge angle",
+        gt=0,
+        le=80,
+    )
+    traverses: int = number(
+        24,
+        "1",
+        "assumed: half of them judge the curves",
+        "traverses of every profile",
+        ge=4,
+        le=10000,
+    )
+    speeds: tuple[float, ...] = number(
+        (0.05, 0.10, 0.15), "m/s", "paper: calibration at 5, 10 and 15 cm/s", "speeds", min_length=1
+    )
+    post_radius: float = number(
+        0.003175, "m", "paper: spheres of 6.35 mm diameter", "radius of the post", gt=0, le=0.1
+    )
+    antenna: AntennaParams = AntennaParams()
+    sensor: SensorParams = SensorParams()
+    conditioning: ConditioningParams = ConditioningParams()
+    physics: BenchPhysicsParams = BenchPhysicsParams()
+
+    @model_validator(mode="after")
+    def _agree(self) -> ForceConfig:
+        steps = 1.0 / (self.sensor.rate * self.physics.timestep)
+        if steps < 0.5 or abs(steps - round(steps)) > 1e-6:
+            raise ValueError(
+                f"sensor.rate must be a whole fraction of the physics rate "
+                f"{1 / self.physics.timestep:g} Hz, got {self.sensor.rate:g} Hz"
+            )
+        if self.nearest > self.from_place:
+            raise ValueError(
+                f"nearest must not exceed from_place, {self.from_place:g}, got {self.nearest:g}"
+            )
+        if len(set(self.profiles)) < len(self.profiles):
+            raise ValueError(f"profiles must differ, got {', '.join(self.profiles)}")
+        if min(self.speeds) <= 0:
+            raise ValueError(f"speeds must be above 0, got {min(self.speeds):g}")
+        return self
+
+    def places(self) -> Floats:
+        """Places of the static loads, over the length, the tip among them."""
+        count = math.floor((1.0 - self.nearest) / self.place_step + 1e-9)
+        return 1.0 - self.place_step * np.arange(count, -1, -1, dtype=np.float64)
+
+
+@dataclass(frozen=True, slots=True)
+class Points:
+    """Contacts: what was felt, how hard they pressed, and where.
+
+    Attributes:
+        scalars: Each of SCALARS, shape (n,).
+        force: Size of the force [N]; `place` over the length; both of shape (n,).
+        trial: What counts as one in intervals: load or traverse, shape (n,).
+        fit: Whether the point serves to fit, shape (n,); the others judge.
+        age: Time since the contact began, shape (n,) [s]; infinite at rest.
+    """
+
+    scalars: dict[str, Floats]
+    force: Floats
+    place: Floats
+    trial: Ints
+    fit: Bools
+    age: Floats
+
+
+def largest_force(chain: Chain, limit: float) -> float:
+    """Force normal to the tip that turns the most bent hinge by `limit` [rad], by bisection [N]."""
+    low, high = 0.0, 4.0 * limit * float(chain.stiffness.max()) / float(chain.lengths.min())
+    while high - low > 1e-9 * high:
+        middle = (low + high) / 2
+        rest = equilibrium(chain, np.array([chain.length]), np.array([[0.0, middle]]), True)
+        low, high = (middle, high) if abs(rest.angles).max() < limit else (low, middle)
+    return low
+
+
+def static_loads(config: ForceConfig, profile: str, friction: float) -> tuple[Points, int]:
+    """Loads of uniform size at every place, within the cone of friction about the normal.
+
+    Returns:
+        The loads that keep every hinge within the limit, and how many did not.
+    """
+    antenna = with_profile(config.antenna, config.sensor, profile)
+    chain, limit = Chain.of(antenna, config.sensor), math.radians(config.hinge_limit_deg)
+    rng = np.random.default_rng([config.seed, 0])
+    places = config.places()
+    place = np.repeat(places, 2 * config.loads)
+    size = rng.uniform(0.0, 1.0, len(place)) * largest_force(chain, limit)
+    lean = rng.uniform(-1.0, 1.0, len(place)) * math.atan(friction)
+    force = size[:, None] * np.stack([np.sin(lean), np.cos(lean)], axis=1)
+    rest = equilibrium(chain, place * chain.length, force, follower=True)
+    good = rest.solved & (abs(rest.angles).max(axis=1) <= limit * (1 + 1e-6))
+    covered = config.sensor.covered_hinges(antenna)
+    flex = rest.angles[:, :covered].sum(axis=1)
+    window = max(1, round(config.conditioning.averaging_time * config.sensor.rate))
+    noise = film.reading_noise(config.sensor, rng, (window, len(flex)))
+    repeated = film.counts(config.sensor, flex, noise)
+    points = Points(
+        {
+            "flex": flex[good],
+            "reading": repeated[0, good],
+            "level": reading.level(config.conditioning, repeated.mean(axis=0))[good],
+        },
+        size[good],
+        place[good],
+        np.arange(len(place))[good],
+        (np.arange(len(place)) % 2 == 1)[good],
+        np.full(int(good.sum()), math.inf),
+    )
+    return points, int((~good).sum())
+
+
+def traverse_points(config: ForceConfig, traverses: list[Traverse]) -> Points:
+    """The samples of all traverses through the sensor chain; even traverses serve to fit."""
+    counts, levels = [np.zeros(0)], [np.zeros(0)]
+    for k, one in enumerate(traverses):
+        rng = np.random.default_rng([config.seed, 2, k])
+        noise = reading.noise(config.sensor, rng, len(one.flex))
+        counts.append(reading.recorded(config.sensor, one.flex, noise))
+        mean = reading.averaged(config.conditioning, counts[-1], config.sensor.rate)
+        levels.append(reading.level(config.conditioning, mean))
+    trial = np.repeat(np.arange(len(traverses)), [len(one.flex) for one in traverses])
+    return Points(
+        {
+            "flex": np.concatenate([one.flex for one in traverses]),
+            "reading": np.concatenate(counts),
+            "level": np.concatenate(levels),
+        },
+        np.concatenate([one.force for one in traverses]),
+        np.concatenate([one.place for one in traverses]),
+        trial,
+        trial % 2 == 0,
+        np.concatenate([one.age for one in traverses]),
+    )

@@ -1,0 +1,248 @@
+"""How much of a contact's force does one scalar tell? By statics, and by traverses past a post.
+
+A curve of force over flex is fitted to one half of the loads and judged on the other: one curve for
+every place of contact, as if a second sense told where it is, and one curve for all places. Forces
+reach up to that which, normal to the tip, turns a hinge by the limit; no load that turns a hinge
+farther takes part.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from antennate.antenna.statics import Chain, equilibrium, with_profile
+from antennate.experiments.force.loads import (
+    ForceConfig,
+    Points,
+    largest_force,
+    static_loads,
+    traverse_points,
+)
+from antennate.experiments.force.post_traverse import Traverse, drag
+from antennate.robots.antenna import AntennaParams
+from antennate.studies.pool import run_tasks
+from antennate.studies.regression import by_group, explained
+from antennate.types import Floats, Ints
+
+SCHEMA = 1
+SCALARS = ("flex", "reading", "level")
+"""Flex without noise, one reading of the converter, and b of the readings of T_avg."""
+
+
+@dataclass(frozen=True, slots=True)
+class TraverseRow:
+    """One traverse, a row of trials.csv."""
+
+    profile: str
+    trial: int
+    status: str
+    overlap: float
+    speed_m_s: float
+    samples: int
+    flex_max_rad: float
+    force_max_n: float
+    place_last: float
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class ProfileOutcome:
+    """What one profile came to: its summary, its rows and the points that figures draw."""
+
+    profile: str
+    summary: dict[str, Any]
+    rows: list[TraverseRow]
+    statics: Points
+    traverses: Points
+
+
+@dataclass(frozen=True, slots=True)
+class ForceOutcome:
+    """All profiles in the order of the configuration."""
+
+    config: ForceConfig
+    profiles: list[ProfileOutcome]
+
+    @property
+    def rows(self) -> list[TraverseRow]:
+        """Every traverse."""
+        return [row for profile in self.profiles for row in profile.rows]
+
+    def result(self) -> dict[str, Any]:
+        """The content of result.json."""
+        return {
+            "schema": SCHEMA,
+            "command": "force",
+            "seed": self.config.seed,
+            "hinge_limit_deg": self.config.hinge_limit_deg,
+            "from_place": self.config.from_place,
+            "friction": self.config.antenna.friction,
+            "profiles": {p.profile: p.summary for p in self.profiles},
+        }
+
+
+def score(
+    points: Points, scalar: str, from_place: float, bins: float | None, largest: float
+) -> dict[str, Any]:
+    """How much of the force a scalar explains: one curve, or one for every `bins` of the length."""
+    within = points.place >= from_place - 1e-9
+    fit, test = within & points.fit, within & ~points.fit
+    x, force = points.scalars[scalar], points.force
+    group = np.zeros(len(force), np.int64)
+    if bins is not None:
+        group = np.floor(points.place / bins + 1e-6).astype(np.int64)
+    guess = by_group(
+        (x[fit], force[fit], group[fit]), x[test], group[test], falling=scalar == "reading"
+    )
+    return _row(points, np.flatnonzero(test)[np.isfinite(guess)], guess, largest)
+
+
+def _row(points: Points, which: Ints, guess: Floats, largest: float) -> dict[str, Any]:
+    guess = guess[np.isfinite(guess)]
+    row = explained(points.force[which], guess, points.trial[which]).row()
+    return row | {"rmse_percent": 100.0 * row["rmse"] / largest}
+
+
+def _judge_all(points: Points, config: ForceConfig, largest: float) -> dict[str, Any]:
+    """Every scalar, with the place known and unknown."""
+    known = {"known": config.place_step, "unknown": None}
+    return {
+        name: {s: score(points, s, config.from_place, bins, largest) for s in SCALARS}
+        for name, bins in known.items()
+    }
+
+
+@dataclass(frozen=True, slots=True)
+class _Task:
+    config: ForceConfig
+    profile: str
+
+
+def study_profile(config: ForceConfig, profile: str) -> ProfileOutcome:
+    """Statics and traverses of one profile."""
+    antenna = with_profile(config.antenna, config.sensor, profile)
+    chain, limit = Chain.of(antenna, config.sensor), math.radians(config.hinge_limit_deg)
+    largest = largest_force(chain, limit)
+    plain, left_out = static_loads(config, profile, 0.0)
+    rubbed, also_out = static_loads(config, profile, config.antenna.friction)
+    rows, traverses = _traverse_all(config, profile, antenna, limit)
+    dragged = traverse_points(config, traverses)
+    guess = closed_form(chain, dragged, config, largest)
+    settled = dragged.age >= config.conditioning.averaging_time
+    summary = {
+        "force_max_n": largest,
+        "statics": {
+            name: {"loads": len(points.force), "left_out": out}
+            | _judge_all(points, config, largest)
+            for name, points, out in (
+                ("frictionless", plain, left_out),
+                ("friction", rubbed, also_out),
+            )
+        },
+        "by_range": [
+            {"from_place": float(place)} | score(plain, "flex", place, None, largest)
+            for place in config.places()
+        ],
+        "traverses": {
+            "trials": len(rows),
+            "invalid": sum(row.status == "invalid" for row in rows),
+            **_judge_all(dragged, config, largest),
+            "closed_form": {
+                name: _row(dragged, np.flatnonzero(which), guess[which], largest)
+                for name, which in (("all", settled | True), ("settled", settled))
+            },
+        },
+    }
+    return ProfileOutcome(profile, summary, rows, plain, dragged)
+
+
+def _traverse_all(
+    config: ForceConfig, profile: str, antenna: AntennaParams, limit: float
+) -> tuple[list[TraverseRow], list[Traverse]]:
+    rows, found = [], []
+    for k in range(config.traverses):
+        chance = float(np.random.default_rng([config.seed, 1, k]).uniform())
+        share = (k + chance) / config.traverses
+        overlap = config.from_place + (1.0 - config.from_place) * share
+        speed = config.speeds[k % len(config.speeds)]
+        one = drag(
+            config.physics,
+            antenna,
+            config.sensor,
+            overlap,
+            speed,
+            config.post_radius,
+            limit,
+            config.sensor.rate,
+        )
+        found.append(one)
+        rows.append(
+            TraverseRow(
+                profile,
+                k,
+                "invalid" if one.reason else "valid",
+                overlap,
+                speed,
+                len(one.flex),
+                float(one.flex.max(initial=0.0)),
+                float(one.force.max(initial=0.0)),
+                float(one.place[-1]) if len(one.place) else 0.0,
+                one.reason,
+            )
+        )
+    return rows, found
+
+
+def closed_form(chain: Chain, points: Points, config: ForceConfig, largest: float) -> Floats:
+    """Force from flex and place by the frictionless statics alone, nothing fitted [N]."""
+    flex, place = points.scalars["flex"], np.clip(points.place, config.nearest, 1.0)
+    grid = np.linspace(config.nearest, 1.0, 39)
+    sizes = np.linspace(0.0, 2.0 * largest, 41)
+    force = np.stack([np.zeros_like(sizes), sizes], axis=1)
+    covered = config.sensor.covered_hinges(config.antenna)
+    tables = []
+    for at in grid:
+        rest = equilibrium(chain, np.full(len(sizes), at * chain.length), force, follower=True)
+        tables.append(np.interp(flex, rest.angles[:, :covered].sum(axis=1), sizes))
+    below = np.clip(np.searchsorted(grid, place, "right") - 1, 0, len(grid) - 2)
+    share = (place - grid[below]) / (grid[below + 1] - grid[below])
+    table, each = np.array(tables), np.arange(len(place))
+    return (1.0 - share) * table[below, each] + share * table[below + 1, each]
+
+
+def _run_task(task: _Task, emit: Callable[[ProfileOutcome], None]) -> None:
+    emit(study_profile(task.config, task.profile))
+
+
+def run(
+    config: ForceConfig,
+    workers: int = 1,
+    on_step: Callable[[int, int], None] = lambda done, total: None,
+    on_row: Callable[[TraverseRow], None] = lambda row: None,
+) -> ForceOutcome:
+    """Study every profile.
+
+    Args:
+        config: What to run.
+        workers: Processes to use; the outcome does not depend on it.
+        on_step: Called after every profile with how many of how many are done.
+        on_row: Called with every traverse.
+
+    Raises:
+        WorkerError: A worker process died.
+    """
+    found: dict[str, ProfileOutcome] = {}
+
+    def take(outcome: ProfileOutcome) -> None:
+        found[outcome.profile] = outcome
+        for row in outcome.rows:
+            on_row(row)
+        on_step(len(found), len(config.profiles))
+
+    run_tasks(_run_task, [_Task(config, profile) for profile in config.profiles], workers, take)
+    return ForceOutcome(config, [found[profile] for profile in config.profiles])

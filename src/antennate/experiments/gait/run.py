@@ -1,0 +1,253 @@
+"""The gait on a flat floor: how far each maneuver goes, what the lead of the body wave is worth.
+
+Every walk runs through the same wall and loop as a trial, with nothing left to chance. The gait is
+its own mirror image half a cycle later, so over whole cycles FORWARD neither yaws nor drifts.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from pydantic import model_validator
+
+from antennate.control.gait import Gait, targets
+from antennate.control.loop import run_loop
+from antennate.experiments.gait.pace import Pace, Walk, measure, rolling_speed
+from antennate.params import GaitParams, Params, PhysicsParams, VariationParams, number
+from antennate.robots.body import RobotParams
+from antennate.sim.sim_robot import Disturbance, SimRobot
+from antennate.sim.world import World, compile_world
+from antennate.studies.pool import run_tasks
+from antennate.types import AntennaFrame, Floats, JointCommand, Maneuver
+
+SCHEMA = 1
+MANEUVERS = (Maneuver.FORWARD, Maneuver.TURN_L, Maneuver.TURN_R, Maneuver.REVERSE)
+WAVE_OFF = "wave_off"
+
+
+class GaitStudyConfig(Params):
+    """Everything that decides the outcome of `antennate gait`."""
+
+    cycles: int = number(
+        4,
+        "1",
+        "measured: antennate gait, six cycles give the same speeds to 0.3 %",
+        "gait cycles measured",
+        ge=2,
+        le=100,
+    )
+    settling_cycles: int = number(
+        2,
+        "1",
+        "measured: antennate gait, speeds then change by 1 % from cycle to cycle",
+        "gait cycles before measuring",
+        ge=0,
+        le=100,
+    )
+    sweep_points: int = number(
+        24,
+        "1",
+        "assumed: steps of 15 deg",
+        "leads of the body wave tried, evenly over a full turn",
+        ge=2,
+        le=360,
+    )
+    rate: float = number(
+        100.0, "Hz", "paper: about 100 Hz over serial", "control ticks per second", gt=0, le=1000
+    )
+    robot: RobotParams = RobotParams()
+    gait: GaitParams = GaitParams()
+    physics: PhysicsParams = PhysicsParams()
+
+    @model_validator(mode="after")
+    def _whole_steps(self) -> GaitStudyConfig:
+        steps = 1.0 / (self.rate * self.physics.timestep)
+        if steps < 0.5 or abs(steps - round(steps)) > 1e-6:
+            raise ValueError(
+                f"rate must be a whole fraction of the physics rate "
+                f"{1 / self.physics.timestep:g} Hz, got {self.rate:g} Hz"
+            )
+        return self
+
+
+@dataclass(frozen=True, slots=True)
+class GaitOutcome:
+    """All walks: four maneuvers by name, one without body wave, and the sweep over its lead."""
+
+    config: GaitStudyConfig
+    maneuvers: dict[str, Walk]
+    wave_off: Walk
+    sweep: list[Walk]
+
+    def pace(self, walk: Walk) -> Pace:
+        """What a walk of this study comes to."""
+        return measure(walk, self.config.settling_cycles, self.config.cycles)
+
+    def result(self) -> dict[str, Any]:
+        """The content of result.json."""
+        config = self.config
+        rolling = rolling_speed(config.gait, config.robot)
+        straight = self.pace(self.wave_off).speed
+        chosen = self.pace(self.maneuvers["forward"]).speed
+        swept = [self.pace(walk) for walk in self.sweep]
+        speeds = [pace.speed for pace in swept]
+        best = max(speeds)
+        return {
+            "schema": SCHEMA,
+            "command": "gait",
+            "body_length_m": config.robot.length,
+            "frequency_hz": config.gait.frequency,
+            "maneuvers": {name: self._row(walk) for name, walk in self.maneuvers.items()},
+            "wave_off": {
+                "speed_m_s": straight,
+                "expected_m_s": rolling,
+                "ratio": straight / rolling,
+            },
+            "phase_sweep": [
+                {
+                    "body_phase_rad": walk.gait.body_phase,
+                    "speed_m_s": pace.speed,
+                    "body_lengths_per_cycle": pace.body_lengths,
+                }
+                for walk, pace in zip(self.sweep, swept, strict=True)
+            ],
+            "chosen_body_phase_rad": config.gait.body_phase,
+            "best_body_phase_rad": self.sweep[speeds.index(best)].gait.body_phase,
+            "cost_of_phase": {
+                "chosen_over_best": chosen / best,
+                "worst_over_best": min(speeds) / best,
+            },
+        }
+
+    def _row(self, walk: Walk) -> dict[str, Any]:
+        pace = self.pace(walk)
+        return {
+            "speed_m_s": pace.speed,
+            "body_lengths_per_cycle": pace.body_lengths,
+            "yaw_deg_per_cycle": math.degrees(pace.yaw),
+            "cost_of_transport": pace.cost_of_transport,
+        }
+
+
+class _Fixed:
+    """A control of one idea: always the same maneuver."""
+
+    def __init__(self, gait: GaitParams, maneuver: Maneuver, period: float) -> None:
+        self._gait = Gait(gait, 1, period)
+        self._maneuver = np.array([int(maneuver)])
+
+    def step(self, frame: AntennaFrame) -> JointCommand:
+        return self._gait.step(self._maneuver)
+
+
+@dataclass(frozen=True, slots=True)
+class _Task:
+    config: GaitStudyConfig
+    name: str
+    gait: GaitParams
+    maneuver: Maneuver = Maneuver.FORWARD
+
+
+def _run_task(task: _Task, emit: Callable[[Walk], None]) -> None:
+    emit(walk_flat(task.config, task.name, task.gait, task.maneuver))
+
+
+def walk_flat(config: GaitStudyConfig, name: str, gait: GaitParams, maneuver: Maneuver) -> Walk:
+    """Walk one maneuver on the flat floor from a straight start.
+
+    Raises:
+        SimulationError: The physics became invalid.
+    """
+    robot, period = config.robot, 1.0 / config.rate
+    world = World(compile_world(config.physics, robot), robot.sensor.covered_hinges(robot.antenna))
+    start = targets(gait, np.zeros(1), np.zeros(1))
+    world.place(0.0, 0.0, 0.0, start.yaw[0], start.leg[0])
+    body = SimRobot(1, robot.sensor, period, config.physics.timestep)
+    body.load(0, world, _no_chance(robot, period))
+    end = (config.settling_cycles + config.cycles) / gait.frequency
+    ticks: list[tuple[float, Floats, float]] = []
+
+    def go_on(frame: AntennaFrame, command: JointCommand) -> bool:
+        failure = body.failure(0)
+        if failure is not None:
+            raise failure
+        ticks.append((world.t, world.links(), _positive_power(world)))
+        return world.t < end - period / 2
+
+    run_loop(body, _Fixed(gait, maneuver, period), period, go_on)
+    links = np.array([tick[1] for tick in ticks])
+    axis = links[:, :3].mean(axis=1) - links[:, 3:].mean(axis=1)
+    return Walk(
+        name=name,
+        gait=gait,
+        t=np.array([tick[0] for tick in ticks]),
+        head=links[:, 0],
+        centre=links.mean(axis=1),
+        heading=np.unwrap(np.arctan2(axis[:, 1], axis[:, 0])),
+        power=np.array([tick[2] for tick in ticks]),
+        weight=float(world.model.body_mass.sum() * np.linalg.norm(world.model.opt.gravity)),
+        length=robot.length,
+    )
+
+
+def _no_chance(robot: RobotParams, period: float) -> Disturbance:
+    """A disturbance that disturbs nothing; the control here does not look at sensor noise."""
+    still = VariationParams(start_lateral=0, start_heading=0, joint_bias=0, slip_log_sd=0)
+    return Disturbance(np.random.default_rng(0), still, robot.sensor, robot.leg_friction, period)
+
+
+def _positive_power(world: World) -> float:
+    """Summed power of the servos that push [W]: torque falls with speed by the joint's damping."""
+    model, data = world.model, world.data
+    slope = model.dof_damping[model.jnt_dofadr[model.actuator_trnid[:, 0]]]
+    speed = data.actuator_velocity
+    return float(np.maximum((data.actuator_force - slope * speed) * speed, 0.0).sum())
+
+
+def _tasks(config: GaitStudyConfig) -> list[_Task]:
+    gait = config.gait
+    tasks = [_Task(config, m.name.lower(), gait, m) for m in MANEUVERS]
+    tasks.append(_Task(config, WAVE_OFF, _changed(gait, amplitude=0.0)))
+    for i in range(config.sweep_points):
+        lead = 2.0 * math.pi * i / config.sweep_points
+        tasks.append(_Task(config, f"sweep{i}", _changed(gait, body_phase=lead)))
+    return tasks
+
+
+def _changed(gait: GaitParams, **values: float) -> GaitParams:
+    return GaitParams(**{**gait.model_dump(), **values})
+
+
+def run(
+    config: GaitStudyConfig,
+    workers: int = 1,
+    on_step: Callable[[int, int], None] = lambda done, total: None,
+) -> GaitOutcome:
+    """Walk all maneuvers, the one without body wave, and the sweep.
+
+    Args:
+        config: What to run.
+        workers: Processes to use; the outcome does not depend on it.
+        on_step: Called after every walk with how many of how many are done.
+
+    Raises:
+        SimulationError: The physics became invalid; from a worker it comes as a WorkerError.
+    """
+    tasks = _tasks(config)
+    found: dict[str, Walk] = {}
+
+    def take(walk: Walk) -> None:
+        found[walk.name] = walk
+        on_step(len(found), len(tasks))
+
+    run_tasks(_run_task, tasks, workers, take)
+    return GaitOutcome(
+        config=config,
+        maneuvers={m.name.lower(): found[m.name.lower()] for m in MANEUVERS},
+        wave_off=found[WAVE_OFF],
+        sweep=[found[f"sweep{i}"] for i in range(config.sweep_points)],
+    )

@@ -1,0 +1,100 @@
+"""Everything that decides the outcome of `antennate sweep`."""
+
+from __future__ import annotations
+
+import math
+
+from pydantic import model_validator
+
+from antennate.antenna.statics import PROFILES
+from antennate.experiments.force.loads import Profile
+from antennate.params import (
+    BenchPhysicsParams,
+    ConditioningParams,
+    EstimateParams,
+    Params,
+    ShapeParams,
+    SweepParams,
+    number,
+)
+from antennate.robots.antenna import AntennaParams
+from antennate.robots.sensor import SensorParams
+
+
+class SweepConfig(Params):
+    """Everything that decides the outcome of `antennate sweep`."""
+
+    seed: int = number(0, "1", "assumed: any", "seed of all chance", ge=0)
+    profiles: tuple[Profile, ...] = number(
+        tuple(PROFILES),
+        "1",
+        "assumed: the paper's three and both controls",
+        "profiles of the map",
+        min_length=1,
+    )
+    profile: Profile = number(
+        "descending", "1", "paper: the robot's profile", "profile of the estimates"
+    )
+    distances: tuple[float, ...] = number(
+        (0.35, 0.5, 0.65, 0.8, 0.95),
+        "1",
+        "assumed: from a third of the antenna to nearly out of reach",
+        "distances of the wall, over the length of the antenna",
+        min_length=1,
+    )
+    centres: tuple[float, ...] = number(
+        tuple(math.radians(a) for a in (47.0, 70.0, 90.0)),
+        "rad",
+        "assumed: the mounting angle, and on to sideways",
+        "centres of the sweep",
+        min_length=1,
+    )
+    amplitudes: tuple[float, ...] = number(
+        tuple(math.radians(a) for a in (15.0, 30.0, 45.0)),
+        "rad",
+        "assumed: half and one and a half times the default",
+        "amplitudes of the sweep",
+        min_length=1,
+    )
+    sweeps: int = number(
+        2, "1", "assumed: they repeat; one before them is left out", "sweeps measured", ge=1, le=100
+    )
+    speed: float = number(
+        0.05,
+        "m/s",
+        "assumed: slowly; under half of the paper's 0.12 m/s",
+        "speed of the base along the wall where it moves",
+        gt=0,
+        le=1,
+    )
+    sweep: SweepParams = SweepParams()
+    shape: ShapeParams = ShapeParams()
+    estimate: EstimateParams = EstimateParams()
+    antenna: AntennaParams = AntennaParams()
+    sensor: SensorParams = SensorParams()
+    conditioning: ConditioningParams = ConditioningParams()
+    physics: BenchPhysicsParams = BenchPhysicsParams()
+
+    @model_validator(mode="after")
+    def _agree(self) -> SweepConfig:
+        steps = 1.0 / (self.sensor.rate * self.physics.timestep)
+        if steps < 0.5 or abs(steps - round(steps)) > 1e-6:
+            raise ValueError(
+                f"sensor.rate must be a whole fraction of the physics rate "
+                f"{1 / self.physics.timestep:g} Hz, got {self.sensor.rate:g} Hz"
+            )
+        if len(set(self.profiles)) < len(self.profiles):
+            raise ValueError(f"profiles must differ, got {', '.join(self.profiles)}")
+        least = self.antenna.radius / self.antenna.length
+        for what, values in (
+            ("distances", self.distances),
+            ("estimate.distance", self.estimate.distance),
+        ):
+            if min(values) <= least:
+                raise ValueError(
+                    f"{what} must exceed the antenna's radius, {least:g} of its length, "
+                    f"got {min(values):g}"
+                )
+        if not self.estimate.distance[0] < self.estimate.distance[1]:
+            raise ValueError(f"estimate.distance must rise, got {self.estimate.distance}")
+        return self

@@ -1,0 +1,197 @@
+"""How well active touch tells the distance to a wall and the width of a gap.
+
+Every trial is a gap: a left and a right antenna, each beside its own wall, sweep outwards once. The
+distance of the left wall and the width of the whole are estimated by curves calibrated on one set
+of trials and judged on a fresh one.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from itertools import product
+from typing import Any
+
+import numpy as np
+
+from antennate.experiments.sweep.reach import (
+    Felt,
+    Statics,
+    calibrate_and_guess,
+    coefficients,
+    cues,
+    feel,
+)
+from antennate.experiments.sweep.scan import Wall, record
+from antennate.params import (
+    BenchPhysicsParams,
+    ConditioningParams,
+    EstimateParams,
+    ShapeParams,
+    SweepParams,
+)
+from antennate.robots.antenna import AntennaParams
+from antennate.robots.sensor import SensorParams
+from antennate.studies.statistics import mean95
+from antennate.types import Floats
+
+CONDITIONS = ("same", "varied", "tilted", "moving")
+"""Every trial sweeps alike; centre and amplitude differ from trial to trial; the sweep is the same
+and walls are not parallel to the heading; the sweep is the same and the base moves along."""
+SPLITS, SIDES = ("calibration", "test"), ("l", "r")
+
+
+@dataclass(frozen=True, slots=True)
+class Setting:
+    """What all trials share."""
+
+    seed: int
+    params: EstimateParams
+    sweep: SweepParams
+    shape: ShapeParams
+    conditioning: ConditioningParams
+    antenna: AntennaParams
+    sensor: SensorParams
+    physics: BenchPhysicsParams
+    speed: float
+
+
+@dataclass(frozen=True, slots=True)
+class Trial:
+    """One antenna beside one wall.
+
+    Attributes:
+        distance: From the base to the wall [m].
+        exact: What was felt without sensor noise, and `noisy` with it; None if nothing was felt.
+        reason: Why the trial is invalid, or empty.
+    """
+
+    condition: str
+    split: str
+    number: int
+    side: str
+    distance: float
+    sweep: SweepParams
+    exact: Felt | None
+    noisy: Felt | None
+    reason: str = ""
+
+
+def plan(params: EstimateParams) -> list[tuple[str, str, int, str]]:
+    """Condition, split, number and side of every trial."""
+    return list(product(CONDITIONS, SPLITS, range(params.trials), SIDES))
+
+
+def run_trial(setting: Setting, condition: str, split: str, number: int, side: str) -> Trial:
+    """Draw one trial and sweep outwards once; chance does not depend on the condition."""
+    params = setting.params
+    key = [setting.seed, SPLITS.index(split), number, SIDES.index(side)]
+    rng = np.random.default_rng(key)
+    distance = float(rng.uniform(*params.distance)) * setting.antenna.length
+    rub, lean = rng.uniform(-1.0, 1.0, 2)
+    zero = float(rng.normal(0.0, params.base_zero))
+    gain = float(rng.normal(0.0, params.gain))
+    both = np.random.default_rng(key[:3]).uniform(-1.0, 1.0, 2)  # one sweep for both antennae
+    sweep = setting.sweep
+    if condition == "varied":
+        sweep = SweepParams(
+            centre=sweep.centre + params.centre_range * float(both[0]),
+            amplitude=sweep.amplitude + params.amplitude_range * float(both[1]),
+            frequency=sweep.frequency,
+        )
+    friction = setting.antenna.friction * (1.0 + params.friction * float(rub))
+    trace = record(
+        setting.physics,
+        setting.antenna.model_copy(update={"friction": friction}),
+        setting.sensor,
+        sweep,
+        Wall(distance, params.tilt_range * float(lean) if condition == "tilted" else 0.0),
+        0.5,
+        setting.speed if condition == "moving" else 0.0,
+        setting.shape.gap,
+    )
+    if trace.reason:
+        return Trial(condition, split, number, side, distance, sweep, None, None, trace.reason)
+    statics = Statics(setting.antenna, setting.sensor)
+    common = (setting.shape.flex, statics, setting.sensor, setting.conditioning, zero)
+    outward = 0.5 / sweep.frequency
+    exact = feel(trace, outward, *common)
+    noisy = feel(trace, outward, *common, gain, rng)
+    return Trial(condition, split, number, side, distance, sweep, exact, noisy)
+
+
+def summarise(trials: list[Trial], spacing: float) -> dict[str, Any]:
+    """Errors of every condition, with and without sensor noise, by quantity and cue."""
+    return {
+        condition: {
+            noise: _judge([t for t in trials if t.condition == condition], noise, spacing)
+            for noise in ("noisy", "exact")
+        }
+        for condition in CONDITIONS
+    }
+
+
+def _judge(trials: list[Trial], noise: str, spacing: float) -> dict[str, Any]:
+    by_split = {split: [t for t in trials if t.split == split] for split in SPLITS}
+    felt = {
+        split: [(t, getattr(t, noise)) for t in some if getattr(t, noise) is not None]
+        for split, some in by_split.items()
+    }
+    found: dict[str, Any] = {
+        "sweeps": len(by_split["test"]),
+        "missed": sum(not t.reason for t in by_split["test"]) - len(felt["test"]),
+        "invalid": sum(bool(t.reason) for t in trials),
+        "distance": {},
+        "gap": {},
+        "base_to_tip": {},
+    }
+    known, asked = ([f for _, f in felt[split]] for split in SPLITS)
+    test = [t for t, _ in felt["test"]]
+    for cue in cues(tip=False):
+        if len(known) < coefficients(cue):
+            continue
+        truth = np.array([t.distance for t, _ in felt["calibration"]])
+        guess = calibrate_and_guess(cue, known, truth, asked)
+        real = np.array([t.distance for t in test])
+        left = np.array([t.side == "l" for t in test], bool)
+        found["distance"][cue] = errors(guess[left], real[left])
+        found["gap"][cue] = errors(*_gaps(test, guess, spacing))
+    for cue in cues(tip=True):
+        if len(known) < coefficients(cue):
+            continue
+        truth = np.array([f.reach for f in known])
+        guess = calibrate_and_guess(cue, known, truth, asked, tip=True)
+        found["base_to_tip"][cue] = errors(guess, np.array([f.reach for f in asked]))
+    return found
+
+
+def _gaps(test: list[Trial], guess: Floats, spacing: float) -> tuple[Floats, Floats]:
+    """Estimated and true widths of the gaps that both antennae felt."""
+    values = {(trial.number, trial.side): k for k, trial in enumerate(test)}
+    left = np.array([k for (n, side), k in values.items() if side == "l" and (n, "r") in values])
+    left = left.astype(np.int64)
+    right = np.array([values[test[k].number, "r"] for k in left], np.int64)
+    truth = np.array([trial.distance for trial in test])
+    return guess[left] + guess[right] + spacing, truth[left] + truth[right] + spacing
+
+
+def errors(guess: Floats, truth: Floats) -> dict[str, Any]:
+    """Errors of estimates, in % of the truth; what cannot be told (NaN) is counted apart.
+
+    Returns:
+        `n`, `untold`, mean absolute percentage error `mape_percent`, root mean square
+        `rmse_percent`, and the mean `bias_percent`; the first two with bootstrap 95 % intervals.
+    """
+    told = np.isfinite(guess)
+    share = 100.0 * (guess[told] / truth[told] - 1.0)
+    mean, low, high = mean95(abs(share))
+    square = mean95(share**2)
+    return {
+        "n": int(told.sum()),
+        "untold": int((~told).sum()),
+        "mape_percent": mean,
+        "mape_95": (low, high),
+        "rmse_percent": math.sqrt(square[0]) if told.any() else float("nan"),
+        "rmse_95": tuple(float(np.sqrt(end)) for end in square[1:]),
+        "bias_percent": float(share.mean()) if told.any() else float("nan"),
+    }

@@ -1,0 +1,167 @@
+"""One antenna whose base sweeps beside a wall: what it does, and which shape it has.
+
+The antenna is a left one: the robot heads along x and the wall stands at positive y. The base comes
+from the heading to the near end of its sweep, and then turns by theta0 + A sin(2 pi f t). A right
+antenna is the mirror image, so it needs no bench of its own.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+
+from antennate.errors import SimulationError
+from antennate.experiments.force.post_traverse import speed_at, way
+from antennate.params import BenchPhysicsParams, ShapeParams, SweepParams
+from antennate.robots.antenna import AntennaParams
+from antennate.robots.sensor import SensorParams
+from antennate.sim.bench import Bar, Bench, compile_bench
+from antennate.types import Bools, Floats, Ints
+
+_APPROACH = 0.5
+"""Time from the heading to the near end of the sweep [s]."""
+_THICK, _LONG = 0.02, 2.0
+"""Radius and half length of the wall's capsule [m]."""
+
+
+class Shape(IntEnum):
+    """Shape of an antenna that touches."""
+
+    FORWARD = 0
+    BACKWARD = 1
+    STRAIGHT = 2
+    TRANSITION = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Wall:
+    """A straight wall.
+
+    Attributes:
+        distance: From the antenna's base at the start to the surface, at right angles [m].
+        tilt: Angle of the wall from the heading, positive away from the robot [rad].
+    """
+
+    distance: float
+    tilt: float = 0.0
+
+    @property
+    def normal(self) -> Floats:
+        """Direction from the base to the wall, shape (2,)."""
+        return np.array([-math.sin(self.tilt), math.cos(self.tilt)])
+
+    def bar(self) -> Bar:
+        """The wall as an obstacle of the bench."""
+        middle = (self.distance + _THICK) * self.normal
+        along = _LONG * np.array([math.cos(self.tilt), math.sin(self.tilt)])
+        (x0, y0), (x1, y1) = middle - along, middle + along
+        return Bar(float(x0), float(y0), float(x1), float(y1), _THICK)
+
+
+@dataclass(frozen=True, slots=True)
+class Trace:
+    """A sweep sample by sample, each of shape (n,).
+
+    Attributes:
+        t: Time since the sweep began [s], negative while the base comes from the heading.
+        base: Angle of the base from the heading [rad].
+        flex: Summed hinge angles under the film [rad].
+        offset: Angle of the tip, seen from the base, off the base's direction [rad].
+        reach: Distance from base to tip [m].
+        touching: Whether the antenna touches the wall.
+        reason: Why the trial is invalid, or empty.
+    """
+
+    t: Floats
+    base: Floats
+    flex: Floats
+    offset: Floats
+    reach: Floats
+    touching: Bools
+    reason: str = ""
+
+
+def record(
+    physics: BenchPhysicsParams,
+    antenna: AntennaParams,
+    sensor: SensorParams,
+    sweep: SweepParams,
+    wall: Wall,
+    sweeps: float,
+    speed: float = 0.0,
+    gap: float = 5e-4,
+) -> Trace:
+    """Sweep beside a wall.
+
+    Args:
+        physics: Numerics.
+        antenna: The antenna.
+        sensor: Its film and the rate of samples.
+        sweep: The sweep.
+        wall: The wall.
+        sweeps: How many sweeps.
+        speed: Speed of the base along the heading [m/s].
+        gap: Distance to the wall that counts as touching [m].
+    """
+    bench = Bench(
+        compile_bench(physics, antenna, sensor, [wall.bar()]), sensor.covered_hinges(antenna)
+    )
+    bench.place(0.0, 0.0, 0.0)
+    steps = round(1.0 / (sensor.rate * physics.timestep))
+    end = _APPROACH + sweeps / sweep.frequency - 0.5 / sensor.rate
+    rows: list[tuple[float, float, float, float, float, bool]] = []
+    try:
+        while bench.t < end:
+            t = bench.t
+            bench.command(way(t, speed), 0.0, speed_at(t, speed), 0.0, commanded(sweep, t))
+            bench.step(steps)
+            joints, base = bench.joints(), bench.base_angle()
+            tip = joints[-1] - joints[0]
+            near = wall.distance - float((joints @ wall.normal).max()) - antenna.radius
+            off = math.atan2(tip[1], tip[0]) - base
+            off = math.remainder(off, 2.0 * math.pi)
+            reach = float(np.hypot(*tip))
+            rows.append((bench.t - _APPROACH, base, bench.flex(), off, reach, near < gap))
+    except SimulationError as error:
+        none = np.zeros(0)
+        return Trace(none, none, none, none, none, none > 0, str(error))
+    t, base, flex, offset, reach, touching = np.array(rows, np.float64).T
+    return Trace(t, base, flex, offset, reach, touching > 0.5)
+
+
+def commanded(sweep: SweepParams, t: float) -> float:
+    """Angle commanded to the base [rad], at a time since the trial began [s]."""
+    if t < _APPROACH:
+        share = t / _APPROACH
+        return (sweep.centre - sweep.amplitude) * share * share * (3.0 - 2.0 * share)
+    turned = 2.0 * math.pi * sweep.frequency * (t - _APPROACH)
+    return sweep.centre - sweep.amplitude * math.cos(turned)
+
+
+def classify(params: ShapeParams, flex: Floats, offset: Floats) -> Ints:
+    """Shape of a touching antenna, one `Shape` for every flex and offset of the tip [rad].
+
+    FORWARD points ahead: film and tip both bend towards the heading. BACKWARD points to the tail:
+    both bend there. STRAIGHT does neither. All else is a TRANSITION, like an S.
+    """
+    straight = (abs(flex) < params.flex) & (abs(offset) < params.offset)
+    forward = (flex <= -params.flex) & (offset <= -params.offset)
+    backward = (flex >= params.flex) & (offset >= params.offset)
+    return np.select(
+        [straight, forward, backward],
+        [Shape.STRAIGHT, Shape.FORWARD, Shape.BACKWARD],
+        Shape.TRANSITION,
+    ).astype(np.int64)
+
+
+def shares(params: ShapeParams, trace: Trace, first: float) -> dict[str, float]:
+    """Shares of time of each shape and of no contact, from `first` [s] on; they add up to 1."""
+    at = trace.t > first
+    shape = classify(params, trace.flex, trace.offset)
+    found = {
+        kind.name.lower(): float((trace.touching & (shape == kind))[at].mean()) for kind in Shape
+    }
+    return found | {"free": float((~trace.touching)[at].mean())}

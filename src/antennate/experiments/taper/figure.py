@@ -1,0 +1,55 @@
+"""Figure of `antennate taper`: stiffness along the animal and along the robot."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from antennate import figures as style
+
+
+@style.styled
+def taper(result: Mapping[str, Any]) -> Figure:
+    """The proxy of the animal, its stretches, the ladder, and the ladder that follows it best.
+
+    Args:
+        result: The content of result.json.
+    """
+    figure = style.canvas(7.0, 4.2)
+    panel = figure.subplots()
+    segments = np.array([row["proxy"] for row in result["segments"]])
+    places = (np.arange(len(segments)) + 0.5) / len(segments)
+    animal, robot, best = style.series(3)
+    panel.plot(
+        places,
+        segments,
+        color=animal,
+        marker="o",
+        markersize=4,
+        label=f"animal, {len(segments)} segments: {result['base_over_tip']:.0f} : 1",
+    )
+    _steps(panel, result["stretches"], animal, (0, (2, 1.5)), "animal, one stretch a spring")
+    for key, colour, name in (("ladder", robot, "ladder"), ("suggested", best, "suggested")):
+        row = result[key]
+        coils = "-".join(f"{n:g}" for n in row["active_coils"])
+        label = f"{name} {coils}: {row['base_over_tip']:.3g} : 1"
+        _steps(panel, row["proxy"], colour, "solid", label)
+    panel.set_yscale("log")
+    panel.set(
+        xlim=(0, 1),
+        xlabel="place along the antenna, base to tip",
+        ylabel="stiffness over that of the base",
+    )
+    panel.legend(loc="lower left", fontsize=8)
+    return figure
+
+
+def _steps(panel: Axes, values: list[float], colour: Any, line: Any, label: str) -> None:
+    edges = np.linspace(0.0, 1.0, len(values) + 1)
+    panel.stairs(
+        values, edges, baseline=None, color=colour, linestyle=line, linewidth=1.8, label=label
+    )

@@ -1,0 +1,280 @@
+"""Figures of `antennate tunnel`: trials seen from above, and the arms side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import pairwise
+from typing import Any, Protocol
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import EllipseCollection
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from matplotlib.ticker import MaxNLocator, PercentFormatter
+
+from antennate import figures as style
+from antennate.types import Floats, Maneuver
+
+MARGIN = 0.3
+"""Shown around the walls; what is farther out is cut off [m]."""
+
+_VERDICTS = {
+    "success": "out after {:.1f} s",
+    "timeout": "out of time, {:.0f} s",
+    "left": "left by the entrance",
+    "invalid": "invalid",
+}
+
+
+class Row(Protocol):
+    """What is needed of one row of the table."""
+
+    @property
+    def arm(self) -> str:
+        """The arm."""
+        ...
+
+    @property
+    def trial(self) -> int:
+        """The trial."""
+        ...
+
+    @property
+    def status(self) -> str:
+        """Success, timeout, left or invalid."""
+        ...
+
+    @property
+    def time_s(self) -> float:
+        """Time to exit, or the limit [s]."""
+        ...
+
+
+class Path(Protocol):
+    """What is needed of one trial's course; lengths in metres."""
+
+    @property
+    def head(self) -> Floats:
+        """Head positions, shape (n, 2)."""
+        ...
+
+    @property
+    def maneuver(self) -> Floats:
+        """`Maneuver` at these positions, shape (n,)."""
+        ...
+
+    @property
+    def walls(self) -> tuple[Floats, Floats]:
+        """The two walls as polylines."""
+        ...
+
+    @property
+    def cylinders(self) -> Floats:
+        """Cylinders at first and at the end, shape (2, m, 2)."""
+        ...
+
+    @property
+    def links(self) -> Floats:
+        """The robot at the end, head first, shape (6, 2)."""
+        ...
+
+
+@style.styled
+def trajectories(
+    paths: Mapping[tuple[str, int], Path],
+    arms: Sequence[str],
+    rows: Sequence[Row],
+    trials: Sequence[int],
+    radius: float,
+) -> Figure:
+    """Trials from above: a column for each trial, a row for each arm.
+
+    Args:
+        paths: Courses by arm and trial; a missing one leaves its panel empty.
+        arms: Arms from top to bottom.
+        rows: The table.
+        trials: Trials from left to right.
+        radius: Radius of a cylinder [m].
+    """
+    table = {(row.arm, row.trial): row for row in rows}
+    boxes = {t: _box([paths[a, t] for a in arms if (a, t) in paths]) for t in trials}
+    sides = [box[1] - box[0] for box in boxes.values() if box is not None] or [np.ones(2)]
+    aspect = float(max(side[1] for side in sides) / max(side[0] for side in sides))
+    width = 0.5 + 2.3 * len(trials)
+    figure = style.canvas(max(width, 6.4), 0.9 + len(arms) * (2.0 * aspect + 0.35))
+    panels = figure.subplots(len(arms), len(trials), squeeze=False)
+    for i, arm in enumerate(arms):
+        for j, trial in enumerate(trials):
+            panel, box = panels[i, j], boxes[trial]
+            _frame(panel, box)
+            if (arm, trial) in paths:
+                _draw_trial(panel, paths[arm, trial], radius)
+                row = table[arm, trial]
+                verdict = _VERDICTS[row.status].format(row.time_s)
+                panel.set_title(f"trial {trial}: {verdict}", fontsize=8.5)
+            else:
+                panel.set_title(f"trial {trial}: not run", fontsize=8.5)
+            if i == len(arms) - 1:
+                panel.set_xlabel("x [m]")
+        panels[i, 0].set_ylabel("y [m]")
+        panels[i, 0].annotate(
+            arm,
+            (0.0, 0.5),
+            (-54.0, 0.0),
+            xycoords="axes fraction",
+            textcoords="offset points",
+            rotation=90,
+            ha="center",
+            va="center",
+            fontsize=11,
+            fontweight="bold",
+        )
+    figure.legend(handles=_handles(), loc="outside lower center", ncols=min(5, 2 + len(trials)))
+    return figure
+
+
+def _box(paths: Sequence[Path]) -> tuple[Floats, Floats] | None:
+    """Lower and upper corner of what is shown of one tunnel [m]; None without a course."""
+    if not paths:
+        return None
+    points = np.concatenate(paths[0].walls)
+    return points.min(axis=0) - MARGIN, points.max(axis=0) + MARGIN
+
+
+def _frame(panel: Axes, box: tuple[Floats, Floats] | None) -> None:
+    panel.set_aspect("equal", adjustable="box")
+    panel.grid(visible=False)
+    for axis in (panel.xaxis, panel.yaxis):
+        axis.set_major_locator(MaxNLocator(4, steps=[1, 2, 5, 10]))
+    if box is not None:
+        panel.set_xlim(box[0][0], box[1][0])
+        panel.set_ylim(box[0][1], box[1][1])
+
+
+def _draw_trial(panel: Axes, path: Path, radius: float) -> None:
+    before, after = path.cylinders
+    _circles(panel, after, radius, facecolors=style.FAINT, edgecolors="none")
+    _circles(panel, before, radius, facecolors="none", edgecolors=style.MUTED, linewidths=0.4)
+    for wall in path.walls:
+        panel.plot(*wall.T, color=style.MUTED, linewidth=1.6, solid_capstyle="butt")
+    exit_line = np.array([wall[-1] for wall in path.walls])
+    panel.plot(*exit_line.T, color=style.MUTED, linewidth=1.0, linestyle=(0, (2, 2)))
+    for maneuver, points in _stretches(path):
+        colour = style.MANEUVER_COLOURS[maneuver]
+        panel.plot(*points.T, color=colour, linewidth=1.4, zorder=3)
+    panel.plot(*path.links.T, color=style.INK, linewidth=2.4, alpha=0.75, zorder=4)
+    panel.plot(*path.links.T, color=style.INK, linestyle="", marker="o", markersize=3, zorder=4)
+    panel.plot(*path.links[0], color=style.INK, marker="o", markersize=5.5, zorder=5)
+
+
+def _circles(panel: Axes, centres: Floats, radius: float, **look: Any) -> None:
+    size = np.full(len(centres), 2.0 * radius)
+    circles = EllipseCollection(
+        size,
+        size,
+        np.zeros(len(size)),
+        units="xy",
+        offsets=centres,
+        offset_transform=panel.transData,
+        **look,
+    )
+    panel.add_collection(circles, autolim=False)
+
+
+def _stretches(path: Path) -> Iterator[tuple[Maneuver, Floats]]:
+    """The course cut where the maneuver changes; a sample carries the maneuver that led to it."""
+    cuts = [0, *(np.flatnonzero(np.diff(path.maneuver[1:])) + 1), len(path.head) - 1]
+    for first, last in pairwise(cuts):
+        if last > first:
+            yield Maneuver(int(path.maneuver[last])), path.head[first : last + 1]
+
+
+def _handles() -> list[Any]:
+    lines = [
+        Line2D([], [], color=colour, label=f"head, {style.MANEUVER_NAMES[maneuver]}")
+        for maneuver, colour in style.MANEUVER_COLOURS.items()
+    ]
+    robot = Line2D(
+        [], [], color=style.INK, linewidth=2.4, marker="o", markersize=5, label="robot at the end"
+    )
+    return [
+        *lines,
+        robot,
+        Line2D([], [], color=style.MUTED, linewidth=1.6, label="wall"),
+        Line2D([], [], color=style.MUTED, linewidth=1.0, linestyle=(0, (2, 2)), label="exit"),
+        Patch(facecolor="white", edgecolor=style.MUTED, linewidth=0.6, label="cylinder at first"),
+        Patch(facecolor=style.FAINT, label="cylinder at the end"),
+    ]
+
+
+@style.styled
+def summary(
+    arms: Mapping[str, Mapping[str, Any]], rows: Sequence[Row], time_limit: float
+) -> Figure:
+    """Success, time inside and restricted mean time of every arm.
+
+    Args:
+        arms: Per arm what result.json says of it.
+        rows: The table.
+        time_limit: Time after which a trial has failed [s].
+    """
+    figure = style.canvas(10.5, 3.4)
+    rate, inside, mean = figure.subplots(1, 3, width_ratios=(1, 1.5, 1))
+    names = list(arms)
+    for i, (name, arm) in enumerate(arms.items()):
+        valid = arm["trials"] - arm["invalid"]
+        if not valid:
+            continue
+        _interval(rate, i, arm["successes"] / valid, arm["wilson95"], name)
+        _interval(mean, i, arm["restricted_mean_time_s"], arm["restricted_mean_time_95"], name)
+        exits = sorted(r.time_s for r in rows if r.arm == name and r.status == "success")
+        left = 1.0 - np.arange(len(exits) + 1) / valid
+        inside.step(
+            [0.0, *exits, time_limit],
+            [*left, left[-1]],
+            where="post",
+            color=style.ARM_COLOURS.get(name, style.INK),
+            linestyle=style.ARM_LINES.get(name, "solid"),
+            linewidth=3.2 - 0.8 * i,
+            label=name,
+        )
+    for panel in (rate, mean):
+        panel.set_yticks(range(len(names)), [_label(name, arms[name]) for name in names])
+        panel.tick_params(axis="y", labelsize=9, labelcolor=style.INK, length=0)
+        panel.set_ylim(len(names) - 0.5, -0.5)
+        panel.grid(visible=False, axis="y")
+    rate.set(
+        xlim=(-0.02, 1.02), xlabel="trials that succeeded [%]", title="Success with Wilson 95 %"
+    )
+    rate.xaxis.set_major_formatter(PercentFormatter(1.0, symbol=""))
+    mean.set(
+        xlim=(0, 1.02 * time_limit),
+        xlabel="restricted mean time [s]",
+        title="Failures as the limit; bootstrap 95 %",
+    )
+    mean.set_yticklabels(names)
+    inside.set(
+        xlim=(0, time_limit),
+        ylim=(-0.03, 1.03),
+        xlabel="time [s]",
+        ylabel="trials not out by the exit [%]",
+        title=f"Over time; failures stay to the limit, {time_limit:g} s",
+    )
+    inside.yaxis.set_major_formatter(PercentFormatter(1.0, symbol=""))
+    if inside.lines:
+        inside.legend(loc="upper right")
+    return figure
+
+
+def _label(name: str, arm: Mapping[str, Any]) -> str:
+    return f"{name}\nn = {arm['trials'] - arm['invalid']}"
+
+
+def _interval(panel: Axes, at: int, value: float, ends: Sequence[float], name: str) -> None:
+    colour = style.ARM_COLOURS.get(name, style.INK)
+    panel.plot(
+        list(ends), [at, at], color=colour, linewidth=2.4, solid_capstyle="butt", clip_on=False
+    )
+    panel.plot(value, at, color=colour, marker="o", markersize=8, clip_on=False)

@@ -1,0 +1,175 @@
+"""What is measured on one trial while it runs, with the truth of the simulation at hand.
+
+The controller sees nothing of this. Progress is arc length along the tunnel's centre line. The
+robot is stuck when its progress has gained less than STUCK_GAIN on its own maximum for STUCK_TIME;
+the episode ends, recovered, with the next such gain.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from antennate.sim import geometry
+from antennate.sim.arena import Tunnel
+from antennate.sim.world import World
+from antennate.types import Floats, Maneuver
+
+Status = Literal["success", "timeout", "left", "invalid"]
+
+STUCK_GAIN = 0.02
+"""Gain of progress that counts as getting on [m]."""
+STUCK_TIME = 5.0
+"""Time without such a gain after which the robot is stuck [s]."""
+LEFT_BEHIND = 0.8
+"""Distance behind the entrance at which the robot has left [m]: its length and more."""
+_EVERY = 10
+"""Ticks between two looks: 10 Hz at the usual rate."""
+
+
+@dataclass(frozen=True, slots=True)
+class TrialResult:
+    """One row of the table.
+
+    Attributes:
+        status: success (the head passed the exit), timeout, left (out through the entrance) or
+            invalid.
+        time_s: Time to exit [s]; the limit for every failure.
+        progress_m: Where the head ended, along the centre line, within [0, length] [m].
+        stuck: Episodes of being stuck; `recovered` of them ended by getting on.
+        share_forward: Share of ticks in each maneuver.
+        force_mean_n: Mean over 10 Hz samples of the summed normal force on robot and antennae [N].
+        force_max_n: Their maximum [N].
+        reason: Why a trial is invalid, with the physics step; empty otherwise.
+    """
+
+    arm: str
+    trial: int
+    status: Status
+    time_s: float
+    progress_m: float
+    stuck: int
+    recovered: int
+    share_forward: float
+    share_turn_l: float
+    share_turn_r: float
+    share_reverse: float
+    share_hold: float
+    force_mean_n: float
+    force_max_n: float
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class TrialPath:
+    """What a figure needs of one trial.
+
+    Attributes:
+        t: Times of the samples [s], shape (n,).
+        head: Head positions [m], shape (n, 2).
+        maneuver: `Maneuver` at the samples, shape (n,).
+        walls: The two walls [m], polylines.
+        cylinders: Where the cylinders stood at first and at the end [m], shape (2, m, 2).
+        links: The robot's links at the end [m], shape (6, 2).
+    """
+
+    t: Floats
+    head: Floats
+    maneuver: Floats
+    walls: tuple[Floats, Floats]
+    cylinders: Floats
+    links: Floats
+
+
+@dataclass
+class TrialMonitor:
+    """Watches one trial from its first tick to its verdict."""
+
+    arm: str
+    trial: int
+    tunnel: Tunnel
+    time_limit: float
+    _ticks: int = 0
+    _best: float = 0.0
+    _best_at: float = 0.0
+    _stuck: int = 0
+    _recovered: int = 0
+    _is_stuck: bool = False
+    _forces: list[float] = field(default_factory=list)
+    _samples: list[tuple[float, float, float, int]] = field(default_factory=list)
+    _counts: Floats = field(default_factory=lambda: np.zeros(len(Maneuver)))
+
+    def watch(self, world: World, maneuver: int, failed: bool) -> Status | None:
+        """Look at the world after a tick; the verdict once there is one."""
+        if failed:
+            return "invalid"
+        self._counts[maneuver] += 1
+        self._ticks += 1
+        t = world.t
+        if self._ticks % _EVERY and t < self.time_limit:
+            return None
+        x, y = float(world.head[0]), float(world.head[1])
+        progress = geometry.progress(self.tunnel.centre, np.array([x, y]))
+        self._samples.append((t, x, y, maneuver))
+        self._forces.append(world.obstacle_force())
+        self._note_progress(progress, t)
+        if progress >= self.tunnel.params.length:
+            return "success"
+        if self._has_left(np.array([x, y]), progress):
+            return "left"
+        return "timeout" if t >= self.time_limit else None
+
+    def _has_left(self, head: Floats, progress: float) -> bool:
+        """Far behind the entrance, or beside the tunnel: nobody reaches the exit from outside."""
+        if progress < 0.0:
+            return float(np.hypot(*head)) >= LEFT_BEHIND
+        left, right = self.tunnel.walls
+        return not geometry.contains(np.concatenate([left, right[::-1]]), head)
+
+    def _note_progress(self, progress: float, t: float) -> None:
+        if progress > self._best + STUCK_GAIN:
+            self._best, self._best_at = progress, t
+            self._recovered += self._is_stuck
+            self._is_stuck = False
+        elif not self._is_stuck and t - self._best_at > STUCK_TIME:
+            self._is_stuck = True
+            self._stuck += 1
+
+    def result(self, world: World, status: Status, reason: str) -> TrialResult:
+        """The row of a trial that ended so."""
+        share = self._counts / max(1.0, self._counts.sum())
+        forces = np.array(self._forces) if self._forces else np.zeros(1)
+        progress = geometry.progress(self.tunnel.centre, world.head[:2].copy())
+        if not np.isfinite(progress):
+            progress = self._best
+        return TrialResult(
+            arm=self.arm,
+            trial=self.trial,
+            status=status,
+            time_s=round(world.t, 6) if status == "success" else self.time_limit,
+            progress_m=round(float(np.clip(progress, 0.0, self.tunnel.params.length)), 6),
+            stuck=self._stuck,
+            recovered=self._recovered,
+            share_forward=round(float(share[Maneuver.FORWARD]), 6),
+            share_turn_l=round(float(share[Maneuver.TURN_L]), 6),
+            share_turn_r=round(float(share[Maneuver.TURN_R]), 6),
+            share_reverse=round(float(share[Maneuver.REVERSE]), 6),
+            share_hold=round(float(share[Maneuver.HOLD]), 6),
+            force_mean_n=round(float(forces.mean()), 6),
+            force_max_n=round(float(forces.max()), 6),
+            reason=reason,
+        )
+
+    def path(self, world: World) -> TrialPath:
+        """The trial as a figure draws it."""
+        samples = np.array(self._samples).reshape(-1, 4)
+        return TrialPath(
+            t=samples[:, 0],
+            head=samples[:, 1:3],
+            maneuver=samples[:, 3],
+            walls=self.tunnel.walls,
+            cylinders=np.stack([self.tunnel.cylinders, world.cylinders()]),
+            links=world.links().copy(),
+        )

@@ -1,0 +1,293 @@
+"""The boulder wall: which antenna passes a line of small spheres, which jams, which slips.
+
+Everything is defined before any run. The base comes in along the wall's normal until the straight
+antenna would reach behind the crests by the overlap, then moves along the wall. A trial *jams* if
+the tip advances less than `jam_advance` over some `jam_travel` of the base, *slips* if no sphere is
+touched for longer than `slip_time`, and succeeds if it does neither over the whole travel. The same
+is counted once more without the `start`. A trial that does both counts as a jam.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from typing import Any, Literal
+
+import numpy as np
+from pydantic import model_validator
+
+from antennate.antenna.statics import PROFILES, with_profile
+from antennate.errors import SimulationError
+from antennate.experiments.wall.outcome import SAMPLE_PERIOD, Fate, Traverse, WallTrial, classify
+from antennate.params import BenchPhysicsParams, BenchVariationParams, Params, WallParams
+from antennate.params.base import number
+from antennate.robots.antenna import AntennaParams
+from antennate.robots.sensor import SensorParams
+from antennate.sim.bench import Ball, Bench, compile_bench
+from antennate.studies import statistics
+from antennate.studies.pool import run_tasks
+from antennate.types import Floats
+
+Profile = Literal["stiff", "descending", "compliant", "matched_uniform", "ascending"]
+REFERENCE: Profile = "descending"
+"""The arm that all others are compared with."""
+_COMMAND_PERIOD = 0.002
+"""Time between commands to the carriage [s]."""
+_SAMPLES = round(SAMPLE_PERIOD / _COMMAND_PERIOD)
+"""Commands to a sample."""
+_CLEAR = 0.002
+"""Distance between tip and crests before the approach [m]."""
+_SETTLE = 0.5
+"""Time to come to rest under gravity before the approach [s]."""
+_GRAVITY = 9.81
+
+
+class WallConfig(Params):
+    """Everything that decides the outcome of `antennate wall`."""
+
+    trials: int = number(
+        20, "1", "paper: 20 trials a profile", "trials of every arm", ge=1, le=10000
+    )
+    seed: int = number(1, "1", "assumed: any", "seed of all chance", ge=0)
+    arms: tuple[Profile, ...] = number(
+        tuple(PROFILES),
+        "1",
+        "paper: stiff, descending, compliant; assumed: two controls it lacks",
+        "profiles to run",
+        min_length=1,
+    )
+    wall: WallParams = WallParams()
+    antenna: AntennaParams = AntennaParams()
+    sensor: SensorParams = SensorParams()
+    variation: BenchVariationParams = BenchVariationParams()
+    physics: BenchPhysicsParams = BenchPhysicsParams()
+
+    @model_validator(mode="after")
+    def _sound(self) -> WallConfig:
+        if len(set(self.arms)) != len(self.arms):
+            raise ValueError(f"arms must differ, got {', '.join(self.arms)}")
+        reach = self.antenna.length * math.sin(self.wall.base_angle)
+        if self.wall.overlap + self.variation.overlap >= reach / 2:
+            raise ValueError(
+                f"wall.overlap must stay below half of the antenna's reach, {reach / 2:.4g} m, got "
+                f"{self.wall.overlap:g} m"
+            )
+        if self.wall.travel <= max(self.wall.start + self.wall.jam_travel, self.wall.jam_travel):
+            raise ValueError(
+                f"wall.travel must exceed start and jam_travel together, "
+                f"{self.wall.start + self.wall.jam_travel:g} m, got {self.wall.travel:g} m"
+            )
+        ratio = _COMMAND_PERIOD / self.physics.timestep
+        if abs(ratio - round(ratio)) > 1e-6 or round(ratio) < 1:
+            raise ValueError(
+                f"physics.timestep must divide {_COMMAND_PERIOD:g} s, got {self.physics.timestep:g}"
+            )
+        return self
+
+
+@dataclass(frozen=True)
+class WallOutcome:
+    """All trials of a run.
+
+    Attributes:
+        config: What was run.
+        rows: Sorted by arm and trial.
+        examples: The first trial of every arm.
+    """
+
+    config: WallConfig
+    rows: list[WallTrial]
+    examples: dict[str, Traverse]
+
+    def result(self) -> dict[str, Any]:
+        """The content of result.json."""
+        by_arm: dict[Profile, list[WallTrial]] = {
+            a: [r for r in self.rows if r.arm == a] for a in self.config.arms
+        }
+        return {
+            "schema": 1,
+            "command": "wall",
+            "seed": self.config.seed,
+            "gravity": self.config.wall.gravity,
+            "start_m": self.config.wall.start,
+            "arms": {arm: _summary(rows) for arm, rows in by_arm.items()},
+            "paired": _paired(by_arm),
+        }
+
+
+def _summary(rows: list[WallTrial]) -> dict[str, Any]:
+    valid = [r for r in rows if r.fate != "invalid"]
+    return {
+        **_counts([r.fate for r in rows]),
+        "after_start": _counts([r.fate_after_start for r in rows]),
+        "least_advance_mm": _median([r.least_advance_mm for r in valid]),
+        "longest_stick_mm": _median([r.longest_stick_mm for r in valid]),
+        "longest_gap_s": _median([r.longest_gap_s for r in valid]),
+        "touched": _median([r.touched for r in valid]),
+        "force_mean_n": _median([r.force_mean_n for r in valid]),
+        "force_max_n": max((r.force_max_n for r in valid), default=None),
+        "flex_max_deg": max((r.flex_max_deg for r in valid), default=None),
+    }
+
+
+def _counts(fates: list[Fate]) -> dict[str, Any]:
+    successes, invalid = fates.count("success"), fates.count("invalid")
+    return {
+        "trials": len(fates),
+        "successes": successes,
+        "jams": fates.count("jam"),
+        "slips": fates.count("slip"),
+        "invalid": invalid,
+        "wilson95": statistics.wilson95(successes, len(fates) - invalid),
+    }
+
+
+def _median(values: list[float]) -> float | None:
+    return float(np.median(values)) if values else None
+
+
+def _paired(by_arm: dict[Profile, list[WallTrial]]) -> dict[str, Any]:
+    """The reference against every other arm, on trials valid in both, with both counts."""
+    if REFERENCE not in by_arm:
+        return {}
+    tests = {}
+    for other, theirs in by_arm.items():
+        pairs = [
+            (a, b)
+            for a, b in zip(by_arm[REFERENCE], theirs, strict=True)
+            if "invalid" not in (a.fate, b.fate)
+        ]
+        if other != REFERENCE and pairs:
+            whole = [(a.fate == "success", b.fate == "success") for a, b in pairs]
+            late = [
+                (a.fate_after_start == "success", b.fate_after_start == "success") for a, b in pairs
+            ]
+            tests[f"{REFERENCE}-{other}"] = {
+                "trials": len(pairs),
+                **asdict(statistics.mcnemar(np.array(whole))),
+                "after_start": asdict(statistics.mcnemar(np.array(late))),
+            }
+    return tests
+
+
+def passage(config: WallConfig, arm: Profile, trial: int) -> Traverse:
+    """Move one antenna along the wall.
+
+    Raises:
+        SimulationError: The physics became invalid.
+    """
+    rng = np.random.default_rng([config.seed, trial])
+    wall, variation = config.wall, config.variation
+    factors = np.exp(rng.normal(0.0, variation.stiffness, 6))
+    friction = max(0.0, config.antenna.friction + rng.normal(0.0, variation.friction))
+    angle = wall.base_angle + rng.uniform(-1, 1) * variation.base_angle
+    overlap = wall.overlap + rng.uniform(-1, 1) * variation.overlap
+    phase = rng.uniform(0.0, 1.0) * wall.sphere_diameter
+    antenna = with_profile(config.antenna, config.sensor, arm)
+    antenna = antenna.model_copy(update={"friction": min(friction, 2.0)})
+    bench = _bench(config, antenna, angle, phase, factors)
+    crest = antenna.length * math.sin(angle) + antenna.radius + _CLEAR
+    return _drive(config, bench, math.pi / 2 - angle, overlap + _CLEAR, crest)
+
+
+def _bench(
+    config: WallConfig, antenna: AntennaParams, angle: float, phase: float, factors: Floats
+) -> Bench:
+    """Bench with spheres all along the way, their crests clear of the tip at first."""
+    wall, pitch = config.wall, config.wall.sphere_diameter
+    x = antenna.length * math.sin(angle) + antenna.radius + _CLEAR + pitch / 2
+    below = -2 * pitch - max(0.0, -antenna.length * math.cos(angle))
+    above = wall.travel + 1.2 * antenna.length
+    heights = np.arange(below + phase, above, pitch)
+    balls = [Ball(x, float(y), pitch / 2) for y in heights]
+    pull = {"down": -_GRAVITY, "up": _GRAVITY, "off": 0.0}[wall.gravity]
+    model = compile_bench(config.physics, antenna, config.sensor, balls, (0.0, pull))
+    for i, factor in enumerate(factors):
+        joint = model.joint(f"antenna/hinge{i}")
+        joint.stiffness *= factor
+    return Bench(model, config.sensor.covered_hinges(antenna))
+
+
+def _drive(
+    config: WallConfig, bench: Bench, base: float, approach: float, crest: float
+) -> Traverse:
+    wall = config.wall
+    bench.place(0.0, 0.0, base)
+    bench.step(round(_SETTLE / config.physics.timestep))
+    substeps = round(_COMMAND_PERIOD / config.physics.timestep)
+    for x in _ramp(approach, wall.speed):
+        bench.command(x, 0.0, wall.speed, 0.0, base)
+        bench.step(substeps)
+    begin = bench.tip()[1]
+    path = _ramp(wall.travel, wall.speed)
+    rows, hinges, shapes = [], [], []
+    marks = {round(i * (len(path) - 1) / 10) for i in range(11)}
+    for i, y in enumerate(path):
+        bench.command(approach, y, 0.0, wall.speed, base)
+        bench.step(substeps)
+        if i in marks:
+            shapes.append(bench.joints())
+        if i % _SAMPLES == 0:
+            force = float(np.hypot(*bench.contact_force()))
+            tip = bench.tip()[1] - begin
+            rows.append((y, tip, bench.touching(), force, bench.flex()))
+            hinges.append(bench.hinges().copy())
+    base_y, tip_y, touching, forces, flex = np.array(rows, float).T
+    from_crest = np.array(shapes) - [crest, 0.0]
+    return Traverse(base_y, tip_y, touching, forces, flex, np.array(hinges), from_crest)
+
+
+def _ramp(length: float, speed: float) -> list[float]:
+    count = max(1, math.ceil(length / (speed * _COMMAND_PERIOD) - 1e-9))
+    return (length * np.arange(1, count + 1) / count).tolist()
+
+
+def _run_task(
+    task: tuple[WallConfig, Profile, int], emit: Callable[[tuple[WallTrial, Traverse | None]], None]
+) -> None:
+    config, arm, trial = task
+    try:
+        seen = passage(config, arm, trial)
+    except SimulationError as error:
+        none = [math.nan] * 7
+        row = WallTrial(arm, trial, "invalid", "invalid", *none, reason=str(error))
+        emit((row, None))
+        return
+    emit((classify(config.wall, arm, trial, seen), seen if trial == 0 else None))
+
+
+def run(
+    config: WallConfig,
+    workers: int = 1,
+    on_step: Callable[[int, int], None] = lambda done, total: None,
+    on_row: Callable[[WallTrial], None] = lambda row: None,
+) -> WallOutcome:
+    """Run all trials of all arms.
+
+    Args:
+        config: What to run.
+        workers: Processes to use; the outcome does not depend on it.
+        on_step: Called after every trial with how many of how many are done.
+        on_row: Called with every trial, in no particular order.
+
+    Raises:
+        WorkerError: A worker process died.
+    """
+    tasks: list[tuple[WallConfig, Profile, int]] = [
+        (config, arm, trial) for trial in range(config.trials) for arm in config.arms
+    ]
+    rows: list[WallTrial] = []
+    examples: dict[str, Traverse] = {}
+
+    def take(item: tuple[WallTrial, Traverse | None]) -> None:
+        row, seen = item
+        rows.append(row)
+        if seen is not None:
+            examples[row.arm] = seen
+        on_row(row)
+        on_step(len(rows), len(tasks))
+
+    run_tasks(_run_task, tasks, workers, take)
+    rows.sort(key=lambda row: (config.arms.index(row.arm), row.trial))
+    return WallOutcome(config, rows, examples)

@@ -1,0 +1,118 @@
+"""One look for every figure: fonts, colours, axes, and bytes that depend on the data alone."""
+
+from __future__ import annotations
+
+import functools
+import io
+from collections.abc import Callable
+from typing import Any, ParamSpec, TypeVar
+
+import matplotlib as mpl
+from matplotlib.figure import Figure
+from matplotlib.layout_engine import PlaceHolderLayoutEngine
+from matplotlib.transforms import Bbox
+
+from antennate.types import Maneuver
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+INK, MUTED, FAINT = "#222222", "#6E6E6E", "#D5D5D5"
+"""Text and robots; secondary lines; things in the background."""
+
+MANEUVER_COLOURS = {
+    Maneuver.FORWARD: "#0072B2",
+    Maneuver.TURN_L: "#009E73",
+    Maneuver.TURN_R: "#E69F00",
+    Maneuver.REVERSE: "#D55E00",
+    Maneuver.HOLD: "#000000",
+}
+"""After Okabe and Ito: apart for every kind of colour vision."""
+
+MANEUVER_NAMES = {
+    Maneuver.FORWARD: "forward",
+    Maneuver.TURN_L: "turn left",
+    Maneuver.TURN_R: "turn right",
+    Maneuver.REVERSE: "reverse",
+    Maneuver.HOLD: "hold",
+}
+
+ARM_COLOURS = {"open": "#8C8C8C", "paper": "#CC79A7", "closed": "#332288"}
+ARM_LINES = {"open": (0, (4, 1.5)), "paper": (0, (4, 1.5, 1, 1.5)), "closed": "solid"}
+"""A second mark beside the colour, for print in grey."""
+
+SERIES = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#D55E00", "#56B4E9", "#332288")
+"""For whatever has no colour of its own; after Okabe and Ito."""
+
+_RC: dict[Any, Any] = {
+    "figure.dpi": 100,
+    "savefig.dpi": 200,
+    "font.family": "DejaVu Sans",
+    "font.size": 9,
+    "axes.titlesize": 9,
+    "axes.labelsize": 9,
+    "axes.labelcolor": INK,
+    "axes.edgecolor": MUTED,
+    "axes.linewidth": 0.8,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.titlelocation": "left",
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "grid.color": "#ECECEC",
+    "grid.linewidth": 0.7,
+    "text.color": INK,
+    "xtick.color": MUTED,
+    "ytick.color": MUTED,
+    "xtick.labelsize": 8,
+    "ytick.labelsize": 8,
+    "legend.fontsize": 9,
+    "legend.frameon": False,
+    "lines.linewidth": 1.8,
+    "svg.fonttype": "path",
+    "svg.hashsalt": "antennate",
+}
+
+
+def styled(draw: Callable[P, R]) -> Callable[P, R]:
+    """Let a function draw in this look."""
+
+    @functools.wraps(draw)
+    def inside(*args: P.args, **kwargs: P.kwargs) -> R:
+        with mpl.rc_context(_RC):
+            return draw(*args, **kwargs)
+
+    return inside
+
+
+def series(count: int) -> list[str]:
+    """As many colours, the first ones first; they repeat after seven."""
+    return [SERIES[i % len(SERIES)] for i in range(count)]
+
+
+def canvas(width: float, height: float) -> Figure:
+    """An empty figure of this size [inches] whose parts keep clear of one another."""
+    return Figure(figsize=(width, height), layout="constrained")
+
+
+@styled
+def render(figure: Figure) -> dict[str, bytes]:
+    """The figure as svg and png: the same bytes for the same data."""
+    _settle(figure)
+    files = {}
+    for suffix, metadata in (("svg", {"Date": None}), ("png", {})):
+        file = io.BytesIO()
+        figure.savefig(file, format=suffix, metadata=metadata, facecolor="white")
+        files[suffix] = file.getvalue()
+    return files
+
+
+def _settle(figure: Figure) -> None:
+    """Lay the figure out once and round the result: the solver's last digits are not repeatable."""
+    if isinstance(figure.get_layout_engine(), PlaceHolderLayoutEngine):
+        return
+    figure.draw_without_rendering()
+    figure.set_layout_engine("none")
+    for panel in figure.axes:
+        left, low, right, high = (round(x, 4) for x in panel.get_position(original=True).extents)
+        panel.set_position(Bbox.from_extents(left, low, right, high))

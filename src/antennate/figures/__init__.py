@@ -1,1 +1,0 @@
-"""One function per figure: plain data goes in, a figure comes out."""

@@ -1,0 +1,1 @@
+"""Robots as data: what a robot is made of, and what follows from it."""

@@ -1,0 +1,167 @@
+"""The sensor: flex film, voltage divider, and the converter of an ESP32."""
+
+from __future__ import annotations
+
+import math
+from typing import Literal
+
+from pydantic import model_validator
+
+from antennate.params.base import Params, number
+from antennate.robots.anatomy import ANTENNA_LINK_COUNT
+from antennate.robots.antenna import AntennaParams
+
+CONVERTER_SLOPE = 196602 / 65536 / 4096
+"""Volts per count and volt of reference: line fit at 11 dB, ESP-IDF adc_cali_line_fitting.c."""
+CONVERTER_OFFSET = 0.142
+"""Voltage up to which the converter reads zero [V]; same source."""
+CONVERTER_LINE_END = 2880
+"""Reading from which the converter compresses [counts]; same source."""
+CONVERTER_STEP = 64
+"""Counts from one entry of the tables below to the next; the first one is at CONVERTER_LINE_END."""
+# fmt: off
+CONVERTER_AT_1_0_V = (
+    2240, 2297, 2352, 2405, 2457, 2512, 2564, 2616, 2664, 2709,
+    2754, 2795, 2832, 2868, 2903, 2937, 2969, 3000, 3030, 3060,
+)
+"""Voltage of a compressed reading, ADC1, reference 1.0 V [mV]; same source."""
+CONVERTER_AT_1_2_V = (
+    2667, 2706, 2745, 2780, 2813, 2844, 2873, 2901, 2928, 2956,
+    2982, 3006, 3032, 3059, 3084, 3110, 3135, 3160, 3184, 3209,
+)
+"""The same with a reference of 1.2 V [mV]."""
+# fmt: on
+
+
+class SensorParams(Params):
+    """Flex film, voltage divider and the ESP32's converter."""
+
+    active_length: float = number(
+        0.0953, "m", "datasheet: Spectra Symbol FS-L-0095-103, active length", "sensed length", gt=0
+    )
+    kind: Literal["flex", "fsr"] = number(
+        "flex",
+        "1",
+        "assumed: the paper's ZD10-100 is sold as a pressure strip and used as a flex sensor",
+        "film whose resistance rises with bending (flex) or falls with it (fsr)",
+    )
+    flat_resistance: float = number(
+        10e3,
+        "Ohm",
+        "datasheet: Spectra Symbol FS-L-0095-103, flat 10 kOhm",
+        "resistance unbent",
+        gt=0,
+    )
+    bend_gain: float = number(
+        1.2 / math.pi,
+        "1/rad",
+        "datasheet: at least doubled at 180 deg (FS-L-0095-103); 2.2 assumed",
+        "relative rise of resistance per radian of flex",
+        gt=0,
+    )
+    unloaded_resistance: float = number(
+        10e6,
+        "Ohm",
+        "datasheet: ZD10-100, above 10 MOhm",
+        "resistance of an unbent fsr film",
+        gt=0,
+    )
+    pressed_resistance: float = number(
+        5e3,
+        "Ohm",
+        "assumed: unpublished for bending; strips of this size reach a few kOhm at full load",
+        "resistance of an fsr film at a right angle",
+        gt=0,
+    )
+    hysteresis: float = number(
+        0.10,
+        "1",
+        "datasheet: ZD10-100, +10 %",
+        "widest gap between loading and unloading, in bends of a right angle",
+        ge=0,
+        le=0.25,
+    )
+    creep: tuple[float, float] = number(
+        (0.025, 0.025),
+        "1",
+        "assumed: 5 % in all, as viscoelastic films show",
+        "shares of the response that come late",
+    )
+    creep_time: tuple[float, float] = number(
+        (0.3, 10.0), "s", "assumed: a fast and a slow part", "how late they come"
+    )
+    directions: Literal["both", "one"] = number(
+        "both",
+        "1",
+        "assumed: the paper's ZD10-100 is sold as a pressure strip, which answers bending either "
+        "way",
+        "whether the film sees bending towards the tail only (one) or either way",
+    )
+    divider_resistance: float = number(
+        10e3,
+        "Ohm",
+        "assumed: the value makers pair with this film",
+        "fixed resistor to ground",
+        gt=0,
+    )
+    supply: float = number(3.3, "V", "datasheet: ESP32 supply", "voltage over the divider", gt=0)
+    reference: float = number(
+        1.1,
+        "V",
+        "datasheet: ESP32, nominal; chips lie between 1.0 and 1.2 V",
+        "reference voltage of the converter",
+        ge=1.0,
+        le=1.2,
+    )
+    oversampling: int = number(
+        16,
+        "1",
+        "assumed: 100 readings a second of two films leave time for 16 samples each",
+        "samples averaged to one reading",
+        ge=1,
+        le=1024,
+    )
+    sample_noise_counts: float = number(
+        8.0,
+        "counts",
+        "assumed: reports of 25 counts peak to peak",
+        "standard deviation of one sample on its own",
+        ge=0,
+    )
+    common_noise_counts: float = number(
+        1.5,
+        "counts",
+        "assumed: averaging 16 samples leaves 2 to 3 counts, so a part of the noise is common",
+        "standard deviation that all samples of a reading share",
+        ge=0,
+    )
+    outlier_share: float = number(
+        0.01, "1", "assumed: reported spikes", "share of samples that are spikes", ge=0, le=1
+    )
+    outlier_counts: float = number(
+        40.0, "counts", "assumed: reported spikes", "height of a spike, up or down", ge=0
+    )
+    rate: float = number(
+        100.0, "Hz", "paper: about 100 Hz over serial", "readings per second", gt=0, le=1000
+    )
+
+    def covered_hinges(self, antenna: AntennaParams) -> int:
+        """Number of hinges, from the base, that lie under the film."""
+        pitch = antenna.link_length
+        return min(ANTENNA_LINK_COUNT, math.ceil(self.active_length / pitch - 1e-9))
+
+    @property
+    def noise_counts(self) -> float:
+        """Standard deviation of one reading without spikes [counts]."""
+        return math.hypot(
+            self.common_noise_counts, self.sample_noise_counts / self.oversampling**0.5
+        )
+
+    @model_validator(mode="after")
+    def _creep_is_a_part(self) -> SensorParams:
+        if min(self.creep) < 0 or sum(self.creep) >= 1 or min(self.creep_time) <= 0:
+            raise ValueError(
+                f"creep must be at least 0 and below 1 in all with creep_time above 0, got "
+                f"{self.creep} and {self.creep_time}"
+            )
+        return self

@@ -1,0 +1,70 @@
+"""One antenna as a part: a base servo hinge and six sprung links, along x, bending about z.
+
+Positive angles bend towards the tail once the part is mounted: on the left as it is, on the right
+turned half about its own axis, which mirrors it.
+"""
+
+from __future__ import annotations
+
+import mujoco
+
+from antennate.robots.anatomy import ANTENNA_BASE, ANTENNA_HINGES
+from antennate.robots.antenna import AntennaParams
+from antennate.robots.sensor import SensorParams
+from antennate.sim import layers
+
+_BASE_STIFFNESS = 2.0
+"""Position gain of the base servo [N·m/rad]: a hundred times the stiffest spring."""
+
+
+def build(params: AntennaParams, sensor: SensorParams) -> mujoco.MjSpec:
+    """The part as an uncompiled spec: bodies `base` and `link0..5`, actuator `base`."""
+    spec = mujoco.MjSpec()
+    spec.compiler.degree = False
+    base = spec.worldbody.add_body(name=ANTENNA_BASE)
+    base.add_joint(
+        name=ANTENNA_BASE,
+        type=mujoco.mjtJoint.mjJNT_HINGE,
+        axis=[0, 0, 1],
+        damping=0.05 * _BASE_STIFFNESS,
+        armature=1e-4,
+    )
+    servo = spec.add_actuator(
+        name=ANTENNA_BASE, trntype=mujoco.mjtTrn.mjTRN_JOINT, target=ANTENNA_BASE
+    )
+    servo.set_to_position(kp=_BASE_STIFFNESS)
+
+    stiffness = params.hinge_stiffness(sensor.covered_hinges(params))
+    parent, where = base, [0.0, 0.0, 0.0]
+    for name, k in zip(ANTENNA_HINGES, stiffness, strict=True):
+        parent = parent.add_body(name=name, pos=where)
+        parent.add_joint(
+            name=name,
+            type=mujoco.mjtJoint.mjJNT_HINGE,
+            axis=[0, 0, 1],
+            stiffness=k,
+            damping=params.damping_time * k,
+            armature=params.armature,
+            limited=mujoco.mjtLimited.mjLIMITED_TRUE,
+            range=[-params.range, params.range],
+        )
+        parent.add_geom(
+            name=name,
+            type=mujoco.mjtGeom.mjGEOM_CAPSULE,
+            fromto=[0, 0, 0, params.link_length, 0, 0],
+            size=[params.radius, 0, 0],
+            mass=params.link_mass,
+            friction=[params.friction, 0, 0],
+            condim=3,
+            contype=layers.ANTENNA,
+            conaffinity=layers.OBSTACLE,
+        )
+        where = [params.link_length, 0.0, 0.0]
+    base.add_geom(
+        type=mujoco.mjtGeom.mjGEOM_SPHERE,
+        size=[params.radius, 0, 0],
+        mass=params.base_mass,
+        contype=0,
+        conaffinity=0,
+    )
+    return spec

@@ -1,0 +1,139 @@
+"""The robot as a part: six links, five yaw and five locked pitch joints, twelve O-legs, antennae.
+
+The head (link 0) carries the free joint and looks along +x; every further link hangs behind the one
+before. A link is a spine along x and a cross-beam along y that houses the two leg servos; an O-leg
+is a crowned ring whose centre sits off its axle.
+"""
+
+from __future__ import annotations
+
+import math
+
+import mujoco
+
+from antennate.robots.anatomy import (
+    ANTENNA_PREFIXES,
+    LEGS,
+    LINKS,
+    PITCH_JOINTS,
+    SIDE_SIGN,
+    YAW_JOINTS,
+)
+from antennate.robots.body import RobotParams, ServoParams
+from antennate.sim import antenna_part as antenna
+from antennate.sim import layers
+
+
+def axle_height(params: RobotParams) -> float:
+    """Height of the leg axles with a leg at mid-stance [m]."""
+    return params.leg_radius + params.leg_eccentricity
+
+
+def build(params: RobotParams) -> mujoco.MjSpec:
+    """The part as an uncompiled spec whose first body is the head, axle height at z = 0."""
+    spec = mujoco.MjSpec()
+    spec.compiler.degree = False
+    parent = spec.worldbody
+    for i, name in enumerate(LINKS):
+        link = parent.add_body(name=name, pos=[-params.link_pitch if i else 0.0, 0.0, 0.0])
+        if i:
+            _add_link_joints(spec, link, i, params)
+        _add_link_shape(link, params)
+        for s, sign in enumerate(SIDE_SIGN):
+            _add_leg(spec, link, LEGS[2 * i + s], sign, params)
+        parent = link
+    _attach_antennae(spec, params)
+    return spec
+
+
+def _add_servo(spec: mujoco.MjSpec, joint: str, servo: ServoParams) -> None:
+    """A position servo on its torque-speed line: clipped drive minus the joint's damping."""
+    actuator = spec.add_actuator(name=joint, trntype=mujoco.mjtTrn.mjTRN_JOINT, target=joint)
+    actuator.set_to_position(kp=servo.stiffness)
+    actuator.forcelimited = mujoco.mjtLimited.mjLIMITED_TRUE
+    actuator.forcerange = [-servo.stall_torque, servo.stall_torque]
+
+
+def _add_link_joints(
+    spec: mujoco.MjSpec, link: mujoco.MjsBody, i: int, params: RobotParams
+) -> None:
+    hinge_at = [params.link_pitch / 2, 0.0, 0.0]
+    link.add_joint(
+        name=YAW_JOINTS[i - 1],
+        type=mujoco.mjtJoint.mjJNT_HINGE,
+        axis=[0, 0, 1],
+        pos=hinge_at,
+        damping=params.servo.damping,
+        armature=params.servo.armature,
+    )
+    _add_servo(spec, YAW_JOINTS[i - 1], params.servo)
+    link.add_joint(
+        name=PITCH_JOINTS[i - 1],
+        type=mujoco.mjtJoint.mjJNT_HINGE,
+        axis=[0, 1, 0],
+        pos=hinge_at,
+        stiffness=params.pitch_stiffness,
+        damping=params.servo.damping,
+        armature=params.servo.armature,
+    )
+
+
+def _add_link_shape(link: mujoco.MjsBody, params: RobotParams) -> None:
+    half_spine = max(params.link_pitch / 2 - params.body_radius, 1e-3)
+    half_beam = max(params.width / 2 - params.leg_width - params.body_radius, 1e-3)
+    for half, along_x in ((half_spine, True), (half_beam, False)):
+        end = [half, 0.0, 0.0] if along_x else [0.0, half, 0.0]
+        link.add_geom(
+            name=f"{link.name}_{'spine' if along_x else 'beam'}",
+            type=mujoco.mjtGeom.mjGEOM_CAPSULE,
+            fromto=[-end[0], -end[1], 0.0, end[0], end[1], 0.0],
+            size=[params.body_radius, 0, 0],
+            mass=params.link_mass / 2,
+            friction=[params.body_friction, 0, 0],
+            condim=3,
+            contype=layers.BODY,
+            conaffinity=layers.OBSTACLE,
+        )
+
+
+def _add_leg(
+    spec: mujoco.MjSpec, link: mujoco.MjsBody, name: str, sign: float, params: RobotParams
+) -> None:
+    lateral = sign * (params.width - params.leg_width) / 2
+    leg = link.add_body(name=name, pos=[0.0, lateral, 0.0])
+    leg.add_joint(
+        name=name,
+        type=mujoco.mjtJoint.mjJNT_HINGE,
+        axis=[0, 1, 0],
+        damping=params.servo.damping,
+        armature=params.servo.armature,
+    )
+    leg.add_geom(
+        name=name,
+        type=mujoco.mjtGeom.mjGEOM_ELLIPSOID,
+        pos=[0.0, 0.0, -params.leg_eccentricity],
+        size=[params.leg_radius, params.leg_width / 2, params.leg_radius],
+        mass=params.leg_mass,
+        friction=[params.leg_friction, 0, 0],
+        priority=1,
+        condim=3,
+        contype=layers.LEG,
+        conaffinity=layers.FLOOR | layers.OBSTACLE,
+    )
+    _add_servo(spec, name, params.servo)
+
+
+def _attach_antennae(spec: mujoco.MjSpec, params: RobotParams) -> None:
+    head = spec.body(LINKS[0])
+    part = antenna.build(params.antenna, params.sensor)
+    for prefix, sign in zip(ANTENNA_PREFIXES, SIDE_SIGN, strict=True):
+        heading = sign * params.antenna.base_angle
+        half = heading / 2
+        turn = [math.cos(half), 0.0, 0.0, math.sin(half)]
+        if sign < 0:  # half a turn about the antenna's own axis mirrors it
+            turn = [0.0, math.cos(half), math.sin(half), 0.0]
+        frame = head.add_frame(
+            pos=[params.link_pitch / 2, sign * params.antenna.base_spacing / 2, 0.0], quat=turn
+        )
+        spec.attach(part, frame=frame, prefix=prefix)
+        part = antenna.build(params.antenna, params.sensor)

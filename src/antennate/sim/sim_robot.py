@@ -1,0 +1,167 @@
+"""The simulated body: a batch of worlds behind the wall, stepped in lockstep.
+
+A row holds one world or none. An empty row, and one whose simulation failed, reads NaN, which the
+control takes for UNKNOWN. Rows never influence one another.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from antennate.antenna.sensor import SensorChain, reading_noise
+from antennate.errors import ConfigError, SimulationError
+from antennate.params import VariationParams
+from antennate.robots.sensor import SensorParams
+from antennate.sim.world import World
+from antennate.types import AntennaFrame, Floats, JointCommand
+
+_NOISE_BLOCK = 1024
+
+
+class Disturbance:
+    """What chance does to one trial: sensor noise, slipping legs, joints off their zero."""
+
+    def __init__(
+        self,
+        rng: np.random.Generator,
+        variation: VariationParams,
+        params: SensorParams,
+        leg_friction: float,
+        period: float,
+    ) -> None:
+        self._rng = rng
+        self._params = params
+        self._variation = variation
+        self._friction = leg_friction
+        self._slip_ticks = max(1, round(variation.slip_time / period))
+        self._noise = np.zeros((0, 2))
+        self.joint_bias: Floats = rng.normal(0.0, variation.joint_bias, 5)
+
+    def noise(self, tick: int) -> Floats:
+        """Reading noise of one tick [counts], shape (2,)."""
+        at = tick % _NOISE_BLOCK
+        if at == 0:
+            self._noise = reading_noise(self._params, self._rng, (_NOISE_BLOCK, 2))
+        return self._noise[at]
+
+    def leg_friction(self, tick: int) -> Floats | None:
+        """New friction of the 12 legs where this tick draws one, else None."""
+        if tick % self._slip_ticks:
+            return None
+        factor = np.exp(self._rng.normal(0.0, self._variation.slip_log_sd, 12))
+        return np.clip(self._friction * factor, 0.02, 2.0)
+
+
+class _Row:
+    """One world of the batch with its chance and its tick count."""
+
+    def __init__(self, world: World, chance: Disturbance) -> None:
+        self.world = world
+        self.chance = chance
+        self.tick = 0
+        self.commanded = False
+        self.failure: SimulationError | None = None
+
+
+class SimRobot:
+    """B worlds behind the wall; also their clock.
+
+    Args:
+        batch: Number of rows B.
+        params: Sensor chain of every row.
+        period: Control period [s]; a whole number of physics steps.
+        timestep: Physics step [s].
+
+    Raises:
+        ConfigError: The period is not a whole number of physics steps.
+    """
+
+    def __init__(self, batch: int, params: SensorParams, period: float, timestep: float) -> None:
+        self._rows: list[_Row | None] = [None] * batch
+        self._sensors = SensorChain(params, (batch, 2), period)
+        self._period = period
+        self._substeps = round(period / timestep)
+        if abs(self._substeps * timestep - period) > 1e-9:
+            raise ConfigError(
+                f"the control period must be a whole number of physics steps of {timestep:g} s, "
+                f"got {period:g} s"
+            )
+        self._ticks = 0
+        self._flex: Floats = np.zeros((batch, 2))
+        self._noise: Floats = np.zeros((batch, 2))
+        self._missing = np.ones(batch, dtype=bool)
+
+    @property
+    def clock(self) -> SimRobot:
+        """The body itself keeps the time."""
+        return self
+
+    def load(self, row: int, world: World, chance: Disturbance) -> None:
+        """Put a fresh world into a row."""
+        self._rows[row] = _Row(world, chance)
+        self._sensors.reset(row)
+        self._missing[row] = False
+
+    def unload(self, row: int) -> None:
+        """Empty a row."""
+        self._rows[row] = None
+        self._missing[row] = True
+
+    def world(self, row: int) -> World:
+        """The world in a row."""
+        held = self._rows[row]
+        if held is None:
+            raise IndexError(f"row {row} holds no world")
+        return held.world
+
+    def failure(self, row: int) -> SimulationError | None:
+        """What ended the row's simulation, if anything did."""
+        held = self._rows[row]
+        return held.failure if held else None
+
+    def now(self) -> float:
+        """Time [s] since the batch began."""
+        return self._ticks * self._period
+
+    def read(self) -> AntennaFrame:
+        """Sample both sensors of every row."""
+        t = np.full(len(self._rows), np.nan)
+        for i, row in enumerate(self._rows):
+            if row is not None:
+                t[i] = row.world.t
+                self._flex[i] = row.world.flex()
+                self._noise[i] = row.chance.noise(row.tick)
+        counts = self._sensors.step(self._flex, self._noise)
+        counts[self._missing] = np.nan
+        return AntennaFrame(t=t, counts=counts)
+
+    def write(self, command: JointCommand) -> None:
+        """Command every row's joints."""
+        batch = len(self._rows)
+        drive = np.concatenate(
+            [command.yaw, command.leg.reshape(batch, 12), command.antenna], axis=1
+        )
+        for i, row in enumerate(self._rows):
+            if row is not None and row.failure is None:
+                drive[i, :5] += row.chance.joint_bias
+                row.commanded = True
+                self._guard(i, row, lambda row=row, i=i: row.world.command(drive[i]))
+
+    def sleep_until(self, t: float) -> None:
+        """Advance the physics of every row that has been commanded to time t [s]."""
+        while self._ticks * self._period < t - 1e-9:
+            self._ticks += 1
+            for i, row in enumerate(self._rows):
+                if row is not None and row.commanded and row.failure is None:
+                    friction = row.chance.leg_friction(row.tick)
+                    if friction is not None:
+                        row.world.set_leg_friction(friction)
+                    row.tick += 1
+                    self._guard(i, row, lambda row=row: row.world.step(self._substeps))
+
+    def _guard(self, i: int, row: _Row, action) -> None:
+        try:
+            action()
+        except SimulationError as error:
+            row.failure = error
+            self._missing[i] = True

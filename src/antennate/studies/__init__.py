@@ -1,0 +1,1 @@
+"""Running many trials, and what they say together."""

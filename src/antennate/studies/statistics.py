@@ -1,0 +1,91 @@
+"""Intervals and tests for paired trials."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import stats
+
+from antennate.types import Bools, Floats
+
+
+def wilson95(successes: int, trials: int) -> tuple[float, float]:
+    """Wilson 95 % interval of a success rate; (0, 1) without trials."""
+    if trials == 0:
+        return 0.0, 1.0
+    interval = stats.binomtest(successes, trials).proportion_ci(0.95, method="wilson")
+    return float(interval.low), float(interval.high)
+
+
+def mean95(values: Floats, seed: int = 0) -> tuple[float, float, float]:
+    """Mean of values (n,) and its bootstrap 95 % interval (2000 draws); NaN without values."""
+    if len(values) == 0:
+        return float("nan"), float("nan"), float("nan")
+    rng = np.random.default_rng(seed)
+    means = values[rng.integers(0, len(values), (2000, len(values)))].mean(axis=1)
+    low, high = np.percentile(means, [2.5, 97.5])
+    return float(values.mean()), float(low), float(high)
+
+
+@dataclass(frozen=True, slots=True)
+class Discordance:
+    """Two arms on the same trials, by success alone.
+
+    Attributes:
+        only_first: Trials on which only the first arm succeeded; `only_second` likewise.
+        mcnemar_p: Exact two-sided McNemar test on those.
+    """
+
+    only_first: int
+    only_second: int
+    mcnemar_p: float
+
+
+def mcnemar(ok: Bools) -> Discordance:
+    """Compare the successes of two arms trial by trial, shape (n, 2)."""
+    first, second = ok[:, 0], ok[:, 1]
+    only_first, only_second = int((first & ~second).sum()), int((second & ~first).sum())
+    discordant = only_first + only_second
+    p = float(stats.binomtest(only_first, discordant).pvalue) if discordant else 1.0
+    return Discordance(only_first, only_second, p)
+
+
+@dataclass(frozen=True, slots=True)
+class PairedTest:
+    """Two arms on the same seeds.
+
+    Attributes:
+        only_first: Seeds on which only the first arm succeeded; `only_second` likewise.
+        mcnemar_p: Exact two-sided McNemar test on those.
+        time_difference_s: Mean of restricted time, first minus second [s], with its 95 % interval.
+        wilcoxon_p: Two-sided signed-rank test on restricted times.
+        both: Seeds on which both succeeded; `both_time_s` are the mean times of the first and the
+            second arm on those [s], None without any.
+    """
+
+    only_first: int
+    only_second: int
+    mcnemar_p: float
+    time_difference_s: float
+    time_difference_95: tuple[float, float]
+    wilcoxon_p: float
+    both: int
+    both_time_s: tuple[float, float] | None
+
+
+def compare(first_ok: Bools, second_ok: Bools, first_t: Floats, second_t: Floats) -> PairedTest:
+    """Compare two arms trial by trial; arrays of shape (n,), times restricted to the limit [s]."""
+    success = mcnemar(np.stack([first_ok, second_ok], axis=1))
+    difference = first_t - second_t
+    mean, low, high = mean95(difference)
+    rank = 1.0
+    if np.any(difference != 0):
+        test = stats.wilcoxon(difference, zero_method="zsplit", method="asymptotic")
+        rank = float(np.asarray(test)[1])
+    both = first_ok & second_ok
+    times = (float(first_t[both].mean()), float(second_t[both].mean())) if both.any() else None
+    return PairedTest(
+        *(success.only_first, success.only_second, success.mcnemar_p),
+        *(mean, (low, high), rank, int(both.sum()), times),
+    )

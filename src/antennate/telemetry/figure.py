@@ -1,0 +1,112 @@
+"""Figure of `antennate replay`: what was read, felt and decided, over time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from itertools import groupby
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+
+from antennate import figures as style
+from antennate.types import Contact, Floats, Ints, Maneuver
+
+_SIDES = ("left", "right")
+_STATES = {
+    "OK": "#BFE3B4",
+    "DEGRADED": "#F0E442",
+    "HOLD": "#56B4E9",
+    "FAULT": "#882255",
+    "OFF": style.FAINT,
+}
+_CONTACTS: dict[int, str] = {Contact.CONTACT: style.INK, Contact.UNKNOWN: "#CC79A7"}
+_MANEUVERS: dict[int, str] = {int(m): colour for m, colour in style.MANEUVER_COLOURS.items()}
+
+
+@dataclass(frozen=True, slots=True)
+class Course:
+    """A drive, tick by tick.
+
+    Attributes:
+        t: Time since the first tick [s], shape (n,).
+        reading: What the board said [counts], shape (n, 2).
+        b: Bending levels, shape (n, 2).
+        contact: `Contact`, shape (n, 2).
+        recorded: `Maneuver` decided then, shape (n,).
+        replayed: `Maneuver` decided now, shape (n,).
+        state: The supervisor's, n of them; empty text without one.
+    """
+
+    t: Floats
+    reading: Floats
+    b: Floats
+    contact: Ints
+    recorded: Ints
+    replayed: Ints
+    state: Sequence[str]
+
+
+@style.styled
+def replay(course: Course) -> Figure:
+    """Four panels over one time."""
+    figure = style.canvas(9.0, 6.4)
+    panels = figure.subplots(4, 1, sharex=True, height_ratios=[3, 3, 1.2, 1.8])
+    readings, levels, contacts, decisions = panels
+    for side, (name, colour) in enumerate(zip(_SIDES, style.series(2), strict=True)):
+        readings.plot(course.t, course.reading[:, side], color=colour, linewidth=1, label=name)
+        levels.plot(course.t, course.b[:, side], color=colour, linewidth=1, label=name)
+    readings.set(ylabel="reading [counts]", title="Readings")
+    readings.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=7)
+    levels.set(ylabel="b", ylim=(-0.05, 1.05), title="Bending level")
+    _draw_contact(contacts, course)
+    _draw_decisions(decisions, course)
+    return figure
+
+
+def _draw_contact(panel: Axes, course: Course) -> None:
+    for side in range(len(_SIDES)):
+        colours = [_CONTACTS.get(value) for value in course.contact[:, side].tolist()]
+        _band(panel, course.t, colours, 1 - side)
+    panel.set(yticks=[1, 0], yticklabels=_SIDES, ylim=(-0.6, 1.6), title="Contact")
+    _legend(panel, {Contact(kind).name.lower(): colour for kind, colour in _CONTACTS.items()})
+
+
+def _draw_decisions(panel: Axes, course: Course) -> None:
+    for height, values in ((2, course.recorded), (1, course.replayed)):
+        colours = [_MANEUVERS.get(value) for value in values.tolist()]
+        _band(panel, course.t, colours, height)
+    _band(panel, course.t, [_STATES.get(state) for state in course.state], 0)
+    panel.set(
+        xlabel="time [s]",
+        title="Maneuver and state",
+        yticks=[2, 1, 0],
+        yticklabels=["recorded", "replayed", "state"],
+        ylim=(-0.6, 2.6),
+    )
+    seen = set(course.recorded.tolist()) | set(course.replayed.tolist())
+    key = {style.MANEUVER_NAMES[m]: style.MANEUVER_COLOURS[m] for m in Maneuver if m in seen}
+    _legend(panel, key | {name: _STATES[name] for name in _STATES if name in course.state})
+
+
+def _band(panel: Axes, t: Floats, colours: Iterable[str | None], height: float) -> None:
+    """Stretches of one colour beside one another; none where there is no colour."""
+    step = float(np.median(np.diff(t))) if len(t) > 1 else 1.0
+    ends = np.append(t[1:], t[-1:] + step)
+    for colour, run in groupby(enumerate(colours), key=lambda pair: pair[1]):
+        at = [i for i, _ in run]
+        if colour is not None:
+            span = (float(t[at[0]]), float(ends[at[-1]] - t[at[0]]))
+            panel.broken_barh([span], (height - 0.4, 0.8), color=colour, linewidth=0)
+
+
+def _legend(panel: Axes, colours: dict[str, str]) -> None:
+    panel.legend(
+        handles=[Patch(color=colour, label=name) for name, colour in colours.items()],
+        loc="center left",
+        bbox_to_anchor=(1.0, 0.5),
+        fontsize=7,
+    )
+    panel.grid(visible=False)

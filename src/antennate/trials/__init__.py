@@ -1,1 +1,0 @@
-"""Running many trials and saying what came out."""
