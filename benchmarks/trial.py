@@ -157,7 +157,7 @@ class Pacing:
     """A control that walks to and fro."""
 
     def __init__(self, config: TunnelConfig) -> None:
-        self._gait = Gait(config.control.gait, 1, config.control.period)
+        self._gait = Gait(config.control.gait, config.robot, 1, config.control.period)
 
     def step(self, frame: AntennaFrame) -> JointCommand:
         back = int(frame.t[0] / _PACING) % 2
@@ -177,10 +177,9 @@ def long_tunnel(config: TunnelConfig) -> tuple[arena.Tunnel, Ints]:
 def seconds_with(config: TunnelConfig, drawn: arena.Tunnel, seconds: float) -> float:
     """CPU time of pacing for some simulated seconds in this tunnel."""
     robot, period = config.robot, config.control.period
-    sensed = robot.sensor.covered_hinges(robot.antenna)
-    world = World(compile_world(config.physics, robot, drawn), sensed)
-    world.place(0.0, 0.0, 0.0, np.zeros(5), np.zeros((6, 2)))
-    body = SimRobot(1, robot.sensor, period, config.physics.timestep)
+    world = World(compile_world(config.physics, robot, drawn), robot)
+    world.place(0.0, 0.0, 0.0, np.zeros(robot.yaw_count), np.zeros((robot.links, 2)))
+    body = SimRobot(1, robot, period, config.physics.timestep)
     chance = experiment.prepare(config, 0).chance
     body.load(0, world, chance)
     control = Pacing(config)

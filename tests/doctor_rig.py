@@ -24,7 +24,7 @@ class Patient:
         self.robot: TwinRobot = build(TwinConfig())
         self.clock = LockstepClock(self.robot)
         self.board = BoardPort(self.robot, self.clock)
-        Faults([read(text) for text in faults], ROBOT.layout.ids).apply(self.robot, 0.0)
+        Faults([read(text) for text in faults], ROBOT.robot.ids).apply(self.robot, 0.0)
         self.clock.latency = self.robot.bus.latency
         self.robot.bus.latency = 0.0
 
@@ -50,7 +50,7 @@ class Patient:
         """Changes made until nothing is left to change."""
         made: list[str] = []
         while (survey := self.examine(esp32=False).survey) and (
-            changes := plan(survey, ROBOT.layout)
+            changes := plan(survey, ROBOT.robot)
         ):
             for change in changes:
                 apply(self.bus, change, self.clock.now)

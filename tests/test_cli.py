@@ -186,14 +186,10 @@ def test_each_of_two_faults_is_looked_at(capsys, bad):
     assert "found loose" in refusal(capsys, "twin", "--duration", "0.01", *words)
 
 
-def test_robot_is_another_name_of_config(capsys, tmp_path):
+def test_a_bad_key_of_a_robot_file_is_named(capsys, tmp_path):
     (tmp_path / "robot.toml").write_text("controller = 3")
-    for name in ("--robot", "--config"):
-        line = refusal(capsys, "drive", name, "robot.toml")
-        assert "robot.toml: controller: expected" in line
-    words = ["--robot", "robot.toml", "--config", "robot.toml"]
-    for command in ("drive", "doctor", "record"):
-        assert "its other name; found both" in refusal(capsys, command, *words)
+    line = refusal(capsys, "drive", "--config", "robot.toml")
+    assert "robot.toml: controller: expected" in line
 
 
 def test_bad_folders(capsys, tmp_path):

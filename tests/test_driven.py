@@ -10,17 +10,15 @@ from antennate.control.controllers import Arm
 from antennate.experiments.driven import driven, simulated_alike
 from antennate.experiments.tunnel.run import TunnelConfig
 from antennate.hardware.safety.causes import State
-from antennate.robots.layout import LayoutParams
 from antennate.types import Maneuver
 
 CONFIG = TunnelConfig(seed=0)
-LAYOUT = LayoutParams()
 
 
 def same(arm: Arm, trial: int, ticks: float, phase: float = 0.0) -> tuple[set[int], int, str]:
     """Both ways agree in every tick; the maneuvers, the number of ticks and the end."""
-    one = driven(CONFIG, arm, trial, LAYOUT, ticks, phase=phase)
-    other = simulated_alike(CONFIG, arm, trial, LAYOUT, one.start, ticks)
+    one = driven(CONFIG, arm, trial, ticks, phase=phase)
+    other = simulated_alike(CONFIG, arm, trial, one.start, ticks)
     assert one.walk.maneuvers == other.maneuvers
     assert one.walk.commands == other.commands
     assert one.walk.readings == other.readings

@@ -9,7 +9,6 @@ from antennate import figures as style
 from antennate.control.controllers import ARMS
 from antennate.experiments.gait import figure as gait
 from antennate.experiments.tunnel import figure as tunnel
-from antennate.robots.anatomy import LINK_COUNT
 from antennate.types import Maneuver
 
 LIMIT = 50.0
@@ -42,7 +41,7 @@ def path(end: float, samples: int = 40) -> Path:
         maneuver=np.arange(samples) * len(Maneuver) // max(samples, 1),
         walls=WALLS,
         cylinders=np.stack([stood, stood + 0.05]),
-        links=np.stack([end - 0.1 * np.arange(LINK_COUNT), np.zeros(LINK_COUNT)], axis=1),
+        links=np.stack([end - 0.1 * np.arange(6), np.zeros(6)], axis=1),
     )
 
 

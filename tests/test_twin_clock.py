@@ -35,7 +35,7 @@ from antennate.hardware.ports.serial_port import SerialPort
 from antennate.hardware.ports.twin_clock import TwinClock
 from antennate.hardware.safety.causes import State
 from antennate.params import ClockParams
-from antennate.robots.layout import LayoutParams
+from antennate.robots.spec import RobotSpec
 from antennate.telemetry.reader import LogReader
 from antennate.twin.clock import ClockServer, FaultyClock
 from antennate.twin.ends import End, Terminal
@@ -45,7 +45,7 @@ from antennate.twin.robot import TwinRobot
 from antennate.twin.tcp import TcpEnd
 
 CONFIG = TunnelConfig(seed=0)
-LAYOUT = LayoutParams()
+LAYOUT = RobotSpec()
 QUICK = ClockParams(arrival=0.2)
 SILENT = ("servo:7=silent@1.8s",)
 """Amid the ticks that are compared."""
@@ -64,7 +64,7 @@ def over(ends: Callable[[], list[End]], ticks: int, faults: tuple[str, ...] = ()
             wires = connect(orders, paths["esp32"], paths["bus"], clock=paths["clock"])
             return stack.enter_context(wires)
 
-        return driven(CONFIG, "closed", 0, LAYOUT, ticks, wired)
+        return driven(CONFIG, "closed", 0, ticks, wired)
 
 
 def without_ports(ticks: int, faults: tuple[str, ...] = ()) -> Driven:
@@ -74,7 +74,7 @@ def without_ports(ticks: int, faults: tuple[str, ...] = ()) -> Driven:
         clock = FaultyClock(robot, Faults([read(text) for text in faults], LAYOUT.ids))
         return prepare(orders, BoardPort(robot, clock), clock, clock)
 
-    return driven(CONFIG, "closed", 0, LAYOUT, ticks, wired)
+    return driven(CONFIG, "closed", 0, ticks, wired)
 
 
 def tcp_ports() -> list[End]:
@@ -87,7 +87,7 @@ def late_terminals() -> list[End]:
 
 @pytest.fixture(scope="module")
 def whole() -> Driven:
-    return driven(CONFIG, "closed", 0, LAYOUT, 200)
+    return driven(CONFIG, "closed", 0, 200)
 
 
 @pytest.mark.parametrize(
@@ -331,8 +331,8 @@ def test_M7_drive_by_the_command_line_decides_as_the_pure_simulation(
     flags: tuple[str, ...], busy: int, most: int, tmp_path: Path
 ) -> None:
     """Two processes: a whole trial alone, and the begin of one beside four busy processes."""
-    start = driven(CONFIG, "closed", 0, LAYOUT, 1).start
-    simulated = simulated_alike(CONFIG, "closed", 0, LAYOUT, start, most)
+    start = driven(CONFIG, "closed", 0, 1).start
+    simulated = simulated_alike(CONFIG, "closed", 0, start, most)
     count = len(simulated.maneuvers)
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join((str(SOURCE), str(HERE)))}
     with ExitStack() as stack, twin(*flags) as (_, addresses):

@@ -16,7 +16,7 @@ from antennate.experiments.tunnel.run import TunnelConfig, prepare
 from antennate.hardware.ports.finder import finder
 from antennate.hardware.ports.port import PortError
 from antennate.params import ControlParams
-from antennate.robots.layout import LayoutParams
+from antennate.robots.spec import RobotSpec
 from antennate.twin.ends import End, Terminal
 from antennate.twin.faults import Faults, read
 from antennate.twin.robot import TwinRobot
@@ -93,7 +93,7 @@ def served(
 ) -> Iterator[dict[str, str]]:
     """Serve a robot; where its wires are."""
     over = threading.Event()
-    demands = Faults([read(text) for text in faults], LayoutParams().ids)
+    demands = Faults([read(text) for text in faults], RobotSpec().ids)
     with TwinServer(robot, demands, *ends()) as server:
         thread = threading.Thread(
             target=server.run_lockstep, args=(lambda t: not over.is_set(),), daemon=True

@@ -13,7 +13,7 @@ from antennate.control.loop import run_loop
 from antennate.experiments.tunnel.run import TunnelConfig
 from antennate.experiments.twin import Stage, TwinConfig, before_twin, rig, simulation
 from antennate.hardware.driving.connect import await_board
-from antennate.robots.layout import LayoutParams
+from antennate.robots.spec import RobotSpec
 from antennate.telemetry.header import Header
 from antennate.telemetry.reader import LogReader
 from antennate.telemetry.replay import ReplayBody, recorded_decider
@@ -22,7 +22,7 @@ from antennate.telemetry.writer import LogWriter
 from antennate.types import AntennaFrame, Clock, JointCommand, Robot
 
 CONFIG = TunnelConfig(seed=0)
-LAYOUT = LayoutParams()
+LAYOUT = RobotSpec()
 TICKS = 260
 """Ticks that a world can at least be run."""
 ARMED_AT = 100
@@ -100,7 +100,7 @@ def _world(stage: Stage, arm: Arm, trial: int) -> World:
     header = Header(
         controller=arm,
         params=CONFIG.control,
-        layout=LAYOUT,
+        robot=LAYOUT,
         seed=CONFIG.seed,
         trial=trial,
         phase=float(stage.control.gait.phase[0]),
@@ -110,14 +110,14 @@ def _world(stage: Stage, arm: Arm, trial: int) -> World:
 
 def simulated(folder: Path, arm: Arm, trial: int, blind: float = math.inf) -> World:
     """The pure simulation, rounded as servos and board do."""
-    world = _world(simulation(CONFIG, arm, trial, LAYOUT), arm, trial)
+    world = _world(simulation(CONFIG, arm, trial), arm, trial)
     world.body = Blinded(world.body, blind)
     return world
 
 
 def twin(folder: Path, arm: Arm, trial: int, blind: float = math.inf) -> World:
     """The hardware code before the twin, in lock-step."""
-    stage = before_twin(CONFIG, arm, trial, LAYOUT)
+    stage = before_twin(CONFIG, arm, trial)
     world = _world(stage, arm, trial)
 
     def go_on(frame: AntennaFrame, command: JointCommand) -> bool:
@@ -133,7 +133,7 @@ def session(folder: Path, arm: Arm, trial: int, blind: float = math.inf) -> Worl
     """The same with its supervisor; armed at tick ARMED_AT, blind for 30 ticks only."""
     made = rig(TwinConfig(world=CONFIG, trial=trial), arm)
     await_board(made.session.board, made.clock)
-    header = Header(controller=arm, params=CONFIG.control, layout=LAYOUT)
+    header = Header(controller=arm, params=CONFIG.control, robot=LAYOUT)
 
     def go_on(frame: AntennaFrame, command: JointCommand) -> bool:
         made.session.orders.arm = len(world.seen) >= ARMED_AT

@@ -25,7 +25,7 @@ COMMANDS = {
     "sensor": "flex to counts: curve, hysteresis, creep, noise and the best divider",
     "force": "how much of a contact's force the flex tells, with and without knowing the place",
     "sweep": "sweep an antenna beside walls: its shapes, and the distances that active touch tells",
-    "twin": "serve a simulated robot as real bytes: an antenna board and a bus of 19 servos",
+    "twin": "serve a simulated robot as real bytes: an antenna board and a bus of servos",
     "doctor": "examine the real robot, or its twin: what is wrong, and the cure",
     "record": "antenna readings to a CSV file that calibrate takes",
     "drive": "let a controller walk the real robot, or its twin",

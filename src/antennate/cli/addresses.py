@@ -22,28 +22,15 @@ class RobotOrders(FromFile):
     """The robot.
 
     Attributes:
-        config: another name of --robot
-        robot: TOML file of the robot, the same for drive, doctor and record; flags override it
+        config: TOML file, the same for drive, doctor and record; flags override it
         esp32: serial port of the antenna board, tcp://HOST:PORT or udp://HOST:PORT
         key: file with the key of a board behind udp://, mode 0600; else ANTENNATE_KEY is read
         insecure_udp: the board has no key; anybody on the network can feign it
     """
 
-    robot: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
     esp32: Annotated[str, tyro.conf.arg(metavar="PORT")] = ""
     key: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
     insecure_udp: bool = False
-
-    @property
-    def file(self) -> Path | None:
-        """The file that was named.
-
-        Raises:
-            ConfigError: Two were.
-        """
-        if self.robot is not None and self.config is not None:
-            raise ConfigError("--robot: expected no --config beside it, its other name; found both")
-        return self.robot or self.config
 
 
 Orders = TypeVar("Orders", bound=RobotOrders)

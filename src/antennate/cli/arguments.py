@@ -49,15 +49,6 @@ class FromFile:
 
     config: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
 
-    @property
-    def file(self) -> Path | None:
-        """The file that was named.
-
-        Raises:
-            ConfigError: Two were.
-        """
-        return self.config
-
 
 @dataclass(frozen=True)
 class Options(FromFile):
@@ -142,7 +133,7 @@ def parse_with(
     A file that holds more than this configuration is read by `read`.
     """
     call = _words(command, description, model(), argv, options)
-    if (file := call.options.file) is not None:
+    if (file := call.options.config) is not None:
         base = read_file(file, model) if read is None else read(file)
         call = _words(command, description, base, argv, options)
     try:

@@ -125,7 +125,7 @@ def _fix(
     for _ in range(_ROUNDS):
         if checkup.survey is None:
             break
-        todo = [one for one in plan(checkup.survey, robot.layout) if one not in refused]
+        todo = [one for one in plan(checkup.survey, robot.robot) if one not in refused]
         if not todo:
             break
         for change in todo:

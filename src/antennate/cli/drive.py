@@ -101,7 +101,7 @@ def _carry_out(config: DriveConfig, session: Session, orders: Orders, log: Path)
 
     In a twin's time nothing is urgent, and the log is waited for.
     """
-    header = Header(controller=config.controller, params=config.control, layout=config.layout)
+    header = Header(controller=config.controller, params=config.control, robot=config.robot)
     required = [viewer.REQUIRED] if config.record_required else []
 
     def words(number: int) -> list[str]:

@@ -31,7 +31,7 @@ _LAST_PORT = 65_533
 
 DESCRIPTION = """\
 Serve the simulated robot in a tunnel as real bytes on two pseudo-terminals: the frames of the
-antenna board, and a DYNAMIXEL bus of 19 servos. Prints one JSON line with the paths when ready.
+antenna board, and a DYNAMIXEL bus of servos. Prints one JSON line with the paths when ready.
 With --tcp both are TCP ports, with --udp the board is a UDP port that signs as the firmware does.
 Physics begins when the first servo gets torque. Faults, each with @Ts for its time:
 servo:ID=silent, bad_crc, truncated, late:SECONDS, doubled, wrong_id, oversized, voltage, overheat,
@@ -74,7 +74,7 @@ def command(argv: Sequence[str]) -> int:
 
 def _serve(argv: Sequence[str]) -> int:
     config, places = parse_with("twin", DESCRIPTION, TwinConfig, argv, Places())
-    faults = Faults([read(text) for text in config.fault], config.layout.ids)
+    faults = Faults([read(text) for text in config.fault], config.world.robot.ids)
     real = places.pace == "real"
     robot, passage = watched(config, boot_id=secrets.randbits(32) if real else None)
     end = float("inf") if config.duration is None else config.duration

@@ -23,6 +23,7 @@ from antennate.control.maneuver import Hold, decide
 from antennate.control.repetition import RepetitionDetector
 from antennate.errors import ConfigError
 from antennate.params import ControlParams
+from antennate.robots.spec import RobotSpec
 from antennate.types import AntennaFrame, Bools, Contact, Floats, Ints, JointCommand, Maneuver
 
 Arm = Literal["open", "paper", "closed"]
@@ -123,7 +124,7 @@ class Controller:
             self._rule = _PaperRule(params, batch)
         else:
             self._rule = _ClosedRule(params, batch)
-        self.gait = Gait(params.gait, batch, params.period)
+        self.gait = Gait(params.gait, RobotSpec(), batch, params.period)
         self.b: Floats = np.zeros((batch, 2))
         self.contact: Ints = np.full((batch, 2), int(Contact.FREE))
         self.maneuver: Ints = np.full(batch, int(Maneuver.FORWARD))

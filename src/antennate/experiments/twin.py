@@ -29,7 +29,6 @@ from antennate.hardware.safety.trust import Trust
 from antennate.params import Params, SupervisorParams, TouchCheckParams, number
 from antennate.params.base import GATHERED
 from antennate.params.twin import BatteryParams
-from antennate.robots.layout import LayoutParams
 from antennate.sim.sim_robot import SimRobot
 from antennate.twin.hand import Hand
 from antennate.twin.lockstep import BoardPort, LockstepClock
@@ -72,7 +71,6 @@ class TwinConfig(Params):
         "antennae bent by hand before it walks, such as left@2s; from the first packet on the bus",
     )
     battery: BatteryParams = BatteryParams()
-    layout: LayoutParams = LayoutParams()
     world: TunnelConfig = TunnelConfig()
 
 
@@ -85,13 +83,13 @@ def watched(config: TwinConfig, boot_id: int | None = None) -> tuple[TwinRobot, 
     """The same, and how far it comes."""
     world, start = config.world, prepare(config.world, config.trial)
     period = world.control.period
-    body = SimRobot(1, world.robot.sensor, period, world.physics.timestep)
+    body = SimRobot(1, world.robot, period, world.physics.timestep)
     body.load(0, start.world, start.chance)
     boot = config.trial + 1 if boot_id is None else boot_id
     hand, passage = Hand(config.touch, world.control.conditioning), Passage(start.tunnel)
     robot = TwinRobot(
         body,
-        config.layout,
+        world.robot,
         period,
         boot,
         standing_noise=True,
@@ -129,7 +127,7 @@ class Watch:
     def __init__(self, config: TunnelConfig, arm: Arm, trial: int) -> None:
         start = prepare(config, trial)
         period = config.control.period
-        self.body = SimRobot(1, config.robot.sensor, period, config.physics.timestep)
+        self.body = SimRobot(1, config.robot, period, config.physics.timestep)
         self.body.load(0, start.world, start.chance)
         self.controller = Controller(config.control, arm)
         self.controller.reset(np.array([0]), start.phase)
@@ -174,17 +172,17 @@ class Stage:
     robot: TwinRobot | None = None
 
 
-def simulation(config: TunnelConfig, arm: Arm, trial: int, layout: LayoutParams) -> Stage:
+def simulation(config: TunnelConfig, arm: Arm, trial: int) -> Stage:
     """The trial in pure simulation, goals rounded to ticks."""
     watch = Watch(config, arm, trial)
-    body = _Rounded(watch.body, Joints(layout))
+    body = _Rounded(watch.body, Joints(config.robot))
     period = config.control.period
     return Stage(body, watch.controller, period, watch.go_on, watch.decisions)
 
 
-def simulated(config: TunnelConfig, arm: Arm, trial: int, layout: LayoutParams) -> Decisions:
+def simulated(config: TunnelConfig, arm: Arm, trial: int) -> Decisions:
     """The whole trial in pure simulation."""
-    stage = simulation(config, arm, trial, layout)
+    stage = simulation(config, arm, trial)
     run_loop(stage.body, stage.control, stage.period, stage.go_on)
     return stage.decisions()
 
@@ -204,8 +202,8 @@ def rig(config: TwinConfig, arm: Arm = "closed", touch: TouchCheckParams | None 
     clock = LockstepClock(robot)
     session = Session(
         board=Board(BoardPort(robot, clock), SupervisorParams().stale_age),
-        bus=Bus(clock, Timing(config.layout.baud, doubt=DOUBT), clock=clock.now),
-        joints=Joints(config.layout),
+        bus=Bus(clock, Timing(config.world.robot.baud, doubt=DOUBT), clock=clock.now),
+        joints=Joints(config.world.robot),
         clock=clock,
         decider=Controller(params, arm),
         period=params.period,
@@ -215,26 +213,26 @@ def rig(config: TwinConfig, arm: Arm = "closed", touch: TouchCheckParams | None 
     return Rig(robot, clock, session)
 
 
-def before_twin(config: TunnelConfig, arm: Arm, trial: int, layout: LayoutParams) -> Stage:
+def before_twin(config: TunnelConfig, arm: Arm, trial: int) -> Stage:
     """The hardware code before a twin, torque on.
 
     Raises:
         BringUpError: The servos did not come up.
     """
-    watch = Watch(config, arm, trial)
+    watch, spec = Watch(config, arm, trial), config.robot
     period = config.control.period
-    robot = TwinRobot(watch.body, layout, period, boot_id=trial + 1)
+    robot = TwinRobot(watch.body, spec, period, boot_id=trial + 1)
     clock = LockstepClock(robot)
     board = Board(BoardPort(robot, clock), SupervisorParams().stale_age)
-    bus = Bus(clock, Timing(layout.baud, doubt=DOUBT), clock=clock.now)
+    bus = Bus(clock, Timing(spec.baud, doubt=DOUBT), clock=clock.now)
     while board.newest(clock.now()) is None and clock.now() < _WARM_UP:
         clock.sleep(period)
         board.poll(clock.now())
     bringup.require(bus, {servo.get("id"): servo.table.model for servo in robot.servos})
-    bringup.arm_watchdogs(bus, layout.ids)
+    bringup.arm_watchdogs(bus, spec.ids)
     clock.sleep_until(period * np.ceil(clock.now() / period + 1.0))
-    bringup.enable(bus, layout.ids)
-    body = HardwareRobot(board, bus, Joints(layout), clock)
+    bringup.enable(bus, spec.ids)
+    body = HardwareRobot(board, bus, Joints(spec), clock)
     return Stage(body, watch.controller, period, watch.go_on, watch.decisions, robot)
 
 
@@ -242,7 +240,6 @@ def on_twin(
     config: TunnelConfig,
     arm: Arm,
     trial: int,
-    layout: LayoutParams,
     on_tick: Callable[[TwinRobot], None] = lambda robot: None,
 ) -> Decisions:
     """The trial by the hardware code, all of it through bytes, in invented time.
@@ -251,13 +248,12 @@ def on_twin(
         config: The trial's world.
         arm: Its controller.
         trial: Its number.
-        layout: Servos of the robot.
         on_tick: Called after every tick, for instance to break something.
 
     Raises:
         BringUpError: The servos did not come up.
     """
-    stage = before_twin(config, arm, trial, layout)
+    stage = before_twin(config, arm, trial)
 
     def go_on(frame: AntennaFrame, command: JointCommand) -> bool:
         if stage.robot is not None:

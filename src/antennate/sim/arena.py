@@ -16,7 +16,7 @@ import numpy as np
 
 from antennate.errors import ArenaError
 from antennate.params import CylinderParams, TunnelParams
-from antennate.robots.body import RobotParams
+from antennate.robots.spec import RobotSpec
 from antennate.sim import geometry, layers
 from antennate.types import Floats
 
@@ -43,7 +43,7 @@ class Tunnel:
     cylinders: Floats
 
 
-def draw_tunnel(params: TunnelParams, robot: RobotParams, rng: np.random.Generator) -> Tunnel:
+def draw_tunnel(params: TunnelParams, robot: RobotSpec, rng: np.random.Generator) -> Tunnel:
     """Draw one tunnel.
 
     Raises:
@@ -70,7 +70,7 @@ def draw_tunnel(params: TunnelParams, robot: RobotParams, rng: np.random.Generat
 
 def _place_cylinders(
     params: TunnelParams,
-    robot: RobotParams,
+    robot: RobotSpec,
     centre: Floats,
     walls: tuple[Floats, Floats],
     rng: np.random.Generator,

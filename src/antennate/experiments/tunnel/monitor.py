@@ -72,7 +72,7 @@ class TrialPath:
         maneuver: `Maneuver` at the samples, shape (n,).
         walls: The two walls [m], polylines.
         cylinders: Where the cylinders stood at first and at the end [m], shape (2, m, 2).
-        links: The robot's links at the end [m], shape (6, 2).
+        links: The robot's links at the end [m], shape (L, 2).
     """
 
     t: Floats

@@ -23,7 +23,7 @@ from antennate.params import (
     VariationParams,
     number,
 )
-from antennate.robots.body import RobotParams
+from antennate.robots.spec import RobotSpec
 from antennate.sim.arena import Tunnel, draw_tunnel
 from antennate.sim.sim_robot import Disturbance, SimRobot
 from antennate.sim.world import World, compile_world
@@ -55,7 +55,7 @@ class TunnelConfig(Params):
         le=3600,
     )
     tunnel: TunnelParams = TunnelParams()
-    robot: RobotParams = RobotParams()
+    robot: RobotSpec = RobotSpec()
     control: ControlParams = ControlParams()
     variation: VariationParams = VariationParams()
     physics: PhysicsParams = PhysicsParams()
@@ -122,11 +122,10 @@ def prepare(config: TunnelConfig, trial: int) -> _Start:
     sequence = np.random.SeedSequence([config.seed, trial])
     for_tunnel, for_start, for_chance = (np.random.default_rng(s) for s in sequence.spawn(3))
     tunnel = draw_tunnel(config.tunnel, config.robot, for_tunnel)
-    sensed = config.robot.sensor.covered_hinges(config.robot.antenna)
-    world = World(compile_world(config.physics, config.robot, tunnel), sensed)
+    world = World(compile_world(config.physics, config.robot, tunnel), config.robot)
     phase = float(for_start.uniform(0.0, 2.0 * math.pi))
     lateral, heading = for_start.uniform(-1.0, 1.0, 2)
-    command = targets(config.control.gait, np.array([phase]), np.zeros(1))
+    command = targets(config.control.gait, config.robot, np.array([phase]), np.zeros(1))
     world.place(
         0.0,
         lateral * config.variation.start_lateral,
@@ -137,8 +136,7 @@ def prepare(config: TunnelConfig, trial: int) -> _Start:
     chance = Disturbance(
         for_chance,
         config.variation,
-        config.robot.sensor,
-        config.robot.leg_friction,
+        config.robot,
         config.control.period,
     )
     return _Start(world, chance, phase, tunnel)
@@ -154,7 +152,7 @@ def run_trials(
     """Run trials of one arm in lockstep, rows refilled as trials end; emit each as it ends."""
     batch = min(batch, len(trials))
     controller = Controller(config.control, arm, batch)
-    body = SimRobot(batch, config.robot.sensor, config.control.period, config.physics.timestep)
+    body = SimRobot(batch, config.robot, config.control.period, config.physics.timestep)
     waiting = list(trials)
     monitors: list[TrialMonitor | None] = [None] * batch
 

@@ -73,15 +73,15 @@ def examine(
     if bus is not None:
 
         def look(opener: Opener) -> list[Row]:
-            found.survey = seen = survey(opener, robot.layout, params, now)
+            found.survey = seen = survey(opener, robot.robot, params, now)
             latency = latency_row(bus[0], slow_adapter(seen, params), params)
-            return [latency, *bus_rows(seen, robot.layout, robot.limits, params)]
+            return [latency, *bus_rows(seen, robot.robot, robot.limits, params)]
 
-        found.rows += _examined("bus", *bus, robot.layout.baud, look)
+        found.rows += _examined("bus", *bus, robot.robot.baud, look)
     if esp32 is not None:
 
         def hear(opener: Opener) -> list[Row]:
-            found.heard = listen(opener, robot.layout, params, now)
+            found.heard = listen(opener, robot.robot, params, now)
             rows = board_rows(found.heard, robot.control, robot.limits, params)
             return rows + film_rows(found.heard.hello, robot.sensor_id)
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from antennate.hardware import roster, settings
+from antennate.hardware import settings
 from antennate.hardware.doctor.rows import Opener
 from antennate.hardware.doctor.survey import Seen, Survey, look, master, read_some
 from antennate.hardware.dynamixel import bringup
@@ -16,14 +16,14 @@ from antennate.hardware.dynamixel.bringup import BringUpError
 from antennate.hardware.dynamixel.bus import Bus
 from antennate.hardware.dynamixel.tables import BAUD_RATES, XC430_W240
 from antennate.hardware.settings import Setting
-from antennate.robots.layout import LayoutParams
+from antennate.robots.spec import RobotSpec
 
 _ID, _BAUD = "id", "baud_rate"
 _MOVED = (_ID, _BAUD)
 """Registers after whose change a servo is found elsewhere."""
 _AFTER = {
-    "drive_mode": "see that its sign in layout.*.directions is right",
-    "homing_offset": "measure its place in layout.*.zeros anew",
+    "drive_mode": "see that its sign in robot.*.directions is right",
+    "homing_offset": "measure its place in robot.*.zeros anew",
 }
 """What a person has to do after a change, by register."""
 
@@ -55,21 +55,21 @@ class Change:
         return f"{said}; {_AFTER[self.register]}" if self.register in _AFTER else said
 
 
-def plan(survey: Survey, layout: LayoutParams) -> list[Change]:
+def plan(survey: Survey, robot: RobotSpec) -> list[Change]:
     """Changes that would put right what can be; those that move a servo come alone, first."""
-    return _moves(survey, layout) or _settings(survey, layout)
+    return _moves(survey, robot) or _settings(survey, robot)
 
 
-def _moves(survey: Survey, layout: LayoutParams) -> list[Change]:
-    missing = [servo for servo in layout.ids if servo not in survey.here]
-    strangers = [seen for i, seen in survey.here.items() if i not in layout.ids]
+def _moves(survey: Survey, robot: RobotSpec) -> list[Change]:
+    missing = [servo for servo in robot.ids if servo not in survey.here]
+    strangers = [seen for i, seen in survey.here.items() if i not in robot.ids]
     strangers += [seen for seen in survey.elsewhere if seen.servo not in missing]
     if len(missing) == 1 and len(strangers) == 1 and strangers[0].state == "ok":
         one = strangers[0]
-        if one.model == roster.models(layout)[missing[0]]:
+        if one.model == robot.models[missing[0]]:
             return [Change(one.servo, one.baud, _ID, one.servo, missing[0])]
     return [
-        Change(seen.servo, seen.baud, _BAUD, _speed(seen.baud), _speed(layout.baud))
+        Change(seen.servo, seen.baud, _BAUD, _speed(seen.baud), _speed(robot.baud))
         for seen in survey.elsewhere
         if seen.servo in missing and seen.state == "ok" and _alone(seen, survey)
     ]
@@ -83,13 +83,13 @@ def _speed(baud: int) -> int:
     return BAUD_RATES.index(baud)
 
 
-def _settings(survey: Survey, layout: LayoutParams) -> list[Change]:
-    delay = dict.fromkeys(layout.ids, Setting(0, 0, 0))
-    wanted = {**settings.settings(layout), "return_delay_time": delay}
+def _settings(survey: Survey, robot: RobotSpec) -> list[Change]:
+    delay = dict.fromkeys(robot.ids, Setting(0, 0, 0))
+    wanted = {**settings.settings(robot), "return_delay_time": delay}
     return [
         Change(servo, survey.baud, name, there[name], setting.cure)
         for servo, seen in survey.here.items()
-        if servo in layout.ids and seen.state == "ok"
+        if servo in robot.ids and seen.state == "ok"
         for there in (seen.registers,)
         for name, of in wanted.items()
         if name in there

@@ -14,7 +14,7 @@ from antennate.hardware.esp32.decoder import Counters
 from antennate.hardware.esp32.stream import Reading, Stream
 from antennate.hardware.esp32.wire import Hello
 from antennate.params import DoctorParams
-from antennate.robots.layout import LayoutParams
+from antennate.robots.spec import RobotSpec
 from antennate.types import Floats
 
 _PATIENCE = 0.02
@@ -62,7 +62,7 @@ class Heard:
 
 
 def listen(
-    opener: Opener, layout: LayoutParams, params: DoctorParams, now: Callable[[], float]
+    opener: Opener, robot: RobotSpec, params: DoctorParams, now: Callable[[], float]
 ) -> Heard:
     """Wait for a greeting and listen for a while; if none comes, see whether servos are there.
 
@@ -81,8 +81,8 @@ def listen(
         heard.hello, heard.refusals = stream.hello, stream.refusals
         heard.text, heard.received = stream.decoder.take_text(), stream.decoder.counters.received
     if heard.hello is None and not heard.refusals:
-        with opener(layout.baud) as port:
-            heard.servos = bool(master(port, layout.baud, now).scan())
+        with opener(robot.baud) as port:
+            heard.servos = bool(master(port, robot.baud, now).scan())
     return heard
 
 

@@ -55,7 +55,7 @@ def _read_row(survey: Survey, params: DoctorParams) -> Row:
         f"{1e3 * time:.1f} ms, {1.0 / time:.0f} a second" if time else "0 ms",
         "bad" if time > params.read_time else None if survey.fast else "warn",
         "cure answer time, answers and lost answers first, then return delay and firmware; then "
-        "end other programs, or raise layout.baud",
+        "end other programs, or raise robot.baud",
     )
 
 

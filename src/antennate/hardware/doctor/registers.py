@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from antennate.hardware import roster
 from antennate.hardware.doctor.rows import Row, Verdict, grouped, ids_text, row
 from antennate.hardware.doctor.survey import Survey, watchdog_text
 from antennate.hardware.dynamixel.tables import (
@@ -14,7 +13,7 @@ from antennate.hardware.dynamixel.tables import (
 )
 from antennate.hardware.settings import Settings, settings
 from antennate.params import DoctorParams, SupervisorParams
-from antennate.robots.layout import LayoutParams
+from antennate.robots.spec import RobotSpec
 
 _PART = "bus"
 _REVERSED, _TIMED, _TORQUE_BY_GOAL = 1, 4, 8
@@ -49,9 +48,9 @@ def _check(
     return row(_PART, check, expected, grouped(values, text), verdict, said)
 
 
-def settings_rows(known: Registers, layout: LayoutParams) -> list[Row]:
+def settings_rows(known: Registers, robot: RobotSpec) -> list[Row]:
     """What lasts over power-off, and the status return level."""
-    rules = settings(layout)
+    rules = settings(robot)
 
     def judge(name: str) -> Callable[[int, int], Verdict | None]:
         return lambda servo, value: None if rules[name][servo].allows(value) else "bad"
@@ -61,7 +60,7 @@ def settings_rows(known: Registers, layout: LayoutParams) -> list[Row]:
             known,
             "operating_mode",
             "operating mode",
-            grouped(roster.modes(layout)),
+            grouped(robot.modes),
             judge("operating_mode"),
             _FIX,
         ),
@@ -88,7 +87,7 @@ def settings_rows(known: Registers, layout: LayoutParams) -> list[Row]:
             "homing offset",
             "0",
             judge("homing_offset"),
-            f"{_FIX}, then correct layout.*.zeros of {{ids}}",
+            f"{_FIX}, then correct robot.*.zeros of {{ids}}",
         ),
         _check(
             known,
@@ -96,14 +95,14 @@ def settings_rows(known: Registers, layout: LayoutParams) -> list[Row]:
             "drive mode",
             "normal",
             judge("drive_mode"),
-            f"{_FIX}; layout.*.directions of {{ids}} tells signs",
+            f"{_FIX}; robot.*.directions of {{ids}} tells signs",
             _drive_mode,
         ),
         _check(
             known,
             "velocity_limit",
             "velocity limit",
-            "from layout.*.fastest on",
+            "from robot.*.fastest on",
             judge("velocity_limit"),
             f"{_FIX}: {{ids}} would refuse their profile velocity",
         ),
@@ -125,7 +124,7 @@ def _position_limits(known: Registers, rules: Settings) -> Row:
     return row(
         _PART,
         "position limits",
-        "at least layout.*.limit about each zero",
+        "at least robot.*.limit about each zero",
         grouped(both, lambda ends: f"{ends[0]} to {ends[1]}"),
         "bad" if wrong else None,
         f"{_FIX}: {ids_text(wrong)} would refuse goals",

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from antennate.hardware import roster
 from antennate.hardware.doctor.pace import pace_rows
 from antennate.hardware.doctor.registers import health_rows, settings_rows
 from antennate.hardware.doctor.rows import Row, Verdict, grouped, ids_text, row
 from antennate.hardware.doctor.survey import Seen, Survey
 from antennate.hardware.dynamixel.tables import TABLES
 from antennate.params import DoctorParams, SupervisorParams
-from antennate.robots.layout import LayoutParams
+from antennate.robots.spec import RobotSpec
 
 _PART = "bus"
 _FIX = "run doctor with --fix"
@@ -19,29 +18,29 @@ _WIRING = "check the supply of the servos, the cable of the bus and its first pl
 
 
 def bus_rows(
-    survey: Survey, layout: LayoutParams, limits: SupervisorParams, params: DoctorParams
+    survey: Survey, robot: RobotSpec, limits: SupervisorParams, params: DoctorParams
 ) -> list[Row]:
     """All rows of a bus; those about servos only if any answers."""
-    rows = [_baud(survey, layout)]
+    rows = [_baud(survey, robot)]
     if not survey.here and not survey.elsewhere:
         return rows
-    rows += [_ids(survey, layout), _whole(survey), _models(survey, layout), _firmware(survey)]
-    known = {i: s.registers for i, s in survey.here.items() if s.registers and i in layout.ids}
+    rows += [_ids(survey, robot), _whole(survey), _models(survey, robot), _firmware(survey)]
+    known = {i: s.registers for i, s in survey.here.items() if s.registers and i in robot.ids}
     if known:
-        rows += settings_rows(known, layout)
+        rows += settings_rows(known, robot)
         rows += health_rows(known, survey, limits, params)
         rows += pace_rows(survey, params)
     return rows
 
 
-def _baud(survey: Survey, layout: LayoutParams) -> Row:
+def _baud(survey: Survey, robot: RobotSpec) -> Row:
     expected = f"all at {survey.baud}"
     if survey.here and not survey.elsewhere:
         return Row(_PART, "baud", expected, f"{len(survey.here)} at {survey.baud}", "ok")
     if survey.elsewhere:
         others = [f"{_at(survey, baud)} at {baud}" for baud in _bauds(survey.elsewhere)]
         here = [f"{len(survey.here)} at {survey.baud}"] if survey.here else []
-        cure = f"{_FIX}, or set layout.baud to what the servos have"
+        cure = f"{_FIX}, or set robot.baud to what the servos have"
         return Row(_PART, "baud", expected, ", ".join(here + others), "bad", cure)
     if survey.board:
         cure = "swap the ports of --esp32 and --bus"
@@ -58,9 +57,9 @@ def _at(survey: Survey, baud: int) -> str:
     return "id " + ids_text({one.servo for one in survey.elsewhere if one.baud == baud})
 
 
-def _ids(survey: Survey, layout: LayoutParams) -> Row:
-    missing = set(layout.ids) - set(survey.here)
-    extra = set(survey.here) - set(layout.ids)
+def _ids(survey: Survey, robot: RobotSpec) -> Row:
+    missing = set(robot.ids) - set(survey.here)
+    extra = set(survey.here) - set(robot.ids)
     said = [f"missing {ids_text(missing)}"] if missing else []
     said += [f"not expected {ids_text(extra)}"] if extra else []
     cures: list[str] = []
@@ -75,10 +74,10 @@ def _ids(survey: Survey, layout: LayoutParams) -> Row:
             "missing, check that cable"
         )
     if extra and not lone:
-        cures.append("unplug those that are not expected, or name them in layout")
+        cures.append("unplug those that are not expected, or name them under robot")
     found = ", ".join(said) or ids_text(survey.here)
     verdict: Verdict | None = "bad" if missing else "warn" if extra else None
-    return row(_PART, "ids", ids_text(layout.ids), found, verdict, "; ".join(cures))
+    return row(_PART, "ids", ids_text(robot.ids), found, verdict, "; ".join(cures))
 
 
 def _whole(survey: Survey) -> Row:
@@ -106,8 +105,8 @@ def _name(model: int | None) -> str:
     return TABLES[model].name if model in TABLES else f"model {model}"
 
 
-def _models(survey: Survey, layout: LayoutParams) -> Row:
-    wanted = roster.models(layout)
+def _models(survey: Survey, robot: RobotSpec) -> Row:
+    wanted = robot.models
     found = {i: s.model for i, s in survey.here.items() if s.model is not None}
     wrong = [i for i, model in found.items() if i in wanted and model != wanted[i]]
     return row(
@@ -116,7 +115,7 @@ def _models(survey: Survey, layout: LayoutParams) -> Row:
         grouped(wanted, _name),
         grouped(found, _name),
         "bad" if wrong else None,
-        f"{ids_text(wrong)}: put a servo of the expected model there, or correct layout",
+        f"{ids_text(wrong)}: put a servo of the expected model there, or correct robot.*.ids",
     )
 
 

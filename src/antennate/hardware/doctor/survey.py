@@ -22,7 +22,7 @@ from antennate.hardware.esp32.board import BOARD_BAUD
 from antennate.hardware.esp32.decoder import FrameDecoder
 from antennate.hardware.ports.port import Port
 from antennate.params import BoardParams, BusParams, DoctorParams
-from antennate.robots.layout import LayoutParams
+from antennate.robots.spec import RobotSpec
 
 BAUDS = (57_600, 115_200, 1_000_000, 2_000_000, 3_000_000, 4_000_000)
 """Bits per second at which servos are usually found."""
@@ -82,7 +82,7 @@ class Survey:
     """What was found on a bus.
 
     Attributes:
-        baud: Bits per second of the layout.
+        baud: Bits per second that are expected.
         here: Servos that answer at that speed, by id.
         elsewhere: Servos that answer at another one.
         board: The port speaks the frames of an antenna board.
@@ -104,7 +104,7 @@ class Survey:
 
 def survey(
     opener: Opener,
-    layout: LayoutParams,
+    robot: RobotSpec,
     params: DoctorParams,
     now: Callable[[], float],
 ) -> Survey:
@@ -112,17 +112,17 @@ def survey(
 
     Args:
         opener: Opens its port.
-        layout: The servos expected.
+        robot: The robot expected.
         params: How often to read.
         now: Monotonic time [s].
 
     Raises:
         PortError: The port is gone or cannot be opened.
     """
-    found = Survey(layout.baud)
-    with opener(layout.baud) as port:
-        bus = master(port, layout.baud, now)
-        found.here = who(bus, layout.ids)
+    found = Survey(robot.baud)
+    with opener(robot.baud) as port:
+        bus = master(port, robot.baud, now)
+        found.here = who(bus, robot.ids)
         fit = [servo for servo, seen in found.here.items() if seen.state == "ok"]
         for servo, values in read_registers(bus, fit).items():
             found.here[servo].registers = values
@@ -130,8 +130,8 @@ def survey(
         _time_reads(bus, fit, found, params.reads, now)
     if not found.here:
         found.board = antenna_board(opener, now)
-    if set(layout.ids) - set(found.here) and not found.board:
-        found.elsewhere = _elsewhere(opener, layout, now)
+    if set(robot.ids) - set(found.here) and not found.board:
+        found.elsewhere = _elsewhere(opener, robot, now)
     return found
 
 
@@ -180,10 +180,10 @@ def antenna_board(opener: Opener, now: Callable[[], float]) -> bool:
     return decoder.counters.good + decoder.counters.refused > 0
 
 
-def _elsewhere(opener: Opener, layout: LayoutParams, now: Callable[[], float]) -> list[Seen]:
+def _elsewhere(opener: Opener, robot: RobotSpec, now: Callable[[], float]) -> list[Seen]:
     found: list[Seen] = []
     for baud in BAUDS:
-        if baud != layout.baud:
+        if baud != robot.baud:
             with opener(baud) as port:
                 bus = master(port, baud, now)
                 heard = {status.id for status in bus.scan()}

@@ -28,7 +28,7 @@ from antennate.hardware.dynamixel import bringup
 from antennate.hardware.dynamixel.bringup import BringUpError
 from antennate.hardware.dynamixel.bus import Bus
 from antennate.hardware.esp32.board import Board
-from antennate.hardware.joints import CommandError, Joints, plain
+from antennate.hardware.joints import CommandError, Joints
 from antennate.hardware.ports.port import PortError
 from antennate.hardware.safety.causes import Cause, Inputs, Outputs, State
 from antennate.hardware.safety.diagnosis import Band, ChannelDiagnosis
@@ -222,7 +222,7 @@ class Session:
             return nowhere()
         thought.decided_at = self.clock.now()
         try:
-            command = plain(command)
+            command = self.joints.plain(command)
             self.joints.ticks(command)
         except CommandError as error:
             thought.bad_command = str(error)
