@@ -11,6 +11,7 @@ import pytest
 
 from antennate.control.controllers import Controller
 from antennate.errors import BadInputError, ConfigError
+from antennate.experiments.tunnel.run import TunnelConfig
 from antennate.experiments.twin import Rig, TwinConfig, rig
 from antennate.hardware.driving.adapter import require_quick
 from antennate.hardware.driving.config import DriveConfig

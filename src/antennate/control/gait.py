@@ -1,10 +1,10 @@
 """Maneuver and phase to joint targets.
 
-The body carries the serpenoid wave of the paper, alpha_j = A sin(2 pi xi j / Y - P + delta) +
-offset, for the yaw joints j = 1 .. Y,
-with P the gait phase: as P grows the crest travels from head to tail and the robot advances. Leg i
-turns with P - 2 pi xi i / L, L the number of links, the right one half a turn later. The lead delta of the body over the
-legs decides the speed: it is best where the feet are down on the side towards which the body bends.
+The yaw joints j = 1 .. Y carry the serpenoid wave of the paper,
+alpha_j = A sin(2 pi xi j / Y - P + delta) + offset, with P the gait phase: as P grows the crest
+travels from head to tail and the robot advances. Leg i of L links turns with P - 2 pi xi i / L, the
+right one half a turn later. The lead delta of the body over the legs decides the speed: it is best
+where the feet are down on the side towards which the body bends.
 
 A positive offset bends every joint to the right-hand turn: joint j rotates the rear link against
 the front one, so the head points right of the tail.

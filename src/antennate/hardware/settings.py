@@ -2,8 +2,8 @@
 
 Drive Mode has to be 0: the robot's `directions` mirror joints, and bit 3 would let a goal bring
 torque. With a homing offset a watchdog makes a servo in extended mode move, and zeros are not what
-its description says. Position and velocity limits have to leave room for what is asked for; legs are in
-extended mode, where position limits do not act.
+its description says. Position and velocity limits have to leave room for what is asked for; rolling
+legs are in extended mode, where position limits do not act.
 """
 
 from __future__ import annotations

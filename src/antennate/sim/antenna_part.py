@@ -13,7 +13,7 @@ from antennate.sim import layers
 
 
 def build(params: AntennaSpec) -> mujoco.MjSpec:
-    """The part as an uncompiled spec: bodies `base`, `hinge0`, `hinge1` and so on, actuator `base`."""
+    """The part as an uncompiled spec: bodies `base`, `hinge0` and so on, actuator `base`."""
     spec = mujoco.MjSpec()
     spec.compiler.degree = False
     base = spec.worldbody.add_body(name=BASE)

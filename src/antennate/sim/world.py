@@ -121,7 +121,7 @@ class World:
         mujoco.mj_forward(self.model, self.data)
 
     def command(self, drive: Floats) -> None:
-        """Set the targets of all driven joints, in the order of the robot's joints [rad], shape (n,).
+        """Set the targets of all joints that servos move, in the robot's order [rad], shape (n,).
 
         Raises:
             SimulationError: A target is not finite; nothing is set then.

@@ -187,7 +187,7 @@ class Tick:
 
 
 def angles_of(command: JointCommand) -> tuple[float, ...]:
-    """Joint targets of one robot [rad] in the order of JOINTS; NaN if they are not as many numbers."""
+    """Joint targets of one robot [rad] in the order of JOINTS; NaN if there are not as many."""
     parts = (_flat(command, name) for name in ("yaw", "leg", "antenna"))
     angles = tuple(angle for part in parts for angle in part)
     return angles if len(angles) == len(JOINTS) else _NOWHERE
