@@ -17,7 +17,7 @@ from antennate.params import (
 )
 from antennate.robots.antenna import AntennaSpec
 from antennate.robots.sensor import SensorParams
-from antennate.robots.servos import XC430Params
+from antennate.robots.servos import ServoParams
 from antennate.robots.spec import RobotSpec
 
 SOURCES = ("paper", "datasheet", "measured", "fitted", "assumed")
@@ -127,7 +127,7 @@ def test_the_film_covers_the_hinges_it_reaches(length: float, hinges: int) -> No
 
 
 def test_the_servo_follows_its_datasheet() -> None:
-    servo = XC430Params()
+    servo = ServoParams()
     assert servo.no_load_speed == pytest.approx(6.81, abs=0.005)
     assert servo.damping == pytest.approx(1.7 / 6.81, rel=1e-3)
 

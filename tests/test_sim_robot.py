@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 
 from antennate.params import PhysicsParams
+from antennate.robots.antenna import AntennaSpec
+from antennate.robots.sensor import SensorParams
 from antennate.robots.spec import RobotSpec
 from antennate.sim.world import PREFIX, World, compile_world
 
@@ -25,7 +27,8 @@ def model() -> mujoco.MjModel:
 
 def bent(model: mujoco.MjModel, angle: float) -> tuple[World, np.ndarray]:
     """A world with every antenna hinge at an angle, and its tips (2, 3)."""
-    world = World(model, RobotSpec())
+    long = SensorParams(active_length=0.12)  # over all six hinges
+    world = World(model, RobotSpec(antenna=AntennaSpec(sensor=long)))
     for side in "lr":
         for i in range(6):
             world.data.joint(f"{PREFIX}antenna_{side}_hinge{i}").qpos[0] = angle

@@ -23,43 +23,24 @@ _PWM_LIMIT = 885
 
 
 class ServoParams(Params):
-    """A servo in position mode: torque follows the position error up to the torque-speed line.
+    """A servo in position mode, a DYNAMIXEL XC430-W240-T at 11.1 V.
+
+    Torque follows the position error up to the torque-speed line. Another model is a subclass with
+    its own numbers.
 
     Attributes:
         model_number: What the servo answers when it is asked for its model.
         voltage: Recommended supply [V].
     """
 
-    model_number: ClassVar[int]
-    voltage: ClassVar[float]
-
-    stall_torque: float
-    no_load_speed: float
-    position_gain: float
-    armature: float
-
-    @property
-    def stiffness(self) -> float:
-        """Torque per radian of position error, before saturation [N·m/rad]."""
-        return self.stall_torque * self.position_gain
-
-    @property
-    def damping(self) -> float:
-        """Slope of the torque-speed line [N·m·s/rad]: full drive holds no_load_speed unloaded."""
-        return self.stall_torque / self.no_load_speed
-
-
-class XC430Params(ServoParams):
-    """DYNAMIXEL XC430-W240-T at 11.1 V."""
-
-    model_number = 1080
-    voltage = 11.1
+    model_number: ClassVar[int] = 1080
+    voltage: ClassVar[float] = 11.1
 
     stall_torque: float = number(
         1.7, "N·m", "datasheet: XC430-W240, 11.1 V", "torque at standstill", gt=0
     )
     no_load_speed: float = number(
-        65.0 * 2.0 * math.pi / 60.0,
+        65.0 * _RPM,
         "rad/s",
         "datasheet: XC430-W240, 65 rpm at 11.1 V",
         "speed unloaded",
@@ -81,12 +62,22 @@ class XC430Params(ServoParams):
         ge=0,
     )
 
+    @property
+    def stiffness(self) -> float:
+        """Torque per radian of position error, before saturation [N·m/rad]."""
+        return self.stall_torque * self.position_gain
+
+    @property
+    def damping(self) -> float:
+        """Slope of the torque-speed line [N·m·s/rad]: full drive holds no_load_speed unloaded."""
+        return self.stall_torque / self.no_load_speed
+
 
 class XL330Params(ServoParams):
     """DYNAMIXEL XL330-M288-T at 5 V."""
 
-    model_number = 1200
-    voltage = 5.0
+    model_number: ClassVar[int] = 1200
+    voltage: ClassVar[float] = 5.0
 
     stall_torque: float = number(
         0.52, "N·m", "datasheet: XL330-M288, 5 V", "torque at standstill", gt=0
@@ -109,7 +100,7 @@ class XL330Params(ServoParams):
 class ServosParams(Params):
     """The servo models by name; a joint group names one of them."""
 
-    xc430_w240: XC430Params = XC430Params()
+    xc430_w240: ServoParams = ServoParams()
     xl330_m288: XL330Params = XL330Params()
 
     def of(self, name: ServoName) -> ServoParams:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from antennate.hardware.dynamixel.tables import XC430_W240
 from antennate.params.twin import BatteryParams
-from antennate.robots.servos import TICKS_A_TURN, XC430Params
+from antennate.robots.servos import TICKS_A_TURN, ServoParams
 from antennate.twin.registers import Servo
 
 _VOLTAGE_ERROR = 1
@@ -25,7 +25,7 @@ class Battery:
 
     def __init__(self, params: BatteryParams) -> None:
         self._params = params
-        self._servo = XC430Params()
+        self._servo = ServoParams()
         self._before: dict[int, float] = {}
         self._t = 0.0
         self._begin = math.inf
