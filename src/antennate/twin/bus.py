@@ -95,11 +95,12 @@ class ServoBus:
         self._byte_time = 10.0 / baud
         self._rng = rng or np.random.default_rng(0)
         self._parser = Parser()
-        self._last = 0.0
+        self._t = self._last = 0.0
         self._out: list[tuple[float, bytes]] = []
 
     def advance(self, t: float) -> None:
         """Let the servos move until t."""
+        self._t = max(self._t, t)
         for servo in self.servos:
             servo.advance(t)
 
@@ -111,6 +112,9 @@ class ServoBus:
         for packet in self._parser.feed(self.noise(data)):
             if packet.instruction != Instruction.STATUS:
                 self._handle(self._last, packet)
+                # Goals may have let time pass. That is no silence: the bytes behind them came
+                # together with them, so the wire is busy until then.
+                self._last = max(self._last, self._t)
 
     def next_time(self) -> float | None:
         """When the next bytes for the master are there [s]."""
