@@ -307,7 +307,8 @@ def test_X16_the_key_is_in_nothing_that_a_drive_over_udp_says(
 
 
 def test_a_twin_that_starts_anew_or_falls_silent_does_so_over_udp_too() -> None:
-    clock, end = Clock(), UdpEndpoint("127.0.0.1", 0, KEY)
+    clock = Clock()
+    end = UdpEndpoint("127.0.0.1", 0, KEY, clock)
     port = UdpPort(*place(end.path), KEY, None, clock)
     heard = FrameDecoder()
 
@@ -327,7 +328,7 @@ def test_a_twin_that_starts_anew_or_falls_silent_does_so_over_udp_too() -> None:
     assert {found.boot_id for found in after} == {6}
     assert sum(isinstance(found, Sample) for found in before) >= 90
     assert sum(isinstance(found, Sample) for found in after) >= 60
-    end._spoke -= 1.0
+    clock.t += 1.0
     asked = port.tally.greetings
     port.write(b"")
     end.read()

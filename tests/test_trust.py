@@ -15,6 +15,7 @@ from antennate.hardware.driving.session import Session
 from antennate.hardware.safety.causes import Cause, State
 from antennate.params import ConditioningParams, TouchCheckParams
 from antennate.twin.touch import TouchStimulus
+from antennate.types import Floats
 
 TOUCHED = TwinConfig(touch=("left@0.5s", "right@2s"))
 CONFIG = DriveConfig(dry_run=1.0, duration=1.0)
@@ -55,12 +56,14 @@ def swapped(made: Rig) -> None:
     body._board.newest = exchange  # type: ignore[method-assign]
 
 
+class Inverted(TouchStimulus):
+    def change(self, t: float, bus_used: bool) -> Floats:
+        return super().change(t, bus_used) * (-1, 1)
+
+
 def inverted(made: Rig) -> None:
     """Let the left film straighten where it should bend."""
-    hand = made.robot._hand
-    assert hand is not None
-    change = hand.change
-    hand.change = lambda t, heard: change(t, heard) * (-1, 1)  # type: ignore[method-assign]
+    made.robot.touch = Inverted(TOUCHED.touch, ConditioningParams())
 
 
 def test_S8_a_robot_whose_antennae_were_bent_by_hand_is_armed() -> None:

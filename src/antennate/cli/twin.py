@@ -36,8 +36,9 @@ With --tcp both are TCP ports, with --udp the board is a UDP port that signs as 
 Physics begins when the first servo gets torque. Faults, each with @Ts for its time:
 servo:ID=silent, bad_crc, truncated, late:SECONDS, doubled, wrong_id, oversized, voltage, overheat,
 encoder, shock, overload, reboot or REGISTER:VALUE; esp32=silent, reset, open_left, open_right,
-left:COUNTS, right:COUNTS or ber:SHARE; bus=silent, loss:SHARE, latency:SECONDS, discharge:VOLTS_A_SECOND
-or ber:SHARE; link=ber:SHARE (bits wrong) or loss:SHARE (bytes lost), on both wires both ways.
+left:COUNTS, right:COUNTS or ber:SHARE; bus=silent, loss:SHARE, latency:SECONDS,
+discharge:VOLTS_A_SECOND or ber:SHARE; link=ber:SHARE (bits wrong) or loss:SHARE (bytes
+lost), on both wires both ways.
 --touch left@2s right@5s bends the antennae of the standing robot, as the check by touch of
 `antennate drive` wants it. --fault and --touch may be repeated."""
 

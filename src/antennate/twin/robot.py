@@ -110,7 +110,7 @@ class TwinRobot:
         layout: Ids, directions and zeros of the servos.
         period: Control period of the board and the physics [s].
         boot_id: Random number of the board's boot.
-        standing_noise: Whether readings are noisy before the physics begins, as those of a real sensor are.
+        standing_noise: Whether readings are noisy before the physics begins, as real ones are.
         touch: Bends the antennae of the standing robot, None for no touches.
         watch: Told the world after each tick of the physics.
         battery: Numbers of its supply.
@@ -118,6 +118,7 @@ class TwinRobot:
     Attributes:
         bus: The servos on their wire.
         t: Time up to which everything has happened [s].
+        touch: Bends the antennae of the standing robot, None for no touches.
         board_silent: The board sends nothing.
         noise: What the board's wire does to bytes, both ways.
         battery: What feeds the servos.
@@ -146,7 +147,7 @@ class TwinRobot:
         self._broken = [False, False]
         self._held = [math.nan, math.nan]
         self._chance = np.random.default_rng(boot_id) if standing_noise else None
-        self._touch = touch
+        self.touch = touch
         self.t = 0.0
         self.board_silent = False
         self.noise = Noise(seed=0)
@@ -257,9 +258,9 @@ class TwinRobot:
         noise = np.zeros(2)
         if self._chance is not None and not self._walked:
             noise = np.rint(self._chance.normal(0.0, _STANDING_NOISE, 2))
-        if self._touch is not None and not self._walked:
+        if self.touch is not None and not self._walked:
             used = any(servo.last_fed > 0.0 for servo in self.servos)
-            noise = noise + np.rint(self._touch.change(self._ticks * self._period, used))
+            noise = noise + np.rint(self.touch.change(self._ticks * self._period, used))
         read = np.where(np.isnan(self._held), self._counts, self._held)
         left, right = (
             0 if broken or math.isnan(counts) else min(max(int(counts), 0), frame.FULL_SCALE)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import socket
 import struct
 import time
+from collections.abc import Callable
 from typing import Any
 
 from antennate.errors import BadInputError
@@ -21,12 +22,16 @@ class UdpEndpoint:
         host: Address to listen on; only this one.
         port: UDP port, 0 for any that is free.
         key: The board's.
+        now: Monotonic time [s].
 
     Raises:
         BadInputError: The port cannot be had.
     """
 
-    def __init__(self, host: str, port: int, key: bytes) -> None:
+    def __init__(
+        self, host: str, port: int, key: bytes, now: Callable[[], float] = time.monotonic
+    ) -> None:
+        self._now = now
         self._signer = datagram.Signer(key)
         self._speaker: datagram.Speaker | None = None
         self._boot = -1
@@ -56,7 +61,7 @@ class UdpEndpoint:
             asked, sender = self._socket.recvfrom(datagram.ASK_SIZE + 1)
         except OSError:
             return b""
-        now = time.monotonic()
+        now = self._now()
         if self._speaker is not None and now - self._written < _ALIVE:
             answer = self._speaker.answer(asked, sender, round(1e3 * now))
             if answer is not None:
@@ -65,7 +70,7 @@ class UdpEndpoint:
 
     def write(self, data: bytes) -> None:
         """Send whole frames; a greeting is kept for whoever asks."""
-        now = time.monotonic()
+        now = self._now()
         self._written = now
         for chunk in data.split(b"\0"):
             body = frame.unstuff(chunk) if chunk else None
