@@ -46,8 +46,8 @@ class Joints:
         """Goal positions [ticks] of a command of one robot, shape (n,).
 
         Raises:
-            CommandError: It is no command of one robot, not finite, or beyond a limit or what
-                servos count. It is refused as a whole.
+            CommandError: It is not of one robot, not finite, or beyond a limit or what servos
+                count. It is refused as a whole.
         """
         angles = self._angles(command)
         with np.errstate(over="ignore"):  # infinite then, and refused
