@@ -11,7 +11,6 @@ import pytest
 from doctor_rig import Patient, wrong
 from test_bad_calibrations import GOOD
 
-from antennate.antenna import calibration
 from antennate.cli import BAD_INPUT, main
 from antennate.cli.addresses import RobotOptions, parse_robot
 from antennate.cli.toml import to_toml
@@ -34,7 +33,7 @@ def file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     (tmp_path / "robot.toml").write_text(text)
     (tmp_path / "left").mkdir()
     made = GOOD.model_copy(update={"sensor_id": "left"})
-    calibration.save(made, tmp_path / "left" / "calibration.json")
+    made.save(tmp_path / "left" / "calibration.json")
     monkeypatch.chdir(tmp_path)
     return Path("robot.toml")
 
