@@ -12,11 +12,11 @@ from doctor_rig import Patient, wrong
 from test_bad_calibrations import GOOD
 
 from antennate.cli import BAD_INPUT, main
-from antennate.cli.addresses import RobotOrders, parse_robot
-from antennate.cli.arguments import read_file
+from antennate.cli.addresses import RobotOptions, parse_robot
 from antennate.cli.toml import to_toml
 from antennate.hardware.doctor.checkup import examine
 from antennate.hardware.robot_file import RobotFile
+from antennate.params.reading import read_file
 
 PAGE = Path(__file__).parents[1] / "docs" / "hardware.md"
 TAKE: dict[str, Callable[[RobotFile], Any]] = {
@@ -41,7 +41,7 @@ def file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 @pytest.mark.parametrize("name", TAKE)
 def test_the_file_of_the_page_serves_each_command(name: str, file: Path) -> None:
     robot = read_file(file, RobotFile)
-    config, _ = parse_robot(name, "", TAKE[name], ["--config", str(file)], RobotOrders())
+    config, _ = parse_robot(name, "", TAKE[name], ["--config", str(file)], RobotOptions)
     assert config == TAKE[name](robot)
     assert config.network == robot.network
     known = robot.record if name == "record" else robot
@@ -51,7 +51,7 @@ def test_the_file_of_the_page_serves_each_command(name: str, file: Path) -> None
 
 def test_each_command_takes_its_own_numbers_and_a_flag_counts_more(file: Path) -> None:
     def parsed(name: str, *words: str) -> Any:
-        return parse_robot(name, "", TAKE[name], ["--config", str(file), *words], RobotOrders())[0]
+        return parse_robot(name, "", TAKE[name], ["--config", str(file), *words], RobotOptions)[0]
 
     tables = "[doctor]\nlisten = 1.5\n[record]\nmarks = [0.0, 10.0]\nduration = 9.0\n"
     file.write_text("duration = 60.0\n" + tables)
