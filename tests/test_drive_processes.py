@@ -67,7 +67,9 @@ def driven(tmp_path_factory: pytest.TempPathFactory) -> Drive:
     folder = tmp_path_factory.mktemp("drive") / "run"
     words = ["drive", "--arm", "--no-touch-check", "--out", str(folder)]
     words += ["--dry-run", f"{DRY_RUN + later}", "--duration", f"{WALK + later}"]
-    with twin((what, t + later) for what, t in FAULTS) as places:
+    first, *others = FAULTS
+    faults = [(first[0], first[1] + later), *((what, t + 2 * later) for what, t in others)]
+    with twin(faults) as places:
         run = subprocess.run(
             [*ANTENNATE, *words, *places], capture_output=True, text=True, check=False
         )
