@@ -11,13 +11,14 @@ import pytest
 from ticked_rig import served
 
 from antennate.cli import main
-from antennate.experiments.twin import Rig, TwinConfig, build, rig
+from antennate.experiments.twin import Rig, rig
 from antennate.hardware.driving.config import DriveConfig
 from antennate.hardware.driving.drive import drive
 from antennate.hardware.driving.report import Report
 from antennate.hardware.driving.session import Session
 from antennate.hardware.safety.causes import Cause, State
 from antennate.params import TouchCheckParams
+from antennate.twin.config import TwinConfig, build
 from antennate.types import AntennaFrame, Contact, JointCommand
 
 CONFIG = DriveConfig(dry_run=0.5, duration=2.0, touch=TouchCheckParams(patience=3.0))

@@ -25,7 +25,6 @@ from antennate.cli import main
 from antennate.errors import BadInputError
 from antennate.experiments.driven import Driven, driven, simulated_alike
 from antennate.experiments.tunnel.run import TunnelConfig
-from antennate.experiments.twin import TwinConfig, build
 from antennate.hardware.driving.config import DriveConfig
 from antennate.hardware.driving.connect import connect, prepare
 from antennate.hardware.driving.session import Session
@@ -38,6 +37,7 @@ from antennate.params import ClockParams
 from antennate.robots.layout import LayoutParams
 from antennate.telemetry.reader import LogReader
 from antennate.twin.clock import ClockServer, FaultyClock
+from antennate.twin.config import TwinConfig, build
 from antennate.twin.ends import End, Terminal
 from antennate.twin.faults import Faults, read
 from antennate.twin.lockstep import BoardPort

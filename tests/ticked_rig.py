@@ -12,11 +12,13 @@ from queue import SimpleQueue
 import numpy as np
 
 from antennate.control.controllers import Controller
-from antennate.experiments.tunnel.run import TunnelConfig, prepare
+from antennate.experiments.tunnel.run import TunnelConfig
 from antennate.hardware.ports.finder import finder
 from antennate.hardware.ports.port import PortError
 from antennate.params import ControlParams
 from antennate.robots.layout import LayoutParams
+from antennate.sim.scenes.tunnel import TunnelScene
+from antennate.sim.trial import draw_trial
 from antennate.twin.ends import End, Terminal
 from antennate.twin.faults import Faults, read
 from antennate.twin.robot import TwinRobot
@@ -28,7 +30,8 @@ class Closed(Controller):
 
     def __init__(self, params: ControlParams) -> None:
         super().__init__(params, "closed")
-        self.reset(np.array([0]), prepare(TunnelConfig(seed=0), 0).phase)
+        trial = draw_trial(TunnelConfig(seed=0), TunnelScene(), 0, params.gait, params.period)
+        self.reset(np.array([0]), trial.phase)
 
 
 class Late:
