@@ -11,9 +11,9 @@ from antennate.robots.layout import LayoutParams
 from antennate.sim.scenes.registry import make_scene
 from antennate.sim.sim_robot import SimRobot
 from antennate.sim.trial import TrialConfig, draw_trial
-from antennate.twin.hand import Hand
 from antennate.twin.passage import Passage
 from antennate.twin.robot import TwinRobot
+from antennate.twin.touch import TouchStimulus
 
 
 class TwinControlParams(Params):
@@ -45,7 +45,7 @@ class TwinConfig(TrialConfig):
         (),
         "1",
         "assumed: nobody is there",
-        "antennae bent by hand before it walks, such as left@2s; from the first packet on the bus",
+        "antennae touched before it walks, such as left@2s; from the first packet on the bus",
     )
     battery: BatteryParams = BatteryParams()
     layout: LayoutParams = LayoutParams()
@@ -65,14 +65,14 @@ def watched(config: TwinConfig, boot_id: int | None = None) -> tuple[TwinRobot, 
     body = SimRobot(1, config.robot.sensor, period, config.physics.timestep)
     body.load(0, start.world, start.chance)
     boot = config.trial + 1 if boot_id is None else boot_id
-    hand, passage = Hand(config.touch, control.conditioning), Passage(start.scene)
+    touch, passage = TouchStimulus(config.touch, control.conditioning), Passage(start.scene)
     robot = TwinRobot(
         body,
         config.layout,
         period,
         boot,
         standing_noise=True,
-        hand=hand,
+        touch=touch,
         watch=passage.watch,
         battery=config.battery,
     )

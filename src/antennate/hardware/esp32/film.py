@@ -33,7 +33,7 @@ def calibrated(
     plain = ConditioningParams(averaging_time=control.conditioning.averaging_time)
     if control.conditioning != plain:
         raise ConfigError(
-            f"control.conditioning: expected no curve beside the calibration file {path}, found one; "
+            f"control.conditioning: expected no curve beside calibration file {path}, found one; "
             "give averaging_time alone"
         )
     if control.rule.threshold != found.threshold:
