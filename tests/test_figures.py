@@ -43,7 +43,7 @@ def path(end: float, samples: int = 40) -> Path:
     return Path(
         head=np.stack([x, 0.1 * np.sin(5 * x)], axis=1),
         maneuver=np.arange(samples) * len(Maneuver) // max(samples, 1),
-        fixed=[np.concatenate([wall, wall[::-1] + 0.02]) for wall in WALLS],
+        fixed=list(WALLS),
         before=stood,
         after=[polygon + 0.05 for polygon in stood],
         exit=np.array([wall[-1] for wall in WALLS]),
@@ -150,7 +150,7 @@ def test_robots_far_outside_do_not_stretch_the_panels():
     style.render(figure := trajectories())
     for panel in figure.axes:
         assert panel.get_xlim() == pytest.approx((-0.3, 2.3))
-        assert panel.get_ylim() == pytest.approx((-0.62, 0.62))
+        assert panel.get_ylim() == pytest.approx((-0.6, 0.6))
         assert panel.get_aspect() == 1.0
 
 
