@@ -12,10 +12,12 @@ import math
 import mujoco
 import numpy as np
 
-from antennate.errors import SimulationError
+from antennate.errors import SceneError, SimulationError, in_one_line
 from antennate.params import PhysicsParams
 from antennate.robots.spec import ANTENNA_PREFIXES, RobotSpec
-from antennate.sim import arena, layers, robot_part
+from antennate.sim import layers, robot_part
+from antennate.sim.outline import outline
+from antennate.sim.scenes.scene import SceneInstance, add_floor
 from antennate.types import Floats, Ints
 
 mujoco.set_mju_user_warning(lambda message: None)
@@ -30,6 +32,8 @@ _ANGLE_LIMIT = 6.3
 """Yaw, pitch and antenna joints cannot turn farther [rad]; legs turn without end."""
 _HEIGHT_LIMIT = 0.3
 """A head above or below this left the world [m]."""
+
+_PLANE = mujoco.mjtGeom.mjGEOM_PLANE
 
 
 def new_spec(physics: PhysicsParams) -> mujoco.MjSpec:
@@ -51,20 +55,28 @@ def new_spec(physics: PhysicsParams) -> mujoco.MjSpec:
 
 
 def compile_world(
-    physics: PhysicsParams, robot: RobotSpec, tunnel: arena.Tunnel | None = None
+    physics: PhysicsParams, robot: RobotSpec, scene: SceneInstance | None = None
 ) -> mujoco.MjModel:
-    """Robot on a floor, inside a tunnel if one is given; the head starts over the origin."""
+    """Robot in a scene, on a bare floor without one; the head is over the origin.
+
+    Raises:
+        SceneError: The engine cannot compile it.
+    """
     spec = new_spec(physics)
-    arena.add_floor(spec)
-    if tunnel is not None:
-        arena.add_tunnel(spec, tunnel)
+    if scene is None:
+        add_floor(spec)
+    else:
+        scene.build(spec)
     frame = spec.worldbody.add_frame(pos=[0, 0, robot_part.axle_height(robot)])
     spec.attach(robot_part.build(robot), frame=frame, prefix=PREFIX)
     spec.body(PREFIX + robot.link_names[0]).add_freejoint(name=PREFIX + "root")
     for geom in spec.geoms:
         geom.solref[0] = physics.contact_time
         geom.solimp[:3] = [0.95, 0.99, 0.0005]
-    return spec.compile()
+    try:
+        return spec.compile()
+    except ValueError as error:
+        raise SceneError(f"the scene cannot be compiled: {in_one_line(error)}") from error
 
 
 class World:
@@ -72,10 +84,12 @@ class World:
 
     Attributes:
         model: The compiled model; `data` its state.
+        robot: The robot in it.
         t: Time since the world was made [s].
     """
 
     def __init__(self, model: mujoco.MjModel, robot: RobotSpec) -> None:
+        self.robot = robot
         self.model = model
         self.data = mujoco.MjData(model)
         hinges = [PREFIX + p + h for p in ANTENNA_PREFIXES for h in robot.antenna.hinge_names]
@@ -90,12 +104,8 @@ class World:
         self._driven = self._addresses(names)
         self._root: int = model.joint(PREFIX + "root").qposadr[0]
         self._links: Ints = np.array([model.body(PREFIX + n).id for n in robot.link_names])
-        bodies = range(model.nbody)
-        self._cylinders: Ints = np.array(
-            [b for b in bodies if model.body(b).name.startswith("cylinder")], dtype=int
-        )
         self._leg_geoms: Ints = np.array([model.geom(PREFIX + n).id for n in robot.leg_names])
-        self._obstacle = model.geom_contype == layers.OBSTACLE
+        self._obstacle = (model.geom_contype & layers.OBSTACLE) != 0
         owner = model.body_rootid[model.geom_bodyid]
         self._robot = owner == model.body(PREFIX + robot.link_names[0]).id
         self._steps = 0
@@ -207,9 +217,22 @@ class World:
         """Plan positions of the links, head first [m], shape (L, 2)."""
         return self.data.xpos[self._links, :2]
 
-    def cylinders(self) -> Floats:
-        """Plan positions of all cylinders [m], shape (m, 2)."""
-        return self.data.xpos[self._cylinders, :2]
+    def outlines(self) -> tuple[list[Floats], list[Floats]]:
+        """Polygons of all obstacles in plan [m], each (n, 2): those fixed, those that can move."""
+        solid = np.flatnonzero(self._obstacle & (self.model.geom_type != _PLANE))
+        fixed = self.model.body_weldid[self.model.geom_bodyid[solid]] == 0
+        polygons = [outline(self.model, self.data, geom) for geom in solid.tolist()]
+        return (
+            [polygon for polygon, still in zip(polygons, fixed, strict=True) if still],
+            [polygon for polygon, still in zip(polygons, fixed, strict=True) if not still],
+        )
+
+    def obstacle_overlap(self) -> float:
+        """How deep the robot is in obstacles at most [m]; 0 if it touches none."""
+        contact = self.data.contact
+        kind = self._obstacle[contact.geom]
+        meets = (kind[:, 0] != kind[:, 1]) & self._robot[contact.geom].any(axis=1)
+        return max(0.0, -float(contact.dist[meets].min(initial=0.0)))
 
     def obstacle_force(self) -> float:
         """Sum of the normal forces between robot and obstacles [N] in the last physics step."""
