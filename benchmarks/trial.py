@@ -26,7 +26,6 @@ from unittest import mock
 import mujoco
 import numpy as np
 
-from antennate.control.controllers import Arm
 from antennate.control.gait import Gait
 from antennate.control.loop import run_loop
 from antennate.experiments.tunnel import run as experiment
@@ -37,7 +36,7 @@ from antennate.sim.sim_robot import SimRobot
 from antennate.sim.world import World, compile_world
 from antennate.types import AntennaFrame, Floats, Ints, JointCommand, Maneuver
 
-ARM: Arm = "closed"
+CONTROLLER = "closed"
 LOCKSTEP = 6
 """Trials the program steps at once."""
 COUNTS = (10, 30, 60, 120)
@@ -68,7 +67,7 @@ def prepare(config: TunnelConfig, trials: int) -> list[Any]:
 def run_whole(config: TunnelConfig, starts: list[Any], batch: int) -> None:
     """Run prepared trials as `antennate tunnel` does."""
     with mock.patch.object(experiment, "prepare", lambda _, trial: starts[trial]):
-        experiment.run_trials(config, ARM, range(len(starts)), lambda _: None, batch)
+        experiment.run_trials(config, CONTROLLER, range(len(starts)), lambda _: None, batch)
 
 
 @contextmanager
@@ -208,7 +207,7 @@ def measure_growth(config: TunnelConfig, seconds: float, repetitions: int) -> di
 def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--json", action="store_true", help="print one JSON object")
-    parser.add_argument("--trials", type=int, default=12, help="trials of the closed arm")
+    parser.add_argument("--trials", type=int, default=12, help="trials of the closed controller")
     parser.add_argument("--seconds", type=float, default=20.0, help="longest trial [s]")
     parser.add_argument("--repetitions", type=int, default=5, help="interleaved repetitions")
     options = parser.parse_args()

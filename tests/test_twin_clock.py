@@ -339,7 +339,7 @@ def test_M7_drive_by_the_command_line_decides_as_the_pure_simulation(
         for _ in range(busy):
             stack.callback(stack.enter_context(subprocess.Popen(BUSY)).kill)
         argv = [*PROGRAM, "drive", *addresses, "--arm", "--no-touch-check", "--dry-run", "0.5"]
-        argv += ["--duration", str(0.01 * count + 0.5), "--controller", "ticked_rig:Closed"]
+        argv += ["--duration", str(0.01 * count + 0.5), "--controller", "ticked_rig:closed"]
         argv += ["--out", str(tmp_path), "--overwrite", "--json"]
         said = subprocess.run(argv, env=environment, capture_output=True, check=True).stdout
     assert json.loads(said)["log_complete"]

@@ -11,11 +11,12 @@ from queue import SimpleQueue
 
 import numpy as np
 
-from antennate.control.controllers import Controller
+from antennate.control.controllers import RuleController, closed_loop
 from antennate.experiments.tunnel.run import TunnelConfig, prepare
 from antennate.hardware.ports.finder import finder
 from antennate.hardware.ports.port import PortError
 from antennate.params import ControlParams
+from antennate.robots.body import RobotParams
 from antennate.robots.layout import LayoutParams
 from antennate.twin.ends import End, Terminal
 from antennate.twin.faults import Faults, read
@@ -23,12 +24,11 @@ from antennate.twin.robot import TwinRobot
 from antennate.twin.serve import TwinServer
 
 
-class Closed(Controller):
-    """The arm `closed` with the gait phase of trial 0, as `drive --controller` takes it."""
-
-    def __init__(self, params: ControlParams) -> None:
-        super().__init__(params, "closed")
-        self.reset(np.array([0]), prepare(TunnelConfig(seed=0), 0).phase)
+def closed(control: ControlParams, robot: RobotParams, batch: int) -> RuleController:
+    """The controller `closed` with the gait phase of trial 0, as `drive --controller` takes it."""
+    made = closed_loop(control, robot, batch)
+    made.reset(np.array([0]), prepare(TunnelConfig(seed=0), 0).phase)
+    return made
 
 
 class Late:

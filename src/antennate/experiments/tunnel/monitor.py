@@ -45,7 +45,7 @@ class TrialResult:
         reason: Why a trial is invalid, with the physics step; empty otherwise.
     """
 
-    arm: str
+    controller: str
     trial: int
     status: Status
     time_s: float
@@ -87,7 +87,7 @@ class TrialPath:
 class TrialMonitor:
     """Watches one trial from its first tick to its verdict."""
 
-    arm: str
+    controller: str
     trial: int
     tunnel: Tunnel
     time_limit: float
@@ -145,7 +145,7 @@ class TrialMonitor:
         if not np.isfinite(progress):
             progress = self._best
         return TrialResult(
-            arm=self.arm,
+            controller=self.controller,
             trial=self.trial,
             status=status,
             time_s=round(world.t, 6) if status == "success" else self.time_limit,
