@@ -53,6 +53,10 @@ class ControllerError(AntennateError):
     """A controller raised an exception, or answered in another form than its protocol says."""
 
 
+class MissingPackageError(AntennateError, ImportError):
+    """An optional package is needed for this and not installed; the text says how to get it."""
+
+
 _LONGEST = 300
 """Most characters of an exception that are quoted; it may hold anything."""
 
