@@ -14,13 +14,14 @@ from test_bad_poses import Robot
 
 from antennate.control.registry import make_controller
 from antennate.errors import ConfigError, in_one_line
-from antennate.experiments.twin import TwinConfig, rig
+from antennate.experiments.twin import rig
 from antennate.hardware.driving.config import DriveConfig
 from antennate.hardware.driving.drive import drive
 from antennate.hardware.driving.tracebacks import Tracebacks
 from antennate.hardware.safety.causes import Active, Cause, State
 from antennate.params import ControlParams, SupervisorParams
 from antennate.telemetry.ticks import Tick, angles_of
+from antennate.twin.config import TwinConfig
 from antennate.types import JointCommand
 
 

@@ -10,7 +10,7 @@ from typing import Any
 
 from antennate.control.loop import run_loop
 from antennate.experiments.tunnel.run import TunnelConfig
-from antennate.experiments.twin import Stage, TwinConfig, before_twin, rig, simulation
+from antennate.experiments.twin import Stage, before_twin, rig, simulation
 from antennate.hardware.driving.connect import await_board
 from antennate.robots.layout import LayoutParams
 from antennate.telemetry.header import Header
@@ -18,6 +18,7 @@ from antennate.telemetry.reader import LogReader
 from antennate.telemetry.replay import ReplayRobot, recorded_controller
 from antennate.telemetry.ticks import Tick
 from antennate.telemetry.writer import LogWriter
+from antennate.twin.config import TwinConfig
 from antennate.types import AntennaFrame, Clock, JointCommand, Robot
 
 CONFIG = TunnelConfig(seed=0)
@@ -130,7 +131,7 @@ def twin(folder: Path, name: str, trial: int, blind: float = math.inf) -> World:
 
 def session(folder: Path, name: str, trial: int, blind: float = math.inf) -> World:
     """The same with its supervisor; armed at tick ARMED_AT, blind for 30 ticks only."""
-    made = rig(TwinConfig(world=CONFIG, trial=trial), name)
+    made = rig(TwinConfig(seed=CONFIG.seed, trial=trial), name)
     await_board(made.session.board, made.clock)
     header = Header(controller=name, params=CONFIG.control, layout=LAYOUT)
 

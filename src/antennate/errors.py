@@ -15,8 +15,8 @@ class ConfigError(BadInputError):
     """A configuration is not acceptable: unknown key, wrong type, value out of bounds."""
 
 
-class ArenaError(BadInputError):
-    """An arena cannot be built as described, or the robot does not fit into it."""
+class SceneError(BadInputError):
+    """A scene cannot be found, read or built as described, or the robot does not fit into it."""
 
 
 class OutputError(BadInputError):
