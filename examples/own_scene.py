@@ -21,7 +21,7 @@ class Pillars:
 
 
 class DrawnPillars(Route):
-    """Pillars around a straight route; `Route` tells progress, success and when the robot has left."""
+    """Pillars around a straight route; `Route` tells progress, success and leaving."""
 
     def __init__(self, places):
         super().__init__(np.array([[0.0, 0.0], [LENGTH, 0.0]]), bounds=places)

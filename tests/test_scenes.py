@@ -181,8 +181,10 @@ def test_a_geom_with_default_bits_meets_body_legs_and_antennae(tmp_path, movable
 def test_geoms_of_a_file_touch_one_another_as_they_did(tmp_path):
     balls = (
         '<body pos="9 0 .1"><freejoint/><geom name="a" size=".1"/></body>'
-        '<body pos="9 .15 .1"><freejoint/><geom name="b" size=".1" contype="2" conaffinity="2"/></body>'
-        '<body pos="9 .05 .22"><freejoint/><geom name="c" size=".1" contype="1" conaffinity="2"/></body>'
+        '<body pos="9 .15 .1"><freejoint/><geom name="b" size=".1" contype="2" conaffinity="2"/>'
+        "</body>"
+        '<body pos="9 .05 .22"><freejoint/><geom name="c" size=".1" contype="1" conaffinity="2"/>'
+        "</body>"
     )
     alone = mujoco.MjModel.from_xml_path(str(mjcf(tmp_path, SITES + balls)))
     data = mujoco.MjData(alone)
@@ -269,7 +271,7 @@ def test_entities_and_large_files_are_refused(tmp_path):
     path.write_bytes(b" " * 5_000_001)
     with pytest.raises(SceneError, match="at most 5000000 bytes"):
         MjcfScene(path)
-    with pytest.raises(SceneError, match="cannot read none.xml"):
+    with pytest.raises(SceneError, match=r"cannot read none\.xml"):
         MjcfScene(tmp_path / "none.xml")
 
 
