@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from antennate.control.controllers import Arm, Controller
 from antennate.control.loop import run_loop
+from antennate.control.registry import make_controller
 from antennate.experiments.tunnel.monitor import TrialMonitor
 from antennate.experiments.tunnel.run import TunnelConfig
 from antennate.hardware.driving.body import HardwareRobot
@@ -31,7 +31,7 @@ from antennate.sim.trial import draw_trial
 from antennate.twin.config import TwinConfig, build
 from antennate.twin.lockstep import BoardPort, LockstepClock
 from antennate.twin.robot import TwinRobot
-from antennate.types import AntennaFrame, Clock, JointCommand, Robot
+from antennate.types import AntennaFrame, Clock, Controller, JointCommand, Robot
 
 _WARM_UP = 2.0
 """Longest time until the board's clock is known [s]."""
@@ -76,15 +76,15 @@ class _Rounded:
 class Watch:
     """The monitor of a trial, and what was decided."""
 
-    def __init__(self, config: TunnelConfig, arm: Arm, trial: int) -> None:
+    def __init__(self, config: TunnelConfig, name: str, trial: int) -> None:
         period = config.control.period
         scene = make_scene(config.scene, config.tunnel)
         start = draw_trial(config, scene, trial, config.control.gait, period)
         self.body = SimRobot(1, config.robot, period, config.physics.timestep)
         self.body.load(0, start.world, start.chance)
-        self.controller = Controller(config.control, arm)
+        self.controller = make_controller(name, config.control, config.robot)
         self.controller.reset(np.array([0]), start.phase)
-        self._monitor = TrialMonitor(arm, trial, start.scene, [], config.time_limit)
+        self._monitor = TrialMonitor(name, trial, start.scene, [], config.time_limit)
         self.maneuvers: list[int] = []
         self.counts: list[tuple[float, float]] = []
         self.status = ""
@@ -125,17 +125,17 @@ class Stage:
     robot: TwinRobot | None = None
 
 
-def simulation(config: TunnelConfig, arm: Arm, trial: int) -> Stage:
+def simulation(config: TunnelConfig, name: str, trial: int) -> Stage:
     """The trial in pure simulation, goals rounded to ticks."""
-    watch = Watch(config, arm, trial)
+    watch = Watch(config, name, trial)
     body = _Rounded(watch.body, Joints(config.robot))
     period = config.control.period
     return Stage(body, watch.controller, period, watch.go_on, watch.decisions)
 
 
-def simulated(config: TunnelConfig, arm: Arm, trial: int) -> Decisions:
+def simulated(config: TunnelConfig, name: str, trial: int) -> Decisions:
     """The whole trial in pure simulation."""
-    stage = simulation(config, arm, trial)
+    stage = simulation(config, name, trial)
     run_loop(stage.body, stage.control, stage.period, stage.go_on)
     return stage.decisions()
 
@@ -149,7 +149,7 @@ class Rig:
     session: Session
 
 
-def rig(config: TwinConfig, arm: Arm = "closed", touch: TouchCheckParams | None = None) -> Rig:
+def rig(config: TwinConfig, name: str = "closed", touch: TouchCheckParams | None = None) -> Rig:
     """A session before a twin robot, not yet armed; checked by touch if `touch` says how."""
     robot = build(config)
     params = ControlParams(**dict(config.control))
@@ -159,7 +159,7 @@ def rig(config: TwinConfig, arm: Arm = "closed", touch: TouchCheckParams | None 
         bus=Bus(clock, Timing(config.robot.baud, doubt=DOUBT), clock=clock.now),
         joints=Joints(config.robot),
         clock=clock,
-        decider=Controller(params, arm),
+        controller=make_controller(name, params, config.robot),
         period=params.period,
         conditioning=params.conditioning,
         trust=Trust(params.conditioning, touch=touch),
@@ -167,13 +167,13 @@ def rig(config: TwinConfig, arm: Arm = "closed", touch: TouchCheckParams | None 
     return Rig(robot, clock, session)
 
 
-def before_twin(config: TunnelConfig, arm: Arm, trial: int) -> Stage:
+def before_twin(config: TunnelConfig, name: str, trial: int) -> Stage:
     """The hardware code before a twin, torque on.
 
     Raises:
         BringUpError: The servos did not come up.
     """
-    watch = Watch(config, arm, trial)
+    watch = Watch(config, name, trial)
     period = config.control.period
     spec = config.robot
     robot = TwinRobot(watch.body, spec, period, boot_id=trial + 1)
@@ -193,7 +193,7 @@ def before_twin(config: TunnelConfig, arm: Arm, trial: int) -> Stage:
 
 def on_twin(
     config: TunnelConfig,
-    arm: Arm,
+    name: str,
     trial: int,
     on_tick: Callable[[TwinRobot], None] = lambda robot: None,
 ) -> Decisions:
@@ -201,14 +201,14 @@ def on_twin(
 
     Args:
         config: The trial's world.
-        arm: Its controller.
+        name: Name of its controller.
         trial: Its number.
         on_tick: Called after every tick, for instance to break something.
 
     Raises:
         BringUpError: The servos did not come up.
     """
-    stage = before_twin(config, arm, trial)
+    stage = before_twin(config, name, trial)
 
     def go_on(frame: AntennaFrame, command: JointCommand) -> bool:
         if stage.robot is not None:

@@ -67,6 +67,7 @@ def compile_world(
         add_floor(spec)
     else:
         scene.build(spec)
+        _meet_robot(spec)
     frame = spec.worldbody.add_frame(pos=[0, 0, robot_part.axle_height(robot)])
     spec.attach(robot_part.build(robot), frame=frame, prefix=PREFIX)
     spec.body(PREFIX + robot.link_names[0]).add_freejoint(name=PREFIX + "root")
@@ -77,6 +78,15 @@ def compile_world(
         return spec.compile()
     except ValueError as error:
         raise SceneError(f"the scene cannot be compiled: {in_one_line(error)}") from error
+
+
+def _meet_robot(spec: mujoco.MjSpec) -> None:
+    """Let geoms with the engine's default collision bits touch the robot; planes are floors."""
+    for geom in spec.geoms:
+        if geom.contype == geom.conaffinity == 1:
+            is_floor = geom.type == _PLANE
+            geom.contype = layers.FLOOR if is_floor else layers.OBSTACLE
+            geom.conaffinity = 0 if is_floor else layers.OBSTACLE | layers.FLOOR
 
 
 class World:
