@@ -17,16 +17,15 @@ import pytest
 import antennate
 from antennate.cli import main
 from antennate.cli.arguments import FromFile, parse_with, read_file
-from antennate.cli.folder import strict, to_csv
 from antennate.cli.messages import one_line
-from antennate.cli.toml import to_toml
 from antennate.errors import ConfigError
 from antennate.experiments.gait.run import GaitStudyConfig
 from antennate.experiments.tunnel.run import TunnelConfig
 from antennate.experiments.twin import TwinConfig
 from antennate.sim.world import World
+from antennate.studies.formats import strict, to_csv, to_toml
 
-SMALL = ["tunnel", "--trials", "1", "--arms", "open", "--time-limit", "1", "--workers", "1"]
+SMALL = ["tunnel", "--trials", "1", "--controllers", "open", "--time-limit", "1", "--workers", "1"]
 QUICK = [*SMALL, "--no-figures"]
 
 
@@ -105,8 +104,11 @@ def test_the_door_opens_without_heavy_imports():
         (["tunnel", "--trials", "many"], ["--trials: expected INT, found 'many'"]),
         (["tunnel", "--trials"], ["--trials: expected 1 value"]),
         (["tunnel", "--trials", "0"], ["--trials: expected a number of at least 1, found 0"]),
-        (["tunnel", "--arms", "zigzag"], ["--arms: expected one of open, paper, closed"]),
-        (["tunnel", "--arms", "open", "open"], ["arms must differ"]),
+        (
+            ["tunnel", "--controllers", "zigzag"],
+            ["--controllers: expected one of open, paper, closed"],
+        ),
+        (["tunnel", "--controllers", "open", "open"], ["controllers must differ"]),
         (["tunnel", "--workers", "0"], ["--workers: expected at least 1, found 0"]),
         (
             ["tunnel", "--tunnel.free-width", "-0.4"],
@@ -150,7 +152,7 @@ def test_bad_words(capsys, tmp_path, argv, parts):
         ("tunnel.free_width = 1979-05-27", ["tunnel.free_width: expected a number"]),
         ("tunnel = 3", ["tunnel: expected a table, found 3"]),
         ("tunnel.segments = [1.0, 'x']", ["tunnel.segments[1]: expected a number, found 'x'"]),
-        ("arms = []", ["arms: expected at least 1 value"]),
+        ("controllers = []", ["controllers: expected at least 1 value"]),
         ("robot.antenna.active_coils = [3, 6]", ["active_coils[2]: expected a value"]),
         ('"a\\u001b[31m\\nb" = 1', ["expected a known key"]),
         ("a = " + "[" * 200_000, ["nested too deeply"]),
@@ -232,7 +234,7 @@ def test_a_run_leaves_a_folder_that_explains_itself(capsys, tmp_path):
     assert main([*SMALL, "--seed", "5", "--out", "deep/run"]) == 0
     out, err = capsys.readouterr()
     assert err.endswith("written to deep/run\n")
-    assert "1 trials an arm, seed 5" in out
+    assert "1 trials a controller, seed 5" in out
     assert "A failure counts as the time limit, 1 s" in out
     assert max(map(len, out.splitlines())) <= 100
     run = tmp_path / "deep" / "run"
@@ -254,7 +256,7 @@ def test_a_run_leaves_a_folder_that_explains_itself(capsys, tmp_path):
     assert versions["antennate"] == antennate.__version__
     assert versions["numpy"] == np.__version__
     [row] = table(run)
-    assert (row["arm"], row["trial"], row["status"], row["time_s"]) == (
+    assert (row["controller"], row["trial"], row["outcome"], row["time_s"]) == (
         "open",
         "0",
         "timeout",
@@ -273,13 +275,13 @@ def test_json_is_strict_and_keeps_its_contract(capsys, tmp_path):
     def refuse(name):
         raise AssertionError(f"{name} is no JSON")
 
-    assert main([*QUICK, "--arms", "open", "closed", "--json", "--out", "run"]) == 0
+    assert main([*QUICK, "--controllers", "open", "closed", "--json", "--out", "run"]) == 0
     text = capsys.readouterr().out
     assert text == (tmp_path / "run" / "result.json").read_text()
     result = json.loads(text, parse_constant=refuse)
-    assert (result["schema"], result["command"], result["seed"]) == (1, "tunnel", 0)
+    assert (result["schema"], result["command"], result["seed"]) == (2, "tunnel", 0)
     assert result["interrupted"] is False
-    assert list(result["arms"]) == ["open", "closed"]
+    assert list(result["controllers"]) == ["open", "closed"]
     assert {
         "trials",
         "successes",
@@ -297,8 +299,8 @@ def test_json_is_strict_and_keeps_its_contract(capsys, tmp_path):
         "share",
         "force_mean_n",
         "force_max_n",
-    } <= result["arms"]["open"].keys()
-    assert result["arms"]["open"]["speed_m_s"] is None  # nobody gets out within a second
+    } <= result["controllers"]["open"].keys()
+    assert result["controllers"]["open"]["speed_m_s"] is None  # nobody gets out within a second
     assert list(result["paired"]) == ["open-closed"]
     assert {"trials", "only_first", "only_second", "mcnemar_p", "wilcoxon_p"} <= result["paired"][
         "open-closed"
@@ -343,7 +345,16 @@ def test_an_unfinished_run_is_not_overwritten(capsys, tmp_path):
 
 def test_one_and_two_workers_write_the_same_bytes(capsys, tmp_path):
     for workers in ("1", "2"):
-        words = ["--trials", "2", "--time-limit", "2", "--arms", "open", "closed", "--no-figures"]
+        words = [
+            "--trials",
+            "2",
+            "--time-limit",
+            "2",
+            "--controllers",
+            "open",
+            "closed",
+            "--no-figures",
+        ]
         assert main(["tunnel", *words, "--workers", workers, "--out", workers]) == 0
     for name in ("trials.csv", "result.json", "config.toml"):
         assert (tmp_path / "1" / name).read_bytes() == (tmp_path / "2" / name).read_bytes()
@@ -360,18 +371,18 @@ def test_an_invalid_trial_is_a_row_and_no_success(capsys, tmp_path, monkeypatch)
     monkeypatch.setattr(World, "step", blow_up)
     assert main([*SMALL, "--trials", "2", "--out", "run"]) == 0
     assert "invalid" in capsys.readouterr().out
-    arm = json.loads((tmp_path / "run" / "result.json").read_text())["arms"]["open"]
+    arm = json.loads((tmp_path / "run" / "result.json").read_text())["controllers"]["open"]
     assert (arm["trials"], arm["invalid"], arm["successes"]) == (2, 2, 0)
     assert arm["restricted_mean_time_s"] is None
     rows = table(tmp_path / "run")
-    assert [row["status"] for row in rows] == ["invalid", "invalid"]
+    assert [row["outcome"] for row in rows] == ["invalid", "invalid"]
     assert all("physics step" in row["reason"] for row in rows)
 
 
 def test_interrupted_in_the_middle_keeps_the_finished_trials(capsys, tmp_path, monkeypatch):
-    from antennate.cli.folder import RunFolder
+    from antennate.studies.run_directory import RunDirectory
 
-    kept = RunFolder.append
+    kept = RunDirectory.append
     seen = []
 
     def append(self, row):
@@ -380,10 +391,10 @@ def test_interrupted_in_the_middle_keeps_the_finished_trials(capsys, tmp_path, m
         if len(seen) == 2:
             raise KeyboardInterrupt
 
-    monkeypatch.setattr(RunFolder, "append", append)
+    monkeypatch.setattr(RunDirectory, "append", append)
     assert main([*SMALL, "--trials", "30", "--out", "run"]) == 130
     out, err = capsys.readouterr()
-    assert "interrupted: kept 2 of 30 trials" in err
+    assert "interrupted: kept 2 trials" in err
     assert "trials" in out
     rows = table(tmp_path / "run")
     assert sorted(int(row["trial"]) for row in rows) == sorted(row["trial"] for row in seen)
@@ -416,7 +427,7 @@ def test_a_signal_ends_the_run_and_keeps_its_trials(tmp_path, number, workers):
     result = json.loads((tmp_path / "run" / "result.json").read_text())
     assert result["interrupted"] is True
     rows = table(tmp_path / "run")
-    assert len(rows) == sum(arm["trials"] for arm in result["arms"].values()) >= 2
+    assert len(rows) == sum(row["trials"] for row in result["controllers"].values()) >= 2
 
 
 def test_gait_runs_and_writes_its_result(capsys, tmp_path):

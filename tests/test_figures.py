@@ -18,9 +18,9 @@ WALLS = (np.array([[0.0, 0.3], [2.0, 0.3]]), np.array([[0.0, -0.3], [2.0, -0.3]]
 
 @dataclass
 class Row:
-    arm: str
+    controller: str
     trial: int
-    status: str
+    outcome: str
     time_s: float
 
 
@@ -47,11 +47,11 @@ def path(end: float, samples: int = 40) -> Path:
 
 
 def rows() -> list[Row]:
-    verdicts = [("success", 10.0), ("success", 20.0), ("timeout", LIMIT), ("left", LIMIT)]
-    return [Row(arm, k, *verdict) for arm in ARMS for k, verdict in enumerate(verdicts)]
+    outcomes = [("success", 10.0), ("success", 20.0), ("timeout", LIMIT), ("left", LIMIT)]
+    return [Row(arm, k, *verdict) for arm in ARMS for k, verdict in enumerate(outcomes)]
 
 
-def arms() -> dict[str, dict]:
+def controllers() -> dict[str, dict]:
     one = {
         "trials": 4,
         "invalid": 0,
@@ -65,7 +65,7 @@ def arms() -> dict[str, dict]:
 
 def trajectories():
     found = rows()
-    paths = {(row.arm, row.trial): path(2.0) for row in found}
+    paths = {(row.controller, row.trial): path(2.0) for row in found}
     paths["open", 3] = path(-40.0)  # far out of the entrance
     return tunnel.trajectories(paths, ARMS, found, range(4), 0.07)
 
@@ -94,7 +94,7 @@ def study():
 
 
 def summary():
-    return tunnel.summary(arms(), rows(), LIMIT)
+    return tunnel.summary(controllers(), rows(), LIMIT)
 
 
 @pytest.mark.parametrize("draw", [trajectories, summary, study])
@@ -154,7 +154,7 @@ def test_every_maneuver_has_its_own_colour_on_the_course():
     drawn = {line.get_color() for line in panel.lines}
     assert set(style.MANEUVER_COLOURS.values()) <= drawn
     assert len(set(style.MANEUVER_COLOURS.values())) == len(Maneuver)
-    assert set(ARMS) == set(style.ARM_COLOURS) == set(style.ARM_LINES)
+    assert set(ARMS) == set(style.CONTROLLER_COLOURS) == set(style.CONTROLLER_LINES)
 
 
 def test_trials_without_a_course_leave_an_empty_panel():
@@ -180,7 +180,7 @@ def test_curve_drops_at_exits_and_failures_stay():
 
 
 def test_an_arm_without_a_valid_trial_is_left_blank():
-    empty = {**arms()["open"], "invalid": 4, "successes": 0, "restricted_mean_time_s": None}
+    empty = {**controllers()["open"], "invalid": 4, "successes": 0, "restricted_mean_time_s": None}
     figure = tunnel.summary({"open": empty}, [Row("open", 0, "invalid", LIMIT)], LIMIT)
     style.render(figure)
     assert figure.axes[0].get_yticklabels()[0].get_text() == "open\nn = 0"

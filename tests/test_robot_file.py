@@ -15,9 +15,9 @@ from antennate.antenna import calibration
 from antennate.cli import BAD_INPUT, main
 from antennate.cli.addresses import RobotOrders, parse_robot
 from antennate.cli.arguments import read_file
-from antennate.cli.toml import to_toml
 from antennate.hardware.doctor.checkup import examine
 from antennate.hardware.robot_file import RobotFile
+from antennate.studies.formats import to_toml
 
 PAGE = Path(__file__).parents[1] / "docs" / "hardware.md"
 TAKE: dict[str, Callable[[RobotFile], Any]] = {

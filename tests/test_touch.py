@@ -12,7 +12,6 @@ from scipy import stats
 from antennate import figures as style
 from antennate.antenna import statics as mechanics
 from antennate.cli import main
-from antennate.cli.folder import to_csv, to_json
 from antennate.errors import SimulationError
 from antennate.experiments import reading
 from antennate.experiments.touch import figure as figures
@@ -28,6 +27,7 @@ from antennate.robots.antenna import AntennaParams
 from antennate.robots.sensor import SensorParams
 from antennate.sim import touch_wall
 from antennate.sim.bench import Ball, Bar, Bench, compile_bench
+from antennate.studies.formats import to_csv, to_json
 
 SMALL = TouchConfig(
     trials=2,
@@ -277,7 +277,7 @@ def test_free_before_and_after_and_pressed_between(outcome):
 
 
 def test_the_study_counts_what_it_ran(outcome):
-    result, rows = outcome.result(), outcome.rows()
+    result, rows = outcome.result(), outcome.rows
     assert json.loads(to_json(result))["command"] == "touch"
     assert len(rows) == len(outcome.traverses) == 8
     for name, measured in result["profiles"].items():

@@ -37,8 +37,8 @@ MANEUVER_NAMES = {
     Maneuver.HOLD: "hold",
 }
 
-ARM_COLOURS = {"open": "#8C8C8C", "paper": "#CC79A7", "closed": "#332288"}
-ARM_LINES = {"open": (0, (4, 1.5)), "paper": (0, (4, 1.5, 1, 1.5)), "closed": "solid"}
+CONTROLLER_COLOURS = {"open": "#8C8C8C", "paper": "#CC79A7", "closed": "#332288"}
+CONTROLLER_LINES = {"open": (0, (4, 1.5)), "paper": (0, (4, 1.5, 1, 1.5)), "closed": "solid"}
 """A second mark beside the colour, for print in grey."""
 
 SERIES = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#D55E00", "#56B4E9", "#332288")

@@ -15,22 +15,12 @@ from antennate import __version__
 
 OK, BAD_INPUT, INTERRUPTED = 0, 2, 130
 
-COMMANDS = {
-    "tunnel": "walk robots through a corridor of loose cylinders, with and without touch",
-    "gait": "walk on a flat floor: speed, turning and cost of the gait",
-    "springs": "torsion springs: stiffness from wire and coils, and back",
-    "taper": "stiffness along a tapering antenna, and the ladder of springs that follows it",
-    "calibrate": "readings to bend: fit a recording, or push a simulated antenna",
-    "wall": "pass a line of boulders with five antennae: success, jam or slip",
-    "sensor": "flex to counts: curve, hysteresis, creep, noise and the best divider",
-    "force": "how much of a contact's force the flex tells, with and without knowing the place",
-    "sweep": "sweep an antenna beside walls: its shapes, and the distances that active touch tells",
+ROBOT_COMMANDS = {
     "twin": "serve a simulated robot as real bytes: an antenna board and a bus of 19 servos",
     "doctor": "examine the real robot, or its twin: what is wrong, and the cure",
     "record": "antenna readings to a CSV file that calibrate takes",
     "drive": "let a controller walk the real robot, or its twin",
     "replay": "let a controller decide again upon the log of a drive",
-    "touch": "move an antenna along walls: sensed contact against true contact",
 }
 
 
@@ -61,32 +51,48 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _run(command: str, argv: list[str]) -> int:
+    from antennate import experiments
     from antennate.cli.messages import nearest, one_line
     from antennate.errors import AntennateError, BadInputError
 
     name = "antennate"
     try:
-        if command not in COMMANDS:
-            known = ", ".join(COMMANDS) + nearest(command, COMMANDS)
-            raise BadInputError(f"expected a command ({known}), found {command}")
-        name = f"antennate {command}"
-        return importlib.import_module(f"antennate.cli.{command}").command(argv)
+        if command in ROBOT_COMMANDS:
+            name = f"antennate {command}"
+            return importlib.import_module(f"antennate.cli.{command}").command(argv)
+        if command in experiments.names():
+            from antennate.cli.experiment import command as carry_out
+
+            name = f"antennate {command}"
+            return carry_out(experiments.load(command), argv)
+        commands = [*experiments.names(), *ROBOT_COMMANDS]
+        known = ", ".join(commands) + nearest(command, commands)
+        raise BadInputError(f"expected a command ({known}), found {command}")
     except AntennateError as error:
         sys.stderr.write(f"{name}: error: {one_line(str(error))}\n")
         return BAD_INPUT
 
 
 def _usage() -> str:
-    width = max(len(name) for name in COMMANDS)
+    from antennate import experiments
+
+    groups = {"experiments": experiments.summaries(), "the robot and its twin": ROBOT_COMMANDS}
+    width = max(len(name) for commands in groups.values() for name in commands)
     return "\n".join(
         [
             "usage: antennate COMMAND [OPTIONS]",
             "",
             "Simulate and study a pair of tactile antennae on a many-legged robot.",
             "",
-            "commands:",
-            *(f"  {name:<{width}}  {what}" for name, what in COMMANDS.items()),
-            "",
+            *(
+                line
+                for title, commands in groups.items()
+                for line in (
+                    f"{title}:",
+                    *(f"  {name:<{width}}  {what}" for name, what in commands.items()),
+                    "",
+                )
+            ),
             "`antennate COMMAND --help` lists every option with its unit and default;",
             "`antennate --version` prints the version.",
             "",

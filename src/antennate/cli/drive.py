@@ -13,7 +13,6 @@ import tyro
 
 from antennate.cli import BAD_INPUT, OK, viewer
 from antennate.cli.addresses import RobotOrders, key_of, parse_robot, require_lossless
-from antennate.cli.folder import LOG, RunFolder, to_json
 from antennate.cli.progress import terminate_as_interrupt
 from antennate.cli.tables import Cell, number, show
 from antennate.errors import ConfigError
@@ -25,6 +24,8 @@ from antennate.hardware.driving.priority import Priority, urgent
 from antennate.hardware.driving.session import Session
 from antennate.hardware.robot_file import RobotFile
 from antennate.hardware.safety.causes import State
+from antennate.studies.formats import to_json
+from antennate.studies.run_directory import LOG, RunDirectory
 from antennate.telemetry.feed import Feed
 from antennate.telemetry.header import Header
 from antennate.telemetry.parts import part, parts
@@ -78,8 +79,8 @@ def command(argv: Sequence[str]) -> int:
     config = config.calibrated()
     require_lossless(orders.bus)
     key = key_of(orders)
-    with RunFolder.open("drive", orders.out, orders.overwrite) as folder:
-        folder.describe("drive", argv, config)
+    with RunDirectory.create("drive", orders.out, orders.overwrite) as folder:
+        folder.describe(config, ["antennate", "drive", *argv])
         folder.without_trials()
         wires = connect(config, orders.esp32, orders.bus, key, orders.clock)
         with wires as session, terminate_as_interrupt():

@@ -133,7 +133,7 @@ class Watch:
         self.body.load(0, start.world, start.chance)
         self.controller = Controller(config.control, arm)
         self.controller.reset(np.array([0]), start.phase)
-        self._judge = TrialMonitor(arm, trial, start.tunnel, config.time_limit)
+        self._judge = TrialMonitor(config.seed, trial, arm, start.tunnel, config.time_limit)
         self.maneuvers: list[int] = []
         self.counts: list[tuple[float, float]] = []
         self.status = ""

@@ -21,6 +21,7 @@ from antennate.params import GaitParams, Params, PhysicsParams, VariationParams,
 from antennate.robots.body import RobotParams
 from antennate.sim.sim_robot import Disturbance, SimRobot
 from antennate.sim.world import World, compile_world
+from antennate.studies.experiment import WithoutTrials
 from antennate.studies.pool import run_tasks
 from antennate.types import AntennaFrame, Floats, JointCommand, Maneuver
 
@@ -75,7 +76,7 @@ class GaitStudyConfig(Params):
 
 
 @dataclass(frozen=True, slots=True)
-class GaitOutcome:
+class GaitOutcome(WithoutTrials):
     """All walks: four maneuvers by name, one without body wave, and the sweep over its lead."""
 
     config: GaitStudyConfig

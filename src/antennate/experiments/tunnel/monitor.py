@@ -17,7 +17,7 @@ from antennate.sim.arena import Tunnel
 from antennate.sim.world import World
 from antennate.types import Floats, Maneuver
 
-Status = Literal["success", "timeout", "left", "invalid"]
+Outcome = Literal["success", "timeout", "left", "invalid"]
 
 STUCK_GAIN = 0.02
 """Gain of progress that counts as getting on [m]."""
@@ -34,7 +34,9 @@ class TrialResult:
     """One row of the table.
 
     Attributes:
-        status: success (the head passed the exit), timeout, left (out through the entrance) or
+        seed: Seed of the run; with `trial` it decides all chance.
+        controller: Name of the controller.
+        outcome: success (the head passed the exit), timeout, left (out through the entrance) or
             invalid.
         time_s: Time to exit [s]; the limit for every failure.
         progress_m: Where the head ended, along the centre line, within [0, length] [m].
@@ -45,9 +47,10 @@ class TrialResult:
         reason: Why a trial is invalid, with the physics step; empty otherwise.
     """
 
-    arm: str
+    seed: int
     trial: int
-    status: Status
+    controller: str
+    outcome: Outcome
     time_s: float
     progress_m: float
     stuck: int
@@ -85,10 +88,11 @@ class TrialPath:
 
 @dataclass
 class TrialMonitor:
-    """Watches one trial from its first tick to its verdict."""
+    """Watches one trial from its first tick to its end."""
 
-    arm: str
+    seed: int
     trial: int
+    controller: str
     tunnel: Tunnel
     time_limit: float
     _ticks: int = 0
@@ -101,8 +105,8 @@ class TrialMonitor:
     _samples: list[tuple[float, float, float, int]] = field(default_factory=list)
     _counts: Floats = field(default_factory=lambda: np.zeros(len(Maneuver)))
 
-    def watch(self, world: World, maneuver: int, failed: bool) -> Status | None:
-        """Look at the world after a tick; the verdict once there is one."""
+    def watch(self, world: World, maneuver: int, failed: bool) -> Outcome | None:
+        """Look at the world after a tick; the outcome once there is one."""
         if failed:
             return "invalid"
         self._counts[maneuver] += 1
@@ -137,7 +141,7 @@ class TrialMonitor:
             self._is_stuck = True
             self._stuck += 1
 
-    def result(self, world: World, status: Status, reason: str) -> TrialResult:
+    def result(self, world: World, outcome: Outcome, reason: str) -> TrialResult:
         """The row of a trial that ended so."""
         share = self._counts / max(1.0, self._counts.sum())
         forces = np.array(self._forces) if self._forces else np.zeros(1)
@@ -145,10 +149,11 @@ class TrialMonitor:
         if not np.isfinite(progress):
             progress = self._best
         return TrialResult(
-            arm=self.arm,
+            seed=self.seed,
             trial=self.trial,
-            status=status,
-            time_s=round(world.t, 6) if status == "success" else self.time_limit,
+            controller=self.controller,
+            outcome=outcome,
+            time_s=round(world.t, 6) if outcome == "success" else self.time_limit,
             progress_m=round(float(np.clip(progress, 0.0, self.tunnel.params.length)), 6),
             stuck=self._stuck,
             recovered=self._recovered,
