@@ -319,7 +319,7 @@ def test_the_force_that_is_needed_bends_the_film_that_far(outcome):
 def test_the_same_bytes_on_one_and_two_workers(outcome):
     other = touch.run(SMALL, workers=2)
     assert to_json(other.result()) == to_json(outcome.result())
-    rows = [to_csv(dataclasses.asdict(r) for r in o.rows()) for o in (outcome, other)]
+    rows = [to_csv(dataclasses.asdict(r) for r in o.rows) for o in (outcome, other)]
     assert rows[0] == rows[1]
 
 
@@ -333,8 +333,8 @@ def test_a_traverse_that_breaks_is_a_row_with_its_reason(monkeypatch):
     assert found.result()["invalid"] == 2
     assert found.result()["profiles"]["stiff"]["f1"] is None
     assert found.example() is None
-    assert [row.status for row in found.rows()] == ["invalid"] * 2
-    assert "engine warning" in found.rows()[0].reason
+    assert [row.status for row in found.rows] == ["invalid"] * 2
+    assert "engine warning" in found.rows[0].reason
     for figure in (figures.measures(found.result()), figures.curves(found.result())):
         style.render(figure)
 
