@@ -31,6 +31,7 @@ from pydantic import ValidationError
 
 from antennate import __version__
 from antennate.errors import BadInputError, OutputError
+from antennate.files import write_whole
 from antennate.params import Params
 from antennate.params.log import MOST_PARTS
 from antennate.studies.formats import from_csv, strict, to_csv, to_json, to_toml
@@ -77,7 +78,7 @@ class RunDirectory:
             OutputError: It cannot be made or written to, or it holds another run.
         """
         if path == "":
-            raise OutputError("--out: expected the name of a folder, found an empty one")
+            raise OutputError("expected the name of a folder, found an empty one")
         place = _free(command) if path is None else Path(path)
         with _writing(place):
             missing = [p for p in (place, *place.parents) if not p.exists()]
@@ -85,7 +86,7 @@ class RunDirectory:
             held = _held(place)
             if held and not overwrite:
                 raise OutputError(
-                    f"--out: expected a folder without a run, found {held[0]}; "
+                    f"expected a folder without a run, found {held[0]}; "
                     "choose another or give --overwrite"
                 )
             for file in held:
@@ -192,19 +193,10 @@ class RunDirectory:
             OutputError: It cannot be written.
         """
         path = self.path / name
-        data = content.encode("utf-8") if isinstance(content, str) else content
-        fresh = path.with_name(f".{path.name}.{os.getpid()}")
         with _writing(path):
             path.parent.mkdir(exist_ok=True)
-            try:
-                fresh.unlink(missing_ok=True)  # of a program with this number that was killed
-                with fresh.open("xb") as file:
-                    file.write(data)
-                    file.flush()
-                    os.fsync(file.fileno())
-                fresh.replace(path)
-            finally:
-                fresh.unlink(missing_ok=True)
+        data = content.encode("utf-8") if isinstance(content, str) else content
+        write_whole(path, data, overwrite=True)
 
     def write_figures(self, figures: Mapping[str, Any]) -> None:
         """Put figures into the directory, each as svg and png, by name."""
@@ -275,6 +267,4 @@ def _writing(path: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        raise OutputError(
-            f"--out: expected to write {path}, found: {error.strerror or error}"
-        ) from None
+        raise OutputError(f"expected to write {path}, found: {error.strerror or error}") from None

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from antennate.antenna.calibration import to_json
 from antennate.experiments import calibrate as package
 from antennate.experiments.calibrate import recording
 from antennate.experiments.calibrate import run as calibrate
@@ -84,7 +83,7 @@ def sentence(result: Mapping[str, Any]) -> str:
 
 def _files(outcome: calibrate.CalibrateOutcome) -> Mapping[str, str]:
     return {
-        "calibration.json": to_json(outcome.calibration),
+        "calibration.json": outcome.calibration.to_json(),
         "conditioning.toml": outcome.conditioning_toml(),
         "recording.csv": recording.write(outcome.raw),
     }
