@@ -1,8 +1,8 @@
 """Everything that docs/science/tunnel.md reports, run again: `python docs/science/study.py PART`.
 
 Parts: `evaluation` (three controllers, 100 fresh trials each), `ablation` (one change at a time)
-and `map` (success over corner angle and corridor width). Each writes docs/science/PART.json; the figures of
-the map are drawn from it. Results do not depend on the number of workers.
+and `map` (success over corner angle and corridor width). Each writes docs/science/PART.json; the
+figures of the map are drawn from it. Results do not depend on the number of workers.
 """
 
 from __future__ import annotations
