@@ -20,11 +20,11 @@ from antennate.cli.arguments import FromFile, parse_with
 from antennate.errors import ConfigError
 from antennate.experiments.gait.run import GaitStudyConfig
 from antennate.experiments.tunnel.run import TunnelConfig
-from antennate.experiments.twin import TwinConfig
 from antennate.messages import one_line
 from antennate.params.reading import read_file
 from antennate.sim.world import World
 from antennate.studies.formats import strict, to_csv, to_toml
+from antennate.twin.config import TwinConfig
 
 SMALL = ["tunnel", "--trials", "1", "--controllers", "open", "--time-limit", "1", "--workers", "1"]
 QUICK = [*SMALL, "--no-figures"]

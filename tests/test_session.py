@@ -11,7 +11,7 @@ import pytest
 
 from antennate.control.controllers import Controller
 from antennate.errors import BadInputError, ConfigError
-from antennate.experiments.twin import Rig, TwinConfig, rig
+from antennate.experiments.twin import Rig, rig
 from antennate.hardware.driving.adapter import require_quick
 from antennate.hardware.driving.config import DriveConfig
 from antennate.hardware.driving.connect import await_board, require_servos
@@ -30,6 +30,7 @@ from antennate.robots.layout import LayoutParams
 from antennate.telemetry.replay import replay
 from antennate.telemetry.ticks import Tick
 from antennate.twin.bus import Fault, Trouble
+from antennate.twin.config import TwinConfig
 from antennate.twin.faults import Faults, read
 from antennate.twin.pty import PtyServer
 from antennate.twin.registers import Servo
@@ -137,6 +138,23 @@ def test_L8_L9_a_silent_board_makes_it_hold_within_100_ms_and_its_return_walk() 
     still = [g for g, when in zip(log.goals, log.t, strict=True) if held[0] <= when < 2.5]
     assert len({tuple(g) for g in still}) == 1
     assert (state[t > 3.5] <= State.DEGRADED).all()
+
+
+@pytest.mark.parametrize("when", [0.3, 1.02, 2.0])
+def test_D9_every_tick_can_be_logged_whenever_the_board_resets(when: float) -> None:
+    """In the dry run, while arming, on the way."""
+    act = at(when, "esp32=reset")
+
+    def keep(session: Session, t: float) -> None:
+        act(made, t)
+        tick = Tick.unpack(Tick.of(session, t).pack())
+        lost.append(tick.lost)
+
+    made, lost = rig(TwinConfig()), list[int]()
+    report = drive(made.session, CONFIG, arm=True, on_tick=keep)
+    assert report.result(made.session)["resets"] == 1
+    assert len(lost) == made.session.tally.ticks
+    assert max(lost) < 10
 
 
 def test_E1_a_board_that_resets_is_counted_and_used_again_within_a_second_of_its_greeting() -> None:

@@ -18,9 +18,9 @@ from antennate.cli.arguments import FromFile, parse_with
 from antennate.cli.options import option
 from antennate.cli.progress import end_at_first
 from antennate.errors import ConfigError
-from antennate.experiments.twin import TwinConfig, watched
 from antennate.hardware.driving.priority import LEVEL, urgent
 from antennate.hardware.ports.keys import read_key
+from antennate.twin.config import TwinConfig, watched
 from antennate.twin.endpoints import Endpoint
 from antennate.twin.faults import Faults, read
 from antennate.twin.serve import TwinServer
@@ -30,7 +30,7 @@ from antennate.twin.udp import UdpEndpoint
 _LAST_PORT = 65_534
 
 DESCRIPTION = """\
-Serve the simulated robot in a tunnel as real bytes on two pseudo-terminals: the frames of the
+Serve the simulated robot in a scene as real bytes on two pseudo-terminals: the frames of the
 antenna board, and a DYNAMIXEL bus of 19 servos. Prints one JSON line with the paths when ready.
 With --tcp both are TCP ports, with --udp the board is a UDP port that signs as the firmware does.
 Physics begins when the first servo gets torque. Faults, each with @Ts for its time:
@@ -83,7 +83,7 @@ def _serve(argv: Sequence[str]) -> int:
         finally:
             invalid = f"physics became invalid: {robot.failure}; " if robot.failure else ""
             late = f"latest tick {1e3 * server.late:.1f} ms late"
-            sys.stderr.write(f"antennate twin: {invalid}{passage.said}; {late}\n")
+            sys.stderr.write(f"antennate twin: {invalid}{passage.summary}; {late}\n")
     return OK
 
 

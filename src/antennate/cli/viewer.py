@@ -97,7 +97,7 @@ def main() -> int:
         if log is not None and kept:
             log.close()
     except LogError as error:
-        kept = _say(error)
+        kept = say(error)
     return int(not kept)
 
 
@@ -106,7 +106,7 @@ def _begin(path: Path, first: Message) -> LogWriter | None:
     try:
         return LogWriter(path, Header.unpack(first.content))
     except LogError as error:
-        _say(error)
+        say(error)
         return None
 
 
@@ -116,11 +116,12 @@ def _keep(log: LogWriter | None, content: bytes) -> bool:
         if log is not None:
             log.write(content)
     except LogError as error:
-        return _say(error)
+        return say(error)
     return log is not None
 
 
-def _say(error: LogError) -> bool:
+def say(error: LogError) -> bool:
+    """Show an error of the log on stderr, below the status line; always False."""
     _write(f"\nantennate drive: {one_line(str(error))}\n")
     return False
 

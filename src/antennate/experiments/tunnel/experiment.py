@@ -8,6 +8,7 @@ from typing import Any
 from antennate.experiments import tunnel as package
 from antennate.experiments.tunnel import measures
 from antennate.experiments.tunnel import run as tunnel
+from antennate.sim.trial import check_start
 from antennate.studies.experiment import Experiment
 from antennate.studies.measures import Table, shown
 
@@ -54,9 +55,7 @@ def _figures(outcome: tunnel.TunnelOutcome) -> Mapping[str, Any]:
     config = outcome.config
     trials = range(min(SHOWN_TRIALS, config.trials))
     return {
-        "trajectories": trajectories(
-            outcome.paths, config.controllers, outcome.rows, trials, config.tunnel.cylinder.radius
-        ),
+        "trajectories": trajectories(outcome.paths, config.controllers, outcome.rows, trials),
         "summary": summary(outcome.result()["controllers"], outcome.rows, config.time_limit),
     }
 
@@ -69,5 +68,5 @@ EXPERIMENT = Experiment(
     tables=tables,
     sentence=sentence,
     figures=_figures,
-    check=lambda config: tunnel.check(config),
+    check=check_start,
 )
