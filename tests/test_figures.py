@@ -53,7 +53,7 @@ def path(end: float, samples: int = 40) -> Path:
 
 def rows() -> list[Row]:
     outcomes = [("success", 10.0), ("success", 20.0), ("timeout", LIMIT), ("left", LIMIT)]
-    return [Row(arm, k, *verdict) for arm in ARMS for k, verdict in enumerate(outcomes)]
+    return [Row(name, k, *end) for name in ARMS for k, end in enumerate(outcomes)]
 
 
 def controllers() -> dict[str, dict]:
@@ -164,10 +164,10 @@ def test_every_maneuver_has_its_own_colour_on_the_course():
 
 def test_trials_without_a_course_leave_an_empty_panel():
     nothing = Path(
-        np.zeros((0, 2)), np.zeros(0), WALLS, np.zeros((2, 0, 2)), np.full((6, 2), np.nan)
+        np.zeros((0, 2)), np.zeros(0), list(WALLS), [], [], WALLS[0], np.full((6, 2), np.nan)
     )
     figure = tunnel.trajectories(
-        {("open", 0): nothing}, ("open",), [Row("open", 0, "invalid", LIMIT)], range(2), 0.07
+        {("open", 0): nothing}, ("open",), [Row("open", 0, "invalid", LIMIT)], range(2)
     )
     style.render(figure)
     assert [p.get_title(loc="left") for p in figure.axes] == [
