@@ -1,8 +1,9 @@
 """Everything that docs/science/tunnel.md reports, run again: `python docs/science/study.py PART`.
 
 Parts: `evaluation` (three controllers, 100 fresh trials each), `ablation` (one change at a time)
-and `map` (success over corner angle and corridor width). Each writes docs/science/PART.json; the
-figures of the map are drawn from it. Results do not depend on the number of workers.
+and `map` (success over corner angle and corridor width). Each writes
+docs/science/PART.json; the figures of the map are drawn from it. Results do not depend on the
+number of workers.
 """
 
 from __future__ import annotations
@@ -37,13 +38,12 @@ ANGLES_DEG = (60.0, 75.0, 90.0, 105.0)
 WIDTHS_M = (0.32, 0.40, 0.50)
 
 
-def _config(trials: int, seed: int, names: tuple[str, ...], **rest: Any) -> TunnelConfig:
-    return TunnelConfig.model_validate(
-        {"trials": trials, "seed": seed, "controllers": names, **rest}
-    )
+def _config(trials: int, seed: int, controllers: tuple[str, ...], **rest: Any) -> TunnelConfig:
+    given = {"trials": trials, "seed": seed, "controllers": controllers}
+    return TunnelConfig.model_validate({**given, **rest})
 
 
-def _run(config: TunnelConfig, workers: int, name: str) -> dict[str, Any]:
+def _results(config: TunnelConfig, workers: int, name: str) -> dict[str, Any]:
     result = run(config, workers)
     print(f"{name}: done", file=sys.stderr)
     return result.result()
@@ -51,7 +51,7 @@ def _run(config: TunnelConfig, workers: int, name: str) -> dict[str, Any]:
 
 def evaluation(trials: int, workers: int) -> dict[str, Any]:
     """The three controllers as they are, on fresh trials."""
-    return _run(
+    return _results(
         _config(trials, EVALUATION_SEED, ("open", "paper", "closed")), workers, "evaluation"
     )
 
@@ -61,9 +61,9 @@ def ablation(trials: int, workers: int) -> dict[str, Any]:
     out = {}
     for name, change in ABLATIONS.items():
         config = _config(trials, ABLATION_SEED, ("closed",), controller=change)
-        out[name] = _run(config, workers, name)["controllers"]["closed"]
+        out[name] = _results(config, workers, name)["controllers"]["closed"]
     config = _config(trials, ABLATION_SEED, ("paper", "closed"), **FILM_ONE_WAY)
-    one_way = _run(config, workers, "film")["controllers"]
+    one_way = _results(config, workers, "film")["controllers"]
     out["closed, film that sees one direction"] = one_way["closed"]
     out["paper, film that sees one direction"] = one_way["paper"]
     return out
@@ -76,7 +76,7 @@ def success_grid(trials: int, workers: int) -> dict[str, Any]:
         for width in WIDTHS_M:
             tunnel = {"turns_deg": (angle,), "free_width": width}
             config = _config(trials, MAP_SEED, ("open", "closed"), tunnel=tunnel)
-            found = _run(config, workers, f"{angle:g} deg, {width:g} m")["controllers"]
+            found = _results(config, workers, f"{angle:g} deg, {width:g} m")["controllers"]
             cells.append({"turn_deg": angle, "free_width_m": width, "controllers": found})
     return {"trials": trials, "cells": cells}
 

@@ -102,7 +102,7 @@ def trajectories(
 
     Args:
         paths: Courses by controller and trial; a missing one leaves its panel empty.
-        controllers: Controllers from top to bottom.
+        controllers: Names from top to bottom.
         rows: The table.
         trials: Trials from left to right.
     """
@@ -128,7 +128,7 @@ def trajectories(
                 panel.set_xlabel("x [m]")
         panels[i, 0].set_ylabel("y [m]")
         panels[i, 0].annotate(
-            controller,
+            style.short_name(controller),
             (0.0, 0.5),
             (-54.0, 0.0),
             xycoords="axes fraction",
@@ -219,29 +219,24 @@ def summary(
     """
     figure = style.canvas(10.5, 3.4)
     rate, inside, mean = figure.subplots(1, 3, width_ratios=(1, 1.5, 1))
-    names = list(controllers)
-    for i, (name, controller) in enumerate(controllers.items()):
-        valid = controller["trials"] - controller["invalid"]
+    names, colours = list(controllers), style.controller_colours(list(controllers))
+    for i, (name, found) in enumerate(controllers.items()):
+        valid = found["trials"] - found["invalid"]
         if not valid:
             continue
-        _interval(rate, i, controller["successes"] / valid, controller["wilson95"], name)
-        _interval(
-            mean,
-            i,
-            controller["restricted_mean_time_s"],
-            controller["restricted_mean_time_95"],
-            name,
-        )
+        colour, time = colours[name], found["restricted_mean_time_s"]
+        _interval(rate, i, found["successes"] / valid, found["wilson95"], colour)
+        _interval(mean, i, time, found["restricted_mean_time_95"], colour)
         exits = sorted(r.time_s for r in rows if r.controller == name and r.outcome == "success")
         left = 1.0 - np.arange(len(exits) + 1) / valid
         inside.step(
             [0.0, *exits, time_limit],
             [*left, left[-1]],
             where="post",
-            color=style.CONTROLLER_COLOURS.get(name, style.INK),
+            color=colour,
             linestyle=style.CONTROLLER_LINES.get(name, "solid"),
             linewidth=3.2 - 0.8 * i,
-            label=name,
+            label=style.short_name(name),
         )
     for panel in (rate, mean):
         panel.set_yticks(range(len(names)), [_label(name, controllers[name]) for name in names])
@@ -257,7 +252,7 @@ def summary(
         xlabel="restricted mean time [s]",
         title="Failures as the limit; bootstrap 95 %",
     )
-    mean.set_yticklabels(names)
+    mean.set_yticklabels([style.short_name(name) for name in names])
     inside.set(
         xlim=(0, time_limit),
         ylim=(-0.03, 1.03),
@@ -271,12 +266,11 @@ def summary(
     return figure
 
 
-def _label(name: str, controller: Mapping[str, Any]) -> str:
-    return f"{name}\nn = {controller['trials'] - controller['invalid']}"
+def _label(name: str, found: Mapping[str, Any]) -> str:
+    return f"{style.short_name(name)}\nn = {found['trials'] - found['invalid']}"
 
 
-def _interval(panel: Axes, at: int, value: float, ends: Sequence[float], name: str) -> None:
-    colour = style.CONTROLLER_COLOURS.get(name, style.INK)
+def _interval(panel: Axes, at: int, value: float, ends: Sequence[float], colour: str) -> None:
     panel.plot(
         list(ends), [at, at], color=colour, linewidth=2.4, solid_capstyle="butt", clip_on=False
     )

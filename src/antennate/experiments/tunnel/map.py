@@ -1,4 +1,4 @@
-"""Success over the shape of the tunnel: corner angle against free width, by controller."""
+"""Success over corner angle and free width of the tunnel: one panel for each controller."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
-from antennate.figures import INK, canvas, styled
+from antennate.figures import INK, canvas, short_name, styled
 
 
 @styled
@@ -18,8 +18,8 @@ def success_map(cells: Sequence[Mapping[str, Any]], controllers: Sequence[str]) 
     """Draw the map.
 
     Args:
-        cells: One a tunnel: `turn_deg`, `free_width_m`, and `controllers` with `trials`,
-            `successes` and `wilson95` per controller.
+        cells: One a tunnel: `turn_deg`, `free_width_m`, and per name in `controllers` the numbers
+            `trials`, `successes` and `wilson95`.
         controllers: Panels, left to right.
     """
     angles = sorted({cell["turn_deg"] for cell in cells})
@@ -44,7 +44,7 @@ def success_map(cells: Sequence[Mapping[str, Any]], controllers: Sequence[str]) 
                 color="white" if share[row, column] < 0.6 else INK,
             )
         panel.imshow(share, origin="lower", norm=scale.norm, cmap=scale.cmap, aspect="auto")
-        panel.set_title(controller)
+        panel.set_title(short_name(controller))
         panel.grid(visible=False)
         panel.set_xticks(range(len(widths)), [f"{w:.2f}" for w in widths])
         panel.set_yticks(range(len(angles)), [f"{a:.0f}" for a in angles])

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from pydantic import model_validator
+from pydantic import field_validator, model_validator
 
-from antennate.control.controllers import ARMS, Arm, Controller
 from antennate.control.loop import run_loop
+from antennate.control.registry import BUILT_IN, CONTROLLERS, make_controller
 from antennate.experiments.tunnel import measures
 from antennate.experiments.tunnel.monitor import TrialMonitor, TrialPath, TrialResult
 from antennate.params import ControlParams, number
@@ -39,8 +39,12 @@ class TunnelConfig(TrialConfig):
         ge=1,
         le=100000,
     )
-    controllers: tuple[Arm, ...] = number(
-        ARMS, "1", "assumed: all", "controllers to run", min_length=1
+    controllers: tuple[str, ...] = number(
+        tuple(BUILT_IN),
+        "1",
+        "assumed: all of ours",
+        "controllers to run: open, paper, closed, or MODULE:NAME or FILE.py:NAME of your own",
+        min_length=1,
     )
     time_limit: float = number(
         100.0,
@@ -51,6 +55,11 @@ class TunnelConfig(TrialConfig):
         le=3600,
     )
     control: ControlParams = ControlParams()
+
+    @field_validator("controllers")
+    @classmethod
+    def _names(cls, names: tuple[str, ...]) -> tuple[str, ...]:
+        return tuple(map(CONTROLLERS.check, names))
 
     @model_validator(mode="after")
     def _agree(self) -> TunnelConfig:
@@ -77,7 +86,7 @@ class TunnelOutcome:
     def result(self) -> dict[str, Any]:
         """The content of result.json."""
         config = self.config
-        by_controller = {
+        by_name = {
             name: [row for row in self.rows if row.controller == name]
             for name in config.controllers
         }
@@ -88,21 +97,21 @@ class TunnelOutcome:
             "time_limit_s": config.time_limit,
             "length_m": config.tunnel.length,
             "interrupted": self.interrupted,
-            "controllers": {n: measures.summary(rows) for n, rows in by_controller.items()},
-            "paired": measures.paired(by_controller),
+            "controllers": {n: measures.summary(rows) for n, rows in by_name.items()},
+            "paired": measures.paired(by_name),
         }
 
 
 def run_trials(
     config: TunnelConfig,
-    name: Arm,
+    controller: str,
     trials: Sequence[int],
     emit: Callable[[tuple[TrialResult, TrialPath]], None],
     batch: int = _BATCH,
 ) -> None:
-    """Run trials of one controller in lockstep, rows refilled as they end; emit each at its end."""
+    """Run trials of one controller in lockstep; rows are refilled and emitted as trials end."""
     batch = min(batch, len(trials))
-    controller = Controller(config.control, name, batch)
+    control = make_controller(controller, config.control, config.robot, batch)
     body = SimRobot(batch, config.robot.sensor, config.control.period, config.physics.timestep)
     scene = make_scene(config.scene, config.tunnel)
     waiting = list(trials)
@@ -115,10 +124,10 @@ def run_trials(
             trial = waiting.pop(0)
             start = draw_trial(config, scene, trial, config.control.gait, config.control.period)
             body.load(row, start.world, start.chance)
-            controller.reset(np.array([row]), start.phase)
+            control.reset(np.array([row]), start.phase)
             before = start.world.outlines()[1]
             monitors[row] = TrialMonitor(
-                config.seed, trial, name, start.scene, before, config.time_limit
+                config.seed, trial, controller, start.scene, before, config.time_limit
             )
 
     def go_on(frame: AntennaFrame, command: JointCommand) -> bool:
@@ -126,7 +135,7 @@ def run_trials(
             if monitor is None:
                 continue
             world, failure = body.world(row), body.failure(row)
-            outcome = monitor.watch(world, int(controller.maneuver[row]), failure is not None)
+            outcome = monitor.watch(world, int(control.maneuver[row]), failure is not None)
             if outcome is not None:
                 emit((monitor.result(world, outcome, str(failure or "")), monitor.path(world)))
                 fill(row)
@@ -134,10 +143,10 @@ def run_trials(
 
     for row in range(batch):
         fill(row)
-    run_loop(body, controller, config.control.period, go_on)
+    run_loop(body, control, config.control.period, go_on)
 
 
-def _run_task(task: tuple[TunnelConfig, Arm, list[int]], emit: Callable[[Any], None]) -> None:
+def _run_task(task: tuple[TunnelConfig, str, list[int]], emit: Callable[[Any], None]) -> None:
     run_trials(*task, emit)
 
 
@@ -165,7 +174,7 @@ def run(
         list(range(first, min(first + size, config.trials)))
         for first in range(0, config.trials, size)
     ]
-    tasks: list[tuple[TunnelConfig, Arm, list[int]]] = [
+    tasks: list[tuple[TunnelConfig, str, list[int]]] = [
         (config, name, chunk) for name in config.controllers for chunk in chunks
     ]
     found: list[tuple[TrialResult, TrialPath]] = []
