@@ -25,6 +25,7 @@ from antennate.params import BenchPhysicsParams, BenchVariationParams, Params
 from antennate.params.base import number
 from antennate.robots.antenna import AntennaSpec
 from antennate.sim.bench import Bench, compile_bench
+from antennate.studies.experiment import WithoutTrials
 from antennate.studies.pool import run_tasks
 from antennate.types import Floats
 
@@ -118,7 +119,7 @@ class CalibrateConfig(Params):
 
 
 @dataclass(frozen=True)
-class CalibrateOutcome:
+class CalibrateOutcome(WithoutTrials):
     """A calibration and its data.
 
     Attributes:
