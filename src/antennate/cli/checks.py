@@ -12,7 +12,7 @@ from rich.table import Table
 from rich.text import Text
 
 from antennate.cli.messages import one_line
-from antennate.hardware.doctor.rows import Row
+from antennate.hardware.doctor.check import Row
 
 _STYLES = {"ok": "green", "warn": "yellow", "bad": "bold red"}
 
