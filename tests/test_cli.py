@@ -15,18 +15,18 @@ import numpy as np
 import pytest
 
 import antennate
-from antennate.cli import main
-from antennate.cli.arguments import FromFile, parse_with, read_file
-from antennate.cli.folder import strict, to_csv
-from antennate.cli.messages import one_line
-from antennate.cli.toml import to_toml
+from antennate.cli import commands, main
+from antennate.cli.arguments import FromFile, parse_with
 from antennate.errors import ConfigError
 from antennate.experiments.gait.run import GaitStudyConfig
 from antennate.experiments.tunnel.run import TunnelConfig
-from antennate.experiments.twin import TwinConfig
+from antennate.messages import one_line
+from antennate.params.reading import read_file
 from antennate.sim.world import World
+from antennate.studies.formats import strict, to_csv, to_toml
+from antennate.twin.config import TwinConfig
 
-SMALL = ["tunnel", "--trials", "1", "--arms", "open", "--time-limit", "1", "--workers", "1"]
+SMALL = ["tunnel", "--trials", "1", "--controllers", "open", "--time-limit", "1", "--workers", "1"]
 QUICK = [*SMALL, "--no-figures"]
 
 
@@ -66,28 +66,44 @@ def test_version_and_help(capsys):
     assert capsys.readouterr().out == f"antennate {antennate.__version__}\n"
     assert main(["--help"]) == 0
     assert "tunnel" in capsys.readouterr().out
-    with pytest.raises(SystemExit) as end:
-        main(["tunnel", "--help"])
-    assert end.value.code == 0
 
 
-def test_help_shows_every_flag_with_unit_and_default(capsys):
-    with pytest.raises(SystemExit):
-        main(["tunnel", "--help"])
-    text = " ".join(capsys.readouterr().out.replace("│", " ").split())
-    assert (
-        "--tunnel.free-width FLOAT widest free width between the linings [m] (default: 0.4)" in text
-    )
-    flags = re.findall(r"[| ]--[a-z][a-z.-]* [A-Z{[]", text)
-    assert text.count("(default:") >= len(flags) > 80
-    for name in ("--control.gait.frequency", "--robot.antenna.length", "--trials", "--out"):
+def test_python_runs_the_package_as_the_command():
+    words = [sys.executable, "-m", "antennate", "--version"]
+    done = subprocess.run(words, capture_output=True, text=True, check=True, timeout=60)
+    assert done.stdout == f"antennate {antennate.__version__}\n"
+
+
+@pytest.mark.parametrize("command", sorted(commands()))
+def test_help_fits_two_screens_and_help_all_shows_every_flag(capsys, command):
+    assert main([command, "--help"]) == 0
+    short = capsys.readouterr().out.splitlines()
+    assert len(short) <= 2 * 24
+    assert max(map(len, short)) <= 80
+    assert main([command, "--help-all"]) == 0
+    whole = capsys.readouterr().out
+    assert max(map(len, whole.splitlines())) <= 80
+    flags = set(re.findall(r"^  (--[a-z0-9-]+)(?!\S)", "\n".join(short), re.MULTILINE))
+    assert "--config" in flags
+    assert flags <= set(re.findall(r"^  (--[a-z0-9-]+)(?!\S)", whole, re.MULTILINE))
+
+
+def test_help_shows_unit_default_range_and_choices(capsys):
+    assert main(["tunnel", "--help-all"]) == 0
+    text = " ".join(capsys.readouterr().out.split())
+    width = "--tunnel.free-width FLOAT widest free width between the linings [m]; above 0"
+    assert f"{width} (default: 0.4)" in text
+    assert "--tunnel.mirror {random,never,always}" in text
+    assert re.search(r"--trials INT .*?; 1 to 100000 \(default:", text)
+    assert text.count("(default:") > 80
+    for name in ("--control.gait.frequency", "--robot.antenna.length", "--seed", "--out"):
         assert f"{name} " in text
 
 
 def test_the_door_opens_without_heavy_imports():
     code = (
         "import sys, antennate.cli as c; c.main(['--help']); "
-        "heavy = {'mujoco', 'matplotlib', 'scipy', 'numpy', 'pydantic', 'rich', 'tyro'}; "
+        "heavy = {'mujoco', 'matplotlib', 'scipy', 'numpy', 'pydantic', 'rich'}; "
         "assert not heavy & set(sys.modules), heavy & set(sys.modules)"
     )
     door = child(code, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
@@ -101,13 +117,21 @@ def test_the_door_opens_without_heavy_imports():
         (["tunel"], ["antennate: error:", "did you mean tunnel?", "found tunel"]),
         (["tunnel", "--trails", "3"], ["did you mean --trials?", "found '--trails'"]),
         (["tunnel", "--tunnel.free_widht=1"], ["did you mean --tunnel.free-width?"]),
+        (["tunnel", "--free-width", "1"], ["did you mean --tunnel.free-width?"]),
+        (["tunnel", "--bogus"], ["expected a known flag, found '--bogus'"]),
+        (["tunnel", "--json", "yes"], ["expected flags only, found 'yes'"]),
+        (["tunnel", "--out", ""], ["--out: expected a path, found nothing"]),
+        (["tunnel", "--tunnel.mirror", "often"], ["expected one of random, never or always"]),
         (["tunnel", "stray"], ["expected flags only", "'stray'"]),
-        (["tunnel", "--trials", "many"], ["--trials: expected INT, found 'many'"]),
-        (["tunnel", "--trials"], ["--trials: expected 1 value"]),
+        (["tunnel", "--trials", "many"], ["--trials: expected a whole number, found many"]),
+        (["tunnel", "--trials"], ["--trials: expected 1 value, INT, found none"]),
         (["tunnel", "--trials", "0"], ["--trials: expected a number of at least 1, found 0"]),
-        (["tunnel", "--arms", "zigzag"], ["--arms: expected one of open, paper, closed"]),
-        (["tunnel", "--arms", "open", "open"], ["arms must differ"]),
-        (["tunnel", "--workers", "0"], ["--workers: expected at least 1, found 0"]),
+        (
+            ["tunnel", "--controllers", "zigzag"],
+            ["controllers: expected one of open, paper, closed, or MODULE"],
+        ),
+        (["tunnel", "--controllers", "open", "open"], ["controllers must differ"]),
+        (["tunnel", "--workers", "0"], ["--workers: expected a number of at least 1, found 0"]),
         (
             ["tunnel", "--tunnel.free-width", "-0.4"],
             ["antennate tunnel: error: --tunnel.free-width: expected a number above 0, found -0.4"],
@@ -118,7 +142,10 @@ def test_the_door_opens_without_heavy_imports():
         (["tunnel", "--control.rate", "333"], ["whole fraction of the physics rate"]),
         (["tunnel", "--config", "missing.toml"], ["found missing.toml: No such file"]),
         (["tunnel", "--config", "."], ["--config: expected a readable file"]),
-        (["gait", "--cycles", "x"], ["antennate gait: error: --cycles: expected INT"]),
+        (
+            ["gait", "--cycles", "x"],
+            ["antennate gait: error: --cycles: expected a whole number, found x"],
+        ),
         (["gait", "--tunnel.free-width", "1"], ["expected a known flag"]),
     ],
 )
@@ -150,7 +177,7 @@ def test_bad_words(capsys, tmp_path, argv, parts):
         ("tunnel.free_width = 1979-05-27", ["tunnel.free_width: expected a number"]),
         ("tunnel = 3", ["tunnel: expected a table, found 3"]),
         ("tunnel.segments = [1.0, 'x']", ["tunnel.segments[1]: expected a number, found 'x'"]),
-        ("arms = []", ["arms: expected at least 1 value"]),
+        ("controllers = []", ["controllers: expected at least 1 value"]),
         ("robot.antenna.active_coils = [3, 6]", ["active_coils[2]: expected a value"]),
         ('"a\\u001b[31m\\nb" = 1', ["expected a known key"]),
         ("a = " + "[" * 200_000, ["nested too deeply"]),
@@ -172,7 +199,7 @@ def test_bad_files(capsys, tmp_path, text, parts):
 def test_a_list_may_be_given_at_once_or_piece_by_piece():
     words = ["--fault", "esp32=reset", "bus=loss:0.1@2s", "--touch=left@1s", "--trial", "3"]
     words += ["--fault=servo:7=silent", "--touch", "right@2s"]
-    config, _ = parse_with("twin", "", TwinConfig, words, FromFile())
+    config, _ = parse_with("twin", "", TwinConfig, words, FromFile)
     assert config.fault == ("esp32=reset", "bus=loss:0.1@2s", "servo:7=silent")
     assert config.touch == ("left@1s", "right@2s")
     assert config.trial == 3
@@ -186,14 +213,12 @@ def test_each_of_two_faults_is_looked_at(capsys, bad):
     assert "found loose" in refusal(capsys, "twin", "--duration", "0.01", *words)
 
 
-def test_robot_is_another_name_of_config(capsys, tmp_path):
-    (tmp_path / "robot.toml").write_text("controller = 3")
-    for name in ("--robot", "--config"):
-        line = refusal(capsys, "drive", name, "robot.toml")
-        assert "robot.toml: controller: expected" in line
-    words = ["--robot", "robot.toml", "--config", "robot.toml"]
-    for command in ("drive", "doctor", "record"):
-        assert "its other name; found both" in refusal(capsys, command, *words)
+def test_negative_numbers_and_none_are_values():
+    words = ["--tunnel.turns-deg", "90", "-60", "-1e1", "--tunnel.segments=1", "1", "1", "1"]
+    config, _ = parse_with("tunnel", "", TunnelConfig, words, FromFile)
+    assert config.tunnel.turns_deg == (90.0, -60.0, -10.0)
+    config, _ = parse_with("twin", "", TwinConfig, ["--duration", "none"], FromFile)
+    assert config.duration is None
 
 
 def test_bad_folders(capsys, tmp_path):
@@ -232,7 +257,7 @@ def test_a_run_leaves_a_folder_that_explains_itself(capsys, tmp_path):
     assert main([*SMALL, "--seed", "5", "--out", "deep/run"]) == 0
     out, err = capsys.readouterr()
     assert err.endswith("written to deep/run\n")
-    assert "1 trials an arm, seed 5" in out
+    assert "1 trials a controller, seed 5" in out
     assert "A failure counts as the time limit, 1 s" in out
     assert max(map(len, out.splitlines())) <= 100
     run = tmp_path / "deep" / "run"
@@ -254,7 +279,7 @@ def test_a_run_leaves_a_folder_that_explains_itself(capsys, tmp_path):
     assert versions["antennate"] == antennate.__version__
     assert versions["numpy"] == np.__version__
     [row] = table(run)
-    assert (row["arm"], row["trial"], row["status"], row["time_s"]) == (
+    assert (row["controller"], row["trial"], row["outcome"], row["time_s"]) == (
         "open",
         "0",
         "timeout",
@@ -273,13 +298,13 @@ def test_json_is_strict_and_keeps_its_contract(capsys, tmp_path):
     def refuse(name):
         raise AssertionError(f"{name} is no JSON")
 
-    assert main([*QUICK, "--arms", "open", "closed", "--json", "--out", "run"]) == 0
+    assert main([*QUICK, "--controllers", "open", "closed", "--json", "--out", "run"]) == 0
     text = capsys.readouterr().out
     assert text == (tmp_path / "run" / "result.json").read_text()
     result = json.loads(text, parse_constant=refuse)
-    assert (result["schema"], result["command"], result["seed"]) == (1, "tunnel", 0)
+    assert (result["schema"], result["command"], result["seed"]) == (2, "tunnel", 0)
     assert result["interrupted"] is False
-    assert list(result["arms"]) == ["open", "closed"]
+    assert list(result["controllers"]) == ["open", "closed"]
     assert {
         "trials",
         "successes",
@@ -297,8 +322,8 @@ def test_json_is_strict_and_keeps_its_contract(capsys, tmp_path):
         "share",
         "force_mean_n",
         "force_max_n",
-    } <= result["arms"]["open"].keys()
-    assert result["arms"]["open"]["speed_m_s"] is None  # nobody gets out within a second
+    } <= result["controllers"]["open"].keys()
+    assert result["controllers"]["open"]["speed_m_s"] is None  # nobody gets out within a second
     assert list(result["paired"]) == ["open-closed"]
     assert {"trials", "only_first", "only_second", "mcnemar_p", "wilcoxon_p"} <= result["paired"][
         "open-closed"
@@ -343,7 +368,16 @@ def test_an_unfinished_run_is_not_overwritten(capsys, tmp_path):
 
 def test_one_and_two_workers_write_the_same_bytes(capsys, tmp_path):
     for workers in ("1", "2"):
-        words = ["--trials", "2", "--time-limit", "2", "--arms", "open", "closed", "--no-figures"]
+        words = [
+            "--trials",
+            "2",
+            "--time-limit",
+            "2",
+            "--controllers",
+            "open",
+            "closed",
+            "--no-figures",
+        ]
         assert main(["tunnel", *words, "--workers", workers, "--out", workers]) == 0
     for name in ("trials.csv", "result.json", "config.toml"):
         assert (tmp_path / "1" / name).read_bytes() == (tmp_path / "2" / name).read_bytes()
@@ -360,18 +394,18 @@ def test_an_invalid_trial_is_a_row_and_no_success(capsys, tmp_path, monkeypatch)
     monkeypatch.setattr(World, "step", blow_up)
     assert main([*SMALL, "--trials", "2", "--out", "run"]) == 0
     assert "invalid" in capsys.readouterr().out
-    arm = json.loads((tmp_path / "run" / "result.json").read_text())["arms"]["open"]
-    assert (arm["trials"], arm["invalid"], arm["successes"]) == (2, 2, 0)
-    assert arm["restricted_mean_time_s"] is None
+    open_ = json.loads((tmp_path / "run" / "result.json").read_text())["controllers"]["open"]
+    assert (open_["trials"], open_["invalid"], open_["successes"]) == (2, 2, 0)
+    assert open_["restricted_mean_time_s"] is None
     rows = table(tmp_path / "run")
-    assert [row["status"] for row in rows] == ["invalid", "invalid"]
+    assert [row["outcome"] for row in rows] == ["invalid", "invalid"]
     assert all("physics step" in row["reason"] for row in rows)
 
 
 def test_interrupted_in_the_middle_keeps_the_finished_trials(capsys, tmp_path, monkeypatch):
-    from antennate.cli.folder import RunFolder
+    from antennate.studies.run_directory import RunDirectory
 
-    kept = RunFolder.append
+    kept = RunDirectory.append
     seen = []
 
     def append(self, row):
@@ -380,10 +414,10 @@ def test_interrupted_in_the_middle_keeps_the_finished_trials(capsys, tmp_path, m
         if len(seen) == 2:
             raise KeyboardInterrupt
 
-    monkeypatch.setattr(RunFolder, "append", append)
+    monkeypatch.setattr(RunDirectory, "append", append)
     assert main([*SMALL, "--trials", "30", "--out", "run"]) == 130
     out, err = capsys.readouterr()
-    assert "interrupted: kept 2 of 30 trials" in err
+    assert "interrupted: kept 2 trials" in err
     assert "trials" in out
     rows = table(tmp_path / "run")
     assert sorted(int(row["trial"]) for row in rows) == sorted(row["trial"] for row in seen)
@@ -416,7 +450,7 @@ def test_a_signal_ends_the_run_and_keeps_its_trials(tmp_path, number, workers):
     result = json.loads((tmp_path / "run" / "result.json").read_text())
     assert result["interrupted"] is True
     rows = table(tmp_path / "run")
-    assert len(rows) == sum(arm["trials"] for arm in result["arms"].values()) >= 2
+    assert len(rows) == sum(open_["trials"] for open_ in result["controllers"].values()) >= 2
 
 
 def test_gait_runs_and_writes_its_result(capsys, tmp_path):

@@ -4,22 +4,23 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import tyro
+from pydantic.dataclasses import dataclass
 
 from antennate.cli import BAD_INPUT, OK
 from antennate.cli.arguments import FromFile, parse_with
-from antennate.cli.folder import RunFolder, to_csv, to_json
-from antennate.cli.messages import one_line
+from antennate.cli.options import option
 from antennate.cli.tables import Cell, number, show
 from antennate.errors import ConfigError
+from antennate.messages import one_line
+from antennate.studies.formats import to_csv, to_json
+from antennate.studies.run_directory import RunDirectory
 from antennate.telemetry.reader import Damage, LogReader
-from antennate.telemetry.replay import ReplayConfig, Replayed, recorded_decider, replay
+from antennate.telemetry.replay import ReplayConfig, Replayed, recorded_controller, replay
 from antennate.telemetry.ticks import FIELDS, Tick
 from antennate.types import Maneuver
 
@@ -37,20 +38,14 @@ _MOST_DRAWN = 5000
 
 @dataclass(frozen=True)
 class Options(FromFile):
-    """Which log, and what to leave behind.
+    """Which log, and what to leave behind."""
 
-    Attributes:
-        log: log of a drive
-        config: TOML file with the parameters below as keys; flags override it
-        out: folder for result.json, ticks.csv and a figure; none are written if not given
-        overwrite: replace the results that the folder holds
-        json: print the result as JSON and nothing else
-    """
-
-    log: tyro.conf.Positional[Annotated[str, tyro.conf.arg(metavar="LOG")]] = ""
-    out: Annotated[Path | None, tyro.conf.arg(metavar="FOLDER")] = None
-    overwrite: bool = False
-    json: bool = False
+    log: str = option("", "log of a drive", "LOG", positional=True)
+    out: Path | None = option(
+        None, "folder for result.json, ticks.csv and a figure; none if not given", "FOLDER"
+    )
+    overwrite: bool = option(False, "replace the results that the folder holds")
+    json: bool = option(False, "print the result as JSON and nothing else")
 
 
 def command(argv: Sequence[str]) -> int:
@@ -59,17 +54,17 @@ def command(argv: Sequence[str]) -> int:
     Raises:
         AntennateError: The log, the controller or the folder cannot be used.
     """
-    config, options = parse_with("replay", DESCRIPTION, ReplayConfig, argv, Options())
+    config, options = parse_with("replay", DESCRIPTION, ReplayConfig, argv, Options)
     if not options.log:
         raise ConfigError("expected the log of a drive, found none")
     path = Path(options.log)
     with LogReader(path) as log:
-        decider = recorded_decider(log.header, config.controller)
-        found = replay(log, decider, log.header.params.period)
+        controller = recorded_controller(log.header, config.controller)
+        found = replay(log, controller, log.header.params.period)
     result = _result(log, found, config.controller)
     if options.out is not None:
-        with RunFolder.open("replay", options.out, options.overwrite) as folder:
-            folder.describe("replay", argv, config)
+        with RunDirectory.create("replay", options.out, options.overwrite) as folder:
+            folder.describe(config, ["antennate", "replay", *argv])
             _keep(folder, path, found)
             folder.finish(result, ())
             sys.stderr.write(f"written to {folder.path}\n")
@@ -175,7 +170,7 @@ def _name(maneuver: int) -> str:
     return Maneuver(maneuver).name if maneuver in set(Maneuver) else str(maneuver)
 
 
-def _keep(folder: RunFolder, path: Path, found: Replayed) -> None:
+def _keep(folder: RunDirectory, path: Path, found: Replayed) -> None:
     """Write the table and the figure, in a second pass over the log."""
     from antennate import figures as style
     from antennate.telemetry.figure import replay as draw
@@ -210,7 +205,7 @@ def _course(ticks: Iterable[Tick], replayed: Sequence[int]) -> Course:
     return Course(
         t=np.array([tick.now - start for tick, _ in kept]),
         reading=np.array([tick.reading for tick, _ in kept]),
-        b=np.array([tick.b for tick, _ in kept]),
+        level=np.array([tick.level for tick, _ in kept]),
         contact=np.array([tick.contact for tick, _ in kept]),
         recorded=np.array([tick.maneuver for tick, _ in kept]),
         replayed=np.array([maneuver for _, maneuver in kept]),
