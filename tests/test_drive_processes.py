@@ -88,4 +88,6 @@ def test_D9_a_reset_or_a_broken_wire_ends_no_drive(driven: Drive) -> None:
     assert result["lost_samples"] < 100
     assert (result["unlogged"], result["log_complete"]) == (0, True)
     assert count(driven.folder / result["logs"][0]) == result["pace"]["ticks"]
+    assert "HOLD OPEN: a channel floats: its wire is open" in result["why"]
+    assert " HOLD (OPEN: a channel floats: its wire is open" in driven.lines[-2]
     assert result["poses_sent"] > 150  # it walked on after the reset
