@@ -76,7 +76,7 @@ def driven(tmp_path_factory: pytest.TempPathFactory) -> Drive:
     return Drive(run.returncode, run.stderr.splitlines(), folder)
 
 
-def test_D9_a_reset_or_a_broken_wire_ends_no_drive(driven: Drive) -> None:
+def test_E1_a_reset_or_a_broken_wire_ends_no_drive(driven: Drive) -> None:
     """It goes to its end, torque off, with its result and every tick in its log."""
     result = driven.result
     assert driven.code == 0, driven.lines[-5:]

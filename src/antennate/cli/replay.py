@@ -19,7 +19,7 @@ from antennate.cli.tables import Cell, number, show
 from antennate.errors import ConfigError
 from antennate.messages import one_line
 from antennate.telemetry.reader import Damage, LogReader
-from antennate.telemetry.replay import ReplayConfig, Replayed, recorded_decider, replay
+from antennate.telemetry.replay import ReplayConfig, Replayed, recorded_controller, replay
 from antennate.telemetry.ticks import FIELDS, Tick
 from antennate.types import Maneuver
 
@@ -58,8 +58,8 @@ def command(argv: Sequence[str]) -> int:
         raise ConfigError("expected the log of a drive, found none")
     path = Path(options.log)
     with LogReader(path) as log:
-        decider = recorded_decider(log.header, config.controller)
-        found = replay(log, decider, log.header.params.period)
+        controller = recorded_controller(log.header, config.controller)
+        found = replay(log, controller, log.header.params.period)
     result = _result(log, found, config.controller)
     if options.out is not None:
         with RunFolder.open("replay", options.out, options.overwrite) as folder:
@@ -204,7 +204,7 @@ def _course(ticks: Iterable[Tick], replayed: Sequence[int]) -> Course:
     return Course(
         t=np.array([tick.now - start for tick, _ in kept]),
         reading=np.array([tick.reading for tick, _ in kept]),
-        b=np.array([tick.b for tick, _ in kept]),
+        level=np.array([tick.level for tick, _ in kept]),
         contact=np.array([tick.contact for tick, _ in kept]),
         recorded=np.array([tick.maneuver for tick, _ in kept]),
         replayed=np.array([maneuver for _, maneuver in kept]),

@@ -1,4 +1,4 @@
-"""`antennate tunnel`: run the arms, keep every trial, say what came out."""
+"""`antennate tunnel`: run the controllers, keep every trial, say what came out."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from antennate.experiments.tunnel.monitor import TrialPath, TrialResult
 from antennate.sim.trial import check_start
 
 DESCRIPTION = """\
-Walk robots through a corridor of loose cylinders. The arms differ in one decision: `open` walks
-forward whatever it feels, `paper` follows the published table, `closed` escapes when its readings
-repeat. All arms meet the same tunnels, starts and disturbances. A trial succeeds when the head
-passes the exit."""
+Walk robots through a corridor of loose cylinders. Our controllers differ in one decision: `open`
+walks forward whatever it feels, `paper` follows the published table, `closed` escapes when its
+readings repeat. All controllers meet the same tunnels, starts and disturbances. A trial succeeds
+when the head passes the exit."""
 SHOWN_TRIALS = 5
 """Trials drawn in the figure of trajectories."""
 
@@ -49,14 +49,14 @@ def command(argv: Sequence[str]) -> int:
         if not options.no_figures:
             _draw(outcome, folder)
         if outcome.interrupted:
-            kept = f"{len(outcome.rows)} of {config.trials * len(config.arms)} trials"
+            kept = f"{len(outcome.rows)} of {config.trials * len(config.controllers)} trials"
             sys.stderr.write(f"antennate tunnel: interrupted: kept {kept}, all that had ended\n")
         sys.stderr.write(f"written to {folder.path}\n")
     return INTERRUPTED if outcome.interrupted else OK
 
 
 def _run(config: tunnel.TunnelConfig, options: Options, folder: RunFolder) -> tunnel.TunnelOutcome:
-    total = config.trials * len(config.arms)
+    total = config.trials * len(config.controllers)
     done = itertools.count(1)
     with progress("trials") as step, terminate_as_interrupt():
 
@@ -74,8 +74,8 @@ def _draw(outcome: tunnel.TunnelOutcome, folder: RunFolder) -> None:
     config = outcome.config
     trials = range(min(SHOWN_TRIALS, config.trials))
     figures = {
-        "trajectories": trajectories(outcome.paths, config.arms, outcome.rows, trials),
-        "summary": summary(outcome.result()["arms"], outcome.rows, config.time_limit),
+        "trajectories": trajectories(outcome.paths, config.controllers, outcome.rows, trials),
+        "summary": summary(outcome.result()["controllers"], outcome.rows, config.time_limit),
     }
     for name, figure in figures.items():
         for suffix, data in style.render(figure).items():
@@ -83,15 +83,15 @@ def _draw(outcome: tunnel.TunnelOutcome, folder: RunFolder) -> None:
 
 
 def show_result(result: Mapping[str, Any]) -> None:
-    """Print the arms one by one and two by two."""
-    arms, limit = result["arms"], result["time_limit_s"]
-    counts = sorted({arm["trials"] for arm in arms.values()})
+    """Print the controllers one by one and two by two."""
+    controllers, limit = result["controllers"], result["time_limit_s"]
+    counts = sorted({arm["trials"] for arm in controllers.values()})
     many = " to ".join(str(n) for n in dict.fromkeys([counts[0], counts[-1]]))
     show(
-        "Arms",
-        arms,
+        "Controllers",
+        controllers,
         _ARM_ROWS,
-        f"{many} trials an arm, seed {result['seed']}. A failure counts as the time limit, "
+        f"{many} trials a controller, seed {result['seed']}. A failure counts as the time limit, "
         f"{limit:g} s; invalid trials\nare left out of all rows below theirs. Intervals of means "
         "are bootstrapped.\n",
     )

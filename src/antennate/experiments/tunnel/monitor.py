@@ -41,7 +41,7 @@ class TrialResult:
         reason: Why a trial is invalid, with the physics step; empty otherwise.
     """
 
-    arm: str
+    controller: str
     trial: int
     status: Status
     time_s: float
@@ -95,7 +95,7 @@ class TrialMonitor:
         time_limit: Time after which it has failed [s].
     """
 
-    arm: str
+    controller: str
     trial: int
     scene: SceneInstance
     before: list[Floats]
@@ -147,7 +147,7 @@ class TrialMonitor:
         if not np.isfinite(progress):
             progress = self._best
         return TrialResult(
-            arm=self.arm,
+            controller=self.controller,
             trial=self.trial,
             status=status,
             time_s=round(world.t, 6) if status == "success" else self.time_limit,

@@ -1,4 +1,4 @@
-"""The tunnel: does touch help? All arms meet the same tunnels, starts and disturbances."""
+"""The tunnel: does touch help? All controllers meet the same tunnels, starts and disturbances."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from itertools import combinations
 from typing import Any
 
 import numpy as np
-from pydantic import model_validator
+from pydantic import field_validator, model_validator
 
-from antennate.control.controllers import ARMS, Arm, Controller
 from antennate.control.loop import run_loop
+from antennate.control.registry import BUILT_IN, CONTROLLERS, make_controller
 from antennate.experiments.tunnel.monitor import TrialMonitor, TrialPath, TrialResult
 from antennate.params import ControlParams, number
 from antennate.sim.scenes.registry import make_scene
@@ -22,7 +22,7 @@ from antennate.studies import statistics
 from antennate.studies.pool import run_tasks
 from antennate.types import AntennaFrame, JointCommand
 
-SCHEMA = 1
+SCHEMA = 2
 _BATCH = 6
 """Trials of one process stepped in lockstep: one NumPy call serves them all."""
 _TASK = 12
@@ -33,9 +33,15 @@ class TunnelConfig(TrialConfig):
     """Everything that decides the outcome of `antennate tunnel`."""
 
     trials: int = number(
-        10, "1", "paper: ten trials an arm", "trials of every arm", ge=1, le=100000
+        10, "1", "paper: ten trials each", "trials of every controller", ge=1, le=100000
     )
-    arms: tuple[Arm, ...] = number(ARMS, "1", "assumed: all", "arms to run", min_length=1)
+    controllers: tuple[str, ...] = number(
+        tuple(BUILT_IN),
+        "1",
+        "assumed: all of ours",
+        "controllers to run: open, paper, closed, or MODULE:NAME or FILE.py:NAME of your own",
+        min_length=1,
+    )
     time_limit: float = number(
         100.0,
         "s",
@@ -46,10 +52,15 @@ class TunnelConfig(TrialConfig):
     )
     control: ControlParams = ControlParams()
 
+    @field_validator("controllers")
+    @classmethod
+    def _names(cls, names: tuple[str, ...]) -> tuple[str, ...]:
+        return tuple(map(CONTROLLERS.check, names))
+
     @model_validator(mode="after")
     def _agree(self) -> TunnelConfig:
-        if len(set(self.arms)) < len(self.arms):
-            raise ValueError(f"arms must differ, got {', '.join(self.arms)}")
+        if len(set(self.controllers)) < len(self.controllers):
+            raise ValueError(f"controllers must differ, got {', '.join(self.controllers)}")
         steps = self.control.period / self.physics.timestep
         if abs(steps - round(steps)) > 1e-6:
             raise ValueError(
@@ -61,7 +72,7 @@ class TunnelConfig(TrialConfig):
 
 @dataclass(frozen=True, slots=True)
 class TunnelOutcome:
-    """All rows in the order of arms and trials, what figures need, and the summary per arm."""
+    """All rows in the order of controllers and trials, what figures need, and the summaries."""
 
     config: TunnelConfig
     rows: list[TrialResult]
@@ -71,8 +82,9 @@ class TunnelOutcome:
     def result(self) -> dict[str, Any]:
         """The content of result.json."""
         config = self.config
-        by_arm: dict[Arm, list[TrialResult]] = {
-            a: [r for r in self.rows if r.arm == a] for a in config.arms
+        by_name = {
+            name: [row for row in self.rows if row.controller == name]
+            for name in config.controllers
         }
         return {
             "schema": SCHEMA,
@@ -81,21 +93,21 @@ class TunnelOutcome:
             "time_limit_s": config.time_limit,
             "length_m": config.tunnel.length,
             "interrupted": self.interrupted,
-            "arms": {a: summarise(rows, config.time_limit) for a, rows in by_arm.items()},
-            "paired": _paired(by_arm),
+            "controllers": {n: summarise(rows, config.time_limit) for n, rows in by_name.items()},
+            "paired": _paired(by_name),
         }
 
 
 def run_trials(
     config: TunnelConfig,
-    arm: Arm,
+    controller: str,
     trials: Sequence[int],
     emit: Callable[[tuple[TrialResult, TrialPath]], None],
     batch: int = _BATCH,
 ) -> None:
-    """Run trials of one arm in lockstep, rows refilled as trials end; emit each as it ends."""
+    """Run trials of one controller in lockstep; rows are refilled and emitted as trials end."""
     batch = min(batch, len(trials))
-    controller = Controller(config.control, arm, batch)
+    control = make_controller(controller, config.control, config.robot, batch)
     body = SimRobot(batch, config.robot.sensor, config.control.period, config.physics.timestep)
     scene = make_scene(config.scene, config.tunnel)
     waiting = list(trials)
@@ -108,16 +120,16 @@ def run_trials(
             trial = waiting.pop(0)
             start = draw_trial(config, scene, trial, config.control.gait, config.control.period)
             body.load(row, start.world, start.chance)
-            controller.reset(np.array([row]), start.phase)
+            control.reset(np.array([row]), start.phase)
             before = start.world.outlines()[1]
-            monitors[row] = TrialMonitor(arm, trial, start.scene, before, config.time_limit)
+            monitors[row] = TrialMonitor(controller, trial, start.scene, before, config.time_limit)
 
     def go_on(frame: AntennaFrame, command: JointCommand) -> bool:
         for row, monitor in enumerate(monitors):
             if monitor is None:
                 continue
             world, failure = body.world(row), body.failure(row)
-            status = monitor.watch(world, int(controller.maneuver[row]), failure is not None)
+            status = monitor.watch(world, int(control.maneuver[row]), failure is not None)
             if status is not None:
                 emit((monitor.result(world, status, str(failure or "")), monitor.path(world)))
                 fill(row)
@@ -125,10 +137,10 @@ def run_trials(
 
     for row in range(batch):
         fill(row)
-    run_loop(body, controller, config.control.period, go_on)
+    run_loop(body, control, config.control.period, go_on)
 
 
-def _run_task(task: tuple[TunnelConfig, Arm, list[int]], emit: Callable[[Any], None]) -> None:
+def _run_task(task: tuple[TunnelConfig, str, list[int]], emit: Callable[[Any], None]) -> None:
     run_trials(*task, emit)
 
 
@@ -137,7 +149,7 @@ def run(
     workers: int = 1,
     on_trial: Callable[[TrialResult, TrialPath], None] = lambda row, path: None,
 ) -> TunnelOutcome:
-    """Run all trials of all arms.
+    """Run all trials of all controllers.
 
     Args:
         config: What to run.
@@ -148,13 +160,13 @@ def run(
         SceneError: A scene cannot be built as described.
         WorkerError: A worker process died.
     """
-    size = max(1, min(_TASK, math.ceil(config.trials * len(config.arms) / (3 * workers))))
+    size = max(1, min(_TASK, math.ceil(config.trials * len(config.controllers) / (3 * workers))))
     chunks = [
         list(range(first, min(first + size, config.trials)))
         for first in range(0, config.trials, size)
     ]
-    tasks: list[tuple[TunnelConfig, Arm, list[int]]] = [
-        (config, arm, chunk) for arm in config.arms for chunk in chunks
+    tasks: list[tuple[TunnelConfig, str, list[int]]] = [
+        (config, name, chunk) for name in config.controllers for chunk in chunks
     ]
     found: list[tuple[TrialResult, TrialPath]] = []
 
@@ -167,17 +179,17 @@ def run(
         run_tasks(_run_task, tasks, workers, take)
     except KeyboardInterrupt:
         interrupted = True
-    found.sort(key=lambda item: (config.arms.index(item[0].arm), item[0].trial))
+    found.sort(key=lambda item: (config.controllers.index(item[0].controller), item[0].trial))
     return TunnelOutcome(
         config=config,
         rows=[row for row, _ in found],
-        paths={(row.arm, row.trial): path for row, path in found},
+        paths={(row.controller, row.trial): path for row, path in found},
         interrupted=interrupted,
     )
 
 
 def summarise(rows: list[TrialResult], time_limit: float) -> dict[str, Any]:
-    """One arm in numbers; invalid trials are counted and left out of every other figure."""
+    """One controller in numbers; invalid trials are counted and left out of every other figure."""
     valid = [r for r in rows if r.status != "invalid"]
     won = [r for r in valid if r.status == "success"]
     times = np.array([r.time_s for r in valid])
@@ -212,12 +224,12 @@ def _mean(values: list[float]) -> float | None:
     return float(np.mean(values)) if values else None
 
 
-def _paired(by_arm: dict[Arm, list[TrialResult]]) -> dict[str, Any]:
-    """Every two arms on the trials that are valid in both."""
+def _paired(by_name: dict[str, list[TrialResult]]) -> dict[str, Any]:
+    """Every two controllers on the trials that are valid in both."""
     tests = {}
-    for first, second in combinations(by_arm, 2):
-        ours = {r.trial: r for r in by_arm[first] if r.status != "invalid"}
-        theirs = {r.trial: r for r in by_arm[second] if r.status != "invalid"}
+    for first, second in combinations(by_name, 2):
+        ours = {r.trial: r for r in by_name[first] if r.status != "invalid"}
+        theirs = {r.trial: r for r in by_name[second] if r.status != "invalid"}
         both = sorted(ours.keys() & theirs.keys())
         if both:
             test = statistics.compare(
