@@ -20,7 +20,7 @@ _PLACES = {
 }
 """Which module holds which public names; `__init__.pyi` says the same to type checkers."""
 
-__all__ = sorted(name for names in _PLACES.values() for name in names)
+__all__ = sorted(name for names in _PLACES.values() for name in names)  # pyright: ignore[reportUnsupportedDunderAll]
 
 
 def __getattr__(name: str) -> Any:
