@@ -1,6 +1,6 @@
 """What a trial costs beside its physics, how fast it runs, and how the cost grows with cylinders.
 
-- `trial_over_bare_engine`: CPU time of whole tunnel trials (sensing, control, recording, judging),
+- `trial_over_bare_engine`: CPU time of whole tunnel trials (sensing, control, recording),
   stepped six at a time as the program does, over CPU time of the bare engine that replays their
   commands, one trial after the other, on the same models from the same starts. Drawing and
   compiling a tunnel is in neither. The replay must end on the same bits. The table shows trials
@@ -32,9 +32,11 @@ from antennate.control.loop import run_loop
 from antennate.experiments.tunnel import run as experiment
 from antennate.experiments.tunnel.run import TunnelConfig
 from antennate.params import TunnelParams
-from antennate.sim import arena, geometry
+from antennate.sim.scenes import geometry
+from antennate.sim.scenes.tunnel import Tunnel, TunnelScene
 from antennate.sim.sim_robot import SimRobot
-from antennate.sim.world import World, compile_world
+from antennate.sim.trial import Trial, draw_trial, make_world
+from antennate.sim.world import World
 from antennate.types import AntennaFrame, Floats, Ints, JointCommand, Maneuver
 
 ARM: Arm = "closed"
@@ -60,14 +62,15 @@ def seconds_of(action: Callable[[], Any]) -> float:
     return time.process_time() - before
 
 
-def prepare(config: TunnelConfig, trials: int) -> list[Any]:
+def prepare(config: TunnelConfig, trials: int) -> list[Trial]:
     """The starts of all trials, fresh."""
-    return [experiment.prepare(config, trial) for trial in range(trials)]
+    scene, control = TunnelScene(config.tunnel), config.control
+    return [draw_trial(config, scene, i, control.gait, control.period) for i in range(trials)]
 
 
-def run_whole(config: TunnelConfig, starts: list[Any], batch: int) -> None:
+def run_whole(config: TunnelConfig, starts: list[Trial], batch: int) -> None:
     """Run prepared trials as `antennate tunnel` does."""
-    with mock.patch.object(experiment, "prepare", lambda _, trial: starts[trial]):
+    with mock.patch.object(experiment, "draw_trial", lambda _, __, trial, *___: starts[trial]):
         experiment.run_trials(config, ARM, range(len(starts)), lambda _: None, batch)
 
 
@@ -164,24 +167,23 @@ class Pacing:
         return self._gait.step(np.array([int(Maneuver.REVERSE if back else Maneuver.FORWARD)]))
 
 
-def long_tunnel(config: TunnelConfig) -> tuple[arena.Tunnel, Ints]:
+def long_tunnel(config: TunnelConfig) -> tuple[Tunnel, Ints]:
     """A tunnel with cylinders enough, and their order from the start."""
     segments = (1.0,) * 10
     turns = (90.0, -90.0) * 4 + (90.0,)
     params = TunnelParams(segments=segments, turns_deg=turns, mirror="never", strewn=20)
-    drawn = arena.draw_tunnel(params, config.robot, np.random.default_rng(0))
+    drawn = TunnelScene(params).draw(config.robot, np.random.default_rng(0))
     along = [geometry.progress(drawn.centre, where) for where in drawn.cylinders]
     return drawn, np.argsort(along)
 
 
-def seconds_with(config: TunnelConfig, drawn: arena.Tunnel, seconds: float) -> float:
+def seconds_with(config: TunnelConfig, drawn: Tunnel, seconds: float) -> float:
     """CPU time of pacing for some simulated seconds in this tunnel."""
     robot, period = config.robot, config.control.period
-    sensed = robot.sensor.covered_hinges(robot.antenna)
-    world = World(compile_world(config.physics, robot, drawn), sensed)
+    world = make_world(config.physics, robot, drawn)
     world.place(0.0, 0.0, 0.0, np.zeros(5), np.zeros((6, 2)))
     body = SimRobot(1, robot.sensor, period, config.physics.timestep)
-    chance = experiment.prepare(config, 0).chance
+    chance = prepare(config, 1)[0].chance
     body.load(0, world, chance)
     control = Pacing(config)
 

@@ -10,7 +10,7 @@ import tempfile
 from pathlib import Path
 
 from antennate.cli import main as antennate
-from antennate.experiments.twin import TwinConfig, rig
+from antennate.experiments.twin import rig
 from antennate.hardware.driving.config import DriveConfig
 from antennate.hardware.driving.drive import drive
 from antennate.hardware.driving.session import Session
@@ -18,6 +18,7 @@ from antennate.params import TouchCheckParams
 from antennate.telemetry.header import Header
 from antennate.telemetry.ticks import Tick
 from antennate.telemetry.writer import LogWriter
+from antennate.twin.config import TwinConfig
 
 PICTURE = Path(__file__).parent / "images" / "replay.png"
 CONFIG = DriveConfig(dry_run=6.0, duration=18.0)

@@ -5,11 +5,11 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Iterator
 
-from antennate.experiments.twin import TwinConfig, build
 from antennate.hardware.doctor.checkup import Checkup, DoctorConfig, examine
 from antennate.hardware.doctor.fix import apply, plan
 from antennate.hardware.doctor.rows import Row
 from antennate.hardware.ports.port import Port
+from antennate.twin.config import TwinConfig, build
 from antennate.twin.faults import Faults, read
 from antennate.twin.lockstep import BoardPort, LockstepClock
 from antennate.twin.robot import TwinRobot

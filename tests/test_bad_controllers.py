@@ -13,7 +13,7 @@ import pytest
 from test_bad_poses import Robot
 
 from antennate.errors import ConfigError
-from antennate.experiments.twin import TwinConfig, rig
+from antennate.experiments.twin import rig
 from antennate.hardware.driving.config import DriveConfig
 from antennate.hardware.driving.decider import chosen
 from antennate.hardware.driving.drive import drive
@@ -21,6 +21,7 @@ from antennate.hardware.driving.tracebacks import Tracebacks, said
 from antennate.hardware.safety.causes import Active, Cause, State
 from antennate.params import ControlParams, SupervisorParams
 from antennate.telemetry.ticks import Tick, angles_of
+from antennate.twin.config import TwinConfig
 from antennate.types import JointCommand
 
 

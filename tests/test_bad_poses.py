@@ -11,11 +11,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from antennate.experiments.twin import TwinConfig, rig
+from antennate.experiments.twin import rig
 from antennate.hardware.safety.causes import Cause, State
 from antennate.hardware.safety.supervisor import Supervisor
 from antennate.params import SupervisorParams
 from antennate.telemetry.ticks import JOINTS, Tick
+from antennate.twin.config import TwinConfig
 from antennate.types import JointCommand
 
 SHAPES = {"yaw": (1, 5), "leg": (1, 6, 2), "antenna": (1, 2)}

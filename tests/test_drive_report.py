@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from antennate.cli import main
-from antennate.experiments.twin import Rig, TwinConfig, build, rig
+from antennate.experiments.twin import Rig, rig
 from antennate.hardware.driving.config import DriveConfig
 from antennate.hardware.driving.connect import prepare
 from antennate.hardware.driving.drive import drive
@@ -19,6 +19,7 @@ from antennate.hardware.driving.report import Report
 from antennate.hardware.driving.session import Session
 from antennate.hardware.safety.causes import Cause, State
 from antennate.params import TouchCheckParams
+from antennate.twin.config import TwinConfig, build
 from antennate.twin.faults import Faults, read
 from antennate.twin.lockstep import BoardPort, LockstepClock
 from antennate.types import AntennaFrame, Contact, JointCommand

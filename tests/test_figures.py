@@ -28,20 +28,25 @@ class Row:
 class Path:
     head: np.ndarray
     maneuver: np.ndarray
-    walls: tuple[np.ndarray, np.ndarray]
-    cylinders: np.ndarray
+    fixed: list[np.ndarray]
+    before: list[np.ndarray]
+    after: list[np.ndarray]
+    exit: np.ndarray
     links: np.ndarray
 
 
 def path(end: float, samples: int = 40) -> Path:
     """A straight course along x, through all maneuvers one after the other."""
     x = np.linspace(0.0, end, samples)
-    stood = np.array([[0.5, 0.2], [1.0, -0.2]])
+    box = 0.07 * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+    stood = [box + np.array([0.5, 0.2]), box + np.array([1.0, -0.2])]
     return Path(
         head=np.stack([x, 0.1 * np.sin(5 * x)], axis=1),
         maneuver=np.arange(samples) * len(Maneuver) // max(samples, 1),
-        walls=WALLS,
-        cylinders=np.stack([stood, stood + 0.05]),
+        fixed=list(WALLS),
+        before=stood,
+        after=[polygon + 0.05 for polygon in stood],
+        exit=np.array([wall[-1] for wall in WALLS]),
         links=np.stack([end - 0.1 * np.arange(LINK_COUNT), np.zeros(LINK_COUNT)], axis=1),
     )
 
@@ -67,7 +72,7 @@ def trajectories():
     found = rows()
     paths = {(row.arm, row.trial): path(2.0) for row in found}
     paths["open", 3] = path(-40.0)  # far out of the entrance
-    return tunnel.trajectories(paths, ARMS, found, range(4), 0.07)
+    return tunnel.trajectories(paths, ARMS, found, range(4))
 
 
 def walk_result() -> dict:
@@ -136,7 +141,7 @@ def test_trajectories_are_a_grid_with_the_verdict_of_each_trial():
         "trial 0: out after 10.0 s",
         "trial 1: out after 20.0 s",
         "trial 2: out of time, 50 s",
-        "trial 3: left by the entrance",
+        "trial 3: left",
     ]
     assert len(figure.legends) == 1
 

@@ -15,7 +15,7 @@ from esp32_streams import encoded, hello, made
 
 from antennate.cli import main
 from antennate.errors import BadInputError
-from antennate.experiments.twin import TwinConfig, rig
+from antennate.experiments.twin import rig
 from antennate.hardware.esp32.decoder import FrameDecoder
 from antennate.hardware.esp32.wire import Hello, Sample
 from antennate.hardware.ports.finder import finder
@@ -24,6 +24,7 @@ from antennate.hardware.ports.port import Port, PortError
 from antennate.hardware.ports.udp_port import UdpPort
 from antennate.params import NetworkParams
 from antennate.robots.layout import LayoutParams
+from antennate.twin.config import TwinConfig
 from antennate.twin.faults import Faults
 from antennate.twin.serve import TwinServer
 from antennate.twin.tcp import TcpEndpoint

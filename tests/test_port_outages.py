@@ -10,7 +10,7 @@ import pytest
 
 from antennate.control.loop import run_loop
 from antennate.errors import BadInputError
-from antennate.experiments.twin import Rig, TwinConfig, rig
+from antennate.experiments.twin import Rig, rig
 from antennate.hardware.driving.config import DriveConfig
 from antennate.hardware.driving.connect import prepare, require_servos
 from antennate.hardware.driving.drive import drive
@@ -20,6 +20,7 @@ from antennate.hardware.esp32.frame import SAMPLE_FRAME_SIZE
 from antennate.hardware.ports.port import Port, PortError
 from antennate.hardware.safety.causes import State
 from antennate.robots.layout import LayoutParams
+from antennate.twin.config import TwinConfig
 from antennate.twin.lockstep import BoardPort
 
 ARM, OUT, BACK, AGAIN = 0.5, 1.2, 1.7, 2.2

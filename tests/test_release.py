@@ -10,7 +10,7 @@ from servo_rig import IDS
 from servo_rig import Rig as Servos
 
 from antennate.control.loop import run_loop
-from antennate.experiments.twin import Rig, TwinConfig, rig
+from antennate.experiments.twin import Rig, rig
 from antennate.hardware.driving.config import DriveConfig
 from antennate.hardware.driving.drive import drive
 from antennate.hardware.driving.session import Session
@@ -20,6 +20,7 @@ from antennate.hardware.dynamixel.parser import Parser
 from antennate.hardware.ports.port import PortError
 from antennate.hardware.safety.causes import Cause, State
 from antennate.twin.bus import Fault, Trouble
+from antennate.twin.config import TwinConfig
 
 CONFIG = DriveConfig(dry_run=0.5, duration=0.5)
 TORQUE, GOAL = b"\x40\0", b"\x74\0"

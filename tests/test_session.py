@@ -11,7 +11,7 @@ import pytest
 
 from antennate.control.controllers import Controller
 from antennate.errors import BadInputError, ConfigError
-from antennate.experiments.twin import Rig, TwinConfig, rig
+from antennate.experiments.twin import Rig, rig
 from antennate.hardware.driving.adapter import require_quick
 from antennate.hardware.driving.config import DriveConfig
 from antennate.hardware.driving.connect import await_board, require_servos
@@ -30,6 +30,7 @@ from antennate.robots.layout import LayoutParams
 from antennate.telemetry.replay import replay
 from antennate.telemetry.ticks import Tick
 from antennate.twin.bus import Fault, Trouble
+from antennate.twin.config import TwinConfig
 from antennate.twin.faults import Faults, read
 from antennate.twin.pty import PtyServer
 from antennate.twin.registers import Servo

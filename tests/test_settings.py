@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import pytest
 
-from antennate.experiments.twin import TwinConfig, rig
+from antennate.experiments.twin import rig
 from antennate.hardware.driving.config import DriveConfig
 from antennate.hardware.driving.connect import require_servos
 from antennate.hardware.driving.drive import drive
@@ -17,6 +17,7 @@ from antennate.hardware.dynamixel.packets import StatusError
 from antennate.hardware.dynamixel.tables import XC430_W240
 from antennate.hardware.safety.causes import State
 from antennate.robots.layout import LayoutParams
+from antennate.twin.config import TwinConfig
 from antennate.twin.registers import Servo
 from antennate.twin.robot import DrivenServo
 

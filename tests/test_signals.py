@@ -9,10 +9,11 @@ from typing import Any
 
 import pytest
 
-from antennate.experiments.twin import Rig, TwinConfig, rig
+from antennate.experiments.twin import Rig, rig
 from antennate.hardware.driving.config import DriveConfig
 from antennate.hardware.driving.drive import drive
 from antennate.hardware.driving.signals import STOPS, StopOnce
+from antennate.twin.config import TwinConfig
 
 CONFIG = DriveConfig(dry_run=0.5, duration=4.0)
 

@@ -11,7 +11,7 @@ import pytest
 from antennate.control.gait import Gait, targets
 from antennate.params import GaitParams, PhysicsParams, TunnelParams
 from antennate.robots.body import RobotParams
-from antennate.sim.arena import draw_tunnel
+from antennate.sim.scenes.tunnel import TunnelScene
 from antennate.sim.world import World, compile_world
 from antennate.types import Maneuver
 
@@ -112,11 +112,12 @@ def test_a_mirrored_tunnel_is_walked_the_mirrored_way() -> None:
     tracks, moved = [], []
     for side, mirror, phase in ((1, "never", 0.0), (-1, "always", math.pi)):
         plan = TunnelParams(segments=(1.0,), turns_deg=(), mirror=mirror, strewn=0)
-        tunnel = draw_tunnel(plan, RobotParams(), np.random.default_rng(3))
+        tunnel = TunnelScene(plan).draw(RobotParams(), np.random.default_rng(3))
         model = compile_world(PhysicsParams(), RobotParams(), tunnel)
         track, world = walk(model, Maneuver.FORWARD, 300, phase=phase, start=(0.3, 0.0, side * 0.4))
         tracks.append(track)
-        moved.append(world.cylinders() - tunnel.cylinders)
+        stand = [world.data.body(f"cylinder{i}").xpos[:2] for i in range(len(tunnel.cylinders))]
+        moved.append(np.array(stand) - tunnel.cylinders)
     assert abs(moved[0]).max() > 0.005  # the robot did push something
     assert abs(tracks[1] - tracks[0] * MIRROR).max() < 1e-5
     assert abs(moved[1] - moved[0] * MIRROR[:2]).max() < 1e-5

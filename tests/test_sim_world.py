@@ -13,7 +13,7 @@ from antennate.errors import SimulationError
 from antennate.params import PhysicsParams, TunnelParams
 from antennate.robots.body import RobotParams
 from antennate.sim import world as world_module
-from antennate.sim.arena import draw_tunnel
+from antennate.sim.scenes.tunnel import TunnelScene
 from antennate.sim.world import PREFIX, World, compile_world, new_spec
 
 
@@ -26,7 +26,7 @@ def _engine_log_goes_away(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> No
 @pytest.fixture(scope="module")
 def model() -> mujoco.MjModel:
     plan = TunnelParams(segments=(1.0,), turns_deg=(), strewn=0, mirror="never")
-    tunnel = draw_tunnel(plan, RobotParams(), np.random.default_rng(3))
+    tunnel = TunnelScene(plan).draw(RobotParams(), np.random.default_rng(3))
     return compile_world(PhysicsParams(), RobotParams(), tunnel)
 
 

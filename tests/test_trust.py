@@ -7,13 +7,14 @@ from collections.abc import Callable
 import pytest
 
 from antennate.errors import BadInputError
-from antennate.experiments.twin import Rig, TwinConfig, rig
+from antennate.experiments.twin import Rig, rig
 from antennate.hardware.driving.config import DriveConfig
 from antennate.hardware.driving.drive import drive
 from antennate.hardware.driving.report import Report
 from antennate.hardware.driving.session import Session
 from antennate.hardware.safety.causes import Cause, State
 from antennate.params import ConditioningParams, TouchCheckParams
+from antennate.twin.config import TwinConfig
 from antennate.twin.touch import TouchStimulus
 from antennate.types import Floats
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from antennate.control.controllers import Controller
-from antennate.experiments.twin import Rig, TwinConfig, rig
+from antennate.experiments.twin import Rig, rig
 from antennate.hardware.driving.config import DriveConfig
 from antennate.hardware.driving.drive import drive
 from antennate.hardware.driving.session import Session
@@ -18,6 +18,7 @@ from antennate.params import ControlParams
 from antennate.telemetry.replay import replay
 from antennate.telemetry.ticks import Tick
 from antennate.twin.bus import Fault, Trouble
+from antennate.twin.config import TwinConfig
 from antennate.types import AntennaFrame, JointCommand
 
 LEGS = slice(5, 17)

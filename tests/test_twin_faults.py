@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from antennate.errors import BadInputError
-from antennate.experiments.twin import Rig, TwinConfig, build, rig
+from antennate.experiments.twin import Rig, rig
 from antennate.hardware.driving.config import DriveConfig
 from antennate.hardware.driving.drive import drive
 from antennate.hardware.driving.session import Session
@@ -17,6 +17,7 @@ from antennate.hardware.dynamixel.parser import Parser
 from antennate.hardware.safety.causes import State
 from antennate.params import BatteryParams
 from antennate.robots.layout import LayoutParams
+from antennate.twin.config import TwinConfig, build
 from antennate.twin.faults import Faults, read
 from antennate.twin.noise import Noise
 from antennate.twin.robot import TwinRobot

@@ -10,12 +10,12 @@ import tty
 
 import numpy as np
 
-from antennate.experiments.twin import TwinConfig, build
 from antennate.hardware.dynamixel import packets
 from antennate.hardware.dynamixel.parser import Parser
 from antennate.hardware.esp32.decoder import FrameDecoder
 from antennate.hardware.esp32.wire import Sample
 from antennate.robots.layout import LayoutParams
+from antennate.twin.config import TwinConfig, build
 from antennate.twin.faults import Faults, read
 from antennate.twin.lockstep import BoardPort, LockstepClock
 from antennate.twin.robot import TwinRobot

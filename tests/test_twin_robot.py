@@ -14,13 +14,15 @@ from pydantic import ValidationError
 
 from antennate.control.controllers import ARMS, Arm, Controller
 from antennate.control.gait import targets
-from antennate.experiments.tunnel.passage import Passage
-from antennate.experiments.tunnel.run import TunnelConfig, prepare
+from antennate.experiments.tunnel.run import TunnelConfig
 from antennate.experiments.twin import Decisions, on_twin, simulated
 from antennate.hardware.joints import CommandError, Joints
 from antennate.params import ControlParams
+from antennate.robots.body import RobotParams
 from antennate.robots.layout import LayoutParams
+from antennate.sim.scenes.tunnel import TunnelScene
 from antennate.sim.world import World
+from antennate.twin.passage import Passage
 from antennate.twin.robot import TwinRobot
 from antennate.types import AntennaFrame, JointCommand, Maneuver
 
@@ -181,14 +183,14 @@ def test_a_board_that_falls_silent_makes_the_robot_hold_within_100_ms() -> None:
 
 
 def test_the_twin_tells_when_its_head_passes_the_exit() -> None:
-    tunnel = prepare(TunnelConfig(), 0).tunnel
-    passage, length = Passage(tunnel), tunnel.params.length
+    tunnel = TunnelScene().draw(RobotParams(), np.random.default_rng(0))
+    passage, length = Passage(tunnel), tunnel.length
     direction = tunnel.centre[-1] - tunnel.centre[-2]
     beyond = tunnel.centre[-1] + 0.1 * direction / np.hypot(*direction)
     for tick in range(1, 41):
         head = tunnel.centre[0] if tick <= 20 else beyond
         passage.watch(cast(World, SimpleNamespace(head=head, t=0.01 * tick)))
         if tick == 20:
-            assert passage.said == f"the head came 0.00 m of {length:.2f} m"
+            assert passage.summary == f"the head came 0.00 m of {length:.2f} m"
     assert passage.passed == pytest.approx(0.3), "the second look of ten ticks after it came out"
-    assert passage.said == "the head passed the exit after 0.3 s of walking"
+    assert passage.summary == "the head passed the exit after 0.3 s of walking"

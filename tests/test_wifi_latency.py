@@ -10,7 +10,7 @@ import pytest
 from esp32_streams import hello
 from hardware_rig import LIMIT
 
-from antennate.experiments.twin import Rig, TwinConfig, rig
+from antennate.experiments.twin import Rig, rig
 from antennate.hardware.driving.body import HardwareRobot
 from antennate.hardware.driving.config import DriveConfig
 from antennate.hardware.driving.drive import drive
@@ -20,6 +20,7 @@ from antennate.hardware.esp32.board import Board
 from antennate.hardware.esp32.verifier import Verifier
 from antennate.hardware.safety.causes import State
 from antennate.params import NetworkParams
+from antennate.twin.config import TwinConfig
 
 KEY = bytes(range(32))
 

@@ -11,7 +11,7 @@ from typing import Any
 from antennate.control.controllers import Arm
 from antennate.control.loop import run_loop
 from antennate.experiments.tunnel.run import TunnelConfig
-from antennate.experiments.twin import Stage, TwinConfig, before_twin, rig, simulation
+from antennate.experiments.twin import Stage, before_twin, rig, simulation
 from antennate.hardware.driving.connect import await_board
 from antennate.robots.layout import LayoutParams
 from antennate.telemetry.header import Header
@@ -19,6 +19,7 @@ from antennate.telemetry.reader import LogReader
 from antennate.telemetry.replay import ReplayBody, recorded_decider
 from antennate.telemetry.ticks import Tick
 from antennate.telemetry.writer import LogWriter
+from antennate.twin.config import TwinConfig
 from antennate.types import AntennaFrame, Clock, JointCommand, Robot
 
 CONFIG = TunnelConfig(seed=0)
@@ -131,7 +132,7 @@ def twin(folder: Path, arm: Arm, trial: int, blind: float = math.inf) -> World:
 
 def session(folder: Path, arm: Arm, trial: int, blind: float = math.inf) -> World:
     """The same with its supervisor; armed at tick ARMED_AT, blind for 30 ticks only."""
-    made = rig(TwinConfig(world=CONFIG, trial=trial), arm)
+    made = rig(TwinConfig(seed=CONFIG.seed, trial=trial), arm)
     await_board(made.session.board, made.clock)
     header = Header(controller=arm, params=CONFIG.control, layout=LAYOUT)
 

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
-import tyro
+from pydantic.dataclasses import dataclass
 
 from antennate.cli import BAD_INPUT, OK, viewer
-from antennate.cli.addresses import RobotOrders, key_of, parse_robot, require_lossless
+from antennate.cli.addresses import RobotOptions, key_of, parse_robot, require_lossless
 from antennate.cli.folder import LOG, RunFolder, to_json
+from antennate.cli.options import option
 from antennate.cli.progress import terminate_as_interrupt
 from antennate.cli.tables import Cell, number, show
 from antennate.errors import ConfigError
@@ -40,22 +40,14 @@ stop it if this program dies."""
 
 
 @dataclass(frozen=True)
-class Orders(RobotOrders):
-    """What to talk to, whether to move, and where the results go.
+class Orders(RobotOptions):
+    """What to talk to, whether to move, and where the results go."""
 
-    Attributes:
-        bus: serial port of the servo bus, or tcp://HOST:PORT
-        arm: torque on after the dry run
-        out: folder for log and result, runs/drive-N if not given
-        overwrite: replace the results that the folder holds
-        json: print the content of result.json and nothing else on stdout
-    """
-
-    bus: Annotated[str, tyro.conf.arg(metavar="PORT")] = ""
-    arm: bool = False
-    out: Annotated[Path | None, tyro.conf.arg(metavar="FOLDER")] = None
-    overwrite: bool = False
-    json: bool = False
+    bus: str = option("", "servo bus: a serial port, or tcp://HOST:PORT", "PORT")
+    arm: bool = option(False, "torque on after the dry run")
+    out: Path | None = option(None, "folder for log and result, else runs/drive-N", "FOLDER")
+    overwrite: bool = option(False, "replace the results that the folder holds")
+    json: bool = option(False, "print the content of result.json and nothing else")
 
 
 def command(argv: Sequence[str]) -> int:
@@ -64,7 +56,7 @@ def command(argv: Sequence[str]) -> int:
     Raises:
         AntennateError: A port, a servo or the board is not what is needed; nothing moved then.
     """
-    config, orders = parse_robot("drive", DESCRIPTION, RobotFile.for_drive, argv, Orders())
+    config, orders = parse_robot("drive", DESCRIPTION, RobotFile.for_drive, argv, Orders)
     for name in ("esp32", "bus"):
         if not getattr(orders, name):
             raise ConfigError(f"--{name}: expected a serial port, found none")

@@ -14,6 +14,7 @@ from antennate.cli.progress import progress, terminate_as_interrupt
 from antennate.cli.tables import Cell, number, show, span
 from antennate.experiments.tunnel import run as tunnel
 from antennate.experiments.tunnel.monitor import TrialPath, TrialResult
+from antennate.sim.trial import check_start
 
 DESCRIPTION = """\
 Walk robots through a corridor of loose cylinders. The arms differ in one decision: `open` walks
@@ -32,7 +33,7 @@ def command(argv: Sequence[str]) -> int:
         WorkerError: A worker died.
     """
     config, options = parse("tunnel", DESCRIPTION, tunnel.TunnelConfig, argv)
-    tunnel.prepare(config, 0)  # a bad arena is found before anything is written
+    check_start(config)  # a bad scene is found before anything is written
     with RunFolder.open("tunnel", options.out, options.overwrite) as folder:
         folder.describe("tunnel", argv, config)
         outcome = _run(config, options, folder)
@@ -73,9 +74,7 @@ def _draw(outcome: tunnel.TunnelOutcome, folder: RunFolder) -> None:
     config = outcome.config
     trials = range(min(SHOWN_TRIALS, config.trials))
     figures = {
-        "trajectories": trajectories(
-            outcome.paths, config.arms, outcome.rows, trials, config.tunnel.cylinder.radius
-        ),
+        "trajectories": trajectories(outcome.paths, config.arms, outcome.rows, trials),
         "summary": summary(outcome.result()["arms"], outcome.rows, config.time_limit),
     }
     for name, figure in figures.items():

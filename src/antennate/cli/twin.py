@@ -8,19 +8,19 @@ import secrets
 import sys
 from collections.abc import Sequence
 from contextlib import nullcontext
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Literal
 
-import tyro
+from pydantic.dataclasses import dataclass
 
 from antennate.cli import OK
 from antennate.cli.arguments import FromFile, parse_with
+from antennate.cli.options import option
 from antennate.cli.progress import end_at_first
 from antennate.errors import ConfigError
-from antennate.experiments.twin import TwinConfig, watched
 from antennate.hardware.driving.priority import LEVEL, urgent
 from antennate.hardware.ports.keys import read_key
+from antennate.twin.config import TwinConfig, watched
 from antennate.twin.endpoints import Endpoint
 from antennate.twin.faults import Faults, read
 from antennate.twin.serve import TwinServer
@@ -30,7 +30,7 @@ from antennate.twin.udp import UdpEndpoint
 _LAST_PORT = 65_534
 
 DESCRIPTION = """\
-Serve the simulated robot in a tunnel as real bytes on two pseudo-terminals: the frames of the
+Serve the simulated robot in a scene as real bytes on two pseudo-terminals: the frames of the
 antenna board, and a DYNAMIXEL bus of 19 servos. Prints one JSON line with the paths when ready.
 With --tcp both are TCP ports, with --udp the board is a UDP port that signs as the firmware does.
 Physics begins when the first servo gets torque. Faults, each with @Ts for its time:
@@ -45,21 +45,16 @@ lost), on both wires both ways.
 
 @dataclass(frozen=True)
 class Places(FromFile):
-    """Where to serve, two pseudo-terminals if not given.
+    """Where to serve; two pseudo-terminals if no port is given."""
 
-    Attributes:
-        config: TOML file with the parameters below as keys and tables; flags override it
-        tcp: both on TCP ports of this host, 127.0.0.1 if not given; 0 takes any, else PORT is the
-            board's and PORT+1 the bus's
-        udp: the board on a UDP port instead, likewise
-        key: file with the key for --udp, mode 0600; else ANTENNATE_KEY is read
-        pace: real time, or lockstep: one control period passes with each sync write of all goals
-    """
-
-    tcp: Annotated[str, tyro.conf.arg(metavar="[HOST:]PORT")] = ""
-    udp: Annotated[str, tyro.conf.arg(metavar="[HOST:]PORT")] = ""
-    key: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
-    pace: Literal["real", "lockstep"] = "real"
+    tcp: str = option("", "TCP: the board on PORT, the bus on PORT+1; 0 takes any", "[HOST:]PORT")
+    udp: str = option("", "the board on a UDP port instead, likewise", "[HOST:]PORT")
+    key: Path | None = option(
+        None, "file with the key for --udp, mode 0600; else ANTENNATE_KEY", "FILE"
+    )
+    pace: Literal["real", "lockstep"] = option(
+        "real", "real time, or a control period with each sync write of all goals"
+    )
 
 
 def command(argv: Sequence[str]) -> int:
@@ -73,7 +68,7 @@ def command(argv: Sequence[str]) -> int:
 
 
 def _serve(argv: Sequence[str]) -> int:
-    config, places = parse_with("twin", DESCRIPTION, TwinConfig, argv, Places())
+    config, places = parse_with("twin", DESCRIPTION, TwinConfig, argv, Places)
     faults = Faults([read(text) for text in config.fault], config.layout.ids)
     real = places.pace == "real"
     robot, passage = watched(config, boot_id=secrets.randbits(32) if real else None)
@@ -88,7 +83,7 @@ def _serve(argv: Sequence[str]) -> int:
         finally:
             invalid = f"physics became invalid: {robot.failure}; " if robot.failure else ""
             late = f"latest tick {1e3 * server.late:.1f} ms late"
-            sys.stderr.write(f"antennate twin: {invalid}{passage.said}; {late}\n")
+            sys.stderr.write(f"antennate twin: {invalid}{passage.summary}; {late}\n")
     return OK
 
 

@@ -8,15 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Annotated
 
 import numpy as np
 
 from antennate.control.controllers import Arm, Controller
 from antennate.control.loop import run_loop
 from antennate.experiments.tunnel.monitor import TrialMonitor
-from antennate.experiments.tunnel.passage import Passage
-from antennate.experiments.tunnel.run import TunnelConfig, prepare
+from antennate.experiments.tunnel.run import TunnelConfig
 from antennate.hardware.driving.body import HardwareRobot
 from antennate.hardware.driving.connect import DOUBT
 from antennate.hardware.driving.session import Session
@@ -26,14 +24,14 @@ from antennate.hardware.dynamixel.bus import Bus
 from antennate.hardware.esp32.board import Board
 from antennate.hardware.joints import Joints
 from antennate.hardware.safety.trust import Trust
-from antennate.params import Params, SupervisorParams, TouchCheckParams, number
-from antennate.params.base import GATHERED
-from antennate.params.twin import BatteryParams
+from antennate.params import ControlParams, SupervisorParams, TouchCheckParams
 from antennate.robots.layout import LayoutParams
+from antennate.sim.scenes.registry import make_scene
 from antennate.sim.sim_robot import SimRobot
+from antennate.sim.trial import draw_trial
+from antennate.twin.config import TwinConfig, build
 from antennate.twin.lockstep import BoardPort, LockstepClock
 from antennate.twin.robot import TwinRobot
-from antennate.twin.touch import TouchStimulus
 from antennate.types import AntennaFrame, Clock, JointCommand, Robot
 
 _WARM_UP = 2.0
@@ -53,53 +51,6 @@ class Decisions:
     maneuvers: list[int]
     counts: list[tuple[float, float]]
     status: str
-
-
-class TwinConfig(Params):
-    """The robot and its world that `antennate twin` serves."""
-
-    trial: int = number(0, "1", "assumed: the first", "trial of the world's seed", ge=0)
-    duration: float | None = number(
-        None, "s", "assumed: until it is stopped", "time to serve", gt=0
-    )
-    fault: Annotated[tuple[str, ...], GATHERED] = number(
-        (), "1", "assumed: nothing is broken", "faults, such as servo:7=silent@3s"
-    )
-    touch: Annotated[tuple[str, ...], GATHERED] = number(
-        (),
-        "1",
-        "assumed: nobody is there",
-        "antennae touched before it walks, such as left@2s; from the first packet on the bus",
-    )
-    battery: BatteryParams = BatteryParams()
-    layout: LayoutParams = LayoutParams()
-    world: TunnelConfig = TunnelConfig()
-
-
-def build(config: TwinConfig, boot_id: int | None = None) -> TwinRobot:
-    """The robot at the start of a tunnel; each start of a real board has a boot id of its own."""
-    return watched(config, boot_id)[0]
-
-
-def watched(config: TwinConfig, boot_id: int | None = None) -> tuple[TwinRobot, Passage]:
-    """The same, and how far it comes."""
-    world, start = config.world, prepare(config.world, config.trial)
-    period = world.control.period
-    body = SimRobot(1, world.robot.sensor, period, world.physics.timestep)
-    body.load(0, start.world, start.chance)
-    boot = config.trial + 1 if boot_id is None else boot_id
-    touch, passage = TouchStimulus(config.touch, world.control.conditioning), Passage(start.tunnel)
-    robot = TwinRobot(
-        body,
-        config.layout,
-        period,
-        boot,
-        standing_noise=True,
-        touch=touch,
-        watch=passage.watch,
-        battery=config.battery,
-    )
-    return robot, passage
 
 
 class _Rounded:
@@ -127,13 +78,14 @@ class Watch:
     """The monitor of a trial, and what was decided."""
 
     def __init__(self, config: TunnelConfig, arm: Arm, trial: int) -> None:
-        start = prepare(config, trial)
         period = config.control.period
+        scene = make_scene(config.scene, config.tunnel)
+        start = draw_trial(config, scene, trial, config.control.gait, period)
         self.body = SimRobot(1, config.robot.sensor, period, config.physics.timestep)
         self.body.load(0, start.world, start.chance)
         self.controller = Controller(config.control, arm)
         self.controller.reset(np.array([0]), start.phase)
-        self._judge = TrialMonitor(arm, trial, start.tunnel, config.time_limit)
+        self._monitor = TrialMonitor(arm, trial, start.scene, [], config.time_limit)
         self.maneuvers: list[int] = []
         self.counts: list[tuple[float, float]] = []
         self.status = ""
@@ -145,7 +97,7 @@ class Watch:
         left, right = frame.counts[0].tolist()
         self.counts.append((left, right))
         failed = self.body.failure(0) is not None
-        self.status = self._judge.watch(self.body.world(0), maneuver, failed) or ""
+        self.status = self._monitor.watch(self.body.world(0), maneuver, failed) or ""
         return not self.status
 
     def decisions(self) -> Decisions:
@@ -200,7 +152,8 @@ class Rig:
 
 def rig(config: TwinConfig, arm: Arm = "closed", touch: TouchCheckParams | None = None) -> Rig:
     """A session before a twin robot, not yet armed; checked by touch if `touch` says how."""
-    robot, params = build(config), config.world.control
+    robot = build(config)
+    params = ControlParams(**dict(config.control))
     clock = LockstepClock(robot)
     session = Session(
         board=Board(BoardPort(robot, clock), SupervisorParams().stale_age),

@@ -12,7 +12,7 @@ import math
 import mujoco
 import numpy as np
 
-from antennate.errors import SimulationError
+from antennate.errors import SceneError, SimulationError, in_one_line
 from antennate.params import PhysicsParams
 from antennate.robots.anatomy import (
     ANTENNA_BASE,
@@ -24,8 +24,10 @@ from antennate.robots.anatomy import (
     YAW_JOINTS,
 )
 from antennate.robots.body import RobotParams
-from antennate.sim import arena, layers
+from antennate.sim import layers
 from antennate.sim import robot_part as robot
+from antennate.sim.outline import outline
+from antennate.sim.scenes.scene import SceneInstance, add_floor
 from antennate.types import Floats, Ints
 
 mujoco.set_mju_user_warning(lambda message: None)
@@ -40,6 +42,8 @@ _ANGLE_LIMIT = 6.3
 """Yaw, pitch and antenna joints cannot turn farther [rad]; legs turn without end."""
 _HEIGHT_LIMIT = 0.3
 """A head above or below this left the world [m]."""
+
+_PLANE = mujoco.mjtGeom.mjGEOM_PLANE
 
 
 def new_spec(physics: PhysicsParams) -> mujoco.MjSpec:
@@ -61,20 +65,28 @@ def new_spec(physics: PhysicsParams) -> mujoco.MjSpec:
 
 
 def compile_world(
-    physics: PhysicsParams, params: RobotParams, tunnel: arena.Tunnel | None = None
+    physics: PhysicsParams, params: RobotParams, scene: SceneInstance | None = None
 ) -> mujoco.MjModel:
-    """Robot on a floor, inside a tunnel if one is given; the head starts over the origin."""
+    """Robot in a scene, on a bare floor without one; the head is over the origin.
+
+    Raises:
+        SceneError: The engine cannot compile it.
+    """
     spec = new_spec(physics)
-    arena.add_floor(spec)
-    if tunnel is not None:
-        arena.add_tunnel(spec, tunnel)
+    if scene is None:
+        add_floor(spec)
+    else:
+        scene.build(spec)
     frame = spec.worldbody.add_frame(pos=[0, 0, robot.axle_height(params)])
     spec.attach(robot.build(params), frame=frame, prefix=PREFIX)
     spec.body(PREFIX + LINKS[0]).add_freejoint(name=PREFIX + "root")
     for geom in spec.geoms:
         geom.solref[0] = physics.contact_time
         geom.solimp[:3] = [0.95, 0.99, 0.0005]
-    return spec.compile()
+    try:
+        return spec.compile()
+    except ValueError as error:
+        raise SceneError(f"the scene cannot be compiled: {in_one_line(error)}") from error
 
 
 class World:
@@ -101,12 +113,8 @@ class World:
         self._driven = self._addresses(names)
         self._root: int = model.joint(PREFIX + "root").qposadr[0]
         self._links: Ints = np.array([model.body(PREFIX + n).id for n in LINKS])
-        bodies = range(model.nbody)
-        self._cylinders: Ints = np.array(
-            [b for b in bodies if model.body(b).name.startswith("cylinder")], dtype=int
-        )
         self._leg_geoms: Ints = np.array([model.geom(PREFIX + n).id for n in LEGS])
-        self._obstacle = model.geom_contype == layers.OBSTACLE
+        self._obstacle = (model.geom_contype & layers.OBSTACLE) != 0
         owner = model.body_rootid[model.geom_bodyid]
         self._robot = owner == model.body(PREFIX + LINKS[0]).id
         self._steps = 0
@@ -218,9 +226,22 @@ class World:
         """Plan positions of the six links, head first [m], shape (6, 2)."""
         return self.data.xpos[self._links, :2]
 
-    def cylinders(self) -> Floats:
-        """Plan positions of all cylinders [m], shape (m, 2)."""
-        return self.data.xpos[self._cylinders, :2]
+    def outlines(self) -> tuple[list[Floats], list[Floats]]:
+        """Polygons of all obstacles in plan [m], each (n, 2): those fixed, those that can move."""
+        solid = np.flatnonzero(self._obstacle & (self.model.geom_type != _PLANE))
+        fixed = self.model.body_weldid[self.model.geom_bodyid[solid]] == 0
+        polygons = [outline(self.model, self.data, geom) for geom in solid.tolist()]
+        return (
+            [polygon for polygon, still in zip(polygons, fixed, strict=True) if still],
+            [polygon for polygon, still in zip(polygons, fixed, strict=True) if not still],
+        )
+
+    def obstacle_overlap(self) -> float:
+        """How deep the robot is in obstacles at most [m]; 0 if it touches none."""
+        contact = self.data.contact
+        kind = self._obstacle[contact.geom]
+        meets = (kind[:, 0] != kind[:, 1]) & self._robot[contact.geom].any(axis=1)
+        return max(0.0, -float(contact.dist[meets].min(initial=0.0)))
 
     def obstacle_force(self) -> float:
         """Sum of the normal forces between robot and obstacles [N] in the last physics step."""

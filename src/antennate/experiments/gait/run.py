@@ -14,13 +14,15 @@ from typing import Any
 import numpy as np
 from pydantic import model_validator
 
-from antennate.control.gait import Gait, targets
+from antennate.control.gait import Gait
 from antennate.control.loop import run_loop
 from antennate.experiments.gait.pace import Pace, Walk, measure, rolling_speed
 from antennate.params import GaitParams, Params, PhysicsParams, VariationParams, number
 from antennate.robots.body import RobotParams
+from antennate.sim.scenes.flat import FlatScene
 from antennate.sim.sim_robot import Disturbance, SimRobot
-from antennate.sim.world import World, compile_world
+from antennate.sim.trial import make_world, place_at_start
+from antennate.sim.world import World
 from antennate.studies.pool import run_tasks
 from antennate.types import AntennaFrame, Floats, JointCommand, Maneuver
 
@@ -163,9 +165,9 @@ def walk_flat(config: GaitStudyConfig, name: str, gait: GaitParams, maneuver: Ma
         SimulationError: The physics became invalid.
     """
     robot, period = config.robot, 1.0 / config.rate
-    world = World(compile_world(config.physics, robot), robot.sensor.covered_hinges(robot.antenna))
-    start = targets(gait, np.zeros(1), np.zeros(1))
-    world.place(0.0, 0.0, 0.0, start.yaw[0], start.leg[0])
+    scene = FlatScene().draw(robot, np.random.default_rng(0))
+    world = make_world(config.physics, robot, scene)
+    place_at_start(world, scene, gait)
     body = SimRobot(1, robot.sensor, period, config.physics.timestep)
     body.load(0, world, _no_chance(robot, period))
     end = (config.settling_cycles + config.cycles) / gait.frequency

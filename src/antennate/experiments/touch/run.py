@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from antennate.errors import ArenaError
+from antennate.errors import SceneError
 from antennate.experiments.touch import result as touch_result
 from antennate.experiments.touch.result import TouchRow
 from antennate.experiments.touch.sensing import Verdict
@@ -166,7 +166,7 @@ class TouchConfig(Params):
                     touch_wall.outline(
                         self.wall, kind, site(self.antenna, overlap, self.wall_length, 0.0)
                     )
-                except ArenaError as error:
+                except SceneError as error:
                     raise ValueError(str(error)) from None
 
 

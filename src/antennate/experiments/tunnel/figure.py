@@ -8,7 +8,7 @@ from typing import Any, Protocol
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.collections import EllipseCollection
+from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
@@ -20,10 +20,10 @@ from antennate.types import Floats, Maneuver
 MARGIN = 0.3
 """Shown around the walls; what is farther out is cut off [m]."""
 
-_VERDICTS = {
+_OUTCOMES = {
     "success": "out after {:.1f} s",
     "timeout": "out of time, {:.0f} s",
-    "left": "left by the entrance",
+    "left": "left",
     "invalid": "invalid",
 }
 
@@ -66,13 +66,23 @@ class Path(Protocol):
         ...
 
     @property
-    def walls(self) -> tuple[Floats, Floats]:
-        """The two walls as polylines."""
+    def fixed(self) -> Sequence[Floats]:
+        """Obstacles that stand still, polygons."""
         ...
 
     @property
-    def cylinders(self) -> Floats:
-        """Cylinders at first and at the end, shape (2, m, 2)."""
+    def before(self) -> Sequence[Floats]:
+        """Obstacles that can move, at the start."""
+        ...
+
+    @property
+    def after(self) -> Sequence[Floats]:
+        """The same at the end."""
+        ...
+
+    @property
+    def exit(self) -> Floats:
+        """Ends of the exit line, shape (2, 2)."""
         ...
 
     @property
@@ -87,7 +97,6 @@ def trajectories(
     arms: Sequence[str],
     rows: Sequence[Row],
     trials: Sequence[int],
-    radius: float,
 ) -> Figure:
     """Trials from above: a column for each trial, a row for each arm.
 
@@ -96,7 +105,6 @@ def trajectories(
         arms: Arms from top to bottom.
         rows: The table.
         trials: Trials from left to right.
-        radius: Radius of a cylinder [m].
     """
     table = {(row.arm, row.trial): row for row in rows}
     boxes = {t: _box([paths[a, t] for a in arms if (a, t) in paths]) for t in trials}
@@ -110,10 +118,10 @@ def trajectories(
             panel, box = panels[i, j], boxes[trial]
             _frame(panel, box)
             if (arm, trial) in paths:
-                _draw_trial(panel, paths[arm, trial], radius)
+                _draw_trial(panel, paths[arm, trial])
                 row = table[arm, trial]
-                verdict = _VERDICTS[row.status].format(row.time_s)
-                panel.set_title(f"trial {trial}: {verdict}", fontsize=8.5)
+                outcome = _OUTCOMES[row.status].format(row.time_s)
+                panel.set_title(f"trial {trial}: {outcome}", fontsize=8.5)
             else:
                 panel.set_title(f"trial {trial}: not run", fontsize=8.5)
             if i == len(arms) - 1:
@@ -136,10 +144,11 @@ def trajectories(
 
 
 def _box(paths: Sequence[Path]) -> tuple[Floats, Floats] | None:
-    """Lower and upper corner of what is shown of one tunnel [m]; None without a course."""
+    """Lower and upper corner of what is shown of one scene [m]; None without a course."""
     if not paths:
         return None
-    points = np.concatenate(paths[0].walls)
+    path = paths[0]
+    points = np.concatenate([*path.fixed, *path.before, path.exit, path.head[:1]])
     return points.min(axis=0) - MARGIN, points.max(axis=0) + MARGIN
 
 
@@ -153,34 +162,22 @@ def _frame(panel: Axes, box: tuple[Floats, Floats] | None) -> None:
         panel.set_ylim(box[0][1], box[1][1])
 
 
-def _draw_trial(panel: Axes, path: Path, radius: float) -> None:
-    before, after = path.cylinders
-    _circles(panel, after, radius, facecolors=style.FAINT, edgecolors="none")
-    _circles(panel, before, radius, facecolors="none", edgecolors=style.MUTED, linewidths=0.4)
-    for wall in path.walls:
-        panel.plot(*wall.T, color=style.MUTED, linewidth=1.6, solid_capstyle="butt")
-    exit_line = np.array([wall[-1] for wall in path.walls])
-    panel.plot(*exit_line.T, color=style.MUTED, linewidth=1.0, linestyle=(0, (2, 2)))
+def _draw_trial(panel: Axes, path: Path) -> None:
+    for polygons, face, edge in (
+        (path.after, style.FAINT, "none"),
+        (path.before, "none", style.MUTED),
+        (path.fixed, style.MUTED, style.MUTED),
+    ):
+        shapes = [polygon.tolist() for polygon in polygons]
+        drawn = PolyCollection(shapes, facecolors=face, edgecolors=edge, linewidths=0.4)
+        panel.add_collection(drawn, autolim=False)
+    panel.plot(*path.exit.T, color=style.MUTED, linewidth=1.0, linestyle=(0, (2, 2)))
     for maneuver, points in _stretches(path):
         colour = style.MANEUVER_COLOURS[maneuver]
         panel.plot(*points.T, color=colour, linewidth=1.4, zorder=3)
     panel.plot(*path.links.T, color=style.INK, linewidth=2.4, alpha=0.75, zorder=4)
     panel.plot(*path.links.T, color=style.INK, linestyle="", marker="o", markersize=3, zorder=4)
     panel.plot(*path.links[0], color=style.INK, marker="o", markersize=5.5, zorder=5)
-
-
-def _circles(panel: Axes, centres: Floats, radius: float, **look: Any) -> None:
-    size = np.full(len(centres), 2.0 * radius)
-    circles = EllipseCollection(
-        size,
-        size,
-        np.zeros(len(size)),
-        units="xy",
-        offsets=centres,
-        offset_transform=panel.transData,
-        **look,
-    )
-    panel.add_collection(circles, autolim=False)
 
 
 def _stretches(path: Path) -> Iterator[tuple[Maneuver, Floats]]:
@@ -202,10 +199,10 @@ def _handles() -> list[Any]:
     return [
         *lines,
         robot,
-        Line2D([], [], color=style.MUTED, linewidth=1.6, label="wall"),
+        Patch(facecolor=style.MUTED, label="wall"),
         Line2D([], [], color=style.MUTED, linewidth=1.0, linestyle=(0, (2, 2)), label="exit"),
-        Patch(facecolor="white", edgecolor=style.MUTED, linewidth=0.6, label="cylinder at first"),
-        Patch(facecolor=style.FAINT, label="cylinder at the end"),
+        Patch(facecolor="white", edgecolor=style.MUTED, linewidth=0.6, label="obstacle at first"),
+        Patch(facecolor=style.FAINT, label="obstacle at the end"),
     ]
 
 

@@ -12,21 +12,12 @@ import numpy as np
 from pydantic import model_validator
 
 from antennate.control.controllers import ARMS, Arm, Controller
-from antennate.control.gait import targets
 from antennate.control.loop import run_loop
 from antennate.experiments.tunnel.monitor import TrialMonitor, TrialPath, TrialResult
-from antennate.params import (
-    ControlParams,
-    Params,
-    PhysicsParams,
-    TunnelParams,
-    VariationParams,
-    number,
-)
-from antennate.robots.body import RobotParams
-from antennate.sim.arena import Tunnel, draw_tunnel
-from antennate.sim.sim_robot import Disturbance, SimRobot
-from antennate.sim.world import World, compile_world
+from antennate.params import ControlParams, number
+from antennate.sim.scenes.registry import make_scene
+from antennate.sim.sim_robot import SimRobot
+from antennate.sim.trial import TrialConfig, draw_trial
 from antennate.studies import statistics
 from antennate.studies.pool import run_tasks
 from antennate.types import AntennaFrame, JointCommand
@@ -38,13 +29,12 @@ _TASK = 12
 """Most trials handed to a process at once."""
 
 
-class TunnelConfig(Params):
+class TunnelConfig(TrialConfig):
     """Everything that decides the outcome of `antennate tunnel`."""
 
     trials: int = number(
         10, "1", "paper: ten trials an arm", "trials of every arm", ge=1, le=100000
     )
-    seed: int = number(0, "1", "assumed: any", "seed of all chance", ge=0)
     arms: tuple[Arm, ...] = number(ARMS, "1", "assumed: all", "arms to run", min_length=1)
     time_limit: float = number(
         100.0,
@@ -54,11 +44,7 @@ class TunnelConfig(Params):
         gt=0,
         le=3600,
     )
-    tunnel: TunnelParams = TunnelParams()
-    robot: RobotParams = RobotParams()
     control: ControlParams = ControlParams()
-    variation: VariationParams = VariationParams()
-    physics: PhysicsParams = PhysicsParams()
 
     @model_validator(mode="after")
     def _agree(self) -> TunnelConfig:
@@ -69,11 +55,6 @@ class TunnelConfig(Params):
             raise ValueError(
                 "control.rate must be a whole fraction of the physics rate "
                 f"{1 / self.physics.timestep:g} Hz, got {self.control.rate:g} Hz"
-            )
-        if self.tunnel.free_width < self.robot.width:
-            raise ValueError(
-                f"tunnel.free_width must be at least robot.width, {self.robot.width:g} m, "
-                f"got {self.tunnel.free_width:g} m"
             )
         return self
 
@@ -105,45 +86,6 @@ class TunnelOutcome:
         }
 
 
-@dataclass(frozen=True, slots=True)
-class _Start:
-    world: World
-    chance: Disturbance
-    phase: float
-    tunnel: Tunnel
-
-
-def prepare(config: TunnelConfig, trial: int) -> _Start:
-    """Draw one trial: its tunnel, its start and its disturbances depend on seed and trial alone.
-
-    Raises:
-        ArenaError: The tunnel cannot be built.
-    """
-    sequence = np.random.SeedSequence([config.seed, trial])
-    for_tunnel, for_start, for_chance = (np.random.default_rng(s) for s in sequence.spawn(3))
-    tunnel = draw_tunnel(config.tunnel, config.robot, for_tunnel)
-    sensed = config.robot.sensor.covered_hinges(config.robot.antenna)
-    world = World(compile_world(config.physics, config.robot, tunnel), sensed)
-    phase = float(for_start.uniform(0.0, 2.0 * math.pi))
-    lateral, heading = for_start.uniform(-1.0, 1.0, 2)
-    command = targets(config.control.gait, np.array([phase]), np.zeros(1))
-    world.place(
-        0.0,
-        lateral * config.variation.start_lateral,
-        heading * config.variation.start_heading,
-        command.yaw[0],
-        command.leg[0],
-    )
-    chance = Disturbance(
-        for_chance,
-        config.variation,
-        config.robot.sensor,
-        config.robot.leg_friction,
-        config.control.period,
-    )
-    return _Start(world, chance, phase, tunnel)
-
-
 def run_trials(
     config: TunnelConfig,
     arm: Arm,
@@ -155,6 +97,7 @@ def run_trials(
     batch = min(batch, len(trials))
     controller = Controller(config.control, arm, batch)
     body = SimRobot(batch, config.robot.sensor, config.control.period, config.physics.timestep)
+    scene = make_scene(config.scene, config.tunnel)
     waiting = list(trials)
     monitors: list[TrialMonitor | None] = [None] * batch
 
@@ -163,10 +106,11 @@ def run_trials(
         monitors[row] = None
         if waiting:
             trial = waiting.pop(0)
-            start = prepare(config, trial)
+            start = draw_trial(config, scene, trial, config.control.gait, config.control.period)
             body.load(row, start.world, start.chance)
             controller.reset(np.array([row]), start.phase)
-            monitors[row] = TrialMonitor(arm, trial, start.tunnel, config.time_limit)
+            before = start.world.outlines()[1]
+            monitors[row] = TrialMonitor(arm, trial, start.scene, before, config.time_limit)
 
     def go_on(frame: AntennaFrame, command: JointCommand) -> bool:
         for row, monitor in enumerate(monitors):
@@ -201,10 +145,9 @@ def run(
         on_trial: Called after every trial, in no particular order.
 
     Raises:
-        ArenaError: A tunnel cannot be built as described.
+        SceneError: A scene cannot be built as described.
         WorkerError: A worker process died.
     """
-    prepare(config, 0)  # a bad arena is found before any worker starts
     size = max(1, min(_TASK, math.ceil(config.trials * len(config.arms) / (3 * workers))))
     chunks = [
         list(range(first, min(first + size, config.trials)))

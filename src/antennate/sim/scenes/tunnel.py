@@ -1,4 +1,4 @@
-"""Arenas as parts: a floor, walls, and cylinders that stand on the floor and can be pushed.
+"""The tunnel: a corridor with turns, lined and strewn with cylinders that can be pushed.
 
 A cylinder slides and spins under one foot contact of four dimensions: with the elliptic cone its
 limit surface is the ellipsoid usual for a sliding patch, isotropic in the plane. Above the floor it
@@ -14,10 +14,12 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from antennate.errors import ArenaError
+from antennate.errors import SceneError
 from antennate.params import CylinderParams, TunnelParams
 from antennate.robots.body import RobotParams
-from antennate.sim import geometry, layers
+from antennate.sim import layers
+from antennate.sim.scenes import geometry
+from antennate.sim.scenes.scene import LEFT_BEHIND, add_floor
 from antennate.types import Floats
 
 _WALL_HALF_THICKNESS = 0.02
@@ -27,9 +29,49 @@ _SETTLE_GAP = 0.002
 """Cylinders are set at least this far apart and off the walls [m]."""
 
 
+class TunnelScene:
+    """Draws tunnels.
+
+    Args:
+        params: Shape of the corridor, and its cylinders.
+    """
+
+    random = True
+
+    def __init__(self, params: TunnelParams | None = None) -> None:
+        self._params = params or TunnelParams()
+
+    def draw(self, robot: RobotParams, rng: np.random.Generator) -> Tunnel:
+        """Draw one tunnel.
+
+        Raises:
+            SceneError: The robot does not fit, or the strewn cylinders do not.
+        """
+        params = self._params
+        if params.free_width < robot.width:
+            raise SceneError(
+                f"tunnel.free_width must be at least the robot's width of {robot.width} m, got "
+                f"{params.free_width} m"
+            )
+        mirrored = params.mirror == "always"
+        if params.mirror == "random":
+            mirrored = bool(rng.random() < 0.5)
+        centre = geometry.centre_line(params)
+        walls = (
+            geometry.offset_line(centre, params.wall_distance, params.corner_radius),
+            geometry.offset_line(centre, -params.wall_distance, params.corner_radius),
+        )
+        cylinders = _place_cylinders(params, robot, centre, walls, rng)
+        if mirrored:
+            flip = np.array([1.0, -1.0])
+            centre, cylinders = centre * flip, cylinders * flip
+            walls = (walls[1] * flip, walls[0] * flip)
+        return Tunnel(params=params, centre=centre, walls=walls, cylinders=cylinders)
+
+
 @dataclass(frozen=True, slots=True)
 class Tunnel:
-    """One drawn tunnel.
+    """One drawn tunnel. Progress is arc length along its centre line.
 
     Attributes:
         centre: Corner points of the centre line [m], shape (n, 2).
@@ -42,30 +84,45 @@ class Tunnel:
     walls: tuple[Floats, Floats]
     cylinders: Floats
 
+    @property
+    def start(self) -> tuple[float, float, float]:
+        """The origin, facing along the first piece."""
+        return 0.0, 0.0, 0.0
 
-def draw_tunnel(params: TunnelParams, robot: RobotParams, rng: np.random.Generator) -> Tunnel:
-    """Draw one tunnel.
+    @property
+    def length(self) -> float:
+        """Length of the centre line [m]."""
+        return self.params.length
 
-    Raises:
-        ArenaError: The robot does not fit, or the strewn cylinders do not.
-    """
-    if params.free_width < robot.width:
-        raise ArenaError(
-            f"tunnel.free_width must be at least the robot's width of {robot.width} m, got "
-            f"{params.free_width} m"
-        )
-    mirrored = bool(rng.random() < 0.5) if params.mirror == "random" else params.mirror == "always"
-    centre = geometry.centre_line(params)
-    walls = (
-        geometry.offset_line(centre, params.wall_distance, params.corner_radius),
-        geometry.offset_line(centre, -params.wall_distance, params.corner_radius),
-    )
-    cylinders = _place_cylinders(params, robot, centre, walls, rng)
-    if mirrored:
-        flip = np.array([1.0, -1.0])
-        centre, cylinders = centre * flip, cylinders * flip
-        walls = (walls[1] * flip, walls[0] * flip)
-    return Tunnel(params=params, centre=centre, walls=walls, cylinders=cylinders)
+    @property
+    def exit(self) -> Floats:
+        """The line between the ends of the walls."""
+        return np.array([wall[-1] for wall in self.walls])
+
+    def build(self, spec: mujoco.MjSpec) -> None:
+        """Add floor, walls and cylinders."""
+        add_floor(spec)
+        friction = self.params.cylinder.contact_friction
+        for side, out, line in zip("lr", (1.0, -1.0), self.walls, strict=True):
+            for i in range(len(line) - 1):
+                _add_wall(spec, f"wall_{side}{i}", line[i], line[i + 1], out, friction)
+        for i, where in enumerate(self.cylinders):
+            _add_cylinder(spec, f"cylinder{i}", where, self.params.cylinder)
+
+    def progress(self, head: Floats) -> float:
+        """Arc length of the nearest point of the centre line [m]."""
+        return geometry.progress(self.centre, head)
+
+    def succeeded(self, head: Floats) -> bool:
+        """Whether the head has passed the end of the centre line."""
+        return self.progress(head) >= self.length
+
+    def left(self, head: Floats) -> bool:
+        """Whether it is far behind the entrance, or beside the walls."""
+        if self.progress(head) < 0.0:
+            return math.hypot(*head) >= LEFT_BEHIND
+        left, right = self.walls
+        return not geometry.contains(np.concatenate([left, right[::-1]]), head)
 
 
 def _place_cylinders(
@@ -98,7 +155,7 @@ def _place_cylinders(
         if _is_free(point, placed, diameter):
             placed.append(point)
     if len(placed) < wanted:
-        raise ArenaError(
+        raise SceneError(
             f"tunnel.strewn asks for {params.strewn} cylinders in the corridor, only "
             f"{params.strewn - wanted + len(placed)} find room; widen or lengthen the tunnel, or "
             "strew fewer"
@@ -108,34 +165,6 @@ def _place_cylinders(
 
 def _is_free(point: Floats, placed: list[Floats], distance: float) -> bool:
     return all(math.hypot(*(point - other)) >= distance for other in placed)
-
-
-def add_floor(spec: mujoco.MjSpec) -> None:
-    """An unbounded floor at z = 0."""
-    spec.worldbody.add_geom(
-        name="floor",
-        type=mujoco.mjtGeom.mjGEOM_PLANE,
-        size=[10, 10, 0.1],
-        contype=layers.FLOOR,
-        conaffinity=0,
-    )
-
-
-def add_tunnel(spec: mujoco.MjSpec, tunnel: Tunnel) -> None:
-    """Add walls and cylinders of a drawn tunnel."""
-    friction = tunnel.params.cylinder.contact_friction
-    for side, line in zip("lr", tunnel.walls, strict=True):
-        for i in range(len(line) - 1):
-            _add_wall(
-                spec,
-                f"wall_{side}{i}",
-                line[i],
-                line[i + 1],
-                1.0 if side == "l" else -1.0,
-                friction,
-            )
-    for i, where in enumerate(tunnel.cylinders):
-        _add_cylinder(spec, f"cylinder{i}", where, tunnel.params.cylinder)
 
 
 def _add_wall(

@@ -1,13 +1,10 @@
-"""How far a twin has come in its tunnel, as the monitor of a trial would say."""
+"""How far a twin has come in its scene."""
 
 from __future__ import annotations
 
 import math
 
-import numpy as np
-
-from antennate.sim import geometry
-from antennate.sim.arena import Tunnel
+from antennate.sim.scenes.scene import SceneInstance
 from antennate.sim.world import World
 
 _EVERY = 10
@@ -15,18 +12,18 @@ _EVERY = 10
 
 
 class Passage:
-    """Follows the head along the centre line.
+    """Follows the head through a scene.
 
     Args:
-        tunnel: Where the robot walks.
+        scene: Where the robot walks.
 
     Attributes:
-        progress: Where the head is, along the centre line [m].
+        progress: How far the head has come [m].
         passed: Time of walking at which the head passed the exit [s], inf before.
     """
 
-    def __init__(self, tunnel: Tunnel) -> None:
-        self._tunnel = tunnel
+    def __init__(self, scene: SceneInstance) -> None:
+        self._scene = scene
         self._ticks = 0
         self.progress = 0.0
         self.passed = math.inf
@@ -36,15 +33,15 @@ class Passage:
         self._ticks += 1
         if self._ticks % _EVERY:
             return
-        head = np.array([float(world.head[0]), float(world.head[1])])
-        self.progress = geometry.progress(self._tunnel.centre, head)
-        if self.progress >= self._tunnel.params.length:
+        head = world.head[:2].copy()
+        self.progress = self._scene.progress(head)
+        if self._scene.succeeded(head):
             self.passed = min(self.passed, world.t)
 
     @property
-    def said(self) -> str:
-        """In words."""
-        length = self._tunnel.params.length
+    def summary(self) -> str:
+        """The same in one sentence."""
+        length = self._scene.length
         if self.passed < math.inf:
             return f"the head passed the exit after {self.passed:.1f} s of walking"
         return f"the head came {self.progress:.2f} m of {length:.2f} m"
