@@ -26,7 +26,6 @@ from unittest import mock
 import mujoco
 import numpy as np
 
-from antennate.control.controllers import Arm
 from antennate.control.gait import Gait
 from antennate.control.loop import run_loop
 from antennate.experiments.tunnel import run as experiment
@@ -39,7 +38,7 @@ from antennate.sim.trial import Trial, draw_trial, make_world
 from antennate.sim.world import World
 from antennate.types import AntennaFrame, Floats, Ints, JointCommand, Maneuver
 
-ARM: Arm = "closed"
+CONTROLLER = "closed"
 LOCKSTEP = 6
 """Trials the program steps at once."""
 COUNTS = (10, 30, 60, 120)
@@ -71,7 +70,7 @@ def prepare(config: TunnelConfig, trials: int) -> list[Trial]:
 def run_whole(config: TunnelConfig, starts: list[Trial], batch: int) -> None:
     """Run prepared trials as `antennate tunnel` does."""
     with mock.patch.object(experiment, "draw_trial", lambda _, __, trial, *___: starts[trial]):
-        experiment.run_trials(config, ARM, range(len(starts)), lambda _: None, batch)
+        experiment.run_trials(config, CONTROLLER, range(len(starts)), lambda _: None, batch)
 
 
 @contextmanager
@@ -210,7 +209,7 @@ def measure_growth(config: TunnelConfig, seconds: float, repetitions: int) -> di
 def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--json", action="store_true", help="print one JSON object")
-    parser.add_argument("--trials", type=int, default=12, help="trials of the closed arm")
+    parser.add_argument("--trials", type=int, default=12, help="trials of the closed controller")
     parser.add_argument("--seconds", type=float, default=20.0, help="longest trial [s]")
     parser.add_argument("--repetitions", type=int, default=5, help="interleaved repetitions")
     options = parser.parse_args()

@@ -55,8 +55,8 @@ def always_sound(old: Any, self: Any, frame_: Any) -> Any:
 
 
 def careless(old: Any, self: Any, frame_: Any) -> Any:
-    self._thought = session.Thought(decided_at=self.clock.now())
-    return self.decider.step(frame_)
+    self._result = session.StepResult(decided_at=self.clock.now())
+    return self.controller.step(frame_)
 
 
 def an_exception_alone(old: Any, self: Any, number: int, frame: Any) -> None:

@@ -43,7 +43,7 @@ def tick(number: int) -> Tick:
         now=real(),
         counts=pair(),
         reading=pair(),
-        b=pair(),
+        level=pair(),
         contact=(chance.randrange(3), chance.randrange(3)),
         maneuver=chance.randrange(-(2**63), 2**63),
         phase=real(),

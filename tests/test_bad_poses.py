@@ -35,7 +35,7 @@ class Robot:
         made = rig(TwinConfig())
         self.session, self._servos = made.session, made.robot.servos
         self.session.supervisor = Supervisor(limits)
-        self._sound = self.session.decider.step
+        self._sound = self.session.controller.step
         for _ in range(150):
             self.step()
         self.session.orders.arm = True
@@ -50,7 +50,7 @@ class Robot:
             self.sound = self._sound(frame)
             return self.sound if command is SOUND else command
 
-        session.decider.step = said
+        session.controller.step = said
         begin = session.clock.now()
         session.write(session.step(session.read()))
         session.clock.sleep_until(begin + session.period)
@@ -182,7 +182,7 @@ def test_a_decision_that_is_none_is_a_failure_of_the_controller(name: str, said:
             return command
 
     setattr(Odd, name, said)
-    made.session.decider = Odd()
+    made.session.controller = Odd()
     made.session.write(made.session.step(made.session.read()))
     out = made.session.outputs
     assert out is not None

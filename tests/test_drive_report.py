@@ -100,7 +100,7 @@ class Unsure:
 
 def test_a_controller_that_never_decides_is_a_hold() -> None:
     made = rig(TwinConfig())
-    made.session.decider = Unsure(made.session.decider)
+    made.session.controller = Unsure(made.session.controller)
     made, report = driven(nothing, made)
     assert made.session.tally.sent == 0
     assert report.worst is State.HOLD
@@ -159,5 +159,5 @@ def test_a_controller_that_does_not_exist_is_named_before_a_port_is_opened(
     ports = ["--esp32", "/no/board", "--bus", "/no/bus", "--out", str(tmp_path / "run")]
     assert main(["drive", *ports, "--controller", "clsoed"]) == 2
     said = capsys.readouterr().err
-    assert "--controller: expected one of open, paper, closed or MODULE:CLASS" in said
+    assert "controller: expected one of open, paper, closed, or MODULE:NAME" in said
     assert "/no/board" not in said

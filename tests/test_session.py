@@ -9,13 +9,12 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from antennate.control.controllers import Controller
+from antennate.control.registry import make_controller
 from antennate.errors import BadInputError, ConfigError
 from antennate.experiments.twin import Rig, rig
 from antennate.hardware.driving.adapter import require_quick
 from antennate.hardware.driving.config import DriveConfig
 from antennate.hardware.driving.connect import await_board, require_servos
-from antennate.hardware.driving.decider import chosen
 from antennate.hardware.driving.drive import drive
 from antennate.hardware.driving.report import Report
 from antennate.hardware.driving.session import Session
@@ -140,6 +139,23 @@ def test_L8_L9_a_silent_board_makes_it_hold_within_100_ms_and_its_return_walk() 
     assert (state[t > 3.5] <= State.DEGRADED).all()
 
 
+@pytest.mark.parametrize("when", [0.3, 1.02, 2.0])
+def test_D9_every_tick_can_be_logged_whenever_the_board_resets(when: float) -> None:
+    """In the dry run, while arming, on the way."""
+    act = at(when, "esp32=reset")
+
+    def keep(session: Session, t: float) -> None:
+        act(made, t)
+        tick = Tick.unpack(Tick.of(session, t).pack())
+        lost.append(tick.lost)
+
+    made, lost = rig(TwinConfig()), list[int]()
+    report = drive(made.session, CONFIG, arm=True, on_tick=keep)
+    assert report.result(made.session)["resets"] == 1
+    assert len(lost) == made.session.tally.ticks
+    assert max(lost) < 10
+
+
 def test_E1_a_board_that_resets_is_counted_and_used_again_within_a_second_of_its_greeting() -> None:
     log = walked(at(2.0, "esp32=reset"))
     clock = log.rig.session.board.clock
@@ -223,7 +239,7 @@ def test_T2_a_controller_that_hangs_stops_every_servo_within_120_ms_of_the_last_
     """It never comes back from its decision: nobody sends, and nobody has to."""
 
     made = rig(TwinConfig())
-    sound, servos, wait = made.session.decider.step, made.robot.servos, made.clock.sleep_until
+    sound, servos, wait = made.session.controller.step, made.robot.servos, made.clock.sleep_until
     tripped: list[float] = []
     seen: list[list[float]] = []
 
@@ -242,7 +258,7 @@ def test_T2_a_controller_that_hangs_stops_every_servo_within_120_ms_of_the_last_
             wait(made.clock.now() + 0.4)
         raise KeyboardInterrupt
 
-    made.session.decider.step = step  # type: ignore[method-assign]
+    made.session.controller.step = step  # type: ignore[method-assign]
     made.session.release = list  # type: ignore[method-assign]
     drive(made.session, CONFIG, arm=True)
     assert tripped[0] <= 0.120
@@ -257,7 +273,7 @@ def test_B8_servos_stop_within_120_ms_when_only_the_controller_fails(
 ) -> None:
     """The loop still reads the board in every tick; a packet to any servo would feed them all."""
     made = rig(TwinConfig())
-    sound, servos = made.session.decider.step, made.robot.servos
+    sound, servos = made.session.controller.step, made.robot.servos
     heard: list[float] = []
     tripped: list[float] = []
 
@@ -270,7 +286,7 @@ def test_B8_servos_stop_within_120_ms_when_only_the_controller_fails(
             tripped.append(made.clock.now())
         raise ValueError("a bug")
 
-    made.session.decider.step = step  # type: ignore[method-assign]
+    made.session.controller.step = step  # type: ignore[method-assign]
     drive(made.session, CONFIG, arm=True)
     assert (made.session.watch.supply < 10.8) == (volts < 10.8)
     assert tripped
@@ -307,7 +323,7 @@ def test_B8_a_controller_that_fails_does_not_feed_the_watchdogs() -> None:
             return command
 
     made = rig(TwinConfig())
-    made.session.decider = Broken(made.session.decider)
+    made.session.controller = Broken(made.session.controller)
     log = Log(made)
     drive(made.session, CONFIG, arm=True, on_tick=log)
     t = np.array(log.t)
@@ -339,7 +355,7 @@ def test_G6_a_robot_whose_record_is_required_holds_while_none_is_kept() -> None:
 @pytest.mark.parametrize("bad", [math.nan, math.inf])
 def test_S5_B14_a_pose_that_is_not_finite_never_reaches_the_bus(bad: float) -> None:
     made = rig(TwinConfig())
-    sound = made.session.decider.step
+    sound = made.session.controller.step
 
     def step(frame: AntennaFrame) -> JointCommand:
         command = sound(frame)
@@ -347,7 +363,7 @@ def test_S5_B14_a_pose_that_is_not_finite_never_reaches_the_bus(bad: float) -> N
             command.leg[0, 2, 1] = bad
         return command
 
-    made.session.decider.step = step  # type: ignore[method-assign]
+    made.session.controller.step = step  # type: ignore[method-assign]
     log = Log(made)
     drive(made.session, CONFIG, arm=True, on_tick=log)
     assert Cause.BAD_POSE in set().union(*log.causes)
@@ -420,7 +436,7 @@ def test_T6_tracebacks_of_a_controller_are_kept_once_a_second() -> None:
         def step(self, frame: object) -> object:
             raise ZeroDivisionError("of the plugin")
 
-    session.decider = Broken()  # type: ignore[assignment]
+    session.controller = Broken()  # type: ignore[assignment]
     session.clock.sleep_until(1.0)
     for tick in range(251):
         session.clock.sleep_until(1.0 + 0.01 * tick)
@@ -461,12 +477,12 @@ def test_B15_servos_that_are_not_as_expected_are_refused(
     "name", ["clsoed", "antennate.control.controllers:Nobody", "no_such_module:X"]
 )
 def test_a_controller_that_does_not_exist_is_refused(name: str) -> None:
-    with pytest.raises(ConfigError, match="--controller"):
-        chosen(name, ControlParams())
+    with pytest.raises(ConfigError, match="controller"):
+        make_controller(name, ControlParams())
 
 
 def test_a_controller_of_ones_own_is_taken() -> None:
-    made = chosen("antennate.control.controllers:Controller", ControlParams())
+    made = make_controller("antennate.control.controllers:closed_loop", ControlParams())
     assert int(made.maneuver[0]) == Maneuver.FORWARD
 
 
@@ -597,7 +613,7 @@ def test_B13_a_supply_that_cannot_be_read_any_more_is_not_known_after_4_s() -> N
 @pytest.mark.parametrize("what", ["servo", "command"])
 def test_B10_arming_that_fails_half_way_leaves_no_servo_with_torque(what: str) -> None:
     made = rig(TwinConfig())
-    servos, sound = made.robot.servos, made.session.decider.step
+    servos, sound = made.robot.servos, made.session.controller.step
     had_torque: list[int] = []
 
     def step(frame: AntennaFrame) -> JointCommand:
@@ -609,7 +625,7 @@ def test_B10_arming_that_fails_half_way_leaves_no_servo_with_torque(what: str) -
     def note(session: Session, t: float) -> None:
         had_torque.append(sum(servo.torque for servo in servos))
 
-    made.session.decider.step = step  # type: ignore[method-assign]
+    made.session.controller.step = step  # type: ignore[method-assign]
     if what == "servo":
         servos[11].write = refusing(servos[11])  # type: ignore[method-assign]
     log = Log(made)
@@ -663,7 +679,7 @@ def test_B13_below_the_first_level_it_walks_at_half_the_pace_and_replays_alike()
     assert {Cause.SUPPLY_WARN} <= {active.cause for active in made.session.outputs.causes}
     assert legs[450] - legs[250] == pytest.approx(np.full(12, 2 * math.pi), rel=0.03)
     assert legs[790] - legs[590] == pytest.approx(np.full(12, math.pi), rel=0.03)
-    found = replay(ticks, Controller(ControlParams()), 0.01)
+    found = replay(ticks, make_controller("closed", ControlParams()), 0.01)
     assert (len(found.maneuvers), found.different, found.commands) == (len(ticks), 0, 0)
 
 

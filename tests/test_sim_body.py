@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from antennate.control.controllers import Controller
 from antennate.control.loop import run_loop
+from antennate.control.registry import make_controller
 from antennate.params import ControlParams, PhysicsParams, VariationParams
 from antennate.robots.body import RobotParams
 from antennate.sim.sim_robot import Disturbance, SimRobot
@@ -44,7 +44,7 @@ def body_of(*seeds: int | None) -> SimRobot:
 
 def run(body: SimRobot, batch: int, ticks: int, spoil_at: int | None = None) -> list[AntennaFrame]:
     """Frames of some ticks; at one tick the world of row 0 is broken."""
-    control, frames = Controller(MIND, "closed", batch), []
+    control, frames = make_controller("closed", MIND, batch=batch), []
 
     def go_on(frame: AntennaFrame, command: JointCommand) -> bool:
         frames.append(frame)
@@ -84,7 +84,7 @@ def test_a_row_that_fails_reads_nan_and_the_others_go_on_as_if_alone() -> None:
 
 
 def test_an_empty_row_reads_nan_and_makes_the_mind_hold() -> None:
-    body, control = body_of(1, None), Controller(MIND, "closed", 2)
+    body, control = body_of(1, None), make_controller("closed", MIND, batch=2)
     frame = body.read()
     control.step(frame)
     assert np.isnan(frame.counts[1]).all()

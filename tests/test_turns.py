@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from antennate.control.controllers import Controller
+from antennate.control.registry import make_controller
 from antennate.experiments.twin import Rig, rig
 from antennate.hardware.driving.config import DriveConfig
 from antennate.hardware.driving.drive import drive
@@ -42,16 +42,16 @@ class Walk:
         self.ticks: list[Tick] = []
         self._act = act
         session = self.rig.session
-        think = session.decider.step
+        think = session.controller.step
 
         def step(frame: AntennaFrame) -> JointCommand:
             command = think(frame)
             if session.outputs is not None and session.outputs.clear:
                 self.frames.append(float(frame.t[0]))
-                self.maneuvers.append(int(session.decider.maneuver[0]))
+                self.maneuvers.append(int(session.controller.maneuver[0]))
             return command
 
-        session.decider.step = step  # type: ignore[method-assign]
+        session.controller.step = step  # type: ignore[method-assign]
         config = CONFIG.model_copy(update={"duration": duration})
         self.report = drive(session, config, arm=True, on_tick=self._note)
 
@@ -101,7 +101,7 @@ def test_one_leg_at_a_time_is_without_torque_and_all_have_it_afterwards(far: Wal
 
 
 def test_G7_its_log_replays_alike_for_the_controller_was_not_asked_meanwhile(far: Walk) -> None:
-    found = replay(far.ticks, Controller(ControlParams()), 0.01)
+    found = replay(far.ticks, make_controller("closed", ControlParams()), 0.01)
     assert (len(found.maneuvers), found.different, found.commands) == (len(far.ticks), 0, 0)
 
 

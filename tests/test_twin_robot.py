@@ -12,8 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from antennate.control.controllers import ARMS, Arm, Controller
 from antennate.control.gait import targets
+from antennate.control.registry import BUILT_IN, make_controller
 from antennate.experiments.tunnel.run import TunnelConfig
 from antennate.experiments.twin import Decisions, on_twin, simulated
 from antennate.hardware.joints import CommandError, Joints
@@ -138,14 +138,14 @@ def test_B14_what_is_not_refused_lies_within_one_turn_but_for_legs(
     assert (abs(ticks[5:17]) <= 1_048_575).all()
 
 
-@pytest.mark.parametrize("arm", ARMS)
-def test_no_pose_of_a_gait_is_beyond_the_limits(arm: Arm) -> None:
+@pytest.mark.parametrize("name", BUILT_IN)
+def test_no_pose_of_a_gait_is_beyond_the_limits(name: str) -> None:
     joints, params = Joints(LAYOUT), ControlParams()
     offset = max(params.gait.turn_offset, params.escape.turn_offset)
     for sign in (-1.0, 1.0):
         for phase in np.linspace(0.0, 2 * math.pi, 100):
             joints.ticks(targets(params.gait, np.array([phase]), np.array([sign * offset])))
-    control = Controller(params, arm)
+    control = make_controller(name, params)
     rng = np.random.default_rng(3)
     for tick in range(1000):
         counts = rng.uniform(0.0, 4095.0, (1, 2))
@@ -153,13 +153,13 @@ def test_no_pose_of_a_gait_is_beyond_the_limits(arm: Arm) -> None:
 
 
 @pytest.mark.parametrize("layout", [LAYOUT, MIRRORED])
-@pytest.mark.parametrize(("arm", "trial"), [("closed", 1), ("paper", 0)])
+@pytest.mark.parametrize(("name", "trial"), [("closed", 1), ("paper", 0)])
 def test_a_whole_trial_through_bytes_is_decided_like_the_pure_simulation(
-    arm: str, trial: int, layout: LayoutParams
+    name: str, trial: int, layout: LayoutParams
 ) -> None:
     config = TunnelConfig(seed=0)
-    pure = simulated(config, arm, trial, layout)
-    twin = on_twin(config, arm, trial, layout)
+    pure = simulated(config, name, trial, layout)
+    twin = on_twin(config, name, trial, layout)
     assert len({Maneuver.FORWARD, Maneuver.REVERSE} & set(pure.maneuvers)) == 2
     assert twin == pure
 

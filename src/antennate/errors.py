@@ -49,12 +49,12 @@ class LogError(BadInputError):
     """The log of a drive cannot be written, read or replayed."""
 
 
-class MissingPackageError(AntennateError, ImportError):
-    """An optional package is needed for this and not installed; the text says how to get it."""
-
-
 class ControllerError(AntennateError):
     """A controller raised an exception, or answered in another form than its protocol says."""
+
+
+class MissingPackageError(AntennateError, ImportError):
+    """An optional package is needed for this and not installed; the text says how to get it."""
 
 
 _LONGEST = 300

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import importlib
 import importlib.util
 import sys
@@ -13,6 +12,7 @@ from types import ModuleType
 from typing import Any, Generic, TypeVar, cast
 
 from antennate.errors import ConfigError, in_one_line
+from antennate.messages import nearest, shown
 
 T = TypeVar("T")
 
@@ -65,10 +65,9 @@ class Registry(Generic[T]):
         place, _, attribute = name.rpartition(":")
         if name in self.names or (place and attribute):
             return name
-        near = difflib.get_close_matches(name, self.names, n=1)
         raise ConfigError(
             f"expected one of {', '.join(self.names)}, or MODULE:NAME or FILE.py:NAME of your own "
-            f"{self._kind}, found {name!r}" + (f"; did you mean {near[0]}?" if near else "")
+            f"{self._kind}, found {shown(name)}{nearest(name, self.names)}"
         )
 
     def find(self, name: str) -> T:

@@ -11,11 +11,10 @@ from pydantic.dataclasses import dataclass
 
 from antennate.cli import BAD_INPUT, OK, viewer
 from antennate.cli.addresses import RobotOptions, key_of, parse_robot, require_lossless
-from antennate.cli.folder import LOG, RunFolder, to_json
 from antennate.cli.options import option
 from antennate.cli.progress import terminate_as_interrupt
 from antennate.cli.tables import Cell, number, show
-from antennate.errors import ConfigError
+from antennate.errors import ConfigError, LogError
 from antennate.hardware.doctor.ports import same
 from antennate.hardware.driving.config import DriveConfig
 from antennate.hardware.driving.connect import connect
@@ -24,6 +23,8 @@ from antennate.hardware.driving.priority import Priority, urgent
 from antennate.hardware.driving.session import Session
 from antennate.hardware.robot_file import RobotFile
 from antennate.hardware.safety.causes import State
+from antennate.studies.formats import to_json
+from antennate.studies.run_directory import LOG, RunDirectory
 from antennate.telemetry.feed import Feed
 from antennate.telemetry.header import Header
 from antennate.telemetry.parts import part, parts
@@ -65,8 +66,8 @@ def command(argv: Sequence[str]) -> int:
     config = config.calibrated()
     require_lossless(orders.bus)
     key = key_of(orders)
-    with RunFolder.open("drive", orders.out, orders.overwrite) as folder:
-        folder.describe("drive", argv, config)
+    with RunDirectory.create("drive", orders.out, orders.overwrite) as folder:
+        folder.describe(config, ["antennate", "drive", *argv])
         folder.without_trials()
         wires = connect(config, orders.esp32, orders.bus, key)
         with wires as session, terminate_as_interrupt():
@@ -92,9 +93,17 @@ def _carry_out(config: DriveConfig, session: Session, orders: Orders, log: Path)
         return [sys.executable, "-m", viewer.__name__, str(part(log, number)), *required]
 
     feed = Feed(words, header.pack())
+    unlogged = False
 
     def keep(session: Session, t: float) -> None:
-        feed.send(Tick.of(session, t).pack())
+        nonlocal unlogged
+        try:
+            feed.send(Tick.of(session, t).pack())
+        except LogError as error:  # the robot walks on without this tick in its log
+            feed.skip()
+            if not unlogged:
+                viewer.say(error)
+            unlogged = True
         session.unrecorded = config.record_required and not feed.keeps
 
     with feed, urgent() as priority:
@@ -167,7 +176,10 @@ _ROWS: list[tuple[str, Cell]] = [
     ("worst tick [ms]", _pace("worst_tick_s", ".1f", 1e3)),
     *(
         (name.replace("_", " "), lambda result, name=name: number(result[name], "d"))
-        for name in ("frames", "crc_errors", "lost_samples", "missed_answers", "stale_answers")
+        for name in (
+            *("frames", "crc_errors", "lost_samples", "resets"),
+            *("missed_answers", "stale_answers"),
+        )
     ),
     ("commands sent", lambda result: number(result["poses_sent"], "d")),
     ("commands refused", lambda result: number(result["poses_refused"], "d")),

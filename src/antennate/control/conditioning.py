@@ -29,8 +29,8 @@ def bending_level(params: ConditioningParams, counts: Floats) -> Floats:
     return 1.0 / (1.0 + np.exp(-z))
 
 
-def deflection(params: ConditioningParams, counts: Floats) -> Floats:
-    """Normalised reading from the straight antenna on: 0 straight, 1 fully bent, same shape."""
+def flex_fraction(params: ConditioningParams, counts: Floats) -> Floats:
+    """Flex as a fraction of the calibrated range: 0 straight, 1 fully bent, same shape."""
     x = (counts - params.counts_low) / (params.counts_high - params.counts_low)
     return x if params.polarity > 0 else 1.0 - x
 

@@ -44,21 +44,21 @@ class Escape:
         self._past[:, rows] = 0.0
         self.touch[rows] = 0.0
 
-    def step(self, t: Floats, b: Floats, stuck: Bools, pressed: Bools) -> Ints:
+    def step(self, t: Floats, level: Floats, stuck: Bools, pressed: Bools) -> Ints:
         """The maneuver of every row.
 
         Args:
             t: Time [s], shape (B,).
-            b: Bending levels, shape (B, 2); a row with NaN answers HOLD and keeps its state.
+            level: Bending levels, shape (B, 2); a row with NaN answers HOLD and keeps its state.
             stuck: Rows found stuck, shape (B,).
             pressed: Rows that feel anything at all, shape (B,).
 
         Returns:
             One `Maneuver` a row, shape (B,).
         """
-        known = ~np.isnan(b).any(axis=1)
+        known = ~np.isnan(level).any(axis=1)
         walking = known & (self.maneuver == int(Maneuver.FORWARD))
-        self.touch += np.where(walking[:, None], b - self.touch, 0.0) * self._memory_gain
+        self.touch += np.where(walking[:, None], level - self.touch, 0.0) * self._memory_gain
         before = self._remember()
         self._felt = np.where(walking & ~pressed, self._felt, t)
         over = known & ~walking & (t >= self._until)

@@ -22,7 +22,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from antennate.control.controllers import Arm
 from antennate.control.loop import run_loop
 from antennate.experiments.tunnel.run import TunnelConfig
 from antennate.experiments.twin import Watch
@@ -37,7 +36,7 @@ from antennate.robots.layout import LayoutParams
 from antennate.sim.sim_robot import SimRobot
 from antennate.twin.lockstep import BoardPort, LockstepClock
 from antennate.twin.robot import TwinRobot
-from antennate.types import AntennaFrame, Clock, Floats, Ints, JointCommand
+from antennate.types import AntennaFrame, Bools, Clock, Floats, Ints, JointCommand
 
 _DRY_RUN = 0.5
 """Time before the arm event [s]."""
@@ -117,7 +116,7 @@ def in_process(orders: DriveConfig, robot: TwinRobot) -> Session:
 
 def driven(
     config: TunnelConfig,
-    arm: Arm,
+    name: str,
     trial: int,
     layout: LayoutParams,
     ticks: float = math.inf,
@@ -128,7 +127,7 @@ def driven(
 
     Args:
         config: The trial's world.
-        arm: Its controller.
+        name: Name of its controller.
         trial: Its number.
         layout: Servos of the robot.
         ticks: Most ticks from the first reading on.
@@ -138,13 +137,13 @@ def driven(
     Raises:
         BringUpError: The servos did not come up.
     """
-    watch, walk, period = Watch(config, arm, trial), Walk(), config.control.period
+    watch, walk, period = Watch(config, name, trial), Walk(), config.control.period
     robot = TwinRobot(watch.body, layout, period, boot_id=trial + 1, standing_noise=True)
     orders = DriveConfig(
-        controller=arm, dry_run=_DRY_RUN, touch_check=False, layout=layout, control=config.control
+        controller=name, dry_run=_DRY_RUN, touch_check=False, layout=layout, control=config.control
     )
     session = wired(orders, robot)
-    control = session.decider = _Judged(watch, lambda: _taken(session.board) - robot.stood)
+    control = session.controller = _Judged(watch, lambda: _taken(session.board) - robot.stood)
     session.clock.sleep_until(session.clock.now() + phase)
 
     def on_tick(session: Session, now: float) -> None:
@@ -161,14 +160,14 @@ def driven(
 
 def simulated_alike(
     config: TunnelConfig,
-    arm: Arm,
+    name: str,
     trial: int,
     layout: LayoutParams,
     start: Start,
     ticks: float = math.inf,
 ) -> Walk:
     """The trial in pure simulation, begun alike."""
-    watch, walk = Watch(config, arm, trial), Walk()
+    watch, walk = Watch(config, name, trial), Walk()
     period, control = config.control.period, watch.controller
     for frame in start.before:
         control.step(frame)
@@ -204,16 +203,21 @@ class _Judged:
 
     def __init__(self, watch: Watch, standing: Callable[[], int]) -> None:
         self._watch, self._standing = watch, standing
-        self.maneuver, self.contact = watch.controller.maneuver, watch.controller.contact
+        control = watch.controller
+        self.maneuver, self.contact, self.level = control.maneuver, control.contact, control.level
         self.before: list[AntennaFrame] = []
         self.standing = 0
         self.first: AntennaFrame | None = None
+
+    def reset(self, rows: Ints | Bools, phase: Floats | float = 0.0) -> None:
+        """Start the controller anew."""
+        self._watch.controller.reset(rows, phase)
 
     def step(self, frame: AntennaFrame) -> JointCommand:
         """The command of this tick."""
         control = self._watch.controller
         command = control.step(frame)
-        self.maneuver, self.contact = control.maneuver, control.contact
+        self.maneuver, self.contact, self.level = control.maneuver, control.contact, control.level
         if self.first is None:
             self.standing = self._standing()
             if self.standing < 0 or np.isnan(frame.counts).all():

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from antennate.control.controllers import Arm, Controller
 from antennate.control.loop import run_loop
+from antennate.control.registry import make_controller
 from antennate.experiments.tunnel.monitor import TrialMonitor
 from antennate.experiments.tunnel.run import TunnelConfig
 from antennate.hardware.driving.body import HardwareRobot
@@ -32,7 +32,7 @@ from antennate.sim.trial import draw_trial
 from antennate.twin.config import TwinConfig, build
 from antennate.twin.lockstep import BoardPort, LockstepClock
 from antennate.twin.robot import TwinRobot
-from antennate.types import AntennaFrame, Clock, JointCommand, Robot
+from antennate.types import AntennaFrame, Clock, Controller, JointCommand, Robot
 
 _WARM_UP = 2.0
 """Longest time until the board's clock is known [s]."""
@@ -77,15 +77,15 @@ class _Rounded:
 class Watch:
     """The monitor of a trial, and what was decided."""
 
-    def __init__(self, config: TunnelConfig, arm: Arm, trial: int) -> None:
+    def __init__(self, config: TunnelConfig, name: str, trial: int) -> None:
         period = config.control.period
         scene = make_scene(config.scene, config.tunnel)
         start = draw_trial(config, scene, trial, config.control.gait, period)
         self.body = SimRobot(1, config.robot.sensor, period, config.physics.timestep)
         self.body.load(0, start.world, start.chance)
-        self.controller = Controller(config.control, arm)
+        self.controller = make_controller(name, config.control, config.robot)
         self.controller.reset(np.array([0]), start.phase)
-        self._monitor = TrialMonitor(arm, trial, start.scene, [], config.time_limit)
+        self._monitor = TrialMonitor(config.seed, trial, name, start.scene, [], config.time_limit)
         self.maneuvers: list[int] = []
         self.counts: list[tuple[float, float]] = []
         self.status = ""
@@ -126,17 +126,17 @@ class Stage:
     robot: TwinRobot | None = None
 
 
-def simulation(config: TunnelConfig, arm: Arm, trial: int, layout: LayoutParams) -> Stage:
+def simulation(config: TunnelConfig, name: str, trial: int, layout: LayoutParams) -> Stage:
     """The trial in pure simulation, goals rounded to ticks."""
-    watch = Watch(config, arm, trial)
+    watch = Watch(config, name, trial)
     body = _Rounded(watch.body, Joints(layout))
     period = config.control.period
     return Stage(body, watch.controller, period, watch.go_on, watch.decisions)
 
 
-def simulated(config: TunnelConfig, arm: Arm, trial: int, layout: LayoutParams) -> Decisions:
+def simulated(config: TunnelConfig, name: str, trial: int, layout: LayoutParams) -> Decisions:
     """The whole trial in pure simulation."""
-    stage = simulation(config, arm, trial, layout)
+    stage = simulation(config, name, trial, layout)
     run_loop(stage.body, stage.control, stage.period, stage.go_on)
     return stage.decisions()
 
@@ -150,7 +150,7 @@ class Rig:
     session: Session
 
 
-def rig(config: TwinConfig, arm: Arm = "closed", touch: TouchCheckParams | None = None) -> Rig:
+def rig(config: TwinConfig, name: str = "closed", touch: TouchCheckParams | None = None) -> Rig:
     """A session before a twin robot, not yet armed; checked by touch if `touch` says how."""
     robot = build(config)
     params = ControlParams(**dict(config.control))
@@ -160,7 +160,7 @@ def rig(config: TwinConfig, arm: Arm = "closed", touch: TouchCheckParams | None 
         bus=Bus(clock, Timing(config.layout.baud, doubt=DOUBT), clock=clock.now),
         joints=Joints(config.layout),
         clock=clock,
-        decider=Controller(params, arm),
+        controller=make_controller(name, params, config.robot),
         period=params.period,
         conditioning=params.conditioning,
         trust=Trust(params.conditioning, touch=touch),
@@ -168,13 +168,13 @@ def rig(config: TwinConfig, arm: Arm = "closed", touch: TouchCheckParams | None 
     return Rig(robot, clock, session)
 
 
-def before_twin(config: TunnelConfig, arm: Arm, trial: int, layout: LayoutParams) -> Stage:
+def before_twin(config: TunnelConfig, name: str, trial: int, layout: LayoutParams) -> Stage:
     """The hardware code before a twin, torque on.
 
     Raises:
         BringUpError: The servos did not come up.
     """
-    watch = Watch(config, arm, trial)
+    watch = Watch(config, name, trial)
     period = config.control.period
     robot = TwinRobot(watch.body, layout, period, boot_id=trial + 1)
     clock = LockstepClock(robot)
@@ -193,7 +193,7 @@ def before_twin(config: TunnelConfig, arm: Arm, trial: int, layout: LayoutParams
 
 def on_twin(
     config: TunnelConfig,
-    arm: Arm,
+    name: str,
     trial: int,
     layout: LayoutParams,
     on_tick: Callable[[TwinRobot], None] = lambda robot: None,
@@ -202,7 +202,7 @@ def on_twin(
 
     Args:
         config: The trial's world.
-        arm: Its controller.
+        name: Name of its controller.
         trial: Its number.
         layout: Servos of the robot.
         on_tick: Called after every tick, for instance to break something.
@@ -210,7 +210,7 @@ def on_twin(
     Raises:
         BringUpError: The servos did not come up.
     """
-    stage = before_twin(config, arm, trial, layout)
+    stage = before_twin(config, name, trial, layout)
 
     def go_on(frame: AntennaFrame, command: JointCommand) -> bool:
         if stage.robot is not None:

@@ -77,6 +77,7 @@ def compile_world(
         add_floor(spec)
     else:
         scene.build(spec)
+        _meet_robot(spec)
     frame = spec.worldbody.add_frame(pos=[0, 0, robot.axle_height(params)])
     spec.attach(robot.build(params), frame=frame, prefix=PREFIX)
     spec.body(PREFIX + LINKS[0]).add_freejoint(name=PREFIX + "root")
@@ -87,6 +88,15 @@ def compile_world(
         return spec.compile()
     except ValueError as error:
         raise SceneError(f"the scene cannot be compiled: {in_one_line(error)}") from error
+
+
+def _meet_robot(spec: mujoco.MjSpec) -> None:
+    """Let geoms with the engine's default collision bits touch the robot; planes are floors."""
+    for geom in spec.geoms:
+        if geom.contype == geom.conaffinity == 1:
+            is_floor = geom.type == _PLANE
+            geom.contype = layers.FLOOR if is_floor else layers.OBSTACLE
+            geom.conaffinity = 0 if is_floor else layers.OBSTACLE | layers.FLOOR
 
 
 class World:

@@ -20,7 +20,7 @@ class Header(BaseModel):
     """Who decided, with which numbers, on which robot. On disk it is JSON.
 
     Attributes:
-        controller: open, paper, closed, or MODULE:CLASS.
+        controller: Name of the controller.
         params: Numbers of the controller.
         layout: Servos of the robot, None in simulation.
         seed: Seed of the world, None on a robot.

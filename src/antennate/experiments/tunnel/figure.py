@@ -1,4 +1,4 @@
-"""Figures of `antennate tunnel`: trials seen from above, and the arms side by side."""
+"""Figures of `antennate tunnel`: trials seen from above, and the controllers side by side."""
 
 from __future__ import annotations
 
@@ -32,8 +32,8 @@ class Row(Protocol):
     """What is needed of one row of the table."""
 
     @property
-    def arm(self) -> str:
-        """The arm."""
+    def controller(self) -> str:
+        """The controller."""
         ...
 
     @property
@@ -42,7 +42,7 @@ class Row(Protocol):
         ...
 
     @property
-    def status(self) -> str:
+    def outcome(self) -> str:
         """Success, timeout, left or invalid."""
         ...
 
@@ -94,41 +94,41 @@ class Path(Protocol):
 @style.styled
 def trajectories(
     paths: Mapping[tuple[str, int], Path],
-    arms: Sequence[str],
+    controllers: Sequence[str],
     rows: Sequence[Row],
     trials: Sequence[int],
 ) -> Figure:
-    """Trials from above: a column for each trial, a row for each arm.
+    """Trials from above: a column for each trial, a row for each controller.
 
     Args:
-        paths: Courses by arm and trial; a missing one leaves its panel empty.
-        arms: Arms from top to bottom.
+        paths: Courses by controller and trial; a missing one leaves its panel empty.
+        controllers: Names from top to bottom.
         rows: The table.
         trials: Trials from left to right.
     """
-    table = {(row.arm, row.trial): row for row in rows}
-    boxes = {t: _box([paths[a, t] for a in arms if (a, t) in paths]) for t in trials}
+    table = {(row.controller, row.trial): row for row in rows}
+    boxes = {t: _box([paths[a, t] for a in controllers if (a, t) in paths]) for t in trials}
     sides = [box[1] - box[0] for box in boxes.values() if box is not None] or [np.ones(2)]
     aspect = float(max(side[1] for side in sides) / max(side[0] for side in sides))
     width = 0.5 + 2.3 * len(trials)
-    figure = style.canvas(max(width, 6.4), 0.9 + len(arms) * (2.0 * aspect + 0.35))
-    panels = figure.subplots(len(arms), len(trials), squeeze=False)
-    for i, arm in enumerate(arms):
+    figure = style.canvas(max(width, 6.4), 0.9 + len(controllers) * (2.0 * aspect + 0.35))
+    panels = figure.subplots(len(controllers), len(trials), squeeze=False)
+    for i, controller in enumerate(controllers):
         for j, trial in enumerate(trials):
             panel, box = panels[i, j], boxes[trial]
             _frame(panel, box)
-            if (arm, trial) in paths:
-                _draw_trial(panel, paths[arm, trial])
-                row = table[arm, trial]
-                outcome = _OUTCOMES[row.status].format(row.time_s)
+            if (controller, trial) in paths:
+                _draw_trial(panel, paths[controller, trial])
+                row = table[controller, trial]
+                outcome = _OUTCOMES[row.outcome].format(row.time_s)
                 panel.set_title(f"trial {trial}: {outcome}", fontsize=8.5)
             else:
                 panel.set_title(f"trial {trial}: not run", fontsize=8.5)
-            if i == len(arms) - 1:
+            if i == len(controllers) - 1:
                 panel.set_xlabel("x [m]")
         panels[i, 0].set_ylabel("y [m]")
         panels[i, 0].annotate(
-            arm,
+            style.short_name(controller),
             (0.0, 0.5),
             (-54.0, 0.0),
             xycoords="axes fraction",
@@ -208,37 +208,38 @@ def _handles() -> list[Any]:
 
 @style.styled
 def summary(
-    arms: Mapping[str, Mapping[str, Any]], rows: Sequence[Row], time_limit: float
+    controllers: Mapping[str, Mapping[str, Any]], rows: Sequence[Row], time_limit: float
 ) -> Figure:
-    """Success, time inside and restricted mean time of every arm.
+    """Success, time inside and restricted mean time of every controller.
 
     Args:
-        arms: Per arm what result.json says of it.
+        controllers: Per controller what result.json says of it.
         rows: The table.
         time_limit: Time after which a trial has failed [s].
     """
     figure = style.canvas(10.5, 3.4)
     rate, inside, mean = figure.subplots(1, 3, width_ratios=(1, 1.5, 1))
-    names = list(arms)
-    for i, (name, arm) in enumerate(arms.items()):
-        valid = arm["trials"] - arm["invalid"]
+    names, colours = list(controllers), style.controller_colours(list(controllers))
+    for i, (name, found) in enumerate(controllers.items()):
+        valid = found["trials"] - found["invalid"]
         if not valid:
             continue
-        _interval(rate, i, arm["successes"] / valid, arm["wilson95"], name)
-        _interval(mean, i, arm["restricted_mean_time_s"], arm["restricted_mean_time_95"], name)
-        exits = sorted(r.time_s for r in rows if r.arm == name and r.status == "success")
+        colour, time = colours[name], found["restricted_mean_time_s"]
+        _interval(rate, i, found["successes"] / valid, found["wilson95"], colour)
+        _interval(mean, i, time, found["restricted_mean_time_95"], colour)
+        exits = sorted(r.time_s for r in rows if r.controller == name and r.outcome == "success")
         left = 1.0 - np.arange(len(exits) + 1) / valid
         inside.step(
             [0.0, *exits, time_limit],
             [*left, left[-1]],
             where="post",
-            color=style.ARM_COLOURS.get(name, style.INK),
-            linestyle=style.ARM_LINES.get(name, "solid"),
+            color=colour,
+            linestyle=style.CONTROLLER_LINES.get(name, "solid"),
             linewidth=3.2 - 0.8 * i,
-            label=name,
+            label=style.short_name(name),
         )
     for panel in (rate, mean):
-        panel.set_yticks(range(len(names)), [_label(name, arms[name]) for name in names])
+        panel.set_yticks(range(len(names)), [_label(name, controllers[name]) for name in names])
         panel.tick_params(axis="y", labelsize=9, labelcolor=style.INK, length=0)
         panel.set_ylim(len(names) - 0.5, -0.5)
         panel.grid(visible=False, axis="y")
@@ -251,7 +252,7 @@ def summary(
         xlabel="restricted mean time [s]",
         title="Failures as the limit; bootstrap 95 %",
     )
-    mean.set_yticklabels(names)
+    mean.set_yticklabels([style.short_name(name) for name in names])
     inside.set(
         xlim=(0, time_limit),
         ylim=(-0.03, 1.03),
@@ -265,12 +266,11 @@ def summary(
     return figure
 
 
-def _label(name: str, arm: Mapping[str, Any]) -> str:
-    return f"{name}\nn = {arm['trials'] - arm['invalid']}"
+def _label(name: str, found: Mapping[str, Any]) -> str:
+    return f"{style.short_name(name)}\nn = {found['trials'] - found['invalid']}"
 
 
-def _interval(panel: Axes, at: int, value: float, ends: Sequence[float], name: str) -> None:
-    colour = style.ARM_COLOURS.get(name, style.INK)
+def _interval(panel: Axes, at: int, value: float, ends: Sequence[float], colour: str) -> None:
     panel.plot(
         list(ends), [at, at], color=colour, linewidth=2.4, solid_capstyle="butt", clip_on=False
     )

@@ -7,11 +7,11 @@ import math
 from collections.abc import Iterator
 from typing import Any
 
+from antennate.control.registry import make_controller
 from antennate.errors import BadInputError
 from antennate.hardware import roster, settings
 from antennate.hardware.driving.adapter import require_quick
 from antennate.hardware.driving.config import DriveConfig
-from antennate.hardware.driving.decider import Decider, chosen
 from antennate.hardware.driving.session import Session
 from antennate.hardware.dynamixel import bringup
 from antennate.hardware.dynamixel.answers import Timing
@@ -28,6 +28,7 @@ from antennate.hardware.ports.reconnecting import Reconnecting
 from antennate.hardware.safety.trust import Trust
 from antennate.params import BusParams, DoctorParams
 from antennate.robots.layout import LayoutParams
+from antennate.types import Controller
 
 _WHO = DoctorParams()
 _PATIENCE = 0.05
@@ -52,7 +53,7 @@ def connect(
         BadInputError: No antenna board speaks, or it is refused.
         BringUpError: The servos are not those expected.
     """
-    control = chosen(config.controller, config.control)
+    controller = make_controller(config.controller, config.control)
     with contextlib.ExitStack() as stack:
         lines: list[Port] = []
         for flag, address, baud in (
@@ -62,7 +63,7 @@ def connect(
             line = Reconnecting(finder(address, baud, flag, key, config.network))
             stack.callback(line.close)
             lines.append(line)
-        yield prepare(config, lines[0], lines[1], HostClock(), bus, control)
+        yield prepare(config, lines[0], lines[1], HostClock(), bus, controller)
 
 
 def prepare(
@@ -71,7 +72,7 @@ def prepare(
     bus: Port,
     clock: Any,
     path: str = "the bus",
-    decider: Decider | None = None,
+    controller: Controller | None = None,
 ) -> Session:
     """A session before two open ports, after both sides have said who they are.
 
@@ -89,7 +90,7 @@ def prepare(
         bus=master,
         joints=Joints(config.layout),
         clock=clock,
-        decider=decider or chosen(config.controller, config.control),
+        controller=controller or make_controller(config.controller, config.control),
         period=config.control.period,
         conditioning=config.control.conditioning,
         limits=config.limits,

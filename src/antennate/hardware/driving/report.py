@@ -71,6 +71,7 @@ class Report:
             "frames": board.decoder.counters.good,
             "crc_errors": board.decoder.counters.crc_errors,
             "lost_samples": board.lost,
+            "resets": board.clock.resets,
             "missed_answers": bus.misses,
             "stale_answers": bus.stale,
             "broken_answers": bus.bad_crc,

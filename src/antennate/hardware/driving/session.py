@@ -17,12 +17,17 @@ import math
 
 import numpy as np
 
-from antennate.errors import AntennateError
+from antennate.errors import AntennateError, in_one_line
 from antennate.hardware.driving.body import HardwareRobot
-from antennate.hardware.driving.decider import Decider, Decision, Thought, decision, nowhere
+from antennate.hardware.driving.decision import (
+    Decision,
+    StepResult,
+    decision_of,
+    no_command,
+)
 from antennate.hardware.driving.orders import Orders, Tally
 from antennate.hardware.driving.timing import LoopTiming
-from antennate.hardware.driving.tracebacks import Tracebacks, said
+from antennate.hardware.driving.tracebacks import Tracebacks
 from antennate.hardware.driving.turns import Turns
 from antennate.hardware.dynamixel import bringup
 from antennate.hardware.dynamixel.bringup import BringUpError
@@ -36,7 +41,14 @@ from antennate.hardware.safety.supervisor import Supervisor
 from antennate.hardware.safety.trust import Trust
 from antennate.hardware.safety.watch import ServoWatch
 from antennate.params import BusParams, ConditioningParams, DiagnosisParams, SupervisorParams
-from antennate.types import AntennaFrame, Clock, Floats, JointCommand, Maneuver
+from antennate.types import (
+    AntennaFrame,
+    Clock,
+    Controller,
+    Floats,
+    JointCommand,
+    Maneuver,
+)
 
 _AGAIN = BusParams().motion_budget
 """Time for the answers of servos told again in a tick to let go [s]."""
@@ -50,7 +62,7 @@ class Session:
         bus: The servos.
         joints: Which servo moves what.
         clock: The host's time.
-        decider: The controller.
+        controller: The controller.
         period: Control period [s].
         conditioning: The calibrated range of both antennae.
         diagnosis: Windows and limits of the diagnosis.
@@ -80,7 +92,7 @@ class Session:
         bus: Bus,
         joints: Joints,
         clock: Clock,
-        decider: Decider,
+        controller: Controller,
         period: float,
         conditioning: ConditioningParams,
         diagnosis: DiagnosisParams | None = None,
@@ -88,7 +100,7 @@ class Session:
         trust: Trust | None = None,
     ) -> None:
         self.board, self.bus, self.joints, self.clock = board, bus, joints, clock
-        self.decider, self.period = decider, period
+        self.controller, self.period = controller, period
         band = Band(conditioning.counts_low, conditioning.counts_high, conditioning.polarity)
         windows = diagnosis or DiagnosisParams()
         self.channels = [ChannelDiagnosis(windows, band) for _ in range(2)]
@@ -103,10 +115,10 @@ class Session:
         self.timing: LoopTiming | None = None
         self.outputs: Outputs | None = None
         self.frame = AntennaFrame(t=np.zeros(1), counts=np.full((1, 2), math.nan))
-        self.command = nowhere()
+        self.command = no_command()
         self.decision = Decision()
         self._body = HardwareRobot(board, bus, joints, clock)
-        self._thought = Thought()
+        self._result = StepResult()
         self._goals: Floats | None = None
         self._command: JointCommand | None = None
         self._used = self._refused = 0
@@ -118,7 +130,7 @@ class Session:
     @property
     def asked(self) -> bool:
         """Whether the controller was asked in the last tick."""
-        return self._thought.asked
+        return self._result.asked
 
     @property
     def mute(self) -> bool:
@@ -205,27 +217,27 @@ class Session:
         but none after a failure.
         """
         due = self._due() or not self._sound
-        thought = self._thought = Thought()
+        result = self._result = StepResult()
         if self._command is not None and (self.turns.standing or not due):
-            thought.asked, thought.decided_at = False, self.clock.now()
+            result.asked, result.decided_at = False, self.clock.now()
             return self._command
         self._sound = False
         try:
             own = AntennaFrame(t=frame.t.copy(), counts=frame.counts.copy())
-            command = self.decider.step(own)  # which it may change
-            self.decision = decision(self.decider)
+            command = self.controller.step(own)  # which it may change
+            self.decision = decision_of(self.controller)
         except KeyboardInterrupt:
             raise
         except BaseException as error:  # noqa: BLE001 a plugged-in controller may raise anything
-            thought.failure = said(error)
+            result.failure = in_one_line(error)
             self.tracebacks.keep(self.clock.now(), error)
-            return nowhere()
-        thought.decided_at = self.clock.now()
+            return no_command()
+        result.decided_at = self.clock.now()
         try:
             command = plain(command)
             self.joints.ticks(command)
         except CommandError as error:
-            thought.bad_command = str(error)
+            result.bad_command = str(error)
             self.tally.refused += 1
         else:
             self._command = command
@@ -270,18 +282,18 @@ class Session:
             self.clock.sleep_until(self.clock.now() + self.period)
 
     def _inputs(self, now: float) -> Inputs:
-        clock, watch, thought = self.board.clock, self.watch, self._thought
+        clock, watch, result = self.board.clock, self.watch, self._result
         left, right = self.channels
         return Inputs(
             age=clock.age(now),
             valid=self._used,
             refused=self._refused,
             findings=(left.reading.finding, right.reading.finding),
-            decided_at=thought.decided_at,
+            decided_at=result.decided_at,
             maneuver=self.decision.maneuver,
             contact=self.decision.contact,
-            bad_command=thought.bad_command,
-            failure=thought.failure,
+            bad_command=result.bad_command,
+            failure=result.failure,
             resets=clock.resets,
             reset_reason="" if clock.last_reset is None else clock.last_reset.name,
             board_error=self.board.trouble,

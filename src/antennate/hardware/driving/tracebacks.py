@@ -9,12 +9,13 @@ import math
 import traceback
 from collections import deque
 
+from antennate.errors import in_one_line
 from antennate.params import HostParams
 
 EVERY = HostParams().traceback_period
 """Shortest time between two that are kept [s]."""
 _KEPT = 16
-_LONGEST_LINE, _LONGEST_TEXT = 300, 20_000
+_LONGEST_TEXT = 20_000
 """Characters; an exception may quote anything."""
 
 
@@ -42,16 +43,5 @@ class Tracebacks:
         except KeyboardInterrupt:
             raise
         except BaseException:  # noqa: BLE001 it asks the error for its notes, which may raise too
-            text = said(error)
+            text = in_one_line(error)
         self.kept.append(text[-_LONGEST_TEXT:])
-
-
-def said(error: BaseException) -> str:
-    """An exception in one line, with its type; of one that has no words the type alone."""
-    name = type(error).__name__
-    try:
-        return f"{name}: {' '.join(str(error).split())}"[:_LONGEST_LINE]
-    except KeyboardInterrupt:
-        raise
-    except BaseException:  # noqa: BLE001 anybody's __str__ may raise anything
-        return name

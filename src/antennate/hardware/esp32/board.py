@@ -49,13 +49,13 @@ class Board(Listener):
 
     @property
     def lost(self) -> int:
-        """Samples that never came since `count_anew`."""
-        return self.clock.sequence.lost - self._lost_before
+        """Samples that never came since `count_anew`; 0 at least, though some may come late."""
+        return max(0, self.clock.lost - self._lost_before)
 
     def count_anew(self, now: float) -> None:
         """Forget what was lost by now [s], as while servos were looked for and nobody read."""
         self.poll(now)
-        self._lost_before = self.clock.sequence.lost
+        self._lost_before = self.clock.lost
 
     def poll(self, now: float) -> int:
         """Take the newest of what has come by now [s]; how many usable samples that were."""

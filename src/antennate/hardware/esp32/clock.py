@@ -120,6 +120,7 @@ class DeviceClock:
         self.epoch = 0
         self.newest: Timed | None = None
         self.sequence = Sequence()
+        self._lost_before = 0
         self._boot: int | None = None
         self._retired: deque[int] = deque(maxlen=RETIRED_BOOTS)
         self._modulus = 0
@@ -143,9 +144,15 @@ class DeviceClock:
         self._modulus = 1 << hello.tick_bits
         self._period = 1e6 / hello.rate
         self.newest = None
+        self._lost_before += self.sequence.lost
         self.sequence = Sequence()
         self._doubts = 0
         return True
+
+    @property
+    def lost(self) -> int:
+        """Samples of all boots that never came; a late one lowers it again."""
+        return self._lost_before + self.sequence.lost
 
     def take(self, sample: Sample, now: float) -> Verdict:
         """Judge a sample that arrived at host's time now [s]; a USED one becomes `newest`."""
