@@ -37,6 +37,7 @@ class Registry(Generic[T]):
     def __init__(self, kind: str, group: str, ours: Mapping[str, T]) -> None:
         self._kind, self._group = kind, group
         self._known: dict[str, T] = dict(ours)
+        self._added: set[str] = set()
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -44,17 +45,24 @@ class Registry(Generic[T]):
         others = (point.name for point in entry_points(group=self._group))
         return tuple(dict.fromkeys((*self._known, *others)))
 
-    def add(self, name: str, found: T) -> None:
+    def add(self, name: str, found: T, replace: bool = False) -> None:
         """Make an object known under a name, in this process only.
+
+        Args:
+            name: The name.
+            found: The object.
+            replace: Take the place of one that was added before, never of one of ours.
 
         Raises:
             ConfigError: The name is taken, or holds a colon.
         """
-        if ":" in name or name in self.names:
+        taken = name in self.names and not (replace and name in self._added)
+        if ":" in name or taken:
             raise ConfigError(
                 f"expected a new name without a colon for a {self._kind}, found {name!r}"
             )
         self._known[name] = found
+        self._added.add(name)
 
     def check(self, name: str) -> str:
         """Return the name if it may be valid; no code of the user runs.
