@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 import antennate
+from antennate.control.controllers import open_loop
 from antennate.params import ControlParams, SpringParams
 
 SHORT = {"trials": 2, "time_limit": 3.0}
@@ -92,8 +93,16 @@ def test_an_own_class_runs_and_may_be_defined_again() -> None:
         ours, mine = result.rows[0], result.rows[2]
         assert mine.controller == "Cell"
         assert mine.progress_m == ours.progress_m
-    with pytest.raises(antennate.BadInputError, match="expected names where workers is above 1"):
-        antennate.run("tunnel", controllers=(Cell,), workers=2, trials=4)
+    again = type("Cell", (Cell,), {})
+    with pytest.raises(antennate.BadInputError, match="expected what worker processes can import"):
+        antennate.run("tunnel", controllers=(again,), workers=2, trials=4)
+
+
+def test_an_own_class_of_a_module_runs_in_workers() -> None:
+    result = antennate.run(
+        "tunnel", controllers=("open", open_loop), trials=1, time_limit=1.0, workers=2
+    )
+    assert {row.controller for row in result.rows} == {"open", "open_loop"}
 
 
 @pytest.mark.parametrize(

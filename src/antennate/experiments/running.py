@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -138,11 +139,18 @@ def _names(controllers: Iterable[str | ControllerFactory], workers: int) -> tupl
             names.append(controller)
             continue
         name = controller.__name__
-        if workers > 1:
+        if workers > 1 and not _importable(controller):
             raise ConfigError(
-                f"controllers: expected names where workers is above 1, found {name}; give "
-                f"'file.py:{name}', or 1 worker"
+                f"controllers: expected what worker processes can import, found {name} of a "
+                f"notebook or a function; put it into a file, or use 1 worker"
             )
-        CONTROLLERS.add(name, controller, replace=True)
+        CONTROLLERS.add(name, controller)
         names.append(name)
     return tuple(names)
+
+
+def _importable(controller: ControllerFactory) -> bool:
+    """Whether a fresh process finds this class: at the top of a module that is a file."""
+    module = sys.modules.get(controller.__module__)
+    found = getattr(module, controller.__name__, None)
+    return found is controller and hasattr(module, "__file__")
