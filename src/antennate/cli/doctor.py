@@ -11,7 +11,6 @@ from pydantic.dataclasses import dataclass
 from antennate.cli import BAD_INPUT, OK
 from antennate.cli.addresses import RobotOptions, key_of, parse_robot, require_lossless
 from antennate.cli.checks import show_rows
-from antennate.cli.folder import RunFolder, to_json
 from antennate.cli.options import option
 from antennate.cli.progress import terminate_as_interrupt
 from antennate.errors import ConfigError
@@ -21,6 +20,8 @@ from antennate.hardware.doctor.ports import opener_of, same
 from antennate.hardware.doctor.rows import Opener, worst
 from antennate.hardware.host_clock import HostClock
 from antennate.hardware.robot_file import RobotFile
+from antennate.studies.formats import to_json
+from antennate.studies.run_directory import RunDirectory
 
 DESCRIPTION = """\
 Examine the antenna board and the servo bus of a robot at rest, or of its twin: one line for each
@@ -56,8 +57,8 @@ def command(argv: Sequence[str]) -> int:
     if orders.out is None:
         checkup, changes = _examine(robot, orders, key)
     else:
-        with RunFolder.open("doctor", orders.out, orders.overwrite) as folder:
-            folder.describe("doctor", argv, config)
+        with RunDirectory.create("doctor", orders.out, orders.overwrite) as folder:
+            folder.describe(config, ["antennate", "doctor", *argv])
             checkup, changes = _examine(robot, orders, key)
             folder.finish(checkup.result(changes), ())
             sys.stderr.write(f"written to {folder.path}\n")

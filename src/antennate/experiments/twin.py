@@ -85,7 +85,7 @@ class Watch:
         self.body.load(0, start.world, start.chance)
         self.controller = make_controller(name, config.control, config.robot)
         self.controller.reset(np.array([0]), start.phase)
-        self._monitor = TrialMonitor(name, trial, start.scene, [], config.time_limit)
+        self._monitor = TrialMonitor(config.seed, trial, name, start.scene, [], config.time_limit)
         self.maneuvers: list[int] = []
         self.counts: list[tuple[float, float]] = []
         self.status = ""
