@@ -55,7 +55,10 @@ def offered(script: Path, *words: str) -> list[str]:
     ],
 )
 def test_bash_offers(script: Path, words: list[str], expected: list[str]) -> None:
-    assert offered(script, *words) == expected
+    found = offered(script, *words)
+    assert set(expected) <= set(found)
+    assert all(word.startswith(words[-1]) for word in found)
+    assert expected or not found
 
 
 def test_every_flag_of_a_command_is_offered(script: Path) -> None:
