@@ -72,7 +72,7 @@ def trajectories():
     found = rows()
     paths = {(row.controller, row.trial): path(2.0) for row in found}
     paths["open", 3] = path(-40.0)  # far out of the entrance
-    return tunnel.trajectories(paths, tuple(BUILT_IN), found, range(4), 0.07)
+    return tunnel.trajectories(paths, tuple(BUILT_IN), found, range(4))
 
 
 def walk_result() -> dict:

@@ -96,7 +96,7 @@ def test_S9_doctor_names_the_board_to_which_the_films_do_not_belong(file: Path) 
     patient = Patient()
     robot = RobotFile(sensor_id="0" * 16).for_doctor()
     row = wrong(examine(robot, None, ("/dev/esp32", patient.esp32), patient.clock.now))[
-        "esp32: films"
+        "esp32: sensors"
     ]
     assert row.expected == f"on board {'0' * 16}"
     assert row.found == f"board {b'twin'.hex()}00000000"

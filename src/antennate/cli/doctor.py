@@ -14,10 +14,11 @@ from antennate.cli.checks import show_rows
 from antennate.cli.options import option
 from antennate.cli.progress import terminate_as_interrupt
 from antennate.errors import ConfigError
-from antennate.hardware.doctor.checkup import Checkup, DoctorConfig, examine
+from antennate.hardware.doctor.check import Opener
+from antennate.hardware.doctor.checkup import Checkup, examine
+from antennate.hardware.doctor.config import DoctorConfig
 from antennate.hardware.doctor.fix import Change, apply, plan
 from antennate.hardware.doctor.ports import opener_of, same
-from antennate.hardware.doctor.rows import Opener, worst
 from antennate.hardware.host_clock import HostClock
 from antennate.hardware.robot_file import RobotFile
 from antennate.studies.formats import to_json
@@ -67,7 +68,7 @@ def command(argv: Sequence[str]) -> int:
         sys.stdout.write(to_json(checkup.result(changes)))
     else:
         show_rows(checkup.rows)
-    return BAD_INPUT if worst(checkup.rows) == "bad" else OK
+    return BAD_INPUT if checkup.verdict == "bad" else OK
 
 
 def _check(orders: Orders) -> None:
@@ -115,9 +116,9 @@ def _fix(
     made: list[str] = []
     refused: set[Change] = set()
     for _ in range(_ROUNDS):
-        if checkup.survey is None:
+        if checkup.bus is None:
             break
-        todo = [one for one in plan(checkup.survey, robot.layout) if one not in refused]
+        todo = [one for one in plan(checkup.bus, robot.layout) if one not in refused]
         if not todo:
             break
         for change in todo:

@@ -32,9 +32,12 @@ def summaries() -> dict[str, str]:
     for name in _folders():
         text = importlib.import_module(f"{__name__}.{name}").__doc__ or ""
         found[name] = text.splitlines()[0].rstrip(".")
-    for name in _entries():
+    for name in names():
         if name not in found:
-            found[name] = load(name).description.partition(".")[0]
+            try:
+                found[name] = load(name).description.strip().partition(".")[0]
+            except BadInputError as error:
+                found[name] = f"({error})"
     return found
 
 

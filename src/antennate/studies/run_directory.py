@@ -25,19 +25,16 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict
 from importlib import metadata
 from pathlib import Path
-from typing import IO, Any, TypeVar
-
-from pydantic import ValidationError
+from typing import IO, Any
 
 from antennate import __version__
 from antennate.errors import BadInputError, OutputError
 from antennate.files import write_whole
 from antennate.params import Params
 from antennate.params.log import MOST_PARTS
+from antennate.params.reading import Config, read_file
 from antennate.studies.formats import from_csv, strict, to_csv, to_json, to_toml
 from antennate.telemetry.parts import part
-
-Config = TypeVar("Config", bound=Params)
 
 RESULT, TABLE, PARTIAL = "result.json", "trials.csv", "trials.partial.jsonl"
 CONFIG, VERSIONS, COMMAND = "config.toml", "versions.json", "command.txt"
@@ -132,12 +129,7 @@ class RunDirectory:
         Raises:
             BadInputError: It is missing or damaged, or is of another command.
         """
-        import tomllib
-
-        return self._decoded(
-            CONFIG,
-            lambda text: model.model_validate_json(json.dumps(tomllib.loads(text)), strict=True),
-        )
+        return read_file(self.path / CONFIG, model)
 
     def _decoded(self, name: str, decode: Any) -> Any:
         path = self.path / name
@@ -147,7 +139,7 @@ class RunDirectory:
             raise BadInputError(
                 f"expected a readable file, found {path}: {error.strerror}"
             ) from None
-        except (ValueError, ValidationError) as error:
+        except ValueError as error:
             raise BadInputError(
                 f"{path}: expected a whole file of this kind, found: {str(error).splitlines()[0]}"
             ) from None
