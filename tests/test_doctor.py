@@ -156,7 +156,8 @@ def test_L14_swapped_ports_are_known_from_both_sides() -> None:
     ("fault", "check", "found", "verdict"),
     [
         ("esp32=silent", "greeting", "nothing", "bad"),
-        ("esp32=open_left", "left antenna", "film torn off", "bad"),
+        ("esp32=open_left", "left antenna", "wire open", "bad"),
+        ("esp32=short_left", "left antenna", "torn off", "bad"),
         ("esp32=right:4200", "right antenna", "short to supply", "bad"),
         ("esp32=left:1450", "left at rest", "b = 0.9", "bad"),
     ],

@@ -40,7 +40,7 @@ ready. Physics begins when the first servo gets torque. --fault and --touch may 
 Faults, each with @Ts for its time:
 servo:ID=silent, bad_crc, truncated, late:SECONDS, doubled, wrong_id, oversized, voltage, overheat,
 encoder, shock, overload, reboot or REGISTER:VALUE;
-esp32=silent, reset, open_left, open_right, left:COUNTS, right:COUNTS or ber:SHARE;
+esp32=silent, reset, open_left, short_left (or right), left:COUNTS, right:COUNTS or ber:SHARE;
 bus=silent, loss:SHARE, latency:SECONDS, discharge:VOLTS_A_SECOND or ber:SHARE;
 link=ber:SHARE (bits wrong) or loss:SHARE (bytes lost), on both wires both ways."""
 

@@ -23,7 +23,7 @@ from antennate.hardware.dynamixel.answers import Timing
 from antennate.hardware.dynamixel.bus import Bus
 from antennate.hardware.esp32.board import Board
 from antennate.hardware.joints import Joints
-from antennate.hardware.safety.trust import Trust
+from antennate.hardware.safety.signal_quality import SignalQuality
 from antennate.params import ControlParams, SupervisorParams, TouchCheckParams
 from antennate.robots.layout import LayoutParams
 from antennate.sim.scenes.registry import make_scene
@@ -162,8 +162,7 @@ def rig(config: TwinConfig, name: str = "closed", touch: TouchCheckParams | None
         clock=clock,
         controller=make_controller(name, params, config.robot),
         period=params.period,
-        conditioning=params.conditioning,
-        trust=Trust(params.conditioning, touch=touch),
+        quality=SignalQuality(params.conditioning, touch=touch),
     )
     return Rig(robot, clock, session)
 
