@@ -9,9 +9,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from twin_rig import Rig, rig
 
 from antennate.cli import main
-from antennate.experiments.twin import Rig, rig
 from antennate.hardware.driving.config import DriveConfig
 from antennate.hardware.driving.connect import prepare
 from antennate.hardware.driving.drive import drive
