@@ -80,6 +80,7 @@ class SimRobot:
         self._rows: list[_Row | None] = [None] * batch
         self._sensors = SensorChain(robot.antenna.sensor, (batch, 2), period)
         self._yaws = robot.yaw_count
+        self._parts = list(robot.command_shapes())
         self._period = period
         self._substeps = round(period / timestep)
         if abs(self._substeps * timestep - period) > 1e-9:
@@ -139,9 +140,8 @@ class SimRobot:
     def write(self, command: JointCommand) -> None:
         """Command every row's joints."""
         batch = len(self._rows)
-        drive = np.concatenate(
-            [command.yaw, command.leg.reshape(batch, -1), command.antenna], axis=1
-        )
+        parts = [getattr(command, name).reshape(batch, -1) for name in self._parts]
+        drive = np.concatenate(parts, axis=1)
         for i, row in enumerate(self._rows):
             if row is not None and row.failure is None:
                 drive[i, : self._yaws] += row.chance.joint_bias

@@ -53,7 +53,7 @@ def connect(
         BadInputError: No antenna board speaks, or it is refused.
         BringUpError: The servos are not those expected.
     """
-    controller = make_controller(config.controller, config.control)
+    controller = make_controller(config.controller, config.control, config.robot)
     with contextlib.ExitStack() as stack:
         lines: list[Port] = []
         for flag, address, baud in (
@@ -90,7 +90,7 @@ def prepare(
         bus=master,
         joints=Joints(config.robot),
         clock=clock,
-        controller=controller or make_controller(config.controller, config.control),
+        controller=controller or make_controller(config.controller, config.control, config.robot),
         period=config.control.period,
         quality=SignalQuality(
             config.control.conditioning,

@@ -106,7 +106,7 @@ class Session:
         self.timing: LoopTiming | None = None
         self.outputs: Outputs | None = None
         self.frame = AntennaFrame(t=np.zeros(1), counts=np.full((1, 2), math.nan))
-        self.command = no_command()
+        self.command = no_command(self.joints.robot)
         self.decision = Decision()
         self._body = HardwareRobot(board, bus, joints, clock)
         self._result = StepResult()
@@ -220,7 +220,7 @@ class Session:
         except BaseException as error:  # noqa: BLE001 a plugged-in controller may raise anything
             result.failure = in_one_line(error)
             self.tracebacks.keep(self.clock.now(), error)
-            return no_command()
+            return no_command(self.joints.robot)
         result.decided_at = self.clock.now()
         try:
             command = self.joints.plain(command)
