@@ -43,7 +43,7 @@ _ANGLE_LIMIT = 6.3
 _HEIGHT_LIMIT = 0.3
 """A head above or below this left the world [m]."""
 
-_PLANE = mujoco.mjtGeom.mjGEOM_PLANE
+_PLANE = int(mujoco.mjtGeom.mjGEOM_PLANE)
 
 
 def new_spec(physics: PhysicsParams) -> mujoco.MjSpec:
@@ -94,7 +94,7 @@ def _meet_robot(spec: mujoco.MjSpec) -> None:
     """Let geoms with the engine's default collision bits touch the robot; planes are floors."""
     for geom in spec.geoms:
         if geom.contype == geom.conaffinity == 1:
-            is_floor = geom.type == _PLANE
+            is_floor = int(geom.type) == _PLANE
             geom.contype = layers.FLOOR if is_floor else layers.OBSTACLE
             geom.conaffinity = 0 if is_floor else layers.OBSTACLE | layers.FLOOR
 
