@@ -130,7 +130,10 @@ class World:
         self._steps = 0
         data = self.data
         self._qpos, self._qvel, self._ctrl = data.qpos, data.qvel, data.ctrl
+        self._head: Floats = data.qpos[self._root : self._root + 3]
+        self._bent: Floats = np.zeros(len(self._bounded))
         self._warnings = data.warning.number
+        self._no_warning = self._warnings.tobytes()
 
     def _addresses(self, joints: list[str]) -> Ints:
         return np.array([self.model.joint(n).qposadr[0] for n in joints])
@@ -161,6 +164,10 @@ class World:
                 self._steps,
                 f"target of actuator {self.model.actuator(self._drive[bad]).name} is {drive[bad]}",
             )
+        self.command_finite(drive)
+
+    def command_finite(self, drive: Floats) -> None:
+        """Set all joint targets as `command` does, without a check."""
         self._ctrl[self._drive] = drive
 
     def drives(self) -> Floats:
@@ -182,8 +189,9 @@ class World:
         self._check(before)
 
     def _check(self, before: float) -> None:
-        x, y, height = self.head.tolist()
-        bent, speed = self._qpos[self._bounded], self._qvel
+        x, y, height = self._head.tolist()
+        bent, speed = self._bent, self._qvel
+        self._qpos.take(self._bounded, out=bent, mode="clip")
         sound = (
             abs(x) < _DISTANCE_LIMIT
             and abs(y) < _DISTANCE_LIMIT
@@ -191,7 +199,7 @@ class World:
             and self.data.time > before
             and bent.dot(bent) < _ANGLE_LIMIT**2  # no entry is larger than the norm
             and speed.dot(speed) < _SPEED_LIMIT**2
-            and not self._warnings.any()
+            and self._warnings.tobytes() == self._no_warning
         )
         if not sound:
             self._explain(before)
@@ -217,6 +225,15 @@ class World:
         if not 0.0 < height < _HEIGHT_LIMIT:
             raise SimulationError(self._steps, f"the head is at a height of {height:.3g} m")
 
+    def read_hinges(self, angles: Floats) -> None:
+        """Write the angles of all hinges under the flex sensors to `angles` [rad], shape (2, n)."""
+        self._qpos.take(self._flex, out=angles, mode="clip")
+
+    @property
+    def sensed_hinges(self) -> int:
+        """Number of hinges under one flex sensor."""
+        return self._flex.shape[1]
+
     def flex(self) -> Floats:
         """Summed hinge angles under each film [rad], shape (2,); positive towards the tail."""
         return self._qpos[self._flex].sum(axis=1)
@@ -224,7 +241,7 @@ class World:
     @property
     def head(self) -> Floats:
         """Position of the head link [m], shape (3,), a view of the state."""
-        return self._qpos[self._root : self._root + 3]
+        return self._head
 
     @property
     def heading(self) -> float:

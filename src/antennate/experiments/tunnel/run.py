@@ -15,7 +15,7 @@ from antennate.control.loop import run_loop
 from antennate.control.registry import BUILT_IN, CONTROLLERS, make_controller
 from antennate.experiments.tunnel.monitor import TrialMonitor, TrialPath, TrialResult
 from antennate.params import ControlParams, number
-from antennate.sim.scenes.registry import make_scene
+from antennate.sim.scenes.registry import TUNNEL, make_scene
 from antennate.sim.sim_robot import SimRobot
 from antennate.sim.trial import TrialConfig, draw_trial
 from antennate.studies import statistics
@@ -23,7 +23,7 @@ from antennate.studies.pool import run_tasks
 from antennate.types import AntennaFrame, JointCommand
 
 SCHEMA = 2
-_BATCH = 6
+_BATCH = 12
 """Trials of one process stepped in lockstep: one NumPy call serves them all."""
 _TASK = 12
 """Most trials handed to a process at once."""
@@ -91,7 +91,7 @@ class TunnelOutcome:
             "command": "tunnel",
             "seed": config.seed,
             "time_limit_s": config.time_limit,
-            "length_m": config.tunnel.length,
+            "length_m": config.tunnel.length if config.scene == TUNNEL else None,
             "interrupted": self.interrupted,
             "controllers": {n: summarise(rows, config.time_limit) for n, rows in by_name.items()},
             "paired": _paired(by_name),
@@ -125,11 +125,12 @@ def run_trials(
             monitors[row] = TrialMonitor(controller, trial, start.scene, before, config.time_limit)
 
     def go_on(frame: AntennaFrame, command: JointCommand) -> bool:
+        maneuvers: list[int] = control.maneuver.tolist()
         for row, monitor in enumerate(monitors):
             if monitor is None:
                 continue
             world, failure = body.world(row), body.failure(row)
-            status = monitor.watch(world, int(control.maneuver[row]), failure is not None)
+            status = monitor.watch(world, maneuvers[row], failure is not None)
             if status is not None:
                 emit((monitor.result(world, status, str(failure or "")), monitor.path(world)))
                 fill(row)
