@@ -199,11 +199,11 @@ def tunnels(engines: list[Engine], trials: int, limit: float) -> dict[str, dict[
 def _statistics(found: list[tuple[TrialResult, float]], limit: float) -> dict[str, Any]:
     times: Floats = np.array([row.time_s for row, _ in found])
     error = float(times.std(ddof=1)) / math.sqrt(len(times))
-    ended = [row.time_s if row.status == "success" else limit for row, _ in found]
+    ended = [row.time_s if row.outcome == "success" else limit for row, _ in found]
     return {
         "trials": len(found),
-        "successes": sum(row.status == "success" for row, _ in found),
-        "invalid": sum(row.status == "invalid" for row, _ in found),
+        "successes": sum(row.outcome == "success" for row, _ in found),
+        "invalid": sum(row.outcome == "invalid" for row, _ in found),
         "mean_time_s": float(times.mean()),
         "mean_time_se": error,
         "mean_force_n": float(np.mean([row.force_mean_n for row, _ in found])),

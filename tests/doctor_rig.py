@@ -5,9 +5,10 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Iterator
 
-from antennate.hardware.doctor.checkup import Checkup, DoctorConfig, examine
+from antennate.hardware.doctor.check import Row
+from antennate.hardware.doctor.checkup import Checkup, examine
+from antennate.hardware.doctor.config import DoctorConfig
 from antennate.hardware.doctor.fix import apply, plan
-from antennate.hardware.doctor.rows import Row
 from antennate.hardware.ports.port import Port
 from antennate.twin.config import TwinConfig, build
 from antennate.twin.faults import Faults, read
@@ -49,9 +50,7 @@ class Patient:
     def fix(self) -> list[str]:
         """Changes made until nothing is left to change."""
         made: list[str] = []
-        while (survey := self.examine(esp32=False).survey) and (
-            changes := plan(survey, ROBOT.layout)
-        ):
+        while (survey := self.examine(esp32=False).bus) and (changes := plan(survey, ROBOT.layout)):
             for change in changes:
                 apply(self.bus, change, self.clock.now)
                 made.append(str(change))

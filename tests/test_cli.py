@@ -15,16 +15,15 @@ import numpy as np
 import pytest
 
 import antennate
-from antennate.cli import COMMANDS, main
+from antennate.cli import commands, main
 from antennate.cli.arguments import FromFile, parse_with
-from antennate.cli.folder import strict, to_csv
-from antennate.cli.toml import to_toml
 from antennate.errors import ConfigError
 from antennate.experiments.gait.run import GaitStudyConfig
 from antennate.experiments.tunnel.run import TunnelConfig
 from antennate.messages import one_line
 from antennate.params.reading import read_file
 from antennate.sim.world import World
+from antennate.studies.formats import strict, to_csv, to_toml
 from antennate.twin.config import TwinConfig
 
 SMALL = ["tunnel", "--trials", "1", "--controllers", "open", "--time-limit", "1", "--workers", "1"]
@@ -75,7 +74,7 @@ def test_python_runs_the_package_as_the_command():
     assert done.stdout == f"antennate {antennate.__version__}\n"
 
 
-@pytest.mark.parametrize("command", sorted(COMMANDS))
+@pytest.mark.parametrize("command", sorted(commands()))
 def test_help_fits_two_screens_and_help_all_shows_every_flag(capsys, command):
     assert main([command, "--help"]) == 0
     short = capsys.readouterr().out.splitlines()
@@ -280,7 +279,7 @@ def test_a_run_leaves_a_folder_that_explains_itself(capsys, tmp_path):
     assert versions["antennate"] == antennate.__version__
     assert versions["numpy"] == np.__version__
     [row] = table(run)
-    assert (row["controller"], row["trial"], row["status"], row["time_s"]) == (
+    assert (row["controller"], row["trial"], row["outcome"], row["time_s"]) == (
         "open",
         "0",
         "timeout",
@@ -399,14 +398,14 @@ def test_an_invalid_trial_is_a_row_and_no_success(capsys, tmp_path, monkeypatch)
     assert (open_["trials"], open_["invalid"], open_["successes"]) == (2, 2, 0)
     assert open_["restricted_mean_time_s"] is None
     rows = table(tmp_path / "run")
-    assert [row["status"] for row in rows] == ["invalid", "invalid"]
+    assert [row["outcome"] for row in rows] == ["invalid", "invalid"]
     assert all("physics step" in row["reason"] for row in rows)
 
 
 def test_interrupted_in_the_middle_keeps_the_finished_trials(capsys, tmp_path, monkeypatch):
-    from antennate.cli.folder import RunFolder
+    from antennate.studies.run_directory import RunDirectory
 
-    kept = RunFolder.append
+    kept = RunDirectory.append
     seen = []
 
     def append(self, row):
@@ -415,10 +414,10 @@ def test_interrupted_in_the_middle_keeps_the_finished_trials(capsys, tmp_path, m
         if len(seen) == 2:
             raise KeyboardInterrupt
 
-    monkeypatch.setattr(RunFolder, "append", append)
+    monkeypatch.setattr(RunDirectory, "append", append)
     assert main([*SMALL, "--trials", "30", "--out", "run"]) == 130
     out, err = capsys.readouterr()
-    assert "interrupted: kept 2 of 30 trials" in err
+    assert "interrupted: kept 2 trials" in err
     assert "trials" in out
     rows = table(tmp_path / "run")
     assert sorted(int(row["trial"]) for row in rows) == sorted(row["trial"] for row in seen)
@@ -431,7 +430,7 @@ def test_interrupted_in_the_middle_keeps_the_finished_trials(capsys, tmp_path, m
 @pytest.mark.parametrize("workers", ["1", "2"])
 def test_a_signal_ends_the_run_and_keeps_its_trials(tmp_path, number, workers):
     code = (
-        "import signal, sys; from antennate.cli import COMMANDS, main; "
+        "import signal, sys; from antennate.cli import main; "
         "signal.signal(signal.SIGINT, signal.default_int_handler); sys.exit(main(sys.argv[1:]))"
     )
     words = ["tunnel", "--trials", "5000", "--out", "run", "--no-figures", "--workers", workers]

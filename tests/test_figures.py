@@ -20,7 +20,7 @@ WALLS = (np.array([[0.0, 0.3], [2.0, 0.3]]), np.array([[0.0, -0.3], [2.0, -0.3]]
 class Row:
     controller: str
     trial: int
-    status: str
+    outcome: str
     time_s: float
 
 
@@ -52,8 +52,8 @@ def path(end: float, samples: int = 40) -> Path:
 
 
 def rows() -> list[Row]:
-    verdicts = [("success", 10.0), ("success", 20.0), ("timeout", LIMIT), ("left", LIMIT)]
-    return [Row(name, k, *verdict) for name in BUILT_IN for k, verdict in enumerate(verdicts)]
+    outcomes = [("success", 10.0), ("success", 20.0), ("timeout", LIMIT), ("left", LIMIT)]
+    return [Row(name, k, *end) for name in BUILT_IN for k, end in enumerate(outcomes)]
 
 
 def summaries() -> dict[str, dict]:
@@ -72,7 +72,7 @@ def trajectories():
     found = rows()
     paths = {(row.controller, row.trial): path(2.0) for row in found}
     paths["open", 3] = path(-40.0)  # far out of the entrance
-    return tunnel.trajectories(paths, tuple(BUILT_IN), found, range(4), 0.07)
+    return tunnel.trajectories(paths, tuple(BUILT_IN), found, range(4))
 
 
 def walk_result() -> dict:
@@ -164,10 +164,10 @@ def test_every_maneuver_has_its_own_colour_on_the_course():
 
 def test_trials_without_a_course_leave_an_empty_panel():
     nothing = Path(
-        np.zeros((0, 2)), np.zeros(0), WALLS, np.zeros((2, 0, 2)), np.full((6, 2), np.nan)
+        np.zeros((0, 2)), np.zeros(0), list(WALLS), [], [], WALLS[0], np.full((6, 2), np.nan)
     )
     figure = tunnel.trajectories(
-        {("open", 0): nothing}, ("open",), [Row("open", 0, "invalid", LIMIT)], range(2), 0.07
+        {("open", 0): nothing}, ("open",), [Row("open", 0, "invalid", LIMIT)], range(2)
     )
     style.render(figure)
     assert [p.get_title(loc="left") for p in figure.axes] == [

@@ -42,7 +42,7 @@ class Log:
     """What was seen after every tick: time, state, causes, maneuver and goals."""
 
     def __init__(self, rig: Rig, act: Callable[[Rig, float], None] | None = None) -> None:
-        self.rig, self._act = rig, act
+        self.rig, self._act, self.report = rig, act, Report()
         self.t: list[float] = []
         self.state: list[State] = []
         self.causes: list[set[Cause]] = []
@@ -67,7 +67,7 @@ class Log:
 def walked(act: Callable[[Rig, float], None] | None = None, config: DriveConfig = CONFIG) -> Log:
     made = rig(TwinConfig())
     log = Log(made, act)
-    drive(made.session, config, arm=True, on_tick=log)
+    log.report = drive(made.session, config, arm=True, on_tick=log)
     return log
 
 
@@ -140,7 +140,7 @@ def test_L8_L9_a_silent_board_makes_it_hold_within_100_ms_and_its_return_walk() 
 
 
 @pytest.mark.parametrize("when", [0.3, 1.02, 2.0])
-def test_D9_every_tick_can_be_logged_whenever_the_board_resets(when: float) -> None:
+def test_E1_every_tick_can_be_logged_whenever_the_board_resets(when: float) -> None:
     """In the dry run, while arming, on the way."""
     act = at(when, "esp32=reset")
 
@@ -166,11 +166,24 @@ def test_E1_a_board_that_resets_is_counted_and_used_again_within_a_second_of_its
     assert (state[t > 3.5] <= State.DEGRADED).all()
 
 
-def test_S1_an_open_wire_makes_it_hold_and_says_which_side() -> None:
-    log = walked(at(2.0, "esp32=open_left"))
+@pytest.mark.parametrize(
+    ("fault", "cause", "side"),
+    [
+        ("open_left", Cause.OPEN, "left"),
+        ("open_right", Cause.OPEN, "right"),
+        ("short_left", Cause.SHORT_LO, "left"),
+        ("right:4095", Cause.SHORT_HI, "right"),
+    ],
+)
+def test_S1_S2_a_broken_wire_is_named_with_its_side_through_bytes_within_100_ms(
+    fault: str, cause: Cause, side: str
+) -> None:
+    log = walked(at(2.0, f"esp32={fault}"))
+    assert log.first(cause) <= 2.0 + 0.1 + 0.02  # the reading after the fault, and its way here
     t, state = np.array(log.t), np.array(log.state)
     assert (state[t > 2.11] >= State.HOLD).all()
-    assert any("(l" in text or "l)" in text for text in log.texts[-5:])
+    assert log.texts[-1].startswith(f"HOLD {cause.name}: {cause.text} ({side})")
+    assert log.report.why.startswith(f"HOLD {cause.name}: ")
 
 
 def test_B1_a_silent_servo_is_named_within_100_ms_and_the_others_keep_their_torque() -> None:

@@ -12,7 +12,6 @@ from scipy import stats
 from antennate import figures as style
 from antennate.antenna import statics as mechanics
 from antennate.cli import main
-from antennate.cli.folder import to_csv, to_json
 from antennate.errors import SimulationError
 from antennate.experiments import reading
 from antennate.experiments.touch import figure as figures
@@ -28,6 +27,7 @@ from antennate.robots.antenna import AntennaParams
 from antennate.robots.sensor import SensorParams
 from antennate.sim import touch_wall
 from antennate.sim.bench import Ball, Bar, Bench, compile_bench
+from antennate.studies.formats import to_csv, to_json
 
 SMALL = TouchConfig(
     trials=2,
@@ -277,7 +277,7 @@ def test_free_before_and_after_and_pressed_between(outcome):
 
 
 def test_the_study_counts_what_it_ran(outcome):
-    result, rows = outcome.result(), outcome.rows()
+    result, rows = outcome.result(), outcome.rows
     assert json.loads(to_json(result))["command"] == "touch"
     assert len(rows) == len(outcome.traverses) == 8
     for name, measured in result["profiles"].items():
@@ -319,7 +319,7 @@ def test_the_force_that_is_needed_bends_the_film_that_far(outcome):
 def test_the_same_bytes_on_one_and_two_workers(outcome):
     other = touch.run(SMALL, workers=2)
     assert to_json(other.result()) == to_json(outcome.result())
-    rows = [to_csv(dataclasses.asdict(r) for r in o.rows()) for o in (outcome, other)]
+    rows = [to_csv(dataclasses.asdict(r) for r in o.rows) for o in (outcome, other)]
     assert rows[0] == rows[1]
 
 
@@ -333,8 +333,8 @@ def test_a_traverse_that_breaks_is_a_row_with_its_reason(monkeypatch):
     assert found.result()["invalid"] == 2
     assert found.result()["profiles"]["stiff"]["f1"] is None
     assert found.example() is None
-    assert [row.status for row in found.rows()] == ["invalid"] * 2
-    assert "engine warning" in found.rows()[0].reason
+    assert [row.status for row in found.rows] == ["invalid"] * 2
+    assert "engine warning" in found.rows[0].reason
     for figure in (figures.measures(found.result()), figures.curves(found.result())):
         style.render(figure)
 

@@ -11,7 +11,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from antennate.hardware.doctor.rows import Row
+from antennate.hardware.doctor.check import Row
 from antennate.messages import one_line
 
 _STYLES = {"ok": "green", "warn": "yellow", "bad": "bold red"}

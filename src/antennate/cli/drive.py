@@ -11,7 +11,6 @@ from pydantic.dataclasses import dataclass
 
 from antennate.cli import BAD_INPUT, OK, viewer
 from antennate.cli.addresses import RobotOptions, key_of, parse_robot, require_lossless
-from antennate.cli.folder import LOG, RunFolder, to_json
 from antennate.cli.options import option
 from antennate.cli.progress import terminate_as_interrupt
 from antennate.cli.tables import Cell, number, show
@@ -24,6 +23,8 @@ from antennate.hardware.driving.priority import Priority, urgent
 from antennate.hardware.driving.session import Session
 from antennate.hardware.robot_file import RobotFile
 from antennate.hardware.safety.causes import State
+from antennate.studies.formats import to_json
+from antennate.studies.run_directory import LOG, RunDirectory
 from antennate.telemetry.feed import Feed
 from antennate.telemetry.header import Header
 from antennate.telemetry.parts import part, parts
@@ -65,8 +66,8 @@ def command(argv: Sequence[str]) -> int:
     config = config.calibrated()
     require_lossless(orders.bus)
     key = key_of(orders)
-    with RunFolder.open("drive", orders.out, orders.overwrite) as folder:
-        folder.describe("drive", argv, config)
+    with RunDirectory.create("drive", orders.out, orders.overwrite) as folder:
+        folder.describe(config, ["antennate", "drive", *argv])
         folder.without_trials()
         wires = connect(config, orders.esp32, orders.bus, key)
         with wires as session, terminate_as_interrupt():

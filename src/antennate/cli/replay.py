@@ -13,11 +13,12 @@ from pydantic.dataclasses import dataclass
 
 from antennate.cli import BAD_INPUT, OK
 from antennate.cli.arguments import FromFile, parse_with
-from antennate.cli.folder import RunFolder, to_csv, to_json
 from antennate.cli.options import option
 from antennate.cli.tables import Cell, number, show
 from antennate.errors import ConfigError
 from antennate.messages import one_line
+from antennate.studies.formats import to_csv, to_json
+from antennate.studies.run_directory import RunDirectory
 from antennate.telemetry.reader import Damage, LogReader
 from antennate.telemetry.replay import ReplayConfig, Replayed, recorded_controller, replay
 from antennate.telemetry.ticks import FIELDS, Tick
@@ -62,8 +63,8 @@ def command(argv: Sequence[str]) -> int:
         found = replay(log, controller, log.header.params.period)
     result = _result(log, found, config.controller)
     if options.out is not None:
-        with RunFolder.open("replay", options.out, options.overwrite) as folder:
-            folder.describe("replay", argv, config)
+        with RunDirectory.create("replay", options.out, options.overwrite) as folder:
+            folder.describe(config, ["antennate", "replay", *argv])
             _keep(folder, path, found)
             folder.finish(result, ())
             sys.stderr.write(f"written to {folder.path}\n")
@@ -169,7 +170,7 @@ def _name(maneuver: int) -> str:
     return Maneuver(maneuver).name if maneuver in set(Maneuver) else str(maneuver)
 
 
-def _keep(folder: RunFolder, path: Path, found: Replayed) -> None:
+def _keep(folder: RunDirectory, path: Path, found: Replayed) -> None:
     """Write the table and the figure, in a second pass over the log."""
     from antennate import figures as style
     from antennate.telemetry.figure import replay as draw

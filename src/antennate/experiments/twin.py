@@ -23,7 +23,7 @@ from antennate.hardware.dynamixel.answers import Timing
 from antennate.hardware.dynamixel.bus import Bus
 from antennate.hardware.esp32.board import Board
 from antennate.hardware.joints import Joints
-from antennate.hardware.safety.trust import Trust
+from antennate.hardware.safety.signal_quality import SignalQuality
 from antennate.params import ControlParams, SupervisorParams, TouchCheckParams
 from antennate.robots.layout import LayoutParams
 from antennate.sim.scenes.registry import make_scene
@@ -85,7 +85,7 @@ class Watch:
         self.body.load(0, start.world, start.chance)
         self.controller = make_controller(name, config.control, config.robot)
         self.controller.reset(np.array([0]), start.phase)
-        self._monitor = TrialMonitor(name, trial, start.scene, [], config.time_limit)
+        self._monitor = TrialMonitor(config.seed, trial, name, start.scene, [], config.time_limit)
         self.maneuvers: list[int] = []
         self.counts: list[tuple[float, float]] = []
         self.status = ""
@@ -162,8 +162,7 @@ def rig(config: TwinConfig, name: str = "closed", touch: TouchCheckParams | None
         clock=clock,
         controller=make_controller(name, params, config.robot),
         period=params.period,
-        conditioning=params.conditioning,
-        trust=Trust(params.conditioning, touch=touch),
+        quality=SignalQuality(params.conditioning, touch=touch),
     )
     return Rig(robot, clock, session)
 

@@ -97,7 +97,7 @@ class Tick:
     def of(cls, session: Session, t: float) -> Tick:
         """The tick of a session that has just written, at the host's time t [s]."""
         out, clock, bus = session.outputs, session.board.clock, session.bus.tally
-        left, right = (channel.reading.counts for channel in session.channels)
+        left, right = session.quality.counts
         bytes_ = session.board.decoder.counters
         return cls(
             **_decided(session.controller, session.decision, session.frame, session.command),
@@ -107,7 +107,7 @@ class Tick:
             reading=(left, right),
             state="" if out is None else out.state.name,
             causes=() if out is None else tuple(_clean(cause.text) for cause in out.causes),
-            note=_clean(session.trust.said),
+            note=_clean(session.quality.status),
             age=clock.age(t),
             missed=0 if session.timing is None else session.timing.report().missed_cycles,
             frames=bytes_.good,

@@ -144,7 +144,8 @@ class TwinRobot:
         self._stream = bytearray()
         self._buffer = bytearray(frame.SAMPLE_FRAME_SIZE)
         self._ticks = self._walked = self._booted = 0
-        self._broken = [False, False]
+        self._wires = ["", ""]
+        self._floating = np.random.default_rng(boot_id)
         self._held = [math.nan, math.nan]
         self._chance = np.random.default_rng(boot_id) if standing_noise else None
         self.touch = touch
@@ -226,7 +227,10 @@ class TwinRobot:
             self._greet()
 
     def break_board(self, what: str) -> None:
-        """Let the board fall silent, start anew after BOOT_TICKS, or lose an antenna's wire."""
+        """Let the board fall silent, start anew after BOOT_TICKS, or break an antenna's wire.
+
+        An open wire leaves the converter's pin unconnected: it reads anything. A short reads 0.
+        """
         if what == "silent":
             self.board_silent = True
         elif what == "reset":
@@ -234,7 +238,8 @@ class TwinRobot:
             self._encoder = frame.SampleEncoder(self._boot_id)
             self._booted = self._ticks + BOOT_TICKS
         else:
-            self._broken[what == "open_right"] = True
+            kind, side = what.split("_")
+            self._wires[side == "right"] = kind
 
     def hold(self, side: int, counts: float) -> None:
         """Hold the reading of antenna 0 (left) or 1 at a value [counts]; NaN releases it."""
@@ -263,13 +268,20 @@ class TwinRobot:
             noise = noise + np.rint(self.touch.change(self._ticks * self._period, used))
         read = np.where(np.isnan(self._held), self._counts, self._held)
         left, right = (
-            0 if broken or math.isnan(counts) else min(max(int(counts), 0), frame.FULL_SCALE)
-            for counts, broken in zip(read + noise, self._broken, strict=True)
+            self._converted(counts, wire)
+            for counts, wire in zip(read + noise, self._wires, strict=True)
         )
         flags = _rail(left, frame.FLAG_LEFT_RAIL) | _rail(right, frame.FLAG_RIGHT_RAIL)
         ticks = round(1e6 * since * self._period) & frame.TICK_MASK
         size = self._encoder.encode_sample_into(self._buffer, since, ticks, left, right, flags, 0)
         self._stream += self._buffer[:size]
+
+    def _converted(self, counts: float, wire: str) -> int:
+        """What the converter gives for a reading behind a wire that may be broken."""
+        if wire == "open":
+            return int(self._floating.integers(frame.FULL_SCALE + 1))
+        shorted = wire == "short" or math.isnan(counts)
+        return 0 if shorted else min(max(int(counts), 0), frame.FULL_SCALE)
 
     def _greet(self) -> None:
         rate = round(1 / self._period)

@@ -26,6 +26,7 @@ from antennate.params.base import number
 from antennate.robots.antenna import AntennaParams
 from antennate.robots.sensor import SensorParams
 from antennate.sim.bench import Bench, compile_bench
+from antennate.studies.experiment import WithoutTrials
 from antennate.studies.pool import run_tasks
 from antennate.types import Floats
 
@@ -120,7 +121,7 @@ class CalibrateConfig(Params):
 
 
 @dataclass(frozen=True)
-class CalibrateOutcome:
+class CalibrateOutcome(WithoutTrials):
     """A calibration and its data.
 
     Attributes:

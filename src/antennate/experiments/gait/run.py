@@ -23,6 +23,7 @@ from antennate.sim.scenes.flat import FlatScene
 from antennate.sim.sim_robot import Disturbance, SimRobot
 from antennate.sim.trial import make_world, place_at_start
 from antennate.sim.world import World
+from antennate.studies.experiment import WithoutTrials
 from antennate.studies.pool import run_tasks
 from antennate.types import AntennaFrame, Floats, JointCommand, Maneuver
 
@@ -77,7 +78,7 @@ class GaitStudyConfig(Params):
 
 
 @dataclass(frozen=True, slots=True)
-class GaitOutcome:
+class GaitOutcome(WithoutTrials):
     """All walks: four maneuvers by name, one without body wave, and the sweep over its lead."""
 
     config: GaitStudyConfig

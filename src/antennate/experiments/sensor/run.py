@@ -13,6 +13,7 @@ from antennate.errors import ConfigError
 from antennate.params import Params
 from antennate.params.base import number
 from antennate.robots.sensor import SensorParams
+from antennate.studies.experiment import WithoutTrials
 from antennate.types import Floats
 
 E24 = (
@@ -42,7 +43,7 @@ class SensorConfig(Params):
 
 
 @dataclass(frozen=True)
-class SensorOutcome:
+class SensorOutcome(WithoutTrials):
     """What the sensor says.
 
     Attributes:

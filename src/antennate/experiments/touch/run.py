@@ -222,6 +222,7 @@ class TouchOutcome:
         """The content of result.json."""
         return self.summary
 
+    @property
     def rows(self) -> list[TouchRow]:
         """The rows of trials.csv."""
         return touch_result.rows(self.traverses, self.verdicts)

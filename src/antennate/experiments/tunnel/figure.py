@@ -42,7 +42,7 @@ class Row(Protocol):
         ...
 
     @property
-    def status(self) -> str:
+    def outcome(self) -> str:
         """Success, timeout, left or invalid."""
         ...
 
@@ -120,7 +120,7 @@ def trajectories(
             if (controller, trial) in paths:
                 _draw_trial(panel, paths[controller, trial])
                 row = table[controller, trial]
-                outcome = _OUTCOMES[row.status].format(row.time_s)
+                outcome = _OUTCOMES[row.outcome].format(row.time_s)
                 panel.set_title(f"trial {trial}: {outcome}", fontsize=8.5)
             else:
                 panel.set_title(f"trial {trial}: not run", fontsize=8.5)
@@ -227,7 +227,7 @@ def summary(
         colour, time = colours[name], found["restricted_mean_time_s"]
         _interval(rate, i, found["successes"] / valid, found["wilson95"], colour)
         _interval(mean, i, time, found["restricted_mean_time_95"], colour)
-        exits = sorted(r.time_s for r in rows if r.controller == name and r.status == "success")
+        exits = sorted(r.time_s for r in rows if r.controller == name and r.outcome == "success")
         left = 1.0 - np.arange(len(exits) + 1) / valid
         inside.step(
             [0.0, *exits, time_limit],

@@ -16,7 +16,7 @@ from antennate.sim.scenes.scene import SceneInstance
 from antennate.sim.world import World
 from antennate.types import Floats, Maneuver
 
-Status = Literal["success", "timeout", "left", "invalid"]
+Outcome = Literal["success", "timeout", "left", "invalid"]
 
 STUCK_GAIN = 0.02
 """Gain of progress that counts as getting on [m]."""
@@ -31,7 +31,9 @@ class TrialResult:
     """One row of the table.
 
     Attributes:
-        status: success (the head passed the exit), timeout, left (out another way) or invalid.
+        seed: Seed of the run; with `trial` it decides all chance.
+        controller: Name of the controller.
+        outcome: success (the head passed the exit), timeout, left (out another way) or invalid.
         time_s: Time to exit [s]; the limit for every failure.
         progress_m: How far the head came, within 0 and the length of the scene [m].
         stuck: Episodes of being stuck; `recovered` of them ended by getting on.
@@ -41,9 +43,10 @@ class TrialResult:
         reason: Why a trial is invalid, with the physics step; empty otherwise.
     """
 
-    controller: str
+    seed: int
     trial: int
-    status: Status
+    controller: str
+    outcome: Outcome
     time_s: float
     progress_m: float
     stuck: int
@@ -88,15 +91,16 @@ class TrialMonitor:
     """Watches one trial from its first tick to its outcome.
 
     Attributes:
-        arm: The controller's name.
-        trial: Number of the trial.
+        seed, trial: What decides all chance.
+        controller: Name of the controller.
         scene: Where it takes place.
         before: Obstacles that can move, at the start, as in `TrialPath`.
         time_limit: Time after which it has failed [s].
     """
 
-    controller: str
+    seed: int
     trial: int
+    controller: str
     scene: SceneInstance
     before: list[Floats]
     time_limit: float
@@ -110,7 +114,7 @@ class TrialMonitor:
     _samples: list[tuple[float, float, float, int]] = field(default_factory=list)
     _counts: list[int] = field(default_factory=lambda: [0] * len(Maneuver))
 
-    def watch(self, world: World, maneuver: int, failed: bool) -> Status | None:
+    def watch(self, world: World, maneuver: int, failed: bool) -> Outcome | None:
         """Look at the world after a tick; the outcome once there is one."""
         if failed:
             return "invalid"
@@ -139,7 +143,7 @@ class TrialMonitor:
             self._is_stuck = True
             self._stuck += 1
 
-    def result(self, world: World, status: Status, reason: str) -> TrialResult:
+    def result(self, world: World, outcome: Outcome, reason: str) -> TrialResult:
         """The row of a trial that ended so."""
         share = np.array(self._counts) / max(1, sum(self._counts))
         forces = np.array(self._forces) if self._forces else np.zeros(1)
@@ -147,10 +151,11 @@ class TrialMonitor:
         if not np.isfinite(progress):
             progress = self._best
         return TrialResult(
-            controller=self.controller,
+            seed=self.seed,
             trial=self.trial,
-            status=status,
-            time_s=round(world.t, 6) if status == "success" else self.time_limit,
+            controller=self.controller,
+            outcome=outcome,
+            time_s=round(world.t, 6) if outcome == "success" else self.time_limit,
             progress_m=round(float(np.clip(progress, 0.0, self.scene.length)), 6),
             stuck=self._stuck,
             recovered=self._recovered,

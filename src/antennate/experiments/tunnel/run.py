@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
-from itertools import combinations
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -13,12 +12,12 @@ from pydantic import field_validator, model_validator
 
 from antennate.control.loop import run_loop
 from antennate.control.registry import BUILT_IN, CONTROLLERS, make_controller
+from antennate.experiments.tunnel import measures
 from antennate.experiments.tunnel.monitor import TrialMonitor, TrialPath, TrialResult
 from antennate.params import ControlParams, number
 from antennate.sim.scenes.registry import TUNNEL, make_scene
 from antennate.sim.sim_robot import SimRobot
 from antennate.sim.trial import TrialConfig, draw_trial
-from antennate.studies import statistics
 from antennate.studies.pool import run_tasks
 from antennate.types import AntennaFrame, JointCommand
 
@@ -33,7 +32,12 @@ class TunnelConfig(TrialConfig):
     """Everything that decides the outcome of `antennate tunnel`."""
 
     trials: int = number(
-        10, "1", "paper: ten trials each", "trials of every controller", ge=1, le=100000
+        30,
+        "1",
+        "assumed: the paper's ten leave an interval of half the range",
+        "trials of every controller",
+        ge=1,
+        le=100000,
     )
     controllers: tuple[str, ...] = number(
         tuple(BUILT_IN),
@@ -72,7 +76,7 @@ class TunnelConfig(TrialConfig):
 
 @dataclass(frozen=True, slots=True)
 class TunnelOutcome:
-    """All rows in the order of controllers and trials, what figures need, and the summaries."""
+    """All rows in the order of controllers and trials, and what figures need of them."""
 
     config: TunnelConfig
     rows: list[TrialResult]
@@ -93,8 +97,8 @@ class TunnelOutcome:
             "time_limit_s": config.time_limit,
             "length_m": config.tunnel.length if config.scene == TUNNEL else None,
             "interrupted": self.interrupted,
-            "controllers": {n: summarise(rows, config.time_limit) for n, rows in by_name.items()},
-            "paired": _paired(by_name),
+            "controllers": {n: measures.summary(rows) for n, rows in by_name.items()},
+            "paired": measures.paired(by_name),
         }
 
 
@@ -122,7 +126,9 @@ def run_trials(
             body.load(row, start.world, start.chance)
             control.reset(np.array([row]), start.phase)
             before = start.world.outlines()[1]
-            monitors[row] = TrialMonitor(controller, trial, start.scene, before, config.time_limit)
+            monitors[row] = TrialMonitor(
+                config.seed, trial, controller, start.scene, before, config.time_limit
+            )
 
     def go_on(frame: AntennaFrame, command: JointCommand) -> bool:
         maneuvers: list[int] = control.maneuver.tolist()
@@ -130,9 +136,9 @@ def run_trials(
             if monitor is None:
                 continue
             world, failure = body.world(row), body.failure(row)
-            status = monitor.watch(world, maneuvers[row], failure is not None)
-            if status is not None:
-                emit((monitor.result(world, status, str(failure or "")), monitor.path(world)))
+            outcome = monitor.watch(world, maneuvers[row], failure is not None)
+            if outcome is not None:
+                emit((monitor.result(world, outcome, str(failure or "")), monitor.path(world)))
                 fill(row)
         return any(monitor is not None for monitor in monitors)
 
@@ -148,20 +154,23 @@ def _run_task(task: tuple[TunnelConfig, str, list[int]], emit: Callable[[Any], N
 def run(
     config: TunnelConfig,
     workers: int = 1,
-    on_trial: Callable[[TrialResult, TrialPath], None] = lambda row, path: None,
+    on_step: Callable[[int, int], None] = lambda done, total: None,
+    on_row: Callable[[TrialResult], None] = lambda row: None,
 ) -> TunnelOutcome:
     """Run all trials of all controllers.
 
     Args:
         config: What to run.
         workers: Processes to use; the outcome does not depend on it.
-        on_trial: Called after every trial, in no particular order.
+        on_step: Called after every trial with how many of how many are done.
+        on_row: Called with every trial, in no particular order.
 
     Raises:
         SceneError: A scene cannot be built as described.
         WorkerError: A worker process died.
     """
-    size = max(1, min(_TASK, math.ceil(config.trials * len(config.controllers) / (3 * workers))))
+    total = config.trials * len(config.controllers)
+    size = max(1, min(_TASK, math.ceil(total / (3 * workers))))
     chunks = [
         list(range(first, min(first + size, config.trials)))
         for first in range(0, config.trials, size)
@@ -173,71 +182,19 @@ def run(
 
     def take(item: tuple[TrialResult, TrialPath]) -> None:
         found.append(item)
-        on_trial(*item)
+        on_row(item[0])
+        on_step(len(found), total)
 
     interrupted = False
     try:
         run_tasks(_run_task, tasks, workers, take)
     except KeyboardInterrupt:
         interrupted = True
-    found.sort(key=lambda item: (config.controllers.index(item[0].controller), item[0].trial))
+    order = {name: i for i, name in enumerate(config.controllers)}
+    found.sort(key=lambda item: (order[item[0].controller], item[0].trial))
     return TunnelOutcome(
         config=config,
         rows=[row for row, _ in found],
         paths={(row.controller, row.trial): path for row, path in found},
         interrupted=interrupted,
     )
-
-
-def summarise(rows: list[TrialResult], time_limit: float) -> dict[str, Any]:
-    """One controller in numbers; invalid trials are counted and left out of every other figure."""
-    valid = [r for r in rows if r.status != "invalid"]
-    won = [r for r in valid if r.status == "success"]
-    times = np.array([r.time_s for r in valid])
-    mean, low, high = statistics.mean95(times)
-    recovered, stuck = sum(r.recovered for r in valid), sum(r.stuck for r in valid)
-    return {
-        "trials": len(rows),
-        "successes": len(won),
-        "timeouts": sum(r.status == "timeout" for r in valid),
-        "left": sum(r.status == "left" for r in valid),
-        "invalid": len(rows) - len(valid),
-        "wilson95": statistics.wilson95(len(won), len(valid)),
-        "speed_m_s": _mean([r.progress_m / r.time_s for r in won]),
-        "time_over_successes_s": _mean([r.time_s for r in won]),
-        "progress_per_time_m_s": sum(r.progress_m for r in valid) / float(times.sum())
-        if valid
-        else None,
-        "restricted_mean_time_s": mean if valid else None,
-        "restricted_mean_time_95": (low, high) if valid else None,
-        "stuck": stuck,
-        "recovered": recovered,
-        "share": {
-            name: _mean([getattr(r, f"share_{name}") for r in valid])
-            for name in ("forward", "turn_l", "turn_r", "reverse", "hold")
-        },
-        "force_mean_n": _mean([r.force_mean_n for r in valid]),
-        "force_max_n": max((r.force_max_n for r in valid), default=None),
-    }
-
-
-def _mean(values: list[float]) -> float | None:
-    return float(np.mean(values)) if values else None
-
-
-def _paired(by_name: dict[str, list[TrialResult]]) -> dict[str, Any]:
-    """Every two controllers on the trials that are valid in both."""
-    tests = {}
-    for first, second in combinations(by_name, 2):
-        ours = {r.trial: r for r in by_name[first] if r.status != "invalid"}
-        theirs = {r.trial: r for r in by_name[second] if r.status != "invalid"}
-        both = sorted(ours.keys() & theirs.keys())
-        if both:
-            test = statistics.compare(
-                np.array([ours[k].status == "success" for k in both]),
-                np.array([theirs[k].status == "success" for k in both]),
-                np.array([ours[k].time_s for k in both]),
-                np.array([theirs[k].time_s for k in both]),
-            )
-            tests[f"{first}-{second}"] = {"trials": len(both), **asdict(test)}
-    return tests

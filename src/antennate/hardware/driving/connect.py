@@ -25,7 +25,7 @@ from antennate.hardware.joints import Joints
 from antennate.hardware.ports.finder import finder
 from antennate.hardware.ports.port import Port, PortError
 from antennate.hardware.ports.reconnecting import Reconnecting
-from antennate.hardware.safety.trust import Trust
+from antennate.hardware.safety.signal_quality import SignalQuality
 from antennate.params import BusParams, DoctorParams
 from antennate.robots.layout import LayoutParams
 from antennate.types import Controller
@@ -92,11 +92,12 @@ def prepare(
         clock=clock,
         controller=controller or make_controller(config.controller, config.control),
         period=config.control.period,
-        conditioning=config.control.conditioning,
-        limits=config.limits,
-        trust=Trust(
-            config.control.conditioning, config.drift, config.touch if config.touch_check else None
+        quality=SignalQuality(
+            config.control.conditioning,
+            drift=config.drift,
+            touch=config.touch if config.touch_check else None,
         ),
+        limits=config.limits,
     )
 
 

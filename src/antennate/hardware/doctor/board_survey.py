@@ -1,14 +1,15 @@
-"""What an antenna board says in a few seconds at rest."""
+"""The antenna board at rest: its greeting, and its readings over a few seconds."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
-from antennate.hardware.doctor.rows import Opener
-from antennate.hardware.doctor.survey import master
+from antennate.hardware.doctor.bus_survey import master
+from antennate.hardware.doctor.check import Opener
 from antennate.hardware.esp32.board import BOARD_BAUD
 from antennate.hardware.esp32.decoder import Counters
 from antennate.hardware.esp32.stream import Reading, Stream
@@ -18,10 +19,11 @@ from antennate.robots.layout import LayoutParams
 from antennate.types import Floats
 
 _PATIENCE = 0.02
+"""Longest wait for bytes before the time is looked at again [s]."""
 
 
 @dataclass(slots=True)
-class Heard:
+class BoardSurvey:
     """What came from the board's port.
 
     Attributes:
@@ -34,7 +36,7 @@ class Heard:
         dropped: Samples that the board itself could not send meanwhile.
         broken: Pieces with a wrong CRC or code after the greeting.
         boots: Times it started anew meanwhile.
-        servos: The port speaks as a bus of servos.
+        servos: Servos answer on the port.
     """
 
     hello: Hello | None = None
@@ -60,16 +62,32 @@ class Heard:
         span = self.readings[-1].now - self.readings[0].now if self.readings else 0.0
         return (len(self.readings) - 1) / span if span > 0 else None
 
+    def result(self) -> dict[str, Any]:
+        """Its part of result.json."""
+        counts, hello = self.counts, self.hello
+        known = len(counts) > 0
+        return {
+            "device_id": None if hello is None else hello.device_id,
+            "firmware": None if hello is None else list(hello.firmware),
+            "reset": None if hello is None else hello.reset.name,
+            "rate_hz": self.rate,
+            "readings": len(counts),
+            "lost": self.lost,
+            "broken": self.broken,
+            "median_counts": np.median(counts, axis=0).tolist() if known else None,
+            "noise_counts": counts.std(axis=0).tolist() if known else None,
+        }
 
-def listen(
+
+def survey_board(
     opener: Opener, layout: LayoutParams, params: DoctorParams, now: Callable[[], float]
-) -> Heard:
-    """Wait for a greeting and listen for a while; if none comes, see whether servos are there.
+) -> BoardSurvey:
+    """Wait for a greeting and read for a while; without one, see whether servos are there.
 
     Raises:
         PortError: The port is gone or cannot be opened.
     """
-    heard = Heard()
+    survey = BoardSurvey()
     with opener(BOARD_BAUD) as port:
         port.drain()
         stream = Stream(port, now)
@@ -77,30 +95,27 @@ def listen(
         while (stream.hello is None or stream.clock.newest is None) and now() < end:
             stream.take(_PATIENCE)
         if stream.hello is not None:
-            _record(stream, heard, params.listen, now)
-        heard.hello, heard.refusals = stream.hello, stream.refusals
-        heard.text, heard.received = stream.decoder.take_text(), stream.decoder.counters.received
-    if heard.hello is None and not heard.refusals:
+            _read(stream, survey, params.listen, now)
+        survey.hello, survey.refusals = stream.hello, stream.refusals
+        survey.text, survey.received = stream.decoder.take_text(), stream.decoder.counters.received
+    if survey.hello is None and not survey.refusals:
         with opener(layout.baud) as port:
-            heard.servos = bool(master(port, layout.baud, now).scan())
-    return heard
+            survey.servos = bool(master(port, layout.baud, now).scan())
+    return survey
 
 
-def _record(stream: Stream, heard: Heard, seconds: float, now: Callable[[], float]) -> None:
-    broken, boots, lost = _broken(stream.decoder.counters), stream.clock.resets, _lost(stream)
+def _read(stream: Stream, survey: BoardSurvey, seconds: float, now: Callable[[], float]) -> None:
+    counters, clock = stream.decoder.counters, stream.clock
+    broken, boots, lost = _broken(counters), clock.resets, clock.sequence.lost
     end = now() + seconds
     while now() < end:
-        heard.readings += stream.take(_PATIENCE)
-    heard.boots = stream.clock.resets - boots
-    heard.lost = _lost(stream) - (0 if heard.boots else lost)
-    heard.broken = _broken(stream.decoder.counters) - broken
-    if heard.readings and not heard.boots:
-        first, last = heard.readings[0].timed.sample, heard.readings[-1].timed.sample
-        heard.dropped = (last.drops - first.drops) % (1 << 16)
-
-
-def _lost(stream: Stream) -> int:
-    return stream.clock.sequence.lost
+        survey.readings += stream.take(_PATIENCE)
+    survey.boots = clock.resets - boots
+    survey.lost = clock.sequence.lost - (0 if survey.boots else lost)
+    survey.broken = _broken(counters) - broken
+    if survey.readings and not survey.boots:
+        first, last = survey.readings[0].timed.sample, survey.readings[-1].timed.sample
+        survey.dropped = (last.drops - first.drops) % (1 << 16)
 
 
 def _broken(counters: Counters) -> int:
