@@ -1,4 +1,4 @@
-"""A robot whose joints hang on another bus: the session, the supervisor and `drive` are the same."""
+"""A robot on another bus of actuators: session, supervisor and `drive` are the same."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 import pytest
+from twin_rig import rig
 
-from antennate.experiments.twin import rig
 from antennate.hardware.actuators import ActuatorError, ActuatorState, Tally
 from antennate.hardware.driving.config import DriveConfig
 from antennate.hardware.driving.drive import drive
