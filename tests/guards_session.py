@@ -25,7 +25,7 @@ from antennate.hardware.driving import session
 from antennate.hardware.driving.decision import StepResult
 from antennate.hardware.driving.signals import StopOnce
 from antennate.hardware.driving.supervised_controller import SupervisedController
-from antennate.hardware.dynamixel import actuators, monitor
+from antennate.hardware.dynamixel import monitor
 from antennate.hardware.dynamixel.actuators import DynamixelActuators
 from antennate.hardware.ports.port import PortError
 from antennate.hardware.safety.causes import Outputs
@@ -137,7 +137,7 @@ SESSION = [
     ),
     Guard(
         "commands that a controller changes later",
-        put(actuators, "plain", lambda command: command),
+        put(joints.Joints, "plain", lambda self, command: command),
         test_bad_controllers.test_B14_a_pose_that_a_controller_changes_later_stays_as_it_was_judged,
     ),
     Guard(

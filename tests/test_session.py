@@ -26,7 +26,7 @@ from antennate.hardware.dynamixel.parser import Parser
 from antennate.hardware.ports.port import PortError
 from antennate.hardware.safety.causes import Cause, State
 from antennate.params import ControlParams
-from antennate.robots.layout import LayoutParams
+from antennate.robots.spec import RobotSpec
 from antennate.telemetry.replay import replay
 from antennate.telemetry.ticks import Tick
 from antennate.twin.bus import Fault, Trouble
@@ -77,7 +77,7 @@ def at(when: float, demand: str) -> Callable[[Rig, float], None]:
 
     def act(rig: Rig, t: float) -> None:
         if not faults:
-            faults.append(Faults([read(f"{demand}@{when}s")], tuple(LayoutParams().ids)))
+            faults.append(Faults([read(f"{demand}@{when}s")], tuple(RobotSpec().ids)))
         faults[0].apply(rig.robot, t)
 
     return act
@@ -487,7 +487,7 @@ def test_B15_servos_that_are_not_as_expected_are_refused(
     made = rig(TwinConfig())
     spoil(made.robot)
     with pytest.raises(BringUpError, match=said):
-        require_servos(made.session.actuators.bus, LayoutParams())
+        require_servos(made.session.actuators.bus, RobotSpec())
 
 
 @pytest.mark.parametrize(
@@ -514,7 +514,7 @@ def test_a_controller_of_ones_own_is_taken() -> None:
 )
 def test_faults_that_do_not_exist_are_refused(text: str, said: str) -> None:
     with pytest.raises(BadInputError, match=said):
-        Faults([read(text)], LayoutParams().ids)
+        Faults([read(text)], RobotSpec().ids)
 
 
 def test_B11_a_servo_that_reboots_alone_is_a_fault_within_a_second() -> None:
@@ -701,8 +701,8 @@ def test_B13_below_the_first_level_it_walks_at_half_the_pace_and_replays_alike()
 
 
 def test_B19_torque_goes_off_in_the_configured_order() -> None:
-    layout = LayoutParams(release=("legs", "antennae", "yaw"))
-    made = rig(TwinConfig(layout=layout))
+    spec = RobotSpec(release=("legs", "antennae", "yaw"))
+    made = rig(TwinConfig(robot=spec))
     begun: list[int] = []
     receive = made.robot.bus.receive
 
@@ -711,14 +711,14 @@ def test_B19_torque_goes_off_in_the_configured_order() -> None:
         begun.extend(p.params[4] for p in packets if p.params[:2] == b"\x40\0")
         receive(t, data)
 
-    config = DriveConfig(dry_run=0.5, duration=0.5, layout=layout)
+    config = DriveConfig(dry_run=0.5, duration=0.5, robot=spec)
     made.robot.bus.receive = listen
     report = drive(made.session, config, arm=True)
     assert begun[-3:] == [6, 18, 1]
     assert report.safe
     assert not any(servo.torque for servo in made.robot.servos)
     with pytest.raises(ValueError, match="each group once"):
-        LayoutParams(release=("legs", "legs", "yaw"))
+        RobotSpec(release=("legs", "legs", "yaw"))
 
 
 @pytest.mark.parametrize("latency", [0.0, 0.016])

@@ -14,7 +14,7 @@ from antennate.hardware.dynamixel.bus import Bus
 from antennate.hardware.dynamixel.leg_turns import LegTurns
 from antennate.hardware.dynamixel.monitor import ServoMonitor
 from antennate.hardware.dynamixel.tables import XC430_W240
-from antennate.hardware.joints import Joints, plain
+from antennate.hardware.joints import Joints
 from antennate.params import BusParams
 from antennate.types import Floats, JointCommand
 
@@ -68,7 +68,7 @@ class DynamixelActuators:
         Raises:
             CommandError: It cannot.
         """
-        command = plain(command)
+        command = self.joints.plain(command)
         self.joints.ticks(command)
         return command
 
