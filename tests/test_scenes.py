@@ -188,7 +188,7 @@ def test_a_geom_with_default_bits_meets_body_legs_and_antennae(tmp_path, movable
 )
 def test_a_level_plane_of_the_file_is_the_floor_or_one_is_added(tmp_path, plane, floors):
     instance = drawn(MjcfScene(mjcf(tmp_path, SITES + plane)))
-    world = make_world(PhysicsParams(), RobotParams(), instance)
+    world = make_world(PhysicsParams(), RobotSpec(), instance)
     place_at_start(world, instance, GaitParams())
     world.command(world.drives().copy())
     world.step(100)
@@ -205,7 +205,7 @@ def test_obstacles_are_outlined_from_above(tmp_path):
     ball = '<body pos="3 3 .1"><freejoint/><geom type="ellipsoid" size=".1 .2 .1"/></body>'
     scene = MjcfScene(mjcf(tmp_path, SITES + lying + tilted + pillar + ball))
     instance = drawn(scene)
-    world = make_world(PhysicsParams(), RobotParams(), instance)
+    world = make_world(PhysicsParams(), RobotSpec(), instance)
     place_at_start(world, instance, GaitParams())
     fixed, movable = world.outlines()
     boxes = [np.concatenate([p.min(axis=0), p.max(axis=0)]) for p in [*fixed, *movable]]
