@@ -29,7 +29,7 @@ SILENT, AGAIN = 16.0, 16.5
 def log(path: Path) -> None:
     """Write the log of the drive."""
     made = rig(TwinConfig(touch=("left@1s", "right@3s"), trial=1), "closed", TouchCheckParams())
-    header = Header(controller="closed", params=CONFIG.control, layout=CONFIG.layout)
+    header = Header(controller="closed", params=CONFIG.control, robot=CONFIG.robot)
     with LogWriter(path, header) as writer:
 
         def on_tick(session: Session, now: float) -> None:

@@ -94,11 +94,6 @@ STREAM = [
     ),
     Guard("firmware", put(listener, "objections", constant(())), OLD_FIRMWARE),
     Guard(
-        "flag of a reading at a rail",
-        put(board, "_RAILS", (0, 0)),
-        partial(test_board.test_S5_a_reading_at_a_rail_is_none, 3, [True, True]),
-    ),
-    Guard(
         "age limit of readings",
         put(board.Board, "newest", lambda self, now: self.clock.newest),
         test_board.test_a_reading_older_than_the_limit_is_none,

@@ -31,7 +31,7 @@ from antennate.hardware.ports import serial_port
 from antennate.hardware.safety import watch
 from antennate.hardware.safety.causes import Outputs, State
 from antennate.params import TurnsParams
-from antennate.robots.layout import LayoutParams
+from antennate.robots.spec import RobotSpec
 from antennate.twin.wire import SimulatedWire
 
 controller_fails = test_session.test_B8_servos_stop_within_120_ms_when_only_the_controller_fails
@@ -380,7 +380,7 @@ SERVOS = [
     ),
     Guard(
         "limits of yaw joints and antennae",
-        put(LayoutParams, "limits", (math.inf,) * 19),
+        put(RobotSpec, "limits", (math.inf,) * 19),
         test_twin_robot.test_B14_a_yaw_or_an_antenna_beyond_its_limit_is_refused_as_a_whole,
     ),
     Guard(

@@ -76,7 +76,7 @@ def driven(tmp_path_factory: pytest.TempPathFactory) -> Drive:
     return Drive(run.returncode, run.stderr.splitlines(), folder)
 
 
-def test_D9_a_reset_or_a_broken_wire_ends_no_drive(driven: Drive) -> None:
+def test_E1_a_reset_or_a_broken_wire_ends_no_drive(driven: Drive) -> None:
     """It goes to its end, torque off, with its result and every tick in its log."""
     result = driven.result
     assert driven.code == 0, driven.lines[-5:]
@@ -88,4 +88,6 @@ def test_D9_a_reset_or_a_broken_wire_ends_no_drive(driven: Drive) -> None:
     assert result["lost_samples"] < 100
     assert (result["unlogged"], result["log_complete"]) == (0, True)
     assert count(driven.folder / result["logs"][0]) == result["pace"]["ticks"]
+    assert "HOLD OPEN: a channel floats: its wire is open" in result["why"]
+    assert " HOLD (OPEN: a channel floats: its wire is open" in driven.lines[-2]
     assert result["poses_sent"] > 150  # it walked on after the reset

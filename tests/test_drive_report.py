@@ -137,7 +137,7 @@ def test_L8_a_drive_that_sent_no_pose_ends_with_2_and_says_so(
     @contextlib.contextmanager
     def in_process(config: DriveConfig, *addresses: object) -> Iterator[Session]:
         robot = build(TwinConfig(), 5)
-        clock = LockstepClock(robot, Faults([read(f"esp32=silent@{when}")], config.layout.ids))
+        clock = LockstepClock(robot, Faults([read(f"esp32=silent@{when}")], config.robot.ids))
         yield prepare(config, BoardPort(robot, clock), clock, clock)
 
     monkeypatch.setattr("antennate.cli.drive.connect", in_process)

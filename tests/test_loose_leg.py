@@ -16,7 +16,7 @@ from antennate.hardware.dynamixel.bringup import BringUpError
 from antennate.hardware.dynamixel.packets import StatusError
 from antennate.hardware.joints import Joints
 from antennate.hardware.safety.causes import Cause, State
-from antennate.robots.layout import LayoutParams
+from antennate.robots.spec import RobotSpec
 from antennate.twin.registers import Servo
 from antennate.types import Floats
 
@@ -41,7 +41,7 @@ class Stand:
                 servo.place(servo.position + FAR)
             servo.set("goal_position", round(servo.position))
             servo.set("torque_enable", 1)
-        self.turns = Turns(self.rig.bus, Joints(LayoutParams()))
+        self.turns = Turns(self.rig.bus, Joints(RobotSpec()))
         self.goals: Floats = np.array([servo.position for servo in self.rig.twin.servos])
         self.n, self.moved = 0, 0.0
 

@@ -19,7 +19,7 @@ from antennate.hardware.dynamixel.bringup import BringUpError
 from antennate.hardware.esp32.frame import SAMPLE_FRAME_SIZE
 from antennate.hardware.ports.port import Port, PortError
 from antennate.hardware.safety.causes import State
-from antennate.robots.layout import LayoutParams
+from antennate.robots.spec import RobotSpec
 from antennate.twin.config import TwinConfig
 from antennate.twin.lockstep import BoardPort
 
@@ -246,5 +246,5 @@ def test_L14_a_board_on_the_port_of_the_bus_is_refused_by_name() -> None:
     session.bus._port = Cable(BoardPort(made.robot, made.clock))
     begin = made.clock.now()
     with pytest.raises(BringUpError, match=r"--bus: .* swapped"):
-        require_servos(session.bus, LayoutParams())
+        require_servos(session.bus, RobotSpec())
     assert made.clock.now() - begin <= 10.0

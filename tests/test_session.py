@@ -25,7 +25,7 @@ from antennate.hardware.dynamixel.parser import Parser
 from antennate.hardware.ports.port import PortError
 from antennate.hardware.safety.causes import Cause, State
 from antennate.params import ControlParams
-from antennate.robots.layout import LayoutParams
+from antennate.robots.spec import RobotSpec
 from antennate.telemetry.replay import replay
 from antennate.telemetry.ticks import Tick
 from antennate.twin.bus import Fault, Trouble
@@ -42,7 +42,7 @@ class Log:
     """What was seen after every tick: time, state, causes, maneuver and goals."""
 
     def __init__(self, rig: Rig, act: Callable[[Rig, float], None] | None = None) -> None:
-        self.rig, self._act = rig, act
+        self.rig, self._act, self.report = rig, act, Report()
         self.t: list[float] = []
         self.state: list[State] = []
         self.causes: list[set[Cause]] = []
@@ -67,7 +67,7 @@ class Log:
 def walked(act: Callable[[Rig, float], None] | None = None, config: DriveConfig = CONFIG) -> Log:
     made = rig(TwinConfig())
     log = Log(made, act)
-    drive(made.session, config, arm=True, on_tick=log)
+    log.report = drive(made.session, config, arm=True, on_tick=log)
     return log
 
 
@@ -77,7 +77,7 @@ def at(when: float, demand: str) -> Callable[[Rig, float], None]:
 
     def act(rig: Rig, t: float) -> None:
         if not faults:
-            faults.append(Faults([read(f"{demand}@{when}s")], tuple(LayoutParams().ids)))
+            faults.append(Faults([read(f"{demand}@{when}s")], tuple(RobotSpec().ids)))
         faults[0].apply(rig.robot, t)
 
     return act
@@ -140,7 +140,7 @@ def test_L8_L9_a_silent_board_makes_it_hold_within_100_ms_and_its_return_walk() 
 
 
 @pytest.mark.parametrize("when", [0.3, 1.02, 2.0])
-def test_D9_every_tick_can_be_logged_whenever_the_board_resets(when: float) -> None:
+def test_E1_every_tick_can_be_logged_whenever_the_board_resets(when: float) -> None:
     """In the dry run, while arming, on the way."""
     act = at(when, "esp32=reset")
 
@@ -166,11 +166,24 @@ def test_E1_a_board_that_resets_is_counted_and_used_again_within_a_second_of_its
     assert (state[t > 3.5] <= State.DEGRADED).all()
 
 
-def test_S1_an_open_wire_makes_it_hold_and_says_which_side() -> None:
-    log = walked(at(2.0, "esp32=open_left"))
+@pytest.mark.parametrize(
+    ("fault", "cause", "side"),
+    [
+        ("open_left", Cause.OPEN, "left"),
+        ("open_right", Cause.OPEN, "right"),
+        ("short_left", Cause.SHORT_LO, "left"),
+        ("right:4095", Cause.SHORT_HI, "right"),
+    ],
+)
+def test_S1_S2_a_broken_wire_is_named_with_its_side_through_bytes_within_100_ms(
+    fault: str, cause: Cause, side: str
+) -> None:
+    log = walked(at(2.0, f"esp32={fault}"))
+    assert log.first(cause) <= 2.0 + 0.1 + 0.02  # the reading after the fault, and its way here
     t, state = np.array(log.t), np.array(log.state)
     assert (state[t > 2.11] >= State.HOLD).all()
-    assert any("(l" in text or "l)" in text for text in log.texts[-5:])
+    assert log.texts[-1].startswith(f"HOLD {cause.name}: {cause.text} ({side})")
+    assert log.report.why.startswith(f"HOLD {cause.name}: ")
 
 
 def test_B1_a_silent_servo_is_named_within_100_ms_and_the_others_keep_their_torque() -> None:
@@ -470,7 +483,7 @@ def test_B15_servos_that_are_not_as_expected_are_refused(
     made = rig(TwinConfig())
     spoil(made.robot)
     with pytest.raises(BringUpError, match=said):
-        require_servos(made.session.bus, LayoutParams())
+        require_servos(made.session.bus, RobotSpec())
 
 
 @pytest.mark.parametrize(
@@ -497,7 +510,7 @@ def test_a_controller_of_ones_own_is_taken() -> None:
 )
 def test_faults_that_do_not_exist_are_refused(text: str, said: str) -> None:
     with pytest.raises(BadInputError, match=said):
-        Faults([read(text)], LayoutParams().ids)
+        Faults([read(text)], RobotSpec().ids)
 
 
 def test_B11_a_servo_that_reboots_alone_is_a_fault_within_a_second() -> None:
@@ -684,8 +697,8 @@ def test_B13_below_the_first_level_it_walks_at_half_the_pace_and_replays_alike()
 
 
 def test_B19_torque_goes_off_in_the_configured_order() -> None:
-    layout = LayoutParams(release=("legs", "antennae", "yaw"))
-    made = rig(TwinConfig(layout=layout))
+    spec = RobotSpec(release=("legs", "antennae", "yaw"))
+    made = rig(TwinConfig(robot=spec))
     begun: list[int] = []
     receive = made.robot.bus.receive
 
@@ -694,14 +707,14 @@ def test_B19_torque_goes_off_in_the_configured_order() -> None:
         begun.extend(p.params[4] for p in packets if p.params[:2] == b"\x40\0")
         receive(t, data)
 
-    config = DriveConfig(dry_run=0.5, duration=0.5, layout=layout)
+    config = DriveConfig(dry_run=0.5, duration=0.5, robot=spec)
     made.robot.bus.receive = listen
     report = drive(made.session, config, arm=True)
     assert begun[-3:] == [6, 18, 1]
     assert report.safe
     assert not any(servo.torque for servo in made.robot.servos)
     with pytest.raises(ValueError, match="each group once"):
-        LayoutParams(release=("legs", "legs", "yaw"))
+        RobotSpec(release=("legs", "legs", "yaw"))
 
 
 @pytest.mark.parametrize("latency", [0.0, 0.016])

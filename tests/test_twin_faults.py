@@ -16,13 +16,13 @@ from antennate.hardware.dynamixel.packets import Instruction
 from antennate.hardware.dynamixel.parser import Parser
 from antennate.hardware.safety.causes import State
 from antennate.params import BatteryParams
-from antennate.robots.layout import LayoutParams
+from antennate.robots.spec import RobotSpec
 from antennate.twin.config import TwinConfig, build
 from antennate.twin.faults import Faults, read
 from antennate.twin.noise import Noise
 from antennate.twin.robot import TwinRobot
 
-IDS = LayoutParams().ids
+IDS = RobotSpec().ids
 
 
 def broken(robot: TwinRobot, *texts: str) -> None:

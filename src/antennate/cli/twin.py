@@ -35,7 +35,7 @@ antenna board, and a DYNAMIXEL bus of 19 servos. Prints one JSON line with the p
 With --tcp both are TCP ports, with --udp the board is a UDP port that signs as the firmware does.
 Physics begins when the first servo gets torque. Faults, each with @Ts for its time:
 servo:ID=silent, bad_crc, truncated, late:SECONDS, doubled, wrong_id, oversized, voltage, overheat,
-encoder, shock, overload, reboot or REGISTER:VALUE; esp32=silent, reset, open_left, open_right,
+encoder, shock, overload, reboot or REGISTER:VALUE; esp32=silent, reset, open_left, short_left,
 left:COUNTS, right:COUNTS or ber:SHARE; bus=silent, loss:SHARE, latency:SECONDS,
 discharge:VOLTS_A_SECOND or ber:SHARE; link=ber:SHARE (bits wrong) or loss:SHARE (bytes
 lost), on both wires both ways.
@@ -69,7 +69,7 @@ def command(argv: Sequence[str]) -> int:
 
 def _serve(argv: Sequence[str]) -> int:
     config, places = parse_with("twin", DESCRIPTION, TwinConfig, argv, Places)
-    faults = Faults([read(text) for text in config.fault], config.layout.ids)
+    faults = Faults([read(text) for text in config.fault], config.robot.ids)
     real = places.pace == "real"
     robot, passage = watched(config, boot_id=secrets.randbits(32) if real else None)
     end = float("inf") if config.duration is None else config.duration

@@ -16,11 +16,11 @@ import numpy as np
 from antennate.errors import LogError
 from antennate.hardware.driving.decision import Decision, decision_of
 from antennate.hardware.driving.session import Session
-from antennate.robots.anatomy import LEGS, SIDES, YAW_JOINTS
+from antennate.robots.spec import RobotSpec
 from antennate.telemetry.framing import SCHEMA, Kind
 from antennate.types import AntennaFrame, Controller, JointCommand
 
-JOINTS = (*YAW_JOINTS, *LEGS, *(f"antenna_{side}" for side in SIDES))
+JOINTS = RobotSpec().joint_names
 """The order of angles."""
 LAYOUT = f"<BBQ?8d3q{len(JOINTS) + 2}d8QI"
 """For `struct`: all fields but the text, whose length in bytes comes last."""
@@ -97,7 +97,7 @@ class Tick:
     def of(cls, session: Session, t: float) -> Tick:
         """The tick of a session that has just written, at the host's time t [s]."""
         out, clock, bus = session.outputs, session.board.clock, session.bus.tally
-        left, right = (channel.reading.counts for channel in session.channels)
+        left, right = session.quality.counts
         bytes_ = session.board.decoder.counters
         return cls(
             **_decided(session.controller, session.decision, session.frame, session.command),
@@ -107,7 +107,7 @@ class Tick:
             reading=(left, right),
             state="" if out is None else out.state.name,
             causes=() if out is None else tuple(_clean(cause.text) for cause in out.causes),
-            note=_clean(session.trust.said),
+            note=_clean(session.quality.status),
             age=clock.age(t),
             missed=0 if session.timing is None else session.timing.report().missed_cycles,
             frames=bytes_.good,
@@ -191,7 +191,7 @@ class Tick:
 
 
 def angles_of(command: JointCommand) -> tuple[float, ...]:
-    """Joint targets of one robot [rad] in the order of JOINTS; NaN if they are not 19 numbers."""
+    """Joint targets of one robot [rad] in the order of JOINTS; NaN if there are not as many."""
     parts = (_flat(command, name) for name in ("yaw", "leg", "antenna"))
     angles = tuple(angle for part in parts for angle in part)
     return angles if len(angles) == len(JOINTS) else _NOWHERE

@@ -112,7 +112,7 @@ def run_trials(
     """Run trials of one controller in lockstep; rows are refilled and emitted as trials end."""
     batch = min(batch, len(trials))
     control = make_controller(controller, config.control, config.robot, batch)
-    body = SimRobot(batch, config.robot.sensor, config.control.period, config.physics.timestep)
+    body = SimRobot(batch, config.robot, config.control.period, config.physics.timestep)
     scene = make_scene(config.scene, config.tunnel)
     waiting = list(trials)
     monitors: list[TrialMonitor | None] = [None] * batch

@@ -78,7 +78,7 @@ class HardwareRobot:
         self.send(self._joints.ticks(command))
 
     def send(self, goals: Ints | Floats) -> None:
-        """Send goal positions [ticks], shape (19,), rounded.
+        """Send goal positions [ticks], shape (n,), rounded.
 
         Raises:
             PortError: The bus is gone.

@@ -33,14 +33,13 @@ from antennate.hardware.dynamixel import bringup
 from antennate.hardware.dynamixel.bringup import BringUpError
 from antennate.hardware.dynamixel.bus import Bus
 from antennate.hardware.esp32.board import Board
-from antennate.hardware.joints import CommandError, Joints, plain
+from antennate.hardware.joints import CommandError, Joints
 from antennate.hardware.ports.port import PortError
 from antennate.hardware.safety.causes import Cause, Inputs, Outputs, State
-from antennate.hardware.safety.diagnosis import Band, ChannelDiagnosis
+from antennate.hardware.safety.signal_quality import SignalQuality
 from antennate.hardware.safety.supervisor import Supervisor
-from antennate.hardware.safety.trust import Trust
 from antennate.hardware.safety.watch import ServoWatch
-from antennate.params import BusParams, ConditioningParams, DiagnosisParams, SupervisorParams
+from antennate.params import BusParams, SupervisorParams
 from antennate.types import (
     AntennaFrame,
     Clock,
@@ -64,15 +63,12 @@ class Session:
         clock: The host's time.
         controller: The controller.
         period: Control period [s].
-        conditioning: The calibrated range of both antennae.
-        diagnosis: Windows and limits of the diagnosis.
+        quality: What the readings of the antennae are worth.
         limits: Limits of the supervisor.
-        trust: What is known of the antennae; they are not checked by touch if not given.
 
     Attributes:
         orders: The operator's, read in every tick.
         outputs: The supervisor's of the last tick, None before the first.
-        channels: Diagnosis of the left and the right antenna.
         watch: What the servos say.
         turns: How far legs have turned.
         tally: What was done.
@@ -94,20 +90,15 @@ class Session:
         clock: Clock,
         controller: Controller,
         period: float,
-        conditioning: ConditioningParams,
-        diagnosis: DiagnosisParams | None = None,
+        quality: SignalQuality,
         limits: SupervisorParams | None = None,
-        trust: Trust | None = None,
     ) -> None:
         self.board, self.bus, self.joints, self.clock = board, bus, joints, clock
         self.controller, self.period = controller, period
-        band = Band(conditioning.counts_low, conditioning.counts_high, conditioning.polarity)
-        windows = diagnosis or DiagnosisParams()
-        self.channels = [ChannelDiagnosis(windows, band) for _ in range(2)]
+        self.quality = quality
         self._limits = limits or SupervisorParams()
         self.supervisor = Supervisor(self._limits)
         self.watch = ServoWatch(bus, joints.ids, clock.now)
-        self.trust = trust or Trust(conditioning)
         self.turns = Turns(bus, joints)
         self.orders = Orders()
         self.tally = Tally()
@@ -153,10 +144,8 @@ class Session:
         self._used = self._body.used
         self._refused = sum(self.board.clock.verdicts.values()) - before - self._used
         t = float(frame.t[0])
-        raw = frame.counts[0].tolist()
-        found = [channel.step(t, c) for channel, c in zip(self.channels, raw, strict=True)]
-        self.trust.step(t, raw, found, self.decision.contact)
-        counts = [reading.counts for reading in found]
+        self.quality.step(t, frame.counts[0].tolist(), self.decision.contact)
+        counts = self.quality.counts
         if self.outputs is None or not self.outputs.clear:
             counts = [math.nan, math.nan]
         self._mark("read")
@@ -234,7 +223,7 @@ class Session:
             return no_command()
         result.decided_at = self.clock.now()
         try:
-            command = plain(command)
+            command = self.joints.plain(command)
             self.joints.ticks(command)
         except CommandError as error:
             result.bad_command = str(error)
@@ -283,12 +272,11 @@ class Session:
 
     def _inputs(self, now: float) -> Inputs:
         clock, watch, result = self.board.clock, self.watch, self._result
-        left, right = self.channels
         return Inputs(
             age=clock.age(now),
             valid=self._used,
             refused=self._refused,
-            findings=(left.reading.finding, right.reading.finding),
+            findings=self.quality.findings,
             decided_at=result.decided_at,
             maneuver=self.decision.maneuver,
             contact=self.decision.contact,
@@ -303,8 +291,8 @@ class Session:
             watchdogs=watch.watchdogs,
             disarmed=watch.disarmed,
             supply=watch.supply,
-            drift=self.trust.drifted,
-            objections=() if self._goals is not None else self.trust.objections,
+            drift=self.quality.drifted,
+            objections=() if self._goals is not None else self.quality.objections,
             unrecorded=self.unrecorded,
             arm=self.orders.arm,
             stop=self.orders.stop,

@@ -21,8 +21,7 @@ from antennate.hardware.dynamixel.bus import Bus
 from antennate.hardware.dynamixel.tables import XC430_W240, Register
 from antennate.hardware.joints import Joints
 from antennate.params import TurnsParams
-from antennate.robots.anatomy import YAW_COUNT
-from antennate.robots.layout import TICKS_A_TURN
+from antennate.robots.servos import TICKS_A_TURN
 from antennate.types import Floats
 
 _TORQUE = XC430_W240["torque_enable"]
@@ -86,19 +85,20 @@ class Turns:
         """Stand still from now on if a leg has turned far enough.
 
         Args:
-            goals: Of all servos [ticks], shape (19,).
+            goals: Of all servos [ticks], shape (n,).
         """
-        turned = abs(goals[YAW_COUNT:-2]) / TICKS_A_TURN
-        if not self.standing and turned.max() >= self._params.most:
+        turning = self._joints.turning
+        turned = abs(goals[turning]) / TICKS_A_TURN
+        if not self.standing and turned.max(initial=0.0) >= self._params.most:
             self.reset()
             far = turned >= 0.5 * self._params.most
-            self._left.extend(YAW_COUNT + i for i, is_far in enumerate(far.tolist()) if is_far)
+            self._left.extend(turning[far].tolist())
 
     def step(self, goals: Floats, positions: Mapping[int, int], may_begin: bool = True) -> None:
         """One tick's share; goals of legs that have forgotten are changed in place.
 
         Args:
-            goals: Of all servos [ticks], shape (19,).
+            goals: Of all servos [ticks], shape (n,).
             positions: Newest positions by id [ticks].
             may_begin: Whether the next leg may lose its torque; one that has lost it goes on.
 

@@ -7,12 +7,7 @@ import math
 import numpy as np
 
 from antennate.hardware.esp32.clock import Timed
-from antennate.hardware.esp32.frame import (
-    FLAG_LEFT_RAIL,
-    FLAG_RIGHT_RAIL,
-    SAMPLE_FRAME_SIZE,
-    encode_request,
-)
+from antennate.hardware.esp32.frame import SAMPLE_FRAME_SIZE, encode_request
 from antennate.hardware.esp32.listener import CHUNK, Listener
 from antennate.hardware.ports.port import Port, PortError
 from antennate.params import BoardParams
@@ -24,7 +19,6 @@ KEPT = BoardParams().backlog * SAMPLE_FRAME_SIZE
 """Most bytes of a backlog that are looked at, the newest."""
 _CHUNKS = 64
 """Most chunks read at once: more than Linux keeps for a line."""
-_RAILS = (FLAG_LEFT_RAIL, FLAG_RIGHT_RAIL)
 
 
 class Board(Listener):
@@ -85,11 +79,7 @@ class Board(Listener):
 
 
 def counts_of(timed: Timed | None) -> Floats:
-    """Readings of a sample [counts], shape (1, 2); NaN where there is none or it is at a rail."""
+    """Readings of a sample as they came [counts], shape (1, 2); NaN where there is none."""
     if timed is None:
         return np.full((1, 2), math.nan)
-    sample = timed.sample
-    read = (sample.left, sample.right)
-    return np.array(
-        [[math.nan if sample.flags & f else float(c) for c, f in zip(read, _RAILS, strict=True)]]
-    )
+    return np.array([[timed.sample.left, timed.sample.right]], float)

@@ -36,7 +36,7 @@ def driven(
         servo.feed_watchdog(0.001)  # as bring-up does
     said: list[str] = []
     drive_config = CONFIG.model_copy(update={"touch": touch or SHORT})
-    report = drive(made.session, drive_config, arm, lambda s, t: said.append(s.trust.said))
+    report = drive(made.session, drive_config, arm, lambda s, t: said.append(s.quality.status))
     return made, report, said
 
 
