@@ -12,7 +12,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MultipleLocator
 
 from antennate import figures as style
-from antennate.experiments.touch.run import Trace, Traverse
+from antennate.experiments.touch.run import Trace
+from antennate.experiments.touch.traverse import Traverse
 
 _TRUE, _SENSED = "#0072B2", "#D55E00"
 _SHAPES = 14

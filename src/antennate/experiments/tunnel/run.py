@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from pydantic import field_validator, model_validator
@@ -15,6 +15,8 @@ from antennate.control.registry import BUILT_IN, CONTROLLERS, make_controller
 from antennate.experiments.tunnel import measures
 from antennate.experiments.tunnel.monitor import TrialMonitor, TrialPath, TrialResult
 from antennate.params import ControlParams, number
+from antennate.params.base import require_different, require_whole_steps
+from antennate.robots.spec import HARDWARE_ALONE
 from antennate.sim.scenes.registry import make_scene
 from antennate.sim.sim_robot import SimRobot
 from antennate.sim.trial import TrialConfig, draw_trial
@@ -31,6 +33,7 @@ _TASK = 12
 class TunnelConfig(TrialConfig):
     """Everything that decides the outcome of `antennate tunnel`."""
 
+    unread: ClassVar[tuple[str, ...]] = HARDWARE_ALONE
     trials: int = number(
         30,
         "1",
@@ -63,14 +66,8 @@ class TunnelConfig(TrialConfig):
 
     @model_validator(mode="after")
     def _agree(self) -> TunnelConfig:
-        if len(set(self.controllers)) < len(self.controllers):
-            raise ValueError(f"controllers must differ, got {', '.join(self.controllers)}")
-        steps = self.control.period / self.physics.timestep
-        if abs(steps - round(steps)) > 1e-6:
-            raise ValueError(
-                "control.rate must be a whole fraction of the physics rate "
-                f"{1 / self.physics.timestep:g} Hz, got {self.control.rate:g} Hz"
-            )
+        require_different("controllers", self.controllers)
+        require_whole_steps("control.rate", self.control.rate, self.physics.timestep)
         return self
 
 
