@@ -28,7 +28,7 @@ import numpy as np
 
 from antennate.control.gait import Gait
 from antennate.control.loop import run_loop
-from antennate.experiments.tunnel import run as experiment
+from antennate.experiments.tunnel import batch as experiment
 from antennate.experiments.tunnel.run import TunnelConfig
 from antennate.params import TunnelParams
 from antennate.sim.scenes import geometry

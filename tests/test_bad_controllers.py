@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 import pytest
 from test_bad_poses import Robot
+from twin_rig import rig
 
 from antennate.control.registry import make_controller
 from antennate.errors import ConfigError, in_one_line
-from antennate.experiments.twin import rig
 from antennate.hardware.driving.config import DriveConfig
 from antennate.hardware.driving.drive import drive
 from antennate.hardware.driving.tracebacks import Tracebacks

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from twin_rig import rig
 
-from antennate.experiments.twin import rig
 from antennate.hardware.safety.causes import Cause, State
 from antennate.hardware.safety.supervisor import Supervisor
 from antennate.params import SupervisorParams

@@ -255,7 +255,7 @@ def test_a_poor_curve_is_warned_of(
     file.write_text("\n".join(["time,counts,bend", *rows]) + "\n")
     words = ["--draws", "20", "--out", str(tmp_path / "out")]
     assert main(["calibrate", "--recording", str(file), *words]) == 0
-    assert ("Record again" in capsys.readouterr().out) == (noise > 0.1)
+    assert ("record again" in capsys.readouterr().out) == (noise > 0.1)
 
 
 def test_the_rig_sees_readings_fall_as_the_rod_goes_in() -> None:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 import pytest
+from driven_rig import driven, simulated_alike
 
-from antennate.experiments.driven import driven, simulated_alike
 from antennate.experiments.tunnel.run import TunnelConfig
 from antennate.hardware.safety.causes import State
 from antennate.types import Maneuver

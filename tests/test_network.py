@@ -12,10 +12,10 @@ from pathlib import Path
 
 import pytest
 from esp32_streams import encoded, hello, made
+from twin_rig import rig
 
 from antennate.cli import main
 from antennate.errors import BadInputError
-from antennate.experiments.twin import rig
 from antennate.hardware.esp32.decoder import FrameDecoder
 from antennate.hardware.esp32.wire import Hello, Sample
 from antennate.hardware.ports.finder import finder

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from twin_rig import Rig, rig
 
 from antennate.control.loop import run_loop
 from antennate.errors import BadInputError
-from antennate.experiments.twin import Rig, rig
 from antennate.hardware.driving.config import DriveConfig
 from antennate.hardware.driving.connect import prepare, require_servos
 from antennate.hardware.driving.drive import drive

@@ -8,9 +8,9 @@ from typing import Any
 import pytest
 from servo_rig import IDS
 from servo_rig import Rig as Servos
+from twin_rig import Rig, rig
 
 from antennate.control.loop import run_loop
-from antennate.experiments.twin import Rig, rig
 from antennate.hardware.driving.config import DriveConfig
 from antennate.hardware.driving.drive import drive
 from antennate.hardware.driving.session import Session

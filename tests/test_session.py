@@ -8,10 +8,11 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from pty_server import PtyServer
+from twin_rig import Rig, rig
 
 from antennate.control.registry import make_controller
 from antennate.errors import BadInputError, ConfigError
-from antennate.experiments.twin import Rig, rig
 from antennate.hardware.driving.adapter import require_quick
 from antennate.hardware.driving.config import DriveConfig
 from antennate.hardware.driving.connect import await_board, require_servos
@@ -31,7 +32,6 @@ from antennate.telemetry.ticks import Tick
 from antennate.twin.bus import Fault, Trouble
 from antennate.twin.config import TwinConfig
 from antennate.twin.faults import Faults, read
-from antennate.twin.pty import PtyServer
 from antennate.twin.registers import Servo
 from antennate.types import AntennaFrame, JointCommand, Maneuver
 

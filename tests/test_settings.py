@@ -6,8 +6,8 @@ import math
 from collections.abc import Callable
 
 import pytest
+from twin_rig import rig
 
-from antennate.experiments.twin import rig
 from antennate.hardware.driving.config import DriveConfig
 from antennate.hardware.driving.connect import require_servos
 from antennate.hardware.driving.drive import drive

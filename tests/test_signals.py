@@ -8,8 +8,8 @@ import threading
 from typing import Any
 
 import pytest
+from twin_rig import Rig, rig
 
-from antennate.experiments.twin import Rig, rig
 from antennate.hardware.driving.config import DriveConfig
 from antennate.hardware.driving.drive import drive
 from antennate.hardware.driving.signals import STOPS, StopOnce

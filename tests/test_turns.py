@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from twin_rig import Rig, rig
 
 from antennate.control.registry import make_controller
-from antennate.experiments.twin import Rig, rig
 from antennate.hardware.driving.config import DriveConfig
 from antennate.hardware.driving.drive import drive
 from antennate.hardware.driving.session import Session

@@ -11,11 +11,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
+from twin_rig import Decisions, on_twin, simulated
 
 from antennate.control.gait import targets
 from antennate.control.registry import BUILT_IN, make_controller
 from antennate.experiments.tunnel.run import TunnelConfig
-from antennate.experiments.twin import Decisions, on_twin, simulated
 from antennate.hardware.joints import CommandError, Joints
 from antennate.params import ControlParams
 from antennate.robots.spec import RobotSpec

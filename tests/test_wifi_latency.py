@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from esp32_streams import hello
 from hardware_rig import LIMIT
+from twin_rig import Rig, rig
 
-from antennate.experiments.twin import Rig, rig
 from antennate.hardware.driving.body import HardwareRobot
 from antennate.hardware.driving.config import DriveConfig
 from antennate.hardware.driving.drive import drive

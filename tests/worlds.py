@@ -8,9 +8,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from twin_rig import Stage, before_twin, rig, simulation
+
 from antennate.control.loop import run_loop
 from antennate.experiments.tunnel.run import TunnelConfig
-from antennate.experiments.twin import Stage, before_twin, rig, simulation
 from antennate.hardware.driving.connect import await_board
 from antennate.robots.spec import RobotSpec
 from antennate.telemetry.header import Header

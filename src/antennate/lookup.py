@@ -32,29 +32,33 @@ class Registry(Generic[T]):
         kind: What the objects are, in the singular, for messages.
         group: Entry-point group.
         ours: The objects of this package.
+
+    Attributes:
+        added: Objects that were given to `add`, by name.
     """
 
     def __init__(self, kind: str, group: str, ours: Mapping[str, T]) -> None:
         self._kind, self._group = kind, group
-        self._known: dict[str, T] = dict(ours)
+        self._ours: dict[str, T] = dict(ours)
+        self.added: dict[str, T] = {}
 
     @property
     def names(self) -> tuple[str, ...]:
         """All names that need no code of the user, ours first."""
         others = (point.name for point in entry_points(group=self._group))
-        return tuple(dict.fromkeys((*self._known, *others)))
+        return tuple(dict.fromkeys((*self._ours, *others, *self.added)))
 
     def add(self, name: str, found: T) -> None:
-        """Make an object known under a name, in this process only.
+        """Make an object known under a name, in this process; a later one takes its place.
 
         Raises:
-            ConfigError: The name is taken, or holds a colon.
+            ConfigError: The name is that of another object, or holds a colon.
         """
-        if ":" in name or name in self.names:
+        if ":" in name or name in set(self.names) - set(self.added):
             raise ConfigError(
                 f"expected a new name without a colon for a {self._kind}, found {name!r}"
             )
-        self._known[name] = found
+        self.added[name] = found
 
     def check(self, name: str) -> str:
         """Return the name if it may be valid; no code of the user runs.
@@ -76,8 +80,9 @@ class Registry(Generic[T]):
         Raises:
             ConfigError: There is none of that name, or its module cannot be imported.
         """
-        if name in self._known:
-            return self._known[name]
+        for known in (self._ours, self.added):
+            if name in known:
+                return known[name]
         self.check(name)
         try:
             found = self._load(name)

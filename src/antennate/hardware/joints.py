@@ -35,7 +35,7 @@ class Joints:
         self.models = robot.models
         self.profiles = profile_velocities(robot)
         self.in_order_of_release = robot.in_order_of_release
-        self._shapes = shapes(robot)
+        self._shapes = robot.command_shapes()
         self._sign: Floats = np.array(robot.directions, float)
         self._zero: Floats = np.array(robot.zeros, float)
         self._limit: Floats = np.array(robot.limits)
@@ -101,14 +101,6 @@ class Joints:
         """Its joint angles [rad], shape (n,)."""
         parts = (_part(command, name, shape) for name, shape in self._shapes.items())
         return np.concatenate([part.ravel() for part in parts])
-
-
-def shapes(robot: RobotSpec) -> dict[str, tuple[int, ...]]:
-    """Shapes of the parts of a command of one robot, in the order of its joints."""
-    found = {"yaw": (1, robot.yaw_count), "leg": (1, robot.links, 2), "antenna": (1, 2)}
-    if robot.pitch_count:
-        found["pitch"] = (1, robot.pitch_count)
-    return found
 
 
 def _part(command: JointCommand, name: str, shape: tuple[int, ...]) -> Floats:

@@ -192,6 +192,15 @@ class RobotSpec(Params):
             first += count
         raise KeyError(name)
 
+    def command_shapes(self, batch: int = 1) -> dict[str, tuple[int, ...]]:
+        """Shapes of the arrays of a `JointCommand` for some robots, in the order of the joints."""
+        shapes = {
+            "yaw": (batch, self.yaw_count),
+            "leg": (batch, self.links, len(SIDES)),
+            "antenna": (batch, len(SIDES)),
+        }
+        return shapes | ({"pitch": (batch, self.pitch_count)} if self.pitch_count else {})
+
     @property
     def ids(self) -> tuple[int, ...]:
         """Servo ids of all joints."""

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
-from pydantic import model_validator
+from pydantic import Field, model_validator
 
 from antennate.antenna.statics import PROFILES, Profile
 from antennate.params import (
@@ -46,14 +46,14 @@ class SweepConfig(Params):
         "distances of the wall, over the length of the antenna",
         min_length=1,
     )
-    centres: tuple[float, ...] = number(
+    centres: tuple[Annotated[float, Field(ge=0, le=2.0)], ...] = number(
         tuple(math.radians(a) for a in (47.0, 70.0, 90.0)),
         "rad",
         "assumed: the mounting angle, and on to sideways",
         "centres of the sweep",
         min_length=1,
     )
-    amplitudes: tuple[float, ...] = number(
+    amplitudes: tuple[Annotated[float, Field(gt=0, le=1.5)], ...] = number(
         tuple(math.radians(a) for a in (15.0, 30.0, 45.0)),
         "rad",
         "assumed: half and one and a half times the default",

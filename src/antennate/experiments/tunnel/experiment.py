@@ -8,7 +8,6 @@ from typing import Any
 from antennate.experiments import tunnel as package
 from antennate.experiments.tunnel import measures
 from antennate.experiments.tunnel import run as tunnel
-from antennate.sim.trial import check_start
 from antennate.studies.experiment import Experiment
 from antennate.studies.measures import Table, shown
 
@@ -68,5 +67,5 @@ EXPERIMENT = Experiment(
     tables=tables,
     sentence=sentence,
     figures=_figures,
-    check=check_start,
+    check=tunnel.check,
 )

@@ -3,72 +3,21 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any
 
-import numpy as np
-from pydantic import field_validator, model_validator
-
-from antennate.control.loop import run_loop
-from antennate.control.registry import BUILT_IN, CONTROLLERS, make_controller
+from antennate.control.registry import CONTROLLERS, ControllerFactory, make_controller
 from antennate.experiments.tunnel import measures
-from antennate.experiments.tunnel.monitor import TrialMonitor, TrialPath, TrialResult
-from antennate.params import ControlParams, number
-from antennate.params.base import require_different, require_whole_steps
-from antennate.robots.spec import HARDWARE_ALONE
-from antennate.sim.scenes.registry import make_scene
-from antennate.sim.sim_robot import SimRobot
-from antennate.sim.trial import TrialConfig, draw_trial
+from antennate.experiments.tunnel.batch import run_trials
+from antennate.experiments.tunnel.config import TunnelConfig
+from antennate.experiments.tunnel.monitor import TrialPath, TrialResult
+from antennate.sim.trial import check_start
 from antennate.studies.pool import run_tasks
-from antennate.types import AntennaFrame, JointCommand
 
 SCHEMA = 2
-_BATCH = 6
-"""Trials of one process stepped in lockstep: one NumPy call serves them all."""
 _TASK = 12
 """Most trials handed to a process at once."""
-
-
-class TunnelConfig(TrialConfig):
-    """Everything that decides the outcome of `antennate tunnel`."""
-
-    unread: ClassVar[tuple[str, ...]] = HARDWARE_ALONE
-    trials: int = number(
-        30,
-        "1",
-        "assumed: the paper's ten leave an interval of half the range",
-        "trials of every controller",
-        ge=1,
-        le=100000,
-    )
-    controllers: tuple[str, ...] = number(
-        tuple(BUILT_IN),
-        "1",
-        "assumed: all of ours",
-        "controllers to run: open, paper, closed, or MODULE:NAME or FILE.py:NAME of your own",
-        min_length=1,
-    )
-    time_limit: float = number(
-        100.0,
-        "s",
-        "paper: open loop made 0.04 m/s over its successes; half of that on 2 m takes this long",
-        "time after which a trial has failed",
-        gt=0,
-        le=3600,
-    )
-    control: ControlParams = ControlParams()
-
-    @field_validator("controllers")
-    @classmethod
-    def _names(cls, names: tuple[str, ...]) -> tuple[str, ...]:
-        return tuple(map(CONTROLLERS.check, names))
-
-    @model_validator(mode="after")
-    def _agree(self) -> TunnelConfig:
-        require_different("controllers", self.controllers)
-        require_whole_steps("control.rate", self.control.rate, self.physics.timestep)
-        return self
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,52 +48,27 @@ class TunnelOutcome:
         }
 
 
-def run_trials(
-    config: TunnelConfig,
-    controller: str,
-    trials: Sequence[int],
-    emit: Callable[[tuple[TrialResult, TrialPath]], None],
-    batch: int = _BATCH,
-) -> None:
-    """Run trials of one controller in lockstep; rows are refilled and emitted as trials end."""
-    batch = min(batch, len(trials))
-    control = make_controller(controller, config.control, config.robot, batch)
-    body = SimRobot(batch, config.robot, config.control.period, config.physics.timestep)
-    scene = make_scene(config.scene, config.tunnel)
-    waiting = list(trials)
-    monitors: list[TrialMonitor | None] = [None] * batch
+def check(config: TunnelConfig) -> None:
+    """Find a bad scene or controller before anything is run.
 
-    def fill(row: int) -> None:
-        body.unload(row)
-        monitors[row] = None
-        if waiting:
-            trial = waiting.pop(0)
-            start = draw_trial(config, scene, trial, config.control.gait, config.control.period)
-            body.load(row, start.world, start.chance)
-            control.reset(np.array([row]), start.phase)
-            before = start.world.outlines()[1]
-            monitors[row] = TrialMonitor(
-                config.seed, trial, controller, start.scene, before, config.time_limit
-            )
-
-    def go_on(frame: AntennaFrame, command: JointCommand) -> bool:
-        for row, monitor in enumerate(monitors):
-            if monitor is None:
-                continue
-            world, failure = body.world(row), body.failure(row)
-            outcome = monitor.watch(world, int(control.maneuver[row]), failure is not None)
-            if outcome is not None:
-                emit((monitor.result(world, outcome, str(failure or "")), monitor.path(world)))
-                fill(row)
-        return any(monitor is not None for monitor in monitors)
-
-    for row in range(batch):
-        fill(row)
-    run_loop(body, control, config.control.period, go_on)
+    Raises:
+        ConfigError: There is no such scene or controller, or it cannot be made.
+        SceneError: The scene cannot be built, or the robot does not fit at its start.
+    """
+    check_start(config)
+    for name in config.controllers:
+        make_controller(name, config.control, config.robot)
 
 
-def _run_task(task: tuple[TunnelConfig, str, list[int]], emit: Callable[[Any], None]) -> None:
-    run_trials(*task, emit)
+_Task = tuple[TunnelConfig, str, ControllerFactory | None, list[int]]
+"""Configuration, name of the controller, the controller if it was added in Python, trials."""
+
+
+def _run_task(task: _Task, emit: Callable[[Any], None]) -> None:
+    config, name, added, trials = task
+    if added is not None:
+        CONTROLLERS.add(name, added)
+    run_trials(config, name, trials, emit)
 
 
 def run(
@@ -171,8 +95,10 @@ def run(
         list(range(first, min(first + size, config.trials)))
         for first in range(0, config.trials, size)
     ]
-    tasks: list[tuple[TunnelConfig, str, list[int]]] = [
-        (config, name, chunk) for name in config.controllers for chunk in chunks
+    tasks: list[_Task] = [
+        (config, name, CONTROLLERS.added.get(name), chunk)
+        for name in config.controllers
+        for chunk in chunks
     ]
     found: list[tuple[TrialResult, TrialPath]] = []
 

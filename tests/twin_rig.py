@@ -52,7 +52,7 @@ class Decisions:
     status: str
 
 
-class _Rounded:
+class Rounded:
     """A simulated body whose servos take whole ticks and whose board stamps microseconds."""
 
     def __init__(self, body: SimRobot, joints: Joints) -> None:
@@ -128,7 +128,7 @@ class Stage:
 def simulation(config: TunnelConfig, name: str, trial: int) -> Stage:
     """The trial in pure simulation, goals rounded to ticks."""
     watch = Watch(config, name, trial)
-    body = _Rounded(watch.body, Joints(config.robot))
+    body = Rounded(watch.body, Joints(config.robot))
     period = config.control.period
     return Stage(body, watch.controller, period, watch.go_on, watch.decisions)
 

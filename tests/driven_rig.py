@@ -21,10 +21,10 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
+from twin_rig import Watch
 
 from antennate.control.loop import run_loop
 from antennate.experiments.tunnel.run import TunnelConfig
-from antennate.experiments.twin import Watch
 from antennate.hardware.driving.config import DriveConfig
 from antennate.hardware.driving.connect import prepare
 from antennate.hardware.driving.drive import drive
