@@ -372,7 +372,10 @@ def test_the_command(capsys, tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("words", "text"),
     [
-        ("--walls cliff", "--walls: expected one of flat, sinusoidal, boulders, step, gap or corner"),
+        (
+            "--walls cliff",
+            "--walls: expected one of flat, sinusoidal, boulders, step, gap or corner",
+        ),
         ("--wall.boulders.pitch -0.01", "--wall.boulders.pitch: expected a number of at least"),
         ("--overlap 0.13", "overlap: expected overlap and spread of at most"),
         ("--speeds 0", "expected a number of at least 0.002, found 0"),
