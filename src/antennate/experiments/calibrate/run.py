@@ -248,7 +248,7 @@ def record(
 
     run_tasks(_run_task, tasks, workers, take)
     parts = [found[trial] for trial in sorted(found)]
-    fields = ("counts", "bend", "trial", "speed", "row")
+    fields = ("counts", "level", "trial", "speed", "row")
     joined = [np.concatenate([getattr(p.samples, f) for p in parts]) for f in fields]
     joined[-1] = np.arange(2, len(joined[0]) + 2)
     whole = Recording(np.concatenate([p.t for p in parts]), Samples(*joined), "")
@@ -267,7 +267,7 @@ def averaged(recording: Recording, averaging_time: float) -> Recording:
         first = np.searchsorted(t, t - averaging_time + 1e-9)
         ends = np.arange(1, len(rows) + 1)
         counts[rows] = (total[ends] - total[first]) / (ends - first)
-    samples = Samples(counts, s.bend, s.trial, s.speed, s.row)
+    samples = Samples(counts, s.level, s.trial, s.speed, s.row)
     return Recording(recording.t, samples, recording.sha256)
 
 
