@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from antennate.errors import ControllerError, in_one_line
-from antennate.robots.anatomy import LINK_COUNT, YAW_COUNT
+from antennate.robots.spec import RobotSpec
 from antennate.types import AntennaFrame, Bools, Controller, Floats, Ints, JointCommand, Maneuver
 
 _LAST = max(Maneuver)
@@ -22,6 +22,7 @@ class CheckedController:
 
     Args:
         controller: The controller of `batch` robots.
+        robot: The robot.
         batch: Number of robots B.
 
     Attributes:
@@ -29,11 +30,10 @@ class CheckedController:
         faults: What is wrong with a row of the last step, by row.
     """
 
-    def __init__(self, controller: Controller, batch: int) -> None:
+    def __init__(self, controller: Controller, robot: RobotSpec, batch: int) -> None:
         self._controller = controller
-        both, legs = (batch, 2), (batch, LINK_COUNT, 2)
-        self._shapes = {"yaw": (batch, YAW_COUNT), "leg": legs, "antenna": both}
-        self._said = {"maneuver": (batch,), "contact": both, "level": both}
+        self._shapes = robot.command_shapes(batch)
+        self._said = {"maneuver": (batch,), "contact": (batch, 2), "level": (batch, 2)}
         self.maneuver: Ints = np.full(batch, int(Maneuver.FORWARD))
         self.faults: dict[int, str] = {}
 
@@ -93,7 +93,8 @@ class CheckedController:
     def _all_sound(self, command: JointCommand) -> bool:
         """Whether no row has a fault. A product that is finite has finite factors."""
         maneuvers = self.maneuver.tolist()
-        squares = sum(float(np.vdot(a, a)) for a in (command.yaw, command.leg, command.antenna))
+        angles = [getattr(command, name) for name in self._shapes]
+        squares = sum(float(np.vdot(a, a)) for a in angles)
         return math.isfinite(squares) and min(maneuvers) >= 0 and max(maneuvers) <= _LAST
 
     def _find_faults(self, command: JointCommand) -> None:
