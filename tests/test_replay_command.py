@@ -91,7 +91,7 @@ def test_another_controller_is_compared(log: Path, capsys: pytest.CaptureFixture
     assert result["first_difference"]["replayed"] == "FORWARD"
     assert main(["replay", str(log), "--controller", "open"]) == 0
     out = capsys.readouterr().out
-    assert f"First difference: tick {result['first_difference']['tick']}, " in out
+    assert f"first in tick {result['first_difference']['tick']} at " in out
 
 
 def test_it_leaves_a_table_and_a_figure(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -121,7 +121,7 @@ class Controller(Protocol):
         ...
 
     def reset(self, rows: Ints | Bools, phase: Floats | float = 0.0) -> None:
-        """Start some rows anew, with their gait at a phase [rad]."""
+        """Start some rows anew, indices (n,) or a mask (B,), their gait at a phase [rad]."""
         ...
 
     def step(self, frame: AntennaFrame) -> JointCommand:

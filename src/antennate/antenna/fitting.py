@@ -14,7 +14,6 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from scipy.optimize import isotonic_regression, least_squares
 
 from antennate import __version__
 from antennate.antenna.calibration import FEWEST, NARROWEST_SPAN, Calibration, SpeedFit
@@ -130,6 +129,8 @@ def fit_sigmoid(x: Floats, bend: Floats, sign: int) -> tuple[float, float]:
         bend: Levels, shape (n,).
         sign: Polarity, 1 or -1.
     """
+    from scipy.optimize import least_squares  # takes long; only where it is needed
+
     z = sign * x
     start = (np.log(8.0), float(np.interp(0.5, *_sorted(bend, z))))
 
@@ -316,6 +317,8 @@ def _deal(groups: list[Ints], parts: int) -> list[list[Ints]]:
 
 
 def _predict(model: str, x: Floats, bend: Floats, at: Floats, sign: int) -> Floats:
+    from scipy.optimize import isotonic_regression  # takes long; only where it is needed
+
     if model == "sigmoid":
         slope, midpoint = fit_sigmoid(x, bend, sign)
         return curve(sign * at, slope, sign * midpoint)

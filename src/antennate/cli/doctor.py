@@ -26,9 +26,10 @@ from antennate.studies.run_directory import RunDirectory
 
 DESCRIPTION = """\
 Examine the antenna board and the servo bus of a robot at rest, or of its twin: one line for each
-check, with the cure for what is not good. Torque never comes on. Nothing is written without --fix,
-which asks before each change of an id, a speed, an operating mode or a return delay, and reads it
-back. Either port may be left out. Exit code 2 if anything is bad."""
+check, with the cure for what is not good. Torque never comes on. Either port may be left out.
+
+Nothing is written without --fix, which asks before each change of an id, a speed, an
+operating mode or a return delay, and reads it back. The exit code is 2 if anything is bad."""
 _ROUNDS = 4
 """Servos that change their id or speed are looked at anew before the rest is put right."""
 

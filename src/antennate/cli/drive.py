@@ -32,12 +32,13 @@ from antennate.telemetry.reader import count
 from antennate.telemetry.ticks import Tick
 
 DESCRIPTION = """\
-Let a controller walk the robot whose antenna board and servo bus hang on two serial ports, or its
-twin. An address is the path of a serial port, tcp://HOST:PORT, or, for a board on the network,
-udp://HOST:PORT with the key it was given. First a dry run: everything is read and nothing written.
-Then, with --arm only, torque comes on with every servo where it stands. Ctrl-C or SIGTERM ends it:
-command held, torque off, verified. A lost board or servo makes it hold; the watchdogs of the servos
-stop it if this program dies."""
+Let a controller walk the real robot, or its twin. First a dry run: everything is read and nothing
+written. Then, with --arm only, torque comes on with every servo where it stands, and the robot
+walks. Ctrl-C or SIGTERM ends it: command held, torque off, verified.
+
+A lost board or servo makes the robot hold; the watchdogs of the servos stop it if this program
+dies. The exit code is 2 if it ended in a FAULT or without supply, if torque was refused or is not
+off, and if it was armed and never walked."""
 
 
 @dataclass(frozen=True)
@@ -125,22 +126,11 @@ def _idle(result: Mapping[str, Any]) -> bool:
 
 def _show(result: Mapping[str, Any]) -> None:
     show("Drive", {result["controller"]: result}, _ROWS, _note(result))
+    sys.stdout.write(_sentence(result) + "\n")
 
 
 def _note(result: Mapping[str, Any]) -> str:
-    why = f" ({result['why']})" if result["why"] else ""
-    if result["torque_off"] is None:
-        note = "Torque never came on.\n"
-    else:
-        note = (
-            f"Worst state {result['worst_state']}{why}.\nTorque is {_power(result['servos_on'])}.\n"
-        )
-    if not result["armed"]:
-        note += "A dry run: nothing was written to the servos; --arm lets it walk.\n"
-    if result["refusal"]:
-        note += f"Not armed: {result['refusal']}.\n"
-    if _idle(result):
-        note += "It never walked: --arm was given, and no command was sent.\n"
+    note = ""
     if result["priority"] == Priority.ORDINARY.value:
         note += "Real-time priority was not allowed; a busy machine will make it miss ticks.\n"
     if not result["log_complete"]:
@@ -148,10 +138,28 @@ def _note(result: Mapping[str, Any]) -> str:
     return note
 
 
-def _power(on: Sequence[int]) -> str:
-    if not on:
-        return "off, verified"
-    return f"NOT confirmed off: servos {', '.join(map(str, on))}; switch their supply off"
+def _sentence(result: Mapping[str, Any]) -> str:
+    """What came out, in one sentence."""
+    why = f" ({result['why']})" if result["why"] else ""
+    worst = f"worst state {result['worst_state']}{why}"
+    torque = _torque(result)
+    if result["refusal"]:
+        return f"The robot was not armed: {result['refusal']}; {worst}; {torque}."
+    if not result["armed"]:
+        return f"A dry run: nothing was written to the servos, {worst}; --arm lets the robot walk."
+    if _idle(result):
+        return f"The robot never walked, no command was sent; {worst}; {torque}."
+    sent = f"{result['poses_sent']} commands of `{result['controller']}` were sent"
+    return f"The robot walked: {sent}, {worst}; {torque}."
+
+
+def _torque(result: Mapping[str, Any]) -> str:
+    if result["torque_off"] is None:
+        return "torque never came on"
+    if not result["servos_on"]:
+        return "torque is off, verified"
+    names = ", ".join(map(str, result["servos_on"]))
+    return f"torque is NOT confirmed off: servos {names}; switch their supply off"
 
 
 def _pace(key: str, form: str, scale: float = 1.0) -> Cell:

@@ -32,7 +32,9 @@ DESCRIPTION = """\
 Record an antenna at a bench, into a CSV file that `antennate calibrate` takes. With --marks you
 hold the antenna at one place after the other and press Enter at each; with --speed a stage pushes
 it at a constant speed from Enter on; with neither, readings of both antennae are written until the
-duration is over or Ctrl-C. Every line is flushed; a file that exists is left alone."""
+duration is over or Ctrl-C.
+
+Every line is flushed; a file that exists is left alone."""
 _SHOWN = 100
 """Readings over which mean and noise are shown."""
 
@@ -62,14 +64,15 @@ def command(argv: Sequence[str]) -> int:
         status = Status(stream, params, now)
         with Lines(orders.out) as lines, terminate_as_interrupt():
             recorder = Recorder(stream, params, now, ask(status), lines.write, status)
+            then = "."
             try:
                 recorder.run()
+                then = f"; {_next(params, orders.out)}"
             finally:
-                where = f"written to {orders.out}" if recorder.rows else "nothing is written"
                 lost = stream.clock.sequence.lost
+                where = f"are in {orders.out}" if recorder.rows else "came, so there is no file"
                 status.close()
-                sys.stderr.write(f"{recorder.rows} readings, {lost} lost, {where}\n")
-    sys.stderr.write(_next(params, orders.out) + "\n")
+                sys.stderr.write(f"{recorder.rows} readings {where}, {lost} were lost{then}\n")
     return OK
 
 
@@ -180,7 +183,7 @@ def _entered() -> bool:
 def _next(params: RecordParams, out: Path) -> str:
     """What to do with the file."""
     if not params.marks and params.speed is None:
-        return "no bends are known: the file shows rate, noise and drift; calibrate needs --marks"
+        return "they show rate, noise and drift; calibrate needs --marks or --speed."
     unit = params.unit if params.marks else "m"
     words = ["antennate", "calibrate", "--recording", str(out), "--columns.bend-unit", unit]
     return "next: " + shlex.join([*words, "--sensor-id", params.side])

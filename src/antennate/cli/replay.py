@@ -120,7 +120,6 @@ def _result(log: LogReader, found: Replayed, controller: str | None) -> dict[str
 
 
 def _show(result: Mapping[str, Any]) -> None:
-    first = result["first_difference"]
     then = {"shares": result["recorded_shares"], "states": result["states"]}
     now = {**result, "states": {}}
     names = [
@@ -144,13 +143,20 @@ def _show(result: Mapping[str, Any]) -> None:
         f"{one_line(', '.join(result['parts']))}.\n"
         f"Recorded by {one_line(result['recorded_controller'])}, antennate "
         f"{one_line(result['version'])}; "
-        f"{'the log is complete' if result['closed'] else 'not ended: its program was killed'}.\n"
-        + (
-            f"First difference: tick {first['tick']}, {first['time_s']:.2f} s, "
-            f"{first['recorded']} then, {first['replayed']} now.\n"
-            if first
-            else "Every maneuver is the recorded one.\n"
-        ),
+        f"{'the log is complete' if result['closed'] else 'not ended: its program was killed'}.\n",
+    )
+    sys.stdout.write(_sentence(result) + "\n")
+
+
+def _sentence(result: Mapping[str, Any]) -> str:
+    """What came out, in one sentence."""
+    ticks, different = result["ticks"], result["different"]
+    if not different:
+        return f"The controller decided as recorded in all {ticks} ticks."
+    first = result["first_difference"]
+    return (
+        f"The controller decided otherwise in {different} of {ticks} ticks, first in tick "
+        f"{first['tick']} at {first['time_s']:.2f} s: {first['replayed']} for {first['recorded']}."
     )
 
 

@@ -6,11 +6,6 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from rich.box import SIMPLE_HEAD
-from rich.console import Console
-from rich.table import Table as Drawn
-from rich.text import Text
-
 from antennate.studies.measures import Table, shown
 
 Cell = Callable[[Mapping[str, Any]], str]
@@ -19,6 +14,11 @@ number = shown
 
 def print_table(table: Table) -> None:
     """Print a table and its note; names of columns break at underscores, shown as spaces."""
+    from rich.box import SIMPLE_HEAD  # slow to import
+    from rich.console import Console
+    from rich.table import Table as Drawn
+    from rich.text import Text
+
     drawn = Drawn(title=table.title, title_justify="left", box=SIMPLE_HEAD, pad_edge=False)
     drawn.add_column("", overflow="fold")
     for name in table.columns:

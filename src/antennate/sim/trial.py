@@ -39,6 +39,7 @@ class TrialConfig(Params):
         "1",
         "paper: a cluttered tunnel",
         "tunnel, flat, a MJCF file.xml, MODULE:CLASS or file.py:CLASS",
+        examples=["tunnel", "flat"],
     )
     tunnel: TunnelParams = TunnelParams()
     robot: RobotParams = RobotParams()

@@ -27,6 +27,7 @@ class ReplayConfig(Params):
         "1",
         "assumed: the one recorded",
         "open, paper, closed, or MODULE:NAME or FILE.py:NAME of your own, in place of the recorded",
+        examples=["open", "paper", "closed"],
     )
 
     @field_validator("controller")

@@ -66,7 +66,7 @@ class SensorOutcome(WithoutTrials):
     def result(self) -> dict[str, Any]:
         """The content of result.json."""
         params = self.config.sensor
-        film = sensor.resistance(params, sensor.bend(params, self.flex))
+        film = sensor.resistance(params, sensor.sensed_flex(params, self.flex))
         volts = sensor.divider(params, film)
         readings = sensor.counts(params, self.flex)
         return {

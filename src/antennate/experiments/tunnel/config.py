@@ -26,6 +26,7 @@ class TunnelConfig(TrialConfig):
         "assumed: all of ours",
         "controllers to run: open, paper, closed, or MODULE:NAME or FILE.py:NAME of your own",
         min_length=1,
+        examples=["open", "paper", "closed"],
     )
     time_limit: float = number(
         100.0,

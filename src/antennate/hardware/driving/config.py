@@ -17,6 +17,7 @@ class DriveConfig(RobotConfig):
         "1",
         "assumed: our best",
         "open, paper, closed, or MODULE:NAME or FILE.py:NAME of your own",
+        examples=["open", "paper", "closed"],
     )
     dry_run: float = number(
         10.0, "s", "assumed: long enough to touch both antennae", "time before torque", ge=0, le=600
