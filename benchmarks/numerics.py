@@ -27,7 +27,7 @@ from antennate.experiments.tunnel import run as experiment
 from antennate.experiments.tunnel.monitor import TrialResult
 from antennate.experiments.tunnel.run import TunnelConfig
 from antennate.params import GaitParams, PhysicsParams, TunnelParams
-from antennate.robots.body import RobotParams
+from antennate.robots.spec import RobotSpec
 from antennate.sim import trial
 from antennate.sim.scenes.scene import SceneInstance
 from antennate.sim.scenes.tunnel import Tunnel
@@ -64,7 +64,7 @@ class Engine:
             sleep_tolerance=self.sleep_tolerance,
         )
 
-    def compile(self, _: PhysicsParams, robot: RobotParams, scene: SceneInstance | None = None):
+    def compile(self, _: PhysicsParams, robot: RobotSpec, scene: SceneInstance | None = None):
         """As compile_world, with cone and sleep of this engine."""
         model = compile_world(self.physics, robot, scene)
         if self.pyramidal:
@@ -153,8 +153,8 @@ def coulomb_stop(params: TunnelParams) -> float:
 def _slide(engine: Engine, direction: float) -> float:
     far = np.array([[-9.0, 9.0], [9.0, 9.0]])
     field = Tunnel(TunnelParams(), far * [1.0, 0.0], (far, -far[::-1]), np.array([[3.0, 0.0]]))
-    robot = RobotParams()
-    world = World(engine.compile(engine.physics, robot, field), 6)
+    robot = RobotSpec()
+    world = World(engine.compile(engine.physics, robot, field), robot)
     model, data = world.model, world.data
     flags = int(model.opt.enableflags)
     model.opt.enableflags = flags & ~int(mujoco.mjtEnableBit.mjENBL_SLEEP)

@@ -159,7 +159,7 @@ class Pacing:
     """A control that walks to and fro."""
 
     def __init__(self, config: TunnelConfig) -> None:
-        self._gait = Gait(config.control.gait, 1, config.control.period)
+        self._gait = Gait(config.control.gait, config.robot, 1, config.control.period)
 
     def step(self, frame: AntennaFrame) -> JointCommand:
         back = int(frame.t[0] / _PACING) % 2
@@ -180,8 +180,8 @@ def seconds_with(config: TunnelConfig, drawn: Tunnel, seconds: float) -> float:
     """CPU time of pacing for some simulated seconds in this tunnel."""
     robot, period = config.robot, config.control.period
     world = make_world(config.physics, robot, drawn)
-    world.place(0.0, 0.0, 0.0, np.zeros(5), np.zeros((6, 2)))
-    body = SimRobot(1, robot.sensor, period, config.physics.timestep)
+    world.place(0.0, 0.0, 0.0, np.zeros(robot.yaw_count), np.zeros((robot.links, 2)))
+    body = SimRobot(1, robot, period, config.physics.timestep)
     chance = prepare(config, 1)[0].chance
     body.load(0, world, chance)
     control = Pacing(config)

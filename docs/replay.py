@@ -31,7 +31,7 @@ def log(path: Path) -> None:
     robot = build(TwinConfig(touch=("left@1s", "right@3s"), trial=1))
     clock = LockstepClock(robot)
     session = prepare(CONFIG, BoardPort(robot, clock), clock, clock)
-    header = Header(controller="closed", params=CONFIG.control, layout=CONFIG.layout)
+    header = Header(controller="closed", params=CONFIG.control, robot=CONFIG.robot)
     with LogWriter(path, header) as writer:
 
         def on_tick(session: Session, now: float) -> None:

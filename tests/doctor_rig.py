@@ -25,7 +25,7 @@ class Patient:
         self.robot: TwinRobot = build(TwinConfig())
         self.clock = LockstepClock(self.robot)
         self.board = BoardPort(self.robot, self.clock)
-        Faults([read(text) for text in faults], ROBOT.layout.ids).apply(self.robot, 0.0)
+        Faults([read(text) for text in faults], ROBOT.robot.ids).apply(self.robot, 0.0)
         self.clock.latency = self.robot.bus.latency
         self.robot.bus.latency = 0.0
 
@@ -50,7 +50,7 @@ class Patient:
     def fix(self) -> list[str]:
         """Changes made until nothing is left to change."""
         made: list[str] = []
-        while (survey := self.examine(esp32=False).bus) and (changes := plan(survey, ROBOT.layout)):
+        while (survey := self.examine(esp32=False).bus) and (changes := plan(survey, ROBOT.robot)):
             for change in changes:
                 apply(self.bus, change, self.clock.now)
                 made.append(str(change))

@@ -32,7 +32,7 @@ from antennate.hardware.driving.report import Report
 from antennate.hardware.driving.session import Session
 from antennate.hardware.esp32.board import Board
 from antennate.hardware.joints import Joints
-from antennate.robots.layout import LayoutParams
+from antennate.robots.spec import RobotSpec
 from antennate.sim.sim_robot import SimRobot
 from antennate.twin.lockstep import BoardPort, LockstepClock
 from antennate.twin.robot import TwinRobot
@@ -118,7 +118,6 @@ def driven(
     config: TunnelConfig,
     name: str,
     trial: int,
-    layout: LayoutParams,
     ticks: float = math.inf,
     wired: Callable[[DriveConfig, TwinRobot], Session] = in_process,
     phase: float = 0.0,
@@ -129,7 +128,6 @@ def driven(
         config: The trial's world.
         name: Name of its controller.
         trial: Its number.
-        layout: Servos of the robot.
         ticks: Most ticks from the first reading on.
         wired: Puts a session before the twin.
         phase: Time that the loop begins later [s], which moves its ticks against the board's.
@@ -138,19 +136,25 @@ def driven(
         BringUpError: The servos did not come up.
     """
     watch, walk, period = Watch(config, name, trial), Walk(), config.control.period
-    robot = TwinRobot(watch.body, layout, period, boot_id=trial + 1, standing_noise=True)
+    robot = TwinRobot(watch.body, config.robot, period, boot_id=trial + 1, standing_noise=True)
     orders = DriveConfig(
-        controller=name, dry_run=_DRY_RUN, touch_check=False, layout=layout, control=config.control
+        controller=name,
+        dry_run=_DRY_RUN,
+        touch_check=False,
+        robot=config.robot,
+        control=config.control,
     )
     session = wired(orders, robot)
-    control = session.controller = _Judged(watch, lambda: _taken(session.board) - robot.stood)
+    control = session.control.controller = _Judged(
+        watch, lambda: _taken(session.board) - robot.stood
+    )
     session.clock.sleep_until(session.clock.now() + phase)
 
     def on_tick(session: Session, now: float) -> None:
         if control.first is None or session.orders.stop:
             return
         goals = tuple(servo.get("goal_position") for servo in robot.servos)
-        walk.note(session.frame, int(control.maneuver[0]), session.command, goals)
+        walk.note(session.frame, int(control.maneuver[0]), session.control.command, goals)
         session.orders.stop = bool(watch.status) or len(walk.readings) >= ticks
 
     report = drive(session, orders, arm=True, on_tick=on_tick)
@@ -162,7 +166,6 @@ def simulated_alike(
     config: TunnelConfig,
     name: str,
     trial: int,
-    layout: LayoutParams,
     start: Start,
     ticks: float = math.inf,
 ) -> Walk:
@@ -171,7 +174,7 @@ def simulated_alike(
     period, control = config.control.period, watch.controller
     for frame in start.before:
         control.step(frame)
-    body = _Begun(watch.body, layout, period, start)
+    body = _Begun(watch.body, config.robot, period, start)
 
     def go_on(frame: AntennaFrame, command: JointCommand) -> bool:
         walk.note(frame, int(control.maneuver[0]), command, body.sent)
@@ -236,8 +239,8 @@ class _Begun:
         sent: The newest goals [ticks].
     """
 
-    def __init__(self, body: SimRobot, layout: LayoutParams, period: float, start: Start) -> None:
-        self._body, self._joints = body, Joints(layout)
+    def __init__(self, body: SimRobot, robot: RobotSpec, period: float, start: Start) -> None:
+        self._body, self._joints = body, Joints(robot)
         self._ahead = float(start.first.t[0]) - start.standing * period
         self.sent: tuple[int, ...] = ()
         self._frame: AntennaFrame | None = self._stamped(body.read())

@@ -21,17 +21,17 @@ import test_twin_robot
 from guard_tools import Guard, after, around, constant, put
 
 from antennate.hardware import joints, settings
-from antennate.hardware.driving import session, turns
-from antennate.hardware.driving.turns import Turns
-from antennate.hardware.dynamixel import bringup, bus, inquiry, packets, parser
+from antennate.hardware.driving import session
+from antennate.hardware.dynamixel import actuators, bringup, bus, inquiry, monitor, packets, parser
+from antennate.hardware.dynamixel import leg_turns as turns
 from antennate.hardware.dynamixel.answers import Timing, Value
 from antennate.hardware.dynamixel.doubts import Doubts
+from antennate.hardware.dynamixel.leg_turns import LegTurns
 from antennate.hardware.dynamixel.tables import XC430_W240
 from antennate.hardware.ports import serial_port
-from antennate.hardware.safety import watch
 from antennate.hardware.safety.causes import Outputs, State
 from antennate.params import TurnsParams
-from antennate.robots.layout import LayoutParams
+from antennate.robots.spec import RobotSpec
 from antennate.twin.wire import SimulatedWire
 
 controller_fails = test_session.test_B8_servos_stop_within_120_ms_when_only_the_controller_fails
@@ -108,8 +108,8 @@ def old_goal(old: Any, self: Any, at: int, goals: Any) -> bool:
     return self._write(self._joints.ids[at], turns._TORQUE, 1)
 
 
-def no_fault(old: Any, self: Any, out: Outputs) -> None:
-    old(self, dataclasses.replace(out, state=State.HOLD))
+def no_fault(old: Any, self: Any, out: Outputs, command: Any) -> None:
+    old(self, dataclasses.replace(out, state=State.HOLD), command)
 
 
 def told_once(old: Any, master: Any, ids: Any, *words: Any) -> list[int]:
@@ -310,7 +310,7 @@ SERVOS = [
     ),
     Guard(
         "torque lost while armed",
-        put(watch, "_TORQUE", XC430_W240["status_return_level"]),
+        put(monitor, "_TORQUE", XC430_W240["status_return_level"]),
         partial(
             test_session.test_B11_B9_a_servo_without_torque_or_watchdog_is_a_fault_within_a_second,
             7,
@@ -320,7 +320,7 @@ SERVOS = [
     ),
     Guard(
         "watchdog lost while armed",
-        put(watch, "WATCHDOG_COUNTS", AnyNumber()),
+        put(monitor, "WATCHDOG_COUNTS", AnyNumber()),
         partial(
             test_session.test_B11_B9_a_servo_without_torque_or_watchdog_is_a_fault_within_a_second,
             7,
@@ -330,17 +330,17 @@ SERVOS = [
     ),
     Guard(
         "torque taken off on purpose",
-        put(Turns, "loose", None),
+        put(LegTurns, "loose", None),
         test_turns.test_a_leg_without_torque_to_forget_its_turns_is_not_reported,
     ),
     Guard(
         "goal of a loose leg is read back",
-        around(Turns, "_write", goal_taken),
+        around(LegTurns, "_write", goal_taken),
         test_loose_leg.test_B10_a_leg_that_does_not_take_its_goal_gets_no_torque,
     ),
     Guard(
         "goal of a loose leg is where it stands",
-        around(Turns, "_hold", old_goal),
+        around(LegTurns, "_hold", old_goal),
         partial(
             test_loose_leg.test_B10_a_leg_that_was_turned_while_loose_gets_torque_where_it_stands,
             600,
@@ -348,12 +348,12 @@ SERVOS = [
     ),
     Guard(
         "a loose leg after a fault",
-        around(session.Session, "_forget_turns", no_fault),
+        around(session.Session, "_move", no_fault),
         test_loose_leg.test_B10_after_a_pause_a_loose_leg_waits_for_an_arm_event,
     ),
     Guard(
         "torque is off before turns are forgotten",
-        around(Turns, "_read", torque_off),
+        around(LegTurns, "_read", torque_off),
         test_loose_leg.test_a_leg_whose_torque_came_back_is_not_cleared,
     ),
     Guard(
@@ -371,24 +371,24 @@ SERVOS = [
     ),
     Guard(
         "legs stand still before one is let go",
-        put(Turns, "_calm", constant(True)),
+        put(LegTurns, "_calm", constant(True)),
         test_loose_leg.test_no_leg_loses_its_torque_before_all_have_stood_still_for_five_ticks,
     ),
     Guard(
         "supply read long ago",
-        put(watch, "_OLD", math.inf),
+        put(monitor, "_OLD", math.inf),
         test_session.test_B13_a_supply_that_cannot_be_read_any_more_is_not_known_after_4_s,
     ),
     Guard(
         "no torque after half an arming",
-        put(session, "AntennateError", ()),
+        put(actuators, "AntennateError", ()),
         partial(
             test_session.test_B10_arming_that_fails_half_way_leaves_no_servo_with_torque, "servo"
         ),
     ),
     Guard(
         "limits of yaw joints and antennae",
-        put(LayoutParams, "limits", (math.inf,) * 19),
+        put(RobotSpec, "limits", (math.inf,) * 19),
         test_twin_robot.test_B14_a_yaw_or_an_antenna_beyond_its_limit_is_refused_as_a_whole,
     ),
     Guard(

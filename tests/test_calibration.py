@@ -263,7 +263,7 @@ def test_the_rig_sees_readings_fall_as_the_rod_goes_in() -> None:
     assert found.calibration.polarity == -1
     assert {speed.speed_m_s for speed in found.calibration.speeds} == {0.05, 0.10, 0.15}
     fsr = RIG.model_dump()
-    fsr["sensor"]["kind"] = "fsr"
+    fsr["antenna"]["sensor"]["kind"] = "fsr"
     assert run(CalibrateConfig.model_validate(fsr)).calibration.polarity == 1
 
 

@@ -230,9 +230,8 @@ def test_fix_sets_what_drive_requires_and_says_what_has_to_follow() -> None:
     assert patient.fix() == [
         "servo 3 (at 1000000): max position limit 2200 -> 4095",
         "servo 3 (at 1000000): min position limit 1900 -> 0",
-        "servo 8 (at 1000000): drive mode 9 -> 0; see that its sign in layout.*.directions is "
-        "right",
-        "servo 9 (at 1000000): homing offset 500 -> 0; measure its place in layout.*.zeros anew",
+        "servo 8 (at 1000000): drive mode 9 -> 0; see that its sign in robot.*.directions is right",
+        "servo 9 (at 1000000): homing offset 500 -> 0; measure its place in robot.*.zeros anew",
         "servo 19 (at 1000000): velocity limit 100 -> 445",
     ]
     assert wrong(patient.examine()) == {}
@@ -257,7 +256,7 @@ def test_B18_fix_writes_nothing_where_nothing_differs() -> None:
 def test_fix_gives_no_id_where_it_is_not_plain_whose_it_is(faults: tuple[str, ...]) -> None:
     survey = Patient(*faults).examine(esp32=False).bus
     assert survey is not None
-    assert [change for change in plan(survey, ROBOT.layout) if change.register == "id"] == []
+    assert [change for change in plan(survey, ROBOT.robot) if change.register == "id"] == []
 
 
 def test_fix_takes_torque_off_before_it_writes_eeprom() -> None:

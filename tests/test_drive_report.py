@@ -100,7 +100,7 @@ class Unsure:
 
 def test_a_controller_that_never_decides_is_a_hold() -> None:
     made = rig(TwinConfig())
-    made.session.controller = Unsure(made.session.controller)
+    made.session.control.controller = Unsure(made.session.control.controller)
     made, report = driven(nothing, made)
     assert made.session.tally.sent == 0
     assert report.worst is State.HOLD
@@ -137,7 +137,7 @@ def test_L8_a_drive_that_sent_no_pose_ends_with_2_and_says_so(
     @contextlib.contextmanager
     def in_process(config: DriveConfig, *addresses: object) -> Iterator[Session]:
         robot = build(TwinConfig(), 5)
-        clock = LockstepClock(robot, Faults([read(f"esp32=silent@{when}")], config.layout.ids))
+        clock = LockstepClock(robot, Faults([read(f"esp32=silent@{when}")], config.robot.ids))
         yield prepare(config, BoardPort(robot, clock), clock, clock)
 
     monkeypatch.setattr("antennate.cli.drive.connect", in_process)

@@ -9,17 +9,15 @@ from driven_rig import driven, simulated_alike
 
 from antennate.experiments.tunnel.run import TunnelConfig
 from antennate.hardware.safety.causes import State
-from antennate.robots.layout import LayoutParams
 from antennate.types import Maneuver
 
 CONFIG = TunnelConfig(seed=0)
-LAYOUT = LayoutParams()
 
 
 def same(name: str, trial: int, ticks: float, phase: float = 0.0) -> tuple[set[int], int, str]:
     """Both ways agree in every tick; the maneuvers, the number of ticks and the end."""
-    one = driven(CONFIG, name, trial, LAYOUT, ticks, phase=phase)
-    other = simulated_alike(CONFIG, name, trial, LAYOUT, one.start, ticks)
+    one = driven(CONFIG, name, trial, ticks, phase=phase)
+    other = simulated_alike(CONFIG, name, trial, one.start, ticks)
     assert one.walk.maneuvers == other.maneuvers
     assert one.walk.commands == other.commands
     assert one.walk.readings == other.readings

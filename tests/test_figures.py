@@ -9,7 +9,6 @@ from antennate import figures as style
 from antennate.control.registry import BUILT_IN
 from antennate.experiments.gait import figure as gait
 from antennate.experiments.tunnel import figure as tunnel
-from antennate.robots.anatomy import LINK_COUNT
 from antennate.types import Maneuver
 
 LIMIT = 50.0
@@ -47,7 +46,7 @@ def path(end: float, samples: int = 40) -> Path:
         before=stood,
         after=[polygon + 0.05 for polygon in stood],
         exit=np.array([wall[-1] for wall in WALLS]),
-        links=np.stack([end - 0.1 * np.arange(LINK_COUNT), np.zeros(LINK_COUNT)], axis=1),
+        links=np.stack([end - 0.1 * np.arange(6), np.zeros(6)], axis=1),
     )
 
 

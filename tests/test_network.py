@@ -23,7 +23,7 @@ from antennate.hardware.ports.keys import read_key
 from antennate.hardware.ports.port import Port, PortError
 from antennate.hardware.ports.udp_port import UdpPort
 from antennate.params import NetworkParams
-from antennate.robots.layout import LayoutParams
+from antennate.robots.spec import RobotSpec
 from antennate.twin.config import TwinConfig
 from antennate.twin.faults import Faults
 from antennate.twin.serve import TwinServer
@@ -279,7 +279,7 @@ def test_X16_the_key_is_in_nothing_that_a_drive_over_udp_says(
     path = private(tmp_path, key.hex())
     server = TwinServer(
         rig(TwinConfig()).robot,
-        Faults([], LayoutParams().ids),
+        Faults([], RobotSpec().ids),
         UdpEndpoint("127.0.0.1", 0, key),
         TcpEndpoint("127.0.0.1", 0),
     )

@@ -125,7 +125,7 @@ def test_the_example_drives_the_twin() -> None:
     goals: set[tuple[int, ...]] = set()
 
     def on_tick(session: Session, now: float) -> None:
-        maneuvers.append(session.decision.maneuver)
+        maneuvers.append(session.control.decision.maneuver)
         goals.add(tuple(servo.get("goal_position") for servo in robot.servos))
 
     report = drive(session, config, True, on_tick)

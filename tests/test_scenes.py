@@ -12,7 +12,7 @@ import pytest
 from antennate.cli import main
 from antennate.errors import AntennateError, ConfigError, SceneError
 from antennate.params import GaitParams, PhysicsParams
-from antennate.robots.body import RobotParams
+from antennate.robots.spec import RobotSpec
 from antennate.sim.scenes.flat import FlatScene
 from antennate.sim.scenes.mjcf import MjcfScene
 from antennate.sim.scenes.registry import make_scene
@@ -33,7 +33,7 @@ def mjcf(folder: Path, world: str, before: str = "") -> Path:
 
 
 def drawn(scene, seed: int = 0):
-    return scene.draw(RobotParams(), np.random.default_rng(seed))
+    return scene.draw(RobotSpec(), np.random.default_rng(seed))
 
 
 def test_ours_keep_the_protocol(tmp_path):
@@ -172,7 +172,7 @@ def test_a_geom_with_default_bits_meets_body_legs_and_antennae(tmp_path, movable
     if movable:
         wall = f"<body><freejoint/>{wall}</body>"
     instance = drawn(MjcfScene(mjcf(tmp_path, SITES + wall)))
-    world = make_world(PhysicsParams(), RobotParams(), instance)
+    world = make_world(PhysicsParams(), RobotSpec(), instance)
     place_at_start(world, instance, GaitParams())
     assert touching(world) == {"lin", "leg", "ant"}
     assert world.obstacle_overlap() > 0.0
@@ -194,7 +194,7 @@ def test_geoms_of_a_file_touch_one_another_as_they_did(tmp_path):
         named = [{model.geom(g).name.removeprefix("scene/") for g in c.geom} for c in contacts]
         return {frozenset(n) for n in named if n <= {"a", "b", "c"}}
 
-    world = make_world(PhysicsParams(), RobotParams(), drawn(MjcfScene(tmp_path / "scene.xml")))
+    world = make_world(PhysicsParams(), RobotSpec(), drawn(MjcfScene(tmp_path / "scene.xml")))
     mujoco.mj_forward(world.model, world.data)
     assert pairs(alone, data.contact) == {frozenset("ac"), frozenset("bc")}
     assert pairs(world.model, world.data.contact) == pairs(alone, data.contact)
@@ -224,7 +224,7 @@ def test_meshes_are_read_from_the_folder_of_the_file(tmp_path):
     assets = '<compiler meshdir="parts"/><asset><mesh file="stone.obj" scale=".2 .2 .2"/></asset>'
     stone = '<geom name="wall" type="mesh" mesh="stone" pos="1 .5 0"/>'
     instance = drawn(MjcfScene(mjcf(tmp_path, SITES + stone, assets)))
-    world = make_world(PhysicsParams(), RobotParams(), instance)
+    world = make_world(PhysicsParams(), RobotSpec(), instance)
     (polygon,) = world.outlines()[0]
     assert polygon.min(axis=0) == pytest.approx([1.0, 0.5], abs=1e-6)
     assert polygon.max(axis=0) == pytest.approx([1.2, 0.7], abs=1e-6)

@@ -10,7 +10,7 @@ import pytest
 
 from antennate.errors import SceneError
 from antennate.params import PhysicsParams, TunnelParams
-from antennate.robots.body import RobotParams
+from antennate.robots.spec import RobotSpec
 from antennate.sim.scenes import geometry
 from antennate.sim.scenes.tunnel import Tunnel, TunnelScene
 from antennate.sim.world import World, compile_world
@@ -18,7 +18,7 @@ from antennate.sim.world import World, compile_world
 MU, G, RADIUS = 0.4, 9.81, 0.07
 STRAIGHT = TunnelParams(segments=(2.0,), turns_deg=(), mirror="never")
 BENT = TunnelParams(segments=(1.0, 0.8, 1.2), turns_deg=(60.0, -90.0), mirror="never")
-ROBOT = RobotParams()
+ROBOT = RobotSpec()
 
 
 def draw(params: TunnelParams, seed: int = 0, **changes: object) -> Tunnel:
@@ -41,7 +41,7 @@ def pushed(velocity: tuple[float, float], spin: float) -> np.ndarray:
         cylinders=np.array([[3.0, 3.0]]),
     )
     model = compile_world(PhysicsParams(), ROBOT, lone)
-    world = World(model, sensed_hinges=5)
+    world = World(model, ROBOT)
     world.step(20)
     first = {axis: model.joint(f"cylinder0_{axis}") for axis in ("x", "y", "spin")}
     before = np.array([world.data.qpos[j.qposadr[0]] for j in first.values()])

@@ -23,7 +23,7 @@ from antennate.experiments.touch.measures import Pool, roc
 from antennate.experiments.touch.run import TouchConfig
 from antennate.experiments.touch.sensing import Judgement, Verdict
 from antennate.params import BenchPhysicsParams, ConditioningParams, RuleParams, TouchWallsParams
-from antennate.robots.antenna import AntennaParams
+from antennate.robots.antenna import AntennaSpec
 from antennate.robots.sensor import SensorParams
 from antennate.sim import touch_wall
 from antennate.sim.bench import Ball, Bar, Bench, compile_bench
@@ -163,7 +163,7 @@ def test_truth_merges_short_gaps_of_strong_presses():
 
 
 def sited(overlap=0.02, length=0.4):
-    return wall_traverse.site(AntennaParams(), overlap, length, 0.25)
+    return wall_traverse.site(AntennaSpec(), overlap, length, 0.25)
 
 
 @pytest.mark.parametrize("kind", touch_wall.WALLS)
@@ -195,7 +195,7 @@ def test_walls_stand_where_they_should(kind):
         ({"wall_length": 0.1, "walls": ("flat",)}, "wall.flat: expected at least 0.02 m"),
         ({"walls": ("boulders",), "wall": {"boulders": {"pitch": 0.4}}}, "room for two spheres"),
         ({"speeds": (0.1, 0.1)}, "speeds must differ"),
-        ({"sensor": {"rate": 300.0}}, "sensor.rate must be a whole fraction"),
+        ({"antenna": {"sensor": {"rate": 300.0}}}, "sensor.rate must be a whole fraction"),
         ({"trials": 10000}, "trials: expected at most 10,000,000 ticks"),
     ],
 )
@@ -217,7 +217,7 @@ def test_arms_meet_the_same_draws_and_springs_follow_them():
     other = config.model_copy(update={"seed": 1})
     assert touch.plan(other, "gap", 0.05, "stiff", 3).site != plans[0].site
     factors = touch.draw(config, 3).springs
-    nominal = mechanics.with_profile(config.antenna, config.sensor, "descending")
+    nominal = mechanics.with_profile(config.antenna, "descending")
     ratio = np.array(plans[1].antenna.spring_stiffness()) / nominal.spring_stiffness()
     np.testing.assert_allclose(ratio, factors)
     assert (abs(factors - 1) <= 0.1).all()
@@ -228,15 +228,15 @@ def test_arms_meet_the_same_draws_and_springs_follow_them():
 
 def test_a_steady_press_has_the_force_of_the_springs():
     """At rest against a smooth ball each spring's torque is the moment of the mean force."""
-    antenna, sensor = AntennaParams(friction=0.0), SensorParams()
-    bench = Bench(compile_bench(BenchPhysicsParams(), antenna, sensor, [Ball(0.11, 0.02, 0.01)]), 5)
+    antenna = AntennaSpec(friction=0.0)
+    bench = Bench(compile_bench(BenchPhysicsParams(), antenna, [Ball(0.11, 0.02, 0.01)]), antenna)
     bench.place(0.0, 0.0, 0.0)
     for i in range(400):
         bench.command(0.0, 0.02 * min(1.0, i / 200), 0.0, 0.0, 0.0)
         bench.step(10)
     force = np.mean([bench.press(20) for _ in range(50)], axis=0)
     joints, angles = bench.joints(), bench.hinges().copy()
-    k = antenna.hinge_stiffness(sensor.covered_hinges(antenna))
+    k = antenna.hinge_stiffness()
     normal = force / np.linalg.norm(force)
     contact = np.array([0.11, 0.02]) + 0.01 * normal
     arm = contact - joints[:4]
@@ -246,9 +246,9 @@ def test_a_steady_press_has_the_force_of_the_springs():
 
 
 def test_pressing_steps_like_stepping():
-    antenna, sensor = AntennaParams(), SensorParams()
-    model = compile_bench(BenchPhysicsParams(), antenna, sensor, [Ball(0.1, 0.01, 0.01)])
-    one, two = Bench(model, 5), Bench(model, 5)
+    antenna = AntennaSpec()
+    model = compile_bench(BenchPhysicsParams(), antenna, [Ball(0.1, 0.01, 0.01)])
+    one, two = Bench(model, antenna), Bench(model, antenna)
     for bench in (one, two):
         bench.place(0.0, 0.0, 0.0)
         bench.command(0.0, 0.002, 0.0, 0.0, 0.0)
@@ -309,7 +309,7 @@ def test_the_force_that_is_needed_bends_the_film_that_far(outcome):
     volts = 0.142 + 0.8056e-3 * (1399.0 + 0.305 * 473.0)
     flex = ((3.3 * 1e4 / volts - 1e4) / 1e4 - 1.0) * math.pi / 1.2
     assert needed["flex_rad"] == pytest.approx(flex, abs=0.01)  # one count is 4 mrad
-    antenna = mechanics.with_profile(AntennaParams(), SensorParams(), "stiff")
+    antenna = mechanics.with_profile(AntennaSpec(), "stiff")
     chain = mechanics.Chain.of(antenna, SensorParams())
     load = np.array([[0.0, needed["tip_force_n"]["stiff"]]])
     bent = mechanics.equilibrium(chain, np.array([0.12]), load, follower=True).angles[0, :5]

@@ -15,17 +15,17 @@ from antennate.control.loop import run_loop
 from antennate.control.registry import make_controller
 from antennate.experiments.tunnel.monitor import TrialMonitor
 from antennate.experiments.tunnel.run import TunnelConfig
-from antennate.hardware.driving.body import HardwareRobot
 from antennate.hardware.driving.connect import DOUBT
+from antennate.hardware.driving.hardware_robot import HardwareRobot
 from antennate.hardware.driving.session import Session
 from antennate.hardware.dynamixel import bringup
+from antennate.hardware.dynamixel.actuators import DynamixelActuators
 from antennate.hardware.dynamixel.answers import Timing
 from antennate.hardware.dynamixel.bus import Bus
 from antennate.hardware.esp32.board import Board
 from antennate.hardware.joints import Joints
 from antennate.hardware.safety.signal_quality import SignalQuality
 from antennate.params import ControlParams, SupervisorParams, TouchCheckParams
-from antennate.robots.layout import LayoutParams
 from antennate.sim.scenes.registry import make_scene
 from antennate.sim.sim_robot import SimRobot
 from antennate.sim.trial import draw_trial
@@ -81,7 +81,7 @@ class Watch:
         period = config.control.period
         scene = make_scene(config.scene, config.tunnel)
         start = draw_trial(config, scene, trial, config.control.gait, period)
-        self.body = SimRobot(1, config.robot.sensor, period, config.physics.timestep)
+        self.body = SimRobot(1, config.robot, period, config.physics.timestep)
         self.body.load(0, start.world, start.chance)
         self.controller = make_controller(name, config.control, config.robot)
         self.controller.reset(np.array([0]), start.phase)
@@ -126,17 +126,17 @@ class Stage:
     robot: TwinRobot | None = None
 
 
-def simulation(config: TunnelConfig, name: str, trial: int, layout: LayoutParams) -> Stage:
+def simulation(config: TunnelConfig, name: str, trial: int) -> Stage:
     """The trial in pure simulation, goals rounded to ticks."""
     watch = Watch(config, name, trial)
-    body = Rounded(watch.body, Joints(layout))
+    body = Rounded(watch.body, Joints(config.robot))
     period = config.control.period
     return Stage(body, watch.controller, period, watch.go_on, watch.decisions)
 
 
-def simulated(config: TunnelConfig, name: str, trial: int, layout: LayoutParams) -> Decisions:
+def simulated(config: TunnelConfig, name: str, trial: int) -> Decisions:
     """The whole trial in pure simulation."""
-    stage = simulation(config, name, trial, layout)
+    stage = simulation(config, name, trial)
     run_loop(stage.body, stage.control, stage.period, stage.go_on)
     return stage.decisions()
 
@@ -155,10 +155,10 @@ def rig(config: TwinConfig, name: str = "closed", touch: TouchCheckParams | None
     robot = build(config)
     params = ControlParams(**dict(config.control))
     clock = LockstepClock(robot)
+    bus = Bus(clock, Timing(config.robot.baud, doubt=DOUBT), clock=clock.now)
     session = Session(
         board=Board(BoardPort(robot, clock), SupervisorParams().stale_age),
-        bus=Bus(clock, Timing(config.layout.baud, doubt=DOUBT), clock=clock.now),
-        joints=Joints(config.layout),
+        actuators=DynamixelActuators(bus, Joints(config.robot), clock.now),
         clock=clock,
         controller=make_controller(name, params, config.robot),
         period=params.period,
@@ -167,7 +167,7 @@ def rig(config: TwinConfig, name: str = "closed", touch: TouchCheckParams | None
     return Rig(robot, clock, session)
 
 
-def before_twin(config: TunnelConfig, name: str, trial: int, layout: LayoutParams) -> Stage:
+def before_twin(config: TunnelConfig, name: str, trial: int) -> Stage:
     """The hardware code before a twin, torque on.
 
     Raises:
@@ -175,18 +175,19 @@ def before_twin(config: TunnelConfig, name: str, trial: int, layout: LayoutParam
     """
     watch = Watch(config, name, trial)
     period = config.control.period
-    robot = TwinRobot(watch.body, layout, period, boot_id=trial + 1)
+    spec = config.robot
+    robot = TwinRobot(watch.body, spec, period, boot_id=trial + 1)
     clock = LockstepClock(robot)
     board = Board(BoardPort(robot, clock), SupervisorParams().stale_age)
-    bus = Bus(clock, Timing(layout.baud, doubt=DOUBT), clock=clock.now)
+    bus = Bus(clock, Timing(spec.baud, doubt=DOUBT), clock=clock.now)
     while board.newest(clock.now()) is None and clock.now() < _WARM_UP:
         clock.sleep(period)
         board.poll(clock.now())
     bringup.require(bus, {servo.get("id"): servo.table.model for servo in robot.servos})
-    bringup.arm_watchdogs(bus, layout.ids)
+    bringup.arm_watchdogs(bus, spec.ids)
     clock.sleep_until(period * np.ceil(clock.now() / period + 1.0))
-    bringup.enable(bus, layout.ids)
-    body = HardwareRobot(board, bus, Joints(layout), clock)
+    bringup.enable(bus, spec.ids)
+    body = HardwareRobot(board, DynamixelActuators(bus, Joints(spec), clock.now), clock)
     return Stage(body, watch.controller, period, watch.go_on, watch.decisions, robot)
 
 
@@ -194,7 +195,6 @@ def on_twin(
     config: TunnelConfig,
     name: str,
     trial: int,
-    layout: LayoutParams,
     on_tick: Callable[[TwinRobot], None] = lambda robot: None,
 ) -> Decisions:
     """The trial by the hardware code, all of it through bytes, in invented time.
@@ -203,13 +203,12 @@ def on_twin(
         config: The trial's world.
         name: Name of its controller.
         trial: Its number.
-        layout: Servos of the robot.
         on_tick: Called after every tick, for instance to break something.
 
     Raises:
         BringUpError: The servos did not come up.
     """
-    stage = before_twin(config, name, trial, layout)
+    stage = before_twin(config, name, trial)
 
     def go_on(frame: AntennaFrame, command: JointCommand) -> bool:
         if stage.robot is not None:

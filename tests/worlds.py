@@ -13,7 +13,7 @@ from twin_rig import Stage, before_twin, rig, simulation
 from antennate.control.loop import run_loop
 from antennate.experiments.tunnel.run import TunnelConfig
 from antennate.hardware.driving.connect import await_board
-from antennate.robots.layout import LayoutParams
+from antennate.robots.spec import RobotSpec
 from antennate.telemetry.header import Header
 from antennate.telemetry.reader import LogReader
 from antennate.telemetry.replay import ReplayRobot, recorded_controller
@@ -23,7 +23,7 @@ from antennate.twin.config import TwinConfig
 from antennate.types import AntennaFrame, Clock, JointCommand, Robot
 
 CONFIG = TunnelConfig(seed=0)
-LAYOUT = LayoutParams()
+LAYOUT = RobotSpec()
 TICKS = 260
 """Ticks that a world can at least be run."""
 ARMED_AT = 100
@@ -101,7 +101,7 @@ def _world(stage: Stage, name: str, trial: int) -> World:
     header = Header(
         controller=name,
         params=CONFIG.control,
-        layout=LAYOUT,
+        robot=LAYOUT,
         seed=CONFIG.seed,
         trial=trial,
         phase=float(stage.control.phase[0]),
@@ -111,14 +111,14 @@ def _world(stage: Stage, name: str, trial: int) -> World:
 
 def simulated(folder: Path, name: str, trial: int, blind: float = math.inf) -> World:
     """The pure simulation, rounded as servos and board do."""
-    world = _world(simulation(CONFIG, name, trial, LAYOUT), name, trial)
+    world = _world(simulation(CONFIG, name, trial), name, trial)
     world.body = Blinded(world.body, blind)
     return world
 
 
 def twin(folder: Path, name: str, trial: int, blind: float = math.inf) -> World:
     """The hardware code before the twin, in lock-step."""
-    stage = before_twin(CONFIG, name, trial, LAYOUT)
+    stage = before_twin(CONFIG, name, trial)
     world = _world(stage, name, trial)
 
     def go_on(frame: AntennaFrame, command: JointCommand) -> bool:
@@ -134,7 +134,7 @@ def session(folder: Path, name: str, trial: int, blind: float = math.inf) -> Wor
     """The same with its supervisor; armed at tick ARMED_AT, blind for 30 ticks only."""
     made = rig(TwinConfig(seed=CONFIG.seed, trial=trial), name)
     await_board(made.session.board, made.clock)
-    header = Header(controller=name, params=CONFIG.control, layout=LAYOUT)
+    header = Header(controller=name, params=CONFIG.control, robot=LAYOUT)
 
     def go_on(frame: AntennaFrame, command: JointCommand) -> bool:
         made.session.orders.arm = len(world.seen) >= ARMED_AT
@@ -146,7 +146,9 @@ def session(folder: Path, name: str, trial: int, blind: float = math.inf) -> Wor
         assert tick.number == number
         return Tick.unpack(tick.pack())
 
-    world = World(made.session, made.session, header, made.session.controller, go_on, tick_of)
+    world = World(
+        made.session, made.session.control, header, made.session.control.controller, go_on, tick_of
+    )
     return world
 
 

@@ -56,8 +56,8 @@ class JointCommand:
     """Joint targets for one control period.
 
     Attributes:
-        yaw: Yaw joint angles [rad], shape (B, 5).
-        leg: Leg axle angles [rad], unwrapped, 0 at mid-stance, shape (B, 6, 2).
+        yaw: Yaw joint angles [rad], shape (B, Y).
+        leg: Leg axle angles [rad], unwrapped, 0 at mid-stance, shape (B, L, 2).
         antenna: Sweep angle of the antenna bases about their mounting angle [rad], positive
             towards the tail, shape (B, 2).
         pitch: Pitch joint angles [rad], shape (B, P); empty where pitch is not actuated.

@@ -15,7 +15,7 @@ from antennate import __version__
 OK, BAD_INPUT, INTERRUPTED = 0, 2, 130
 
 ROBOT_COMMANDS = {
-    "twin": "serve a simulated robot as real bytes: an antenna board and a bus of 19 servos",
+    "twin": "serve a simulated robot as real bytes: an antenna board and a bus of servos",
     "doctor": "examine the real robot, or its twin: what is wrong, and the cure",
     "record": "antenna readings to a CSV file that calibrate takes",
     "drive": "let a controller walk the real robot, or its twin",

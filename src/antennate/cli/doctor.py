@@ -118,7 +118,7 @@ def _fix(
     for _ in range(_ROUNDS):
         if checkup.bus is None:
             break
-        todo = [one for one in plan(checkup.bus, robot.layout) if one not in refused]
+        todo = [one for one in plan(checkup.bus, robot.robot) if one not in refused]
         if not todo:
             break
         for change in todo:

@@ -87,7 +87,7 @@ def command(argv: Sequence[str]) -> int:
 
 def _carry_out(config: DriveConfig, session: Session, orders: Orders, log: Path) -> dict[str, Any]:
     """Drive, with the log and the status line in a process of their own."""
-    header = Header(controller=config.controller, params=config.control, layout=config.layout)
+    header = Header(controller=config.controller, params=config.control, robot=config.robot)
     required = [viewer.REQUIRED] if config.record_required else []
 
     def words(number: int) -> list[str]:

@@ -71,7 +71,7 @@ def command(argv: Sequence[str]) -> int:
 
 def _serve(argv: Sequence[str]) -> int:
     config, places = parse_with("twin", DESCRIPTION, TwinConfig, argv, Places)
-    faults = Faults([read(text) for text in config.fault], config.layout.ids)
+    faults = Faults([read(text) for text in config.fault], config.robot.ids)
     real = places.pace == "real"
     robot, passage = watched(config, boot_id=secrets.randbits(32) if real else None)
     end = float("inf") if config.duration is None else config.duration

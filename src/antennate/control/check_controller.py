@@ -12,7 +12,7 @@ from antennate.control.checked import CheckedController
 from antennate.control.registry import ControllerFactory, make_controller
 from antennate.errors import AntennateError
 from antennate.params import ConditioningParams, ControlParams
-from antennate.robots.body import RobotParams
+from antennate.robots.spec import RobotSpec
 from antennate.types import AntennaFrame, Contact, Floats, JointCommand, Maneuver
 
 _ROWS = 5
@@ -43,7 +43,7 @@ class _Trace:
 
 def check_controller(
     factory: str | ControllerFactory,
-    robot: RobotParams | None = None,
+    robot: RobotSpec | None = None,
     control: ControlParams | None = None,
 ) -> None:
     """Check a controller.
@@ -64,7 +64,7 @@ def check_controller(
     Raises:
         AssertionError: It does not; the text says what was expected and found.
     """
-    run = _Runs(factory, robot or RobotParams(), control or ControlParams())
+    run = _Runs(factory, robot or RobotSpec(), control or ControlParams())
     counts, rows = run.counts, list(range(_ROWS))
     together = run.trace(counts, rows)
     _expect(
@@ -91,7 +91,7 @@ class _Runs:
     """Runs of fresh controllers over readings."""
 
     def __init__(
-        self, factory: str | ControllerFactory, robot: RobotParams, control: ControlParams
+        self, factory: str | ControllerFactory, robot: RobotSpec, control: ControlParams
     ) -> None:
         self._factory, self._robot, self._control = factory, robot, control
         self.counts = _readings(control.conditioning, control.period, control.gait.frequency)
@@ -113,7 +113,7 @@ class _Runs:
         offsets = 0.37 * np.array(rows, float)
         try:
             made = make_controller(self._factory, self._control, self._robot, batch)
-            checked = CheckedController(made, batch)
+            checked = CheckedController(made, self._robot, batch)
             checked.reset(np.arange(batch), offsets)
             commands: list[JointCommand] = []
             kept: list[list[Floats]] = []

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from antennate.errors import ControllerError, in_one_line
-from antennate.robots.anatomy import LINK_COUNT, YAW_COUNT
+from antennate.robots.spec import RobotSpec
 from antennate.types import AntennaFrame, Bools, Controller, Floats, Ints, JointCommand, Maneuver
 
 _LAST = max(Maneuver)
@@ -22,6 +22,7 @@ class CheckedController:
 
     Args:
         controller: The controller of `batch` robots.
+        robot: The robot.
         batch: Number of robots B.
 
     Attributes:
@@ -29,11 +30,10 @@ class CheckedController:
         faults: What is wrong with a row of the last step, by row.
     """
 
-    def __init__(self, controller: Controller, batch: int) -> None:
+    def __init__(self, controller: Controller, robot: RobotSpec, batch: int) -> None:
         self._controller = controller
-        both, legs = (batch, 2), (batch, LINK_COUNT, 2)
-        self._shapes = {"yaw": (batch, YAW_COUNT), "leg": legs, "antenna": both}
-        self._said = {"maneuver": (batch,), "contact": both, "level": both}
+        self._shapes = robot.command_shapes(batch)
+        self._said = {"maneuver": (batch,), "contact": (batch, 2), "level": (batch, 2)}
         self.maneuver: Ints = np.full(batch, int(Maneuver.FORWARD))
         self.faults: dict[int, str] = {}
 
@@ -82,9 +82,7 @@ class CheckedController:
         return bool(
             maneuver.min() >= 0
             and maneuver.max() <= _LAST
-            and np.isfinite(command.yaw).all()
-            and np.isfinite(command.leg).all()
-            and np.isfinite(command.antenna).all()
+            and all(np.isfinite(getattr(command, name)).all() for name in self._shapes)
         )
 
     def _find_faults(self, command: JointCommand) -> None:

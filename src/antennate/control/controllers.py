@@ -20,7 +20,7 @@ from antennate.control.gait import Gait
 from antennate.control.maneuver import Hold, decide
 from antennate.control.repetition import RepetitionDetector
 from antennate.params import ControlParams
-from antennate.robots.body import RobotParams
+from antennate.robots.spec import RobotSpec
 from antennate.types import AntennaFrame, Bools, Contact, Floats, Ints, JointCommand, Maneuver
 
 
@@ -122,12 +122,12 @@ class RuleController:
         gait: The gait and its phase.
     """
 
-    def __init__(self, rule: Rule, control: ControlParams, robot: RobotParams, batch: int) -> None:
+    def __init__(self, rule: Rule, control: ControlParams, robot: RobotSpec, batch: int) -> None:
         self._conditioning = control.conditioning
         self._mean = RunningMean(control.conditioning, batch, control.period)
         self._contact = ContactState(control.rule, batch)
         self._rule = rule
-        self.gait = Gait(control.gait, batch, control.period)
+        self.gait = Gait(control.gait, robot, batch, control.period)
         self.level: Floats = np.zeros((batch, 2))
         self.contact: Ints = np.full((batch, 2), int(Contact.FREE))
         self.maneuver: Ints = np.full(batch, int(Maneuver.FORWARD))
@@ -154,16 +154,16 @@ class RuleController:
         return self.gait.step(self.maneuver, self._rule.turn_offset)
 
 
-def open_loop(control: ControlParams, robot: RobotParams, batch: int) -> RuleController:
+def open_loop(control: ControlParams, robot: RobotSpec, batch: int) -> RuleController:
     """`open`: walks FORWARD whatever it feels."""
     return RuleController(_OpenRule(control), control, robot, batch)
 
 
-def paper(control: ControlParams, robot: RobotParams, batch: int) -> RuleController:
+def paper(control: ControlParams, robot: RobotSpec, batch: int) -> RuleController:
     """`paper`: the published table with its hold."""
     return RuleController(_PaperRule(control, batch), control, robot, batch)
 
 
-def closed_loop(control: ControlParams, robot: RobotParams, batch: int) -> RuleController:
+def closed_loop(control: ControlParams, robot: RobotSpec, batch: int) -> RuleController:
     """`closed`: walks FORWARD until its readings repeat, then escapes."""
     return RuleController(_ClosedRule(control, batch), control, robot, batch)

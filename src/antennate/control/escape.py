@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 
 from antennate.params import EscapeParams
-from antennate.robots.anatomy import LEFT, RIGHT
+from antennate.robots.sides import LEFT, RIGHT
 from antennate.types import Bools, Floats, Ints, Maneuver
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from antennate.params import RuleParams
-from antennate.robots.anatomy import LEFT, RIGHT
+from antennate.robots.sides import LEFT, RIGHT
 from antennate.types import Bools, Contact, Floats, Ints, Maneuver
 
 

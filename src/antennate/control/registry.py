@@ -8,10 +8,10 @@ from antennate.control import controllers
 from antennate.errors import ConfigError, in_one_line
 from antennate.lookup import Registry
 from antennate.params import ControlParams
-from antennate.robots.body import RobotParams
+from antennate.robots.spec import RobotSpec
 from antennate.types import Controller
 
-ControllerFactory = Callable[[ControlParams, RobotParams, int], Controller]
+ControllerFactory = Callable[[ControlParams, RobotSpec, int], Controller]
 """Makes a controller of B robots. A class whose `__init__` takes these three is one."""
 
 BUILT_IN: dict[str, ControllerFactory] = {
@@ -27,7 +27,7 @@ CONTROLLERS: Registry[ControllerFactory] = Registry("controller", "antennate.con
 def make_controller(
     name: str | ControllerFactory,
     control: ControlParams | None = None,
-    robot: RobotParams | None = None,
+    robot: RobotSpec | None = None,
     batch: int = 1,
 ) -> Controller:
     """A controller of `batch` robots, as it begins.
@@ -43,7 +43,7 @@ def make_controller(
     """
     factory = CONTROLLERS.find(name) if isinstance(name, str) else name
     try:
-        made = factory(control or ControlParams(), robot or RobotParams(), batch)
+        made = factory(control or ControlParams(), robot or RobotSpec(), batch)
     except KeyboardInterrupt:
         raise
     except BaseException as error:

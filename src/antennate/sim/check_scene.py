@@ -9,7 +9,7 @@ import numpy as np
 
 from antennate.errors import AntennateError
 from antennate.params import GaitParams, PhysicsParams
-from antennate.robots.body import RobotParams
+from antennate.robots.spec import RobotSpec
 from antennate.sim.scenes.scene import Scene, SceneInstance
 from antennate.sim.trial import make_world, place_at_start, require_room
 from antennate.types import Floats
@@ -25,7 +25,7 @@ _SETTLE = 250
 """Physics steps for which the robot stands."""
 
 
-def check_scene(scene: Scene, robot: RobotParams | None = None) -> None:
+def check_scene(scene: Scene, robot: RobotSpec | None = None) -> None:
     """Check a scene.
 
     The same seed gives the same instance, other seeds give others if the scene says that it is
@@ -40,7 +40,7 @@ def check_scene(scene: Scene, robot: RobotParams | None = None) -> None:
     Raises:
         AssertionError: It does not; the text says what was expected and found.
     """
-    robot = robot or RobotParams()
+    robot = robot or RobotSpec()
     models = [_checked_model(_draw(scene, robot, seed), robot) for seed in _SEEDS]
     for seed, model in zip(_SEEDS, models, strict=True):
         again = _checked_model(_draw(scene, robot, seed), robot)
@@ -55,11 +55,11 @@ def check_scene(scene: Scene, robot: RobotParams | None = None) -> None:
         _check_course(_draw(scene, robot, seed))
 
 
-def _draw(scene: Scene, robot: RobotParams, seed: int) -> SceneInstance:
+def _draw(scene: Scene, robot: RobotSpec, seed: int) -> SceneInstance:
     return scene.draw(robot, np.random.default_rng(seed))
 
 
-def _checked_model(drawn: SceneInstance, robot: RobotParams) -> bytes:
+def _checked_model(drawn: SceneInstance, robot: RobotSpec) -> bytes:
     """Compile, let the robot stand at the start, and return the whole model."""
     try:
         world = make_world(PhysicsParams(), robot, drawn)

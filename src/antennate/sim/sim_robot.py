@@ -11,7 +11,7 @@ import numpy as np
 from antennate.antenna.sensor import SensorChain, reading_noise
 from antennate.errors import ConfigError, SimulationError
 from antennate.params import VariationParams
-from antennate.robots.sensor import SensorParams
+from antennate.robots.spec import RobotSpec
 from antennate.sim.world import World
 from antennate.types import AntennaFrame, Floats, JointCommand
 
@@ -25,17 +25,17 @@ class Disturbance:
         self,
         rng: np.random.Generator,
         variation: VariationParams,
-        params: SensorParams,
-        leg_friction: float,
+        robot: RobotSpec,
         period: float,
     ) -> None:
         self._rng = rng
-        self._params = params
+        self._params = robot.antenna.sensor
+        self._legs = robot.leg_count
         self._variation = variation
-        self._friction = leg_friction
+        self._friction = robot.leg_friction
         self._slip_ticks = max(1, round(variation.slip_time / period))
         self._noise = np.zeros((0, 2))
-        self.joint_bias: Floats = rng.normal(0.0, variation.joint_bias, 5)
+        self.joint_bias: Floats = rng.normal(0.0, variation.joint_bias, robot.yaw_count)
 
     def noise(self, tick: int) -> Floats:
         """Reading noise of one tick [counts], shape (2,)."""
@@ -45,10 +45,10 @@ class Disturbance:
         return self._noise[at]
 
     def leg_friction(self, tick: int) -> Floats | None:
-        """New friction of the 12 legs where this tick draws one, else None."""
+        """New friction of all legs where this tick draws one, else None."""
         if tick % self._slip_ticks:
             return None
-        factor = np.exp(self._rng.normal(0.0, self._variation.slip_log_sd, 12))
+        factor = np.exp(self._rng.normal(0.0, self._variation.slip_log_sd, self._legs))
         return np.clip(self._friction * factor, 0.02, 2.0)
 
 
@@ -68,7 +68,7 @@ class SimRobot:
 
     Args:
         batch: Number of rows B.
-        params: Sensor chain of every row.
+        robot: The robot of every row.
         period: Control period [s]; a whole number of physics steps.
         timestep: Physics step [s].
 
@@ -76,9 +76,10 @@ class SimRobot:
         ConfigError: The period is not a whole number of physics steps.
     """
 
-    def __init__(self, batch: int, params: SensorParams, period: float, timestep: float) -> None:
+    def __init__(self, batch: int, robot: RobotSpec, period: float, timestep: float) -> None:
         self._rows: list[_Row | None] = [None] * batch
-        self._sensors = SensorChain(params, (batch, 2), period)
+        self._sensors = SensorChain(robot.antenna.sensor, (batch, 2), period)
+        self._yaws = robot.yaw_count
         self._period = period
         self._substeps = round(period / timestep)
         if abs(self._substeps * timestep - period) > 1e-9:
@@ -139,11 +140,11 @@ class SimRobot:
         """Command every row's joints."""
         batch = len(self._rows)
         drive = np.concatenate(
-            [command.yaw, command.leg.reshape(batch, 12), command.antenna], axis=1
+            [command.yaw, command.leg.reshape(batch, -1), command.antenna], axis=1
         )
         for i, row in enumerate(self._rows):
             if row is not None and row.failure is None:
-                drive[i, :5] += row.chance.joint_bias
+                drive[i, : self._yaws] += row.chance.joint_bias
                 row.commanded = True
                 self._guard(i, row, lambda row=row, i=i: row.world.command(drive[i]))
 

@@ -20,7 +20,7 @@ from antennate.params import (
     VariationParams,
     number,
 )
-from antennate.robots.body import RobotParams
+from antennate.robots.spec import RobotSpec
 from antennate.sim.scenes.registry import TUNNEL, check_name, make_scene
 from antennate.sim.scenes.scene import Scene, SceneInstance
 from antennate.sim.sim_robot import Disturbance
@@ -42,7 +42,7 @@ class TrialConfig(Params):
         examples=["tunnel", "flat"],
     )
     tunnel: TunnelParams = TunnelParams()
-    robot: RobotParams = RobotParams()
+    robot: RobotSpec = RobotSpec()
     variation: VariationParams = VariationParams()
     physics: PhysicsParams = PhysicsParams()
 
@@ -103,7 +103,7 @@ def draw_trial(
     lateral, heading = for_start.uniform(-1.0, 1.0, 2)
     lateral, heading = lateral * variation.start_lateral, heading * variation.start_heading
     place_at_start(world, drawn, gait, phase, lateral, heading)
-    chance = Disturbance(for_chance, variation, robot.sensor, robot.leg_friction, period)
+    chance = Disturbance(for_chance, variation, robot, period)
     return Trial(world, chance, phase, drawn)
 
 
@@ -148,10 +148,9 @@ def require_room(world: World) -> None:
         )
 
 
-def make_world(physics: PhysicsParams, robot: RobotParams, scene: SceneInstance) -> World:
+def make_world(physics: PhysicsParams, robot: RobotSpec, scene: SceneInstance) -> World:
     """Compile the robot in a scene."""
-    sensed = robot.sensor.covered_hinges(robot.antenna)
-    return World(compile_world(physics, robot, scene), sensed)
+    return World(compile_world(physics, robot, scene), robot)
 
 
 def place_at_start(
@@ -173,7 +172,7 @@ def place_at_start(
         heading: Turn to the left from the start's heading [rad].
     """
     x, y, ahead = scene.start
-    command = targets(gait, np.array([phase]), np.zeros(1))
+    command = targets(gait, world.robot, np.array([phase]), np.zeros(1))
     world.place(
         x - lateral * math.sin(ahead),
         y + lateral * math.cos(ahead),

@@ -14,18 +14,8 @@ import numpy as np
 
 from antennate.errors import SceneError, SimulationError, in_one_line
 from antennate.params import PhysicsParams
-from antennate.robots.anatomy import (
-    ANTENNA_BASE,
-    ANTENNA_HINGES,
-    ANTENNA_PREFIXES,
-    LEGS,
-    LINKS,
-    PITCH_JOINTS,
-    YAW_JOINTS,
-)
-from antennate.robots.body import RobotParams
-from antennate.sim import layers
-from antennate.sim import robot_part as robot
+from antennate.robots.spec import ANTENNA_PREFIXES, RobotSpec
+from antennate.sim import layers, robot_part
 from antennate.sim.outline import outline
 from antennate.sim.scenes.scene import SceneInstance, add_floor
 from antennate.types import Floats, Ints
@@ -65,7 +55,7 @@ def new_spec(physics: PhysicsParams) -> mujoco.MjSpec:
 
 
 def compile_world(
-    physics: PhysicsParams, params: RobotParams, scene: SceneInstance | None = None
+    physics: PhysicsParams, robot: RobotSpec, scene: SceneInstance | None = None
 ) -> mujoco.MjModel:
     """Robot in a scene, on a bare floor without one; the head is over the origin.
 
@@ -78,9 +68,9 @@ def compile_world(
     else:
         scene.build(spec)
         _meet_robot(spec)
-    frame = spec.worldbody.add_frame(pos=[0, 0, robot.axle_height(params)])
-    spec.attach(robot.build(params), frame=frame, prefix=PREFIX)
-    spec.body(PREFIX + LINKS[0]).add_freejoint(name=PREFIX + "root")
+    frame = spec.worldbody.add_frame(pos=[0, 0, robot_part.axle_height(robot)])
+    spec.attach(robot_part.build(robot), frame=frame, prefix=PREFIX)
+    spec.body(PREFIX + robot.link_names[0]).add_freejoint(name=PREFIX + "root")
     for geom in spec.geoms:
         geom.solref[0] = physics.contact_time
         geom.solimp[:3] = [0.95, 0.99, 0.0005]
@@ -104,29 +94,30 @@ class World:
 
     Attributes:
         model: The compiled model; `data` its state.
+        robot: The robot in it.
         t: Time since the world was made [s].
     """
 
-    def __init__(self, model: mujoco.MjModel, sensed_hinges: int) -> None:
+    def __init__(self, model: mujoco.MjModel, robot: RobotSpec) -> None:
+        self.robot = robot
         self.model = model
         self.data = mujoco.MjData(model)
-        self._yaw = self._addresses([PREFIX + n for n in YAW_JOINTS])
-        self._leg = self._addresses([PREFIX + n for n in LEGS])
-        hinges = [PREFIX + p + h for p in ANTENNA_PREFIXES for h in ANTENNA_HINGES[:sensed_hinges]]
-        self._flex = self._addresses(hinges).reshape(2, sensed_hinges)
-        bent = [PREFIX + p + h for p in ANTENNA_PREFIXES for h in ANTENNA_HINGES]
-        pitch = [PREFIX + n for n in PITCH_JOINTS]
-        self._bounded = np.concatenate([self._yaw, self._addresses([*pitch, *bent])])
-        bases = [p + ANTENNA_BASE for p in ANTENNA_PREFIXES]
-        names = [PREFIX + n for n in (*YAW_JOINTS, *LEGS, *bases)]
+        hinges = [PREFIX + p + h for p in ANTENNA_PREFIXES for h in robot.antenna.hinge_names]
+        bent = self._addresses(hinges)
+        self._yaw = self._addresses([PREFIX + n for n in robot.yaw_names])
+        self._leg = self._addresses([PREFIX + n for n in robot.leg_names])
+        self._flex = bent.reshape(len(ANTENNA_PREFIXES), -1)[:, : robot.antenna.sensed_hinges]
+        pitch = self._addresses([PREFIX + n for n in robot.pitch_names])
+        self._bounded = np.concatenate([self._yaw, pitch, bent])
+        names = [PREFIX + n for n in robot.joint_names]
         self._drive: Ints = np.array([model.actuator(n).id for n in names])
         self._driven = self._addresses(names)
         self._root: int = model.joint(PREFIX + "root").qposadr[0]
-        self._links: Ints = np.array([model.body(PREFIX + n).id for n in LINKS])
-        self._leg_geoms: Ints = np.array([model.geom(PREFIX + n).id for n in LEGS])
+        self._links: Ints = np.array([model.body(PREFIX + n).id for n in robot.link_names])
+        self._leg_geoms: Ints = np.array([model.geom(PREFIX + n).id for n in robot.leg_names])
         self._obstacle = (model.geom_contype & layers.OBSTACLE) != 0
         owner = model.body_rootid[model.geom_bodyid]
-        self._robot = owner == model.body(PREFIX + LINKS[0]).id
+        self._robot = owner == model.body(PREFIX + robot.link_names[0]).id
         self._steps = 0
         data = self.data
         self._qpos, self._qvel, self._ctrl = data.qpos, data.qvel, data.ctrl
@@ -141,7 +132,7 @@ class World:
         return float(self.data.time)
 
     def place(self, x: float, y: float, heading: float, yaw: Floats, leg: Floats) -> None:
-        """Put the head at x, y [m] with a heading [rad], joints at yaw (5,), leg (6, 2) [rad]."""
+        """Put the head at x, y [m] with a heading [rad], joints at yaw (Y,), leg (L, 2) [rad]."""
         q = self.data.qpos
         q[self._root : self._root + 2] = x, y
         q[self._root + 3 : self._root + 7] = math.cos(heading / 2), 0.0, 0.0, math.sin(heading / 2)
@@ -150,7 +141,7 @@ class World:
         mujoco.mj_forward(self.model, self.data)
 
     def command(self, drive: Floats) -> None:
-        """Set all joint targets: 5 yaws, 12 legs, 2 antenna bases [rad], shape (19,).
+        """Set the targets of all joints that servos move, in the robot's order [rad], shape (n,).
 
         Raises:
             SimulationError: A target is not finite; nothing is set then.
@@ -164,7 +155,7 @@ class World:
         self._ctrl[self._drive] = drive
 
     def drives(self) -> Floats:
-        """Angles of all driven joints, in the order of `command` [rad], shape (19,)."""
+        """Angles of all driven joints, in the order of `command` [rad], shape (n,)."""
         return self._qpos[self._driven]
 
     def step(self, count: int) -> None:
@@ -233,7 +224,7 @@ class World:
         return math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
 
     def links(self) -> Floats:
-        """Plan positions of the six links, head first [m], shape (6, 2)."""
+        """Plan positions of the links, head first [m], shape (L, 2)."""
         return self.data.xpos[self._links, :2]
 
     def outlines(self) -> tuple[list[Floats], list[Floats]]:
@@ -262,7 +253,7 @@ class World:
         return float(self.data.efc_force[address[address >= 0]].sum())
 
     def set_leg_friction(self, friction: Floats) -> None:
-        """Give every leg its own sliding friction, shape (12,)."""
+        """Give every leg its own sliding friction, shape (2 L,)."""
         self.model.geom_friction[self._leg_geoms, 0] = friction
 
 

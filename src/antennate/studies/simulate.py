@@ -50,7 +50,7 @@ def simulate(
     scene = make_scene(config.scene, config.tunnel)
     start = draw_trial(config, scene, trial, control.gait, control.period)
     controlling = make_controller(controller, control, config.robot, 1)
-    robot = SimRobot(1, config.robot.sensor, control.period, config.physics.timestep)
+    robot = SimRobot(1, config.robot, control.period, config.physics.timestep)
     robot.load(0, start.world, start.chance)
     controlling.reset(np.array([0]), start.phase)
     recorder = TimeSeriesRecorder(controlling, lambda: start.world.head[:2])

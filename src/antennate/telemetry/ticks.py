@@ -16,11 +16,11 @@ import numpy as np
 from antennate.errors import LogError
 from antennate.hardware.driving.decision import Decision, decision_of
 from antennate.hardware.driving.session import Session
-from antennate.robots.anatomy import LEGS, SIDES, YAW_JOINTS
+from antennate.robots.spec import RobotSpec
 from antennate.telemetry.framing import SCHEMA, Kind
 from antennate.types import AntennaFrame, Controller, JointCommand
 
-JOINTS = (*YAW_JOINTS, *LEGS, *(f"antenna_{side}" for side in SIDES))
+JOINTS = RobotSpec().joint_names
 """The order of angles."""
 LAYOUT = f"<BBQ?8d3q{len(JOINTS) + 2}d8QI"
 """For `struct`: all fields but the text, whose length in bytes comes last."""
@@ -96,14 +96,19 @@ class Tick:
     @classmethod
     def of(cls, session: Session, t: float) -> Tick:
         """The tick of a session that has just written, at the host's time t [s]."""
-        out, clock, bus = session.outputs, session.board.clock, session.bus.tally
+        out, clock, bus = session.outputs, session.board.clock, session.actuators.tally
         left, right = session.quality.counts
         bytes_ = session.board.decoder.counters
         return cls(
-            **_decided(session.controller, session.decision, session.frame, session.command),
+            **_decided(
+                session.control.controller,
+                session.control.decision,
+                session.frame,
+                session.control.command,
+            ),
             number=session.tally.ticks,
             now=t,
-            asked=session.asked,
+            asked=session.control.result.asked,
             reading=(left, right),
             state="" if out is None else out.state.name,
             causes=() if out is None else tuple(_clean(cause.text) for cause in out.causes),
@@ -116,7 +121,7 @@ class Tick:
             misses=bus.misses,
             stale=bus.stale,
             sent=session.tally.sent,
-            refused=session.tally.refused,
+            refused=session.control.refused,
         )
 
     @classmethod
@@ -191,7 +196,7 @@ class Tick:
 
 
 def angles_of(command: JointCommand) -> tuple[float, ...]:
-    """Joint targets of one robot [rad] in the order of JOINTS; NaN if they are not 19 numbers."""
+    """Joint targets of one robot [rad] in the order of JOINTS; NaN if there are not as many."""
     parts = (_flat(command, name) for name in ("yaw", "leg", "antenna"))
     angles = tuple(angle for part in parts for angle in part)
     return angles if len(angles) == len(JOINTS) else _NOWHERE

@@ -7,7 +7,7 @@ from typing import Annotated
 from antennate.params import ConditioningParams, GaitParams, Params, number
 from antennate.params.base import GATHERED
 from antennate.params.twin import BatteryParams
-from antennate.robots.layout import LayoutParams
+from antennate.robots.spec import RobotSpec
 from antennate.sim.scenes.registry import make_scene
 from antennate.sim.sim_robot import SimRobot
 from antennate.sim.trial import TrialConfig, draw_trial
@@ -48,7 +48,7 @@ class TwinConfig(TrialConfig):
         "antennae touched before it walks, such as left@2s; from the first packet on the bus",
     )
     battery: BatteryParams = BatteryParams()
-    layout: LayoutParams = LayoutParams()
+    robot: RobotSpec = RobotSpec()
     control: TwinControlParams = TwinControlParams()
 
 
@@ -62,13 +62,13 @@ def watched(config: TwinConfig, boot_id: int | None = None) -> tuple[TwinRobot, 
     control, period = config.control, config.control.period
     scene = make_scene(config.scene, config.tunnel)
     start = draw_trial(config, scene, config.trial, control.gait, period)
-    body = SimRobot(1, config.robot.sensor, period, config.physics.timestep)
+    body = SimRobot(1, config.robot, period, config.physics.timestep)
     body.load(0, start.world, start.chance)
     boot = config.trial + 1 if boot_id is None else boot_id
     touch, passage = TouchStimulus(config.touch, control.conditioning), Passage(start.scene)
     robot = TwinRobot(
         body,
-        config.layout,
+        config.robot,
         period,
         boot,
         standing_noise=True,

@@ -23,8 +23,7 @@ from antennate.control.conditioning import bending_level
 from antennate.experiments.calibrate.recording import Recording, RecordingParams, read, write
 from antennate.params import BenchPhysicsParams, BenchVariationParams, Params
 from antennate.params.base import number
-from antennate.robots.antenna import AntennaParams
-from antennate.robots.sensor import SensorParams
+from antennate.robots.antenna import AntennaSpec
 from antennate.sim.bench import Bench, compile_bench
 from antennate.studies.experiment import WithoutTrials
 from antennate.studies.pool import run_tasks
@@ -100,8 +99,7 @@ class CalibrateConfig(Params):
     draws: int = number(500, "1", "assumed: usual", "bootstrap draws", ge=20, le=100000)
     seed: int = number(1, "1", "assumed: any", "seed of all chance", ge=0)
     rig: RigParams = RigParams()
-    antenna: AntennaParams = AntennaParams()
-    sensor: SensorParams = SensorParams()
+    antenna: AntennaSpec = AntennaSpec()
     variation: BenchVariationParams = BenchVariationParams()
     physics: BenchPhysicsParams = BenchPhysicsParams()
 
@@ -164,15 +162,15 @@ def push(config: CalibrateConfig, trial: int) -> Recording:
     rig = config.rig
     speed = rig.speeds[trial // rig.pushes]
     rng = np.random.default_rng([config.seed, trial])
-    factors = np.exp(rng.normal(0.0, config.variation.stiffness, 6))
+    factors = np.exp(rng.normal(0.0, config.variation.stiffness, config.antenna.hinges))
     gap = 2 * rig.start_spread * rng.uniform(0.0, 1.0)
     bench = _bench(config, factors)
-    period = 1.0 / config.sensor.rate
+    period = 1.0 / config.antenna.sensor.rate
     touch = config.antenna.radius + rig.rod_radius
-    rate = config.sensor.rate
+    rate = config.antenna.sensor.rate
     ticks = int(np.ceil((gap + rig.depth) / speed * rate)) + 1
-    noise = reading_noise(config.sensor, rng, (ticks,))
-    sensor = SensorChain(config.sensor, (), period)
+    noise = reading_noise(config.antenna.sensor, rng, (ticks,))
+    sensor = SensorChain(config.antenna.sensor, (), period)
     bench.place(0.0, 0.0, 0.0)
     bench.place_probe(rig.place, -touch - gap)
     rows = []
@@ -198,12 +196,10 @@ def push(config: CalibrateConfig, trial: int) -> Recording:
 
 
 def _bench(config: CalibrateConfig, factors: Floats) -> Bench:
-    model = compile_bench(
-        config.physics, config.antenna, config.sensor, probe_radius=config.rig.rod_radius
-    )
+    model = compile_bench(config.physics, config.antenna, probe_radius=config.rig.rod_radius)
     for i, factor in enumerate(factors):
         model.joint(f"antenna/hinge{i}").stiffness *= factor
-    return Bench(model, config.sensor.covered_hinges(config.antenna))
+    return Bench(model, config.antenna)
 
 
 def _run_task(task: tuple[CalibrateConfig, int], emit: Callable[[Any], None]) -> None:

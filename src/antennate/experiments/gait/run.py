@@ -18,7 +18,7 @@ from antennate.control.gait import Gait
 from antennate.control.loop import run_loop
 from antennate.experiments.gait.pace import Pace, Walk, measure, rolling_speed
 from antennate.params import GaitParams, Params, PhysicsParams, VariationParams, number
-from antennate.robots.body import RobotParams
+from antennate.robots.spec import RobotSpec
 from antennate.sim.scenes.flat import FlatScene
 from antennate.sim.sim_robot import Disturbance, SimRobot
 from antennate.sim.trial import make_world, place_at_start
@@ -62,7 +62,7 @@ class GaitStudyConfig(Params):
     rate: float = number(
         100.0, "Hz", "paper: about 100 Hz over serial", "control ticks per second", gt=0, le=1000
     )
-    robot: RobotParams = RobotParams()
+    robot: RobotSpec = RobotSpec()
     gait: GaitParams = GaitParams()
     physics: PhysicsParams = PhysicsParams()
 
@@ -139,8 +139,10 @@ class GaitOutcome(WithoutTrials):
 class _Fixed:
     """A control of one idea: always the same maneuver."""
 
-    def __init__(self, gait: GaitParams, maneuver: Maneuver, period: float) -> None:
-        self._gait = Gait(gait, 1, period)
+    def __init__(
+        self, gait: GaitParams, robot: RobotSpec, maneuver: Maneuver, period: float
+    ) -> None:
+        self._gait = Gait(gait, robot, 1, period)
         self._maneuver = np.array([int(maneuver)])
 
     def step(self, frame: AntennaFrame) -> JointCommand:
@@ -169,7 +171,7 @@ def walk_flat(config: GaitStudyConfig, name: str, gait: GaitParams, maneuver: Ma
     scene = FlatScene().draw(robot, np.random.default_rng(0))
     world = make_world(config.physics, robot, scene)
     place_at_start(world, scene, gait)
-    body = SimRobot(1, robot.sensor, period, config.physics.timestep)
+    body = SimRobot(1, robot, period, config.physics.timestep)
     body.load(0, world, _no_chance(robot, period))
     end = (config.settling_cycles + config.cycles) / gait.frequency
     ticks: list[tuple[float, Floats, float]] = []
@@ -181,9 +183,10 @@ def walk_flat(config: GaitStudyConfig, name: str, gait: GaitParams, maneuver: Ma
         ticks.append((world.t, world.links(), _positive_power(world)))
         return world.t < end - period / 2
 
-    run_loop(body, _Fixed(gait, maneuver, period), period, go_on)
+    run_loop(body, _Fixed(gait, robot, maneuver, period), period, go_on)
     links = np.array([tick[1] for tick in ticks])
-    axis = links[:, :3].mean(axis=1) - links[:, 3:].mean(axis=1)
+    half = robot.links // 2
+    axis = links[:, :half].mean(axis=1) - links[:, half:].mean(axis=1)
     return Walk(
         name=name,
         gait=gait,
@@ -197,10 +200,10 @@ def walk_flat(config: GaitStudyConfig, name: str, gait: GaitParams, maneuver: Ma
     )
 
 
-def _no_chance(robot: RobotParams, period: float) -> Disturbance:
+def _no_chance(robot: RobotSpec, period: float) -> Disturbance:
     """A disturbance that disturbs nothing; the control here does not look at sensor noise."""
     still = VariationParams(start_lateral=0, start_heading=0, joint_bias=0, slip_log_sd=0)
-    return Disturbance(np.random.default_rng(0), still, robot.sensor, robot.leg_friction, period)
+    return Disturbance(np.random.default_rng(0), still, robot, period)
 
 
 def _positive_power(world: World) -> float:

@@ -17,8 +17,7 @@ from antennate.params import (
     SweepParams,
     number,
 )
-from antennate.robots.antenna import AntennaParams
-from antennate.robots.sensor import SensorParams
+from antennate.robots.antenna import AntennaSpec
 
 
 class SweepConfig(Params):
@@ -70,18 +69,17 @@ class SweepConfig(Params):
     sweep: SweepParams = SweepParams()
     shape: ShapeParams = ShapeParams()
     estimate: EstimateParams = EstimateParams()
-    antenna: AntennaParams = AntennaParams()
-    sensor: SensorParams = SensorParams()
+    antenna: AntennaSpec = AntennaSpec()
     conditioning: ConditioningParams = ConditioningParams()
     physics: BenchPhysicsParams = BenchPhysicsParams()
 
     @model_validator(mode="after")
     def _agree(self) -> SweepConfig:
-        steps = 1.0 / (self.sensor.rate * self.physics.timestep)
+        steps = 1.0 / (self.antenna.sensor.rate * self.physics.timestep)
         if steps < 0.5 or abs(steps - round(steps)) > 1e-6:
             raise ValueError(
-                f"sensor.rate must be a whole fraction of the physics rate "
-                f"{1 / self.physics.timestep:g} Hz, got {self.sensor.rate:g} Hz"
+                "antenna.sensor.rate must be a whole fraction of the physics rate "
+                f"{1 / self.physics.timestep:g} Hz, got {self.antenna.sensor.rate:g} Hz"
             )
         if len(set(self.profiles)) < len(self.profiles):
             raise ValueError(f"profiles must differ, got {', '.join(self.profiles)}")

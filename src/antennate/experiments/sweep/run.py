@@ -160,8 +160,7 @@ def map_cell(config: SweepConfig, cell: _Cell) -> SweepRow:
     wall = sweeping.Wall(cell.distance * config.antenna.length)
     trace = sweeping.record(
         config.physics,
-        with_profile(config.antenna, config.sensor, cell.profile),
-        config.sensor,
+        with_profile(config.antenna, cell.profile),
         sweep,
         wall,
         config.sweeps + 1,
@@ -200,7 +199,7 @@ def _run_task(task: _Task, emit: Callable[[Any], None]) -> None:
 
 
 def _estimate(config: SweepConfig, condition: str, split: str, number: int, side: str) -> Trial:
-    antenna = with_profile(config.antenna, config.sensor, config.profile)
+    antenna = with_profile(config.antenna, config.profile)
     return estimates.run_trial(
         estimates.Setting(
             config.seed,
@@ -209,7 +208,6 @@ def _estimate(config: SweepConfig, condition: str, split: str, number: int, side
             config.shape,
             config.conditioning,
             antenna,
-            config.sensor,
             config.physics,
             config.speed,
         ),

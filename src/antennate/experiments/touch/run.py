@@ -32,8 +32,7 @@ from antennate.params import (
     TouchWallsParams,
     number,
 )
-from antennate.robots.antenna import AntennaParams
-from antennate.robots.sensor import SensorParams
+from antennate.robots.antenna import AntennaSpec
 from antennate.sim import touch_wall
 from antennate.sim.touch_wall import WALLS, WallKind
 from antennate.studies.pool import run_tasks
@@ -109,8 +108,7 @@ class TouchConfig(Params):
         "assumed: a fifth of the default to three times it",
         "further T_avg to try on the same readings",
     )
-    antenna: AntennaParams = AntennaParams()
-    sensor: SensorParams = SensorParams()
+    antenna: AntennaSpec = AntennaSpec()
     conditioning: ConditioningParams = ConditioningParams()
     rule: RuleParams = RuleParams()
     wall: TouchWallsParams = TouchWallsParams()
@@ -130,12 +128,12 @@ class TouchConfig(Params):
             values = getattr(self, name)
             if len(set(values)) < len(values):
                 raise ValueError(f"{name} must differ, got {', '.join(map(str, values))}")
-        if not steps_fit(self.sensor.rate, self.physics.timestep):
+        if not steps_fit(self.antenna.sensor.rate, self.physics.timestep):
             raise ValueError(
-                "sensor.rate must be a whole fraction of a fifth of the physics rate "
-                f"{1 / self.physics.timestep:g} Hz, got {self.sensor.rate:g} Hz"
+                "antenna.sensor.rate must be a whole fraction of a fifth of the physics rate "
+                f"{1 / self.physics.timestep:g} Hz, got {self.antenna.sensor.rate:g} Hz"
             )
-        ticks = sum(self.travel / speed * self.sensor.rate for speed in self.speeds)
+        ticks = sum(self.travel / speed * self.antenna.sensor.rate for speed in self.speeds)
         ticks *= self.trials * len(self.walls) * len(self.profiles)
         if ticks > _MOST_TICKS:
             raise ValueError(
@@ -237,7 +235,7 @@ class TouchOutcome:
         for one, verdict in zip(valid, self.verdicts, strict=True):
             if (one.wall, one.profile, one.speed, one.trial) == (wall, profile, speed, 0):
                 rule = config.rule
-                t = np.arange(len(verdict.truth)) / config.sensor.rate
+                t = np.arange(len(verdict.truth)) / config.antenna.sensor.rate
                 b = 1.0 / (1.0 + np.exp(-verdict.level))
                 return Trace(one, verdict, t, b, rule.threshold, rule.hysteresis)
         return None
@@ -248,18 +246,17 @@ def draw(config: TouchConfig, trial: int) -> Draw:
     rng = np.random.default_rng([config.seed, trial])
     shift, phase = rng.random(2)
     overlap = config.overlap + config.overlap_spread * rng.uniform(-1.0, 1.0)
-    springs = 1.0 + config.spring_tolerance * rng.uniform(-1.0, 1.0, 6)
+    springs = 1.0 + config.spring_tolerance * rng.uniform(-1.0, 1.0, config.antenna.hinges)
     return Draw(shift * config.place_spread, phase, overlap, springs)
 
 
 def plan(config: TouchConfig, wall: WallKind, speed: float, profile: Profile, trial: int) -> Plan:
     """One traverse with its draws."""
     drawn = draw(config, trial)
-    antenna = with_springs(config.antenna, config.sensor, profile, drawn.springs)
+    antenna = with_springs(config.antenna, profile, drawn.springs)
     lead = antenna.length * math.cos(antenna.base_angle)
     return Plan(
         antenna=antenna,
-        sensor=config.sensor,
         physics=config.physics,
         walls=config.wall,
         kind=wall,

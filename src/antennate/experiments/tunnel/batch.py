@@ -59,7 +59,7 @@ class _Rows:
         self._scene = make_scene(config.scene, config.tunnel)
         self._monitors: list[TrialMonitor | None] = [None] * batch
         period = config.control.period
-        self._robot = SimRobot(batch, config.robot.sensor, period, config.physics.timestep)
+        self._robot = SimRobot(batch, config.robot, period, config.physics.timestep)
 
     @property
     def unfinished(self) -> list[int]:
@@ -79,7 +79,7 @@ class _Rows:
             made = make_controller(self._name, config.control, config.robot, self._batch)
         except ConfigError as error:
             raise ControllerError(str(error)) from error
-        control = CheckedController(made, self._batch)
+        control = CheckedController(made, config.robot, self._batch)
         for row, phase in enumerate(phases):
             control.reset(np.array([row]), phase)
 

@@ -73,7 +73,7 @@ class TrialPath:
         before: Obstacles that can move, likewise, at the start.
         after: The same at the end.
         exit: Ends of the exit line [m], shape (2, 2).
-        links: The robot's links at the end [m], shape (6, 2).
+        links: The robot's links at the end [m], shape (L, 2).
     """
 
     t: Floats

@@ -59,8 +59,8 @@ class Traverse:
         touching: Whether a sphere is touched, shape (n,).
         force: Contact force [N], shape (n,).
         flex: Flex under the flex sensor [rad], shape (n,).
-        hinges: Hinge angles [rad], shape (n, 6).
-        shapes: Hinges and tip in the plane [m] at every tenth of the travel, shape (11, 7, 2).
+        hinges: Hinge angles [rad], shape (t, n).
+        shapes: Hinges and tip in the plane [m] at every tenth of the travel, shape (11, n + 1, 2).
     """
 
     base: Floats

@@ -23,8 +23,7 @@ from antennate.experiments.wall import measures
 from antennate.experiments.wall.outcome import SAMPLE_PERIOD, Traverse, WallTrial, classify
 from antennate.params import BenchPhysicsParams, BenchVariationParams, Params, WallParams
 from antennate.params.base import number
-from antennate.robots.antenna import AntennaParams
-from antennate.robots.sensor import SensorParams
+from antennate.robots.antenna import AntennaSpec
 from antennate.sim.bench import Ball, Bench, compile_bench
 from antennate.studies.pool import run_tasks
 from antennate.types import Floats
@@ -58,8 +57,7 @@ class WallConfig(Params):
         min_length=1,
     )
     wall: WallParams = WallParams()
-    antenna: AntennaParams = AntennaParams()
-    sensor: SensorParams = SensorParams()
+    antenna: AntennaSpec = AntennaSpec()
     variation: BenchVariationParams = BenchVariationParams()
     physics: BenchPhysicsParams = BenchPhysicsParams()
 
@@ -124,12 +122,12 @@ def passage(config: WallConfig, profile: Profile, trial: int) -> Traverse:
     """
     rng = np.random.default_rng([config.seed, trial])
     wall, variation = config.wall, config.variation
-    factors = np.exp(rng.normal(0.0, variation.stiffness, 6))
+    factors = np.exp(rng.normal(0.0, variation.stiffness, config.antenna.hinges))
     friction = max(0.0, config.antenna.friction + rng.normal(0.0, variation.friction))
     angle = wall.base_angle + rng.uniform(-1, 1) * variation.base_angle
     overlap = wall.overlap + rng.uniform(-1, 1) * variation.overlap
     phase = rng.uniform(0.0, 1.0) * wall.sphere_diameter
-    antenna = with_profile(config.antenna, config.sensor, profile)
+    antenna = with_profile(config.antenna, profile)
     antenna = antenna.model_copy(update={"friction": min(friction, 2.0)})
     bench = _bench(config, antenna, angle, phase, factors)
     crest = antenna.length * math.sin(angle) + antenna.radius + _CLEAR
@@ -137,7 +135,7 @@ def passage(config: WallConfig, profile: Profile, trial: int) -> Traverse:
 
 
 def _bench(
-    config: WallConfig, antenna: AntennaParams, angle: float, phase: float, factors: Floats
+    config: WallConfig, antenna: AntennaSpec, angle: float, phase: float, factors: Floats
 ) -> Bench:
     """Bench with spheres all along the way, their crests clear of the tip at first."""
     wall, pitch = config.wall, config.wall.sphere_diameter
@@ -147,11 +145,11 @@ def _bench(
     heights = np.arange(below + phase, above, pitch)
     balls = [Ball(x, float(y), pitch / 2) for y in heights]
     pull = {"down": -_GRAVITY, "up": _GRAVITY, "off": 0.0}[wall.gravity]
-    model = compile_bench(config.physics, antenna, config.sensor, balls, (0.0, pull))
+    model = compile_bench(config.physics, antenna, balls, (0.0, pull))
     for i, factor in enumerate(factors):
         joint = model.joint(f"antenna/hinge{i}")
         joint.stiffness *= factor
-    return Bench(model, config.sensor.covered_hinges(antenna))
+    return Bench(model, antenna)
 
 
 def _drive(

@@ -15,7 +15,7 @@ from antennate.hardware.esp32.decoder import Counters
 from antennate.hardware.esp32.stream import Reading, Stream
 from antennate.hardware.esp32.wire import Hello
 from antennate.params import DoctorParams
-from antennate.robots.layout import LayoutParams
+from antennate.robots.spec import RobotSpec
 from antennate.types import Floats
 
 _PATIENCE = 0.02
@@ -80,7 +80,7 @@ class BoardSurvey:
 
 
 def survey_board(
-    opener: Opener, layout: LayoutParams, params: DoctorParams, now: Callable[[], float]
+    opener: Opener, robot: RobotSpec, params: DoctorParams, now: Callable[[], float]
 ) -> BoardSurvey:
     """Wait for a greeting and read for a while; without one, see whether servos are there.
 
@@ -99,8 +99,8 @@ def survey_board(
         survey.hello, survey.refusals = stream.hello, stream.refusals
         survey.text, survey.received = stream.decoder.take_text(), stream.decoder.counters.received
     if survey.hello is None and not survey.refusals:
-        with opener(layout.baud) as port:
-            survey.servos = bool(master(port, layout.baud, now).scan())
+        with opener(robot.baud) as port:
+            survey.servos = bool(master(port, robot.baud, now).scan())
     return survey
 
 

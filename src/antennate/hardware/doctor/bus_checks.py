@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from statistics import median
 
-from antennate.hardware import roster
 from antennate.hardware.doctor.bus_survey import BusSurvey
 from antennate.hardware.doctor.check import Check, Finding, Verdict, grouped, ids_text
 from antennate.hardware.doctor.config import DoctorConfig
@@ -48,7 +47,7 @@ def _baud(bus: BusSurvey, robot: DoctorConfig) -> Finding:
         for baud, servo in bus.elsewhere:
             ids.setdefault(baud, set()).add(servo.servo)
         others = [f"id {ids_text(ids[baud])} at {baud}" for baud in sorted(ids)]
-        cure = f"{FIX}, or set layout.baud to what the servos have"
+        cure = f"{FIX}, or set robot.baud to what the servos have"
         return Finding(", ".join(here + others), "bad", cure)
     if here:
         return Finding(here[0])
@@ -64,8 +63,8 @@ def _baud(bus: BusSurvey, robot: DoctorConfig) -> Finding:
 
 
 def _ids(bus: BusSurvey, robot: DoctorConfig) -> Finding:
-    missing = set(robot.layout.ids) - set(bus.here)
-    extra = set(bus.here) - set(robot.layout.ids)
+    missing = set(robot.robot.ids) - set(bus.here)
+    extra = set(bus.here) - set(robot.robot.ids)
     parts = [f"missing {ids_text(missing)}"] if missing else []
     parts += [f"not expected {ids_text(extra)}"] if extra else []
     cures: list[str] = []
@@ -80,7 +79,7 @@ def _ids(bus: BusSurvey, robot: DoctorConfig) -> Finding:
             "missing, check that cable"
         )
     if extra and not lone:
-        cures.append("unplug those that are not expected, or name them in layout")
+        cures.append("unplug those that are not expected, or name them under robot")
     verdict: Verdict = "bad" if missing else "warn" if extra else "ok"
     return Finding(", ".join(parts) or ids_text(bus.here), verdict, "; ".join(cures))
 
@@ -95,10 +94,10 @@ def _answers(bus: BusSurvey, robot: DoctorConfig) -> Finding:
 
 
 def _models(bus: BusSurvey, robot: DoctorConfig) -> Finding:
-    wanted = roster.models(robot.layout)
+    wanted = robot.robot.models
     found = {i: seen.model for i, seen in bus.here.items() if seen.model is not None}
     wrong = [i for i, model in found.items() if i in wanted and model != wanted[i]]
-    cure = f"{ids_text(wrong)}: put a servo of the expected model there, or correct layout"
+    cure = f"{ids_text(wrong)}: put a servo of the expected model there, or correct robot.*.ids"
     return Finding(grouped(found, _model), "bad" if wrong else "ok", cure)
 
 
@@ -137,7 +136,7 @@ def _read_time(bus: BusSurvey, robot: DoctorConfig) -> Finding:
         f"{1e3 * time:.1f} ms{rate}, {'fast' if bus.fast else 'slow'} reads of {len(bus.whole)}",
         "bad" if time > robot.doctor.read_time else "ok" if bus.fast else "warn",
         "cure answer time, answers and lost answers first, then return delay and firmware; then "
-        "end other programs, or raise layout.baud",
+        "end other programs, or raise robot.baud",
     )
 
 
@@ -152,9 +151,9 @@ def _lost_answers(bus: BusSurvey, robot: DoctorConfig) -> Finding:
 
 _SPEED = (Check("baud", lambda bus, robot: f"all at {bus.baud}", _baud),)
 _SERVOS = (
-    Check("ids", lambda bus, robot: ids_text(robot.layout.ids), _ids),
+    Check("ids", lambda bus, robot: ids_text(robot.robot.ids), _ids),
     Check("answers", "one whole answer of each", _answers),
-    Check("models", lambda bus, robot: grouped(roster.models(robot.layout), _model), _models),
+    Check("models", lambda bus, robot: grouped(robot.robot.models, _model), _models),
     Check(
         "firmware",
         f"from {', '.join(f'{t.name} {t.fast_read_firmware}' for t in TABLES.values())} on",

@@ -18,7 +18,7 @@ from antennate.hardware.esp32.board import BOARD_BAUD
 from antennate.hardware.esp32.decoder import FrameDecoder
 from antennate.hardware.ports.port import Port
 from antennate.params import DoctorParams
-from antennate.robots.layout import LayoutParams
+from antennate.robots.spec import RobotSpec
 
 BAUDS = (57_600, 115_200, 1_000_000, 2_000_000, 3_000_000, 4_000_000)
 """Bits per second at which servos are usually found."""
@@ -58,7 +58,7 @@ class BusSurvey:
     """What was found on a bus.
 
     Attributes:
-        baud: Bits per second of the layout.
+        baud: Bits per second that are expected.
         here: Servos that answer at that speed, by id.
         elsewhere: Servos that answer at another one, each with its bits per second.
         registers: Values by id and name, of those that could be read.
@@ -107,30 +107,30 @@ class BusSurvey:
 
 
 def survey_bus(
-    opener: Opener, layout: LayoutParams, params: DoctorParams, now: Callable[[], float]
+    opener: Opener, robot: RobotSpec, params: DoctorParams, now: Callable[[], float]
 ) -> BusSurvey:
     """Look at a bus; a few seconds, ten if no servo answers.
 
     Args:
         opener: Opens its port.
-        layout: The servos expected.
+        robot: The robot expected.
         params: How often to read.
         now: Monotonic time [s].
 
     Raises:
         PortError: The port is gone or cannot be opened.
     """
-    survey = BusSurvey(layout.baud)
-    with opener(layout.baud) as port:
-        bus = master(port, layout.baud, now)
-        survey.here = _present(bus, layout.ids)
+    survey = BusSurvey(robot.baud)
+    with opener(robot.baud) as port:
+        bus = master(port, robot.baud, now)
+        survey.here = _present(bus, robot.ids)
         survey.registers = _registers(bus, survey.whole)
         _time_pings(bus, survey, now)
         _time_reads(bus, survey, params.reads, now)
     if not survey.here:
         survey.board = _antenna_board(opener, now)
-    if set(layout.ids) - set(survey.here) and not survey.board:
-        survey.elsewhere = _elsewhere(opener, layout, now)
+    if set(robot.ids) - set(survey.here) and not survey.board:
+        survey.elsewhere = _elsewhere(opener, robot, now)
     return survey
 
 
@@ -172,11 +172,11 @@ def _antenna_board(opener: Opener, now: Callable[[], float]) -> bool:
 
 
 def _elsewhere(
-    opener: Opener, layout: LayoutParams, now: Callable[[], float]
+    opener: Opener, robot: RobotSpec, now: Callable[[], float]
 ) -> list[tuple[int, Present]]:
     others: list[tuple[int, Present]] = []
     for baud in BAUDS:
-        if baud != layout.baud:
+        if baud != robot.baud:
             with opener(baud) as port:
                 others += [(baud, one) for one in _present(master(port, baud, now), ()).values()]
     return others

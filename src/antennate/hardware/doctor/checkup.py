@@ -66,16 +66,16 @@ def examine(
     if bus is not None:
 
         def look_at_bus(opener: Opener) -> list[Row]:
-            survey = checkup.bus = survey_bus(opener, robot.layout, robot.doctor, now)
+            survey = checkup.bus = survey_bus(opener, robot.robot, robot.doctor, now)
             latency = latency_row(bus[0], bus_checks.slow(survey, robot), robot.doctor)
             checks = bus_checks.checks(survey, robot)
             return [latency, *(check.row("bus", survey, robot) for check in checks)]
 
-        checkup.rows += _port("bus", *bus, robot.layout.baud, look_at_bus)
+        checkup.rows += _port("bus", *bus, robot.robot.baud, look_at_bus)
     if esp32 is not None:
 
         def look_at_board(opener: Opener) -> list[Row]:
-            survey = checkup.board = survey_board(opener, robot.layout, robot.doctor, now)
+            survey = checkup.board = survey_board(opener, robot.robot, robot.doctor, now)
             checks = board_checks.checks(survey, robot)
             return [check.row("esp32", survey, robot) for check in checks]
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from antennate.hardware import roster, settings
+from antennate.hardware import settings
 from antennate.hardware.doctor.bus_survey import BusSurvey, master, read_some
 from antennate.hardware.doctor.check import Opener
 from antennate.hardware.dynamixel import bringup
@@ -17,14 +17,14 @@ from antennate.hardware.dynamixel.bus import Bus
 from antennate.hardware.dynamixel.inquiry import look
 from antennate.hardware.dynamixel.tables import BAUD_RATES, XC430_W240
 from antennate.hardware.settings import Setting
-from antennate.robots.layout import LayoutParams
+from antennate.robots.spec import RobotSpec
 
 _ID, _BAUD = "id", "baud_rate"
 _MOVED = (_ID, _BAUD)
 """Registers after whose change a servo is found elsewhere."""
 _AFTER = {
-    "drive_mode": "see that its sign in layout.*.directions is right",
-    "homing_offset": "measure its place in layout.*.zeros anew",
+    "drive_mode": "see that its sign in robot.*.directions is right",
+    "homing_offset": "measure its place in robot.*.zeros anew",
 }
 """What a person has to do after a change, by register."""
 
@@ -56,34 +56,34 @@ class Change:
         return f"{text}; {_AFTER[self.register]}" if self.register in _AFTER else text
 
 
-def plan(survey: BusSurvey, layout: LayoutParams) -> list[Change]:
+def plan(survey: BusSurvey, robot: RobotSpec) -> list[Change]:
     """Changes that would put right what can be; those that move a servo come alone, first."""
-    return _moves(survey, layout) or _settings(survey, layout)
+    return _moves(survey, robot) or _settings(survey, robot)
 
 
-def _moves(survey: BusSurvey, layout: LayoutParams) -> list[Change]:
-    missing = [servo for servo in layout.ids if servo not in survey.here]
-    extra = [(survey.baud, one) for i, one in survey.here.items() if i not in layout.ids]
+def _moves(survey: BusSurvey, robot: RobotSpec) -> list[Change]:
+    missing = [servo for servo in robot.ids if servo not in survey.here]
+    extra = [(survey.baud, one) for i, one in survey.here.items() if i not in robot.ids]
     extra += [(baud, one) for baud, one in survey.elsewhere if one.servo not in missing]
     if len(missing) == 1 and len(extra) == 1:
         baud, one = extra[0]
-        if one.state == "ok" and one.model == roster.models(layout)[missing[0]]:
+        if one.state == "ok" and one.model == robot.models[missing[0]]:
             return [Change(one.servo, baud, _ID, one.servo, missing[0])]
     ids = [one.servo for _, one in survey.elsewhere]
     return [
-        Change(one.servo, baud, _BAUD, BAUD_RATES.index(baud), BAUD_RATES.index(layout.baud))
+        Change(one.servo, baud, _BAUD, BAUD_RATES.index(baud), BAUD_RATES.index(robot.baud))
         for baud, one in survey.elsewhere
         if one.servo in missing and one.state == "ok" and ids.count(one.servo) == 1
     ]
 
 
-def _settings(survey: BusSurvey, layout: LayoutParams) -> list[Change]:
-    delay = dict.fromkeys(layout.ids, Setting(0, 0, 0))
-    wanted = {**settings.settings(layout), "return_delay_time": delay}
+def _settings(survey: BusSurvey, robot: RobotSpec) -> list[Change]:
+    delay = dict.fromkeys(robot.ids, Setting(0, 0, 0))
+    wanted = {**settings.settings(robot), "return_delay_time": delay}
     return [
         Change(servo, survey.baud, name, there[name], setting.cure)
         for servo, there in survey.registers.items()
-        if servo in layout.ids
+        if servo in robot.ids
         for name, rules in wanted.items()
         if name in there
         and (setting := rules.get(servo)) is not None

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from antennate.hardware import roster
 from antennate.hardware.doctor.bus_survey import BusSurvey
 from antennate.hardware.doctor.check import Check, Finding, Verdict, grouped, ids_text, worst
 from antennate.hardware.doctor.config import DoctorConfig
@@ -31,7 +30,7 @@ Judge = Callable[[BusSurvey, DoctorConfig, int, int], Verdict]
 
 def known(bus: BusSurvey, robot: DoctorConfig) -> dict[int, dict[str, int]]:
     """Registers of the expected servos that could be read."""
-    return {i: values for i, values in bus.registers.items() if i in robot.layout.ids}
+    return {i: values for i, values in bus.registers.items() if i in robot.robot.ids}
 
 
 def _values(bus: BusSurvey, robot: DoctorConfig, register: str) -> dict[int, int]:
@@ -68,7 +67,7 @@ def _of_servos(verdicts: Mapping[int, Verdict], found: str, cure: str) -> Findin
 def _required(register: str) -> Judge:
     """What `drive` requires, as `hardware.settings` says."""
     return lambda bus, robot, servo, value: (
-        "ok" if settings(robot.layout)[register][servo].allows(value) else "bad"
+        "ok" if settings(robot.robot)[register][servo].allows(value) else "bad"
     )
 
 
@@ -78,7 +77,7 @@ def _unless(good: Callable[[int], bool], verdict: Verdict) -> Judge:
 
 
 def _position_limits(bus: BusSurvey, robot: DoctorConfig) -> Finding:
-    rules = settings(robot.layout)
+    rules = settings(robot.robot)
     low, high = (_values(bus, robot, f"{end}_position_limit") for end in ("min", "max"))
     both = {i: (low[i], high[i]) for i in rules["min_position_limit"] if i in low and i in high}
     verdicts: dict[int, Verdict] = {
@@ -118,7 +117,7 @@ REGISTER_CHECKS: tuple[Check[BusSurvey], ...] = (
     _register(
         "operating mode",
         "operating_mode",
-        lambda bus, robot: grouped(roster.modes(robot.layout)),
+        lambda bus, robot: grouped(robot.robot.modes),
         _required("operating_mode"),
         FIX,
     ),
@@ -142,24 +141,24 @@ REGISTER_CHECKS: tuple[Check[BusSurvey], ...] = (
         "homing_offset",
         "0",
         _required("homing_offset"),
-        f"{FIX}, then correct layout.*.zeros of {{ids}}",
+        f"{FIX}, then correct robot.*.zeros of {{ids}}",
     ),
     _register(
         "drive mode",
         "drive_mode",
         "normal",
         _required("drive_mode"),
-        f"{FIX}; layout.*.directions of {{ids}} tells signs",
+        f"{FIX}; robot.*.directions of {{ids}} tells signs",
         lambda value: " + ".join(word for bit, word in _MODES if value & bit) or "normal",
     ),
     _register(
         "velocity limit",
         "velocity_limit",
-        "from layout.*.fastest on",
+        "from robot.*.fastest on",
         _required("velocity_limit"),
         f"{FIX}: {{ids}} would refuse their profile velocity",
     ),
-    Check("position limits", "at least layout.*.limit about each zero", _position_limits),
+    Check("position limits", "at least robot.*.limit about each zero", _position_limits),
     _register(
         "shuts itself down at",
         "shutdown",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from antennate.robots.body import RobotParams
+from antennate.robots.spec import RobotSpec
 from antennate.sim.scenes.scene import Route
 
 
@@ -20,6 +20,6 @@ class FlatScene:
     def __init__(self, length: float = 2.0) -> None:
         self._length = length
 
-    def draw(self, robot: RobotParams, rng: np.random.Generator) -> Route:
+    def draw(self, robot: RobotSpec, rng: np.random.Generator) -> Route:
         """Every instance is the same."""
         return Route(np.array([[0.0, 0.0], [self._length, 0.0]]))

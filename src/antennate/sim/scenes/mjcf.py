@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 
 from antennate.errors import SceneError, in_one_line
-from antennate.robots.body import RobotParams
+from antennate.robots.spec import RobotSpec
 from antennate.sim import layers
 from antennate.sim.outline import outline
 from antennate.sim.scenes.mjcf_file import read_spec
@@ -53,7 +53,7 @@ class MjcfScene:
         self._bounds = [outline(model, data, g) for g in solid]
         self._has_floor = _share_bits(self._spec, model, data)
 
-    def draw(self, robot: RobotParams, rng: np.random.Generator) -> Route:
+    def draw(self, robot: RobotSpec, rng: np.random.Generator) -> Route:
         """The scene of the file."""
         bounds = np.concatenate(self._bounds) if self._bounds else None
         return _Instance(self._route, bounds, self._spec, self._has_floor)

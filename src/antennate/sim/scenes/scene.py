@@ -8,7 +8,7 @@ from typing import Protocol
 import mujoco
 import numpy as np
 
-from antennate.robots.body import RobotParams
+from antennate.robots.spec import RobotSpec
 from antennate.sim import layers
 from antennate.sim.scenes import geometry
 from antennate.types import Floats
@@ -63,7 +63,7 @@ class Scene(Protocol):
         """Whether instances differ from draw to draw."""
         ...
 
-    def draw(self, robot: RobotParams, rng: np.random.Generator) -> SceneInstance:
+    def draw(self, robot: RobotSpec, rng: np.random.Generator) -> SceneInstance:
         """Draw one instance in which the robot fits.
 
         Raises:

@@ -16,7 +16,7 @@ import numpy as np
 
 from antennate.errors import SceneError
 from antennate.params import CylinderParams, TunnelParams
-from antennate.robots.body import RobotParams
+from antennate.robots.spec import RobotSpec
 from antennate.sim import layers
 from antennate.sim.scenes import geometry
 from antennate.sim.scenes.scene import LEFT_BEHIND, add_floor
@@ -41,7 +41,7 @@ class TunnelScene:
     def __init__(self, params: TunnelParams | None = None) -> None:
         self._params = params or TunnelParams()
 
-    def draw(self, robot: RobotParams, rng: np.random.Generator) -> Tunnel:
+    def draw(self, robot: RobotSpec, rng: np.random.Generator) -> Tunnel:
         """Draw one tunnel.
 
         Raises:
@@ -127,7 +127,7 @@ class Tunnel:
 
 def _place_cylinders(
     params: TunnelParams,
-    robot: RobotParams,
+    robot: RobotSpec,
     centre: Floats,
     walls: tuple[Floats, Floats],
     rng: np.random.Generator,

@@ -21,8 +21,7 @@ from antennate.hardware.dynamixel.bus import Bus
 from antennate.hardware.dynamixel.tables import XC430_W240, Register
 from antennate.hardware.joints import Joints
 from antennate.params import TurnsParams
-from antennate.robots.anatomy import YAW_COUNT
-from antennate.robots.layout import TICKS_A_TURN
+from antennate.robots.servos import TICKS_A_TURN
 from antennate.types import Floats
 
 _TORQUE = XC430_W240["torque_enable"]
@@ -32,7 +31,7 @@ _SPARE = {_TORQUE.name: 1, _GOAL.name: 12, _PRESENT.name: 12}
 """Defined bytes after each, by which late answers are told apart."""
 
 
-class Turns:
+class LegTurns:
     """Watches how far legs have turned, and lets them forget it; for one thread.
 
     Args:
@@ -48,7 +47,6 @@ class Turns:
         self._bus, self._joints = bus, joints
         self._params = params or TurnsParams()
         self.forgotten = 0
-        self._seen = self._stood = 0.0
         self.reset()
 
     def reset(self) -> None:
@@ -69,36 +67,24 @@ class Turns:
         begun = self.standing and (self._stage or self._tried)
         return self._joints.ids[self._left[0]] if begun else None
 
-    def time(self, t: Floats, rate: float = 1.0) -> Floats:
-        """The controller's time [s], which stands still with the robot; call once a tick.
-
-        Args:
-            t: Time of the frame [s], shape (1,).
-            rate: How fast it goes otherwise, 1 as the clock.
-        """
-        now = float(t[0])
-        if self.standing or rate < 1.0:
-            self._stood += (now - self._seen) * (1.0 if self.standing else 1.0 - rate)
-        self._seen = now
-        return t - self._stood
-
     def begin(self, goals: Floats) -> None:
         """Stand still from now on if a leg has turned far enough.
 
         Args:
-            goals: Of all servos [ticks], shape (19,).
+            goals: Of all servos [ticks], shape (n,).
         """
-        turned = abs(goals[YAW_COUNT:-2]) / TICKS_A_TURN
-        if not self.standing and turned.max() >= self._params.most:
+        turning = self._joints.turning
+        turned = abs(goals[turning]) / TICKS_A_TURN
+        if not self.standing and turned.max(initial=0.0) >= self._params.most:
             self.reset()
             far = turned >= 0.5 * self._params.most
-            self._left.extend(YAW_COUNT + i for i, is_far in enumerate(far.tolist()) if is_far)
+            self._left.extend(turning[far].tolist())
 
     def step(self, goals: Floats, positions: Mapping[int, int], may_begin: bool = True) -> None:
         """One tick's share; goals of legs that have forgotten are changed in place.
 
         Args:
-            goals: Of all servos [ticks], shape (19,).
+            goals: Of all servos [ticks], shape (n,).
             positions: Newest positions by id [ticks].
             may_begin: Whether the next leg may lose its torque; one that has lost it goes on.
 
