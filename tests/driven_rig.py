@@ -145,14 +145,16 @@ def driven(
         control=config.control,
     )
     session = wired(orders, robot)
-    control = session.controller = _Judged(watch, lambda: _taken(session.board) - robot.stood)
+    control = session.control.controller = _Judged(
+        watch, lambda: _taken(session.board) - robot.stood
+    )
     session.clock.sleep_until(session.clock.now() + phase)
 
     def on_tick(session: Session, now: float) -> None:
         if control.first is None or session.orders.stop:
             return
         goals = tuple(servo.get("goal_position") for servo in robot.servos)
-        walk.note(session.frame, int(control.maneuver[0]), session.command, goals)
+        walk.note(session.frame, int(control.maneuver[0]), session.control.command, goals)
         session.orders.stop = bool(watch.status) or len(walk.readings) >= ticks
 
     report = drive(session, orders, arm=True, on_tick=on_tick)

@@ -18,7 +18,7 @@ from worlds import TICKS, WORLDS, World, recorded, replayed, session, simulated,
 
 from antennate.control.loop import run_loop
 from antennate.control.registry import BUILT_IN
-from antennate.hardware.driving.body import HardwareRobot
+from antennate.hardware.driving.hardware_robot import HardwareRobot
 from antennate.hardware.esp32.clock import Timed
 from antennate.hardware.esp32.wire import Sample
 from antennate.params import ControlParams, LogParams
@@ -130,7 +130,7 @@ def test_M7_time_of_a_board_follows_the_host_whatever_comes_and_never_goes_back(
             return Timed(EMPTY, self.epoch, 0, round(1e6 * self.taken), 0.0)
 
     clock = Wandering(0, 0.01)
-    body = HardwareRobot(Chance(), None, None, clock)  # type: ignore[arg-type]
+    body = HardwareRobot(Chance(), None, clock)  # type: ignore[arg-type]
     times = []
     for tick in range(5000):
         clock.sleep_until(0.01 * tick)

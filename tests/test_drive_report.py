@@ -100,7 +100,7 @@ class Unsure:
 
 def test_a_controller_that_never_decides_is_a_hold() -> None:
     made = rig(TwinConfig())
-    made.session.controller = Unsure(made.session.controller)
+    made.session.control.controller = Unsure(made.session.control.controller)
     made, report = driven(nothing, made)
     assert made.session.tally.sent == 0
     assert report.worst is State.HOLD

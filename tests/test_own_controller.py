@@ -31,6 +31,11 @@ EXAMPLE = f"{Path(__file__).parents[1] / 'examples/own_controller.py'}:OwnContro
 SHORT = {"trials": 3, "time_limit": 1.5, "seed": 3}
 
 
+@pytest.fixture(autouse=True)
+def _nothing_added(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(CONTROLLERS, "added", {})
+
+
 def rows_of(name: str, **changes: Any) -> list[Any]:
     """The table of short trials."""
     return run(TunnelConfig.model_validate({**SHORT, "controllers": [name], **changes})).rows
@@ -125,7 +130,7 @@ def test_the_example_drives_the_twin() -> None:
     goals: set[tuple[int, ...]] = set()
 
     def on_tick(session: Session, now: float) -> None:
-        maneuvers.append(session.decision.maneuver)
+        maneuvers.append(session.control.decision.maneuver)
         goals.add(tuple(servo.get("goal_position") for servo in robot.servos))
 
     report = drive(session, config, True, on_tick)

@@ -99,7 +99,7 @@ def test_B19_a_group_whose_release_fails_keeps_no_other_from_its_own(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     made, disable = rig(TwinConfig()), bringup.disable
-    first = made.session.joints.in_order_of_release[0]
+    first = made.session.actuators.joints.in_order_of_release[0]
 
     def broken(bus: Any, ids: Any, *words: Any) -> list[int]:
         if tuple(ids) == first:
@@ -177,7 +177,7 @@ def ticked(made: Rig, end: float, act: Callable[[float], None]) -> None:
         act(clock.now())
         return clock.now() < end
 
-    run_loop(session, session, session.period, go_on)
+    run_loop(session, session.control, session.period, go_on)
 
 
 def test_B19_servos_that_kept_their_torque_in_off_are_told_again_until_they_let_go() -> None:
@@ -201,7 +201,7 @@ def test_B19_servos_that_kept_their_torque_in_off_are_told_again_until_they_let_
     assert len(kept) > 20, "telling them takes no more than two ticks"
     assert {tuple(ids) for ids in kept} == {(4, 18)}
     assert not any(ids for t, ids in on.items() if t >= 2.6)
-    assert made.session.unreleased == []
+    assert made.session.actuators.left_on == []
 
 
 def test_B10_B19_a_servo_that_keeps_torque_after_half_an_arming_is_told_again() -> None:

@@ -252,7 +252,11 @@ def test_T2_a_controller_that_hangs_stops_every_servo_within_120_ms_of_the_last_
     """It never comes back from its decision: nobody sends, and nobody has to."""
 
     made = rig(TwinConfig())
-    sound, servos, wait = made.session.controller.step, made.robot.servos, made.clock.sleep_until
+    sound, servos, wait = (
+        made.session.control.controller.step,
+        made.robot.servos,
+        made.clock.sleep_until,
+    )
     tripped: list[float] = []
     seen: list[list[float]] = []
 
@@ -271,7 +275,7 @@ def test_T2_a_controller_that_hangs_stops_every_servo_within_120_ms_of_the_last_
             wait(made.clock.now() + 0.4)
         raise KeyboardInterrupt
 
-    made.session.controller.step = step  # type: ignore[method-assign]
+    made.session.control.controller.step = step  # type: ignore[method-assign]
     made.session.release = list  # type: ignore[method-assign]
     drive(made.session, CONFIG, arm=True)
     assert tripped[0] <= 0.120
@@ -286,7 +290,7 @@ def test_B8_servos_stop_within_120_ms_when_only_the_controller_fails(
 ) -> None:
     """The loop still reads the board in every tick; a packet to any servo would feed them all."""
     made = rig(TwinConfig())
-    sound, servos = made.session.controller.step, made.robot.servos
+    sound, servos = made.session.control.controller.step, made.robot.servos
     heard: list[float] = []
     tripped: list[float] = []
 
@@ -299,9 +303,9 @@ def test_B8_servos_stop_within_120_ms_when_only_the_controller_fails(
             tripped.append(made.clock.now())
         raise ValueError("a bug")
 
-    made.session.controller.step = step  # type: ignore[method-assign]
+    made.session.control.controller.step = step  # type: ignore[method-assign]
     drive(made.session, CONFIG, arm=True)
-    assert (made.session.watch.supply < 10.8) == (volts < 10.8)
+    assert (made.session.actuators.state.supply < 10.8) == (volts < 10.8)
     assert tripped
     assert tripped[0] - heard[0] <= 0.120 + 0.02  # its last tick, and the one that looks
 
@@ -336,7 +340,7 @@ def test_B8_a_controller_that_fails_does_not_feed_the_watchdogs() -> None:
             return command
 
     made = rig(TwinConfig())
-    made.session.controller = Broken(made.session.controller)
+    made.session.control.controller = Broken(made.session.control.controller)
     log = Log(made)
     drive(made.session, CONFIG, arm=True, on_tick=log)
     t = np.array(log.t)
@@ -368,7 +372,7 @@ def test_G6_a_robot_whose_record_is_required_holds_while_none_is_kept() -> None:
 @pytest.mark.parametrize("bad", [math.nan, math.inf])
 def test_S5_B14_a_pose_that_is_not_finite_never_reaches_the_bus(bad: float) -> None:
     made = rig(TwinConfig())
-    sound = made.session.controller.step
+    sound = made.session.control.controller.step
 
     def step(frame: AntennaFrame) -> JointCommand:
         command = sound(frame)
@@ -376,7 +380,7 @@ def test_S5_B14_a_pose_that_is_not_finite_never_reaches_the_bus(bad: float) -> N
             command.leg[0, 2, 1] = bad
         return command
 
-    made.session.controller.step = step  # type: ignore[method-assign]
+    made.session.control.controller.step = step  # type: ignore[method-assign]
     log = Log(made)
     drive(made.session, CONFIG, arm=True, on_tick=log)
     assert Cause.BAD_POSE in set().union(*log.causes)
@@ -449,13 +453,13 @@ def test_T6_tracebacks_of_a_controller_are_kept_once_a_second() -> None:
         def step(self, frame: object) -> object:
             raise ZeroDivisionError("of the plugin")
 
-    session.controller = Broken()  # type: ignore[assignment]
+    session.control.controller = Broken()  # type: ignore[assignment]
     session.clock.sleep_until(1.0)
     for tick in range(251):
         session.clock.sleep_until(1.0 + 0.01 * tick)
-        session.step(session.frame)
-    kept = session.tracebacks.kept
-    assert (len(kept), session.tracebacks.left_out) == (3, 248)
+        session.control.step(session.frame)
+    kept = session.control.tracebacks.kept
+    assert (len(kept), session.control.tracebacks.left_out) == (3, 248)
     assert "in step" in kept[0]
     assert "ZeroDivisionError: of the plugin" in kept[0]
     assert Report().result(session)["tracebacks"] == list(kept)
@@ -483,7 +487,7 @@ def test_B15_servos_that_are_not_as_expected_are_refused(
     made = rig(TwinConfig())
     spoil(made.robot)
     with pytest.raises(BringUpError, match=said):
-        require_servos(made.session.bus, RobotSpec())
+        require_servos(made.session.actuators.bus, RobotSpec())
 
 
 @pytest.mark.parametrize(
@@ -566,7 +570,7 @@ def test_B11_a_restart_that_answers_at_once_is_a_fault_and_arming_sets_all_of_it
 
     def tick(n: int) -> None:
         for _ in range(n):
-            session.write(session.step(session.read()))
+            session.write(session.control.step(session.read()))
             assert session.outputs is not None
             causes.append({active.cause for active in session.outputs.causes})
             made.clock.sleep_until(made.clock.now() + session.period / 2)
@@ -614,7 +618,7 @@ def test_B13_a_supply_that_cannot_be_read_any_more_is_not_known_after_4_s() -> N
 
     def note(session: Session, t: float) -> None:
         log(session, t)
-        supply.append(session.watch.supply)
+        supply.append(session.actuators.state.supply)
 
     drive(made.session, DriveConfig(dry_run=7.0, duration=7.0), arm=False, on_tick=note)
     known = np.isfinite(supply)
@@ -626,7 +630,7 @@ def test_B13_a_supply_that_cannot_be_read_any_more_is_not_known_after_4_s() -> N
 @pytest.mark.parametrize("what", ["servo", "command"])
 def test_B10_arming_that_fails_half_way_leaves_no_servo_with_torque(what: str) -> None:
     made = rig(TwinConfig())
-    servos, sound = made.robot.servos, made.session.controller.step
+    servos, sound = made.robot.servos, made.session.control.controller.step
     had_torque: list[int] = []
 
     def step(frame: AntennaFrame) -> JointCommand:
@@ -638,7 +642,7 @@ def test_B10_arming_that_fails_half_way_leaves_no_servo_with_torque(what: str) -
     def note(session: Session, t: float) -> None:
         had_torque.append(sum(servo.torque for servo in servos))
 
-    made.session.controller.step = step  # type: ignore[method-assign]
+    made.session.control.controller.step = step  # type: ignore[method-assign]
     if what == "servo":
         servos[11].write = refusing(servos[11])  # type: ignore[method-assign]
     log = Log(made)

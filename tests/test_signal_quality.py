@@ -42,7 +42,7 @@ def driven(
 
 def swapped(made: Rig) -> None:
     """Let the board send each channel as the other."""
-    body = made.session._body
+    body = made.session.robot
     read = body._board.newest
 
     def exchange(now: float):

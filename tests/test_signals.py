@@ -49,14 +49,14 @@ def test_signals_are_left_alone_outside_the_main_thread() -> None:
 def walk_until(made: Rig, said: Any) -> None:
     """Replace what the controller does in one tick, the 50th of the walk and all after it."""
     session = made.session
-    sound = session.controller.step
+    sound = session.control.controller.step
 
     def step(frame: Any) -> Any:
         if session.tally.sent >= 50:
             said()
         return sound(frame)
 
-    session.controller.step = step  # type: ignore[method-assign]
+    session.control.controller.step = step  # type: ignore[method-assign]
 
 
 @pytest.mark.parametrize("number", STOPS)

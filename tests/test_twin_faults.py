@@ -117,7 +117,7 @@ def test_L1_B3_bit_errors_are_counted_and_no_wrong_value_is_ever_used(
         for servo in made.robot.servos:
             if t > 1.6:
                 assert servo.get("goal_position") in truth.goals[servo.get("id")]
-        for servo, position in session.watch.positions.items():
+        for servo, position in session.actuators.state.positions.items():
             assert position in truth.positions[servo]
 
     report = drive(made.session, DriveConfig(dry_run=0.5, duration=6.0), arm=True, on_tick=look)
@@ -125,7 +125,7 @@ def test_L1_B3_bit_errors_are_counted_and_no_wrong_value_is_ever_used(
     assert made.robot.bus.noise.wrong > 50
     assert made.robot.noise.wrong > 5
     assert result["crc_errors"] >= 3
-    assert made.session.bus.tally.misses > 100
+    assert made.session.actuators.bus.tally.misses > 100
     assert max(states[:-1]) <= worst
     assert (states[-1] is State.FAULT) == (worst is State.FAULT)
     assert not any(servo.torque for servo in made.robot.servos)

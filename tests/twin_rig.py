@@ -15,10 +15,11 @@ from antennate.control.loop import run_loop
 from antennate.control.registry import make_controller
 from antennate.experiments.tunnel.monitor import TrialMonitor
 from antennate.experiments.tunnel.run import TunnelConfig
-from antennate.hardware.driving.body import HardwareRobot
 from antennate.hardware.driving.connect import DOUBT
+from antennate.hardware.driving.hardware_robot import HardwareRobot
 from antennate.hardware.driving.session import Session
 from antennate.hardware.dynamixel import bringup
+from antennate.hardware.dynamixel.actuators import DynamixelActuators
 from antennate.hardware.dynamixel.answers import Timing
 from antennate.hardware.dynamixel.bus import Bus
 from antennate.hardware.esp32.board import Board
@@ -154,10 +155,10 @@ def rig(config: TwinConfig, name: str = "closed", touch: TouchCheckParams | None
     robot = build(config)
     params = ControlParams(**dict(config.control))
     clock = LockstepClock(robot)
+    bus = Bus(clock, Timing(config.robot.baud, doubt=DOUBT), clock=clock.now)
     session = Session(
         board=Board(BoardPort(robot, clock), SupervisorParams().stale_age),
-        bus=Bus(clock, Timing(config.robot.baud, doubt=DOUBT), clock=clock.now),
-        joints=Joints(config.robot),
+        actuators=DynamixelActuators(bus, Joints(config.robot), clock.now),
         clock=clock,
         controller=make_controller(name, params, config.robot),
         period=params.period,
@@ -186,7 +187,7 @@ def before_twin(config: TunnelConfig, name: str, trial: int) -> Stage:
     bringup.arm_watchdogs(bus, spec.ids)
     clock.sleep_until(period * np.ceil(clock.now() / period + 1.0))
     bringup.enable(bus, spec.ids)
-    body = HardwareRobot(board, bus, Joints(spec), clock)
+    body = HardwareRobot(board, DynamixelActuators(bus, Joints(spec), clock.now), clock)
     return Stage(body, watch.controller, period, watch.go_on, watch.decisions, robot)
 
 

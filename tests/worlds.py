@@ -146,7 +146,9 @@ def session(folder: Path, name: str, trial: int, blind: float = math.inf) -> Wor
         assert tick.number == number
         return Tick.unpack(tick.pack())
 
-    world = World(made.session, made.session, header, made.session.controller, go_on, tick_of)
+    world = World(
+        made.session, made.session.control, header, made.session.control.controller, go_on, tick_of
+    )
     return world
 
 

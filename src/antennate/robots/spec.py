@@ -33,6 +33,18 @@ from antennate.robots.sides import SIDES
 GroupName = Literal["yaw", "legs", "antennae", "pitch"]
 ROBOTS: Mapping[str, Mapping[str, Any]] = {"scuttle": {}}
 """Robots that are known by name: what differs from the defaults."""
+HARDWARE_ALONE = (
+    *(
+        f"robot.{group}.{name}"
+        for group in ("yaw", "legs", "antennae", "pitch")
+        for name in ("ids", "directions", "zeros", "limit", "fastest")
+    ),
+    "robot.antennae.servo",
+    "robot.antenna.sensor.rate",
+    "robot.baud",
+    "robot.release",
+)
+"""Parameters that only the robot's hardware, or its twin, reads; the simulation alone does not."""
 ANTENNA_PREFIXES = tuple(f"antenna_{side}_" for side in SIDES)
 
 

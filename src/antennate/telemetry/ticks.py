@@ -92,15 +92,15 @@ class Tick:
     @classmethod
     def of(cls, session: Session, t: float) -> Tick:
         """The tick of a session that has just written, at the host's time t [s]."""
-        out, clock, bus = session.outputs, session.board.clock, session.bus.tally
+        out, clock, bus = session.outputs, session.board.clock, session.actuators.tally
         left, right = session.quality.counts
         bytes_ = session.board.decoder.counters
         return cls(
-            **_decided(session.controller, session.decision, session.frame),
-            angles=angles_of(session.command, len(session.joints.ids)),
+            **_decided(session.control.controller, session.control.decision, session.frame),
+            angles=angles_of(session.control.command, len(session.control.robot.ids)),
             number=session.tally.ticks,
             now=t,
-            asked=session.asked,
+            asked=session.control.result.asked,
             reading=(left, right),
             state="" if out is None else out.state.name,
             causes=() if out is None else tuple(_clean(cause.text) for cause in out.causes),
@@ -113,7 +113,7 @@ class Tick:
             misses=bus.misses,
             stale=bus.stale,
             sent=session.tally.sent,
-            refused=session.tally.refused,
+            refused=session.control.refused,
         )
 
     @classmethod

@@ -14,6 +14,7 @@ from antennate.hardware.driving.adapter import require_quick
 from antennate.hardware.driving.config import DriveConfig
 from antennate.hardware.driving.session import Session
 from antennate.hardware.dynamixel import bringup
+from antennate.hardware.dynamixel.actuators import DynamixelActuators
 from antennate.hardware.dynamixel.answers import Timing
 from antennate.hardware.dynamixel.bringup import BringUpError
 from antennate.hardware.dynamixel.bus import Bus
@@ -87,8 +88,7 @@ def prepare(
     board.count_anew(clock.now())
     return Session(
         board=board,
-        bus=master,
-        joints=Joints(config.robot),
+        actuators=DynamixelActuators(master, Joints(config.robot), clock.now),
         clock=clock,
         controller=controller or make_controller(config.controller, config.control, config.robot),
         period=config.control.period,

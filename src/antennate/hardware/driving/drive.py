@@ -70,7 +70,7 @@ def drive(
     with StopOnce() as stop:
         try:
             try:
-                run_loop(session, session, session.period, go_on)
+                run_loop(session, session.control, session.period, go_on)
             except KeyboardInterrupt:
                 pass
             finally:

@@ -69,7 +69,7 @@ class Report:
 
     def result(self, session: Session) -> dict[str, Any]:
         """All of it as plain numbers and words, for result.json."""
-        board, bus = session.board, session.bus.tally
+        board, answers = session.board, session.actuators.tally
         return {
             "worst_state": self.worst.name,
             "why": self.why,
@@ -82,13 +82,16 @@ class Report:
             "crc_errors": board.decoder.counters.crc_errors,
             "lost_samples": board.lost,
             "resets": board.clock.resets,
-            "missed_answers": bus.misses,
-            "stale_answers": bus.stale,
-            "broken_answers": bus.bad_crc,
+            "missed_answers": answers.misses,
+            "stale_answers": answers.stale,
+            "broken_answers": answers.bad_crc,
             "poses_sent": session.tally.sent,
             "poses_limited": session.tally.limited,
-            "poses_refused": session.tally.refused,
-            "tracebacks": list(session.tracebacks.kept),
+            "poses_refused": session.control.refused,
+            "tracebacks": [
+                *session.control.tracebacks.kept,
+                *session.actuators.state.tracebacks.kept,
+            ],
         }
 
 

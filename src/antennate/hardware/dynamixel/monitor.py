@@ -1,4 +1,4 @@
-"""What the servos say of themselves, a little in every tick."""
+"""Health and positions of the servos, a little of it read in every tick."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Iterable
 from itertools import cycle
 
+from antennate.hardware.actuators import ActuatorState
 from antennate.hardware.dynamixel.answers import POSITION, Answer, Span, Value
 from antennate.hardware.dynamixel.bringup import WATCHDOG_COUNTS
 from antennate.hardware.dynamixel.bus import Bus
@@ -24,7 +25,7 @@ _PATIENCE = BusParams().look_every
 _OLD = BusParams().supply_age
 
 
-class ServoWatch:
+class ServoMonitor(ActuatorState):
     """Reads all positions every tick, and one servo's watchdog, torque and the supply in turn.
 
     Args:
@@ -35,14 +36,8 @@ class ServoWatch:
 
     Attributes:
         positions: Newest position by id [ticks].
-        missed: Answers missed in a row, by id.
-        errors: Hardware errors in words, by id.
-        watchdogs: Ids stopped by their watchdog.
         armed: Whether torque and watchdogs are to be on; see `arm`.
         loose: Id of a servo whose torque is off on purpose, None if there is none.
-        disarmed: Ids that have lost their torque or their watchdog while armed.
-        supply: Voltage [V], NaN before it was read and when it was not for a while.
-        bus_error: What is wrong with the bus as a whole, empty if nothing is.
     """
 
     def __init__(
@@ -52,6 +47,7 @@ class ServoWatch:
         clock: Callable[[], float],
         budget: float = BusParams().motion_budget,
     ) -> None:
+        super().__init__(missed=dict.fromkeys(ids, 0))
         self._bus = bus
         self._clock = clock
         self._ids = ids
@@ -59,15 +55,9 @@ class ServoWatch:
         self._turn = cycle(range(len(ids)))
         self._waited = 0
         self.positions: dict[int, int] = {}
-        self.missed: dict[int, int] = dict.fromkeys(ids, 0)
-        self.errors: dict[int, str] = {}
-        self.watchdogs: tuple[int, ...] = ()
         self.armed = False
         self.loose: int | None = None
-        self.disarmed: tuple[int, ...] = ()
-        self.supply = math.nan
-        self._weighed = -math.inf
-        self.bus_error = ""
+        self._measured = -math.inf
 
     def arm(self, armed: bool) -> None:
         """From now on torque and watchdogs are on, or off on purpose."""
@@ -85,7 +75,7 @@ class ServoWatch:
         except PortError as error:
             self.bus_error = str(error)
             self.missed = {servo: count + 1 for servo, count in self.missed.items()}
-        if self._clock() - self._weighed > _OLD:
+        if self._clock() - self._measured > _OLD:
             self.supply = math.nan
 
     def _look(self) -> None:
@@ -105,7 +95,7 @@ class ServoWatch:
         self._guard(servo)
         if at == 0 and (volts := self._one(servo, Span(_VOLTAGE.address, 2))) is not None:
             self.supply = _VOLT * _VOLTAGE.decode(volts)
-            self._weighed = self._clock()
+            self._measured = self._clock()
 
     def _guard(self, servo: int) -> None:
         """Whether a servo still has the watchdog and the torque that it was given."""

@@ -31,7 +31,7 @@ _SPARE = {_TORQUE.name: 1, _GOAL.name: 12, _PRESENT.name: 12}
 """Defined bytes after each, by which late answers are told apart."""
 
 
-class Turns:
+class LegTurns:
     """Watches how far legs have turned, and lets them forget it; for one thread.
 
     Args:
@@ -47,7 +47,6 @@ class Turns:
         self._bus, self._joints = bus, joints
         self._params = params or TurnsParams()
         self.forgotten = 0
-        self._seen = self._stood = 0.0
         self.reset()
 
     def reset(self) -> None:
@@ -67,19 +66,6 @@ class Turns:
         """Id of the leg whose torque may be off for it, None if there is none."""
         begun = self.standing and (self._stage or self._tried)
         return self._joints.ids[self._left[0]] if begun else None
-
-    def time(self, t: Floats, rate: float = 1.0) -> Floats:
-        """The controller's time [s], which stands still with the robot; call once a tick.
-
-        Args:
-            t: Time of the frame [s], shape (1,).
-            rate: How fast it goes otherwise, 1 as the clock.
-        """
-        now = float(t[0])
-        if self.standing or rate < 1.0:
-            self._stood += (now - self._seen) * (1.0 if self.standing else 1.0 - rate)
-        self._seen = now
-        return t - self._stood
 
     def begin(self, goals: Floats) -> None:
         """Stand still from now on if a leg has turned far enough.

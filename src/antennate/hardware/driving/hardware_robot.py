@@ -1,40 +1,33 @@
-"""The real robot as a Robot: the newest reading of the board, goals to all servos at once."""
+"""The real robot as a `Robot`: the newest reading of its board, commands to its actuators."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from antennate.hardware.dynamixel.bus import Bus
-from antennate.hardware.dynamixel.tables import XC430_W240
+from antennate.hardware.actuators import Actuators
 from antennate.hardware.esp32.board import Board, counts_of
 from antennate.hardware.esp32.clock import Timed
-from antennate.hardware.joints import Joints
-from antennate.types import AntennaFrame, Clock, Floats, Ints, JointCommand
-
-_GOAL = XC430_W240["goal_position"]
-"""At the same address in both models."""
+from antennate.types import AntennaFrame, Clock, JointCommand
 
 
 class HardwareRobot:
-    """One robot behind the wall. A reading that is missing or too old is NaN.
+    """One robot. A reading that is missing or too old is NaN.
 
     Frames are stamped with the board's own time since the first reading, so that neither its way to
     the host nor the host's load shows in them. Their time never goes back.
 
     Args:
         board: Its antennae.
-        bus: Its servos, torque on.
-        joints: Which servo moves what.
+        actuators: What moves its joints.
         clock: The host's time, which never steps.
 
     Attributes:
         used: Usable samples that the last reading found.
     """
 
-    def __init__(self, board: Board, bus: Bus, joints: Joints, clock: Clock) -> None:
+    def __init__(self, board: Board, actuators: Actuators, clock: Clock) -> None:
         self._board = board
-        self._bus = bus
-        self._joints = joints
+        self._actuators = actuators
         self._clock = clock
         self.used = 0
         self._stamp: Timed | None = None
@@ -69,19 +62,10 @@ class HardwareRobot:
         return self._stamp_t + 1e-6 * (timed.elapsed_us - last.elapsed_us)
 
     def write(self, command: JointCommand) -> None:
-        """Send goals to all servos.
+        """Send a command to the actuators, which have torque.
 
         Raises:
             CommandError: The command must not be sent; nothing is.
             PortError: The bus is gone.
         """
-        self.send(self._joints.ticks(command))
-
-    def send(self, goals: Ints | Floats) -> None:
-        """Send goal positions [ticks], shape (n,), rounded.
-
-        Raises:
-            PortError: The bus is gone.
-        """
-        pairs = zip(self._joints.ids, np.rint(goals).astype(int).tolist(), strict=True)
-        self._bus.write_all(_GOAL.address, {servo: _GOAL.encode(goal) for servo, goal in pairs})
+        self._actuators.command(command)
