@@ -10,7 +10,7 @@ import hashlib
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -59,9 +59,19 @@ class RigParams(Params):
     )
 
 
+_OF_THE_RIG = ("rig", "antenna", "variation", "physics")
+
+
 class CalibrateConfig(Params):
     """Everything that decides a calibration."""
 
+    unread: ClassVar[tuple[str, ...]] = (
+        "antenna.base_angle",
+        "antenna.base_spacing",
+        "variation.base_angle",
+        "variation.friction",
+        "variation.overlap",
+    )
     recording: str | None = number(
         None, "1", "assumed: no recording", "CSV file to calibrate from; the rig if not given"
     )
@@ -102,6 +112,19 @@ class CalibrateConfig(Params):
     antenna: AntennaSpec = AntennaSpec()
     variation: BenchVariationParams = BenchVariationParams()
     physics: BenchPhysicsParams = BenchPhysicsParams()
+
+    @model_validator(mode="after")
+    def _rig_or_recording(self) -> CalibrateConfig:
+        """A recording needs no rig, and the rig no columns."""
+        names = ("columns",) if self.recording is None else _OF_THE_RIG
+        for name in names:
+            if getattr(self, name) != type(self).model_fields[name].default:
+                without = "without" if self.recording is None else "with"
+                raise ValueError(
+                    f"{name}: expected the default, as {without} a recording it is not "
+                    "read, found another"
+                )
+        return self
 
     @model_validator(mode="after")
     def _on_the_antenna(self) -> CalibrateConfig:
