@@ -46,7 +46,9 @@ def test_the_compiled_model_holds_the_declared_numbers(hinges: int, angle: str) 
         assert joint.stiffness[0] == antenna.hinge_stiffness()[i]
         assert joint.range == pytest.approx([-antenna.range, antenna.range])
     names = {model.sensor(i).name for i in range(model.nsensor)}
-    assert names == {f"antenna_left/{kind}{i}" for kind in ("angle", "touch") for i in range(hinges)}
+    assert names == {
+        f"antenna_left/{kind}{i}" for kind in ("angle", "touch") for i in range(hinges)
+    }
     length = antenna.length / hinges
     assert model.body(f"antenna_left/hinge{hinges - 1}").pos[0] == pytest.approx(
         length if hinges > 1 else 0.0

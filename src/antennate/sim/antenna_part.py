@@ -15,7 +15,6 @@ from antennate.errors import ConfigError
 from antennate.robots.antenna import BASE, AntennaSpec
 from antennate.sim import layers
 
-
 Side = Literal["left", "right"]
 
 
