@@ -96,13 +96,11 @@ def test_the_right_antenna_is_the_mirror_image() -> None:
         attach_antenna(own, "head", antenna, side, (0.02, 0.0, 0.0))
     model = own.compile()
     data = mujoco.MjData(model)
-    tips = []
     for side in ("left", "right"):
         for i in range(antenna.hinges):
             data.joint(f"antenna_{side}/hinge{i}").qpos = 0.1 * i
     mujoco.mj_forward(model, data)
-    for side in ("left", "right"):
-        tips.append(data.body(f"antenna_{side}/hinge5").xpos.copy())
+    tips = [data.body(f"antenna_{side}/hinge5").xpos.copy() for side in ("left", "right")]
     assert tips[0][1] > 0.01
     assert tips[1] == pytest.approx(tips[0] * [1, -1, 1], abs=1e-12)
     assert tips[0][0] < 0.02 + 0.1 * math.cos(antenna.base_angle)  # bent towards the tail
@@ -172,7 +170,7 @@ def test_a_reader_forgets() -> None:
 
 def test_what_cannot_be_attached_is_one_line() -> None:
     own, antenna = spec(), AntennaSpec()
-    with pytest.raises(ConfigError, match="body: expected the name of a body, .*head, found neck"):
+    with pytest.raises(ConfigError, match=r"body: expected the name of a body, .*head, found neck"):
         attach_antenna(own, "neck", antenna)
     with pytest.raises(ConfigError, match="side: expected left or right, found up"):
         attach_antenna(own, "head", antenna, "up")  # pyright: ignore[reportArgumentType]
@@ -181,6 +179,6 @@ def test_what_cannot_be_attached_is_one_line() -> None:
         attach_antenna(own, "head", antenna)
     model = own.compile()
     for names, kind in ((["feeler"], antenna), ([name], AntennaSpec(active_coils=(3.0,) * 7))):
-        with pytest.raises(ConfigError, match="names: expected antennae of . hinges") as error:
+        with pytest.raises(ConfigError, match=r"names: expected antennae of . hinges") as error:
             AntennaReader(model, names, kind, 0.01)
         assert "\n" not in str(error.value)

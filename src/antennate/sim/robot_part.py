@@ -7,7 +7,6 @@ of a leg is a crowned ring; that of a rolling leg sits off its axle.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import Any
 
