@@ -1,11 +1,11 @@
 """What a trial costs beside its physics, how fast it runs, and how the cost grows with cylinders.
 
 - `trial_over_bare_engine`: CPU time of whole tunnel trials (sensing, control, recording),
-  stepped six at a time as the program does, over CPU time of the bare engine that replays their
+  stepped twelve at a time as the program does, over CPU time of the bare engine that replays their
   commands, one trial after the other, on the same models from the same starts. Drawing and
   compiling a tunnel is in neither. The replay must end on the same bits. The table shows trials
   stepped one at a time as well.
-- `realtime_factor`: simulated seconds per CPU second of whole trials, six at a time.
+- `realtime_factor`: simulated seconds per CPU second of whole trials, twelve at a time.
 - `growth`: CPU time per simulated second with n cylinders over that with 10. The robot paces to and
   fro at the start of one long tunnel, of which only the n cylinders nearest to the start are kept:
   its own work is the same in every case, and what is measured is what the others cost.
@@ -39,7 +39,7 @@ from antennate.sim.world import World
 from antennate.types import AntennaFrame, Floats, Ints, JointCommand, Maneuver
 
 CONTROLLER = "closed"
-LOCKSTEP = 6
+LOCKSTEP = 12
 """Trials the program steps at once."""
 COUNTS = (10, 30, 60, 120)
 _PACING = 3.0
@@ -134,7 +134,7 @@ class Cost:
 
 
 def measure_trials(config: TunnelConfig, trials: int, repetitions: int) -> dict[int, Cost]:
-    """The cost of trials stepped one and six at a time, medians of interleaved repetitions."""
+    """The cost of trials stepped one and twelve at a time, medians of interleaved repetitions."""
     tapes, ended = record(config, trials)
     simulated = sum(world.t for world in ended)
     ratios: dict[int, list[float]] = {1: [], LOCKSTEP: []}

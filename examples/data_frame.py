@@ -2,8 +2,8 @@
 
 import antennate
 
-if __name__ == "__main__":  # workers are fresh processes that import this file
-    result = antennate.run("tunnel", trials=2, controllers=("open", "closed"), workers=2)
+if __name__ == "__main__":
+    result = antennate.run("tunnel", trials=2, controllers=("open", "closed"), time_limit=30.0)
     print(result.sentence)
 
     trials = result.to_dataframe()

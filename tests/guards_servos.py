@@ -22,9 +22,9 @@ from guard_tools import Guard, after, around, constant, put
 
 from antennate.hardware import joints, settings
 from antennate.hardware.driving import session
-from antennate.hardware.dynamixel import actuators, bringup, bus, monitor, packets, parser
+from antennate.hardware.dynamixel import actuators, bringup, bus, inquiry, monitor, packets, parser
 from antennate.hardware.dynamixel import leg_turns as turns
-from antennate.hardware.dynamixel.answers import Value
+from antennate.hardware.dynamixel.answers import Timing, Value
 from antennate.hardware.dynamixel.doubts import Doubts
 from antennate.hardware.dynamixel.leg_turns import LegTurns
 from antennate.hardware.dynamixel.tables import XC430_W240
@@ -56,11 +56,13 @@ class AnyBytes(bytes):
     __hash__ = bytes.__hash__
 
 
-class Everyone(list[int]):
-    """Ids among which every id is."""
+class Agreeing(int):
+    """A value that differs from none."""
 
-    def __contains__(self, key: object) -> bool:
-        return True
+    def __ne__(self, other: object) -> bool:
+        return False
+
+    __hash__ = int.__hash__
 
 
 def any_refusal(old: Any, packet: Any, length: int, doubtful: set[int]) -> Any:
@@ -72,16 +74,26 @@ def any_length(old: Any, packet: Any, length: int, doubtful: set[int]) -> Any:
     return status and dataclasses.replace(status, data=status.data[-length:] if length else b"")
 
 
-def from_anybody(old: Any, self: Any, request: bytes, ids: Any, length: int, end: float) -> Any:
-    return old(self, request, Everyone(ids), length, end)
+def from_its_neighbour(old: Any, packet: Any) -> Any:
+    status = old(packet)
+    return status and dataclasses.replace(status, id=3)
 
 
-def unread(old: Any, master: Any, register: Any, values: Any) -> None:
-    master.write_all(register.address, {i: register.encode(v) for i, v in values.items()})
+def as_wished(old: Any, *args: Any) -> dict[int, int]:
+    return {servo: Agreeing(value) for servo, value in old(*args).items()}
+
+
+def without_end(old: Any, self: Any, ids: Any, span: Any, budget: float = 0.0) -> Any:
+    return old(self, ids, span, 1.0)
+
+
+def of_any_model(old: Any, *args: Any) -> Any:
+    present = old(*args)
+    return present and dataclasses.replace(present, model=None)
 
 
 def where_goals_were(old: Any, master: Any, ids: Any) -> Any:
-    return bringup.read_register(master, ids, bringup._COMMON["present_position"])
+    return bringup.read_register(master, ids, XC430_W240["present_position"])
 
 
 def goal_taken(old: Any, self: Any, servo: int, register: Any, value: int) -> bool:
@@ -100,16 +112,12 @@ def no_fault(old: Any, self: Any, out: Outputs, command: Any) -> None:
     old(self, dataclasses.replace(out, state=State.HOLD), command)
 
 
-def no_line_of_errors(self: Any, what: str) -> Any:
-    return contextlib.nullcontext()
-
-
 def told_once(old: Any, master: Any, ids: Any, *words: Any) -> list[int]:
     return old(master, ids, 1)
 
 
-def only_when_quiet(old: Any, self: Any, request: bytes, end: float, anyway: bool = False) -> bool:
-    return old(self, request, end)
+def only_when_quiet(old: Any, self: Any, address: int, data: Any, anyway: bool = False) -> None:
+    old(self, address, data)
 
 
 def shared(old: Any, *args: Any, exclusive: bool = True, **kwargs: Any) -> Any:
@@ -144,7 +152,7 @@ BUS = [
     ),
     Guard(
         "ids in requests",
-        put(packets, "_check_ids", constant(None)),
+        put(packets, "require_ids", constant(None)),
         partial(test_packets.test_ids_that_cannot_be_are_refused, [1, 1]),
     ),
     Guard(
@@ -154,7 +162,7 @@ BUS = [
     ),
     Guard(
         "bus quiet before a request",
-        put(bus.Bus, "_quiet", constant(True)),
+        put(bus, "Timing", partial(Timing, quiet=0.0)),
         partial(test_bus.test_B4_no_late_answer_is_taken_for_a_new_one, 0.060, True),
     ),
     Guard(
@@ -169,17 +177,17 @@ BUS = [
     ),
     Guard(
         "late refusals",
-        around(bus, "_fitting", any_refusal),
+        around(bus, "fitting", any_refusal),
         test_bus.test_B4_a_late_refusal_does_not_refuse_the_next_read,
     ),
     Guard(
         "length of an answer",
-        around(bus, "_fitting", any_length),
+        around(bus, "fitting", any_length),
         test_bus.test_B4_single_reads_after_a_late_answer,
     ),
     Guard(
         "id of an answer",
-        around(bus.Bus, "_exchange", from_anybody),
+        around(packets, "as_status", from_its_neighbour),
         test_bus.test_an_answer_with_another_id_is_no_answer,
     ),
     Guard(
@@ -198,7 +206,7 @@ BUS = [
     ),
     Guard(
         "budget of time",
-        put(bus.Bus, "_time_for", constant(True)),
+        around(bus.Bus, "read_all", without_end),
         test_bus.test_B1_two_silent_servos_leave_seventeen,
     ),
     Guard(
@@ -218,7 +226,7 @@ BUS = [
     ),
     Guard(
         "line that goes away",
-        put(serial_port.SerialPort, "_mapped", no_line_of_errors),
+        put(serial_port, "PortError", OSError),
         test_twin_bus.test_L12_a_line_that_goes_away_is_a_port_error,
         by=(OSError,),
     ),
@@ -236,7 +244,7 @@ SERVOS = [
     ),
     Guard(
         "model of a servo",
-        around(bringup, "_verdict", lambda old, found, model: old(found, found.model or model)),
+        around(inquiry, "look", of_any_model),
         test_bus.test_B15_missing_wrong_double_and_strange_servos_are_named_within_3_s,
     ),
     Guard(
@@ -270,7 +278,7 @@ SERVOS = [
     ),
     Guard(
         "writes are read back",
-        around(bringup, "_write_checked", unread),
+        around(bringup, "read_register", as_wished),
         test_bus.test_B9_latched_watchdogs_are_seen_and_rearmed_in_place,
     ),
     Guard(
@@ -290,7 +298,7 @@ SERVOS = [
     ),
     Guard(
         "torque off through noise",
-        around(bus.Bus, "_send", only_when_quiet),
+        around(bus.Bus, "write_all", only_when_quiet),
         partial(
             test_release.test_B19_noise_at_the_release_leaves_no_servo_with_torque_within_2_s, 60.0
         ),

@@ -31,6 +31,11 @@ EXAMPLE = f"{Path(__file__).parents[1] / 'examples/own_controller.py'}:OwnContro
 SHORT = {"trials": 3, "time_limit": 1.5, "seed": 3}
 
 
+@pytest.fixture(autouse=True)
+def _nothing_added(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(CONTROLLERS, "added", {})
+
+
 def rows_of(name: str, **changes: Any) -> list[Any]:
     """The table of short trials."""
     return run(TunnelConfig.model_validate({**SHORT, "controllers": [name], **changes})).rows

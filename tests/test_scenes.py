@@ -178,6 +178,47 @@ def test_a_geom_with_default_bits_meets_body_legs_and_antennae(tmp_path, movable
     assert world.obstacle_overlap() > 0.0
 
 
+@pytest.mark.parametrize(
+    ("plane", "floors"),
+    [
+        ("", {"floor"}),
+        ('<geom name="ground" type="plane" size="5 5 1"/>', {"scene/ground"}),
+        ('<geom name="slope" type="plane" size="5 5 1" pos="0 0 -.2" euler="0 5 0"/>', {"floor"}),
+    ],
+)
+def test_a_level_plane_of_the_file_is_the_floor_or_one_is_added(tmp_path, plane, floors):
+    instance = drawn(MjcfScene(mjcf(tmp_path, SITES + plane)))
+    world = make_world(PhysicsParams(), RobotSpec(), instance)
+    place_at_start(world, instance, GaitParams())
+    world.command(world.drives().copy())
+    world.step(100)
+    named = [{world.model.geom(g).name for g in c.geom} for c in world.data.contact]
+    assert len(named) >= 3, "the robot stands on its legs"
+    assert {min(pair - {name for name in pair if "robot/" in name}) for pair in named} == floors
+    assert all(any("leg" in name for name in pair) for pair in named)
+
+
+def test_obstacles_are_outlined_from_above(tmp_path):
+    lying = '<geom type="capsule" fromto="1 1 .1 2 1 .1" size=".1"/>'
+    tilted = '<geom type="box" size=".1 .2 .3" pos="1 -1 .1" euler="0 0 90"/>'
+    pillar = '<geom type="cylinder" size=".3 .2" pos="5 0 .2"/>'
+    ball = '<body pos="3 3 .1"><freejoint/><geom type="ellipsoid" size=".1 .2 .1"/></body>'
+    scene = MjcfScene(mjcf(tmp_path, SITES + lying + tilted + pillar + ball))
+    instance = drawn(scene)
+    world = make_world(PhysicsParams(), RobotSpec(), instance)
+    place_at_start(world, instance, GaitParams())
+    fixed, movable = world.outlines()
+    boxes = [np.concatenate([p.min(axis=0), p.max(axis=0)]) for p in [*fixed, *movable]]
+    expected = [
+        (0.9, 0.9, 2.1, 1.1),
+        (0.8, -1.1, 1.2, -0.9),
+        (4.7, -0.3, 5.3, 0.3),
+        (2.9, 2.8, 3.1, 3.2),
+    ]
+    assert np.array(boxes) == pytest.approx(np.array(expected), abs=1e-3)
+    assert len(movable) == 1
+
+
 def test_geoms_of_a_file_touch_one_another_as_they_did(tmp_path):
     balls = (
         '<body pos="9 0 .1"><freejoint/><geom name="a" size=".1"/></body>'

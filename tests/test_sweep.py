@@ -261,7 +261,7 @@ def test_command_writes_its_run(capsys, tmp_path, monkeypatch):
     assert main(words) == 0
     out = capsys.readouterr().out
     assert "sweep varied, with sensor noise" in out
-    assert "base to tip 7.75 %, gap 6.73 %" in out
+    assert "published for CITRAS: 7.75 % and 6.73 %" in out
     result = json.loads((tmp_path / "run" / "result.json").read_text())
     assert (result["schema"], result["command"], result["seed"]) == (1, "sweep", 0)
     with (tmp_path / "run" / "trials.csv").open(newline="") as file:

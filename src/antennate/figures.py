@@ -41,6 +41,15 @@ CONTROLLER_COLOURS = {"open": "#8C8C8C", "paper": "#CC79A7", "closed": "#332288"
 CONTROLLER_LINES = {"open": (0, (4, 1.5)), "paper": (0, (4, 1.5, 1, 1.5)), "closed": "solid"}
 """A second mark beside the colour, for print in grey."""
 
+PROFILE_LOOKS = {
+    "stiff": ("#0072B2", "o", "solid"),
+    "descending": ("#D55E00", "s", (0, (5, 1.5))),
+    "compliant": ("#009E73", "^", (0, (4, 1.5, 1, 1.5))),
+    "matched_uniform": ("#CC79A7", "D", (0, (1, 1.2))),
+    "ascending": ("#E69F00", "v", (0, (6, 1, 1, 1, 1, 1))),
+}
+"""Colour, marker and line of each profile: apart in grey, too."""
+
 SERIES = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#D55E00", "#56B4E9", "#332288")
 """For whatever has no colour of its own; after Okabe and Ito."""
 

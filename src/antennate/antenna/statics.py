@@ -14,13 +14,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Literal, get_args
 
 import numpy as np
 
 from antennate.robots.antenna import AntennaSpec
 from antennate.types import Bools, Floats, Ints
 
-PROFILES = ("stiff", "descending", "compliant", "matched_uniform", "ascending")
+Profile = Literal["stiff", "descending", "compliant", "matched_uniform", "ascending"]
+PROFILES: tuple[Profile, ...] = get_args(Profile)
 """Names of profiles, all made of an antenna's own springs.
 
 `descending` is the antenna as it is, by default with 3, 6, 6, 9, 9, 9 coils from base to tip.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+import math
 
 import numpy as np
 
@@ -59,10 +59,7 @@ class CheckedController:
         self.faults = {}
         try:
             command = self._controller.step(frame)
-            for name, shape in self._shapes.items():
-                _require(command, name, shape)
-            for name, shape in self._said.items():
-                _require(self._controller, name, shape)
+            self._require_shapes(command)
             self.maneuver = self._controller.maneuver
             sound = self._all_sound(command)
         except (KeyboardInterrupt, ControllerError):
@@ -73,17 +70,32 @@ class CheckedController:
             self._find_faults(command)
         return command
 
+    def _require_shapes(self, command: JointCommand) -> None:
+        """Arrays of the right shapes.
+
+        Raises:
+            ControllerError: One is something else.
+        """
+        for owner, shapes in ((command, self._shapes), (self._controller, self._said)):
+            for name, shape in shapes.items():
+                value = getattr(owner, name)
+                if not isinstance(value, np.ndarray):
+                    raise ControllerError(
+                        f"expected an array as {name}, found {type(value).__name__}"
+                    )
+                if value.shape != shape:
+                    raise ControllerError(f"expected {name} of shape {shape}, found {value.shape}")
+        for name in ("maneuver", "contact"):
+            kind = getattr(self._controller, name).dtype
+            if kind.kind not in "iu":
+                raise ControllerError(f"expected whole numbers as {name}, found an array of {kind}")
+
     def _all_sound(self, command: JointCommand) -> bool:
-        maneuver = self.maneuver
-        if maneuver.dtype.kind not in "iu":
-            raise ControllerError(
-                f"expected whole numbers as maneuver, found an array of {maneuver.dtype}"
-            )
-        return bool(
-            maneuver.min() >= 0
-            and maneuver.max() <= _LAST
-            and all(np.isfinite(getattr(command, name)).all() for name in self._shapes)
-        )
+        """Whether no row has a fault. A product that is finite has finite factors."""
+        maneuvers = self.maneuver.tolist()
+        angles = [getattr(command, name) for name in self._shapes]
+        squares = sum(float(np.vdot(a, a)) for a in angles)
+        return math.isfinite(squares) and min(maneuvers) >= 0 and max(maneuvers) <= _LAST
 
     def _find_faults(self, command: JointCommand) -> None:
         for name in self._shapes:
@@ -92,16 +104,3 @@ class CheckedController:
                 self.faults[int(row)] = f"expected finite angles in {name}, found {angles[row]}"
         for row in np.flatnonzero((self.maneuver < 0) | (self.maneuver > _LAST)):
             self.faults[int(row)] = f"expected a maneuver of 0 to 4, found {self.maneuver[row]}"
-
-
-def _require(owner: Any, name: str, shape: tuple[int, ...]) -> None:
-    """An array of this shape in an attribute.
-
-    Raises:
-        ControllerError: It is something else.
-    """
-    value = getattr(owner, name)
-    if not isinstance(value, np.ndarray):
-        raise ControllerError(f"expected an array as {name}, found {type(value).__name__}")
-    if value.shape != shape:
-        raise ControllerError(f"expected {name} of shape {shape}, found {value.shape}")

@@ -54,4 +54,4 @@ class RunningMean:
         self._ring[self._next] = np.where(np.isfinite(counts), counts, np.nan)
         self._next = (self._next + 1) % self.length
         self._seen = np.minimum(self._seen + 1, self.length)
-        return self._ring.sum(axis=0) / self._seen[:, None]
+        return np.add.reduce(self._ring, axis=0) / self._seen[:, None]

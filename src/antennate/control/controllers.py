@@ -20,6 +20,7 @@ from antennate.control.gait import Gait
 from antennate.control.maneuver import Hold, decide
 from antennate.control.repetition import RepetitionDetector
 from antennate.params import ControlParams
+from antennate.robots.sides import LEFT, RIGHT
 from antennate.robots.spec import RobotSpec
 from antennate.types import AntennaFrame, Bools, Contact, Floats, Ints, JointCommand, Maneuver
 
@@ -98,12 +99,13 @@ class _ClosedRule:
         self._escape.reset(rows)
 
     def step(self, t: Floats, level: Floats, contact: Ints, flex: Floats) -> Ints:
-        walking = (self._escape.maneuver == int(Maneuver.FORWARD)) & ~np.isnan(level).any(axis=1)
+        unknown = np.isnan(level[:, LEFT] + level[:, RIGHT])
+        walking = (self._escape.maneuver == int(Maneuver.FORWARD)) & ~unknown
         stuck = self._detector.step(flex, walking)
         if self._control.escape.trigger == "contact":
             stuck = decide(self._control.rule, contact, level) == Maneuver.REVERSE
-        pressed: Bools = np.any(flex > self._control.repetition.pressure, axis=1)
-        return self._escape.step(t, level, stuck, pressed)
+        left, right = (flex > self._control.repetition.pressure).T
+        return self._escape.step(t, level, stuck, left | right)
 
 
 class RuleController:

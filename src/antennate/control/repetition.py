@@ -58,8 +58,15 @@ class RepetitionDetector:
         self._ticks += 1
         self._walked = np.where(walking, self._walked + 1, 0)
         ready = self._walked >= self._needed
-        if not ready.any():
+        if not np.count_nonzero(ready):
             return ready
-        repeats = self._change.mean(axis=0).max(axis=1) < self._params.change
-        pressed = self._press.mean(axis=0).max(axis=1) > self._params.pressure
-        return ready & repeats & pressed
+        pressed = ready & (_largest_mean(self._press) > self._params.pressure)
+        if not np.count_nonzero(pressed):  # the other mean costs as much as the rest of a step
+            return pressed
+        return pressed & (_largest_mean(self._change) < self._params.change)
+
+
+def _largest_mean(memory: Floats) -> Floats:
+    """Mean over the window (ticks, B, 2) of the side where it is larger, shape (B,)."""
+    left, right = (np.add.reduce(memory, axis=0) / len(memory)).T
+    return np.maximum(left, right)

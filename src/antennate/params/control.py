@@ -1,4 +1,4 @@
-"""Everything in front of the wall: from counts to joint targets."""
+"""Parameters of the controllers: from counts to joint targets."""
 
 from __future__ import annotations
 
@@ -300,7 +300,7 @@ class EscapeParams(Params):
 
 
 class ControlParams(Params):
-    """Everything in front of the wall."""
+    """Conditioning, contact rule, maneuvers and gait of the controllers."""
 
     rate: float = number(
         100.0, "Hz", "paper: about 100 Hz over serial", "control ticks per second", gt=0, le=1000

@@ -32,7 +32,7 @@ CONVERTER_AT_1_2_V = (
 
 
 class SensorParams(Params):
-    """Flex film, voltage divider and the ESP32's converter."""
+    """Flex sensor, voltage divider and the ESP32's converter."""
 
     active_length: float = number(
         0.0953, "m", "datasheet: Spectra Symbol FS-L-0095-103, active length", "sensed length", gt=0

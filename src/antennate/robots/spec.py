@@ -26,6 +26,18 @@ from antennate.robots.servos import EXTENDED_MODE, POSITION_MODE, TICKS_A_TURN, 
 from antennate.robots.sides import SIDES
 
 GroupName = Literal["yaw", "legs", "antennae", "pitch"]
+HARDWARE_ALONE = (
+    *(
+        f"robot.{group}.{name}"
+        for group in ("yaw", "legs", "antennae", "pitch")
+        for name in ("ids", "directions", "zeros", "limit", "fastest")
+    ),
+    "robot.antennae.servo",
+    "robot.antenna.sensor.rate",
+    "robot.baud",
+    "robot.release",
+)
+"""Parameters that only the robot's hardware, or its twin, reads; the simulation alone does not."""
 ANTENNA_PREFIXES = tuple(f"antenna_{side}_" for side in SIDES)
 
 

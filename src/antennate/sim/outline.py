@@ -9,7 +9,11 @@ import numpy as np
 
 from antennate.types import Floats
 
-_GEOM = mujoco.mjtGeom
+_SPHERE = int(mujoco.mjtGeom.mjGEOM_SPHERE)
+_CAPSULE = int(mujoco.mjtGeom.mjGEOM_CAPSULE)
+_ELLIPSOID = int(mujoco.mjtGeom.mjGEOM_ELLIPSOID)
+_CYLINDER = int(mujoco.mjtGeom.mjGEOM_CYLINDER)
+_MESH = int(mujoco.mjtGeom.mjGEOM_MESH)
 _TURN = np.linspace(0.0, 2.0 * math.pi, 24, endpoint=False)
 _RING = np.stack([np.cos(_TURN), np.sin(_TURN)], axis=1)
 _BALL = np.concatenate(
@@ -19,7 +23,7 @@ _BALL = np.concatenate(
     ]
 )
 _CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
-_ROUND = (_GEOM.mjGEOM_SPHERE, _GEOM.mjGEOM_CAPSULE, _GEOM.mjGEOM_CYLINDER)
+_ROUND = (_SPHERE, _CAPSULE, _CYLINDER)
 _UPRIGHT = 0.9999
 
 
@@ -39,16 +43,16 @@ def _points(model: mujoco.MjModel, geom: int) -> Floats:
     """Points in the geom's own frame whose hull is the geom [m], shape (n, 3)."""
     kind, size = model.geom_type[geom], model.geom_size[geom]
     radius, half = size[0], np.array([0.0, 0.0, size[1]])
-    if kind == _GEOM.mjGEOM_SPHERE:
+    if kind == _SPHERE:
         return radius * _BALL
-    if kind == _GEOM.mjGEOM_ELLIPSOID:
+    if kind == _ELLIPSOID:
         return size * _BALL
-    if kind == _GEOM.mjGEOM_CAPSULE:
+    if kind == _CAPSULE:
         return np.concatenate([radius * _BALL + half, radius * _BALL - half])
-    if kind == _GEOM.mjGEOM_CYLINDER:
+    if kind == _CYLINDER:
         disc = np.column_stack([radius * _RING, np.zeros(len(_RING))])
         return np.concatenate([disc + half, disc - half])
-    if kind == _GEOM.mjGEOM_MESH:
+    if kind == _MESH:
         mesh = model.geom_dataid[geom]
         first = model.mesh_vertadr[mesh]
         return model.mesh_vert[first : first + model.mesh_vertnum[mesh]].astype(float)

@@ -1,7 +1,7 @@
-"""The simulated body: a batch of worlds behind the wall, stepped in lockstep.
+"""The simulated robot: a batch of worlds stepped in lockstep.
 
 A row holds one world or none. An empty row, and one whose simulation failed, reads NaN, which the
-control takes for UNKNOWN. Rows never influence one another.
+controller takes for UNKNOWN. Rows never influence one another.
 """
 
 from __future__ import annotations
@@ -53,18 +53,21 @@ class Disturbance:
 
 
 class _Row:
-    """One world of the batch with its chance and its tick count."""
+    """One world of the batch with its disturbance and its tick count."""
+
+    __slots__ = ("chance", "commanded", "failure", "hinges", "tick", "world")
 
     def __init__(self, world: World, chance: Disturbance) -> None:
         self.world = world
         self.chance = chance
+        self.hinges: Floats = np.zeros((2, world.sensed_hinges))
         self.tick = 0
         self.commanded = False
         self.failure: SimulationError | None = None
 
 
 class SimRobot:
-    """B worlds behind the wall; also their clock.
+    """B simulated robots; also their clock.
 
     Args:
         batch: Number of rows B.
@@ -77,9 +80,10 @@ class SimRobot:
     """
 
     def __init__(self, batch: int, robot: RobotSpec, period: float, timestep: float) -> None:
-        self._rows: list[_Row | None] = [None] * batch
-        self._sensors = SensorChain(robot.antenna.sensor, (batch, 2), period)
+        self._rows: dict[int, _Row] = {}
+        self._batch = batch
         self._yaws = robot.yaw_count
+        self._sensors = SensorChain(robot.antenna.sensor, (batch, 2), period)
         self._period = period
         self._substeps = round(period / timestep)
         if abs(self._substeps * timestep - period) > 1e-9:
@@ -94,7 +98,7 @@ class SimRobot:
 
     @property
     def clock(self) -> SimRobot:
-        """The body itself keeps the time."""
+        """The robot itself keeps the time."""
         return self
 
     def load(self, row: int, world: World, chance: Disturbance) -> None:
@@ -105,19 +109,18 @@ class SimRobot:
 
     def unload(self, row: int) -> None:
         """Empty a row."""
-        self._rows[row] = None
+        self._rows.pop(row, None)
         self._missing[row] = True
 
     def world(self, row: int) -> World:
         """The world in a row."""
-        held = self._rows[row]
-        if held is None:
+        if row not in self._rows:
             raise IndexError(f"row {row} holds no world")
-        return held.world
+        return self._rows[row].world
 
     def failure(self, row: int) -> SimulationError | None:
         """What ended the row's simulation, if anything did."""
-        held = self._rows[row]
+        held = self._rows.get(row)
         return held.failure if held else None
 
     def now(self) -> float:
@@ -126,43 +129,49 @@ class SimRobot:
 
     def read(self) -> AntennaFrame:
         """Sample both sensors of every row."""
-        t = np.full(len(self._rows), np.nan)
-        for i, row in enumerate(self._rows):
-            if row is not None:
-                t[i] = row.world.t
-                self._flex[i] = row.world.flex()
-                self._noise[i] = row.chance.noise(row.tick)
+        t = np.full(self._batch, np.nan)
+        for i, row in self._rows.items():
+            t[i] = row.world.data.time
+            row.world.read_hinges(row.hinges)
+            row.hinges.sum(axis=1, out=self._flex[i])
+            self._noise[i] = row.chance.noise(row.tick)
         counts = self._sensors.step(self._flex, self._noise)
         counts[self._missing] = np.nan
         return AntennaFrame(t=t, counts=counts)
 
     def write(self, command: JointCommand) -> None:
         """Command every row's joints."""
-        batch = len(self._rows)
         drive = np.concatenate(
-            [command.yaw, command.leg.reshape(batch, -1), command.antenna], axis=1
+            [command.yaw, command.leg.reshape(self._batch, -1), command.antenna], axis=1
         )
-        for i, row in enumerate(self._rows):
-            if row is not None and row.failure is None:
+        finite = bool(np.isfinite(drive).all())
+        for i, row in self._rows.items():
+            if row.failure is None:
                 drive[i, : self._yaws] += row.chance.joint_bias
                 row.commanded = True
-                self._guard(i, row, lambda row=row, i=i: row.world.command(drive[i]))
+                if finite:
+                    row.world.command_finite(drive[i])
+                    continue
+                try:
+                    row.world.command(drive[i])
+                except SimulationError as error:
+                    self._fail(i, row, error)
 
     def sleep_until(self, t: float) -> None:
         """Advance the physics of every row that has been commanded to time t [s]."""
         while self._ticks * self._period < t - 1e-9:
             self._ticks += 1
-            for i, row in enumerate(self._rows):
-                if row is not None and row.commanded and row.failure is None:
+            for i, row in self._rows.items():
+                if row.commanded and row.failure is None:
                     friction = row.chance.leg_friction(row.tick)
                     if friction is not None:
                         row.world.set_leg_friction(friction)
                     row.tick += 1
-                    self._guard(i, row, lambda row=row: row.world.step(self._substeps))
+                    try:
+                        row.world.step(self._substeps)
+                    except SimulationError as error:
+                        self._fail(i, row, error)
 
-    def _guard(self, i: int, row: _Row, action) -> None:
-        try:
-            action()
-        except SimulationError as error:
-            row.failure = error
-            self._missing[i] = True
+    def _fail(self, i: int, row: _Row, error: SimulationError) -> None:
+        row.failure = error
+        self._missing[i] = True

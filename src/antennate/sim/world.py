@@ -33,7 +33,7 @@ _ANGLE_LIMIT = 6.3
 _HEIGHT_LIMIT = 0.3
 """A head above or below this left the world [m]."""
 
-_PLANE = mujoco.mjtGeom.mjGEOM_PLANE
+_PLANE = int(mujoco.mjtGeom.mjGEOM_PLANE)
 
 
 def new_spec(physics: PhysicsParams) -> mujoco.MjSpec:
@@ -84,7 +84,7 @@ def _meet_robot(spec: mujoco.MjSpec) -> None:
     """Let geoms with the engine's default collision bits touch the robot; planes are floors."""
     for geom in spec.geoms:
         if geom.contype == geom.conaffinity == 1:
-            is_floor = geom.type == _PLANE
+            is_floor = int(geom.type) == _PLANE
             geom.contype = layers.FLOOR if is_floor else layers.OBSTACLE
             geom.conaffinity = 0 if is_floor else layers.OBSTACLE | layers.FLOOR
 
@@ -121,7 +121,10 @@ class World:
         self._steps = 0
         data = self.data
         self._qpos, self._qvel, self._ctrl = data.qpos, data.qvel, data.ctrl
+        self._head: Floats = data.qpos[self._root : self._root + 3]
+        self._bent: Floats = np.zeros(len(self._bounded))
         self._warnings = data.warning.number
+        self._no_warning = self._warnings.tobytes()
 
     def _addresses(self, joints: list[str]) -> Ints:
         return np.array([self.model.joint(n).qposadr[0] for n in joints])
@@ -152,6 +155,10 @@ class World:
                 self._steps,
                 f"target of actuator {self.model.actuator(self._drive[bad]).name} is {drive[bad]}",
             )
+        self.command_finite(drive)
+
+    def command_finite(self, drive: Floats) -> None:
+        """Set all joint targets as `command` does, without a check."""
         self._ctrl[self._drive] = drive
 
     def drives(self) -> Floats:
@@ -173,8 +180,9 @@ class World:
         self._check(before)
 
     def _check(self, before: float) -> None:
-        x, y, height = self.head.tolist()
-        bent, speed = self._qpos[self._bounded], self._qvel
+        x, y, height = self._head.tolist()
+        bent, speed = self._bent, self._qvel
+        self._qpos.take(self._bounded, out=bent, mode="clip")
         sound = (
             abs(x) < _DISTANCE_LIMIT
             and abs(y) < _DISTANCE_LIMIT
@@ -182,7 +190,7 @@ class World:
             and self.data.time > before
             and bent.dot(bent) < _ANGLE_LIMIT**2  # no entry is larger than the norm
             and speed.dot(speed) < _SPEED_LIMIT**2
-            and not self._warnings.any()
+            and self._warnings.tobytes() == self._no_warning
         )
         if not sound:
             self._explain(before)
@@ -208,6 +216,15 @@ class World:
         if not 0.0 < height < _HEIGHT_LIMIT:
             raise SimulationError(self._steps, f"the head is at a height of {height:.3g} m")
 
+    def read_hinges(self, angles: Floats) -> None:
+        """Write the angles of all hinges under the flex sensors to `angles` [rad], shape (2, n)."""
+        self._qpos.take(self._flex, out=angles, mode="clip")
+
+    @property
+    def sensed_hinges(self) -> int:
+        """Number of hinges under one flex sensor."""
+        return self._flex.shape[1]
+
     def flex(self) -> Floats:
         """Summed hinge angles under each film [rad], shape (2,); positive towards the tail."""
         return self._qpos[self._flex].sum(axis=1)
@@ -215,7 +232,7 @@ class World:
     @property
     def head(self) -> Floats:
         """Position of the head link [m], shape (3,), a view of the state."""
-        return self._qpos[self._root : self._root + 3]
+        return self._head
 
     @property
     def heading(self) -> float:

@@ -94,7 +94,7 @@ def _figures(outcome: calibrate.CalibrateOutcome) -> Mapping[str, Any]:
 
     s = outcome.recording.samples
     level = calibrate.levels(outcome)
-    return {"calibrate": draw(outcome.result(), s.counts, s.bend, s.speed, level)}
+    return {"calibrate": draw(outcome.result(), s.counts, s.level, s.speed, level)}
 
 
 EXPERIMENT = Experiment(

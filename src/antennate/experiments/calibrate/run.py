@@ -10,7 +10,7 @@ import hashlib
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -59,9 +59,19 @@ class RigParams(Params):
     )
 
 
+_OF_THE_RIG = ("rig", "antenna", "variation", "physics")
+
+
 class CalibrateConfig(Params):
     """Everything that decides a calibration."""
 
+    unread: ClassVar[tuple[str, ...]] = (
+        "antenna.base_angle",
+        "antenna.base_spacing",
+        "variation.base_angle",
+        "variation.friction",
+        "variation.overlap",
+    )
     recording: str | None = number(
         None, "1", "assumed: no recording", "CSV file to calibrate from; the rig if not given"
     )
@@ -102,6 +112,19 @@ class CalibrateConfig(Params):
     antenna: AntennaSpec = AntennaSpec()
     variation: BenchVariationParams = BenchVariationParams()
     physics: BenchPhysicsParams = BenchPhysicsParams()
+
+    @model_validator(mode="after")
+    def _rig_or_recording(self) -> CalibrateConfig:
+        """A recording needs no rig, and the rig no columns."""
+        names = ("columns",) if self.recording is None else _OF_THE_RIG
+        for name in names:
+            if getattr(self, name) != type(self).model_fields[name].default:
+                without = "without" if self.recording is None else "with"
+                raise ValueError(
+                    f"{name}: expected the default, as {without} a recording it is not "
+                    "read, found another"
+                )
+        return self
 
     @model_validator(mode="after")
     def _on_the_antenna(self) -> CalibrateConfig:
@@ -225,7 +248,7 @@ def record(
 
     run_tasks(_run_task, tasks, workers, take)
     parts = [found[trial] for trial in sorted(found)]
-    fields = ("counts", "bend", "trial", "speed", "row")
+    fields = ("counts", "level", "trial", "speed", "row")
     joined = [np.concatenate([getattr(p.samples, f) for p in parts]) for f in fields]
     joined[-1] = np.arange(2, len(joined[0]) + 2)
     whole = Recording(np.concatenate([p.t for p in parts]), Samples(*joined), "")
@@ -244,7 +267,7 @@ def averaged(recording: Recording, averaging_time: float) -> Recording:
         first = np.searchsorted(t, t - averaging_time + 1e-9)
         ends = np.arange(1, len(rows) + 1)
         counts[rows] = (total[ends] - total[first]) / (ends - first)
-    samples = Samples(counts, s.bend, s.trial, s.speed, s.row)
+    samples = Samples(counts, s.level, s.trial, s.speed, s.row)
     return Recording(recording.t, samples, recording.sha256)
 
 

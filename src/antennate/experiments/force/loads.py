@@ -4,25 +4,25 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Literal
+from typing import ClassVar
 
 import numpy as np
 from pydantic import model_validator
 
 from antennate.antenna import sensor as film
-from antennate.antenna.statics import PROFILES, Chain, equilibrium, with_profile
+from antennate.antenna.statics import PROFILES, Chain, Profile, equilibrium, with_profile
 from antennate.experiments import reading
 from antennate.experiments.force.post_traverse import Traverse
 from antennate.params import BenchPhysicsParams, ConditioningParams, Params, number
+from antennate.params.base import require_different, require_whole_steps
 from antennate.robots.antenna import AntennaSpec
 from antennate.types import Bools, Floats, Ints
-
-Profile = Literal["stiff", "descending", "compliant", "matched_uniform", "ascending"]
 
 
 class ForceConfig(Params):
     """Everything that decides the outcome of `antennate force`."""
 
+    unread: ClassVar[tuple[str, ...]] = ("antenna.base_angle", "antenna.base_spacing")
     seed: int = number(0, "1", "assumed: any", "seed of all chance", ge=0)
     profiles: tuple[Profile, ...] = number(
         tuple(PROFILES),
@@ -81,18 +81,12 @@ class ForceConfig(Params):
 
     @model_validator(mode="after")
     def _agree(self) -> ForceConfig:
-        steps = 1.0 / (self.antenna.sensor.rate * self.physics.timestep)
-        if steps < 0.5 or abs(steps - round(steps)) > 1e-6:
-            raise ValueError(
-                "antenna.sensor.rate must be a whole fraction of the physics rate "
-                f"{1 / self.physics.timestep:g} Hz, got {self.antenna.sensor.rate:g} Hz"
-            )
+        require_whole_steps("antenna.sensor.rate", self.antenna.sensor.rate, self.physics.timestep)
         if self.nearest > self.from_place:
             raise ValueError(
                 f"nearest must not exceed from_place, {self.from_place:g}, got {self.nearest:g}"
             )
-        if len(set(self.profiles)) < len(self.profiles):
-            raise ValueError(f"profiles must differ, got {', '.join(self.profiles)}")
+        require_different("profiles", self.profiles)
         if min(self.speeds) <= 0:
             raise ValueError(f"speeds must be above 0, got {min(self.speeds):g}")
         return self

@@ -38,8 +38,9 @@ SCALARS = ("flex", "reading", "level")
 class TraverseRow:
     """One traverse, a row of trials.csv."""
 
-    profile: str
+    seed: int
     trial: int
+    profile: str
     status: str
     overlap: float
     speed_m_s: float
@@ -182,8 +183,9 @@ def _traverse_all(
         found.append(one)
         rows.append(
             TraverseRow(
-                profile,
+                config.seed,
                 k,
+                profile,
                 "invalid" if one.reason else "valid",
                 overlap,
                 speed,

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from pydantic import model_validator
@@ -18,7 +18,8 @@ from antennate.control.gait import Gait
 from antennate.control.loop import run_loop
 from antennate.experiments.gait.pace import Pace, Walk, measure, rolling_speed
 from antennate.params import GaitParams, Params, PhysicsParams, VariationParams, number
-from antennate.robots.spec import RobotSpec
+from antennate.params.base import require_whole_steps
+from antennate.robots.spec import HARDWARE_ALONE, RobotSpec
 from antennate.sim.scenes.flat import FlatScene
 from antennate.sim.sim_robot import Disturbance, SimRobot
 from antennate.sim.trial import make_world, place_at_start
@@ -35,6 +36,7 @@ WAVE_OFF = "wave_off"
 class GaitStudyConfig(Params):
     """Everything that decides the outcome of `antennate gait`."""
 
+    unread: ClassVar[tuple[str, ...]] = HARDWARE_ALONE
     cycles: int = number(
         4,
         "1",
@@ -68,12 +70,7 @@ class GaitStudyConfig(Params):
 
     @model_validator(mode="after")
     def _whole_steps(self) -> GaitStudyConfig:
-        steps = 1.0 / (self.rate * self.physics.timestep)
-        if steps < 0.5 or abs(steps - round(steps)) > 1e-6:
-            raise ValueError(
-                f"rate must be a whole fraction of the physics rate "
-                f"{1 / self.physics.timestep:g} Hz, got {self.rate:g} Hz"
-            )
+        require_whole_steps("rate", self.rate, self.physics.timestep)
         return self
 
 

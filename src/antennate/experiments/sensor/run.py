@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -26,6 +26,7 @@ E24 = (
 class SensorConfig(Params):
     """A film under a given range of bends."""
 
+    unread: ClassVar[tuple[str, ...]] = ("sensor.active_length",)
     largest_flex: float = number(
         math.pi / 2, "rad", "assumed: antenna bent to a right angle", "largest bend", gt=0.01, le=6
     )

@@ -35,10 +35,11 @@ class SweepRow:
     Columns that do not apply are empty.
     """
 
+    seed: int
+    trial: int
     kind: Literal["map", "estimate"]
     profile: str
     condition: str
-    trial: int
     side: str
     status: str
     distance_m: float
@@ -113,6 +114,7 @@ class SweepOutcome:
 def _row(config: SweepConfig, trial: Trial) -> SweepRow:
     felt = trial.noisy
     return SweepRow(
+        seed=config.seed,
         kind="estimate",
         profile=config.profile,
         condition=trial.condition,
@@ -172,6 +174,7 @@ def map_cell(config: SweepConfig, cell: _Cell) -> SweepRow:
         found = sweeping.shares(config.shape, trace, 1.0 / sweep.frequency)
         found["peak_flex_rad"] = float(abs(trace.flex).max())
     return SweepRow(
+        seed=config.seed,
         kind="map",
         profile=cell.profile,
         condition=cell.motion,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -15,13 +15,12 @@ from antennate.antenna.statics import Chain
 from antennate.control.conditioning import bending_level
 from antennate.experiments import reading
 from antennate.experiments.touch import sensing
+from antennate.experiments.touch.config import TouchConfig
 from antennate.experiments.touch.measures import Pool, roc
 from antennate.experiments.touch.sensing import Judgement, Verdict
+from antennate.experiments.touch.traverse import Traverse
 from antennate.params import ConditioningParams
 from antennate.types import Floats
-
-if TYPE_CHECKING:
-    from antennate.experiments.touch.run import TouchConfig, Traverse
 
 SCHEMA = 1
 _FLEX = np.linspace(0.0, 2.0 * np.pi, 20001)
@@ -33,10 +32,11 @@ _STRONGEST = 1.0
 class TouchRow:
     """One traverse in the table; empty cells where the physics is invalid."""
 
+    seed: int
+    trial: int
     wall: str
     speed_m_s: float
     profile: str
-    trial: int
     status: str
     overlap_m: float
     contact_share: float | None = None
@@ -235,18 +235,19 @@ def _told(
     return {"contact_force_n": force, "merge_time_s": merge, **{key: found[key] for key in keys}}
 
 
-def rows(traverses: Sequence[Traverse], verdicts: Sequence[Verdict]) -> list[TouchRow]:
+def rows(seed: int, traverses: Sequence[Traverse], verdicts: Sequence[Verdict]) -> list[TouchRow]:
     """One row for every traverse, in their order."""
     waiting = iter(verdicts)
-    return [_row(t, None if t.course.reason else next(waiting)) for t in traverses]
+    return [_row(seed, t, None if t.course.reason else next(waiting)) for t in traverses]
 
 
-def _row(one: Traverse, verdict: Verdict | None) -> TouchRow:
+def _row(seed: int, one: Traverse, verdict: Verdict | None) -> TouchRow:
     empty = TouchRow(
+        seed=seed,
+        trial=one.trial,
         wall=one.wall,
         speed_m_s=one.speed,
         profile=one.profile,
-        trial=one.trial,
         status="invalid" if verdict is None else "valid",
         overlap_m=one.overlap,
         reason=one.course.reason,

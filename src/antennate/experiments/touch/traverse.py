@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from antennate.antenna import statics as mechanics
+from antennate.antenna.statics import Profile
 from antennate.errors import SimulationError
 from antennate.params import BenchPhysicsParams, TouchWallsParams
 from antennate.robots.antenna import AntennaSpec
@@ -20,7 +21,7 @@ CLEARANCE = 0.005
 """Free way between the straight antenna and what it must not touch yet [m]."""
 RUN_UP = 0.5
 """Time in which the carriage starts off, before the first tick [s]."""
-_MOVES = 5
+MOVES = 5
 """Updates of the carriage's target in one tick."""
 
 
@@ -87,6 +88,26 @@ class Course:
     reason: str = ""
 
 
+@dataclass(frozen=True, slots=True)
+class Traverse:
+    """One traverse as it came out of the engine.
+
+    Attributes:
+        wall, speed, profile, trial: Which one; speed in [m/s].
+        course: What the engine says.
+        overlap: Drawn overlap [m].
+        outline: Surface of the wall along the traverse, lines of shape (n, 2) [m].
+    """
+
+    wall: WallKind
+    speed: float
+    profile: Profile
+    trial: int
+    course: Course
+    overlap: float
+    outline: list[Floats]
+
+
 def reach(antenna: AntennaSpec) -> float:
     """Distance of the straight antenna's tip from the line of traverse [m]."""
     return antenna.length * math.sin(antenna.base_angle)
@@ -138,7 +159,7 @@ def _start_off(bench: Bench, plan: Plan) -> None:
     """Reach x = 0 at full speed, from rest, at a steady acceleration."""
     base, speed = plan.antenna.base_angle, plan.speed
     bench.place(-speed * RUN_UP / 2, 0.0, base)
-    moves = round(RUN_UP * plan.antenna.sensor.rate) * _MOVES
+    moves = round(RUN_UP * plan.antenna.sensor.rate) * MOVES
     for i in range(1, moves + 1):
         share = i / moves
         bench.command(speed * RUN_UP / 2 * (share**2 - 1.0), 0.0, share * speed, 0.0, base)
@@ -148,21 +169,15 @@ def _start_off(bench: Bench, plan: Plan) -> None:
 def _advance(bench: Bench, plan: Plan, since: float) -> float:
     """One tick on, `since` seconds after the first; the mean force in it [N]."""
     force = np.zeros(2)
-    pace = 1.0 / (plan.antenna.sensor.rate * _MOVES)
-    for i in range(1, _MOVES + 1):
+    pace = 1.0 / (plan.antenna.sensor.rate * MOVES)
+    for i in range(1, MOVES + 1):
         bench.command(
             plan.speed * (since + i * pace), 0.0, plan.speed, 0.0, plan.antenna.base_angle
         )
-        force += bench.press(_steps(plan)) / _MOVES
+        force += bench.press(_steps(plan)) / MOVES
     return float(np.linalg.norm(force))
 
 
 def _steps(plan: Plan) -> int:
     """Physics steps between two targets of the carriage."""
-    return round(1.0 / (plan.antenna.sensor.rate * _MOVES * plan.physics.timestep))
-
-
-def steps_fit(rate: float, timestep: float) -> bool:
-    """Whether a tick has a whole number of physics steps that its moves share."""
-    steps = 1.0 / (rate * _MOVES * timestep)
-    return steps > 0.5 and abs(steps - round(steps)) < 1e-6
+    return round(1.0 / (plan.antenna.sensor.rate * MOVES * plan.physics.timestep))

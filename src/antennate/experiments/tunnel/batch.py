@@ -17,7 +17,7 @@ from antennate.sim.sim_robot import SimRobot
 from antennate.sim.trial import draw_trial
 from antennate.types import AntennaFrame, JointCommand
 
-BATCH = 6
+BATCH = 12
 """Trials of one process stepped in lockstep."""
 Emit = Callable[[tuple[TrialResult, TrialPath]], None]
 

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 from pydantic import field_validator, model_validator
 
 from antennate.control.registry import BUILT_IN, CONTROLLERS
 from antennate.params import ControlParams, number
+from antennate.params.base import require_different, require_whole_steps
+from antennate.robots.spec import HARDWARE_ALONE
 from antennate.sim.trial import TrialConfig
 
 
 class TunnelConfig(TrialConfig):
     """Everything that decides the outcome of `antennate tunnel`."""
 
+    unread: ClassVar[tuple[str, ...]] = HARDWARE_ALONE
     trials: int = number(
         30,
         "1",
@@ -45,12 +50,6 @@ class TunnelConfig(TrialConfig):
 
     @model_validator(mode="after")
     def _agree(self) -> TunnelConfig:
-        if len(set(self.controllers)) < len(self.controllers):
-            raise ValueError(f"controllers must differ, got {', '.join(self.controllers)}")
-        steps = self.control.period / self.physics.timestep
-        if abs(steps - round(steps)) > 1e-6:
-            raise ValueError(
-                "control.rate must be a whole fraction of the physics rate "
-                f"{1 / self.physics.timestep:g} Hz, got {self.control.rate:g} Hz"
-            )
+        require_different("controllers", self.controllers)
+        require_whole_steps("control.rate", self.control.rate, self.physics.timestep)
         return self

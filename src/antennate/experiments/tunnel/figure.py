@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -15,6 +15,7 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator, PercentFormatter
 
 from antennate import figures as style
+from antennate.experiments.tunnel.monitor import TrialPath, TrialResult
 from antennate.types import Floats, Maneuver
 
 MARGIN = 0.3
@@ -28,74 +29,11 @@ _OUTCOMES = {
 }
 
 
-class Row(Protocol):
-    """What is needed of one row of the table."""
-
-    @property
-    def controller(self) -> str:
-        """The controller."""
-        ...
-
-    @property
-    def trial(self) -> int:
-        """The trial."""
-        ...
-
-    @property
-    def outcome(self) -> str:
-        """Success, timeout, left or invalid."""
-        ...
-
-    @property
-    def time_s(self) -> float:
-        """Time to exit, or the limit [s]."""
-        ...
-
-
-class Path(Protocol):
-    """What is needed of one trial's course; lengths in metres."""
-
-    @property
-    def head(self) -> Floats:
-        """Head positions, shape (n, 2)."""
-        ...
-
-    @property
-    def maneuver(self) -> Floats:
-        """`Maneuver` at these positions, shape (n,)."""
-        ...
-
-    @property
-    def fixed(self) -> Sequence[Floats]:
-        """Obstacles that stand still, polygons."""
-        ...
-
-    @property
-    def before(self) -> Sequence[Floats]:
-        """Obstacles that can move, at the start."""
-        ...
-
-    @property
-    def after(self) -> Sequence[Floats]:
-        """The same at the end."""
-        ...
-
-    @property
-    def exit(self) -> Floats:
-        """Ends of the exit line, shape (2, 2)."""
-        ...
-
-    @property
-    def links(self) -> Floats:
-        """The robot at the end, head first, shape (6, 2)."""
-        ...
-
-
 @style.styled
 def trajectories(
-    paths: Mapping[tuple[str, int], Path],
+    paths: Mapping[tuple[str, int], TrialPath],
     controllers: Sequence[str],
-    rows: Sequence[Row],
+    rows: Sequence[TrialResult],
     trials: Sequence[int],
 ) -> Figure:
     """Trials from above: a column for each trial, a row for each controller.
@@ -143,7 +81,7 @@ def trajectories(
     return figure
 
 
-def _box(paths: Sequence[Path]) -> tuple[Floats, Floats] | None:
+def _box(paths: Sequence[TrialPath]) -> tuple[Floats, Floats] | None:
     """Lower and upper corner of what is shown of one scene [m]; None without a course."""
     if not paths:
         return None
@@ -162,7 +100,7 @@ def _frame(panel: Axes, box: tuple[Floats, Floats] | None) -> None:
         panel.set_ylim(box[0][1], box[1][1])
 
 
-def _draw_trial(panel: Axes, path: Path) -> None:
+def _draw_trial(panel: Axes, path: TrialPath) -> None:
     for polygons, face, edge in (
         (path.after, style.FAINT, "none"),
         (path.before, "none", style.MUTED),
@@ -180,7 +118,7 @@ def _draw_trial(panel: Axes, path: Path) -> None:
     panel.plot(*path.links[0], color=style.INK, marker="o", markersize=5.5, zorder=5)
 
 
-def _stretches(path: Path) -> Iterator[tuple[Maneuver, Floats]]:
+def _stretches(path: TrialPath) -> Iterator[tuple[Maneuver, Floats]]:
     """The course cut where the maneuver changes; a sample carries the maneuver that led to it."""
     cuts = [0, *(np.flatnonzero(np.diff(path.maneuver[1:])) + 1), len(path.head) - 1]
     for first, last in pairwise(cuts):
@@ -208,7 +146,7 @@ def _handles() -> list[Any]:
 
 @style.styled
 def summary(
-    controllers: Mapping[str, Mapping[str, Any]], rows: Sequence[Row], time_limit: float
+    controllers: Mapping[str, Mapping[str, Any]], rows: Sequence[TrialResult], time_limit: float
 ) -> Figure:
     """Success, time inside and restricted mean time of every controller.
 

@@ -112,7 +112,7 @@ class TrialMonitor:
     _is_stuck: bool = False
     _forces: list[float] = field(default_factory=list)
     _samples: list[tuple[float, float, float, int]] = field(default_factory=list)
-    _counts: Floats = field(default_factory=lambda: np.zeros(len(Maneuver)))
+    _counts: list[int] = field(default_factory=lambda: [0] * len(Maneuver))
 
     def watch(self, world: World, maneuver: int, failed: bool) -> Outcome | None:
         """Look at the world after a tick; the outcome once there is one."""
@@ -120,7 +120,7 @@ class TrialMonitor:
             return "invalid"
         self._counts[maneuver] += 1
         self._ticks += 1
-        t = world.t
+        t = world.data.time
         if self._ticks % _EVERY and t < self.time_limit:
             return None
         head = world.head[:2].copy()
@@ -145,7 +145,7 @@ class TrialMonitor:
 
     def result(self, world: World, outcome: Outcome, reason: str) -> TrialResult:
         """The row of a trial that ended so."""
-        share = self._counts / max(1.0, self._counts.sum())
+        share = np.array(self._counts) / max(1, sum(self._counts))
         forces = np.array(self._forces) if self._forces else np.zeros(1)
         progress = self.scene.progress(world.head[:2].copy())
         if not np.isfinite(progress):

@@ -12,6 +12,7 @@ from antennate.experiments.tunnel import measures
 from antennate.experiments.tunnel.batch import run_trials
 from antennate.experiments.tunnel.config import TunnelConfig
 from antennate.experiments.tunnel.monitor import TrialPath, TrialResult
+from antennate.sim.scenes.registry import TUNNEL
 from antennate.sim.trial import check_start
 from antennate.studies.pool import run_tasks
 
@@ -41,7 +42,7 @@ class TunnelOutcome:
             "command": "tunnel",
             "seed": config.seed,
             "time_limit_s": config.time_limit,
-            "length_m": config.tunnel.length,
+            "length_m": config.tunnel.length if config.scene == TUNNEL else None,
             "interrupted": self.interrupted,
             "controllers": {n: measures.summary(rows) for n, rows in by_name.items()},
             "paired": measures.paired(by_name),

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from antennate import figures as style
-from antennate.types import Floats
+from antennate.experiments.wall.outcome import Traverse
 
 OUTCOME_COLOURS = {
     "successes": "#009E73",
@@ -18,25 +18,6 @@ OUTCOME_COLOURS = {
     "slips": "#56B4E9",
     "invalid": "#000000",
 }
-
-
-class Traverse(Protocol):
-    """What is needed of one passage."""
-
-    @property
-    def base(self) -> Floats:
-        """Travel of the base [m], shape (n,)."""
-        ...
-
-    @property
-    def tip(self) -> Floats:
-        """Advance of the tip [m], shape (n,)."""
-        ...
-
-    @property
-    def shapes(self) -> Floats:
-        """Hinges and tip in the plane [m], shape (k, 7, 2), x from the crests."""
-        ...
 
 
 @style.styled

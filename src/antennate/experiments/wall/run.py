@@ -12,23 +12,23 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, ClassVar
 
 import numpy as np
 from pydantic import model_validator
 
-from antennate.antenna.statics import PROFILES, with_profile
+from antennate.antenna.statics import PROFILES, Profile, with_profile
 from antennate.errors import SimulationError
 from antennate.experiments.wall import measures
 from antennate.experiments.wall.outcome import SAMPLE_PERIOD, Traverse, WallTrial, classify
 from antennate.params import BenchPhysicsParams, BenchVariationParams, Params, WallParams
-from antennate.params.base import number
+from antennate.params.base import number, require_different
 from antennate.robots.antenna import AntennaSpec
+from antennate.robots.sensor import SensorParams
 from antennate.sim.bench import Ball, Bench, compile_bench
 from antennate.studies.pool import run_tasks
 from antennate.types import Floats
 
-Profile = Literal["stiff", "descending", "compliant", "matched_uniform", "ascending"]
 REFERENCE: Profile = "descending"
 """The profile that all others are compared with."""
 _COMMAND_PERIOD = 0.002
@@ -45,6 +45,11 @@ _GRAVITY = 9.81
 class WallConfig(Params):
     """Everything that decides the outcome of `antennate wall`."""
 
+    unread: ClassVar[tuple[str, ...]] = (
+        "antenna.base_angle",
+        "antenna.base_spacing",
+        *(f"antenna.sensor.{n}" for n in SensorParams.model_fields if n != "active_length"),
+    )
     trials: int = number(
         20, "1", "paper: 20 trials a profile", "trials of every profile", ge=1, le=10000
     )
@@ -63,8 +68,7 @@ class WallConfig(Params):
 
     @model_validator(mode="after")
     def _sound(self) -> WallConfig:
-        if len(set(self.profiles)) != len(self.profiles):
-            raise ValueError(f"profiles must differ, got {', '.join(self.profiles)}")
+        require_different("profiles", self.profiles)
         reach = self.antenna.length * math.sin(self.wall.base_angle)
         if self.wall.overlap + self.variation.overlap >= reach / 2:
             raise ValueError(

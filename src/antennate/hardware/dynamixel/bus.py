@@ -264,7 +264,7 @@ class Bus:
         while len(good) < len(ids) and (part := self._listen(wait, end)):
             wait = self.timing.answer(length)
             for packet in parser.feed(part):
-                status = _fitting(packet, length, doubtful)
+                status = fitting(packet, length, doubtful)
                 if status and status.id in ids and status.id not in good:
                     good[status.id] = answer(status)
                     continue
@@ -337,8 +337,14 @@ class Bus:
         return part
 
 
-def _fitting(packet: Packet, length: int, doubtful: set[int]) -> Status | None:
-    """The status, if it can be the answer to a request for so many bytes."""
+def fitting(packet: Packet, length: int, doubtful: set[int]) -> Status | None:
+    """The status in a packet, if it can be the answer to a request for so many bytes.
+
+    Args:
+        packet: Any packet.
+        length: Bytes of data asked for.
+        doubtful: Ids whose late answers may still come: a refusal of theirs may be to the last one.
+    """
     status = packets.as_status(packet)
     if status is None:
         return None

@@ -23,6 +23,8 @@ SETTLE_TIME = BoardParams().settle_time
 SETTLE_FALL = BoardParams().settle_fall
 EARLY = BoardParams().early
 RETIRED_BOOTS = 8
+HIDDEN_WRAP = 0.5
+"""Share of the span of the board's counter after which an outage may hide a wrap."""
 
 _SEQ = 1 << 32
 _WINDOW = 64
@@ -176,7 +178,7 @@ class DeviceClock:
         if place is not Verdict.USED:
             return place
         newest = self.newest
-        if newest is None or now - self._arrived >= 0.5e-6 * self._modulus:
+        if newest is None or now - self._arrived >= HIDDEN_WRAP * 1e-6 * self._modulus:
             self._rebase(sample, now)
             return Verdict.USED
         step = (sample.ticks - newest.sample.ticks) % self._modulus

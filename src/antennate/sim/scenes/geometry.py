@@ -71,17 +71,21 @@ def resample(points: Floats, spacing: Floats) -> Floats:
 
 def progress(points: Floats, where: Floats) -> float:
     """Arc length of the centre line's nearest point [m]; it goes on straight past its ends."""
+    x, y = where.tolist()
+    corners = points.tolist()
     best, best_distance, done = 0.0, math.inf, 0.0
-    last = len(points) - 2
-    for i in range(len(points) - 1):
-        along = points[i + 1] - points[i]
-        length = math.hypot(along[0], along[1])
-        s = float((where - points[i]) @ along) / length
-        low = -math.inf if i == 0 else 0.0
-        high = math.inf if i == last else length
-        s = min(max(s, low), high)
-        gap = where - points[i] - along * (s / length)
-        distance = math.hypot(gap[0], gap[1])
+    last = len(corners) - 2
+    for i in range(last + 1):
+        (x0, y0), (x1, y1) = corners[i], corners[i + 1]
+        dx, dy = x1 - x0, y1 - y0
+        length = math.hypot(dx, dy)
+        s = ((x - x0) * dx + (y - y0) * dy) / length
+        if i > 0:
+            s = max(s, 0.0)
+        if i < last:
+            s = min(s, length)
+        part = s / length
+        distance = math.hypot(x - x0 - dx * part, y - y0 - dy * part)
         if distance < best_distance:
             best, best_distance = done + s, distance
         done += length
@@ -90,9 +94,12 @@ def progress(points: Floats, where: Floats) -> float:
 
 def contains(polygon: Floats, where: Floats) -> bool:
     """Whether a point lies inside a closed polygon of corners (n, 2), by counting crossings."""
-    x, y = float(where[0]), float(where[1])
-    start, end = polygon, np.roll(polygon, -1, axis=0)
-    across = (start[:, 1] > y) != (end[:, 1] > y)
-    rise = np.where(across, end[:, 1] - start[:, 1], 1.0)
-    at = start[:, 0] + (y - start[:, 1]) / rise * (end[:, 0] - start[:, 0])
-    return bool((across & (x < at)).sum() % 2)
+    x, y = where.tolist()
+    corners = polygon.tolist()
+    inside = False
+    x0, y0 = corners[-1]
+    for x1, y1 in corners:
+        if (y0 > y) != (y1 > y) and x < x0 + (y - y0) / (y1 - y0) * (x1 - x0):
+            inside = not inside
+        x0, y0 = x1, y1
+    return inside

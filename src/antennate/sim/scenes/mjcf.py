@@ -17,6 +17,7 @@ from antennate.sim.scenes.scene import Route, add_floor
 from antennate.types import Floats
 
 PREFIX = "scene/"
+_PLANE = int(mujoco.mjtGeom.mjGEOM_PLANE)
 _OWN_BITS = 8
 """The file's collision bits are moved up by so many, past those of the robot and the floor."""
 _MOST_BITS = 1 << 20
@@ -91,7 +92,7 @@ def _is_wall(model: mujoco.MjModel, geom: int) -> bool:
     """Whether a geom stands still, touches something and has an end."""
     touches = model.geom_contype[geom] or model.geom_conaffinity[geom]
     still = model.body_weldid[model.geom_bodyid[geom]] == 0
-    return bool(touches and still and model.geom_type[geom] != mujoco.mjtGeom.mjGEOM_PLANE)
+    return bool(touches and still and model.geom_type[geom] != _PLANE)
 
 
 def _share_bits(spec: mujoco.MjSpec, model: mujoco.MjModel, data: mujoco.MjData) -> bool:
@@ -118,6 +119,6 @@ def _share_bits(spec: mujoco.MjSpec, model: mujoco.MjModel, data: mujoco.MjData)
 
 
 def _is_floor(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> bool:
-    plane = model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_PLANE
+    plane = model.geom_type[geom] == _PLANE
     level = abs(data.geom_xmat[geom].reshape(3, 3)[2, 2] - 1.0) < 1e-6
     return bool(plane and level and abs(data.geom_xpos[geom, 2]) < 1e-6)
