@@ -6,6 +6,7 @@ import contextlib
 import dataclasses
 import math
 from functools import partial
+from types import SimpleNamespace
 from typing import Any
 
 import test_dynamixel_bus as test_bus
@@ -18,7 +19,7 @@ import test_settings
 import test_turns
 import test_twin_bus
 import test_twin_robot
-from guard_tools import Guard, after, around, constant, put
+from guard_tools import Guard, after, around, constant, given, put
 
 from antennate.hardware import joints, settings
 from antennate.hardware.driving import session
@@ -29,7 +30,6 @@ from antennate.hardware.dynamixel.doubts import Doubts
 from antennate.hardware.dynamixel.leg_turns import LegTurns
 from antennate.hardware.dynamixel.tables import XC430_W240
 from antennate.hardware.ports import serial_port
-from antennate.hardware.safety.causes import Outputs, State
 from antennate.params import TurnsParams
 from antennate.robots.spec import RobotSpec
 from antennate.twin.wire import SimulatedWire
@@ -96,20 +96,52 @@ def where_goals_were(old: Any, master: Any, ids: Any) -> Any:
     return bringup.read_register(master, ids, XC430_W240["present_position"])
 
 
-def goal_taken(old: Any, self: Any, servo: int, register: Any, value: int) -> bool:
-    return old(self, servo, register, value) or register is turns._GOAL
+GOAL, TORQUE, PLACE = (
+    XC430_W240[name].address for name in ("goal_position", "torque_enable", "present_position")
+)
 
 
-def torque_off(old: Any, self: Any, servo: int, register: Any) -> Any:
-    return 0 if register is turns._TORQUE and self._stage == 1 else old(self, servo, register)
+class Echo:
+    """Goals of single servos read as they were written, whether they were taken or not."""
+
+    def __init__(self) -> None:
+        self.written: dict[int, bytes] = {}
+
+    def __call__(self, patch: Any) -> None:
+        around(bus.Bus, "write_all", self.write)(patch)
+        around(bus.Bus, "read_all", self.read)(patch)
+
+    def write(self, old: Any, master: Any, address: int, data: Any, *more: Any) -> None:
+        self.written |= data if address == GOAL and len(data) == 1 else {}
+        old(master, address, data, *more)
+
+    def read(self, old: Any, master: Any, ids: Any, span: Any, *more: Any) -> Any:
+        answers = old(master, ids, span, *more)
+        if span.address != GOAL:
+            return answers
+        return {i: Value(self.written[i], False) if i in self.written else answers[i] for i in ids}
 
 
-def old_goal(old: Any, self: Any, at: int, goals: Any) -> bool:
-    return self._write(self._joints.ids[at], turns._TORQUE, 1)
+class Stale:
+    """A leg's place is not read anew after it was cleared: the third time as the second."""
+
+    def __init__(self) -> None:
+        self.places: list[Any] = []
+
+    def __call__(self, old: Any, master: Any, ids: Any, span: Any, *more: Any) -> Any:
+        answers = old(master, ids, span, *more)
+        if span.address != PLACE or len(ids) > 1:
+            return answers
+        self.places.append(answers)
+        return self.places[min(len(self.places) - 1, 1)]
 
 
-def no_fault(old: Any, self: Any, out: Outputs, command: Any) -> None:
-    old(self, dataclasses.replace(out, state=State.HOLD), command)
+def torque_reads(value: bytes) -> Any:
+    def read(old: Any, master: Any, ids: Any, span: Any, *more: Any) -> Any:
+        answers = old(master, ids, span, *more)
+        return dict.fromkeys(ids, Value(value, False)) if span.address == TORQUE else answers
+
+    return around(bus.Bus, "read_all", read)
 
 
 def told_once(old: Any, master: Any, ids: Any, *words: Any) -> list[int]:
@@ -310,7 +342,7 @@ SERVOS = [
     ),
     Guard(
         "torque lost while armed",
-        put(monitor, "_TORQUE", XC430_W240["status_return_level"]),
+        torque_reads(b"\1"),
         partial(
             test_session.test_B11_B9_a_servo_without_torque_or_watchdog_is_a_fault_within_a_second,
             7,
@@ -335,12 +367,12 @@ SERVOS = [
     ),
     Guard(
         "goal of a loose leg is read back",
-        around(LegTurns, "_write", goal_taken),
+        Echo(),
         test_loose_leg.test_B10_a_leg_that_does_not_take_its_goal_gets_no_torque,
     ),
     Guard(
         "goal of a loose leg is where it stands",
-        around(LegTurns, "_hold", old_goal),
+        around(bus.Bus, "read_all", Stale()),
         partial(
             test_loose_leg.test_B10_a_leg_that_was_turned_while_loose_gets_torque_where_it_stands,
             600,
@@ -348,12 +380,12 @@ SERVOS = [
     ),
     Guard(
         "a loose leg after a fault",
-        around(session.Session, "_move", no_fault),
+        put(session, "State", SimpleNamespace(FAULT=math.inf)),
         test_loose_leg.test_B10_after_a_pause_a_loose_leg_waits_for_an_arm_event,
     ),
     Guard(
         "torque is off before turns are forgotten",
-        around(LegTurns, "_read", torque_off),
+        torque_reads(b"\0"),
         test_loose_leg.test_a_leg_whose_torque_came_back_is_not_cleared,
     ),
     Guard(
@@ -371,12 +403,12 @@ SERVOS = [
     ),
     Guard(
         "legs stand still before one is let go",
-        put(LegTurns, "_calm", constant(True)),
+        given(turns, TurnsParams, calm=0),
         test_loose_leg.test_no_leg_loses_its_torque_before_all_have_stood_still_for_five_ticks,
     ),
     Guard(
         "supply read long ago",
-        put(monitor, "_OLD", math.inf),
+        put(monitor, "SUPPLY_AGE", math.inf),
         test_session.test_B13_a_supply_that_cannot_be_read_any_more_is_not_known_after_4_s,
     ),
     Guard(

@@ -48,8 +48,10 @@ def cleared(old: Any, self: Any, now: float, inputs: Any) -> Outputs:
     return dataclasses.replace(old(self, now, inputs), clear=True)
 
 
-def raising(self: Any) -> None:
-    self._look()
+def raising(old: Any, self: Any) -> None:
+    old(self)
+    if self.bus_error:
+        raise PortError(self.bus_error)
 
 
 def finite_goals(old: Any, self: Any, angles: Any) -> Any:
@@ -123,13 +125,13 @@ SESSION = [
     ),
     Guard(
         "signals while the torque goes off",
-        before(StopOnce, "_hear", lambda self, *_: setattr(self, "deaf", False)),
+        before(StopOnce, "receive", lambda self, *_: setattr(self, "deaf", False)),
         partial(test_signals.test_B19_no_signal_is_heard_once_the_walk_is_over_of_itself, "stand"),
         by=(KeyboardInterrupt,),
     ),
     Guard(
         "signals that a controller swallows",
-        around(StopOnce, "_hear", an_exception_alone),
+        around(StopOnce, "receive", an_exception_alone),
         partial(
             test_signals.test_B19_a_signal_that_a_controller_swallows_ends_the_walk_all_the_same,
             signal.SIGINT,
@@ -148,7 +150,7 @@ SESSION = [
     ),
     Guard(
         "dead wire ends nothing",
-        put(monitor.ServoMonitor, "step", raising),
+        around(monitor.ServoMonitor, "step", raising),
         test_bus.test_a_dead_wire_is_noted_by_the_watch_and_ends_nothing,
         by=(PortError,),
     ),

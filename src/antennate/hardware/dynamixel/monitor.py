@@ -22,7 +22,7 @@ _POSITION = XC430_W240["present_position"]
 _VOLT = 0.1
 _ALONE = BusParams().single_budget
 _PATIENCE = BusParams().look_every
-_OLD = BusParams().supply_age
+SUPPLY_AGE = BusParams().supply_age
 
 
 class ServoMonitor(ActuatorState):
@@ -75,7 +75,7 @@ class ServoMonitor(ActuatorState):
         except PortError as error:
             self.bus_error = str(error)
             self.missed = {servo: count + 1 for servo, count in self.missed.items()}
-        if self._clock() - self._measured > _OLD:
+        if self._clock() - self._measured > SUPPLY_AGE:
             self.supply = math.nan
 
     def _look(self) -> None:
