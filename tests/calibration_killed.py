@@ -21,7 +21,8 @@ from typing import Any
 
 import numpy as np
 
-from antennate.antenna import calibration, fitting
+from antennate.antenna import fitting
+from antennate.antenna.calibration import Calibration
 from antennate.antenna.fitting import Samples
 from antennate.cli.arguments import Options
 from antennate.cli.calibrate import STUDY
@@ -107,7 +108,7 @@ def main() -> None:
     folder, kills, seed = Path(sys.argv[1]), int(sys.argv[2]), int(sys.argv[3])
     chance = random.Random(seed)
     old, new = outcome("old"), outcome("new")
-    calibrated = {calibration.to_json(made.calibration).encode(): made for made in (old, new)}
+    calibrated = {made.calibration.to_json().encode(): made for made in (old, new)}
     names = dict(zip(calibrated, ("old", "new"), strict=True))
     before = folder.with_name("before")  # all files of a run, so that each kill meets the same
     before.mkdir()
@@ -126,7 +127,7 @@ def main() -> None:
         point = points[n] if n < len(points) else None
         _, data = killed(folder, new, point, None if point else chance.uniform(0.0, took))
         try:
-            calibration.load(folder / NAME)
+            Calibration.load(folder / NAME)
             left.append(names.get(data, "mixed"))
         except CalibrationError as error:
             left.append(str(error))

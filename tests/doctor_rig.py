@@ -30,7 +30,7 @@ class Patient:
 
     @contextlib.contextmanager
     def bus(self, baud: int) -> Iterator[Port]:
-        self.robot.bus.heard_at = baud
+        self.robot.bus.master_baud = baud
         yield self.clock
 
     @contextlib.contextmanager

@@ -32,7 +32,7 @@ from antennate.hardware.safety import watch
 from antennate.hardware.safety.causes import Outputs, State
 from antennate.params import TurnsParams
 from antennate.robots.layout import LayoutParams
-from antennate.twin.link import Link
+from antennate.twin.wire import SimulatedWire
 
 controller_fails = test_session.test_B8_servos_stop_within_120_ms_when_only_the_controller_fails
 
@@ -149,7 +149,7 @@ BUS = [
     ),
     Guard(
         "stale bytes drained before a request",
-        put(Link, "drain", constant(0)),
+        put(SimulatedWire, "drain", constant(0)),
         partial(test_bus.test_B4_no_late_answer_is_taken_for_a_new_one, 0.003, True),
     ),
     Guard(

@@ -6,8 +6,8 @@ from antennate.hardware.dynamixel.answers import MOTION, Answer, Span, Value
 from antennate.hardware.dynamixel.bus import Bus
 from antennate.hardware.dynamixel.tables import XC430_W240, XL330_M288
 from antennate.twin.bus import ServoBus
-from antennate.twin.link import Link
 from antennate.twin.registers import Servo
+from antennate.twin.wire import SimulatedWire
 
 IDS = list(range(1, 20))
 MODELS = {i: (XC430_W240 if i <= 17 else XL330_M288).model for i in IDS}
@@ -28,7 +28,7 @@ class Rig:
 
     def __init__(self, fast: bool = True, loss: float = 0.0, speaks_fast: bool = True) -> None:
         self.twin = ServoBus(servos(), loss=loss, fast=speaks_fast)
-        self.link = Link(self.twin)
+        self.link = SimulatedWire(self.twin)
         self.bus = Bus(self.link, fast=fast, clock=self.link.now)
 
     def cycle(self, span: Span = MOTION, period: float = 0.01) -> tuple[dict[int, Answer], float]:

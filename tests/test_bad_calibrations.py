@@ -9,7 +9,6 @@ from typing import Any
 
 import pytest
 
-from antennate.antenna import calibration
 from antennate.antenna.calibration import Calibration
 from antennate.cli import main
 from antennate.errors import AntennateError, CalibrationError, ConfigError
@@ -124,7 +123,7 @@ def test_S9_there_are_two_hundred_bad_files_and_a_good_one(tmp_path: Path) -> No
     assert len({text for _, text, _ in FILES}) >= 200
     path = tmp_path / "good.json"
     path.write_text(json.dumps(CONTENT))
-    assert calibration.load(path, "left-1") == GOOD
+    assert Calibration.load(path, "left-1") == GOOD
 
 
 @pytest.mark.parametrize(("name", "text", "field"), FILES, ids=[name for name, _, _ in FILES])
@@ -134,7 +133,7 @@ def test_S9_a_bad_file_is_refused_with_field_and_reason(
     path = tmp_path / "left.json"
     path.write_text(text)
     with pytest.raises(CalibrationError) as refusal:
-        calibration.load(path)
+        Calibration.load(path)
     assert isinstance(refusal.value, AntennateError)
     said = str(refusal.value)
     assert said.startswith(f"{path}: ")
@@ -149,9 +148,9 @@ def test_S9_a_bad_file_is_refused_with_field_and_reason(
 
 def test_S9_the_file_of_another_sensor_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "left.json"
-    calibration.save(GOOD, path)
+    GOOD.save(path)
     with pytest.raises(CalibrationError, match="sensor_id: expected right-1, found left-1"):
-        calibration.load(path, "right-1")
+        Calibration.load(path, "right-1")
 
 
 def test_S9_the_file_of_another_board_is_refused() -> None:
@@ -172,17 +171,17 @@ def test_S9_a_bad_recording_keeps_the_calibration_that_is_there(
 ) -> None:
     out, bad = tmp_path / "out", tmp_path / "bad.csv"
     out.mkdir()
-    calibration.save(GOOD, out / "calibration.json")
+    GOOD.save(out / "calibration.json")
     bad.write_text("time,counts,bend\n")
     words = ["calibrate", "--recording", str(bad), "--out", str(out), "--overwrite"]
     assert main(words) == 2
-    assert calibration.load(out / "calibration.json") == GOOD
+    assert Calibration.load(out / "calibration.json") == GOOD
     assert capsys.readouterr().err.count("\n") == 1
 
 
 def test_a_calibration_file_gives_the_controller_its_curve(tmp_path: Path) -> None:
     path = tmp_path / "left.json"
-    calibration.save(GOOD, path)
+    GOOD.save(path)
     control = ControlParams(conditioning=ConditioningParams(averaging_time=0.05))
     made, found = calibrated(control, path, "left-1")
     assert found == GOOD
@@ -201,6 +200,6 @@ def test_a_curve_or_a_theta_beside_the_file_is_refused(
     tmp_path: Path, control: ControlParams, said: str
 ) -> None:
     path = tmp_path / "left.json"
-    calibration.save(GOOD, path)
+    GOOD.save(path)
     with pytest.raises(ConfigError, match=said):
         calibrated(control, path)

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from antennate.antenna import calibration, fitting
+from antennate.antenna import fitting
 from antennate.antenna.calibration import Calibration
 from antennate.antenna.fitting import Samples
 from antennate.cli import main
@@ -84,20 +84,20 @@ def test_a_sigmoid_is_not_beaten_by_a_line_where_it_is_true() -> None:
 def test_the_controller_gets_the_same_curve() -> None:
     samples = simulated(14.0, 0.4, -1, 1)
     found = fit(samples)
-    level = calibration.level(found, samples.counts)
+    level = found.level(samples.counts)
     assert np.sqrt(np.mean((level - samples.bend) ** 2)) == pytest.approx(found.rmse, rel=1e-9)
 
 
 def test_a_saved_file_is_read_back_and_never_replaced_unasked(tmp_path: Path) -> None:
     found, path = fit(simulated(14.0, 0.4, -1, 1)), tmp_path / "left.json"
-    calibration.save(found, path)
-    assert calibration.load(path) == found
+    found.save(path)
+    assert Calibration.load(path) == found
     other = found.model_copy(update={"slope": 1.0})
     with pytest.raises(OutputError, match="expected no such file"):
-        calibration.save(other, path)
-    assert calibration.load(path) == found
-    calibration.save(other, path, overwrite=True)
-    assert calibration.load(path).slope == 1.0
+        other.save(path)
+    assert Calibration.load(path) == found
+    other.save(path, overwrite=True)
+    assert Calibration.load(path).slope == 1.0
     assert [file.name for file in tmp_path.iterdir()] == ["left.json"]
 
 
@@ -123,7 +123,7 @@ def test_a_bad_file_is_refused_with_its_field(
     path = tmp_path / "bad.json"
     path.write_text(json.dumps(content))
     with pytest.raises(CalibrationError, match=word):
-        calibration.load(path)
+        Calibration.load(path)
 
 
 @pytest.mark.parametrize("text", ["", "{", "[]", '{"slope": NaN}', '{"slope": 1e999}', "\x00"])
@@ -131,7 +131,7 @@ def test_what_is_no_calibration_is_refused(tmp_path: Path, text: str) -> None:
     path = tmp_path / "bad.json"
     path.write_text(text)
     with pytest.raises(CalibrationError):
-        calibration.load(path)
+        Calibration.load(path)
 
 
 def table(counts: Floats, bend: Floats) -> str:
@@ -152,7 +152,10 @@ def spoiled(row: int, cell: str) -> str:
 
 
 BAD = {
-    "non-monotonic": (table(1800 - 400 * np.sin(3 * BEND), BEND), r"row \d+.*non-monotonic.*film"),
+    "non-monotonic": (
+        table(1800 - 400 * np.sin(3 * BEND), BEND),
+        r"row \d+.*non-monotonic.*sensor",
+    ),
     "constant": (table(np.full(100, 1500.0), BEND), r"row 2.*constant.*wiring"),
     "saturated": (table(np.where(BEND > 0.5, 0, GOOD), BEND), r"row 52.*saturated.*resistor"),
     "nan": (spoiled(7, "0.05,nan,0.05"), r"row 7.*finite.*delete the row"),

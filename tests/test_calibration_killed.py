@@ -12,7 +12,7 @@ import pytest
 from test_bad_calibrations import GOOD
 
 import antennate
-from antennate.antenna import calibration
+from antennate.antenna.calibration import Calibration
 from antennate.cli.folder import RunFolder
 
 
@@ -49,9 +49,9 @@ def test_S13_what_a_killed_program_of_the_same_number_left_is_in_nobodys_way(
 ) -> None:
     """In a container every program may have the same number."""
     (tmp_path / f".calibration.json.{os.getpid()}").write_text("half of a calib")
-    calibration.save(GOOD, tmp_path / "calibration.json")
-    assert calibration.load(tmp_path / "calibration.json") == GOOD
+    GOOD.save(tmp_path / "calibration.json")
+    assert Calibration.load(tmp_path / "calibration.json") == GOOD
     (tmp_path / f".calibration.json.{os.getpid()}").write_text("half of a calib")
     with RunFolder.open("calibrate", tmp_path, overwrite=True) as folder:
-        folder.write("calibration.json", calibration.to_json(GOOD))
-    assert calibration.load(tmp_path / "calibration.json") == GOOD
+        folder.write("calibration.json", GOOD.to_json())
+    assert Calibration.load(tmp_path / "calibration.json") == GOOD

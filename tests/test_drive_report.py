@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
-from ticked_rig import served
 
 from antennate.cli import main
 from antennate.experiments.twin import Rig, TwinConfig, build, rig
 from antennate.hardware.driving.config import DriveConfig
+from antennate.hardware.driving.connect import prepare
 from antennate.hardware.driving.drive import drive
 from antennate.hardware.driving.report import Report
 from antennate.hardware.driving.session import Session
 from antennate.hardware.safety.causes import Cause, State
 from antennate.params import TouchCheckParams
+from antennate.twin.faults import Faults, read
+from antennate.twin.lockstep import BoardPort, LockstepClock
 from antennate.types import AntennaFrame, Contact, JointCommand
 
 CONFIG = DriveConfig(dry_run=0.5, duration=2.0, touch=TouchCheckParams(patience=3.0))
@@ -123,13 +126,23 @@ def test_B13_torque_that_went_off_while_walking_is_the_worst() -> None:
     ],
 )
 def test_L8_a_drive_that_sent_no_pose_ends_with_2_and_says_so(
-    when: str, worst: State, said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    when: str,
+    worst: State,
+    said: str,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    with served(build(TwinConfig(), 5), faults=(f"esp32=silent@{when}",)) as paths:
-        addresses = [word for name, at in paths.items() for word in (f"--{name}", at)]
-        argv = ["drive", *addresses, "--arm", "--no-touch-check", "--dry-run", "0.5"]
-        argv += ["--duration", "1", "--touch.patience", "0.5", "--out", str(tmp_path)]
-        assert main([*argv, "--overwrite"]) == 2
+    @contextlib.contextmanager
+    def in_process(config: DriveConfig, *addresses: object) -> Iterator[Session]:
+        robot = build(TwinConfig(), 5)
+        clock = LockstepClock(robot, Faults([read(f"esp32=silent@{when}")], config.layout.ids))
+        yield prepare(config, BoardPort(robot, clock), clock, clock)
+
+    monkeypatch.setattr("antennate.cli.drive.connect", in_process)
+    argv = ["drive", "--esp32", "board", "--bus", "bus", "--arm", "--no-touch-check"]
+    argv += ["--dry-run", "0.5", "--duration", "1", "--touch.patience", "0.5"]
+    assert main([*argv, "--out", str(tmp_path), "--overwrite"]) == 2
     text = " ".join(capsys.readouterr().out.split())
     assert said in text
     assert "It never walked: --arm was given, and no command was sent." in text

@@ -27,8 +27,8 @@ from antennate.hardware.dynamixel.tables import XL330_M288
 from antennate.hardware.ports.port import PortError
 from antennate.hardware.safety.watch import ServoWatch
 from antennate.twin.bus import Fault, ServoBus, Trouble
-from antennate.twin.link import Link
 from antennate.twin.registers import Servo
+from antennate.twin.wire import SimulatedWire
 
 LIMIT = 0.010 + 1e-9
 TRUE = {i: 100 * i for i in IDS}
@@ -240,7 +240,7 @@ class Boom(Exception):
     """Something that is no error of the port."""
 
 
-class Fragile(Link):
+class Fragile(SimulatedWire):
     """A wire that raises at its n-th call."""
 
     def __init__(self, bus: ServoBus) -> None:
@@ -340,7 +340,7 @@ def test_values_that_do_not_fit_are_not_sent() -> None:
 
 
 def test_a_babbling_bus_is_given_up_in_time() -> None:
-    class Noise(Link):
+    class Noise(SimulatedWire):
         def read(self, most: int, timeout: float) -> bytes:
             self.sleep(min(timeout, 0.0003))
             return b"\xff\xff\xfd\x00\x01"
@@ -363,7 +363,7 @@ def test_the_wall_clock_is_never_asked(monkeypatch: pytest.MonkeyPatch) -> None:
         raise AssertionError("wall clock")
 
     monkeypatch.setattr(time, "time", fail)
-    link = Link(Rig().twin)
+    link = SimulatedWire(Rig().twin)
     assert positions(Bus(link, clock=link.now).read_all(IDS, MOTION)) == TRUE
     assert Bus(link).timing == Timing()
 
@@ -500,7 +500,7 @@ def test_an_answer_with_another_id_is_no_answer() -> None:
 
 
 def test_two_answers_of_one_servo_that_differ_are_none() -> None:
-    class Echo(Link):
+    class Echo(SimulatedWire):
         def read(self, most: int, timeout: float) -> bytes:
             came = super().read(most, timeout)
             other = Status(3, StatusError.NONE, False, bytes(4))
@@ -511,7 +511,7 @@ def test_two_answers_of_one_servo_that_differ_are_none() -> None:
 
 
 def test_a_dead_wire_is_noted_by_the_watch_and_ends_nothing() -> None:
-    class Dead(Link):
+    class Dead(SimulatedWire):
         def write(self, data: bytes) -> None:
             raise PortError("the wire is gone")
 

@@ -26,8 +26,8 @@ from antennate.params import NetworkParams
 from antennate.robots.layout import LayoutParams
 from antennate.twin.faults import Faults
 from antennate.twin.serve import TwinServer
-from antennate.twin.tcp import TcpEnd
-from antennate.twin.udp import UdpEnd
+from antennate.twin.tcp import TcpEndpoint
+from antennate.twin.udp import UdpEndpoint
 
 KEY = bytes(range(32))
 
@@ -47,9 +47,9 @@ def place(path: str) -> tuple[str, int]:
 
 
 @contextmanager
-def flooded_board(params: NetworkParams) -> Iterator[tuple[UdpPort, Clock, UdpEnd]]:
+def flooded_board(params: NetworkParams) -> Iterator[tuple[UdpPort, Clock, UdpEndpoint]]:
     """A port that a board has been granted, and the board's end."""
-    end, clock = UdpEnd("127.0.0.1", 0, KEY), Clock()
+    end, clock = UdpEndpoint("127.0.0.1", 0, KEY), Clock()
     port = UdpPort(*place(end.path), KEY, params, clock)
     end.write(hello(5))
     for _ in range(3):
@@ -120,7 +120,7 @@ def test_a_board_that_is_not_there_yet_is_awaited() -> None:
     for _ in range(10):
         clock.t += 0.3
         assert port.read(4096, 0.0) == b""
-    end = UdpEnd("127.0.0.1", number, KEY)
+    end = UdpEndpoint("127.0.0.1", number, KEY)
     end.write(hello(5))
     for _ in range(4):
         clock.t += 0.3
@@ -234,7 +234,7 @@ def test_a_twin_at_no_port_is_refused(text: str, capsys: pytest.CaptureFixture[s
     assert "expected [HOST:]PORT" in capsys.readouterr().err
 
 
-def eventually(port: Port, end: TcpEnd, said: bytes) -> bool:
+def eventually(port: Port, end: TcpEndpoint, said: bytes) -> bool:
     """Whether what the end writes comes within a second."""
     for _ in range(100):
         end.read()
@@ -245,7 +245,7 @@ def eventually(port: Port, end: TcpEnd, said: bytes) -> bool:
 
 
 def test_a_tcp_end_serves_one_client_at_a_time_and_lets_it_come_back() -> None:
-    end = TcpEnd("127.0.0.1", 0)
+    end = TcpEndpoint("127.0.0.1", 0)
     end.write(b"lost, as nobody listens")
     first = finder(end.path, 9600)()
     assert eventually(first, end, b"one")
@@ -279,8 +279,8 @@ def test_X16_the_key_is_in_nothing_that_a_drive_over_udp_says(
     server = TwinServer(
         rig(TwinConfig()).robot,
         Faults([], LayoutParams().ids),
-        UdpEnd("127.0.0.1", 0, key),
-        TcpEnd("127.0.0.1", 0),
+        UdpEndpoint("127.0.0.1", 0, key),
+        TcpEndpoint("127.0.0.1", 0),
     )
     over = threading.Event()
     with server:
@@ -307,7 +307,8 @@ def test_X16_the_key_is_in_nothing_that_a_drive_over_udp_says(
 
 
 def test_a_twin_that_starts_anew_or_falls_silent_does_so_over_udp_too() -> None:
-    clock, end = Clock(), UdpEnd("127.0.0.1", 0, KEY)
+    clock = Clock()
+    end = UdpEndpoint("127.0.0.1", 0, KEY, clock)
     port = UdpPort(*place(end.path), KEY, None, clock)
     heard = FrameDecoder()
 
@@ -327,7 +328,7 @@ def test_a_twin_that_starts_anew_or_falls_silent_does_so_over_udp_too() -> None:
     assert {found.boot_id for found in after} == {6}
     assert sum(isinstance(found, Sample) for found in before) >= 90
     assert sum(isinstance(found, Sample) for found in after) >= 60
-    end._spoke -= 1.0
+    clock.t += 1.0
     asked = port.tally.greetings
     port.write(b"")
     end.read()

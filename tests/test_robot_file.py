@@ -11,13 +11,12 @@ import pytest
 from doctor_rig import Patient, wrong
 from test_bad_calibrations import GOOD
 
-from antennate.antenna import calibration
 from antennate.cli import BAD_INPUT, main
-from antennate.cli.addresses import RobotOrders, parse_robot
-from antennate.cli.arguments import read_file
+from antennate.cli.addresses import RobotOptions, parse_robot
 from antennate.cli.toml import to_toml
 from antennate.hardware.doctor.checkup import examine
 from antennate.hardware.robot_file import RobotFile
+from antennate.params.reading import read_file
 
 PAGE = Path(__file__).parents[1] / "docs" / "hardware.md"
 TAKE: dict[str, Callable[[RobotFile], Any]] = {
@@ -34,7 +33,7 @@ def file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     (tmp_path / "robot.toml").write_text(text)
     (tmp_path / "left").mkdir()
     made = GOOD.model_copy(update={"sensor_id": "left"})
-    calibration.save(made, tmp_path / "left" / "calibration.json")
+    made.save(tmp_path / "left" / "calibration.json")
     monkeypatch.chdir(tmp_path)
     return Path("robot.toml")
 
@@ -42,7 +41,7 @@ def file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 @pytest.mark.parametrize("name", TAKE)
 def test_the_file_of_the_page_serves_each_command(name: str, file: Path) -> None:
     robot = read_file(file, RobotFile)
-    config, _ = parse_robot(name, "", TAKE[name], ["--robot", str(file)], RobotOrders())
+    config, _ = parse_robot(name, "", TAKE[name], ["--config", str(file)], RobotOptions)
     assert config == TAKE[name](robot)
     assert config.network == robot.network
     known = robot.record if name == "record" else robot
@@ -52,7 +51,7 @@ def test_the_file_of_the_page_serves_each_command(name: str, file: Path) -> None
 
 def test_each_command_takes_its_own_numbers_and_a_flag_counts_more(file: Path) -> None:
     def parsed(name: str, *words: str) -> Any:
-        return parse_robot(name, "", TAKE[name], ["--robot", str(file), *words], RobotOrders())[0]
+        return parse_robot(name, "", TAKE[name], ["--config", str(file), *words], RobotOptions)[0]
 
     tables = "[doctor]\nlisten = 1.5\n[record]\nmarks = [0.0, 10.0]\nduration = 9.0\n"
     file.write_text("duration = 60.0\n" + tables)
@@ -76,7 +75,7 @@ def test_a_key_that_none_of_them_knows_is_an_error_in_all(
     name: str, text: str, said: str, file: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     file.write_text(text)
-    assert main([name, "--robot", str(file)]) == BAD_INPUT
+    assert main([name, "--config", str(file)]) == BAD_INPUT
     told = capsys.readouterr().err
     assert f"robot.toml: {said}" in told
     assert told.count("\n") == 1
@@ -116,6 +115,6 @@ def test_what_a_run_keeps_is_a_robot_file_that_needs_no_calibration_file(file: P
 def test_record_with_the_file_of_drive_gets_as_far_as_the_port(
     file: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    words = ["record", "--robot", str(file), "--esp32", "/dev/null", "--out", "left.csv"]
+    words = ["record", "--config", str(file), "--esp32", "/dev/null", "--out", "left.csv"]
     assert main(words) == BAD_INPUT
     assert "/dev/null: not a serial port" in capsys.readouterr().err

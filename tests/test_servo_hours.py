@@ -20,8 +20,8 @@ from antennate.hardware.dynamixel.parser import Parser
 from antennate.hardware.safety.causes import Cause, State
 from antennate.hardware.safety.watch import ServoWatch
 from antennate.twin.bus import ServoBus
-from antennate.twin.link import Link
 from antennate.twin.registers import Servo
+from antennate.twin.wire import SimulatedWire
 
 GOAL = 116
 
@@ -79,7 +79,7 @@ def test_B2_an_hour_with_one_lost_answer_in_a_hundred_has_no_hold() -> None:
     sys.stdout.write(f"longest run of misses {worst}, answers missed {misses}\n")
 
 
-class Strict(Link):
+class Strict(SimulatedWire):
     """A wire that counts requests sent while the answer to another one is on its way."""
 
     def __init__(self, bus: ServoBus) -> None:

@@ -230,7 +230,7 @@ def test_T2_a_controller_that_hangs_stops_every_servo_within_120_ms_of_the_last_
         seen.append([servo.position for servo in servos])
         if made.clock.now() < 2.0:
             return sound(frame)
-        last = max(servo.last_heard for servo in servos)
+        last = max(servo.last_fed for servo in servos)
         while not all(servo.get("bus_watchdog") == -1 for servo in servos):
             wait(made.clock.now() + 0.001)
             if made.clock.now() > last + 1.0:
@@ -263,7 +263,7 @@ def test_B8_servos_stop_within_120_ms_when_only_the_controller_fails(
     def step(frame: AntennaFrame) -> JointCommand:
         servos[0].set("present_input_voltage", round(10 * volts))  # at 10.5 V it goes at half pace
         if made.clock.now() < 1.6:
-            heard[:] = [max(servo.last_heard for servo in servos)]
+            heard[:] = [max(servo.last_fed for servo in servos)]
             return sound(frame)
         if all(servo.get("bus_watchdog") == -1 for servo in servos):
             tripped.append(made.clock.now())
@@ -636,7 +636,7 @@ def refusing(servo: Servo) -> Callable[[int, bytes], StatusError]:
 
 def test_B13_a_sagging_supply_warns_then_holds_then_switches_off() -> None:
     """From 11.1 V by 0.5 V a second, less under load; the limit of the XC430-W240 is 6.0 V."""
-    log = walked(at(1.5, "bus=sag:0.5"), DriveConfig(dry_run=1.0, duration=5.0))
+    log = walked(at(1.5, "bus=discharge:0.5"), DriveConfig(dry_run=1.0, duration=5.0))
     order = [log.first(c) for c in (Cause.SUPPLY_WARN, Cause.SUPPLY_HOLD, Cause.SUPPLY_OFF)]
     assert order == sorted(set(order))
     states = dict(zip(log.t, log.state, strict=True))

@@ -35,7 +35,7 @@ def test_the_papers_table_within_its_rounding(coils: int, printed: float) -> Non
     ],
 )
 def test_other_wires_that_give_the_same_stiffness(modulus: float, wire: float, coil: float) -> None:
-    k = springs.stiffness(modulus, 1e-3 * wire, 1e-3 * coil, 3)
+    k = springs.spring_stiffness(modulus, 1e-3 * wire, 1e-3 * coil, 3)
     assert k / N_MM_PER_DEG == pytest.approx(0.274, rel=5e-3)
 
 
@@ -43,12 +43,14 @@ def test_beam_theory_is_six_percent_stiffer() -> None:
     """E I / L of the uncoiled wire: 64 instead of 10.8 x 2 pi."""
     d, coil, coils = 0.5e-3, 4e-3, 5
     beam = E * math.pi * d**4 / 64 / (math.pi * coil * coils)
-    assert beam / springs.stiffness(E, d, coil, coils) == pytest.approx(10.8 / 10.186, rel=1e-4)
+    assert beam / springs.spring_stiffness(E, d, coil, coils) == pytest.approx(
+        10.8 / 10.186, rel=1e-4
+    )
 
 
 def test_the_way_back_returns() -> None:
     coil = springs.coil_diameter(E, 0.5e-3, 6, 0.0079)
-    assert springs.stiffness(E, 0.5e-3, coil, 6) == pytest.approx(0.0079, rel=1e-12)
+    assert springs.spring_stiffness(E, 0.5e-3, coil, 6) == pytest.approx(0.0079, rel=1e-12)
 
 
 def test_a_straight_wire_yields_at_its_surface() -> None:

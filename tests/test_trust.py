@@ -14,7 +14,8 @@ from antennate.hardware.driving.report import Report
 from antennate.hardware.driving.session import Session
 from antennate.hardware.safety.causes import Cause, State
 from antennate.params import ConditioningParams, TouchCheckParams
-from antennate.twin.hand import Hand
+from antennate.twin.touch import TouchStimulus
+from antennate.types import Floats
 
 TOUCHED = TwinConfig(touch=("left@0.5s", "right@2s"))
 CONFIG = DriveConfig(dry_run=1.0, duration=1.0)
@@ -31,7 +32,7 @@ def driven(
     made = rig(config, touch=touch)
     spoil(made)
     for servo in made.robot.servos:
-        servo.heard(0.001)  # as bring-up does
+        servo.feed_watchdog(0.001)  # as bring-up does
     said: list[str] = []
     drive_config = CONFIG.model_copy(update={"touch": touch or SHORT})
     report = drive(made.session, drive_config, arm, lambda s, t: said.append(s.trust.said))
@@ -55,12 +56,14 @@ def swapped(made: Rig) -> None:
     body._board.newest = exchange  # type: ignore[method-assign]
 
 
+class Inverted(TouchStimulus):
+    def change(self, t: float, bus_used: bool) -> Floats:
+        return super().change(t, bus_used) * (-1, 1)
+
+
 def inverted(made: Rig) -> None:
     """Let the left film straighten where it should bend."""
-    hand = made.robot._hand
-    assert hand is not None
-    change = hand.change
-    hand.change = lambda t, heard: change(t, heard) * (-1, 1)  # type: ignore[method-assign]
+    made.robot.touch = Inverted(TOUCHED.touch, ConditioningParams())
 
 
 def test_S8_a_robot_whose_antennae_were_bent_by_hand_is_armed() -> None:
@@ -138,4 +141,4 @@ def test_S8_an_arm_event_before_the_check_has_passed_is_not_accepted() -> None:
 @pytest.mark.parametrize("order", ["left", "left@2", "middle@2s", "left@-1s", "left@1es"])
 def test_orders_to_the_hand_that_do_not_exist_are_refused(order: str) -> None:
     with pytest.raises(BadInputError, match="--touch: expected left@Ts"):
-        Hand([order], ConditioningParams())
+        TouchStimulus([order], ConditioningParams())

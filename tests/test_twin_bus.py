@@ -137,7 +137,7 @@ def test_B9_a_tripped_watchdog_locks_goals_until_zero_is_written() -> None:
     """The steps of the example of Bus Watchdog(98) in the manual, at 100 ms."""
     servo = moving(4000)
     put(servo, "bus_watchdog", 5)
-    servo.heard(0.05)
+    servo.feed_watchdog(0.05)
     servo.advance(1.0)
     assert servo.get("bus_watchdog") == -1
     assert servo.position == pytest.approx(306 * 0.229 / 60 * 4096 * 0.15)
@@ -437,7 +437,7 @@ def test_B7_a_killed_program_leaves_a_robot_that_stops(server: PtyServer) -> Non
         program.kill()
     time.sleep(0.15)
     with server.lock:
-        last = max(servo.last_heard for servo in server.bus.servos)
+        last = max(servo.last_fed for servo in server.bus.servos)
         server.bus.advance(last + 0.12)
         assert {servo.get("bus_watchdog") for servo in server.bus.servos} == {-1}
         stopped = [servo.position for servo in server.bus.servos]

@@ -134,7 +134,7 @@ def test_a_supply_sags_at_its_rate_and_servos_latch_when_it_is_below_their_limit
     robot = build(TwinConfig())
     large, small = robot.servos[0], robot.servos[17]
     robot.advance(1.0)
-    broken(robot, "bus=sag:2")
+    broken(robot, "bus=discharge:2")
     robot.advance(3.0)
     assert large.get("present_input_voltage") == pytest.approx(71, abs=1)  # 11.1 V - 2 s * 2 V/s
     assert small.get("present_input_voltage") == 50  # behind its regulator
@@ -149,7 +149,7 @@ def test_a_supply_sags_at_its_rate_and_servos_latch_when_it_is_below_their_limit
 def test_a_sagging_supply_gives_way_under_load() -> None:
     """Two servos blocked at full strength: 2 * 1.3 A through 0.5 ohm."""
     robot = build(TwinConfig(battery=BatteryParams(resistance=0.5, stall_current=1.3)))
-    broken(robot, "bus=sag:0")
+    broken(robot, "bus=discharge:0")
     for servo in robot.servos[:2]:
         servo.set("torque_enable", 1)
         servo.set("goal_position", servo.get("present_position") + 4000)

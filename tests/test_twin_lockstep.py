@@ -56,6 +56,10 @@ def in_invented_time() -> bytes:
     return came
 
 
+def periods_of(robot: TwinRobot) -> int:
+    return round(robot.t / PERIOD)
+
+
 class Client:
     """Both pseudo-terminals of a twin in lock-step."""
 
@@ -84,6 +88,13 @@ class Client:
 
     def say(self, data: bytes) -> None:
         os.write(self._ends[1], data)
+
+    def passed(self, ticks: int) -> bool:
+        """Whether so many control periods have passed, within 2 s."""
+        last = time.monotonic() + 2.0
+        while periods_of(self.robot) < ticks and time.monotonic() < last:
+            time.sleep(0.0005)
+        return periods_of(self.robot) == ticks
 
     def hear(self, end: int, size: int) -> bytes:
         """What comes until it is `size` bytes, within 20 s."""
@@ -129,3 +140,14 @@ def test_only_goals_of_all_servos_let_time_pass_and_the_bus_answers_at_once() ->
         client.hear(1, 14)
         assert client.robot.t == 2 * PERIOD
         assert client.robot.servos[2].get("hardware_error_status") == 32
+
+
+def test_goals_split_anywhere_after_others_let_time_pass_for_each() -> None:
+    with Client() as client:
+        client.say(TORQUE)
+        goals = goals_of(client.robot, 0)
+        for cut in range(len(goals) + 1):
+            client.say(goals + goals + goals[:cut])
+            assert client.passed(3 * cut + 2 + (cut == len(goals))), f"cut at {cut}"
+            client.say(goals[cut:])
+            assert client.passed(3 * cut + 3), f"cut at {cut}"

@@ -1,3 +1,37 @@
-"""Simulate, calibrate, drive and study a pair of tactile antennae on a many-legged robot."""
+"""Simulate, calibrate, drive and study a pair of tactile antennae on a many-legged robot.
+
+Every name of `__all__` is imported when it is first used, so that `import antennate` costs nothing.
+"""
+
+from importlib import import_module
+from typing import Any
 
 __version__ = "0.1.0"
+
+_PLACES = {
+    "antennate.antenna.calibration": ("Calibration",),
+    "antennate.antenna.fitting": ("fit_calibration",),
+    "antennate.antenna.springs": ("spring_stiffness", "windings"),
+    "antennate.antenna.statics": ("Chain", "equilibrium"),
+    "antennate.errors": ("AntennateError", "BadInputError"),
+    "antennate.hardware.esp32.recording": ("Esp32Recording", "read_esp32"),
+    "antennate.telemetry.time_series": ("TimeSeries",),
+    "antennate.types": ("AntennaFrame", "Contact", "JointCommand", "Maneuver", "Robot"),
+}
+"""Which module holds which public names; `__init__.pyi` says the same to type checkers."""
+
+__all__ = sorted(name for names in _PLACES.values() for name in names)
+
+
+def __getattr__(name: str) -> Any:
+    """Import a public name when it is first asked for."""
+    for place, names in _PLACES.items():
+        if name in names:
+            value = globals()[name] = getattr(import_module(place), name)
+            return value
+    raise AttributeError(f"module 'antennate' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    """The public names, for completion."""
+    return [*__all__, "__version__"]

@@ -47,3 +47,7 @@ class CalibrationError(BadInputError):
 
 class LogError(BadInputError):
     """The log of a drive cannot be written, read or replayed."""
+
+
+class MissingPackageError(AntennateError, ImportError):
+    """An optional package is needed for this and not installed; the text says how to get it."""

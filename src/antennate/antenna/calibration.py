@@ -1,10 +1,9 @@
-"""A calibration and its file: the curve from readings to bend, and what is needed to trust it."""
+"""A calibration, the curve from readings [counts] to the flex level, and its file."""
 
 from __future__ import annotations
 
 import json
 import math
-import os
 from pathlib import Path
 from typing import Literal
 
@@ -12,7 +11,8 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from antennate.control.conditioning import bending_level
-from antennate.errors import CalibrationError, OutputError
+from antennate.errors import CalibrationError
+from antennate.files import read_limited, write_whole
 from antennate.params import ConditioningParams
 from antennate.types import Floats
 
@@ -22,7 +22,7 @@ FEWEST = 20
 NARROWEST_SPAN = 20.0
 """Fewest counts between straight and bent that can be told from noise."""
 NARROWEST_RISE = 10.0
-"""Fewest counts over which the bend may rise from 0.1 to 0.9: four sigma of a reading's noise."""
+"""Fewest counts over which the level may rise from 0.1 to 0.9: four times a reading's noise."""
 _RISE = 2.0 * math.log(9.0)
 """That rise of a sigmoid in units of 1 / slope."""
 _FULL_SCALE = 4095
@@ -34,7 +34,7 @@ class _Strict(BaseModel):
 
 
 class SpeedFit(_Strict):
-    """How well the one curve serves one speed."""
+    """How well the curve fits the pushes of one speed [m/s]; None where the speed is unknown."""
 
     speed_m_s: float | None
     samples: int = Field(ge=1)
@@ -43,7 +43,28 @@ class SpeedFit(_Strict):
 
 
 class Calibration(_Strict):
-    """A curve with all that is needed to trust it; what a calibration file holds."""
+    """The content of a calibration file: a sigmoid from counts to level, and how well it fits.
+
+        level = 1 / (1 + exp(-polarity slope (x - midpoint))),  x = (counts - low) / (high - low)
+
+    Attributes:
+        schema_version: Version of this format.
+        made_by: Program and version.
+        sensor_id: Which flex sensor: letters, digits, dots, hyphens, underscores.
+        data_sha256: Hash of the recording.
+        polarity: 1 if readings rise with the flex, -1 if they fall.
+        slope: Slope of the sigmoid over x; `slope_95` its 95 % interval.
+        midpoint: x at which the level is 0.5; `midpoint_95` its 95 % interval.
+        counts_low: Reading at x = 0 [counts]; `counts_high` at x = 1.
+        threshold: Level from which on there is contact (theta of the paper).
+        valid_counts: Lowest and highest reading of the recording [counts].
+        valid_bend: Lowest and highest level of the recording.
+        samples: Readings used, from `trials` pushes.
+        r2: Share of the level's variance that the curve explains; `rmse` its error.
+        speeds: The same for each pushing speed.
+        cross_validated_rmse: Error on unseen pushes of the sigmoid and of two other models.
+        better_than_sigmoid: Models that were better by more than one standard error.
+    """
 
     schema_version: Literal[1] = SCHEMA
     made_by: str = Field(max_length=64)
@@ -68,7 +89,7 @@ class Calibration(_Strict):
     better_than_sigmoid: tuple[Literal["line", "isotonic"], ...]
 
     def conditioning(self, averaging_time: float = 0.1) -> ConditioningParams:
-        """What the controller takes."""
+        """The curve as parameters of a controller; `averaging_time` [s] is T_avg of the paper."""
         return ConditioningParams(
             averaging_time=averaging_time,
             midpoint=self.midpoint,
@@ -78,60 +99,66 @@ class Calibration(_Strict):
             counts_high=self.counts_high,
         )
 
+    def level(self, counts: Floats) -> Floats:
+        """Flex level, 0 to 1, of readings [counts], same shape; NaN stays NaN."""
+        return bending_level(self.conditioning(), counts)
 
-def level(calibration: Calibration, counts: Floats) -> Floats:
-    """Bending level of readings [counts], same shape."""
-    return bending_level(calibration.conditioning(), counts)
+    def to_json(self) -> str:
+        """The content of a calibration file."""
+        return json.dumps(self.model_dump(mode="json"), indent=2, allow_nan=False) + "\n"
 
+    def save(self, path: str | Path, overwrite: bool = False) -> None:
+        """Write a calibration file, whole or not at all.
 
-def load(path: Path, sensor_id: str | None = None) -> Calibration:
-    """Read a calibration file.
+        Raises:
+            OutputError: There is such a file and it may not be replaced, or it cannot be written.
+        """
+        write_whole(Path(path), self.to_json().encode(), overwrite)
 
-    Args:
-        path: The file.
-        sensor_id: The film it has to belong to, None for any.
+    @classmethod
+    def load(cls, path: str | Path, sensor_id: str | None = None) -> Calibration:
+        """Read a calibration file.
 
-    Raises:
-        CalibrationError: It cannot be read; a field is missing, doubled, unknown or out of bounds;
-            or no film can have such a curve.
-    """
-    try:
-        with path.open("rb") as file:
-            data = file.read(_LARGEST_FILE + 1)
-    except OSError as error:
-        raise CalibrationError(f"{path}: expected a readable file: {error.strerror}") from None
-    if len(data) > _LARGEST_FILE:
-        raise CalibrationError(f"{path}: expected at most {_LARGEST_FILE} bytes, found more")
-    try:
-        found = Calibration.model_validate_json(data, strict=True)
-        json.loads(data, object_pairs_hook=_once)
-    except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        field = ".".join(str(part) for part in first["loc"]) or "the file"
-        raise CalibrationError(f"{path}: {field}: {first['msg']}") from None
-    except CalibrationError as error:
-        raise CalibrationError(f"{path}: {error}") from None
-    if sensor_id is not None and found.sensor_id != sensor_id:
-        raise CalibrationError(
-            f"{path}: sensor_id: expected {sensor_id}, found {found.sensor_id}: the calibration of "
-            "another film"
-        )
-    if why := _impossible(found):
-        raise CalibrationError(f"{path}: {why}")
-    return found
+        Args:
+            path: The file.
+            sensor_id: The flex sensor it has to belong to, None for any.
+
+        Raises:
+            CalibrationError: It cannot be read; a field is missing, doubled, unknown or out of
+                bounds; or no flex sensor can have such a curve.
+        """
+        path = Path(path)
+        data = read_limited(path, _LARGEST_FILE, CalibrationError)
+        try:
+            found = cls.model_validate_json(data, strict=True)
+            json.loads(data, object_pairs_hook=_once)
+        except ValidationError as error:
+            first = error.errors(include_url=False)[0]
+            field = ".".join(str(part) for part in first["loc"]) or "the file"
+            raise CalibrationError(f"{path}: {field}: {first['msg']}") from None
+        except CalibrationError as error:
+            raise CalibrationError(f"{path}: {error}") from None
+        if sensor_id is not None and found.sensor_id != sensor_id:
+            raise CalibrationError(
+                f"{path}: sensor_id: expected {sensor_id}, found {found.sensor_id}: the "
+                "calibration of another flex sensor"
+            )
+        if why := _impossible(found):
+            raise CalibrationError(f"{path}: {why}")
+        return found
 
 
 def _once(pairs: list[tuple[str, object]]) -> None:
-    """Refuse what pydantic lets pass: doubled keys, and truth values taken for numbers."""
+    """Refuse what pydantic accepts: doubled keys, and booleans in place of numbers."""
     keys = [key for key, _ in pairs]
     if doubled := next((key for key in keys if keys.count(key) > 1), None):
         raise CalibrationError(f"{doubled}: expected once, found {keys.count(doubled)} times")
-    if said := next((key for key, value in pairs if isinstance(value, bool)), None):
-        raise CalibrationError(f"{said}: expected no truth value, found one")
+    if key := next((key for key, value in pairs if isinstance(value, bool)), None):
+        raise CalibrationError(f"{key}: expected a number, found a boolean")
 
 
 def _impossible(found: Calibration) -> str:
-    """Why no film can have this curve, empty if one can; these bounds no file can widen."""
+    """Why no flex sensor can have this curve, empty if one can; no file can widen these bounds."""
     span = found.counts_high - found.counts_low
     if span < NARROWEST_SPAN:
         return (
@@ -147,46 +174,14 @@ def _impossible(found: Calibration) -> str:
         return f"valid_counts: expected readings of 12 bits, found {low:g} to {high:g}"
     if (width := _RISE * span / found.slope) < NARROWEST_RISE:
         return (
-            f"slope: expected a bend that rises from 0.1 to 0.9 over {NARROWEST_RISE:g} counts or "
+            f"slope: expected a level that rises from 0.1 to 0.9 over {NARROWEST_RISE:g} counts or "
             f"more, found {width:.3g}"
         )
-    ends = level(found, np.array([found.counts_low, found.counts_high]))
+    ends = found.level(np.array([found.counts_low, found.counts_high]))
     straight, bent = ends if found.polarity > 0 else ends[::-1]
     if not straight < found.threshold < bent:
         return (
-            f"midpoint: expected a bend below the threshold {found.threshold:g} at the straight "
+            f"midpoint: expected a level below the threshold {found.threshold:g} at the straight "
             f"end and above it at the bent end, found {straight:.3g} and {bent:.3g}"
         )
     return ""
-
-
-def to_json(calibration: Calibration) -> str:
-    """The content of a calibration file."""
-    return json.dumps(calibration.model_dump(mode="json"), indent=2, allow_nan=False) + "\n"
-
-
-def save(calibration: Calibration, path: Path, overwrite: bool = False) -> None:
-    """Write a calibration file, whole or not at all.
-
-    Raises:
-        OutputError: There is a file already and it may not be replaced, or it cannot be written.
-    """
-    fresh = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
-        fresh.unlink(missing_ok=True)  # of a program with this number that was killed
-        with fresh.open("x", encoding="utf-8") as file:
-            file.write(to_json(calibration))
-            file.flush()
-            os.fsync(file.fileno())
-        if overwrite:
-            fresh.replace(path)
-        else:
-            os.link(fresh, path)  # fails if there is one, even if it came this moment
-    except FileExistsError:
-        raise OutputError(
-            f"{path}: expected no such file, found one; choose another or give --overwrite"
-        ) from None
-    except OSError as error:
-        raise OutputError(f"{path}: expected to write it, found: {error.strerror}") from None
-    finally:
-        fresh.unlink(missing_ok=True)

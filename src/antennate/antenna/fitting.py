@@ -1,13 +1,15 @@
-"""From readings with a known bend to a calibration: one sigmoid, its intervals, and its rivals.
+"""From readings with a known flex level to a calibration: a sigmoid and its 95 % intervals.
 
     b = 1 / (1 + exp(-s k (x - x0))),   x = (counts - low) / (high - low)
 
-b is the bend, 0 straight and 1 full; s the polarity, found from the data; x0 the midpoint and k the
-slope. The fit minimises the squared error of b. Data that cannot be calibrated are refused.
+b is the level, 0 straight and 1 full; s the polarity, found from the data; x0 the midpoint and k
+the slope. The fit minimises the squared error of b. A straight line and an isotonic regression are
+fitted beside it for comparison. Data that cannot be calibrated are refused.
 """
 
 from __future__ import annotations
 
+import hashlib
 from dataclasses import dataclass
 from typing import Literal
 
@@ -21,21 +23,21 @@ from antennate.types import Bools, Floats, Ints
 
 MODELS = ("sigmoid", "line", "isotonic")
 REVERSAL = 0.15
-"""Share of the span by which mean readings may run backwards over the bend."""
+"""Share of the span by which mean readings may fall back while the level rises."""
 _BINS = 10
 _RAILS = (0.0, 4090.0)
-"""Readings at or beyond these say nothing about the bend [counts]."""
+"""Readings at or beyond these say nothing about the level [counts]."""
 _RAIL_SHARE = 0.2
 """Share of such readings that is too much."""
 
 
 @dataclass(frozen=True)
 class Samples:
-    """Readings with their bends.
+    """Readings with known levels.
 
     Attributes:
         counts: Readings [counts], shape (n,).
-        bend: Bends, 0 straight and 1 full, shape (n,).
+        bend: Level of each, 0 straight and 1 full, shape (n,).
         trial: Number of the push of each, shape (n,).
         speed: Pushing speed [m/s], NaN where unknown, shape (n,).
         row: Row of the file, for errors, shape (n,).
@@ -48,7 +50,7 @@ class Samples:
     row: Ints
 
     def __getitem__(self, chosen: Bools | Ints) -> Samples:
-        """Some of them."""
+        """Some rows."""
         return Samples(
             self.counts[chosen],
             self.bend[chosen],
@@ -103,30 +105,30 @@ def _check_monotonic(samples: Samples, span: float) -> None:
         bad = held[int(np.argmin(worst))]
         row = samples.row[np.flatnonzero(place == bad)[0]]
         raise CalibrationError(
-            f"row {row}: expected readings that go one way with the bend, found them turning back "
-            f"by {-worst.min():.0f} of {span:.0f} counts near a bend of "
-            f"{samples.bend[place == bad].mean():.2f} (non-monotonic); check that the film is "
+            f"row {row}: expected readings that go one way with the level, found them turning back "
+            f"by {-worst.min():.0f} of {span:.0f} counts near a level of "
+            f"{samples.bend[place == bad].mean():.2f} (non-monotonic); check that the sensor is "
             "fixed and that time and bend belong together"
         )
 
 
 def polarity(samples: Samples) -> Literal[-1, 1]:
-    """+1 if readings rise with the bend."""
+    """1 if readings rise with the level, -1 if they fall."""
     return 1 if float((samples.bend - samples.bend.mean()) @ samples.counts) >= 0 else -1
 
 
 def curve(z: Floats, slope: float, midpoint: float) -> Floats:
-    """The sigmoid of signed normalised readings."""
+    """Level, 0 to 1, of signed normalised readings z = s x, same shape; midpoint is s x0."""
     return 1.0 / (1.0 + np.exp(-np.clip(slope * (z - midpoint), -700.0, 700.0)))
 
 
 def fit_sigmoid(x: Floats, bend: Floats, sign: int) -> tuple[float, float]:
-    """Slope and midpoint of the least squared error of b.
+    """Slope k and midpoint x0 that minimise the squared error of the level.
 
     Args:
         x: Normalised readings, shape (n,).
-        bend: Bends, shape (n,).
-        sign: Polarity.
+        bend: Levels, shape (n,).
+        sign: Polarity, 1 or -1.
     """
     z = sign * x
     start = (np.log(8.0), float(np.interp(0.5, *_sorted(bend, z))))
@@ -153,17 +155,17 @@ def fit(
     draws: int = 500,
     seed: int = 0,
 ) -> Calibration:
-    """Calibrate.
+    """Calibrate recorded samples.
 
     Args:
         samples: The data.
-        sensor_id: Name of the film, of letters, digits, dots, hyphens and underscores.
+        sensor_id: Name of the flex sensor: letters, digits, dots, hyphens and underscores.
         data_sha256: Hash of the recording.
-        threshold: Bending level that counts as contact.
-        full_scale: Normalise readings by the converter's 0 to 4095 and not by the recording's ends.
-        least_r2: A worse fit is refused.
+        threshold: Flex level that counts as contact.
+        full_scale: Normalise readings by 0 to 4095 and not by the recording's extremes.
+        least_r2: A fit that explains a smaller share of the variance is refused.
         draws: Bootstrap draws.
-        seed: Seed of the bootstrap.
+        seed: Of the bootstrap.
 
     Raises:
         CalibrationError: The data cannot be calibrated, or the sigmoid does not fit them.
@@ -208,6 +210,41 @@ def fit(
     )
 
 
+def fit_calibration(
+    counts: Floats,
+    level: Floats,
+    trial: Ints | None = None,
+    speed: Floats | None = None,
+    sensor_id: str = "unnamed",
+    threshold: float = 0.5,
+) -> Calibration:
+    """Calibrate a flex sensor from arrays.
+
+    Args:
+        counts: Readings [counts], shape (n,), at least 20.
+        level: How far the antenna was bent at each, 0 straight and 1 full, shape (n,).
+        trial: Number of the push of each, shape (n,); None if it was one.
+        speed: Pushing speed of each [m/s], shape (n,); None if unknown.
+        sensor_id: Name of the flex sensor: letters, digits, dots, hyphens and underscores.
+        threshold: Flex level that counts as contact.
+
+    Raises:
+        CalibrationError: Shapes differ, a value is not finite, or the data cannot be calibrated.
+    """
+    counts, level = np.asarray(counts, float), np.asarray(level, float)
+    n = counts.shape
+    trial = np.zeros(n, np.int64) if trial is None else np.asarray(trial, np.int64)
+    speed = np.full(n, np.nan) if speed is None else np.asarray(speed, float)
+    for name, values in (("counts", counts), ("level", level), ("trial", trial), ("speed", speed)):
+        if values.ndim != 1 or values.shape != n:
+            raise CalibrationError(f"{name}: expected shape {n} as counts, found {values.shape}")
+    if not (np.isfinite(counts) & np.isfinite(level)).all():
+        raise CalibrationError("counts and level: expected finite numbers, found others")
+    samples = Samples(counts, level, trial, speed, np.arange(1, len(counts) + 1))
+    digest = hashlib.sha256(np.stack([counts, level]).tobytes()).hexdigest()
+    return fit(samples, sensor_id, digest, threshold)
+
+
 def _ends(samples: Samples) -> tuple[float, float]:
     """Readings that normalise to 0 and 1: the outermost ones, a few outliers apart."""
     low, high = np.percentile(samples.counts, [0.5, 99.5])
@@ -240,7 +277,7 @@ def _per_speed(samples: Samples, predicted: Floats) -> list[SpeedFit]:
 
 
 def _groups(samples: Samples) -> list[Ints]:
-    """What belongs together: trials, or blocks of a single one."""
+    """Rows that are not independent: trials, or ten blocks if there are fewer than three."""
     trials = np.unique(samples.trial)
     if len(trials) >= 3:
         return [np.flatnonzero(samples.trial == trial) for trial in trials]
@@ -250,7 +287,7 @@ def _groups(samples: Samples) -> list[Ints]:
 def _bootstrap(
     samples: Samples, x: Floats, sign: int, draws: int, seed: int
 ) -> tuple[tuple[float, float], tuple[float, float]]:
-    """95 % intervals of slope and midpoint over whole trials drawn anew."""
+    """95 % intervals of slope and midpoint, by drawing whole trials with replacement."""
     groups, rng = _groups(samples), np.random.default_rng(seed)
     found = []
     for _ in range(draws):
@@ -273,8 +310,9 @@ def cross_validate(samples: Samples, x: Floats, sign: int) -> dict[str, Floats]:
     return {model: np.array(e) for model, e in errors.items()}
 
 
-def _deal(groups: list[Ints], hands: int) -> list[list[Ints]]:
-    return [groups[i::hands] for i in range(min(hands, len(groups)))]
+def _deal(groups: list[Ints], parts: int) -> list[list[Ints]]:
+    """The groups in at most so many parts."""
+    return [groups[i::parts] for i in range(min(parts, len(groups)))]
 
 
 def _predict(model: str, x: Floats, bend: Floats, at: Floats, sign: int) -> Floats:

@@ -18,7 +18,7 @@ from antennate.params import SpringParams
 from antennate.params.spring import RATE_FACTOR, STOCK_WIRES_MM, WIRES
 
 
-def stiffness(modulus: float, wire: float, coil: float, coils: float) -> float:
+def spring_stiffness(modulus: float, wire: float, coil: float, coils: float) -> float:
     """Stiffness [N·m/rad] from E [Pa], wire and mean coil diameter [m] and active coils."""
     return modulus * wire**4 / (RATE_FACTOR * coil * coils) / (2.0 * math.pi)
 
@@ -48,7 +48,7 @@ def inner_stress(torque: float, wire: float, coil: float) -> float:
 
 def yield_angle(params: SpringParams, wire: float, coil: float, coils: float) -> float:
     """Angle [rad] at which a spring of these diameters [m] begins to yield."""
-    per_radian = inner_stress(stiffness(modulus_of(params), wire, coil, coils), wire, coil)
+    per_radian = inner_stress(spring_stiffness(modulus_of(params), wire, coil, coils), wire, coil)
     return yield_stress(params, wire) / per_radian
 
 
@@ -119,7 +119,7 @@ def _wind(
     params: SpringParams, wire: float, coil: float, wanted: tuple[float, ...]
 ) -> Winding | None:
     modulus, step = modulus_of(params), params.coil_step
-    one = stiffness(modulus, wire, coil, 1.0)
+    one = spring_stiffness(modulus, wire, coil, 1.0)
     coils = tuple(max(1, round(one / k / step)) * step for k in wanted)
     low, high = params.coil_limits
     if min(coils) < low or max(coils) > high:

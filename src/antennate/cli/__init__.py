@@ -7,7 +7,6 @@ answered with one line on stderr. What a command needs is imported when it runs.
 from __future__ import annotations
 
 import importlib
-import os
 import sys
 from collections.abc import Sequence
 
@@ -43,34 +42,48 @@ def main(argv: Sequence[str] | None = None) -> int:
     Returns:
         The exit code.
     """
+    from antennate.cli.output import safe_streams
+
     words = list(sys.argv[1:] if argv is None else argv)
+    name = f"antennate {words[0]}" if words and words[0] in COMMANDS else "antennate"
+    with safe_streams() as output:
+        try:
+            code = _run(words, name)
+        except KeyboardInterrupt:
+            sys.stderr.write(f"{name}: interrupted\n")
+            return INTERRUPTED
+        output.flush()
+        if output.error is None or isinstance(output.error, BrokenPipeError):
+            return code  # whoever read a pipe has seen enough
+        reason = output.error.strerror or output.error
+        sys.stderr.write(f"{name}: error: standard output: expected to write, found: {reason}\n")
+        return BAD_INPUT
+
+
+def _run(words: Sequence[str], name: str) -> int:
     if not words or words[0] in ("-h", "--help"):
         sys.stdout.write(_usage())
         return OK if words else BAD_INPUT
     if words[0] == "--version":
         sys.stdout.write(f"antennate {__version__}\n")
         return OK
-    try:
-        return _run(words[0], words[1:])
-    except KeyboardInterrupt:
-        sys.stderr.write(f"antennate {words[0]}: interrupted\n")
-        return INTERRUPTED
-    except BrokenPipeError:  # whoever read stdout has gone; nothing more can be said there
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return OK
-
-
-def _run(command: str, argv: list[str]) -> int:
-    from antennate.cli.messages import nearest, one_line
+    from antennate.cli.arguments import HelpRequest
     from antennate.errors import AntennateError, BadInputError
+    from antennate.messages import nearest, one_line, shortened
 
-    name = "antennate"
     try:
-        if command not in COMMANDS:
-            known = ", ".join(COMMANDS) + nearest(command, COMMANDS)
-            raise BadInputError(f"expected a command ({known}), found {command}")
-        name = f"antennate {command}"
-        return importlib.import_module(f"antennate.cli.{command}").command(argv)
+        if words[0] == "--completion":
+            from antennate.cli.completion import script
+
+            sys.stdout.write(script(words[1:], COMMANDS))
+            return OK
+        if words[0] not in COMMANDS:
+            known = f"{nearest(words[0], COMMANDS)}, one of {', '.join(COMMANDS)}"
+            raise BadInputError(f"expected a command{known}, found {shortened(words[0])}")
+        return importlib.import_module(f"antennate.cli.{words[0]}").command(list(words[1:]))
+    except HelpRequest as page:
+        sys.stdout.write(str(page))
+        return OK
     except AntennateError as error:
         sys.stderr.write(f"{name}: error: {one_line(str(error))}\n")
         return BAD_INPUT
@@ -87,7 +100,8 @@ def _usage() -> str:
             "commands:",
             *(f"  {name:<{width}}  {what}" for name, what in COMMANDS.items()),
             "",
-            "`antennate COMMAND --help` lists every option with its unit and default;",
+            "`antennate COMMAND --help` shows its options, `--help-all` every one;",
+            "`antennate --completion bash` (zsh, fish) prints a script for the shell;",
             "`antennate --version` prints the version.",
             "",
         ]

@@ -4,49 +4,34 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, TypeVar
+from typing import TypeVar
 
-import tyro
+from pydantic.dataclasses import dataclass
 
-from antennate.cli.arguments import Config, FromFile, parse_with, read_file
+from antennate.cli.arguments import FromFile, parse_with
+from antennate.cli.options import option
 from antennate.errors import ConfigError
 from antennate.hardware.ports.finder import is_udp
 from antennate.hardware.ports.keys import read_key
 from antennate.hardware.robot_file import RobotFile
+from antennate.params.reading import Config, read_file
 
 
 @dataclass(frozen=True)
-class RobotOrders(FromFile):
-    """The robot.
+class RobotOptions(FromFile):
+    """Where the robot is."""
 
-    Attributes:
-        config: another name of --robot
-        robot: TOML file of the robot, the same for drive, doctor and record; flags override it
-        esp32: serial port of the antenna board, tcp://HOST:PORT or udp://HOST:PORT
-        key: file with the key of a board behind udp://, mode 0600; else ANTENNATE_KEY is read
-        insecure_udp: the board has no key; anybody on the network can feign it
-    """
-
-    robot: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
-    esp32: Annotated[str, tyro.conf.arg(metavar="PORT")] = ""
-    key: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
-    insecure_udp: bool = False
-
-    @property
-    def file(self) -> Path | None:
-        """The file that was named.
-
-        Raises:
-            ConfigError: Two were.
-        """
-        if self.robot is not None and self.config is not None:
-            raise ConfigError("--robot: expected no --config beside it, its other name; found both")
-        return self.robot or self.config
+    esp32: str = option(
+        "", "antenna board: a serial port, tcp://HOST:PORT, udp://HOST:PORT", "PORT"
+    )
+    key: Path | None = option(
+        None, "file with the key of a board behind udp://, mode 0600; else ANTENNATE_KEY", "FILE"
+    )
+    insecure_udp: bool = option(False, "a board without a key; anybody on the network can feign it")
 
 
-Orders = TypeVar("Orders", bound=RobotOrders)
+Chosen = TypeVar("Chosen", bound=RobotOptions)
 
 
 def parse_robot(
@@ -54,8 +39,8 @@ def parse_robot(
     description: str,
     take: Callable[[RobotFile], Config],
     argv: Sequence[str],
-    orders: Orders,
-) -> tuple[Config, Orders]:
+    options: type[Chosen],
+) -> tuple[Config, Chosen]:
     """Read the words of a command that talks to a robot.
 
     Args:
@@ -63,30 +48,30 @@ def parse_robot(
         description: What it does.
         take: What it takes of a robot's file.
         argv: Its words.
-        orders: Its other options, by their defaults.
+        options: Its other options.
 
     Raises:
         ConfigError: A flag, the file or a value cannot be used.
-        SystemExit: Help was asked for and has been printed.
+        HelpRequest: Help was asked for.
     """
     model = type(take(RobotFile()))
     return parse_with(
-        command, description, model, argv, orders, lambda path: take(read_file(path, RobotFile))
+        command, description, model, argv, options, lambda path: take(read_file(path, RobotFile))
     )
 
 
-def key_of(orders: RobotOrders) -> bytes | None:
+def key_of(options: RobotOptions) -> bytes | None:
     """The key for a board behind udp://, None if there is no such board.
 
     Raises:
         ConfigError: --insecure-udp beside a key.
         BadInputError: There is no key, or it cannot be used.
     """
-    if not is_udp(orders.esp32):
+    if not is_udp(options.esp32):
         return None
-    if not orders.insecure_udp:
-        return read_key(orders.key, "or give --insecure-udp for a board without one")
-    if orders.key is not None:
+    if not options.insecure_udp:
+        return read_key(options.key, "or give --insecure-udp for a board without one")
+    if options.key is not None:
         raise ConfigError("--insecure-udp: expected no --key beside it, found both")
     warning = "UDP without a key: anybody on this network can feign the antenna board"
     red = "\x1b[1;31m{}\x1b[0m" if sys.stderr.isatty() else "{}"

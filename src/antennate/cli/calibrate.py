@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from antennate.antenna.calibration import to_json
 from antennate.cli.study import Keep, Step, Study
 from antennate.cli.tables import Cell, number, show, span
 from antennate.experiments.calibrate import recording
@@ -86,7 +85,7 @@ def _run(
 
 def _files(outcome: calibrate.CalibrateOutcome) -> Mapping[str, str]:
     return {
-        "calibration.json": to_json(outcome.calibration),
+        "calibration.json": outcome.calibration.to_json(),
         "conditioning.toml": outcome.conditioning_toml(),
         "recording.csv": recording.write(outcome.raw),
     }

@@ -11,8 +11,8 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from antennate.cli.messages import one_line
 from antennate.hardware.doctor.rows import Row
+from antennate.messages import one_line
 
 _STYLES = {"ok": "green", "warn": "yellow", "bad": "bold red"}
 

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
 
-import tyro
+from pydantic.dataclasses import dataclass
 
 from antennate.cli import BAD_INPUT, OK
-from antennate.cli.addresses import RobotOrders, key_of, parse_robot, require_lossless
+from antennate.cli.addresses import RobotOptions, key_of, parse_robot, require_lossless
 from antennate.cli.checks import show_rows
 from antennate.cli.folder import RunFolder, to_json
+from antennate.cli.options import option
 from antennate.cli.progress import terminate_as_interrupt
 from antennate.errors import ConfigError
 from antennate.hardware.doctor.checkup import Checkup, DoctorConfig, examine
@@ -33,24 +32,15 @@ _ROUNDS = 4
 
 
 @dataclass(frozen=True)
-class Orders(RobotOrders):
-    """What to examine, and what to do about it.
+class Orders(RobotOptions):
+    """What to examine, and what to do about it."""
 
-    Attributes:
-        bus: serial port of the servo bus, or tcp://HOST:PORT
-        fix: put right what can be, asking before each change
-        yes: answer yes to all that --fix asks
-        json: print the result in JSON and nothing else
-        out: folder for result.json, none if not given
-        overwrite: replace the run that the folder holds
-    """
-
-    bus: Annotated[str, tyro.conf.arg(metavar="PORT")] = ""
-    fix: bool = False
-    yes: bool = False
-    json: bool = False
-    out: Annotated[Path | None, tyro.conf.arg(metavar="FOLDER")] = None
-    overwrite: bool = False
+    bus: str = option("", "servo bus: a serial port, or tcp://HOST:PORT", "PORT")
+    fix: bool = option(False, "put right what can be, asking before each change")
+    yes: bool = option(False, "answer yes to all that --fix asks")
+    json: bool = option(False, "print the result in JSON and nothing else")
+    out: Path | None = option(None, "folder for result.json; none if not given", "FOLDER")
+    overwrite: bool = option(False, "replace the results that the folder holds")
 
 
 def command(argv: Sequence[str]) -> int:
@@ -59,7 +49,7 @@ def command(argv: Sequence[str]) -> int:
     Raises:
         AntennateError: Something given cannot be used, or a change did not succeed.
     """
-    config, orders = parse_robot("doctor", DESCRIPTION, RobotFile.for_doctor, argv, Orders())
+    config, orders = parse_robot("doctor", DESCRIPTION, RobotFile.for_doctor, argv, Orders)
     _check(orders)
     robot = config.calibrated()
     key = key_of(orders)

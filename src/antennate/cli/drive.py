@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Mapping, Sequence
-from contextlib import nullcontext
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
-import tyro
+from pydantic.dataclasses import dataclass
 
 from antennate.cli import BAD_INPUT, OK, viewer
-from antennate.cli.addresses import RobotOrders, key_of, parse_robot, require_lossless
+from antennate.cli.addresses import RobotOptions, key_of, parse_robot, require_lossless
 from antennate.cli.folder import LOG, RunFolder, to_json
+from antennate.cli.options import option
 from antennate.cli.progress import terminate_as_interrupt
 from antennate.cli.tables import Cell, number, show
 from antennate.errors import ConfigError
@@ -37,28 +36,18 @@ twin. An address is the path of a serial port, tcp://HOST:PORT, or, for a board 
 udp://HOST:PORT with the key it was given. First a dry run: everything is read and nothing written.
 Then, with --arm only, torque comes on with every servo where it stands. Ctrl-C or SIGTERM ends it:
 command held, torque off, verified. A lost board or servo makes it hold; the watchdogs of the servos
-stop it if this program dies. --clock is for a twin in lock-step alone, never for a robot."""
+stop it if this program dies."""
 
 
 @dataclass(frozen=True)
-class Orders(RobotOrders):
-    """What to talk to, whether to move, and where the results go.
+class Orders(RobotOptions):
+    """What to talk to, whether to move, and where the results go."""
 
-    Attributes:
-        bus: serial port of the servo bus, or tcp://HOST:PORT
-        clock: address of the clock of `antennate twin --pace lockstep`: time is the twin's
-        arm: torque on after the dry run
-        out: folder for log and result, runs/drive-N if not given
-        overwrite: replace the results that the folder holds
-        json: print the content of result.json and nothing else on stdout
-    """
-
-    bus: Annotated[str, tyro.conf.arg(metavar="PORT")] = ""
-    clock: Annotated[str, tyro.conf.arg(metavar="PORT")] = ""
-    arm: bool = False
-    out: Annotated[Path | None, tyro.conf.arg(metavar="FOLDER")] = None
-    overwrite: bool = False
-    json: bool = False
+    bus: str = option("", "servo bus: a serial port, or tcp://HOST:PORT", "PORT")
+    arm: bool = option(False, "torque on after the dry run")
+    out: Path | None = option(None, "folder for log and result, else runs/drive-N", "FOLDER")
+    overwrite: bool = option(False, "replace the results that the folder holds")
+    json: bool = option(False, "print the content of result.json and nothing else")
 
 
 def command(argv: Sequence[str]) -> int:
@@ -67,21 +56,19 @@ def command(argv: Sequence[str]) -> int:
     Raises:
         AntennateError: A port, a servo or the board is not what is needed; nothing moved then.
     """
-    config, orders = parse_robot("drive", DESCRIPTION, RobotFile.for_drive, argv, Orders())
+    config, orders = parse_robot("drive", DESCRIPTION, RobotFile.for_drive, argv, Orders)
     for name in ("esp32", "bus"):
         if not getattr(orders, name):
             raise ConfigError(f"--{name}: expected a serial port, found none")
     if same(orders.esp32, orders.bus):
         raise ConfigError(f"--esp32 and --bus: expected two ports, found {orders.bus} twice")
-    if orders.clock and any(same(orders.clock, one) for one in (orders.esp32, orders.bus)):
-        raise ConfigError(f"--clock: expected a port of its own, found {orders.clock} twice")
     config = config.calibrated()
     require_lossless(orders.bus)
     key = key_of(orders)
     with RunFolder.open("drive", orders.out, orders.overwrite) as folder:
         folder.describe("drive", argv, config)
         folder.without_trials()
-        wires = connect(config, orders.esp32, orders.bus, key, orders.clock)
+        wires = connect(config, orders.esp32, orders.bus, key)
         with wires as session, terminate_as_interrupt():
             result = _carry_out(config, session, orders, folder.path / LOG)
         folder.finish(result, ())
@@ -97,27 +84,23 @@ def command(argv: Sequence[str]) -> int:
 
 
 def _carry_out(config: DriveConfig, session: Session, orders: Orders, log: Path) -> dict[str, Any]:
-    """Drive, with the log and the status line in a process of their own.
-
-    In a twin's time nothing is urgent, and the log is waited for.
-    """
+    """Drive, with the log and the status line in a process of their own."""
     header = Header(controller=config.controller, params=config.control, layout=config.layout)
     required = [viewer.REQUIRED] if config.record_required else []
 
     def words(number: int) -> list[str]:
         return [sys.executable, "-m", viewer.__name__, str(part(log, number)), *required]
 
-    feed = Feed(words, header.pack(), waits=bool(orders.clock))
+    feed = Feed(words, header.pack())
 
     def keep(session: Session, t: float) -> None:
         feed.send(Tick.of(session, t).pack())
         session.unrecorded = config.record_required and not feed.keeps
 
-    with feed, nullcontext(Priority.ORDINARY) if orders.clock else urgent() as priority:
+    with feed, urgent() as priority:
         report = drive(session, config, orders.arm, keep)
     head = {"schema": 1, "command": "drive", "controller": config.controller, "armed": orders.arm}
     tail = {
-        "clock": "twin" if orders.clock else "host",
         "priority": priority.value,
         "unlogged": 0 if feed.complete else feed.offered - count(log),
         "log_complete": feed.complete,
@@ -149,9 +132,7 @@ def _note(result: Mapping[str, Any]) -> str:
         note += f"Not armed: {result['refusal']}.\n"
     if _idle(result):
         note += "It never walked: --arm was given, and no command was sent.\n"
-    if result["clock"] == "twin":
-        note += "Time was the twin's.\n"
-    elif result["priority"] == Priority.ORDINARY.value:
+    if result["priority"] == Priority.ORDINARY.value:
         note += "Real-time priority was not allowed; a busy machine will make it miss ticks.\n"
     if not result["log_complete"]:
         note += f"The log is not complete; its files: {', '.join(result['logs']) or 'none'}.\n"

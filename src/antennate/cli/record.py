@@ -10,15 +10,14 @@ import sys
 import termios
 from collections import deque
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from statistics import fmean, pstdev
-from typing import Annotated
 
-import tyro
+from pydantic.dataclasses import dataclass
 
 from antennate.cli import OK
-from antennate.cli.addresses import RobotOrders, key_of, parse_robot
+from antennate.cli.addresses import RobotOptions, key_of, parse_robot
+from antennate.cli.options import option
 from antennate.cli.progress import terminate_as_interrupt
 from antennate.errors import BadInputError, ConfigError, OutputError
 from antennate.hardware.doctor.ports import opener_of
@@ -40,14 +39,10 @@ _SHOWN = 100
 
 
 @dataclass(frozen=True)
-class Orders(RobotOrders):
-    """Where from and where to.
+class Orders(RobotOptions):
+    """Where from and where to."""
 
-    Attributes:
-        out: CSV file to make
-    """
-
-    out: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
+    out: Path | None = option(None, "CSV file to make", "FILE")
 
 
 def command(argv: Sequence[str]) -> int:
@@ -56,7 +51,7 @@ def command(argv: Sequence[str]) -> int:
     Raises:
         AntennateError: Something given cannot be used, or the board is silent.
     """
-    params, orders = parse_robot("record", DESCRIPTION, RobotFile.for_record, argv, Orders())
+    params, orders = parse_robot("record", DESCRIPTION, RobotFile.for_record, argv, Orders)
     if not orders.esp32:
         raise ConfigError("--esp32: expected a serial port, found none")
     if orders.out is None:

@@ -4,20 +4,20 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import tyro
+from pydantic.dataclasses import dataclass
 
 from antennate.cli import BAD_INPUT, OK
 from antennate.cli.arguments import FromFile, parse_with
 from antennate.cli.folder import RunFolder, to_csv, to_json
-from antennate.cli.messages import one_line
+from antennate.cli.options import option
 from antennate.cli.tables import Cell, number, show
 from antennate.errors import ConfigError
+from antennate.messages import one_line
 from antennate.telemetry.reader import Damage, LogReader
 from antennate.telemetry.replay import ReplayConfig, Replayed, recorded_decider, replay
 from antennate.telemetry.ticks import FIELDS, Tick
@@ -37,20 +37,14 @@ _MOST_DRAWN = 5000
 
 @dataclass(frozen=True)
 class Options(FromFile):
-    """Which log, and what to leave behind.
+    """Which log, and what to leave behind."""
 
-    Attributes:
-        log: log of a drive
-        config: TOML file with the parameters below as keys; flags override it
-        out: folder for result.json, ticks.csv and a figure; none are written if not given
-        overwrite: replace the results that the folder holds
-        json: print the result as JSON and nothing else
-    """
-
-    log: tyro.conf.Positional[Annotated[str, tyro.conf.arg(metavar="LOG")]] = ""
-    out: Annotated[Path | None, tyro.conf.arg(metavar="FOLDER")] = None
-    overwrite: bool = False
-    json: bool = False
+    log: str = option("", "log of a drive", "LOG", positional=True)
+    out: Path | None = option(
+        None, "folder for result.json, ticks.csv and a figure; none if not given", "FOLDER"
+    )
+    overwrite: bool = option(False, "replace the results that the folder holds")
+    json: bool = option(False, "print the result as JSON and nothing else")
 
 
 def command(argv: Sequence[str]) -> int:
@@ -59,7 +53,7 @@ def command(argv: Sequence[str]) -> int:
     Raises:
         AntennateError: The log, the controller or the folder cannot be used.
     """
-    config, options = parse_with("replay", DESCRIPTION, ReplayConfig, argv, Options())
+    config, options = parse_with("replay", DESCRIPTION, ReplayConfig, argv, Options)
     if not options.log:
         raise ConfigError("expected the log of a drive, found none")
     path = Path(options.log)

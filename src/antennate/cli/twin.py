@@ -8,26 +8,26 @@ import secrets
 import sys
 from collections.abc import Sequence
 from contextlib import nullcontext
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Literal
 
-import tyro
+from pydantic.dataclasses import dataclass
 
 from antennate.cli import OK
 from antennate.cli.arguments import FromFile, parse_with
+from antennate.cli.options import option
 from antennate.cli.progress import end_at_first
 from antennate.errors import ConfigError
 from antennate.experiments.twin import TwinConfig, watched
 from antennate.hardware.driving.priority import LEVEL, urgent
 from antennate.hardware.ports.keys import read_key
-from antennate.twin.ends import End, Terminal
+from antennate.twin.endpoints import Endpoint
 from antennate.twin.faults import Faults, read
 from antennate.twin.serve import TwinServer
-from antennate.twin.tcp import TcpEnd
-from antennate.twin.udp import UdpEnd
+from antennate.twin.tcp import TcpEndpoint
+from antennate.twin.udp import UdpEndpoint
 
-_LAST_PORT = 65_533
+_LAST_PORT = 65_534
 
 DESCRIPTION = """\
 Serve the simulated robot in a tunnel as real bytes on two pseudo-terminals: the frames of the
@@ -36,30 +36,25 @@ With --tcp both are TCP ports, with --udp the board is a UDP port that signs as 
 Physics begins when the first servo gets torque. Faults, each with @Ts for its time:
 servo:ID=silent, bad_crc, truncated, late:SECONDS, doubled, wrong_id, oversized, voltage, overheat,
 encoder, shock, overload, reboot or REGISTER:VALUE; esp32=silent, reset, open_left, open_right,
-left:COUNTS, right:COUNTS or ber:SHARE; bus=silent, loss:SHARE, latency:SECONDS, sag:VOLTS_A_SECOND
-or ber:SHARE; link=ber:SHARE (bits wrong) or loss:SHARE (bytes lost), on both wires both ways.
+left:COUNTS, right:COUNTS or ber:SHARE; bus=silent, loss:SHARE, latency:SECONDS,
+discharge:VOLTS_A_SECOND or ber:SHARE; link=ber:SHARE (bits wrong) or loss:SHARE (bytes
+lost), on both wires both ways.
 --touch left@2s right@5s bends the antennae of the standing robot, as the check by touch of
 `antennate drive` wants it. --fault and --touch may be repeated."""
 
 
 @dataclass(frozen=True)
 class Places(FromFile):
-    """Where to serve, two pseudo-terminals if not given.
+    """Where to serve; two pseudo-terminals if no port is given."""
 
-    Attributes:
-        config: TOML file with the parameters below as keys and tables; flags override it
-        tcp: both on TCP ports of this host, 127.0.0.1 if not given; 0 takes any, else PORT is the
-            board's, PORT+1 the bus's, and PORT+2 the clock's
-        udp: the board on a UDP port instead, likewise
-        key: file with the key for --udp, mode 0600; else ANTENNATE_KEY is read
-        pace: real time, or lockstep: time passes as the client of the clock wants (`antennate drive
-            --clock`), or, without one, a control period with each sync write of all goals
-    """
-
-    tcp: Annotated[str, tyro.conf.arg(metavar="[HOST:]PORT")] = ""
-    udp: Annotated[str, tyro.conf.arg(metavar="[HOST:]PORT")] = ""
-    key: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
-    pace: Literal["real", "lockstep"] = "real"
+    tcp: str = option("", "TCP: the board on PORT, the bus on PORT+1; 0 takes any", "[HOST:]PORT")
+    udp: str = option("", "the board on a UDP port instead, likewise", "[HOST:]PORT")
+    key: Path | None = option(
+        None, "file with the key for --udp, mode 0600; else ANTENNATE_KEY", "FILE"
+    )
+    pace: Literal["real", "lockstep"] = option(
+        "real", "real time, or a control period with each sync write of all goals"
+    )
 
 
 def command(argv: Sequence[str]) -> int:
@@ -73,12 +68,12 @@ def command(argv: Sequence[str]) -> int:
 
 
 def _serve(argv: Sequence[str]) -> int:
-    config, places = parse_with("twin", DESCRIPTION, TwinConfig, argv, Places())
+    config, places = parse_with("twin", DESCRIPTION, TwinConfig, argv, Places)
     faults = Faults([read(text) for text in config.fault], config.layout.ids)
     real = places.pace == "real"
     robot, passage = watched(config, boot_id=secrets.randbits(32) if real else None)
     end = float("inf") if config.duration is None else config.duration
-    with TwinServer(robot, faults, *_ends(places)) as server:
+    with TwinServer(robot, faults, *_endpoints(places)) as server:
         try:
             sys.stdout.write(json.dumps(server.paths) + "\n")
             sys.stdout.flush()
@@ -92,18 +87,16 @@ def _serve(argv: Sequence[str]) -> int:
     return OK
 
 
-def _ends(places: Places) -> tuple[End | None, End | None, End | None]:
-    """Ends of the board and of the bus, None for a pseudo-terminal; and of the clock, if any."""
-    board = bus = clock = None
-    lockstep = places.pace == "lockstep"
+def _endpoints(places: Places) -> tuple[Endpoint | None, Endpoint | None]:
+    """Endpoints of the board and the bus, None for a pseudo-terminal."""
+    board = bus = None
     if places.udp:
-        board = UdpEnd(*_place("--udp", places.udp), read_key(places.key))
+        board = UdpEndpoint(*_place("--udp", places.udp), read_key(places.key))
     if places.tcp:
         host, port = _place("--tcp", places.tcp)
-        board = board or TcpEnd(host, port)
-        bus = TcpEnd(host, port and port + 1)
-        clock = TcpEnd(host, port and port + 2) if lockstep else None
-    return board, bus, clock or (Terminal() if lockstep else None)
+        board = board or TcpEndpoint(host, port)
+        bus = TcpEndpoint(host, port and port + 1)
+    return board, bus
 
 
 def _place(flag: str, text: str) -> tuple[str, int]:

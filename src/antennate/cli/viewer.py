@@ -14,9 +14,9 @@ import signal
 import sys
 from pathlib import Path
 
-from antennate.cli.messages import one_line
 from antennate.errors import LogError
 from antennate.hardware.driving.signals import STOPS
+from antennate.messages import one_line
 from antennate.telemetry.feed import Message, messages
 from antennate.telemetry.header import Header
 from antennate.telemetry.ticks import Tick

@@ -31,9 +31,9 @@ from antennate.params.base import GATHERED
 from antennate.params.twin import BatteryParams
 from antennate.robots.layout import LayoutParams
 from antennate.sim.sim_robot import SimRobot
-from antennate.twin.hand import Hand
 from antennate.twin.lockstep import BoardPort, LockstepClock
 from antennate.twin.robot import TwinRobot
+from antennate.twin.touch import TouchStimulus
 from antennate.types import AntennaFrame, Clock, JointCommand, Robot
 
 _WARM_UP = 2.0
@@ -69,7 +69,7 @@ class TwinConfig(Params):
         (),
         "1",
         "assumed: nobody is there",
-        "antennae bent by hand before it walks, such as left@2s; from the first packet on the bus",
+        "antennae touched before it walks, such as left@2s; from the first packet on the bus",
     )
     battery: BatteryParams = BatteryParams()
     layout: LayoutParams = LayoutParams()
@@ -88,14 +88,14 @@ def watched(config: TwinConfig, boot_id: int | None = None) -> tuple[TwinRobot, 
     body = SimRobot(1, world.robot.sensor, period, world.physics.timestep)
     body.load(0, start.world, start.chance)
     boot = config.trial + 1 if boot_id is None else boot_id
-    hand, passage = Hand(config.touch, world.control.conditioning), Passage(start.tunnel)
+    touch, passage = TouchStimulus(config.touch, world.control.conditioning), Passage(start.tunnel)
     robot = TwinRobot(
         body,
         config.layout,
         period,
         boot,
         standing_noise=True,
-        hand=hand,
+        touch=touch,
         watch=passage.watch,
         battery=config.battery,
     )

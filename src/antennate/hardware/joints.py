@@ -45,7 +45,7 @@ class Joints:
         """Goal positions [ticks] of a command of one robot, shape (19,).
 
         Raises:
-            CommandError: It is no command of one robot, not finite, or beyond a limit or what servos
+            CommandError: It is not of one robot, not finite, or beyond a limit or what servos
                 count. It is refused as a whole.
         """
         angles = _angles(command)
@@ -91,7 +91,7 @@ def plain(command: JointCommand) -> JointCommand:
     """A copy of the command of one robot, which nobody else changes; it may have been anything.
 
     Raises:
-        CommandError: It is no command of one robot.
+        CommandError: It is not of one robot.
     """
     return JointCommand(**{name: _part(command, name, shape) for name, shape in _SHAPES.items()})
 

@@ -8,7 +8,6 @@ properties, computed here and never typed.
 
 from antennate.params.base import Params, number
 from antennate.params.bench import BenchVariationParams, WallParams
-from antennate.params.clock import ClockParams
 from antennate.params.control import (
     ConditioningParams,
     ControlParams,
@@ -42,7 +41,7 @@ from antennate.params.touch import (
     StepWallParams,
     TouchWallsParams,
 )
-from antennate.params.twin import BatteryParams, TwinParams
+from antennate.params.twin import BatteryParams
 from antennate.params.wires import BoardParams, BusParams, PortParams
 
 __all__ = [
@@ -52,7 +51,6 @@ __all__ = [
     "BoardParams",
     "BouldersWallParams",
     "BusParams",
-    "ClockParams",
     "ConditioningParams",
     "ControlParams",
     "CornerWallParams",
@@ -85,7 +83,6 @@ __all__ = [
     "TouchWallsParams",
     "TunnelParams",
     "TurnsParams",
-    "TwinParams",
     "VariationParams",
     "WallParams",
     "number",

@@ -1,4 +1,4 @@
-"""What the twin's robot is fed from, and how its board and servos behave."""
+"""The supply of the twin's robot."""
 
 from __future__ import annotations
 
@@ -6,13 +6,13 @@ from antennate.params.base import Params, number
 
 
 class BatteryParams(Params):
-    """The supply of a twin once it begins to sag; until then it is stiff."""
+    """The supply of a twin once it discharges; until then its voltage is constant."""
 
     voltage: float = number(
         11.1,
         "V",
         "datasheet: XC430-W240, recommended voltage; three lithium cells",
-        "voltage at rest before it sags",
+        "voltage at rest before it discharges",
         gt=0,
         le=16,
     )
@@ -39,66 +39,4 @@ class BatteryParams(Params):
         "current of a servo that pulls as hard as it can",
         ge=0,
         le=10,
-    )
-
-
-class TwinParams(Params):
-    """Habits of the twin's board, servos, adapter and hand."""
-
-    greeting_period: float = number(
-        1.0, "s", "assumed: as firmware/main.py", "time between greetings of the board", gt=0, le=60
-    )
-    boot_samples: int = number(
-        50,
-        "1",
-        "assumed: half a second at 100 Hz",
-        "samples that a starting board does not send",
-        ge=0,
-        le=10_000,
-    )
-    standing_noise: float = number(
-        2.5,
-        "counts",
-        "assumed: as while walking",
-        "standard deviation of the readings of a resting film",
-        ge=0,
-        le=100,
-    )
-    udp_silence: float = number(
-        0.1,
-        "s",
-        "assumed: ten samples",
-        "silence after which the board answers no asks either",
-        gt=0,
-        le=10,
-    )
-    servo_boot: float = number(
-        0.25, "s", "assumed: not in the manual", "time after a reboot without ears", gt=0, le=10
-    )
-    packet_patience: float = number(
-        0.01,
-        "s",
-        "assumed: ten times the longest packet used",
-        "silence after which servos forget half a packet",
-        gt=0,
-        le=1,
-    )
-    lump: float = number(
-        0.00025,
-        "s",
-        "assumed: two microframes of USB",
-        "answers leave in lumps of this time",
-        gt=0,
-        le=0.1,
-    )
-    hand_depth: float = number(
-        0.6,
-        "1",
-        "assumed: twice what the check by touch asks for",
-        "change of the reading by a hand, in spans",
-        gt=0,
-        le=1,
-    )
-    hand_time: float = number(
-        1.0, "s", "assumed: a slow touch", "time for which the hand bends an antenna", gt=0, le=60
     )

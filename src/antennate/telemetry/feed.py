@@ -2,7 +2,7 @@
 
 A message is the content of a record behind its length and how many were dropped before it. The
 loop writes it to a pipe at once or not at all: what the other process cannot take is dropped and
-counted; in a twin's time, which stands still meanwhile, it waits. The content of no bytes says that
+counted. The content of no bytes says that
 the loop has ended in order; a pipe that closes without it means that the loop was killed.
 """
 
@@ -54,7 +54,6 @@ class Feed:
         words: The command line of the n-th process, 1 the first. It reads messages from its
             standard input, and writes anything to its standard output once it keeps them.
         first: The content of the first message, of any length.
-        waits: Wait for room instead of dropping, where the loop's time is not the host's.
         params: How many processes may follow the first.
 
     Attributes:
@@ -68,10 +67,9 @@ class Feed:
         self,
         words: Callable[[int], Sequence[str]],
         first: bytes,
-        waits: bool = False,
         params: LogParams | None = None,
     ) -> None:
-        self._words, self._first, self._waits = words, first, waits
+        self._words, self._first = words, first
         self._most = 1 + (params or LogParams()).restarts
         self._process: subprocess.Popen[bytes] | None = None
         self._pipe = -1
@@ -157,7 +155,7 @@ class Feed:
             with contextlib.suppress(OSError, AttributeError):  # less room where not allowed
                 fcntl.fcntl(ours, fcntl.F_SETPIPE_SZ, _ROOM)
             os.write(ours, _HEAD.pack(len(self._first), self.dropped) + self._first)
-            os.set_blocking(ours, self._waits)
+            os.set_blocking(ours, False)
             if self._pipe < 0:
                 self._pipe = os.dup(ours)
             else:

@@ -86,7 +86,7 @@ class ReplayBody:
 
 
 class _Guarded:
-    """A controller asked when it was then, whose exceptions give a command of NaN, as in a session."""
+    """A controller asked when it was then, whose exceptions give NaN, as in a session."""
 
     def __init__(self, decider: Decider, body: ReplayBody) -> None:
         self._decider, self._body = decider, body

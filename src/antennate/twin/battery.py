@@ -1,4 +1,4 @@
-"""A supply that runs empty and gives way under load."""
+"""A supply that discharges, and whose voltage drops under load."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _TICK = 2.0 * math.pi / TICKS_A_TURN
 
 
 class Battery:
-    """Feeds all servos; stiff until `sag` is called.
+    """Feeds all servos; its voltage is constant until `discharge` is called.
 
     Args:
         params: Its numbers.
@@ -32,8 +32,8 @@ class Battery:
         self._begin = math.inf
         self._rate = 0.0
 
-    def sag(self, t: float, rate: float) -> None:
-        """From t [s] on it falls by `rate` [V/s], and gives way under load."""
+    def discharge(self, t: float, rate: float) -> None:
+        """From t [s] on the voltage falls by `rate` [V/s], and drops under load."""
         self._begin, self._rate = t, rate
 
     def feed(self, servos: Sequence[Servo], t: float) -> None:

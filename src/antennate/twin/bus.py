@@ -6,7 +6,7 @@ A reply leaves one return delay after the request, and is there when its last by
 together answer one after the other; each waits for the one before it, so that the chain stops at a
 silent servo, in sync reads (https://github.com/ROBOTIS-GIT/DynamixelSDK/issues/331) as in fast
 ones. Two servos with one id talk at the same time, and of their bits the zeros win. The master
-is expected to be quiet meanwhile: what it says never collides with an answer.
+is expected to be quiet meanwhile: its packets never collide with an answer.
 """
 
 from __future__ import annotations
@@ -22,11 +22,12 @@ from antennate.hardware.dynamixel import packets
 from antennate.hardware.dynamixel.packets import BROADCAST, Instruction, Packet, Status, StatusError
 from antennate.hardware.dynamixel.parser import Parser
 from antennate.hardware.dynamixel.tables import BAUD_RATES, RETURN_DELAY_UNIT, XC430_W240
-from antennate.params import TwinParams
 from antennate.twin.noise import Noise
 from antennate.twin.registers import Servo
 
-_GIVE_UP = TwinParams().packet_patience
+_GIVE_UP = 0.01
+"""Silence after which servos forget half a packet [s]: ten times the longest packet used."""
+
 _GOAL = XC430_W240["goal_position"]
 _CLEAR = b"\x01\x44\x58\x4c\x22"
 
@@ -34,7 +35,7 @@ _CLEAR = b"\x01\x44\x58\x4c\x22"
 class Fault(Enum):
     """What may be wrong with the answers of a servo."""
 
-    SILENT = "hears nothing and says nothing"
+    SILENT = "takes nothing and replies nothing"
     BAD_CRC = "answers with a wrong CRC"
     TRUNCATED = "stops in the middle of an answer"
     LATE = "answers, and all after it, `delay` seconds late"
@@ -71,8 +72,8 @@ class ServoBus:
     Attributes:
         latency: Time by which the adapter delivers answers late [s].
         noise: What the wire does to bytes, both ways.
-        heard_at: Bits per second of the master; servos set to another baud hear nothing. None
-            while that is not known: then all do.
+        master_baud: Bits per second of the master; servos set to another baud understand nothing.
+            None while that is not known: then all do.
         on_goals: Called when a sync write has given every servo a goal position.
     """
 
@@ -90,16 +91,17 @@ class ServoBus:
         self.fast = fast
         self.latency = 0.0
         self.noise = Noise(seed=1)
-        self.heard_at: int | None = None
+        self.master_baud: int | None = None
         self.on_goals: Callable[[], None] = lambda: None
         self._byte_time = 10.0 / baud
         self._rng = rng or np.random.default_rng(0)
         self._parser = Parser()
-        self._last = 0.0
+        self._t = self._last = 0.0
         self._out: list[tuple[float, bytes]] = []
 
     def advance(self, t: float) -> None:
         """Let the servos move until t."""
+        self._t = max(self._t, t)
         for servo in self.servos:
             servo.advance(t)
 
@@ -111,6 +113,9 @@ class ServoBus:
         for packet in self._parser.feed(self.noise(data)):
             if packet.instruction != Instruction.STATUS:
                 self._handle(self._last, packet)
+                # Goals may have let time pass. That is no silence: the bytes behind them came
+                # together with them, so the wire is busy until then.
+                self._last = max(self._last, self._t)
 
     def next_time(self) -> float | None:
         """When the next bytes for the master are there [s]."""
@@ -126,9 +131,9 @@ class ServoBus:
     # requests
 
     def _handle(self, t: float, packet: Packet) -> None:
-        present = [s for s in self.servos if s.awake(t) and self._hears(s)]
+        present = [s for s in self.servos if s.awake(t) and self._understands(s)]
         for servo in present:
-            servo.heard(t)
+            servo.feed_watchdog(t)
         many = {
             Instruction.SYNC_READ: self._sync_read,
             Instruction.FAST_SYNC_READ: self._fast_sync_read,
@@ -183,8 +188,8 @@ class ServoBus:
             servos = [s for s in present if s.get("id") == name and s.get("status_return_level")]
             if not servos:
                 return
-            said = [packets.status(_answer(s, name, *s.read(address, length))) for s in servos]
-            t = self._reply(t, servos[0], said)
+            replies = [packets.status(_answer(s, name, *s.read(address, length))) for s in servos]
+            t = self._reply(t, servos[0], replies)
 
     def _fast_sync_read(self, t: float, present: list[Servo], params: bytes) -> None:
         address, length = _two_words(params)
@@ -207,24 +212,24 @@ class ServoBus:
     # answers
 
     def _reply(
-        self, t: float, servo: Servo, said: list[bytes], delay: float | None = None
+        self, t: float, servo: Servo, replies: list[bytes], delay: float | None = None
     ) -> float:
-        """Put what servos of one id say on the wire after t; the time at which it ends."""
-        if not said:
+        """Put the replies of servos of one id on the wire after t; the time at which they end."""
+        if not replies:
             return t
         trouble = self._use(servo)
         start = t + (RETURN_DELAY_UNIT * servo.get("return_delay_time") if delay is None else delay)
         if trouble and trouble.fault is Fault.LATE:
             start += trouble.delay
-        data = bytes(_collide(said))
+        data = bytes(_collide(replies))
         data = _spoil(data, trouble.fault) if trouble else data
         end = start + self._byte_time * len(data)
         if not (self.loss and self._rng.random() < self.loss):
             self._out.append((end + self.latency, data))
         return end
 
-    def _hears(self, servo: Servo) -> bool:
-        known = self.heard_at is None or BAUD_RATES[servo.get("baud_rate")] == self.heard_at
+    def _understands(self, servo: Servo) -> bool:
+        known = self.master_baud is None or BAUD_RATES[servo.get("baud_rate")] == self.master_baud
         return known and not self._is(servo, Fault.SILENT)
 
     def _is(self, servo: Servo, fault: Fault) -> bool:
@@ -252,12 +257,12 @@ def _two_words(params: bytes) -> tuple[int, int]:
     return int.from_bytes(params[:2], "little"), int.from_bytes(params[2:4], "little")
 
 
-def _collide(said: list[bytes]) -> list[int]:
+def _collide(replies: list[bytes]) -> list[int]:
     mixed: list[int] = []
-    for together in zip_longest(*said, fillvalue=0xFF):
+    for together in zip_longest(*replies, fillvalue=0xFF):
         byte = 0xFF
-        for one in together:
-            byte &= one
+        for bits in together:
+            byte &= bits
         mixed.append(byte)
     return mixed
 

@@ -26,7 +26,7 @@ _SIDES = ("left", "right")
 _KNOWN = {
     "servo": (*_SERVO, *_HARDWARE, "reboot"),
     "esp32": ("silent", "reset", "open_left", "open_right", "left", "right", "ber"),
-    "bus": ("loss", "silent", "latency", "sag", "ber"),
+    "bus": ("loss", "silent", "latency", "discharge", "ber"),
     "link": ("loss", "ber"),
 }
 _SHARES = ("loss", "ber")
@@ -130,8 +130,8 @@ def _break_board(robot: TwinRobot, demand: Demand) -> None:
 def _break_bus(robot: TwinRobot, demand: Demand) -> None:
     if demand.what == "latency":
         robot.bus.latency = demand.size
-    elif demand.what == "sag":
-        robot.battery.sag(robot.t, demand.size)
+    elif demand.what == "discharge":
+        robot.battery.discharge(robot.t, demand.size)
     elif demand.what == "ber":
         robot.bus.noise.ber = demand.size
     else:

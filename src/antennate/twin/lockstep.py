@@ -1,17 +1,24 @@
-"""Hardware code and twin in one invented time: waiting is what makes the twin go on."""
+"""Hardware code and twin in one invented time, which passes while the hardware code waits."""
 
 from __future__ import annotations
 
-from antennate.twin.link import Link
-from antennate.twin.robot import TwinRobot
+from antennate.twin.faults import Faults
+from antennate.twin.robot import ROUNDING, TwinRobot
+from antennate.twin.wire import SimulatedWire
 
 
-class LockstepClock(Link):
-    """The bus of a twin robot as a Port, and the clock of everything."""
+class LockstepClock(SimulatedWire):
+    """The bus of a twin robot as a Port, and the clock of everything.
 
-    def __init__(self, robot: TwinRobot) -> None:
+    Args:
+        robot: The robot.
+        faults: What goes wrong, and when; nothing by default.
+    """
+
+    def __init__(self, robot: TwinRobot, faults: Faults | None = None) -> None:
         super().__init__(robot.bus)
         self._robot, self._t = robot, robot.t
+        self._faults = faults or Faults([], ())
 
     def sleep_until(self, t: float) -> None:
         """Let time pass until t [s], if it has not yet."""
@@ -19,6 +26,9 @@ class LockstepClock(Link):
             self._until(t)
 
     def _until(self, t: float) -> None:
+        while self._robot.due <= t + ROUNDING:
+            self._faults.apply(self._robot, self._robot.due)
+            self._robot.advance(self._robot.due)
         self._robot.advance(t)
         super()._until(t)
 
@@ -33,10 +43,10 @@ class BoardPort:
 
     def write(self, data: bytes) -> None:
         """Send to the board."""
-        self._robot.hear(data)
+        self._robot.receive(data)
 
     def read(self, most: int, timeout: float) -> bytes:
-        """What has come by now, or comes within `timeout` [s]."""
+        """Bytes that have come by now, or come within `timeout` [s]."""
         if not self._came:
             self._came = self._robot.take()
         if not self._came and timeout > 0:
@@ -46,7 +56,7 @@ class BoardPort:
         return came
 
     def drain(self) -> int:
-        """Throw away what has come; how many bytes that was."""
+        """Throw away the bytes that have come; how many."""
         count = len(self._came) + len(self._robot.take())
         self._came = b""
         return count

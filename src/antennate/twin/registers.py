@@ -21,9 +21,9 @@ from antennate.hardware.dynamixel.tables import (
     Register,
     Table,
 )
-from antennate.params import TwinParams
 
-BOOT_TIME = TwinParams().servo_boot
+BOOT_TIME = 0.25
+"""Time after a reboot in which it takes nothing [s]; assumed, the manual says nothing."""
 
 _POSITION_MODES = (3, 4, 5)
 _VELOCITY_MODE = 1
@@ -85,9 +85,9 @@ class Servo:
         return self._position
 
     @property
-    def last_heard(self) -> float:
+    def last_fed(self) -> float:
         """When an instruction packet last fed its bus watchdog [s]."""
-        return self._heard
+        return self._fed
 
     @property
     def torque(self) -> bool:
@@ -113,7 +113,7 @@ class Servo:
     # what the wire sees
 
     def awake(self, t: float) -> bool:
-        """It listens."""
+        """It takes packets."""
         return t >= self._boot
 
     def advance(self, t: float) -> None:
@@ -127,10 +127,10 @@ class Servo:
             self._stopped = True
         self._move(t)
 
-    def heard(self, t: float) -> None:
-        """An instruction packet, for whomever, was on the bus."""
+    def feed_watchdog(self, t: float) -> None:
+        """An instruction packet, for any servo, was on the bus."""
         self.advance(t)
-        self._heard = t
+        self._fed = t
 
     def read(self, address: int, length: int) -> tuple[StatusError, bytes]:
         """Bytes of the table."""
@@ -180,7 +180,7 @@ class Servo:
         self.set("goal_position", round(self._position))
         self.set("present_input_voltage", self.get("min_voltage_limit") + _VOLTS_MARGIN)
         self.set("present_temperature", _ROOM_TEMPERATURE)
-        self._boot = self._heard = boot
+        self._boot = self._fed = boot
         self._stopped = False
         self._show(0.0)
 
@@ -216,7 +216,7 @@ class Servo:
         if register.name in GOALS or register.name == "torque_enable":
             self._stopped = False
         if register.name in ("torque_enable", "bus_watchdog"):
-            self._heard = max(self._heard, self._t)
+            self._fed = max(self._fed, self._t)
         self.set(register.name, value)
         if register.name in GOALS and self.get("drive_mode") & _TORQUE_BY_GOAL:
             self.set("torque_enable", 1)
@@ -227,7 +227,7 @@ class Servo:
         watchdog = self.get("bus_watchdog")
         if watchdog <= 0 or not self.torque:
             return math.inf
-        return self._heard + WATCHDOG_UNIT * watchdog
+        return self._fed + WATCHDOG_UNIT * watchdog
 
     def _speed(self) -> float:
         """Velocity that is aimed at [ticks/s], with sign in velocity mode, else the limit."""

@@ -23,7 +23,6 @@ from antennate.hardware.dynamixel.tables import (
 )
 from antennate.hardware.esp32 import frame
 from antennate.hardware.joints import Joints
-from antennate.params import TwinParams
 from antennate.params.twin import BatteryParams
 from antennate.robots.anatomy import YAW_COUNT
 from antennate.robots.layout import TICKS_A_TURN, LayoutParams
@@ -31,18 +30,21 @@ from antennate.sim.sim_robot import SimRobot
 from antennate.sim.world import World
 from antennate.twin.battery import Battery
 from antennate.twin.bus import ServoBus
-from antennate.twin.hand import Hand
 from antennate.twin.noise import Noise
 from antennate.twin.registers import Servo
+from antennate.twin.touch import TouchStimulus
 from antennate.types import Floats
 
-GREETING_PERIOD = TwinParams().greeting_period
+GREETING_PERIOD = 1.0
+"""Time between greetings of the board [s], as firmware/main.py."""
 BOARD_SETTINGS = (15, 34, 35)
 """Burst and pins of firmware/config.py."""
-BOOT_TICKS = TwinParams().boot_samples
-_STANDING_NOISE = TwinParams().standing_noise
+BOOT_TICKS = 50
+"""Samples that a starting board does not send: half a second at 100 Hz."""
+_STANDING_NOISE = 2.5
+"""Standard deviation of the readings of a resting antenna [counts], about that while walking."""
 _DEVICE = b"twin\0\0\0\0"
-_ROUNDING = 1e-9
+ROUNDING = 1e-9
 _REVERSED = 1
 """Bit of Drive Mode."""
 
@@ -55,7 +57,7 @@ class DrivenServo(Servo):
     """Ticks that it counts more than the shaft has turned."""
 
     def turn(self, turns: float) -> None:
-        """Let it have counted some turns more, as after a long walk or by a hand.
+        """Let it have counted some turns more, as after a long walk.
 
         The joint stays where it is.
         """
@@ -69,10 +71,10 @@ class DrivenServo(Servo):
     def clear_turns(self) -> StatusError:
         """Forget whole turns; the shaft stays."""
         before = self.position
-        said = super().clear_turns()
+        error = super().clear_turns()
         self._ahead += self.position - before
         self._stood = None
-        return said
+        return error
 
     def goal(self) -> float:
         """Where it pulls the shaft to [ticks]; where that stood when it was stopped or let go.
@@ -90,11 +92,11 @@ class DrivenServo(Servo):
         """From the shaft to what it counts, and back: Drive Mode may reverse it."""
         return TICKS_A_TURN - ticks if self.get("drive_mode") & _REVERSED else ticks
 
-    def heard(self, t: float) -> None:
+    def feed_watchdog(self, t: float) -> None:
         """An instruction packet was on the bus; all else waits for the next tick."""
         if self._trip_time() < t:
             self.advance(t)
-        self._heard = t
+        self._fed = t
 
     def _speed(self) -> float:
         return 0.0
@@ -108,15 +110,16 @@ class TwinRobot:
         layout: Ids, directions and zeros of the servos.
         period: Control period of the board and the physics [s].
         boot_id: Random number of the board's boot.
-        standing_noise: Whether readings are noisy before the physics begins, as a real film's are.
-        hand: Bends the antennae of the standing robot, None if nobody does.
+        standing_noise: Whether readings are noisy before the physics begins, as real ones are.
+        touch: Bends the antennae of the standing robot, None for no touches.
         watch: Told the world after each tick of the physics.
         battery: Numbers of its supply.
 
     Attributes:
         bus: The servos on their wire.
         t: Time up to which everything has happened [s].
-        board_silent: The board says nothing.
+        touch: Bends the antennae of the standing robot, None for no touches.
+        board_silent: The board sends nothing.
         noise: What the board's wire does to bytes, both ways.
         battery: What feeds the servos.
     """
@@ -128,7 +131,7 @@ class TwinRobot:
         period: float,
         boot_id: int,
         standing_noise: bool = False,
-        hand: Hand | None = None,
+        touch: TouchStimulus | None = None,
         watch: Callable[[World], None] = lambda world: None,
         battery: BatteryParams | None = None,
     ) -> None:
@@ -144,7 +147,7 @@ class TwinRobot:
         self._broken = [False, False]
         self._held = [math.nan, math.nan]
         self._chance = np.random.default_rng(boot_id) if standing_noise else None
-        self._hand = hand
+        self.touch = touch
         self.t = 0.0
         self.board_silent = False
         self.noise = Noise(seed=0)
@@ -153,7 +156,7 @@ class TwinRobot:
         self.bus = ServoBus(self.servos, layout.baud)
         self._show(self._shafts())
         self._counts = body.read().counts[0]
-        self._say()
+        self._sample()
 
     @property
     def failure(self) -> SimulationError | None:
@@ -167,7 +170,7 @@ class TwinRobot:
 
     def advance(self, t: float) -> None:
         """Let everything happen until t."""
-        while self.due <= t + _ROUNDING:
+        while self.due <= t + ROUNDING:
             self.end_tick(self.move(self.begin_tick()))
         self.t = max(self.t, t)
 
@@ -204,7 +207,7 @@ class TwinRobot:
         """A tick ends: servos learn where their shafts are, and the board sends a sample."""
         if shafts is not None:
             self._show(shafts)
-        self._say()
+        self._sample()
 
     def next_time(self) -> float:
         """When something happens next without anybody asking [s]."""
@@ -216,7 +219,7 @@ class TwinRobot:
         data, self._stream = bytes(self._stream), bytearray()
         return self.noise(data)
 
-    def hear(self, data: bytes) -> None:
+    def receive(self, data: bytes) -> None:
         """Let the board take bytes from the host: it greets if it is asked to."""
         asked = frame.encode_request() in self.noise(data)
         if asked and not self.board_silent and self._ticks >= self._booted:
@@ -234,7 +237,7 @@ class TwinRobot:
             self._broken[what == "open_right"] = True
 
     def hold(self, side: int, counts: float) -> None:
-        """Somebody bends antenna 0 (left) or 1 so that it reads so; NaN lets it go [counts]."""
+        """Hold the reading of antenna 0 (left) or 1 at a value [counts]; NaN releases it."""
         self._held[side] = counts
 
     def _shafts(self) -> Floats:
@@ -245,7 +248,7 @@ class TwinRobot:
         for servo, ticks in zip(self.servos, shafts.tolist(), strict=True):
             servo.shaft(ticks)
 
-    def _say(self) -> None:
+    def _sample(self) -> None:
         """One sample of the board, and a greeting now and then."""
         since = self._ticks - self._booted
         if self.board_silent or since < 0:
@@ -255,9 +258,9 @@ class TwinRobot:
         noise = np.zeros(2)
         if self._chance is not None and not self._walked:
             noise = np.rint(self._chance.normal(0.0, _STANDING_NOISE, 2))
-        if self._hand is not None and not self._walked:
-            heard = any(servo.last_heard > 0.0 for servo in self.servos)
-            noise = noise + np.rint(self._hand.change(self._ticks * self._period, heard))
+        if self.touch is not None and not self._walked:
+            used = any(servo.last_fed > 0.0 for servo in self.servos)
+            noise = noise + np.rint(self.touch.change(self._ticks * self._period, used))
         read = np.where(np.isnan(self._held), self._counts, self._held)
         left, right = (
             0 if broken or math.isnan(counts) else min(max(int(counts), 0), frame.FULL_SCALE)

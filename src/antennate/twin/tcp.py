@@ -1,4 +1,4 @@
-"""A TCP port as one end of a twin: one client at a time, and one that goes away can come back."""
+"""A TCP port as an endpoint: one client at a time, and one that goes away can come back."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from antennate.errors import BadInputError
 _CHUNK = 4096
 
 
-class TcpEnd:
-    """Listens on a port; whoever connects to `path` talks to us.
+class TcpEndpoint:
+    """Listens on a port; a client connects to `path`.
 
     Args:
         host: Address to listen on; only this one.
@@ -35,7 +35,7 @@ class TcpEnd:
         self.path = f"tcp://{host}:{self._listener.getsockname()[1]}"
 
     def fileno(self) -> int:
-        """Ready to be read if a client comes, says something or goes."""
+        """Ready to be read if a client comes, sends or goes."""
         return self._ready.fileno()
 
     def baud(self) -> int | None:
@@ -43,7 +43,7 @@ class TcpEnd:
         return None
 
     def read(self) -> bytes:
-        """What has come."""
+        """Bytes that have come."""
         came = b"" if self._client is None else self._receive(self._client)
         try:
             client, _ = self._listener.accept()
@@ -58,28 +58,19 @@ class TcpEnd:
         self._ready.register(client, selectors.EVENT_READ)
         return came
 
-    def write(self, data: bytes) -> int:
-        """Say it; what finds no room because nobody listens is lost, as on a real line."""
+    def write(self, data: bytes) -> None:
+        """Send; bytes that find no room because nobody reads are lost, as on a real line."""
         if self._client is None:
-            return 0
+            return
         try:
-            return self._client.send(data)
+            self._client.send(data)
         except BlockingIOError:
-            return 0
+            return
         except OSError:
             self._part(self._client)
-            return 0
-
-    @property
-    def taken(self) -> bool:
-        """A client is connected."""
-        return self._client is not None
-
-    def clear(self) -> None:
-        """Nothing: a connection begins empty."""
 
     def close(self) -> None:
-        """Client and listener."""
+        """Close client and listener."""
         if self._client is not None:
             self._part(self._client)
         self._ready.close()

@@ -1,37 +1,41 @@
-"""A board's frames over UDP, signed as the firmware signs them, as one end of a twin."""
+"""A board's frames over UDP, signed as the firmware signs them, as an endpoint."""
 
 from __future__ import annotations
 
 import socket
 import struct
 import time
+from collections.abc import Callable
 from typing import Any
 
 from antennate.errors import BadInputError
 from antennate.hardware.esp32 import datagram, frame
-from antennate.params import TwinParams
 
-_ALIVE = TwinParams().udp_silence
-"""A board that has been silent for longer [s] does not answer either."""
+_ALIVE = 0.1
+"""A board that has been silent for longer [s], ten samples, does not answer either."""
 
 
-class UdpEnd:
-    """Answers asks and sends each frame in a datagram of its own.
+class UdpEndpoint:
+    """Answers requests and sends each frame in a datagram of its own.
 
     Args:
         host: Address to listen on; only this one.
         port: UDP port, 0 for any that is free.
         key: The board's.
+        now: Monotonic time [s].
 
     Raises:
         BadInputError: The port cannot be had.
     """
 
-    def __init__(self, host: str, port: int, key: bytes) -> None:
+    def __init__(
+        self, host: str, port: int, key: bytes, now: Callable[[], float] = time.monotonic
+    ) -> None:
+        self._now = now
         self._signer = datagram.Signer(key)
         self._speaker: datagram.Speaker | None = None
         self._boot = -1
-        self._spoke = 0.0
+        self._written = 0.0
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.setblocking(False)
         try:
@@ -52,22 +56,22 @@ class UdpEnd:
         return None
 
     def read(self) -> bytes:
-        """Answer what has come; a board hears nothing else."""
+        """Answer a request that has come; a board takes nothing else."""
         try:
             asked, sender = self._socket.recvfrom(datagram.ASK_SIZE + 1)
         except OSError:
             return b""
-        now = time.monotonic()
-        if self._speaker is not None and now - self._spoke < _ALIVE:
+        now = self._now()
+        if self._speaker is not None and now - self._written < _ALIVE:
             answer = self._speaker.answer(asked, sender, round(1e3 * now))
             if answer is not None:
-                self._say(answer, sender)
+                self._send(answer, sender)
         return b""
 
-    def write(self, data: bytes) -> int:
+    def write(self, data: bytes) -> None:
         """Send whole frames; a greeting is kept for whoever asks."""
-        now = time.monotonic()
-        self._spoke = now
+        now = self._now()
+        self._written = now
         for chunk in data.split(b"\0"):
             body = frame.unstuff(chunk) if chunk else None
             if body is None:
@@ -78,19 +82,10 @@ class UdpEnd:
             elif self._speaker is not None:
                 signed = self._speaker.sign(whole, round(1e3 * now))
                 if signed is not None:
-                    self._say(signed, self._speaker.listener)
-        return len(data)
-
-    @property
-    def taken(self) -> bool:
-        """Always: whoever asks is sent frames."""
-        return True
-
-    def clear(self) -> None:
-        """Nothing: what was sent is on its way."""
+                    self._send(signed, self._speaker.listener)
 
     def close(self) -> None:
-        """Let the port go."""
+        """Close the port."""
         self._socket.close()
 
     def _begin(self, hello: bytes, boot: int) -> None:
@@ -99,7 +94,7 @@ class UdpEnd:
             self._speaker = datagram.Speaker(self._signer, boot, hello, size)
             self._boot = boot
 
-    def _say(self, data: bytes | bytearray, receiver: Any) -> None:
+    def _send(self, data: bytes | bytearray, receiver: Any) -> None:
         try:
             self._socket.sendto(data, receiver)
         except OSError:

@@ -49,7 +49,7 @@ class SpringsOutcome:
 
 
 def _spring(config: SpringParams, wire: float, coil: float, coils: float) -> dict[str, Any]:
-    k = springs.stiffness(springs.modulus_of(config), wire, coil, coils)
+    k = springs.spring_stiffness(springs.modulus_of(config), wire, coil, coils)
     yields = springs.yield_angle(config, wire, coil, coils)
     printed = PAPER_TABLE.get(coils)
     return {

@@ -25,7 +25,6 @@ from antennate.hardware.joints import Joints
 from antennate.hardware.ports.finder import finder
 from antennate.hardware.ports.port import Port, PortError
 from antennate.hardware.ports.reconnecting import Reconnecting
-from antennate.hardware.ports.twin_clock import twin_clock
 from antennate.hardware.safety.trust import Trust
 from antennate.params import BusParams, DoctorParams
 from antennate.robots.layout import LayoutParams
@@ -37,7 +36,7 @@ DOUBT = BusParams().doubt_walking
 
 @contextlib.contextmanager
 def connect(
-    config: DriveConfig, esp32: str, bus: str, key: bytes | None = None, clock: str = ""
+    config: DriveConfig, esp32: str, bus: str, key: bytes | None = None
 ) -> Iterator[Session]:
     """Open both ports, find who is there, and close them again afterwards.
 
@@ -46,20 +45,15 @@ def connect(
         esp32: Address of the antenna board, as `finder` takes it.
         bus: Address of the servo bus.
         key: Of a board behind udp://; empty for one without a key.
-        clock: Address of the clock of a twin in lock-step; the host's time is taken if not given.
 
     Raises:
-        ConfigError: There is no such controller; or a clock is given, but a port can be no twin's.
+        ConfigError: There is no such controller.
         PortError: A port cannot be opened.
         BadInputError: No antenna board speaks, or it is refused.
         BringUpError: The servos are not those expected.
     """
     control = chosen(config.controller, config.control)
     with contextlib.ExitStack() as stack:
-        if clock:
-            twin = stack.enter_context(twin_clock(esp32, bus, clock, config.layout.baud))
-            yield prepare(config, twin.esp32, twin.bus, twin, decider=control)
-            return
         lines: list[Port] = []
         for flag, address, baud in (
             ("--esp32", esp32, BOARD_BAUD),

@@ -5,7 +5,7 @@ supervisor. Nothing reaches the servos but what the supervisor lets through. Any
 watchdogs, and with torque on packets are sent only upon a decision of this very tick: the
 controller's, or the session's own to stand still while legs forget their turns or for a moment
 before a release, or to keep the command for one tick after a sound decision at half pace. Goals
-move at a limited speed, so that neither the first command nor a broken controller makes a joint jump.
+move at a limited speed, so that neither the first command nor a broken controller lets one jump.
 
 After the bus was lost no goal is sent until an arm event. With that one ids and models are checked,
 watchdogs armed and goals set to where the servos stand, as with the first.

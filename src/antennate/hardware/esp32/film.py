@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from antennate.antenna import calibration
 from antennate.antenna.calibration import Calibration
 from antennate.errors import CalibrationError, ConfigError
 from antennate.hardware.esp32.wire import Hello
@@ -29,11 +28,11 @@ def calibrated(
         CalibrationError: The file cannot be used.
         ConfigError: There is another curve, or another theta, beside it.
     """
-    found = calibration.load(path, sensor_id)
+    found = Calibration.load(path, sensor_id)
     plain = ConditioningParams(averaging_time=control.conditioning.averaging_time)
     if control.conditioning != plain:
         raise ConfigError(
-            f"control.conditioning: expected no curve beside the calibration file {path}, found one; "
+            f"control.conditioning: expected no curve beside calibration file {path}, found one; "
             "give averaging_time alone"
         )
     if control.rule.threshold != found.threshold:

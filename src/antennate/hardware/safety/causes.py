@@ -13,7 +13,7 @@ from antennate.types import Contact, Maneuver
 class State(IntEnum):
     """The ladder; each state is safer than the one before.
 
-    DEGRADED walks. HOLD keeps the last command with torque on. FAULT is a HOLD that only an arm event
+    DEGRADED walks. HOLD keeps the last command, torque on. FAULT is a HOLD that only an arm event
     ends. OFF has no torque and also needs an arm event.
     """
 

@@ -1,7 +1,8 @@
-"""The twin's ends of its wires, and the pseudo-terminal as one of them."""
+"""The twin's endpoints of its wires, and the pseudo-terminal as one of them."""
 
 from __future__ import annotations
 
+import contextlib
 import os
 import termios
 import tty
@@ -15,8 +16,8 @@ _SPEEDS: dict[int, int] = {
 }
 
 
-class End(Protocol):
-    """The twin's end of a wire; `select` takes it."""
+class Endpoint(Protocol):
+    """The twin's side of a wire; `select` takes it."""
 
     @property
     def path(self) -> str:
@@ -32,29 +33,20 @@ class End(Protocol):
         ...
 
     def read(self) -> bytes:
-        """What has come."""
+        """Bytes that have come."""
         ...
 
-    def write(self, data: bytes) -> int:
-        """Say it; what finds no room is lost. How many bytes found room."""
-        ...
-
-    @property
-    def taken(self) -> bool:
-        """Somebody has opened it, as far as that can be known."""
-        ...
-
-    def clear(self) -> None:
-        """Throw away what was said and nobody has read, where that can be done."""
+    def write(self, data: bytes) -> None:
+        """Send; bytes that find no room are lost."""
         ...
 
     def close(self) -> None:
-        """Let it go."""
+        """Close it."""
         ...
 
 
 class Terminal:
-    """One pseudo-terminal; whoever opens `path` talks to us."""
+    """One pseudo-terminal; a client opens `path`."""
 
     def __init__(self) -> None:
         self._master, self._slave = os.openpty()
@@ -67,33 +59,22 @@ class Terminal:
         return _SPEEDS.get(termios.tcgetattr(self._slave)[5])
 
     def fileno(self) -> int:
-        """Of our end."""
+        """File descriptor of our side."""
         return self._master
 
     def read(self) -> bytes:
-        """What has come."""
+        """Bytes that have come."""
         try:
             return os.read(self._master, _CHUNK)
         except BlockingIOError:
             return b""
 
-    def write(self, data: bytes) -> int:
-        """Say it; what finds no room because nobody listens is lost, as on a real line."""
-        try:
-            return os.write(self._master, data)
-        except BlockingIOError:
-            return 0
-
-    @property
-    def taken(self) -> bool:
-        """Always: what is said waits for whoever opens it."""
-        return True
-
-    def clear(self) -> None:
-        """Throw away what was said and nobody has read."""
-        termios.tcflush(self._slave, termios.TCIFLUSH)
+    def write(self, data: bytes) -> None:
+        """Send; bytes that find no room because nobody reads are lost, as on a real line."""
+        with contextlib.suppress(BlockingIOError):
+            os.write(self._master, data)
 
     def close(self) -> None:
-        """Both ends."""
+        """Close both sides."""
         os.close(self._master)
         os.close(self._slave)

@@ -1,7 +1,7 @@
-"""A person's hand at the antennae of the standing twin: `left@2s` bends the left one for a second.
+"""Simulated touch of the antennae of the standing twin: `left@2s` bends the left one for a second.
 
-The counts of a bent film are shown, the film itself is not bent. Times count from the first packet
-on the servo bus, when somebody has begun to look at the robot.
+Only the readings of the antenna change; the simulated antenna itself is not bent. Times count from
+the first packet on the servo bus, when a client has begun.
 """
 
 from __future__ import annotations
@@ -13,20 +13,22 @@ from collections.abc import Sequence
 import numpy as np
 
 from antennate.errors import BadInputError
-from antennate.params import ConditioningParams, TwinParams
+from antennate.params import ConditioningParams
 from antennate.types import Floats
 
-DEPTH = TwinParams().hand_depth
-LENGTH = TwinParams().hand_time
+DEPTH = 0.6
+"""Change of a reading by a touch, in spans: twice what the check by touch asks for."""
+LENGTH = 1.0
+"""Time for which a touch bends an antenna [s]."""
 _FORM = re.compile(r"(left|right)@([0-9]+(?:\.[0-9]+)?)s")
 
 
-class Hand:
-    """Bends antennae when told.
+class TouchStimulus:
+    """Touches of antennae at given times.
 
     Args:
-        orders: Which, and when; may overlap.
-        conditioning: The range of their readings, straight to bent.
+        orders: Side and time of each; they may overlap.
+        conditioning: The range of the readings, straight to bent.
 
     Raises:
         BadInputError: An order has another form.
@@ -38,9 +40,9 @@ class Hand:
         self._change = conditioning.polarity * DEPTH * span
         self._begin = math.inf
 
-    def change(self, t: float, heard: bool) -> Floats:
-        """Change of both readings [counts] at time t [s], shape (2,); `heard`: the bus was used."""
-        if heard:
+    def change(self, t: float, bus_used: bool) -> Floats:
+        """Change of both readings [counts] at time t [s], shape (2,)."""
+        if bus_used:
             self._begin = min(self._begin, t)
         bent = np.zeros(2)
         for side, start in self._orders:

@@ -1,4 +1,4 @@
-"""The servo bus as a Port in invented time: waiting costs nothing and nothing is ever by chance."""
+"""The servo bus as a Port in invented time: no call waits, and nothing depends on chance."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from antennate.twin.bus import ServoBus
 _ROUNDING = 1e-9
 
 
-class Link:
+class SimulatedWire:
     """A wire from a master to twin servos, and the clock of both.
 
     Args:
@@ -34,20 +34,17 @@ class Link:
         self.bus.receive(self._t, data)
 
     def read(self, most: int, timeout: float) -> bytes:
-        """What has come by now, or first comes within `timeout` [s]."""
-        self.listen(self._t + timeout)
-        came, self._came = self._came[:most], self._came[most:]
-        return came
-
-    def listen(self, end: float) -> None:
-        """Let time pass until there is something to be read, at most until `end` [s]."""
+        """Bytes that have come by now, or first come within `timeout` [s]."""
+        end = self._t + timeout
         self._collect()
         while not self._came and self._t < end:
             due = self.bus.next_time()
             self._until(end if due is None else max(self._t, min(due + self.latency, end)))
+        came, self._came = self._came[:most], self._came[most:]
+        return came
 
     def drain(self) -> int:
-        """Throw away what has come; how many bytes."""
+        """Throw away the bytes that have come; how many."""
         self._collect()
         count, self._came = len(self._came), b""
         return count

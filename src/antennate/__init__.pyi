@@ -1,0 +1,20 @@
+"""The public names for type checkers, which do not run `__getattr__`."""
+
+from antennate.antenna.calibration import Calibration as Calibration
+from antennate.antenna.fitting import fit_calibration as fit_calibration
+from antennate.antenna.springs import spring_stiffness as spring_stiffness
+from antennate.antenna.springs import windings as windings
+from antennate.antenna.statics import Chain as Chain
+from antennate.antenna.statics import equilibrium as equilibrium
+from antennate.errors import AntennateError as AntennateError
+from antennate.errors import BadInputError as BadInputError
+from antennate.hardware.esp32.recording import Esp32Recording as Esp32Recording
+from antennate.hardware.esp32.recording import read_esp32 as read_esp32
+from antennate.telemetry.time_series import TimeSeries as TimeSeries
+from antennate.types import AntennaFrame as AntennaFrame
+from antennate.types import Contact as Contact
+from antennate.types import JointCommand as JointCommand
+from antennate.types import Maneuver as Maneuver
+from antennate.types import Robot as Robot
+
+__version__: str

@@ -1,0 +1,145 @@
+"""The help of a command: a short page of two screens, and a long one with every option."""
+
+from __future__ import annotations
+
+import shutil
+import textwrap
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+from antennate.cli.options import Option, fields_of, first_line, flag_of
+from antennate.params.reading import group_of
+
+_WIDEST, _NARROWEST = 100, 40
+_COLUMN = 26
+"""Column in which the meaning of an option begins."""
+_LEAST_TEXT = 24
+"""Fewest columns for it beside a long flag."""
+SHORT_LINES = 46
+"""Most lines of the short page: two screens of 24, less a prompt on each."""
+
+
+def short_page(
+    command: str,
+    description: str,
+    model: type,
+    parameters: Sequence[Option],
+    others: Sequence[Option],
+) -> str:
+    """What people use first: options outside all groups, and the names of the groups.
+
+    Args:
+        command: Name of the command.
+        description: What it does; only what precedes the first empty line is shown.
+        model: Its configuration.
+        parameters: Options of the configuration; the first ones, if they are too many.
+        others: Its other options.
+    """
+    top = [option for option in parameters if len(option.path) == 1]
+    groups = _groups(model, parameters)
+    head = [*_head(command, others, description.split("\n\n")[0]), *_section("options:", others)]
+    tail = [*groups, "", f"`antennate {command} --help-all` shows every option."]
+    lines = list(_section("parameters:", top))
+    if (over := len(head) + len(lines) + len(tail) - SHORT_LINES) > 0:
+        kept, shown = lines[: 2 if len(lines) > 1 else 0], 0
+        for option in top:
+            block = _block(option)
+            if len(kept) + len(block) > len(lines) - over - 1:
+                break
+            kept += block
+            shown += 1
+        lines = [*kept, f"  and {len(top) - shown} more"]
+    return "\n".join([*head, *lines, *tail]) + "\n"
+
+
+def long_page(
+    command: str,
+    description: str,
+    model: type,
+    parameters: Sequence[Option],
+    others: Sequence[Option],
+) -> str:
+    """Every option, group by group; arguments as for `short_page`."""
+    lines = [*_head(command, others, description), *_section("options:", others)]
+    by_group: dict[tuple[str, ...], list[Option]] = {}
+    for option in parameters:
+        by_group.setdefault(option.path[:-1], []).append(option)
+    for group, options in by_group.items():
+        lines += _section(_title(model, group), options)
+    return "\n".join(lines) + "\n"
+
+
+def width() -> int:
+    """Columns to fill."""
+    return max(_NARROWEST, min(_WIDEST, shutil.get_terminal_size().columns))
+
+
+def paragraphs(text: str) -> list[str]:
+    """The lines of a text, filled paragraph by paragraph."""
+    blocks = [textwrap.fill(" ".join(part.split()), width()) for part in text.strip().split("\n\n")]
+    return "\n\n".join(blocks).split("\n")
+
+
+def _head(command: str, others: Iterable[Option], description: str) -> list[str]:
+    free = "".join(f" {option.metavar}" for option in others if option.positional)
+    return [f"usage: antennate {command}{free} [OPTIONS]", "", *paragraphs(description)]
+
+
+def _section(title: str, options: Sequence[Option]) -> list[str]:
+    lines = [line for option in options for line in _block(option)]
+    return ["", *textwrap.wrap(title, width()), *lines] if lines else []
+
+
+def _block(option: Option) -> list[str]:
+    """An option in one line or more."""
+    head = option.metavar if option.positional else option.offered
+    if not option.positional and option.metavar:
+        head += f" {option.metavar}{'...' if option.many else ''}"
+    notes = [option.meaning, option.limits]
+    known = ", ".join(option.examples)
+    text = "; ".join(filter(None, [*notes, f"known: {known}" if known else ""]))
+    if option.default and option.metavar:
+        text += f" (default: {option.default})"
+    elif option.default:
+        text = f"turns off: {text}"
+    return _two_columns(head, text)
+
+
+def _two_columns(head: str, text: str) -> list[str]:
+    column = min(_COLUMN, width() // 3)
+    start, rest = f"  {head}  ".ljust(column), " " * column
+    above = [] if len(start) + _LEAST_TEXT <= width() else [start.rstrip()]
+    lines = textwrap.wrap(
+        text,
+        width(),
+        initial_indent=rest if above else start,
+        subsequent_indent=rest,
+        break_on_hyphens=False,
+    )
+    return above + (lines or [start.rstrip()])
+
+
+def _groups(model: type, parameters: Iterable[Option]) -> list[str]:
+    """The groups of parameters, each with its number of options."""
+    counts = Counter(option.path[0] for option in parameters if len(option.path) > 1)
+    lines = ["", "groups, with their number of options:"] if counts else []
+    for name, count in counts.items():
+        start = f"  {flag_of((name,))}.*".ljust(_COLUMN - 1)
+        text = f"{start} {count:>3}  {_meaning(model, (name,))}"
+        lines.append(text if len(text) <= width() else text[: width() - 3] + "...")
+    return lines
+
+
+def _title(model: type, group: tuple[str, ...]) -> str:
+    return f"{flag_of(group)}.*  {_meaning(model, group)}" if group else "parameters:"
+
+
+def _meaning(model: Any, group: tuple[str, ...]) -> str:
+    """What a group is, by its description or its docstring."""
+    text = ""
+    for part in group:
+        field = fields_of(model)[part]
+        model = group_of(field.annotation)
+        text = field.description or first_line(model)
+    return text

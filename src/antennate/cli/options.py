@@ -1,0 +1,303 @@
+"""The flags of a command, made from its models, and the values that words give them.
+
+Each field of a model is a flag: its path with dots, hyphens for underscores. Nothing is checked
+here but the flags themselves and how many values they take; the models check the values. argparse
+is not used: it takes values such as -1e-3 and -inf for flags, and answers in words of its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from types import NoneType, UnionType
+from typing import Any, Literal, Union, get_args, get_origin
+
+from pydantic import BaseModel, Field
+from pydantic.fields import FieldInfo
+
+from antennate.errors import ConfigError
+from antennate.messages import nearest, shortened, shown
+from antennate.params.base import GATHERED
+from antennate.params.reading import group_of
+
+_METAVARS = {int: "INT", float: "FLOAT", str: "TEXT", Path: "FILE"}
+_BOUNDS = {"gt": "above", "ge": "at least", "lt": "below", "le": "at most"}
+
+
+def option(default: Any, meaning: str, metavar: str = "", **more: Any) -> Any:
+    """Declare one option of a command that is no physical number.
+
+    Args:
+        default: Its default.
+        meaning: What it does.
+        metavar: What stands for its value in the help, such as FILE.
+        more: As for pydantic's Field; `positional` is for a value without a flag.
+    """
+    extra: dict[str, Any] = {"metavar": metavar} if metavar else {}
+    if more.pop("positional", False):
+        extra["positional"] = True
+    return Field(default, description=meaning, json_schema_extra=extra, **more)
+
+
+@dataclass(frozen=True)
+class Option:
+    """One flag.
+
+    Attributes:
+        path: Field that it sets, within the model.
+        metavar: What stands for a value in the help; empty for a switch.
+        many: Whether it takes several values.
+        gathered: Whether those of a flag given again add to the first ones.
+        choices: All valid values, if they are few.
+        examples: Known values among others, for completion.
+        meaning: What the field means, with its unit.
+        limits: Bounds in words, such as `at least 1`.
+        default: Its default in words, empty if there is none to tell.
+        kinds: Types that a word is tried as, beside text.
+        positional: Whether it is given without a flag.
+    """
+
+    path: tuple[str, ...]
+    metavar: str
+    many: bool
+    gathered: bool
+    choices: tuple[Any, ...]
+    examples: tuple[str, ...]
+    meaning: str
+    limits: str
+    default: str
+    kinds: frozenset[type]
+    positional: bool
+
+    @property
+    def flag(self) -> str:
+        """The flag, such as `--tunnel.free-width`."""
+        return flag_of(self.path)
+
+    @property
+    def offered(self) -> str:
+        """The flag that help and completion show; of a switch the one that changes its default."""
+        return self.flags[-1] if self.default and not self.metavar else self.flag
+
+    @property
+    def flags(self) -> tuple[str, ...]:
+        """The flag; of a switch also the one that turns it off."""
+        if self.metavar:
+            return (self.flag,)
+        head, _, name = self.flag.removeprefix("--").rpartition(".")
+        return self.flag, f"--{head}{'.' if head else ''}no-{name}"
+
+    def value(self, word: str) -> Any:
+        """The value of a word; what fits no type stays text and is refused by the model.
+
+        Raises:
+            ConfigError: It is empty and a path is wanted.
+        """
+        if not word and Path in self.kinds:
+            raise ConfigError(f"{self.flag}: expected a path, found nothing")
+        for choice in self.choices:
+            if word == str(choice):
+                return choice
+        if word.lower() == "none" and NoneType in self.kinds:
+            return None
+        for kind in (int, float):
+            if kind in self.kinds:
+                try:
+                    return kind(word)
+                except ValueError:
+                    pass
+        return word
+
+
+def flag_of(path: Sequence[int | str]) -> str:
+    """`("tunnel", "segments", 0)` as `--tunnel.segments`."""
+    return "--" + ".".join(part for part in path if isinstance(part, str)).replace("_", "-")
+
+
+def fields_of(kind: Any) -> Mapping[str, FieldInfo]:
+    """The fields of a model or of a pydantic dataclass."""
+    return kind.model_fields if issubclass(kind, BaseModel) else kind.__pydantic_fields__
+
+
+def options_of(default: Any, path: tuple[str, ...] = ()) -> Iterator[Option]:
+    """An option for each field that a flag can set, group by group.
+
+    A group whose class has `named(text)` is also an option of its own: a name, or a file.
+
+    Args:
+        default: A model or pydantic dataclass with its default values.
+        path: Where it stands in the model of the command.
+    """
+    for name, field in fields_of(type(default)).items():
+        value = getattr(default, name)
+        group = group_of(field.annotation)
+        if group is None:
+            option = _option((*path, name), field, value)
+            if option is not None:
+                yield option
+        else:
+            if hasattr(group, "named"):
+                yield _named((*path, name), field, group)
+            yield from options_of(group() if value is None else value, (*path, name))
+
+
+def _option(path: tuple[str, ...], field: FieldInfo, default: Any) -> Option | None:
+    extra = field.json_schema_extra if isinstance(field.json_schema_extra, dict) else {}
+    types, many = _types(field.annotation)
+    choices = tuple(c for kind in types if get_origin(kind) is Literal for c in get_args(kind))
+    kinds = frozenset(kind for kind in types if isinstance(kind, type)) | {type(c) for c in choices}
+    switch = bool in kinds
+    if not switch and not kinds & {*_METAVARS}:
+        return None  # a list of tables, for a file only
+    known = next((text for kind, text in _METAVARS.items() if kind in kinds), "")
+    metavar = "{" + ",".join(map(str, choices)) + "}" if choices else known
+    return Option(
+        path=path,
+        metavar="" if switch else str(extra.get("metavar", metavar)),
+        many=many,
+        gathered=GATHERED in field.metadata,
+        choices=choices,
+        examples=tuple(map(str, field.examples or ())),
+        meaning=field.description or "",
+        limits=_limits(field),
+        default=_words(default),
+        kinds=kinds,
+        positional=bool(extra.get("positional")),
+    )
+
+
+def _named(path: tuple[str, ...], field: FieldInfo, group: type[BaseModel]) -> Option:
+    return Option(
+        path=path,
+        metavar="NAME|FILE",
+        many=False,
+        gathered=False,
+        choices=(),
+        examples=tuple(map(str, field.examples or ())),
+        meaning=field.description or first_line(group),
+        limits="",
+        default="",
+        kinds=frozenset({str}),
+        positional=False,
+    )
+
+
+def first_line(group: type) -> str:
+    """What a group is, by its docstring."""
+    return (group.__doc__ or "").strip().split("\n")[0].rstrip(".")
+
+
+def _types(annotation: Any) -> tuple[list[Any], bool]:
+    """The types of one value, and whether there are several of them."""
+    annotation = _bare(annotation)
+    if get_origin(annotation) in (Union, UnionType):
+        parts = [_types(part) for part in get_args(annotation)]
+        return [kind for kinds, _ in parts for kind in kinds], any(many for _, many in parts)
+    if get_origin(annotation) is tuple:
+        items = [item for item in get_args(annotation) if item is not Ellipsis]
+        return [kind for item in items for kind in _types(item)[0]], True
+    return [annotation], False
+
+
+def _bare(annotation: Any) -> Any:
+    """An annotation without what `Annotated` adds."""
+    return annotation.__origin__ if hasattr(annotation, "__metadata__") else annotation
+
+
+def _limits(field: FieldInfo) -> str:
+    """The bounds of a number, or of each number of a list."""
+    annotation = _bare(field.annotation)
+    inner = [m for item in get_args(annotation)[:1] for m in getattr(item, "__metadata__", ())]
+    found = list(field.metadata)
+    for each in inner:
+        found += each.metadata if isinstance(each, FieldInfo) else [each]
+    bounds = {key: getattr(each, key) for key in _BOUNDS for each in found if hasattr(each, key)}
+    if bounds.keys() == {"ge", "le"}:
+        return f"{bounds['ge']:g} to {bounds['le']:g}"
+    return ", ".join(f"{_BOUNDS[key]} {value:g}" for key, value in bounds.items())
+
+
+def _words(value: Any) -> str:
+    """A default as it is typed; empty for none, nothing and off."""
+    if isinstance(value, tuple):
+        return " ".join(_words(item) for item in value)
+    if value is None or value is False:
+        return ""
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def read_words(argv: Sequence[str], options: Sequence[Option]) -> dict[tuple[str, ...], Any]:
+    """Values by the path of their field.
+
+    Of a flag given twice the last one counts, unless its values are gathered.
+
+    Raises:
+        ConfigError: A flag is unknown, or has too few or too many values.
+    """
+    by_flag = {flag: option for option in options for flag in option.flags}
+    values: dict[tuple[str, ...], Any] = {}
+    free = [option for option in options if option.positional]
+    for name, words in _groups(argv):
+        option = _named_by(name, by_flag)
+        if option is None:
+            rest = words
+        elif not option.metavar:
+            values[option.path] = name == option.flag
+            rest = words
+        elif not words:
+            raise ConfigError(f"{name}: expected {_count(option)}, found none")
+        elif option.many:
+            before = values.get(option.path, ()) if option.gathered else ()
+            values[option.path] = (*before, *map(option.value, words))
+            rest = []
+        else:
+            values[option.path] = option.value(words[0])
+            rest = words[1:]
+        for word in rest:
+            if not free:
+                raise ConfigError(f"expected flags only, found {shown(word)}")
+            first = free.pop(0)
+            values[first.path] = first.value(word)
+    return values
+
+
+def _named_by(flag: str, by_flag: Mapping[str, Option]) -> Option | None:
+    """The option of a flag, None of none."""
+    if flag and flag not in by_flag:
+        raise ConfigError(f"expected a known flag{nearest(flag, by_flag)}, found {shown(flag)}")
+    return by_flag.get(flag)
+
+
+def _groups(argv: Sequence[str]) -> Iterator[tuple[str, list[str]]]:
+    """Each flag with the words up to the next one; first those before any flag, without one."""
+    name, words = "", list[str]()
+    for word in argv:
+        if word.startswith("--"):
+            yield name, words
+            name, given, value = word.partition("=")
+            name, words = name.replace("_", "-"), [value] if given else []
+        else:
+            words.append(word)
+    yield name, words
+
+
+def _count(option: Option) -> str:
+    return "at least 1 value" if option.many else f"1 value, {option.metavar}"
+
+
+def merged(base: Mapping[str, Any], values: Mapping[tuple[str, ...], Any]) -> dict[str, Any]:
+    """Nested tables with values put over them."""
+    result = dict(base)
+    for path, value in values.items():
+        table = result
+        for part in path[:-1]:
+            table[part] = dict(table.get(part) or {})
+            table = table[part]
+        table[path[-1]] = value
+    return result
+
+
+def found(value: Any) -> str:
+    """A value as it was typed."""
+    return shortened(" ".join(map(str, value)) if isinstance(value, tuple) else str(value))

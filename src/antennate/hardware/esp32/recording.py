@@ -1,0 +1,168 @@
+"""A recorded stream of ESP32 frames as arrays, with the board's own times.
+
+Nobody has to say when the bytes arrived. The board counts microseconds modulo 2**tick_bits; how
+often this counter wrapped between two samples follows from their sequence numbers and the rate that
+the board declared in its HELLO.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from antennate.dataframe import from_columns
+from antennate.errors import BadInputError
+from antennate.hardware.esp32.decoder import Counters, FrameDecoder
+from antennate.hardware.esp32.frame import FLAG_LEFT_RAIL, FLAG_RIGHT_RAIL
+from antennate.hardware.esp32.wire import Hello, Refused, Sample
+from antennate.types import Bools, Floats, Ints
+
+_CHUNK = 1 << 20
+
+
+@dataclass(frozen=True, slots=True)
+class Esp32Recording:
+    """Samples of both antennae in the order in which each boot of the board took them.
+
+    Attributes:
+        t: Time since the first sample of the same boot [s], by the board's clock, shape (n,).
+        boot: Which boot of the board: 0, 1, … in order of arrival, shape (n,). Times of two boots
+            have no common origin.
+        seq: Number of the sample since that boot, unwrapped, shape (n,); gaps are lost samples.
+        counts: Readings, left before right [counts], 0 to 4095, shape (n, 2).
+        rail: Whether the reading is at 0 or full scale, as of a broken or shorted wire,
+            shape (n, 2).
+        hellos: The first HELLO of each boot: firmware, rate [Hz], serial number, cause of reset.
+        counters: What became of every byte: good frames, CRC errors, noise, text.
+        unknown_boot: Samples left out because no HELLO of their boot was recorded.
+        unordered: Samples left out because the board's time did not rise from the one before.
+    """
+
+    t: Floats
+    boot: Ints
+    seq: Ints
+    counts: Floats
+    rail: Bools
+    hellos: tuple[Hello, ...]
+    counters: Counters
+    unknown_boot: int
+    unordered: int
+
+    @property
+    def lost(self) -> int:
+        """Samples that are missing between the first and the last one of their boots."""
+        spans = [np.ptp(self.seq[self.boot == b]) + 1 for b in np.unique(self.boot)]
+        return int(sum(spans)) - len(self.seq)
+
+    def to_dataframe(self) -> Any:
+        """A pandas DataFrame: boot, seq, t [s], left, right [counts], left_rail, right_rail.
+
+        Raises:
+            MissingPackageError: pandas is not installed.
+        """
+        return from_columns(
+            {
+                "boot": self.boot,
+                "seq": self.seq,
+                "t": self.t,
+                "left": self.counts[:, 0],
+                "right": self.counts[:, 1],
+                "left_rail": self.rail[:, 0],
+                "right_rail": self.rail[:, 1],
+            }
+        )
+
+
+def read_esp32(source: str | Path | bytes) -> Esp32Recording:
+    """Decode a recorded stream of the antenna board.
+
+    Damaged frames are skipped and counted; duplicates are dropped; samples that arrived late are
+    put back into their place.
+
+    Args:
+        source: A file of raw bytes as they came over USB or TCP, or the bytes themselves.
+
+    Raises:
+        BadInputError: The file cannot be read, or there is no usable sample in it.
+    """
+    decoder, hellos, samples, refused = FrameDecoder(), {}, {}, ""
+    for chunk in _chunks(source):
+        for frame in decoder.feed(chunk):
+            if isinstance(frame, Hello):
+                hellos.setdefault(frame.boot_id, frame)
+            elif isinstance(frame, Sample):
+                samples.setdefault(frame.boot_id, []).append(frame)
+            elif isinstance(frame, Refused):
+                refused = frame.reason
+    known = [boot for boot in samples if boot in hellos]
+    if not known:
+        raise BadInputError(_empty(source, decoder.counters, len(hellos), len(samples), refused))
+    parts = [_boot_arrays(samples[boot], hellos[boot]) for boot in known]
+    t, seq, counts, flags = (np.concatenate([part[i] for part in parts]) for i in range(4))
+    return Esp32Recording(
+        t=t,
+        boot=np.repeat(np.arange(len(parts)), [len(part[0]) for part in parts]),
+        seq=seq,
+        counts=counts,
+        rail=(flags[:, None] & np.array([FLAG_LEFT_RAIL, FLAG_RIGHT_RAIL])) != 0,
+        hellos=tuple(hellos[boot] for boot in known),
+        counters=decoder.counters,
+        unknown_boot=sum(len(samples[boot]) for boot in samples if boot not in hellos),
+        unordered=sum(part[4] for part in parts),
+    )
+
+
+def _chunks(source: str | Path | bytes) -> list[bytes]:
+    if isinstance(source, bytes | bytearray):
+        return [bytes(source)]
+    try:
+        with Path(source).open("rb") as file:
+            return list(iter(lambda: file.read(_CHUNK), b""))
+    except OSError as error:
+        raise BadInputError(
+            f"{source}: expected a readable file of ESP32 frames: {error.strerror or error}"
+        ) from None
+    except ValueError as error:  # a path with a zero byte
+        raise BadInputError(f"expected the path of a file, found {source!r}: {error}") from None
+
+
+def _boot_arrays(samples: list[Sample], hello: Hello) -> tuple[Floats, Ints, Floats, Ints, int]:
+    """Times [s], numbers, counts and flags of one boot in order, and how many were unordered."""
+    seq = np.array([sample.seq for sample in samples])
+    ahead = (np.diff(seq, prepend=seq[0]) + (1 << 31)) % (1 << 32) - (1 << 31)
+    number, first = np.unique(seq[0] + np.cumsum(ahead), return_index=True)
+    ticks = np.array([samples[i].ticks for i in first])
+    modulus, period = 1 << hello.tick_bits, 1e6 / hello.rate
+    kept = np.arange(len(number))
+    while True:
+        expected = period * np.diff(number[kept])
+        step = np.diff(ticks[kept]) % modulus
+        step = step + modulus * np.maximum(0, np.rint((expected - step) / modulus)).astype(int)
+        bad = (step == 0) | (step - expected > modulus / 2)
+        if not bad.any():
+            break
+        kept = np.delete(kept, 1 + int(np.argmax(bad)))
+    chosen = [samples[i] for i in first[kept]]
+    counts = np.array([(s.left, s.right) for s in chosen], dtype=np.float64)
+    flags = np.array([s.flags for s in chosen], dtype=np.int64)
+    t = 1e-6 * np.concatenate([[0], np.cumsum(step)])
+    return t, number[kept], counts, flags, len(number) - len(kept)
+
+
+def _empty(
+    source: str | Path | bytes, counters: Counters, hellos: int, boots: int, refused: str
+) -> str:
+    where = f"{len(source)} bytes" if isinstance(source, bytes | bytearray) else str(source)
+    if boots and not hellos:
+        why = f"{counters.good} samples but no HELLO, which says how the board counts time"
+    elif boots:
+        why = f"{counters.good} good frames, but no HELLO of the boot that the samples belong to"
+    else:
+        damaged = counters.crc_errors + counters.cobs_errors
+        why = f"{counters.received} bytes with {counters.good} good and {damaged} damaged frames"
+    return f"{where}: expected samples of an antenna board, found {why}" + (
+        f" ({refused})" if refused else ""
+    )

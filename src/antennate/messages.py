@@ -1,0 +1,46 @@
+"""Wording of messages: one line, values as found, and a hint at the nearest valid choice."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from difflib import get_close_matches
+from typing import Any
+
+_CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f]+")
+_LONGEST = 80
+"""Most characters of a found value that are shown."""
+_SIMILAR = 0.7
+"""Least similarity of a word to the choice that is hinted at, from 0 to 1."""
+
+
+def one_line(text: str) -> str:
+    """The text without line breaks and control characters."""
+    return " ".join(_CONTROL.sub(" ", text).split())
+
+
+def shortened(text: str) -> str:
+    """The text on one line, cut if it is long."""
+    text = one_line(text)
+    return text if len(text) <= _LONGEST else text[: _LONGEST - 3] + "..."
+
+
+def shown(value: Any) -> str:
+    """A value as Python writes it, in one short line."""
+    return shortened(repr(value))
+
+
+def nearest(word: str, known: Iterable[str]) -> str:
+    """A hint at the choice that was perhaps meant, or nothing.
+
+    A flag or key is also found by its last part: `--free-width` by `--tunnel.free-width`.
+
+    Args:
+        word: What was given.
+        known: The valid choices.
+    """
+    choices = {choice.lstrip("-"): choice for choice in known}
+    wanted = word.lstrip("-").lower()
+    ends = [name for name in choices if name.endswith(f".{wanted}")]
+    close = ends[:2] or get_close_matches(wanted, choices, n=1, cutoff=_SIMILAR)
+    return f" (did you mean {' or '.join(choices[name] for name in close)}?)" if close else ""

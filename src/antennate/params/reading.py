@@ -1,0 +1,150 @@
+"""A configuration from a TOML file, and what is wrong with one, in one line."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from types import UnionType
+from typing import Any, TypeVar, Union, get_args, get_origin
+
+from pydantic import BaseModel, ValidationError
+
+from antennate.errors import ConfigError
+from antennate.messages import nearest, one_line, shown
+from antennate.params.base import Params
+
+LARGEST_FILE = 1_000_000
+"""Most bytes of a configuration file."""
+_MOST_DOTS = 100
+"""Most dots on a line of it; keys of thousands of parts would keep the reader busy for minutes."""
+
+Config = TypeVar("Config", bound=Params)
+Place = tuple[int | str, ...]
+
+_EXPECTED = {
+    "greater_than": "a number above {gt:g}",
+    "greater_than_equal": "a number of at least {ge:g}",
+    "less_than": "a number below {lt:g}",
+    "less_than_equal": "a number of at most {le:g}",
+    "finite_number": "a finite number",
+    "literal_error": "one of {expected}",
+    "too_short": "at least {min_length} value(s)",
+    "too_long": "at most {max_length} value(s)",
+    "missing": "a value",
+}
+"""What pydantic's error types ask for."""
+
+_KINDS = {
+    "int": "a whole number",
+    "float": "a number",
+    "bool": "true or false",
+    "string": "text",
+    "tuple": "a list",
+    "model": "a table",
+}
+"""What pydantic's families of error types ask for, by the first word of the type."""
+
+
+def read_file(path: Path, model: type[Config]) -> Config:
+    """A configuration from a TOML file with the model's keys.
+
+    Raises:
+        ConfigError: The file cannot be read, is no TOML, or holds what the model refuses.
+    """
+    try:
+        with path.open("rb") as file:
+            content = file.read(LARGEST_FILE + 1)
+    except OSError as error:
+        raise ConfigError(
+            f"--config: expected a readable file, found {path}: {error.strerror}"
+        ) from None
+    if len(content) > LARGEST_FILE:
+        raise ConfigError(f"{path}: expected at most {LARGEST_FILE} bytes, found more")
+    try:
+        text = content.decode("utf-8")
+        for number, line in enumerate(text.splitlines(), 1):
+            if line.count(".") > _MOST_DOTS:
+                raise ConfigError(
+                    f"{path}: line {number}: expected at most {_MOST_DOTS} dots, found more"
+                )
+        data = json.dumps(tomllib.loads(text), default=str)
+    except UnicodeDecodeError as error:
+        raise ConfigError(
+            f"{path}: expected UTF-8 text, found byte {content[error.start]:#04x} at {error.start}"
+        ) from None
+    except tomllib.TOMLDecodeError as error:
+        raise ConfigError(f"{path}: expected TOML, found: {error}") from None
+    except RecursionError:
+        raise ConfigError(f"{path}: expected plain tables, found them nested too deeply") from None
+    try:
+        return model.model_validate_json(data, strict=True)
+    except ValidationError as error:
+        raise ConfigError(f"{path}: {describe(error, model)}") from None
+
+
+def dotted(path: Place) -> str:
+    """`("tunnel", "segments", 0)` as `tunnel.segments[0]`."""
+    text = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in path)
+    return one_line(text.lstrip("."))
+
+
+def describe(
+    error: ValidationError,
+    model: type[Any],
+    where: Callable[[Place], str] = dotted,
+    found: Callable[[Any], str] = shown,
+) -> str:
+    """The first fault pydantic found, and how many more there are.
+
+    Args:
+        error: What it raised.
+        model: The model or dataclass that was to be filled.
+        where: How a place in it is written.
+        found: How a value is written.
+    """
+    every = error.errors(include_url=False)
+    inner = {fault["loc"][:n] for fault in every for n in range(len(fault["loc"]))}
+    faults = [fault for fault in every if fault["loc"] not in inner]  # not what follows from one
+    first = faults[0]
+    kind, path, context = first["type"], first["loc"], first.get("ctx", {})
+    more = f" (and {len(faults) - 1} more)" if len(faults) > 1 else ""
+    if kind == "value_error":
+        place = f"{dotted(path)}: " if path else ""
+        return f"{place}{context['error']}{more}"
+    if kind == "extra_forbidden":
+        key, group = str(path[-1]), dotted(path[:-1])
+        known = _keys(model, path[:-1])
+        what = f"a known key{f' of {group}' if group else ''}{nearest(key, known)}"
+        return f"{where(path)}: expected {what}, found {shown(key)}{more}"
+    value = "none" if kind == "missing" else found(first["input"])
+    return (
+        f"{where(path)}: expected {_expected(kind, context) or first['msg']}, found {value}{more}"
+    )
+
+
+def _expected(kind: str, context: Mapping[str, Any]) -> str | None:
+    if kind in _EXPECTED:
+        return _EXPECTED[kind].format(**context).replace("'", "")
+    return _KINDS.get(kind.split("_")[0])
+
+
+def group_of(annotation: Any) -> type[BaseModel] | None:
+    """The model that an annotation names, alone or beside None; None if it names no model."""
+    union = get_origin(annotation) in (Union, UnionType)
+    for kind in get_args(annotation) if union else (annotation,):
+        if isinstance(kind, type) and issubclass(kind, BaseModel):
+            return kind
+    return None
+
+
+def _keys(model: type[BaseModel], path: Place) -> list[str]:
+    """Keys of the group at `path`, none if it is not known."""
+    for part in path:
+        field = model.model_fields.get(str(part))
+        group = None if field is None else group_of(field.annotation)
+        if group is None:
+            return []
+        model = group
+    return list(model.model_fields)

@@ -1,0 +1,269 @@
+"""The time series of one trial: what was read, decided and commanded at each control tick.
+
+A file is either `.npz`, NumPy's zip of arrays (never pickled objects), or `.csv`, one row for each
+tick after a first line that holds format and meta data. Both give back every bit of every number.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import re
+import zipfile
+import zlib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from antennate.dataframe import from_columns
+from antennate.errors import BadInputError
+from antennate.files import read_limited, write_whole
+from antennate.types import AntennaFrame, Floats, Ints, JointCommand
+
+FORMAT = "antennate time series 1"
+_LARGEST_FILE = 1 << 30
+_DIMENSIONS: dict[str, int] = {
+    "t": 1,
+    "counts": 2,
+    "level": 2,
+    "contact": 2,
+    "maneuver": 1,
+    "yaw": 2,
+    "leg": 3,
+    "antenna": 2,
+    "pitch": 2,
+    "head": 2,
+}
+"""Number of axes of each array; the first is time."""
+_WHOLE = ("contact", "maneuver")
+"""Arrays of integers; all others hold floats."""
+_MAY_BE_EMPTY = ("yaw", "pitch")
+_UNUSABLE = (
+    *(ValueError, KeyError, TypeError, EOFError, MemoryError, OverflowError, RuntimeError),
+    *(csv.Error, zlib.error, zipfile.BadZipFile),
+)
+"""What damaged files make the standard library and NumPy raise."""
+_COLUMN = re.compile(r"([a-z]+)((?:_\d+)*)")
+_MOST_COLUMNS = 1000
+
+
+@dataclass(frozen=True, slots=True)
+class TimeSeries:
+    """One robot over n control ticks.
+
+    Attributes:
+        t: Time of the frame [s], shape (n,).
+        counts: Readings of the antennae, left before right [counts], shape (n, 2); NaN is missing.
+        level: Flex levels as the controller saw them, 0 to 1, shape (n, 2).
+        contact: `Contact` of each antenna, shape (n, 2).
+        maneuver: `Maneuver`, shape (n,).
+        yaw: Commanded yaw angles, head first [rad], shape (n, Y).
+        leg: Commanded leg angles [rad], shape (n, L, 2), left before right.
+        antenna: Commanded angles of the antenna bases [rad], shape (n, 2).
+        pitch: Commanded pitch angles [rad], shape (n, P); P is 0 unless pitch is actuated.
+        head: Position of the head in the world [m], shape (n, 2).
+        meta: What the series is of, such as controller, robot and seed.
+    """
+
+    t: Floats
+    counts: Floats
+    level: Floats
+    contact: Ints
+    maneuver: Ints
+    yaw: Floats
+    leg: Floats
+    antenna: Floats
+    pitch: Floats
+    head: Floats
+    meta: Mapping[str, str | int | float | None] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        for name, axes in _DIMENSIONS.items():
+            shape = np.shape(getattr(self, name))
+            if len(shape) != axes or shape[0] != len(self.t):
+                raise BadInputError(
+                    f"{name}: expected {axes} axes of which the first has {len(self.t)} ticks, "
+                    f"found shape {shape}"
+                )
+
+    def __len__(self) -> int:
+        """Number of ticks."""
+        return len(self.t)
+
+    def columns(self) -> dict[str, Floats | Ints]:
+        """Every number of a tick as a column of shape (n,): `t`, `counts_0`, …, `leg_5_1`, …."""
+        found: dict[str, Floats | Ints] = {}
+        for name in _DIMENSIONS:
+            values = getattr(self, name)
+            for index in np.ndindex(values.shape[1:]):
+                found["_".join([name, *map(str, index)])] = values[(slice(None), *index)]
+        return found
+
+    def to_dataframe(self) -> Any:
+        """A pandas DataFrame with one row for each tick and the columns of `columns`.
+
+        Raises:
+            MissingPackageError: pandas is not installed.
+        """
+        return from_columns(self.columns())
+
+    def save(self, path: str | Path, overwrite: bool = False) -> None:
+        """Write the series to a file that ends in `.npz` or `.csv`.
+
+        Raises:
+            BadInputError: The file has another ending.
+            OutputError: There is such a file and it may not be replaced, or it cannot be written.
+        """
+        path = Path(path)
+        data = self._npz() if _ending(path) == ".npz" else self._csv().encode()
+        write_whole(path, data, overwrite)
+
+    @classmethod
+    def load(cls, path: str | Path) -> TimeSeries:
+        """Read a file that `save` wrote.
+
+        Raises:
+            BadInputError: The file cannot be read or is not a whole time series.
+        """
+        path = Path(path)
+        read = _from_npz if _ending(path) == ".npz" else _from_csv
+        data = read_limited(path, _LARGEST_FILE)
+        try:
+            return cls(**read(data))
+        except _UNUSABLE as error:
+            why = " ".join(str(error).split())
+            raise BadInputError(f"{path}: expected an {FORMAT}, found {why}") from None
+
+    def _head(self) -> str:
+        return json.dumps({"format": FORMAT, "meta": dict(self.meta)})
+
+    def _npz(self) -> bytes:
+        file = io.BytesIO()
+        arrays = {name: getattr(self, name) for name in _DIMENSIONS}
+        np.savez_compressed(file, allow_pickle=False, header=np.array(self._head()), **arrays)
+        return file.getvalue()
+
+    def _csv(self) -> str:
+        file = io.StringIO()
+        file.write(f"# {self._head()}\n")
+        writer = csv.writer(file, lineterminator="\n")
+        columns = self.columns()
+        writer.writerow(columns)
+        writer.writerows(zip(*(values.tolist() for values in columns.values()), strict=True))
+        return file.getvalue()
+
+
+class TimeSeriesRecorder:
+    """Collects one row of a batch, tick by tick.
+
+    Args:
+        controller: What decides: its `level`, `contact` and `maneuver` are read after each step.
+        head: Gives the position of the robot's head [m], shape (2,).
+        row: Row of the batch.
+    """
+
+    def __init__(self, controller: Any, head: Callable[[], Floats], row: int = 0) -> None:
+        self._controller, self._head, self._row = controller, head, row
+        self._ticks: dict[str, list[Any]] = {name: [] for name in _DIMENSIONS}
+
+    def take(self, frame: AntennaFrame, command: JointCommand) -> None:
+        """Keep one tick."""
+        for source, names in (
+            (frame, ("t", "counts")),
+            (self._controller, ("level", "contact", "maneuver")),
+            (command, ("yaw", "leg", "antenna", "pitch")),
+        ):
+            for name in names:
+                self._ticks[name].append(np.array(getattr(source, name)[self._row]))
+        self._ticks["head"].append(np.array(self._head()))
+
+    def series(self, meta: Mapping[str, str | int | float | None]) -> TimeSeries:
+        """What was collected.
+
+        Raises:
+            BadInputError: Nothing was.
+        """
+        if not self._ticks["t"]:
+            raise BadInputError("time series: expected at least one tick, found none")
+        arrays: dict[str, Any] = {
+            name: np.array(values, dtype=np.int64 if name in _WHOLE else np.float64)
+            for name, values in self._ticks.items()
+        }
+        return TimeSeries(**arrays, meta=dict(meta))
+
+
+def _ending(path: Path) -> str:
+    if path.suffix not in (".npz", ".csv"):
+        raise BadInputError(f"{path}: expected a name that ends in .npz or .csv")
+    return path.suffix
+
+
+def _meta(text: str) -> dict[str, Any]:
+    head = json.loads(text)
+    if not isinstance(head, dict) or head.get("format") != FORMAT:
+        raise ValueError("another format")
+    meta = head.get("meta")
+    if not isinstance(meta, dict):
+        raise ValueError("no meta data")
+    return meta
+
+
+def _from_npz(data: bytes) -> dict[str, Any]:
+    """The fields of a series from the bytes of an npz file."""
+    with zipfile.ZipFile(io.BytesIO(data)) as archive:
+        size = sum(member.file_size for member in archive.infolist())
+        if size > _LARGEST_FILE:
+            raise ValueError(f"{size} bytes unpacked, more than {_LARGEST_FILE}")
+    with np.load(io.BytesIO(data), allow_pickle=False) as file:
+        arrays = {name: file[name] for name in _DIMENSIONS}
+        meta = _meta(str(file["header"]))
+    for name, values in arrays.items():
+        wanted = np.int64 if name in _WHOLE else np.float64
+        if values.dtype != wanted:
+            raise ValueError(f"{name} of type {values.dtype} in place of {np.dtype(wanted)}")
+    return arrays | {"meta": meta}
+
+
+def _from_csv(data: bytes) -> dict[str, Any]:
+    """The fields of a series from the bytes of a csv file."""
+    first, _, rest = data.decode("utf-8").partition("\n")
+    meta = _meta(first.removeprefix("#"))
+    rows = csv.reader(io.StringIO(rest))
+    header = next(rows, [])
+    if len(header) > _MOST_COLUMNS:
+        raise ValueError(f"{len(header)} columns")
+    cells = list(rows)
+    for number, row in enumerate(cells, start=3):
+        if len(row) != len(header):
+            raise ValueError(f"{len(row)} cells in line {number}, not {len(header)}")
+    values = list(zip(*cells, strict=True)) or [()] * len(header)
+    columns = dict(zip(header, values, strict=True))
+    return _gathered(columns, len(cells)) | {"meta": meta}
+
+
+def _gathered(columns: Mapping[str, tuple[str, ...]], ticks: int) -> dict[str, Any]:
+    """Columns `name_i_j` as arrays `name` of shape (ticks, i, j)."""
+    parts: dict[str, dict[tuple[int, ...], tuple[str, ...]]] = {name: {} for name in _DIMENSIONS}
+    for column, values in columns.items():
+        match = _COLUMN.fullmatch(column)
+        if match is None or match[1] not in parts:
+            raise ValueError(f"an unknown column {column!r}")
+        parts[match[1]][tuple(map(int, match[2].split("_")[1:]))] = values
+    arrays: dict[str, Any] = {}
+    for name, held in parts.items():
+        axes = _DIMENSIONS[name] - 1
+        if any(len(index) != axes for index in held) or (not held and name not in _MAY_BE_EMPTY):
+            raise ValueError(f"no whole {name}")
+        shape = tuple(1 + max(i) for i in zip(*held, strict=True)) if held else (0,)
+        if int(np.prod(shape)) != len(held):
+            raise ValueError(f"gaps in the columns of {name}")
+        convert: Callable[[str], Any] = int if name in _WHOLE else float
+        array = np.empty((ticks, *shape), dtype=np.int64 if name in _WHOLE else np.float64)
+        for index, values in held.items():
+            array[(slice(None), *index)] = [convert(value) for value in values]
+        arrays[name] = array
+    return arrays

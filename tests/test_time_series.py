@@ -1,0 +1,149 @@
+"""The time series of a trial: every bit comes back, and a damaged file is one line."""
+
+from __future__ import annotations
+
+import dataclasses
+import pickle
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from antennate import AntennateError, BadInputError, TimeSeries
+
+ARRAYS = [f.name for f in dataclasses.fields(TimeSeries) if f.name != "meta"]
+ODD = [np.nan, np.inf, -np.inf, -0.0, 5e-324, 0.1, 1 / 3, 1.7976931348623157e308]
+"""Floats that a careless writer changes."""
+
+
+def made(ticks: int = 8, links: int = 6, pitch: int = 0) -> TimeSeries:
+    rng = np.random.default_rng(1)
+    counts = rng.normal(size=(ticks, 2))
+    counts[:, 0] = np.resize(ODD, ticks)
+    return TimeSeries(
+        t=0.01 * np.arange(ticks),
+        counts=counts,
+        level=rng.random((ticks, 2)),
+        contact=rng.integers(0, 3, (ticks, 2)),
+        maneuver=rng.integers(0, 5, ticks),
+        yaw=rng.normal(size=(ticks, links - 1)),
+        leg=rng.normal(size=(ticks, links, 2)),
+        antenna=rng.normal(size=(ticks, 2)),
+        pitch=rng.normal(size=(ticks, pitch)),
+        head=rng.normal(size=(ticks, 2)),
+        meta={"controller": "closed", "seed": 3, "length_m": 0.1, "scene": None, "note": "ä\n,"},
+    )
+
+
+@pytest.mark.parametrize("ending", [".npz", ".csv"])
+@pytest.mark.parametrize(("ticks", "links", "pitch"), [(8, 6, 0), (1, 4, 3), (30, 8, 7), (0, 6, 0)])
+def test_every_bit_comes_back(
+    tmp_path: Path, ending: str, ticks: int, links: int, pitch: int
+) -> None:
+    series, path = made(ticks, links, pitch), tmp_path / f"trial{ending}"
+    series.save(path)
+    found = TimeSeries.load(path)
+    assert found.meta == series.meta
+    for name in ARRAYS:
+        before, after = getattr(series, name), getattr(found, name)
+        assert (after.dtype, after.shape) == (before.dtype, before.shape)
+        assert after.tobytes() == before.tobytes()
+
+
+def test_a_file_is_not_replaced_unasked(tmp_path: Path) -> None:
+    path = tmp_path / "trial.npz"
+    made().save(path)
+    with pytest.raises(AntennateError, match="expected no such file"):
+        made(3).save(path)
+    assert len(TimeSeries.load(path)) == 8
+    made(3).save(path, overwrite=True)
+    assert len(TimeSeries.load(path)) == 3
+    assert [p.name for p in tmp_path.iterdir()] == ["trial.npz"]
+
+
+def refusal(path: Path) -> str:
+    try:
+        TimeSeries.load(path)
+    except BadInputError as error:
+        return str(error)
+    return ""
+
+
+@pytest.mark.parametrize("ending", [".npz", ".csv"])
+def test_a_damaged_file_is_one_line(tmp_path: Path, ending: str) -> None:
+    """Cut anywhere or with any byte changed it loads or is refused, and nothing else is raised."""
+    good = tmp_path / f"good{ending}"
+    made().save(good)
+    data, refused = good.read_bytes(), 0
+    rng = np.random.default_rng(2)
+    bad = tmp_path / f"bad{ending}"
+    for place in rng.integers(0, len(data), 150).tolist():
+        changed = bytearray(data)
+        changed[place] ^= 1 << int(rng.integers(8))
+        for content in (data[:place], bytes(changed)):
+            bad.write_bytes(content)
+            why = refusal(bad)
+            refused += bool(why)
+            assert not why or (str(bad) in why and "\n" not in why)
+    assert refused > 150
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "why"),
+    [
+        ("a.csv", b"", "found"),
+        ("a.csv", b"t,counts_0\n0,1\n", "found"),
+        ("a.csv", b'# {"format": "antennate time series 9", "meta": {}}\nt\n', "another format"),
+        ("a.csv", b'# {"format": "antennate time series 1", "meta": {}}\nt,x\n0,1\n', "column 'x'"),
+        ("a.csv", b'# {"format": "antennate time series 1", "meta": {}}\nt\n0,1\n', "2 cells"),
+        (
+            "a.csv",
+            b'# {"format": "antennate time series 1", "meta": {}}\nt\n0\n',
+            "no whole counts",
+        ),
+        ("a.csv", b"\xff\xfe\x00", "decode"),
+        ("a.npz", b"PK\x03\x04", "zip"),
+        ("a.npz", pickle.dumps({"t": 1}), "zip"),
+        ("a.txt", b"", "ends in .npz or .csv"),
+    ],
+)
+def test_what_is_no_time_series_is_refused(
+    tmp_path: Path, name: str, content: bytes, why: str
+) -> None:
+    path = tmp_path / name
+    path.write_bytes(content)
+    with pytest.raises(BadInputError, match=why):
+        TimeSeries.load(path)
+
+
+def test_pickled_objects_are_never_loaded(tmp_path: Path) -> None:
+    path = tmp_path / "a.npz"
+    np.savez(path, t=np.array([{"a": 1}], dtype=object))
+    with pytest.raises(BadInputError, match="allow_pickle=False"):
+        TimeSeries.load(path)
+
+
+def test_a_bomb_is_not_unpacked(tmp_path: Path) -> None:
+    path = tmp_path / "a.npz"
+    with (
+        zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive,
+        archive.open("t.npy", "w") as t,
+    ):
+        for _ in range(1040):
+            t.write(bytes(1 << 20))
+    with pytest.raises(BadInputError, match="unpacked"):
+        TimeSeries.load(path)
+
+
+def test_arrays_of_unequal_length_are_refused() -> None:
+    with pytest.raises(BadInputError, match=r"yaw: expected 2 axes .* 8 ticks, found shape \(3, 5"):
+        dataclasses.replace(made(), yaw=np.zeros((3, 5)))
+
+
+def test_a_data_frame_holds_every_column() -> None:
+    series = made()
+    frame = series.to_dataframe()
+    assert len(frame) == 8
+    assert list(frame)[:3] == ["t", "counts_0", "counts_1"]
+    assert (frame["leg_5_1"] == series.leg[:, 5, 1]).all()
