@@ -20,11 +20,13 @@ import json
 import multiprocessing
 import signal
 import statistics
+import sys
 import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from importlib import import_module
 from multiprocessing.connection import Connection
+from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
@@ -34,7 +36,6 @@ from antennate.hardware.dynamixel.bus import Bus
 from antennate.hardware.dynamixel.tables import XC430_W240, XL330_M288
 from antennate.hardware.ports.serial_port import SerialPort
 from antennate.twin.bus import Fault, ServoBus, Trouble
-from antennate.twin.pty import PtyServer
 from antennate.twin.registers import Servo
 
 IDS = tuple(range(1, 20))
@@ -54,7 +55,9 @@ def serve(pipe: Connection) -> None:
     servos = [Servo(XC430_W240 if i <= 17 else XL330_M288, i, 100.0 * i) for i in IDS]
     for servo in servos:
         servo.set("return_delay_time", 0)
-    with PtyServer(ServoBus(servos)) as server:
+    sys.path.append(str(Path(__file__).parents[1] / "tests"))
+    server_of = import_module("pty_server").PtyServer
+    with server_of(ServoBus(servos)) as server:
         pipe.send(server.path)
         while (order := pipe.recv()) is not None:
             what, value = order

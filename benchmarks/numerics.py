@@ -27,8 +27,10 @@ from antennate.experiments.tunnel import run as experiment
 from antennate.experiments.tunnel.monitor import TrialResult
 from antennate.experiments.tunnel.run import TunnelConfig
 from antennate.params import GaitParams, PhysicsParams, TunnelParams
-from antennate.robots.body import RobotParams
-from antennate.sim.arena import Tunnel
+from antennate.robots.spec import RobotSpec
+from antennate.sim import trial
+from antennate.sim.scenes.scene import SceneInstance
+from antennate.sim.scenes.tunnel import Tunnel
 from antennate.sim.world import World, compile_world
 from antennate.studies.pool import core_count, run_tasks
 from antennate.types import Floats, Maneuver
@@ -62,9 +64,9 @@ class Engine:
             sleep_tolerance=self.sleep_tolerance,
         )
 
-    def compile(self, _: PhysicsParams, robot: RobotParams, tunnel: Tunnel | None = None):
+    def compile(self, _: PhysicsParams, robot: RobotSpec, scene: SceneInstance | None = None):
         """As compile_world, with cone and sleep of this engine."""
-        model = compile_world(self.physics, robot, tunnel)
+        model = compile_world(self.physics, robot, scene)
         if self.pyramidal:
             model.opt.cone = mujoco.mjtCone.mjCONE_PYRAMIDAL
         if not self.sleep:
@@ -118,7 +120,7 @@ def walk(engine: Engine) -> dict[str, float]:
         sunk.append(-float(self.data.contact.dist.min(initial=0.0)))
 
     with (
-        mock.patch("antennate.experiments.gait.run.compile_world", engine.compile),
+        mock.patch.object(trial, "compile_world", engine.compile),
         mock.patch.object(World, "step", watched),
     ):
         before = time.process_time()
@@ -151,18 +153,18 @@ def coulomb_stop(params: TunnelParams) -> float:
 def _slide(engine: Engine, direction: float) -> float:
     far = np.array([[-9.0, 9.0], [9.0, 9.0]])
     field = Tunnel(TunnelParams(), far * [1.0, 0.0], (far, -far[::-1]), np.array([[3.0, 0.0]]))
-    robot = RobotParams()
-    world = World(engine.compile(engine.physics, robot, field), 6)
+    robot = RobotSpec()
+    world = World(engine.compile(engine.physics, robot, field), robot)
     model, data = world.model, world.data
     flags = int(model.opt.enableflags)
     model.opt.enableflags = flags & ~int(mujoco.mjtEnableBit.mjENBL_SLEEP)
     world.step(round(_SETTLE / engine.timestep))
-    start = world.cylinders()[0]
+    start = data.body("cylinder0").xpos[:2].copy()
     for axis, value in (("x", math.cos(direction)), ("y", math.sin(direction))):
         data.qvel[model.joint(f"cylinder0_{axis}").dofadr[0]] = _PUSH * value
     model.opt.enableflags = flags
     world.step(round(0.5 / engine.timestep))
-    return float(np.linalg.norm(world.cylinders()[0] - start))
+    return float(np.linalg.norm(data.body("cylinder0").xpos[:2] - start))
 
 
 def run_engine(
@@ -171,11 +173,13 @@ def run_engine(
     """Trials of the open loop on one engine, with the CPU time of each."""
     engine, limit, trials = task
     config = TunnelConfig(time_limit=limit, physics=engine.physics)
-    with mock.patch.object(experiment, "compile_world", engine.compile):
-        for trial in trials:
+    with mock.patch.object(trial, "compile_world", engine.compile):
+        for number in trials:
             before = time.process_time()
             rows: list[TrialResult] = []
-            experiment.run_trials(config, "open", [trial], lambda item, to=rows: to.append(item[0]))
+            experiment.run_trials(
+                config, "open", [number], lambda item, to=rows: to.append(item[0])
+            )
             emit((engine.name, rows[0], time.process_time() - before))
 
 
@@ -195,11 +199,11 @@ def tunnels(engines: list[Engine], trials: int, limit: float) -> dict[str, dict[
 def _statistics(found: list[tuple[TrialResult, float]], limit: float) -> dict[str, Any]:
     times: Floats = np.array([row.time_s for row, _ in found])
     error = float(times.std(ddof=1)) / math.sqrt(len(times))
-    ended = [row.time_s if row.status == "success" else limit for row, _ in found]
+    ended = [row.time_s if row.outcome == "success" else limit for row, _ in found]
     return {
         "trials": len(found),
-        "successes": sum(row.status == "success" for row, _ in found),
-        "invalid": sum(row.status == "invalid" for row, _ in found),
+        "successes": sum(row.outcome == "success" for row, _ in found),
+        "invalid": sum(row.outcome == "invalid" for row, _ in found),
         "mean_time_s": float(times.mean()),
         "mean_time_se": error,
         "mean_force_n": float(np.mean([row.force_mean_n for row, _ in found])),

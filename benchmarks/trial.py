@@ -1,11 +1,11 @@
 """What a trial costs beside its physics, how fast it runs, and how the cost grows with cylinders.
 
-- `trial_over_bare_engine`: CPU time of whole tunnel trials (sensing, control, recording, judging),
-  stepped six at a time as the program does, over CPU time of the bare engine that replays their
+- `trial_over_bare_engine`: CPU time of whole tunnel trials (sensing, control, recording),
+  stepped twelve at a time as the program does, over CPU time of the bare engine that replays their
   commands, one trial after the other, on the same models from the same starts. Drawing and
   compiling a tunnel is in neither. The replay must end on the same bits. The table shows trials
   stepped one at a time as well.
-- `realtime_factor`: simulated seconds per CPU second of whole trials, six at a time.
+- `realtime_factor`: simulated seconds per CPU second of whole trials, twelve at a time.
 - `growth`: CPU time per simulated second with n cylinders over that with 10. The robot paces to and
   fro at the start of one long tunnel, of which only the n cylinders nearest to the start are kept:
   its own work is the same in every case, and what is measured is what the others cost.
@@ -26,19 +26,20 @@ from unittest import mock
 import mujoco
 import numpy as np
 
-from antennate.control.controllers import Arm
 from antennate.control.gait import Gait
 from antennate.control.loop import run_loop
-from antennate.experiments.tunnel import run as experiment
+from antennate.experiments.tunnel import batch as experiment
 from antennate.experiments.tunnel.run import TunnelConfig
 from antennate.params import TunnelParams
-from antennate.sim import arena, geometry
+from antennate.sim.scenes import geometry
+from antennate.sim.scenes.tunnel import Tunnel, TunnelScene
 from antennate.sim.sim_robot import SimRobot
-from antennate.sim.world import World, compile_world
+from antennate.sim.trial import Trial, draw_trial, make_world
+from antennate.sim.world import World
 from antennate.types import AntennaFrame, Floats, Ints, JointCommand, Maneuver
 
-ARM: Arm = "closed"
-LOCKSTEP = 6
+CONTROLLER = "closed"
+LOCKSTEP = 12
 """Trials the program steps at once."""
 COUNTS = (10, 30, 60, 120)
 _PACING = 3.0
@@ -60,15 +61,16 @@ def seconds_of(action: Callable[[], Any]) -> float:
     return time.process_time() - before
 
 
-def prepare(config: TunnelConfig, trials: int) -> list[Any]:
+def prepare(config: TunnelConfig, trials: int) -> list[Trial]:
     """The starts of all trials, fresh."""
-    return [experiment.prepare(config, trial) for trial in range(trials)]
+    scene, control = TunnelScene(config.tunnel), config.control
+    return [draw_trial(config, scene, i, control.gait, control.period) for i in range(trials)]
 
 
-def run_whole(config: TunnelConfig, starts: list[Any], batch: int) -> None:
+def run_whole(config: TunnelConfig, starts: list[Trial], batch: int) -> None:
     """Run prepared trials as `antennate tunnel` does."""
-    with mock.patch.object(experiment, "prepare", lambda _, trial: starts[trial]):
-        experiment.run_trials(config, ARM, range(len(starts)), lambda _: None, batch)
+    with mock.patch.object(experiment, "draw_trial", lambda _, __, trial, *___: starts[trial]):
+        experiment.run_trials(config, CONTROLLER, range(len(starts)), lambda _: None, batch)
 
 
 @contextmanager
@@ -132,7 +134,7 @@ class Cost:
 
 
 def measure_trials(config: TunnelConfig, trials: int, repetitions: int) -> dict[int, Cost]:
-    """The cost of trials stepped one and six at a time, medians of interleaved repetitions."""
+    """The cost of trials stepped one and twelve at a time, medians of interleaved repetitions."""
     tapes, ended = record(config, trials)
     simulated = sum(world.t for world in ended)
     ratios: dict[int, list[float]] = {1: [], LOCKSTEP: []}
@@ -157,31 +159,30 @@ class Pacing:
     """A control that walks to and fro."""
 
     def __init__(self, config: TunnelConfig) -> None:
-        self._gait = Gait(config.control.gait, 1, config.control.period)
+        self._gait = Gait(config.control.gait, config.robot, 1, config.control.period)
 
     def step(self, frame: AntennaFrame) -> JointCommand:
         back = int(frame.t[0] / _PACING) % 2
         return self._gait.step(np.array([int(Maneuver.REVERSE if back else Maneuver.FORWARD)]))
 
 
-def long_tunnel(config: TunnelConfig) -> tuple[arena.Tunnel, Ints]:
+def long_tunnel(config: TunnelConfig) -> tuple[Tunnel, Ints]:
     """A tunnel with cylinders enough, and their order from the start."""
     segments = (1.0,) * 10
     turns = (90.0, -90.0) * 4 + (90.0,)
     params = TunnelParams(segments=segments, turns_deg=turns, mirror="never", strewn=20)
-    drawn = arena.draw_tunnel(params, config.robot, np.random.default_rng(0))
+    drawn = TunnelScene(params).draw(config.robot, np.random.default_rng(0))
     along = [geometry.progress(drawn.centre, where) for where in drawn.cylinders]
     return drawn, np.argsort(along)
 
 
-def seconds_with(config: TunnelConfig, drawn: arena.Tunnel, seconds: float) -> float:
+def seconds_with(config: TunnelConfig, drawn: Tunnel, seconds: float) -> float:
     """CPU time of pacing for some simulated seconds in this tunnel."""
     robot, period = config.robot, config.control.period
-    sensed = robot.sensor.covered_hinges(robot.antenna)
-    world = World(compile_world(config.physics, robot, drawn), sensed)
-    world.place(0.0, 0.0, 0.0, np.zeros(5), np.zeros((6, 2)))
-    body = SimRobot(1, robot.sensor, period, config.physics.timestep)
-    chance = experiment.prepare(config, 0).chance
+    world = make_world(config.physics, robot, drawn)
+    world.place(0.0, 0.0, 0.0, np.zeros(robot.yaw_count), np.zeros((robot.links, 2)))
+    body = SimRobot(1, robot, period, config.physics.timestep)
+    chance = prepare(config, 1)[0].chance
     body.load(0, world, chance)
     control = Pacing(config)
 
@@ -208,7 +209,7 @@ def measure_growth(config: TunnelConfig, seconds: float, repetitions: int) -> di
 def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--json", action="store_true", help="print one JSON object")
-    parser.add_argument("--trials", type=int, default=12, help="trials of the closed arm")
+    parser.add_argument("--trials", type=int, default=12, help="trials of the closed controller")
     parser.add_argument("--seconds", type=float, default=20.0, help="longest trial [s]")
     parser.add_argument("--repetitions", type=int, default=5, help="interleaved repetitions")
     options = parser.parse_args()

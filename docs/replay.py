@@ -1,6 +1,6 @@
 """Draw docs/images/replay.png: a drive of a twin, in invented time, and its log replayed.
 
-A hand bends both antennae in the dry run, the robot walks by `closed`, the board is silent for
+Both antennae are touched in the dry run, the robot walks by `closed`, the board is silent for
 half a second, and `paper` decides again upon the log.
 """
 
@@ -10,14 +10,15 @@ import tempfile
 from pathlib import Path
 
 from antennate.cli import main as antennate
-from antennate.experiments.twin import TwinConfig, rig
 from antennate.hardware.driving.config import DriveConfig
+from antennate.hardware.driving.connect import prepare
 from antennate.hardware.driving.drive import drive
 from antennate.hardware.driving.session import Session
-from antennate.params import TouchCheckParams
 from antennate.telemetry.header import Header
 from antennate.telemetry.ticks import Tick
 from antennate.telemetry.writer import LogWriter
+from antennate.twin.config import TwinConfig, build
+from antennate.twin.lockstep import BoardPort, LockstepClock
 
 PICTURE = Path(__file__).parent / "images" / "replay.png"
 CONFIG = DriveConfig(dry_run=6.0, duration=18.0)
@@ -27,15 +28,17 @@ SILENT, AGAIN = 16.0, 16.5
 
 def log(path: Path) -> None:
     """Write the log of the drive."""
-    made = rig(TwinConfig(touch=("left@1s", "right@3s"), trial=1), "closed", TouchCheckParams())
-    header = Header(controller="closed", params=CONFIG.control, layout=CONFIG.layout)
+    robot = build(TwinConfig(touch=("left@1s", "right@3s"), trial=1))
+    clock = LockstepClock(robot)
+    session = prepare(CONFIG, BoardPort(robot, clock), clock, clock)
+    header = Header(controller="closed", params=CONFIG.control, robot=CONFIG.robot)
     with LogWriter(path, header) as writer:
 
         def on_tick(session: Session, now: float) -> None:
-            made.robot.board_silent = SILENT <= now < AGAIN
+            robot.board_silent = SILENT <= now < AGAIN
             writer.write(Tick.of(session, now))
 
-        drive(made.session, CONFIG, arm=True, on_tick=on_tick)
+        drive(session, CONFIG, arm=True, on_tick=on_tick)
 
 
 def main() -> int:

@@ -25,11 +25,12 @@ from antennate.antenna import fitting
 from antennate.antenna.calibration import Calibration
 from antennate.antenna.fitting import Samples
 from antennate.cli.arguments import Options
-from antennate.cli.calibrate import STUDY
-from antennate.cli.folder import RunFolder
+from antennate.cli.experiment import carry_out
 from antennate.errors import CalibrationError
+from antennate.experiments.calibrate.experiment import EXPERIMENT
 from antennate.experiments.calibrate.recording import Recording
 from antennate.experiments.calibrate.run import CalibrateConfig, CalibrateOutcome
+from antennate.studies.run_directory import RunDirectory
 
 TOUCHING = {"open", "write", "flush", "fsync", "close", "replace", "rename", "unlink", "mkdir"}
 NAME = "calibration.json"
@@ -48,9 +49,9 @@ def outcome(sensor_id: str) -> CalibrateOutcome:
 
 def calibrate(folder: Path, made: CalibrateOutcome) -> None:
     """The command from the end of the fit on."""
-    study: Any = dataclasses.replace(STUDY, run=lambda *_: made)
+    experiment: Any = dataclasses.replace(EXPERIMENT, run=lambda *_: made)
     options = Options(out=folder, overwrite=True, json=True, no_figures=True)
-    study.carry_out([], made.config, options)
+    carry_out(experiment, [], made.config, options)
 
 
 def child(folder: Path, made: CalibrateOutcome, kill_at: int | None, said: int) -> None:
@@ -59,14 +60,14 @@ def child(folder: Path, made: CalibrateOutcome, kill_at: int | None, said: int) 
     Otherwise say which events lie within the write of the calibration, and how many there are.
     """
     events, span = 0, list[int]()
-    write = RunFolder.write
+    write = RunDirectory.write
 
-    def watched(self: RunFolder, name: str, content: str | bytes) -> None:
+    def watched(self: RunDirectory, name: str, content: str | bytes) -> None:
         span.extend([events] if name == NAME else [])
         write(self, name, content)
         span.extend([events] if name == NAME else [])
 
-    RunFolder.write = watched  # type: ignore[method-assign]
+    RunDirectory.write = watched  # type: ignore[method-assign]
 
     def watch(frame: FrameType, event: str, call: Any) -> None:
         nonlocal events

@@ -5,11 +5,12 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Iterator
 
-from antennate.experiments.twin import TwinConfig, build
-from antennate.hardware.doctor.checkup import Checkup, DoctorConfig, examine
+from antennate.hardware.doctor.check import Row
+from antennate.hardware.doctor.checkup import Checkup, examine
+from antennate.hardware.doctor.config import DoctorConfig
 from antennate.hardware.doctor.fix import apply, plan
-from antennate.hardware.doctor.rows import Row
 from antennate.hardware.ports.port import Port
+from antennate.twin.config import TwinConfig, build
 from antennate.twin.faults import Faults, read
 from antennate.twin.lockstep import BoardPort, LockstepClock
 from antennate.twin.robot import TwinRobot
@@ -24,7 +25,7 @@ class Patient:
         self.robot: TwinRobot = build(TwinConfig())
         self.clock = LockstepClock(self.robot)
         self.board = BoardPort(self.robot, self.clock)
-        Faults([read(text) for text in faults], ROBOT.layout.ids).apply(self.robot, 0.0)
+        Faults([read(text) for text in faults], ROBOT.robot.ids).apply(self.robot, 0.0)
         self.clock.latency = self.robot.bus.latency
         self.robot.bus.latency = 0.0
 
@@ -49,9 +50,7 @@ class Patient:
     def fix(self) -> list[str]:
         """Changes made until nothing is left to change."""
         made: list[str] = []
-        while (survey := self.examine(esp32=False).survey) and (
-            changes := plan(survey, ROBOT.layout)
-        ):
+        while (survey := self.examine(esp32=False).bus) and (changes := plan(survey, ROBOT.robot)):
             for change in changes:
                 apply(self.bus, change, self.clock.now)
                 made.append(str(change))

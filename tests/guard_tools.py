@@ -10,6 +10,7 @@ import pytest
 
 from antennate.hardware.safety.causes import Outputs
 from antennate.hardware.safety.supervisor import Supervisor
+from antennate.params import Params
 
 Patch = pytest.MonkeyPatch
 Off = Callable[[Patch], None]
@@ -35,6 +36,25 @@ class Guard:
 def put(target: Any, name: str, value: Any) -> Off:
     """Replace one thing."""
     return lambda patch: patch.setattr(target, name, value)
+
+
+def given(place: Any, kind: type[Params], **values: Any) -> Off:
+    """Give a module's objects other parameters, beyond their limits too."""
+
+    def made(**known: Any) -> Params:
+        return kind(**known).model_copy(update=values)
+
+    return put(place, kind.__name__, made)
+
+
+def together(*offs: Off) -> Off:
+    """Several changes."""
+
+    def off(patch: Patch) -> None:
+        for each in offs:
+            each(patch)
+
+    return off
 
 
 def around(target: Any, name: str, wrap: Callable[..., Any]) -> Off:

@@ -8,36 +8,57 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
+import hardware_rig
 import test_supervisor
 import test_supervisor_outages as test_outages
 import test_touch_check
-from guard_tools import Guard, after, around, before, blind, constant, put
+from guard_tools import Guard, Off, after, around, blind, given, put
 from hardware_rig import PERIOD
 
-from antennate.hardware.safety import diagnosis, rate
-from antennate.hardware.safety.causes import Cause, Outputs
+from antennate.hardware.safety import diagnosis, rate, supervisor
+from antennate.hardware.safety.causes import Cause, Outputs, State
 from antennate.hardware.safety.supervisor import Supervisor
+from antennate.params import SupervisorParams
 from antennate.types import Contact, Maneuver
 
 
-class Never:
-    """Counts nothing."""
+class Pulse:
+    """An order to arm that is new whenever it is given."""
 
-    def add(self, now: float) -> bool:
-        return False
+    def __init__(self) -> None:
+        self.asked = False
 
-    def clear(self) -> None:
-        """Nothing to forget."""
+    def __bool__(self) -> bool:
+        first, self.asked = not self.asked, True
+        return first
 
 
-def nothing_known(self: Any, *args: Any) -> None:
-    self._waiting.clear()
-    self._streak = 10**6
+def always_new(old: Any, self: Any, now: float, inputs: Any) -> Outputs:
+    return old(self, now, dataclasses.replace(inputs, arm=Pulse()) if inputs.arm else inputs)
 
 
 def fed(old: Any, self: Any, *args: Any) -> Outputs:
     out = old(self, *args)
     return dataclasses.replace(out, feed_watchdog=out.torque)
+
+
+def no_fault(cause: Cause) -> State:
+    return min(cause.value[0], State.HOLD)
+
+
+class Steady:
+    """Lets the time of each supervisor pass evenly, whatever its clock says."""
+
+    def __init__(self) -> None:
+        self.times: dict[int, float] = {}
+
+    def __call__(self, old: Any, supervisor: Any, now: float, inputs: Any) -> Outputs:
+        t = self.times[id(supervisor)] = self.times.get(id(supervisor), 0.0) + PERIOD
+        return old(supervisor, t, dataclasses.replace(inputs, decided_at=t))
+
+
+def limits(**values: Any) -> Off:
+    return given(hardware_rig, SupervisorParams, **values)
 
 
 def told(cause: Cause) -> Callable[[], Any]:
@@ -95,7 +116,7 @@ SUPERVISOR = [
     ),
     Guard(
         "watchdogs fed only upon a fresh decision",
-        around(Supervisor, "_outputs", fed),
+        around(Supervisor, "step", fed),
         test_supervisor.test_B8_watchdogs_are_fed_only_upon_a_decision_of_this_tick,
     ),
     Guard(
@@ -105,32 +126,32 @@ SUPERVISOR = [
     ),
     Guard(
         "arm gate",
-        put(Supervisor, "_objections", constant(())),
+        put(supervisor, "CURED_BY_ARMING", set(Cause)),
         test_supervisor.test_it_begins_off_and_arms_on_good_data_only,
     ),
     Guard(
         "arming is an event",
-        before(Supervisor, "step", lambda self, *args: setattr(self, "_asked", False)),
+        around(Supervisor, "step", always_new),
         test_supervisor.test_it_begins_off_and_arms_on_good_data_only,
     ),
     Guard(
         "faults stay until an arm event",
-        put(Supervisor, "_latch", constant(None)),
+        put(Cause, "severity", property(no_fault)),
         test_outages.test_T5_after_a_pause_it_does_not_resume,
     ),
     Guard(
         "clock that lies",
-        before(Supervisor, "step", lambda self, *args: setattr(self, "_last", -math.inf)),
+        around(Supervisor, "step", Steady()),
         partial(test_supervisor.test_a_clock_that_lies_is_a_fault, -1.0),
     ),
     Guard(
         "pause of the loop",
-        before(Supervisor, "step", lambda self, now, seen: setattr(self, "_last", now - PERIOD)),
+        limits(longest_pause=math.inf),
         test_outages.test_T5_after_a_pause_it_does_not_resume,
     ),
     Guard(
         "ten good samples after a loss",
-        after(Supervisor, "_recover", nothing_known),
+        limits(recovery=0),
         test_supervisor.test_data_must_be_well_ten_times_in_a_row,
     ),
     Guard(
@@ -140,19 +161,19 @@ SUPERVISOR = [
     ),
     Guard(
         "three holds are a fault",
-        after(Supervisor, "__init__", lambda self, params: setattr(self, "_holds", Never())),
+        limits(repeats=10**6),
         test_supervisor.test_three_holds_in_ten_seconds_are_a_fault,
     ),
     Guard(
         "three failures are a fault",
-        after(Supervisor, "__init__", lambda self, params: setattr(self, "_failures", Never())),
+        limits(repeats=10**6),
         partial(test_outages.test_T6_an_exception_holds_in_the_same_tick_and_three_are_a_fault, 0),
     ),
     Guard(
         "reboot loop",
-        after(Supervisor, "__init__", lambda self, params: setattr(self, "_reboots", Never())),
+        limits(repeats=10**6),
         partial(test_outages.test_E2_a_reboot_loop_is_a_fault_after_three, 0.3, "HARD"),
-        by=(KeyError,),
+        by=(StopIteration,),
     ),
     Guard(
         "wrong rate",
@@ -161,7 +182,7 @@ SUPERVISOR = [
     ),
     Guard(
         "supply does not flutter",
-        before(Supervisor, "_supply", lambda self, *args: self._low.clear()),
+        limits(supply_rise=0.0),
         test_supervisor.test_the_supply_sags_down_the_ladder_and_does_not_flutter,
     ),
 ]

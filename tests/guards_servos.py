@@ -6,6 +6,7 @@ import contextlib
 import dataclasses
 import math
 from functools import partial
+from types import SimpleNamespace
 from typing import Any
 
 import test_dynamixel_bus as test_bus
@@ -18,20 +19,19 @@ import test_settings
 import test_turns
 import test_twin_bus
 import test_twin_robot
-from guard_tools import Guard, after, around, constant, put
+from guard_tools import Guard, after, around, constant, given, put
 
 from antennate.hardware import joints, settings
-from antennate.hardware.driving import session, turns
-from antennate.hardware.driving.turns import Turns
-from antennate.hardware.dynamixel import bringup, bus, packets, parser
-from antennate.hardware.dynamixel.answers import Value
+from antennate.hardware.driving import session
+from antennate.hardware.dynamixel import actuators, bringup, bus, inquiry, monitor, packets, parser
+from antennate.hardware.dynamixel import leg_turns as turns
+from antennate.hardware.dynamixel.answers import Timing, Value
 from antennate.hardware.dynamixel.doubts import Doubts
+from antennate.hardware.dynamixel.leg_turns import LegTurns
 from antennate.hardware.dynamixel.tables import XC430_W240
 from antennate.hardware.ports import serial_port
-from antennate.hardware.safety import watch
-from antennate.hardware.safety.causes import Outputs, State
 from antennate.params import TurnsParams
-from antennate.robots.layout import LayoutParams
+from antennate.robots.spec import RobotSpec
 from antennate.twin.wire import SimulatedWire
 
 controller_fails = test_session.test_B8_servos_stop_within_120_ms_when_only_the_controller_fails
@@ -56,11 +56,13 @@ class AnyBytes(bytes):
     __hash__ = bytes.__hash__
 
 
-class Everyone(list[int]):
-    """Ids among which every id is."""
+class Agreeing(int):
+    """A value that differs from none."""
 
-    def __contains__(self, key: object) -> bool:
-        return True
+    def __ne__(self, other: object) -> bool:
+        return False
+
+    __hash__ = int.__hash__
 
 
 def any_refusal(old: Any, packet: Any, length: int, doubtful: set[int]) -> Any:
@@ -72,44 +74,82 @@ def any_length(old: Any, packet: Any, length: int, doubtful: set[int]) -> Any:
     return status and dataclasses.replace(status, data=status.data[-length:] if length else b"")
 
 
-def from_anybody(old: Any, self: Any, request: bytes, ids: Any, length: int, end: float) -> Any:
-    return old(self, request, Everyone(ids), length, end)
+def from_its_neighbour(old: Any, packet: Any) -> Any:
+    status = old(packet)
+    return status and dataclasses.replace(status, id=3)
 
 
-def unread(old: Any, master: Any, register: Any, values: Any) -> None:
-    master.write_all(register.address, {i: register.encode(v) for i, v in values.items()})
+def as_wished(old: Any, *args: Any) -> dict[int, int]:
+    return {servo: Agreeing(value) for servo, value in old(*args).items()}
+
+
+def without_end(old: Any, self: Any, ids: Any, span: Any, budget: float = 0.0) -> Any:
+    return old(self, ids, span, 1.0)
+
+
+def of_any_model(old: Any, *args: Any) -> Any:
+    present = old(*args)
+    return present and dataclasses.replace(present, model=None)
 
 
 def where_goals_were(old: Any, master: Any, ids: Any) -> Any:
-    return bringup.read_register(master, ids, bringup._COMMON["present_position"])
+    return bringup.read_register(master, ids, XC430_W240["present_position"])
 
 
-def goal_taken(old: Any, self: Any, servo: int, register: Any, value: int) -> bool:
-    return old(self, servo, register, value) or register is turns._GOAL
+GOAL, TORQUE, PLACE = (
+    XC430_W240[name].address for name in ("goal_position", "torque_enable", "present_position")
+)
 
 
-def torque_off(old: Any, self: Any, servo: int, register: Any) -> Any:
-    return 0 if register is turns._TORQUE and self._stage == 1 else old(self, servo, register)
+class Echo:
+    """Goals of single servos read as they were written, whether they were taken or not."""
+
+    def __init__(self) -> None:
+        self.written: dict[int, bytes] = {}
+
+    def __call__(self, patch: Any) -> None:
+        around(bus.Bus, "write_all", self.write)(patch)
+        around(bus.Bus, "read_all", self.read)(patch)
+
+    def write(self, old: Any, master: Any, address: int, data: Any, *more: Any) -> None:
+        self.written |= data if address == GOAL and len(data) == 1 else {}
+        old(master, address, data, *more)
+
+    def read(self, old: Any, master: Any, ids: Any, span: Any, *more: Any) -> Any:
+        answers = old(master, ids, span, *more)
+        if span.address != GOAL:
+            return answers
+        return {i: Value(self.written[i], False) if i in self.written else answers[i] for i in ids}
 
 
-def old_goal(old: Any, self: Any, at: int, goals: Any) -> bool:
-    return self._write(self._joints.ids[at], turns._TORQUE, 1)
+class Stale:
+    """A leg's place is not read anew after it was cleared: the third time as the second."""
+
+    def __init__(self) -> None:
+        self.places: list[Any] = []
+
+    def __call__(self, old: Any, master: Any, ids: Any, span: Any, *more: Any) -> Any:
+        answers = old(master, ids, span, *more)
+        if span.address != PLACE or len(ids) > 1:
+            return answers
+        self.places.append(answers)
+        return self.places[min(len(self.places) - 1, 1)]
 
 
-def no_fault(old: Any, self: Any, out: Outputs) -> None:
-    old(self, dataclasses.replace(out, state=State.HOLD))
+def torque_reads(value: bytes) -> Any:
+    def read(old: Any, master: Any, ids: Any, span: Any, *more: Any) -> Any:
+        answers = old(master, ids, span, *more)
+        return dict.fromkeys(ids, Value(value, False)) if span.address == TORQUE else answers
 
-
-def no_line_of_errors(self: Any, what: str) -> Any:
-    return contextlib.nullcontext()
+    return around(bus.Bus, "read_all", read)
 
 
 def told_once(old: Any, master: Any, ids: Any, *words: Any) -> list[int]:
     return old(master, ids, 1)
 
 
-def only_when_quiet(old: Any, self: Any, request: bytes, end: float, anyway: bool = False) -> bool:
-    return old(self, request, end)
+def only_when_quiet(old: Any, self: Any, address: int, data: Any, anyway: bool = False) -> None:
+    old(self, address, data)
 
 
 def shared(old: Any, *args: Any, exclusive: bool = True, **kwargs: Any) -> Any:
@@ -144,7 +184,7 @@ BUS = [
     ),
     Guard(
         "ids in requests",
-        put(packets, "_check_ids", constant(None)),
+        put(packets, "require_ids", constant(None)),
         partial(test_packets.test_ids_that_cannot_be_are_refused, [1, 1]),
     ),
     Guard(
@@ -154,7 +194,7 @@ BUS = [
     ),
     Guard(
         "bus quiet before a request",
-        put(bus.Bus, "_quiet", constant(True)),
+        put(bus, "Timing", partial(Timing, quiet=0.0)),
         partial(test_bus.test_B4_no_late_answer_is_taken_for_a_new_one, 0.060, True),
     ),
     Guard(
@@ -169,17 +209,17 @@ BUS = [
     ),
     Guard(
         "late refusals",
-        around(bus, "_fitting", any_refusal),
+        around(bus, "fitting", any_refusal),
         test_bus.test_B4_a_late_refusal_does_not_refuse_the_next_read,
     ),
     Guard(
         "length of an answer",
-        around(bus, "_fitting", any_length),
+        around(bus, "fitting", any_length),
         test_bus.test_B4_single_reads_after_a_late_answer,
     ),
     Guard(
         "id of an answer",
-        around(bus.Bus, "_exchange", from_anybody),
+        around(packets, "as_status", from_its_neighbour),
         test_bus.test_an_answer_with_another_id_is_no_answer,
     ),
     Guard(
@@ -198,7 +238,7 @@ BUS = [
     ),
     Guard(
         "budget of time",
-        put(bus.Bus, "_time_for", constant(True)),
+        around(bus.Bus, "read_all", without_end),
         test_bus.test_B1_two_silent_servos_leave_seventeen,
     ),
     Guard(
@@ -218,7 +258,7 @@ BUS = [
     ),
     Guard(
         "line that goes away",
-        put(serial_port.SerialPort, "_mapped", no_line_of_errors),
+        put(serial_port, "PortError", OSError),
         test_twin_bus.test_L12_a_line_that_goes_away_is_a_port_error,
         by=(OSError,),
     ),
@@ -236,7 +276,7 @@ SERVOS = [
     ),
     Guard(
         "model of a servo",
-        around(bringup, "_verdict", lambda old, found, model: old(found, found.model or model)),
+        around(inquiry, "look", of_any_model),
         test_bus.test_B15_missing_wrong_double_and_strange_servos_are_named_within_3_s,
     ),
     Guard(
@@ -270,7 +310,7 @@ SERVOS = [
     ),
     Guard(
         "writes are read back",
-        around(bringup, "_write_checked", unread),
+        around(bringup, "read_register", as_wished),
         test_bus.test_B9_latched_watchdogs_are_seen_and_rearmed_in_place,
     ),
     Guard(
@@ -290,7 +330,7 @@ SERVOS = [
     ),
     Guard(
         "torque off through noise",
-        around(bus.Bus, "_send", only_when_quiet),
+        around(bus.Bus, "write_all", only_when_quiet),
         partial(
             test_release.test_B19_noise_at_the_release_leaves_no_servo_with_torque_within_2_s, 60.0
         ),
@@ -302,7 +342,7 @@ SERVOS = [
     ),
     Guard(
         "torque lost while armed",
-        put(watch, "_TORQUE", XC430_W240["status_return_level"]),
+        torque_reads(b"\1"),
         partial(
             test_session.test_B11_B9_a_servo_without_torque_or_watchdog_is_a_fault_within_a_second,
             7,
@@ -312,7 +352,7 @@ SERVOS = [
     ),
     Guard(
         "watchdog lost while armed",
-        put(watch, "WATCHDOG_COUNTS", AnyNumber()),
+        put(monitor, "WATCHDOG_COUNTS", AnyNumber()),
         partial(
             test_session.test_B11_B9_a_servo_without_torque_or_watchdog_is_a_fault_within_a_second,
             7,
@@ -322,17 +362,17 @@ SERVOS = [
     ),
     Guard(
         "torque taken off on purpose",
-        put(Turns, "loose", None),
+        put(LegTurns, "loose", None),
         test_turns.test_a_leg_without_torque_to_forget_its_turns_is_not_reported,
     ),
     Guard(
         "goal of a loose leg is read back",
-        around(Turns, "_write", goal_taken),
+        Echo(),
         test_loose_leg.test_B10_a_leg_that_does_not_take_its_goal_gets_no_torque,
     ),
     Guard(
         "goal of a loose leg is where it stands",
-        around(Turns, "_hold", old_goal),
+        around(bus.Bus, "read_all", Stale()),
         partial(
             test_loose_leg.test_B10_a_leg_that_was_turned_while_loose_gets_torque_where_it_stands,
             600,
@@ -340,12 +380,12 @@ SERVOS = [
     ),
     Guard(
         "a loose leg after a fault",
-        around(session.Session, "_forget_turns", no_fault),
+        put(session, "State", SimpleNamespace(FAULT=math.inf)),
         test_loose_leg.test_B10_after_a_pause_a_loose_leg_waits_for_an_arm_event,
     ),
     Guard(
         "torque is off before turns are forgotten",
-        around(Turns, "_read", torque_off),
+        torque_reads(b"\0"),
         test_loose_leg.test_a_leg_whose_torque_came_back_is_not_cleared,
     ),
     Guard(
@@ -363,24 +403,24 @@ SERVOS = [
     ),
     Guard(
         "legs stand still before one is let go",
-        put(Turns, "_calm", constant(True)),
+        given(turns, TurnsParams, calm=0),
         test_loose_leg.test_no_leg_loses_its_torque_before_all_have_stood_still_for_five_ticks,
     ),
     Guard(
         "supply read long ago",
-        put(watch, "_OLD", math.inf),
+        put(monitor, "SUPPLY_AGE", math.inf),
         test_session.test_B13_a_supply_that_cannot_be_read_any_more_is_not_known_after_4_s,
     ),
     Guard(
         "no torque after half an arming",
-        put(session, "AntennateError", ()),
+        put(actuators, "AntennateError", ()),
         partial(
             test_session.test_B10_arming_that_fails_half_way_leaves_no_servo_with_torque, "servo"
         ),
     ),
     Guard(
         "limits of yaw joints and antennae",
-        put(LayoutParams, "limits", (math.inf,) * 19),
+        put(RobotSpec, "limits", (math.inf,) * 19),
         test_twin_robot.test_B14_a_yaw_or_an_antenna_beyond_its_limit_is_refused_as_a_whole,
     ),
     Guard(

@@ -22,27 +22,36 @@ from guard_tools import Guard, around, before, constant, put
 from antennate.control import loop
 from antennate.hardware import joints
 from antennate.hardware.driving import session
+from antennate.hardware.driving.decision import StepResult
 from antennate.hardware.driving.signals import StopOnce
+from antennate.hardware.driving.supervised_controller import SupervisedController
+from antennate.hardware.dynamixel import monitor
+from antennate.hardware.dynamixel.actuators import DynamixelActuators
 from antennate.hardware.ports.port import PortError
-from antennate.hardware.safety import watch
 from antennate.hardware.safety.causes import Outputs
 from antennate.hardware.safety.supervisor import Supervisor
 
 controller_fails = test_session.test_B8_servos_stop_within_120_ms_when_only_the_controller_fails
 
 
-def always_watch(old: Any, self: Any, command: Any) -> None:
-    old(self, command)
-    if self.outputs.torque and not self.outputs.feed_watchdog:
-        self.watch.step()
+def always_watch(old: Any, self: Any, out: Outputs, command: Any) -> None:
+    old(self, out, command)
+    if out.torque and not out.feed_watchdog:
+        self.actuators.look()
+
+
+def once(old: Any, self: Any, again: bool = False) -> list[int]:
+    return [] if again else old(self)
 
 
 def cleared(old: Any, self: Any, now: float, inputs: Any) -> Outputs:
     return dataclasses.replace(old(self, now, inputs), clear=True)
 
 
-def raising(self: Any) -> None:
-    self._look()
+def raising(old: Any, self: Any) -> None:
+    old(self)
+    if self.bus_error:
+        raise PortError(self.bus_error)
 
 
 def finite_goals(old: Any, self: Any, angles: Any) -> Any:
@@ -55,8 +64,8 @@ def always_sound(old: Any, self: Any, frame_: Any) -> Any:
 
 
 def careless(old: Any, self: Any, frame_: Any) -> Any:
-    self._thought = session.Thought(decided_at=self.clock.now())
-    return self.decider.step(frame_)
+    self.result = StepResult(decided_at=self._now())
+    return self.controller.step(frame_)
 
 
 def an_exception_alone(old: Any, self: Any, number: int, frame: Any) -> None:
@@ -91,7 +100,7 @@ SESSION = [
     ),
     Guard(
         "every tick decided after a failure, at half pace too",
-        around(session.Session, "step", always_sound),
+        around(SupervisedController, "step", always_sound),
         partial(controller_fails, 10.5),
     ),
     Guard(
@@ -101,7 +110,7 @@ SESSION = [
     ),
     Guard(
         "servos that kept their torque",
-        put(session.Session, "_release_again", constant(None)),
+        around(DynamixelActuators, "disable", once),
         test_release.test_B19_servos_that_kept_their_torque_in_off_are_told_again_until_they_let_go,
     ),
     Guard(
@@ -116,13 +125,13 @@ SESSION = [
     ),
     Guard(
         "signals while the torque goes off",
-        before(StopOnce, "_hear", lambda self, *_: setattr(self, "deaf", False)),
+        before(StopOnce, "receive", lambda self, *_: setattr(self, "deaf", False)),
         partial(test_signals.test_B19_no_signal_is_heard_once_the_walk_is_over_of_itself, "stand"),
         by=(KeyboardInterrupt,),
     ),
     Guard(
         "signals that a controller swallows",
-        around(StopOnce, "_hear", an_exception_alone),
+        around(StopOnce, "receive", an_exception_alone),
         partial(
             test_signals.test_B19_a_signal_that_a_controller_swallows_ends_the_walk_all_the_same,
             signal.SIGINT,
@@ -130,18 +139,18 @@ SESSION = [
     ),
     Guard(
         "commands that a controller changes later",
-        put(session, "plain", lambda command: command),
+        put(joints.Joints, "plain", lambda self, command: command),
         test_bad_controllers.test_B14_a_pose_that_a_controller_changes_later_stays_as_it_was_judged,
     ),
     Guard(
         "exceptions of the controller end nothing",
-        around(session.Session, "step", careless),
+        around(SupervisedController, "step", careless),
         partial(controller_fails, 11.1),
         by=(ValueError,),
     ),
     Guard(
         "dead wire ends nothing",
-        put(watch.ServoWatch, "step", raising),
+        around(monitor.ServoMonitor, "step", raising),
         test_bus.test_a_dead_wire_is_noted_by_the_watch_and_ends_nothing,
         by=(PortError,),
     ),

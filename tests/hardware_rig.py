@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from antennate.control.controllers import Arm, Controller
+from antennate.control.registry import make_controller
 from antennate.hardware.safety.causes import Inputs, Outputs, State
 from antennate.hardware.safety.diagnosis import Band, ChannelDiagnosis, Finding
 from antennate.hardware.safety.supervisor import Supervisor
@@ -72,8 +72,8 @@ def armed(params: SupervisorParams | None = None) -> Ticker:
 class Rig:
     """One tick after the other: readings in, command sent out."""
 
-    def __init__(self, arm: Arm = "paper", control: Any = None) -> None:
-        self.control = control or Controller(ControlParams(), arm)
+    def __init__(self, name: str = "paper", control: Any = None) -> None:
+        self.control = control or make_controller(name, ControlParams())
         self.films = [ChannelDiagnosis(DiagnosisParams(), BAND) for _ in range(2)]
         self.supervisor = Supervisor(SupervisorParams())
         self.n = -1

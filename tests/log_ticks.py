@@ -8,14 +8,14 @@ import struct
 from functools import lru_cache
 
 from antennate.params import ControlParams
-from antennate.robots.layout import LayoutParams
+from antennate.robots.spec import RobotSpec
 from antennate.telemetry.header import Header
 from antennate.telemetry.ticks import JOINTS, Tick
 
 HEADER = Header(
     controller="closed",
     params=ControlParams.model_validate({"conditioning": {"midpoint": 0.1 + 0.2}}),
-    layout=LayoutParams(),
+    robot=RobotSpec(),
     seed=7,
     trial=3,
     phase=math.pi / 3,
@@ -43,7 +43,7 @@ def tick(number: int) -> Tick:
         now=real(),
         counts=pair(),
         reading=pair(),
-        b=pair(),
+        level=pair(),
         contact=(chance.randrange(3), chance.randrange(3)),
         maneuver=chance.randrange(-(2**63), 2**63),
         phase=real(),

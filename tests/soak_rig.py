@@ -10,7 +10,7 @@ import numpy as np
 from esp32_streams import hello
 from hardware_rig import BAND, BENT, FREE, LIMIT, PERIOD
 
-from antennate.hardware.driving.body import HardwareRobot
+from antennate.hardware.driving.hardware_robot import HardwareRobot
 from antennate.hardware.esp32 import frame
 from antennate.hardware.esp32.board import Board
 from antennate.hardware.safety.causes import Cause, Inputs, Outputs, State
@@ -147,7 +147,7 @@ class Soak:
         self._clock = Now()
         self._board = Board(self._source, SupervisorParams().stale_age)
         nobody: Any = None
-        self._body = HardwareRobot(self._board, nobody, nobody, self._clock)
+        self._body = HardwareRobot(self._board, nobody, self._clock)
         self._films = [ChannelDiagnosis(DiagnosisParams(), BAND) for _ in range(2)]
         self._supervisor = Supervisor(SupervisorParams())
         self._events = events

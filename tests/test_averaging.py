@@ -9,8 +9,8 @@ import pytest
 from esp32_streams import BOOT, encoded, hello
 from hardware_rig import BENT, FREE, PERIOD
 
-from antennate.control.controllers import Controller
-from antennate.hardware.driving.body import HardwareRobot
+from antennate.control.registry import make_controller
+from antennate.hardware.driving.hardware_robot import HardwareRobot
 from antennate.hardware.esp32.board import Board
 from antennate.hardware.esp32.wire import Sample
 from antennate.params import ControlParams, SupervisorParams
@@ -59,15 +59,15 @@ def levels(rate: int, phase: float) -> tuple[np.ndarray, np.ndarray]:
     """Bending level and age of the frame [s] of each tick from that of the bend on."""
     stream, nobody = Stream(rate, phase), None
     board = Board(stream, SupervisorParams().stale_age)
-    body: Any = HardwareRobot(board, nobody, nobody, stream)  # type: ignore[arg-type]
-    control, found, stamps = Controller(ControlParams(), "paper"), [], []
+    body: Any = HardwareRobot(board, nobody, stream)  # type: ignore[arg-type]
+    control, found, stamps = make_controller("paper", ControlParams()), [], []
     for tick in range(round(WARM_UP / PERIOD) + 60):
         stream.sleep_until(tick * PERIOD)
         frame = body.read()
         control.step(frame)
         if tick == round(WARM_UP / PERIOD):
             stream.bend()
-        found.append(control.b[0, 0])
+        found.append(control.level[0, 0])
         stamps.append(float(frame.t[0]))
     begin = round(WARM_UP / PERIOD)
     return np.array(found[begin:]), np.array(stamps[begin:])

@@ -8,13 +8,14 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from twin_rig import rig
 
 from antennate.antenna.calibration import Calibration
 from antennate.cli import main
 from antennate.errors import AntennateError, CalibrationError, ConfigError
-from antennate.experiments.twin import TwinConfig, rig
 from antennate.hardware.esp32.film import calibrated, require_film
 from antennate.params import ConditioningParams, ControlParams, RuleParams
+from antennate.twin.config import TwinConfig
 
 GOOD = Calibration(
     made_by="antennate 0",

@@ -11,16 +11,17 @@ from typing import Any
 import numpy as np
 import pytest
 from test_bad_poses import Robot
+from twin_rig import rig
 
-from antennate.errors import ConfigError
-from antennate.experiments.twin import TwinConfig, rig
+from antennate.control.registry import make_controller
+from antennate.errors import ConfigError, in_one_line
 from antennate.hardware.driving.config import DriveConfig
-from antennate.hardware.driving.decider import chosen
 from antennate.hardware.driving.drive import drive
-from antennate.hardware.driving.tracebacks import Tracebacks, said
 from antennate.hardware.safety.causes import Active, Cause, State
+from antennate.hardware.tracebacks import Tracebacks
 from antennate.params import ControlParams, SupervisorParams
 from antennate.telemetry.ticks import Tick, angles_of
+from antennate.twin.config import TwinConfig
 from antennate.types import JointCommand
 
 
@@ -71,7 +72,7 @@ class Plugin:
 def robot() -> tuple[Robot, Any]:
     """One for all, whom no repetition makes a FAULT, and its own controller."""
     made = Robot(SupervisorParams(repeats=100, repeat_time=1e-6))
-    return made, made.session.decider
+    return made, made.session.control.controller
 
 
 class Driven:
@@ -80,17 +81,17 @@ class Driven:
     def __init__(self, kind: type[Plugin]) -> None:
         made, own = robot()
         self.session: Any = made.session
-        self.session.decider = Plugin(made._sound, own)
+        self.session.control.controller = Plugin(made._sound, own)
         self.step()
         assert self.session.outputs.state < State.HOLD
-        self.session.tracebacks = Tracebacks()
-        self.session.decider = kind(made._sound, own)
+        self.session.control.tracebacks = Tracebacks()
+        self.session.control.controller = kind(made._sound, own)
 
     def step(self) -> Active | None:
         """One tick: the most severe cause, None if there is none."""
         session = self.session
         begin = session.clock.now()
-        session.write(session.step(session.read()))
+        session.write(session.control.step(session.read()))
         session.clock.sleep_until(begin + session.period)
         causes = session.outputs.causes
         return causes[0] if causes else None
@@ -107,20 +108,20 @@ def test_T6_whatever_a_controller_raises_is_a_failure_of_it(error: BaseException
     assert found is not None
     assert found.cause is Cause.FAILED
     assert type(error).__name__ in found.detail
-    assert type(error).__name__ in made.session.tracebacks.kept[0]
+    assert type(error).__name__ in made.session.control.tracebacks.kept[0]
     assert np.isnan(Tick.unpack(Tick.of(made.session, 1.0).pack()).angles).all()
 
 
 def test_T6_a_controller_that_leaves_the_program_gets_the_torque_off_and_a_bad_end() -> None:
     made = rig(TwinConfig())
-    sound = made.session.decider.step
+    sound = made.session.control.controller.step
 
     def step(frame: Any) -> JointCommand:
         if made.session.tally.sent >= 20:
             raise SystemExit(0)
         return sound(frame)
 
-    made.session.decider.step = step  # type: ignore[method-assign]
+    made.session.control.controller.step = step  # type: ignore[method-assign]
     config = DriveConfig(dry_run=0.5, duration=4.0, fault_time=0.5)
     report = drive(made.session, config, arm=True)
     assert report.worst is State.FAULT
@@ -171,7 +172,7 @@ def test_what_a_controller_cannot_show_is_not_known_and_ends_nothing(error: Base
     made = Driven(Shy)
     made.step()
     tick = Tick.of(made.session, 1.0)
-    assert np.isnan([*tick.b, tick.phase]).all()
+    assert np.isnan([*tick.level, tick.phase]).all()
     assert np.isfinite(tick.angles).all()
 
 
@@ -221,17 +222,17 @@ def test_B14_a_pose_that_a_controller_changes_later_stays_as_it_was_judged() -> 
 
     made = Driven(Keeps)
     made.step()
-    kept = angles_of(made.session.command)
+    kept = angles_of(made.session.control.command)
     given[-1].leg[:] = 100.0
-    assert angles_of(made.session.command) == kept
+    assert angles_of(made.session.control.command) == kept
 
 
 @pytest.mark.parametrize(
     ("text", "said"),
     [
         ("import sys; sys.exit(0)", "SystemExit: 0"),
-        ("class C:\n  def __init__(self, p): raise SystemExit('a\\nb')", "SystemExit: a b"),
-        ("class C:\n  def __init__(self, p): raise GeneratorExit", "GeneratorExit"),
+        ("class C:\n  def __init__(self, *given): raise SystemExit('a\\nb')", "SystemExit: a b"),
+        ("class C:\n  def __init__(self, *given): raise GeneratorExit", "GeneratorExit"),
     ],
 )
 def test_a_controller_that_leaves_the_program_at_once_is_bad_input_in_one_line(
@@ -241,7 +242,7 @@ def test_a_controller_that_leaves_the_program_at_once_is_bad_input_in_one_line(
     (tmp_path / f"{name}.py").write_text(text)
     monkeypatch.syspath_prepend(tmp_path)
     with pytest.raises(ConfigError) as found:
-        chosen(f"{name}:C", ControlParams())
+        make_controller(f"{name}:C", ControlParams())
     assert said in str(found.value)
     assert "\n" not in str(found.value)
 
@@ -250,5 +251,5 @@ def test_an_exception_of_many_words_is_cut() -> None:
     error = ValueError("word " * 100_000)
     kept = Tracebacks()
     kept.keep(1.0, error)
-    assert len(said(error)) == 300
+    assert len(in_one_line(error)) == 300
     assert len(kept.kept[0]) == 20_000

@@ -10,12 +10,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from twin_rig import rig
 
-from antennate.experiments.twin import TwinConfig, rig
 from antennate.hardware.safety.causes import Cause, State
 from antennate.hardware.safety.supervisor import Supervisor
 from antennate.params import SupervisorParams
 from antennate.telemetry.ticks import JOINTS, Tick
+from antennate.twin.config import TwinConfig
 from antennate.types import JointCommand
 
 SHAPES = {"yaw": (1, 5), "leg": (1, 6, 2), "antenna": (1, 2)}
@@ -34,7 +35,7 @@ class Robot:
         made = rig(TwinConfig())
         self.session, self._servos = made.session, made.robot.servos
         self.session.supervisor = Supervisor(limits)
-        self._sound = self.session.decider.step
+        self._sound = self.session.control.controller.step
         for _ in range(150):
             self.step()
         self.session.orders.arm = True
@@ -49,9 +50,9 @@ class Robot:
             self.sound = self._sound(frame)
             return self.sound if command is SOUND else command
 
-        session.decider.step = said
+        session.control.controller.step = said
         begin = session.clock.now()
-        session.write(session.step(session.read()))
+        session.write(session.control.step(session.read()))
         session.clock.sleep_until(begin + session.period)
         assert session.outputs is not None
         return session.outputs.state
@@ -127,17 +128,17 @@ def test_B14_a_bad_pose_is_refused_as_a_whole_and_counted_and_the_goal_held(
 ) -> None:
     made = robot()
     assert made.step() in (State.OK, State.DEGRADED)
-    before, refused, sent = made.goals, made.session.tally.refused, made.session.tally.sent
+    before, refused, sent = made.goals, made.session.control.refused, made.session.tally.sent
     bad = data.draw(BAD[kind])
     assert made.step(bad) is State.HOLD
     assert made.goals == before
-    assert (made.session.tally.refused, made.session.tally.sent) == (refused + 1, sent)
+    assert (made.session.control.refused, made.session.tally.sent) == (refused + 1, sent)
     out = made.session.outputs
     assert out is not None
     first = out.causes[0]
     assert first.cause is Cause.BAD_POSE
     assert "expected" in first.detail
-    assert made.session.watch.bus_error == ""
+    assert made.session.actuators.state.bus_error == ""
     tick = Tick.of(made.session, 1.0)
     assert Tick.unpack(tick.pack()).refused == refused + 1
 
@@ -146,9 +147,9 @@ def test_B14_a_bad_pose_is_refused_as_a_whole_and_counted_and_the_goal_held(
 @settings(max_examples=20, deadline=None)
 def test_B14_a_pose_within_all_limits_is_not_refused(seed: int) -> None:
     angles = sound_angles() + np.random.default_rng(seed).uniform(-0.05, 0.05, len(JOINTS))
-    made, refused = robot(), robot().session.tally.refused
+    made, refused = robot(), robot().session.control.refused
     assert made.step(pose_of(np.clip(angles, -1.5, 1.5))) in (State.OK, State.DEGRADED)
-    assert made.session.tally.refused == refused
+    assert made.session.control.refused == refused
 
 
 def test_B14_poses_refused_again_and_again_are_a_fault_that_says_so() -> None:
@@ -172,7 +173,7 @@ def test_B14_poses_refused_again_and_again_are_a_fault_that_says_so() -> None:
 )
 def test_a_decision_that_is_none_is_a_failure_of_the_controller(name: str, said: Any) -> None:
     made = Robot(SupervisorParams())
-    decision, command = made.session.decision, made.sound
+    decision, command = made.session.control.decision, made.sound
 
     class Odd:
         maneuver, contact = np.array([0]), np.array([[0, 0]])
@@ -181,12 +182,12 @@ def test_a_decision_that_is_none_is_a_failure_of_the_controller(name: str, said:
             return command
 
     setattr(Odd, name, said)
-    made.session.decider = Odd()
-    made.session.write(made.session.step(made.session.read()))
+    made.session.control.controller = Odd()
+    made.session.write(made.session.control.step(made.session.read()))
     out = made.session.outputs
     assert out is not None
     assert out.state >= State.HOLD
     assert out.causes[0].cause is Cause.FAILED
     assert f"expected {name} of shape (1," in out.causes[0].text
-    assert made.session.decision == decision
+    assert made.session.control.decision == decision
     assert Tick.of(made.session, 1.0).maneuver == decision.maneuver

@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from antennate.control.conditioning import bending_level
-from antennate.control.controllers import Arm, Controller
+from antennate.control.registry import make_controller
 from antennate.params import ConditioningParams, ControlParams, RuleParams
 from antennate.robots.sensor import SensorParams
 from antennate.types import AntennaFrame, Contact, Maneuver
@@ -28,10 +28,10 @@ from antennate.types import AntennaFrame, Contact, Maneuver
     ),
     st.sampled_from(["open", "paper", "closed"]),
 )
-def test_S5_what_is_no_number_holds_and_never_reaches_a_pose(readings: list, arm) -> None:
+def test_S5_what_is_no_number_holds_and_never_reaches_a_pose(readings: list, name) -> None:
     """NaN, infinities and None in counts: HOLD in the same tick, as long as the mean holds them."""
     params = ControlParams()
-    control = Controller(params, arm)
+    control = make_controller(name, params)
     length = round(params.conditioning.averaging_time / params.period)
     since = length
     for n, pair in enumerate(readings):
@@ -65,7 +65,7 @@ def test_S10_the_sigmoid_never_overflows() -> None:
 def test_S12_chatter_turns_the_robot_once_per_hold_at_most(frequency: float) -> None:
     """A square wave of contact for 20 s. FORWARD is not held: it may stand between two turns."""
     params = ControlParams()
-    control = Controller(params, "paper")
+    control = make_controller("paper", params)
     duration = 20.0
     seen = []
     for n in range(round(duration * params.rate)):
@@ -80,15 +80,15 @@ def test_S12_chatter_turns_the_robot_once_per_hold_at_most(frequency: float) -> 
 
 
 @pytest.mark.parametrize("right", ["free", "like left", "against left"])
-@pytest.mark.parametrize(("arm", "most"), [("closed", 11), ("open", 0), ("paper", 19)])
+@pytest.mark.parametrize(("name", "most"), [("closed", 11), ("open", 0), ("paper", 19)])
 def test_S12_chatter_changes_the_action_as_often_as_the_page_says(
-    arm: Arm, most: int, right: str
+    name: str, most: int, right: str
 ) -> None:
     """1 to 50 Hz in 20 s, where duration / T_hold + 1 is 11; all changes, FORWARD among them."""
     params = ControlParams()
     frequency = np.repeat(np.arange(1.0, 50.1, 0.3), 2)
     start = np.tile([0.0, 0.21], len(frequency) // 2)
-    control = Controller(params, arm, len(frequency))
+    control = make_controller(name, params, batch=len(frequency))
     changes, before = np.zeros(len(frequency), int), control.maneuver
     for n in range(2000):
         touch = np.floor(2 * (frequency * n * PERIOD + start) + 1e-9) % 2 == 1

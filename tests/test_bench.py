@@ -8,17 +8,15 @@ import pytest
 from antennate.antenna.statics import Chain, shape
 from antennate.errors import SimulationError
 from antennate.params import BenchPhysicsParams
-from antennate.robots.antenna import AntennaParams
-from antennate.robots.sensor import SensorParams
+from antennate.robots.antenna import AntennaSpec
 from antennate.sim.bench import Ball, Bar, Bench, compile_bench
 
-ANTENNA, SENSOR = AntennaParams(), SensorParams()
-COVERED = SENSOR.covered_hinges(ANTENNA)
+ANTENNA = AntennaSpec()
 
 
 def bench(*obstacles: Ball | Bar, gravity: tuple[float, float] = (0.0, 0.0)) -> Bench:
     physics = BenchPhysicsParams()
-    return Bench(compile_bench(physics, ANTENNA, SENSOR, obstacles, gravity), COVERED)
+    return Bench(compile_bench(physics, ANTENNA, obstacles, gravity), ANTENNA)
 
 
 def rest(held: Bench, seconds: float = 1.5) -> None:
@@ -31,7 +29,7 @@ def test_the_model_holds_the_declared_numbers() -> None:
     assert model.opt.impratio == 10
     assert (model.geom_solref[:, 0] == 1e-3).all()
     stiffness = [model.joint(f"antenna/hinge{i}").stiffness[0] for i in range(6)]
-    assert stiffness == pytest.approx(list(Chain.of(ANTENNA, SENSOR).stiffness))
+    assert stiffness == pytest.approx(list(Chain.of(ANTENNA).stiffness))
     assert (model.opt.gravity == 0).all()
 
 
@@ -60,7 +58,7 @@ def test_weight_bends_by_the_sum_of_its_levers() -> None:
     held.place(0.0, 0.0, 0.0)
     rest(held)
     link, mass = ANTENNA.link_length, ANTENNA.link_mass
-    stiffness = Chain.of(ANTENNA, SENSOR).stiffness
+    stiffness = Chain.of(ANTENNA).stiffness
     expected = [
         -sum(mass * 1.0 * (j + 0.5 - i) * link for j in range(i, 6)) / stiffness[i]
         for i in range(6)
@@ -84,7 +82,7 @@ def test_springs_balance_the_force_of_a_ball() -> None:
     hinge, middle = held.joints()[0], np.array([ball.x, ball.y])
     to_middle = middle - hinge
     moment = to_middle[0] * force[1] - to_middle[1] * force[0]  # through the middle: no friction
-    torque = Chain.of(ANTENNA, SENSOR).stiffness[0] * held.hinges()[0]
+    torque = Chain.of(ANTENNA).stiffness[0] * held.hinges()[0]
     friction_arm = ball.radius * ANTENNA.friction * np.linalg.norm(force)
     assert torque == pytest.approx(moment, abs=friction_arm + 1e-5)
     assert held.hinges()[0] > 0.01
@@ -96,9 +94,9 @@ def test_joints_are_where_the_chain_says() -> None:
     rest(held)
     angles = held.hinges()[None, :].copy()
     angles[0, 0] += held.base_angle()
-    expected = shape(Chain.of(ANTENNA, SENSOR), angles)[0] + held.carriage()
+    expected = shape(Chain.of(ANTENNA), angles)[0] + held.carriage()
     assert held.joints() == pytest.approx(expected, abs=1e-6)
-    assert held.flex() == pytest.approx(held.hinges()[:COVERED].sum())
+    assert held.flex() == pytest.approx(held.hinges()[: ANTENNA.sensed_hinges].sum())
 
 
 def test_a_bar_stops_what_a_gap_lets_through() -> None:

@@ -85,7 +85,7 @@ def test_the_controller_gets_the_same_curve() -> None:
     samples = simulated(14.0, 0.4, -1, 1)
     found = fit(samples)
     level = found.level(samples.counts)
-    assert np.sqrt(np.mean((level - samples.bend) ** 2)) == pytest.approx(found.rmse, rel=1e-9)
+    assert np.sqrt(np.mean((level - samples.level) ** 2)) == pytest.approx(found.rmse, rel=1e-9)
 
 
 def test_a_saved_file_is_read_back_and_never_replaced_unasked(tmp_path: Path) -> None:
@@ -214,7 +214,7 @@ def test_a_recording_with_units_is_what_it_says(tmp_path: Path) -> None:
     )
     found = read(file, columns)
     assert found.t[50] == pytest.approx(0.5)
-    assert found.samples.bend[50] == pytest.approx(0.5)
+    assert found.samples.level[50] == pytest.approx(0.5)
     assert found.samples.row[0] == 2
 
 
@@ -255,7 +255,7 @@ def test_a_poor_curve_is_warned_of(
     file.write_text("\n".join(["time,counts,bend", *rows]) + "\n")
     words = ["--draws", "20", "--out", str(tmp_path / "out")]
     assert main(["calibrate", "--recording", str(file), *words]) == 0
-    assert ("Record again" in capsys.readouterr().out) == (noise > 0.1)
+    assert ("record again" in capsys.readouterr().out) == (noise > 0.1)
 
 
 def test_the_rig_sees_readings_fall_as_the_rod_goes_in() -> None:
@@ -263,7 +263,7 @@ def test_the_rig_sees_readings_fall_as_the_rod_goes_in() -> None:
     assert found.calibration.polarity == -1
     assert {speed.speed_m_s for speed in found.calibration.speeds} == {0.05, 0.10, 0.15}
     fsr = RIG.model_dump()
-    fsr["sensor"]["kind"] = "fsr"
+    fsr["antenna"]["sensor"]["kind"] = "fsr"
     assert run(CalibrateConfig.model_validate(fsr)).calibration.polarity == 1
 
 

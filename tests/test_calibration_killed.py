@@ -13,7 +13,7 @@ from test_bad_calibrations import GOOD
 
 import antennate
 from antennate.antenna.calibration import Calibration
-from antennate.cli.folder import RunFolder
+from antennate.studies.run_directory import RunDirectory
 
 
 @pytest.mark.parametrize("kills", [40, pytest.param(500, marks=pytest.mark.slow)])
@@ -52,6 +52,6 @@ def test_S13_what_a_killed_program_of_the_same_number_left_is_in_nobodys_way(
     GOOD.save(tmp_path / "calibration.json")
     assert Calibration.load(tmp_path / "calibration.json") == GOOD
     (tmp_path / f".calibration.json.{os.getpid()}").write_text("half of a calib")
-    with RunFolder.open("calibrate", tmp_path, overwrite=True) as folder:
+    with RunDirectory.create("calibrate", tmp_path, overwrite=True) as folder:
         folder.write("calibration.json", GOOD.to_json())
     assert Calibration.load(tmp_path / "calibration.json") == GOOD

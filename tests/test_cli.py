@@ -15,19 +15,18 @@ import numpy as np
 import pytest
 
 import antennate
-from antennate.cli import COMMANDS, main
+from antennate.cli import commands, main
 from antennate.cli.arguments import FromFile, parse_with
-from antennate.cli.folder import strict, to_csv
-from antennate.cli.toml import to_toml
 from antennate.errors import ConfigError
 from antennate.experiments.gait.run import GaitStudyConfig
 from antennate.experiments.tunnel.run import TunnelConfig
-from antennate.experiments.twin import TwinConfig
 from antennate.messages import one_line
 from antennate.params.reading import read_file
 from antennate.sim.world import World
+from antennate.studies.formats import strict, to_csv, to_toml
+from antennate.twin.config import TwinConfig
 
-SMALL = ["tunnel", "--trials", "1", "--arms", "open", "--time-limit", "1", "--workers", "1"]
+SMALL = ["tunnel", "--trials", "1", "--controllers", "open", "--time-limit", "1", "--workers", "1"]
 QUICK = [*SMALL, "--no-figures"]
 
 
@@ -75,7 +74,7 @@ def test_python_runs_the_package_as_the_command():
     assert done.stdout == f"antennate {antennate.__version__}\n"
 
 
-@pytest.mark.parametrize("command", sorted(COMMANDS))
+@pytest.mark.parametrize("command", sorted(commands()))
 def test_help_fits_two_screens_and_help_all_shows_every_flag(capsys, command):
     assert main([command, "--help"]) == 0
     short = capsys.readouterr().out.splitlines()
@@ -128,10 +127,10 @@ def test_the_door_opens_without_heavy_imports():
         (["tunnel", "--trials"], ["--trials: expected 1 value, INT, found none"]),
         (["tunnel", "--trials", "0"], ["--trials: expected a number of at least 1, found 0"]),
         (
-            ["tunnel", "--arms", "zigzag"],
-            ["--arms: expected one of open, paper or closed, found zigzag"],
+            ["tunnel", "--controllers", "zigzag"],
+            ["controllers: expected one of open, paper, closed, or MODULE"],
         ),
-        (["tunnel", "--arms", "open", "open"], ["arms must differ"]),
+        (["tunnel", "--controllers", "open", "open"], ["controllers must differ"]),
         (["tunnel", "--workers", "0"], ["--workers: expected a number of at least 1, found 0"]),
         (
             ["tunnel", "--tunnel.free-width", "-0.4"],
@@ -178,8 +177,8 @@ def test_bad_words(capsys, tmp_path, argv, parts):
         ("tunnel.free_width = 1979-05-27", ["tunnel.free_width: expected a number"]),
         ("tunnel = 3", ["tunnel: expected a table, found 3"]),
         ("tunnel.segments = [1.0, 'x']", ["tunnel.segments[1]: expected a number, found 'x'"]),
-        ("arms = []", ["arms: expected at least 1 value"]),
-        ("robot.antenna.active_coils = [3, 6]", ["active_coils[2]: expected a value"]),
+        ("controllers = []", ["controllers: expected at least 1 value"]),
+        ("robot.antenna.active_coils = []", ["active_coils: expected at least 1 value"]),
         ('"a\\u001b[31m\\nb" = 1', ["expected a known key"]),
         ("a = " + "[" * 200_000, ["nested too deeply"]),
         ("a." * 400_000 + "a = 1", ["line 1: expected at most 100 dots"]),
@@ -258,7 +257,7 @@ def test_a_run_leaves_a_folder_that_explains_itself(capsys, tmp_path):
     assert main([*SMALL, "--seed", "5", "--out", "deep/run"]) == 0
     out, err = capsys.readouterr()
     assert err.endswith("written to deep/run\n")
-    assert "1 trials an arm, seed 5" in out
+    assert "1 trials a controller, seed 5" in out
     assert "A failure counts as the time limit, 1 s" in out
     assert max(map(len, out.splitlines())) <= 100
     run = tmp_path / "deep" / "run"
@@ -280,7 +279,7 @@ def test_a_run_leaves_a_folder_that_explains_itself(capsys, tmp_path):
     assert versions["antennate"] == antennate.__version__
     assert versions["numpy"] == np.__version__
     [row] = table(run)
-    assert (row["arm"], row["trial"], row["status"], row["time_s"]) == (
+    assert (row["controller"], row["trial"], row["outcome"], row["time_s"]) == (
         "open",
         "0",
         "timeout",
@@ -299,13 +298,13 @@ def test_json_is_strict_and_keeps_its_contract(capsys, tmp_path):
     def refuse(name):
         raise AssertionError(f"{name} is no JSON")
 
-    assert main([*QUICK, "--arms", "open", "closed", "--json", "--out", "run"]) == 0
+    assert main([*QUICK, "--controllers", "open", "closed", "--json", "--out", "run"]) == 0
     text = capsys.readouterr().out
     assert text == (tmp_path / "run" / "result.json").read_text()
     result = json.loads(text, parse_constant=refuse)
-    assert (result["schema"], result["command"], result["seed"]) == (1, "tunnel", 0)
+    assert (result["schema"], result["command"], result["seed"]) == (2, "tunnel", 0)
     assert result["interrupted"] is False
-    assert list(result["arms"]) == ["open", "closed"]
+    assert list(result["controllers"]) == ["open", "closed"]
     assert {
         "trials",
         "successes",
@@ -323,8 +322,8 @@ def test_json_is_strict_and_keeps_its_contract(capsys, tmp_path):
         "share",
         "force_mean_n",
         "force_max_n",
-    } <= result["arms"]["open"].keys()
-    assert result["arms"]["open"]["speed_m_s"] is None  # nobody gets out within a second
+    } <= result["controllers"]["open"].keys()
+    assert result["controllers"]["open"]["speed_m_s"] is None  # nobody gets out within a second
     assert list(result["paired"]) == ["open-closed"]
     assert {"trials", "only_first", "only_second", "mcnemar_p", "wilcoxon_p"} <= result["paired"][
         "open-closed"
@@ -369,7 +368,16 @@ def test_an_unfinished_run_is_not_overwritten(capsys, tmp_path):
 
 def test_one_and_two_workers_write_the_same_bytes(capsys, tmp_path):
     for workers in ("1", "2"):
-        words = ["--trials", "2", "--time-limit", "2", "--arms", "open", "closed", "--no-figures"]
+        words = [
+            "--trials",
+            "2",
+            "--time-limit",
+            "2",
+            "--controllers",
+            "open",
+            "closed",
+            "--no-figures",
+        ]
         assert main(["tunnel", *words, "--workers", workers, "--out", workers]) == 0
     for name in ("trials.csv", "result.json", "config.toml"):
         assert (tmp_path / "1" / name).read_bytes() == (tmp_path / "2" / name).read_bytes()
@@ -386,18 +394,18 @@ def test_an_invalid_trial_is_a_row_and_no_success(capsys, tmp_path, monkeypatch)
     monkeypatch.setattr(World, "step", blow_up)
     assert main([*SMALL, "--trials", "2", "--out", "run"]) == 0
     assert "invalid" in capsys.readouterr().out
-    arm = json.loads((tmp_path / "run" / "result.json").read_text())["arms"]["open"]
-    assert (arm["trials"], arm["invalid"], arm["successes"]) == (2, 2, 0)
-    assert arm["restricted_mean_time_s"] is None
+    open_ = json.loads((tmp_path / "run" / "result.json").read_text())["controllers"]["open"]
+    assert (open_["trials"], open_["invalid"], open_["successes"]) == (2, 2, 0)
+    assert open_["restricted_mean_time_s"] is None
     rows = table(tmp_path / "run")
-    assert [row["status"] for row in rows] == ["invalid", "invalid"]
+    assert [row["outcome"] for row in rows] == ["invalid", "invalid"]
     assert all("physics step" in row["reason"] for row in rows)
 
 
 def test_interrupted_in_the_middle_keeps_the_finished_trials(capsys, tmp_path, monkeypatch):
-    from antennate.cli.folder import RunFolder
+    from antennate.studies.run_directory import RunDirectory
 
-    kept = RunFolder.append
+    kept = RunDirectory.append
     seen = []
 
     def append(self, row):
@@ -406,10 +414,10 @@ def test_interrupted_in_the_middle_keeps_the_finished_trials(capsys, tmp_path, m
         if len(seen) == 2:
             raise KeyboardInterrupt
 
-    monkeypatch.setattr(RunFolder, "append", append)
+    monkeypatch.setattr(RunDirectory, "append", append)
     assert main([*SMALL, "--trials", "30", "--out", "run"]) == 130
     out, err = capsys.readouterr()
-    assert "interrupted: kept 2 of 30 trials" in err
+    assert "interrupted: kept 2 trials" in err
     assert "trials" in out
     rows = table(tmp_path / "run")
     assert sorted(int(row["trial"]) for row in rows) == sorted(row["trial"] for row in seen)
@@ -422,7 +430,7 @@ def test_interrupted_in_the_middle_keeps_the_finished_trials(capsys, tmp_path, m
 @pytest.mark.parametrize("workers", ["1", "2"])
 def test_a_signal_ends_the_run_and_keeps_its_trials(tmp_path, number, workers):
     code = (
-        "import signal, sys; from antennate.cli import COMMANDS, main; "
+        "import signal, sys; from antennate.cli import main; "
         "signal.signal(signal.SIGINT, signal.default_int_handler); sys.exit(main(sys.argv[1:]))"
     )
     words = ["tunnel", "--trials", "5000", "--out", "run", "--no-figures", "--workers", workers]
@@ -442,7 +450,7 @@ def test_a_signal_ends_the_run_and_keeps_its_trials(tmp_path, number, workers):
     result = json.loads((tmp_path / "run" / "result.json").read_text())
     assert result["interrupted"] is True
     rows = table(tmp_path / "run")
-    assert len(rows) == sum(arm["trials"] for arm in result["arms"].values()) >= 2
+    assert len(rows) == sum(open_["trials"] for open_ in result["controllers"].values()) >= 2
 
 
 def test_gait_runs_and_writes_its_result(capsys, tmp_path):

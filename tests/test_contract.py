@@ -16,15 +16,15 @@ import numpy as np
 import pytest
 from worlds import TICKS, WORLDS, World, recorded, replayed, session, simulated, twin
 
-from antennate.control.controllers import ARMS
 from antennate.control.loop import run_loop
-from antennate.hardware.driving.body import HardwareRobot
+from antennate.control.registry import BUILT_IN
+from antennate.hardware.driving.hardware_robot import HardwareRobot
 from antennate.hardware.esp32.clock import Timed
 from antennate.hardware.esp32.wire import Sample
 from antennate.params import ControlParams, LogParams
 from antennate.telemetry.header import Header
 from antennate.telemetry.reader import LogReader
-from antennate.telemetry.replay import recorded_decider, replay
+from antennate.telemetry.replay import recorded_controller, replay
 from antennate.telemetry.ticks import Tick
 from antennate.telemetry.writer import LogWriter
 from antennate.types import AntennaFrame, Contact, JointCommand, Maneuver
@@ -130,7 +130,7 @@ def test_M7_time_of_a_board_follows_the_host_whatever_comes_and_never_goes_back(
             return Timed(EMPTY, self.epoch, 0, round(1e6 * self.taken), 0.0)
 
     clock = Wandering(0, 0.01)
-    body = HardwareRobot(Chance(), None, None, clock)  # type: ignore[arg-type]
+    body = HardwareRobot(Chance(), None, clock)  # type: ignore[arg-type]
     times = []
     for tick in range(5000):
         clock.sleep_until(0.01 * tick)
@@ -142,9 +142,9 @@ def test_M7_time_of_a_board_follows_the_host_whatever_comes_and_never_goes_back(
 # the same decisions
 
 
-def same_everywhere(folder: Path, arm: str, trial: int, ticks: float) -> set[int]:
+def same_everywhere(folder: Path, name: str, trial: int, ticks: float) -> set[int]:
     """Run three worlds and the replays of two logs; the maneuvers that occurred."""
-    worlds = {"simulation": simulated(folder, arm, trial), "twin": twin(folder, arm, trial)}
+    worlds = {"simulation": simulated(folder, name, trial), "twin": twin(folder, name, trial)}
     logs = [recorded(world, folder / name, ticks) for name, world in worlds.items()]
     seen = [world.seen for world in worlds.values()] + [replayed(log).run() for log in logs]
     first = [one.decision() for one in seen[0]]
@@ -162,11 +162,11 @@ def test_M7_G7_all_worlds_decide_the_same_in_the_same_scene(tmp_path: Path) -> N
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("arm", "trial"), [("closed", 1), ("paper", 0), ("paper", 2)])
+@pytest.mark.parametrize(("name", "trial"), [("closed", 1), ("paper", 0), ("paper", 2)])
 def test_M7_G7_all_worlds_decide_the_same_for_a_whole_trial(
-    tmp_path: Path, arm: str, trial: int
+    tmp_path: Path, name: str, trial: int
 ) -> None:
-    assert Maneuver.REVERSE in same_everywhere(tmp_path, arm, trial, math.inf)
+    assert Maneuver.REVERSE in same_everywhere(tmp_path, name, trial, math.inf)
 
 
 def test_G7_a_session_with_a_silent_board_is_replayed_to_the_bit(tmp_path: Path) -> None:
@@ -176,7 +176,7 @@ def test_G7_a_session_with_a_silent_board_is_replayed_to_the_bit(tmp_path: Path)
     again = replayed(path)
     assert [one.decision() for one in again.run()] == [one.decision() for one in live.seen]
     with LogReader(path) as log:
-        found = replay(log, recorded_decider(log.header), log.header.params.period)
+        found = replay(log, recorded_controller(log.header), log.header.params.period)
         assert (log.ticks, log.missing, log.bad, log.end) == (350, 0, 0, 350)
     assert (found.different, found.commands, found.failures) == (0, 0, 0)
     assert {"OFF", "OK", "HOLD"} < set(found.states)
@@ -233,9 +233,9 @@ def test_G7_logs_of_wandering_readings_are_replayed_to_the_bit(
 ) -> None:
     met: Counter[int] = Counter()
     for seed in range(logs):
-        arm = ARMS[seed % len(ARMS)]
-        header = Header(controller=arm, params=ControlParams(), seed=seed, phase=0.1 * seed)
-        control = recorded_decider(header)
+        name = list(BUILT_IN)[seed % len(BUILT_IN)]
+        header = Header(controller=name, params=ControlParams(), seed=seed, phase=0.1 * seed)
+        control = recorded_controller(header)
         body = Wandering(seed, header.params.period)
         path = tmp_path / str(seed)
         with LogWriter(path, header, LogParams(least_free=0.0)) as out:
@@ -247,7 +247,7 @@ def test_G7_logs_of_wandering_readings_are_replayed_to_the_bit(
 
             run_loop(body, control, header.params.period, go_on)
         with LogReader(path) as log:
-            found = replay(log, recorded_decider(log.header), log.header.params.period)
+            found = replay(log, recorded_controller(log.header), log.header.params.period)
             assert (log.ticks, log.missing, log.bad) == (ticks, 0, 0)
         assert (found.different, found.commands) == (0, 0)
         met += found.recorded
@@ -258,7 +258,7 @@ def test_G7_another_controller_differs_and_the_first_difference_is_named(tmp_pat
     world = simulated(tmp_path, "paper", 0)
     path = recorded(world, tmp_path / "log", 200)
     with LogReader(path) as log:
-        found = replay(log, recorded_decider(log.header, "open"), log.header.params.period)
+        found = replay(log, recorded_controller(log.header, "open"), log.header.params.period)
     decided = [one.maneuver for one in world.seen]
     turned = next(i for i, maneuver in enumerate(decided) if maneuver != Maneuver.FORWARD)
     assert found.first is not None
@@ -279,5 +279,5 @@ def test_a_tick_of_a_controller_of_anybody_is_kept_too() -> None:
     seen.command.yaw.resize((1, 4), refcheck=False)
     tick = Tick.plain(Odd(), seen.frame, seen.command, 1, 0.5)
     assert (tick.maneuver, tick.contact) == (3, (0, 1))
-    assert all(map(math.isnan, (*tick.b, tick.phase, *tick.angles)))
+    assert all(map(math.isnan, (*tick.level, tick.phase, *tick.angles)))
     assert Tick.unpack(tick.pack()).pack() == tick.pack()

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from antennate.control.controllers import ARMS, Arm, Controller
+from antennate.control.registry import BUILT_IN, make_controller
 from antennate.errors import ConfigError
 from antennate.params import ControlParams
 from antennate.types import AntennaFrame, Maneuver
@@ -41,16 +41,16 @@ def streams(ticks: int, rows: int) -> np.ndarray:
     return counts
 
 
-def run(arm: Arm, counts: np.ndarray, phase: float = 0.0) -> dict[str, np.ndarray]:
+def run(name: str, counts: np.ndarray, phase: float = 0.0) -> dict[str, np.ndarray]:
     """All that a fresh controller says to counts of shape (ticks, B, 2)."""
     batch = counts.shape[1]
-    control = Controller(PARAMS, arm, batch)
+    control = make_controller(name, PARAMS, batch=batch)
     control.reset(np.arange(batch), phase)
     said: dict[str, list[np.ndarray]] = {"b": [], "maneuver": [], "yaw": [], "leg": []}
     for i, reading in enumerate(counts):
         command = control.step(AntennaFrame(t=np.full(batch, i * PERIOD), counts=reading))
         for name, value in (
-            ("b", control.b),
+            ("b", control.level),
             ("maneuver", control.maneuver),
             ("yaw", command.yaw),
             ("leg", command.leg),
@@ -59,18 +59,18 @@ def run(arm: Arm, counts: np.ndarray, phase: float = 0.0) -> dict[str, np.ndarra
     return {name: np.array(values) for name, values in said.items()}
 
 
-def test_an_arm_that_does_not_exist_is_refused_with_the_valid_ones() -> None:
-    with pytest.raises(ConfigError, match=r"open, paper, closed, got 'clsoed'"):
-        Controller(PARAMS, "clsoed")  # type: ignore[arg-type]
+def test_a_name_that_does_not_exist_is_refused_with_the_valid_ones() -> None:
+    with pytest.raises(ConfigError, match=r"open, paper, closed, .*did you mean closed\?"):
+        make_controller("clsoed", PARAMS)
 
 
-@pytest.mark.parametrize("arm", ARMS)
-def test_a_robot_that_touches_nothing_walks_forward(arm: Arm) -> None:
-    said = run(arm, np.full((800, 1, 2), STRAIGHT))
+@pytest.mark.parametrize("name", BUILT_IN)
+def test_a_robot_that_touches_nothing_walks_forward(name: str) -> None:
+    said = run(name, np.full((800, 1, 2), STRAIGHT))
     assert (said["maneuver"] == Maneuver.FORWARD).all()
 
 
-def test_the_open_arm_walks_on_whatever_it_touches() -> None:
+def test_open_walks_on_whatever_it_touches() -> None:
     assert (run("open", np.full((300, 1, 2), BENT))["maneuver"] == Maneuver.FORWARD).all()
 
 
@@ -78,7 +78,7 @@ def test_the_open_arm_walks_on_whatever_it_touches() -> None:
     ("bend", "expected"),
     [((1, 0), Maneuver.TURN_R), ((0, 1), Maneuver.TURN_L), ((1, 1), Maneuver.REVERSE)],
 )
-def test_the_paper_arm_answers_touch_at_once(bend: tuple[int, int], expected: Maneuver) -> None:
+def test_paper_answers_touch_at_once(bend: tuple[int, int], expected: Maneuver) -> None:
     counts = STRAIGHT - (STRAIGHT - BENT) * np.array(bend, dtype=float)
     said = run("paper", np.tile(counts, (200, 1, 1)))
     assert (said["maneuver"] == expected).all()
@@ -87,7 +87,7 @@ def test_the_paper_arm_answers_touch_at_once(bend: tuple[int, int], expected: Ma
 @pytest.mark.parametrize(
     ("left", "right", "away"), [(0.9, 0.3, Maneuver.TURN_R), (0.3, 0.9, Maneuver.TURN_L)]
 )
-def test_the_closed_arm_backs_off_and_turns_away_when_readings_repeat(
+def test_closed_backs_off_and_turns_away_when_readings_repeat(
     left: float, right: float, away: Maneuver
 ) -> None:
     counts = pressed(1500, left, right, np.random.default_rng(1))[:, None]
@@ -98,60 +98,60 @@ def test_the_closed_arm_backs_off_and_turns_away_when_readings_repeat(
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
 @pytest.mark.parametrize("side", [0, 1])
-@pytest.mark.parametrize("arm", ARMS)
+@pytest.mark.parametrize("name", BUILT_IN)
 def test_a_reading_that_is_no_number_stops_the_robot_at_once(
-    arm: Arm, side: int, bad: float
+    name: str, side: int, bad: float
 ) -> None:
     counts = np.full((60, 1, 2), STRAIGHT)
     counts[20:, 0, side] = bad
-    said = run(arm, counts)
+    said = run(name, counts)
     assert (said["maneuver"][20:] == Maneuver.HOLD).all()
     assert (said["leg"][20:] == said["leg"][19]).all()
     assert (said["yaw"][20:] == said["yaw"][19]).all()
 
 
-@pytest.mark.parametrize("arm", ARMS)
-def test_a_robot_walks_again_once_the_window_has_passed_a_gap(arm: Arm) -> None:
+@pytest.mark.parametrize("name", BUILT_IN)
+def test_a_robot_walks_again_once_the_window_has_passed_a_gap(name: str) -> None:
     counts = np.full((60, 1, 2), STRAIGHT)
     counts[20, 0, 0] = np.nan
-    holding = run(arm, counts)["maneuver"][:, 0] == Maneuver.HOLD
+    holding = run(name, counts)["maneuver"][:, 0] == Maneuver.HOLD
     assert np.flatnonzero(holding).tolist() == list(range(20, 30))  # T_avg is ten samples
 
 
-@pytest.mark.parametrize("arm", ARMS)
-def test_a_row_says_the_same_alone_and_in_a_batch_of_seven(arm: Arm) -> None:
+@pytest.mark.parametrize("name", BUILT_IN)
+def test_a_row_says_the_same_alone_and_in_a_batch_of_seven(name: str) -> None:
     counts = streams(1500, 7)
-    together = run(arm, counts)
+    together = run(name, counts)
     for row in range(7):
-        alone = run(arm, counts[:, row : row + 1])
-        for name, values in alone.items():
-            assert np.array_equal(values[:, 0], together[name][:, row], equal_nan=True), (name, row)
+        alone = run(name, counts[:, row : row + 1])
+        for what, values in alone.items():
+            assert np.array_equal(values[:, 0], together[what][:, row], equal_nan=True), (what, row)
 
 
-def test_the_streams_of_the_batch_test_make_the_arms_act() -> None:
+def test_the_streams_of_the_batch_test_make_controllers_act() -> None:
     counts = streams(1500, 7)
     assert set(np.unique(run("closed", counts)["maneuver"])) == set(Maneuver)
     assert set(np.unique(run("paper", counts)["maneuver"])) == set(Maneuver)
 
 
-@pytest.mark.parametrize("arm", ARMS)
-def test_swapping_the_antennae_swaps_the_turns_and_mirrors_the_gait(arm: Arm) -> None:
+@pytest.mark.parametrize("name", BUILT_IN)
+def test_swapping_the_antennae_swaps_the_turns_and_mirrors_the_gait(name: str) -> None:
     counts = streams(1500, 5)
-    here = run(arm, counts)
-    there = run(arm, counts[:, :, ::-1], phase=math.pi)
+    here = run(name, counts)
+    there = run(name, counts[:, :, ::-1], phase=math.pi)
     assert (there["maneuver"] == SWAP[here["maneuver"]]).all()
     assert there["yaw"] == pytest.approx(-here["yaw"], abs=1e-9)
 
 
-@pytest.mark.parametrize("arm", ARMS)
-def test_a_row_that_is_reset_says_what_a_new_controller_says(arm: Arm) -> None:
+@pytest.mark.parametrize("name", BUILT_IN)
+def test_a_row_that_is_reset_says_what_a_new_controller_says(name: str) -> None:
     counts = streams(900, 2)
-    control = Controller(PARAMS, arm, 2)
+    control = make_controller(name, PARAMS, batch=2)
     control.reset(np.arange(2))
     for i in range(777):  # any number that leaves the rings mid-way
         control.step(AntennaFrame(t=np.full(2, i * PERIOD), counts=np.full((2, 2), 100.0 + i)))
     control.reset(np.array([0]))
-    fresh = run(arm, counts)
+    fresh = run(name, counts)
     for i in range(900):
         command = control.step(AntennaFrame(t=np.full(2, i * PERIOD), counts=counts[i]))
         assert control.maneuver[0] == fresh["maneuver"][i, 0]

@@ -7,21 +7,25 @@ from pathlib import Path
 import pytest
 from doctor_rig import ROBOT, Patient, wrong
 
-from antennate.hardware.doctor.antenna import board_rows
+from antennate.hardware.doctor.board_checks import checks
+from antennate.hardware.doctor.board_survey import BoardSurvey
+from antennate.hardware.doctor.check import grouped, ids_text
 from antennate.hardware.doctor.checkup import examine
 from antennate.hardware.doctor.fix import Change, apply, plan
-from antennate.hardware.doctor.hearing import Heard
-from antennate.hardware.doctor.pace import latency_row
-from antennate.hardware.doctor.rows import grouped, ids_text, worst
+from antennate.hardware.doctor.ports import latency_row
 from antennate.hardware.dynamixel.bringup import BringUpError
+from antennate.hardware.dynamixel.packets import StatusError
 from antennate.hardware.ports.errors import OpenError
-from antennate.params import DoctorParams, SupervisorParams
+from antennate.params import DoctorParams
 from antennate.twin.registers import Servo
 
 
-def memory(patient: Patient) -> list[bytes]:
+def memory(patient: Patient) -> list[dict[str, int]]:
     """Registers of all servos up to the goals, without those that time changes."""
-    return [bytes(servo._memory[:120]) for servo in patient.robot.servos]
+    return [
+        {r.name: servo.get(r.name) for r in servo.table.registers.values() if r.address < 120}
+        for servo in patient.robot.servos
+    ]
 
 
 def test_a_healthy_robot_has_no_row_that_is_not_ok_and_nothing_is_written() -> None:
@@ -38,13 +42,12 @@ def test_B17_an_adapter_that_is_16_ms_late_is_measured_and_its_cure_named() -> N
     patient = Patient("bus=latency:0.016")
     checkup = patient.examine(esp32=False)
     rows = wrong(checkup)
-    assert checkup.survey is not None
-    times = [seen.ping_time for seen in checkup.survey.here.values()]
-    assert times == pytest.approx([0.016] * 19, abs=2e-4)
-    assert set(rows) == {"bus: latency timer", "bus: answer time", "bus: one fast read of 19"}
+    assert checkup.bus is not None
+    assert list(checkup.bus.ping_times.values()) == pytest.approx([0.016] * 19, abs=2e-4)
+    assert set(rows) == {"bus: latency timer", "bus: answer time", "bus: read of all"}
     assert "setserial /dev/bus low_latency" in rows["bus: latency timer"].cure
     assert "/sys/bus/usb-serial/devices/ttyUSB0/latency_timer" in rows["bus: latency timer"].cure
-    assert worst(checkup.rows) == "bad"
+    assert checkup.verdict == "bad"
 
 
 @pytest.mark.parametrize(("timer", "verdict"), [("16", "bad"), ("1", "ok")])
@@ -153,7 +156,8 @@ def test_L14_swapped_ports_are_known_from_both_sides() -> None:
     ("fault", "check", "found", "verdict"),
     [
         ("esp32=silent", "greeting", "nothing", "bad"),
-        ("esp32=open_left", "left antenna", "film torn off", "bad"),
+        ("esp32=open_left", "left antenna", "wire open", "bad"),
+        ("esp32=short_left", "left antenna", "torn off", "bad"),
         ("esp32=right:4200", "right antenna", "short to supply", "bad"),
         ("esp32=left:1450", "left at rest", "b = 0.9", "bad"),
     ],
@@ -168,10 +172,10 @@ def test_what_the_board_says_is_judged(fault: str, check: str, found: str, verdi
 
 
 def test_a_board_that_speaks_another_language_is_quoted() -> None:
-    text = Heard(text="MicroPython v1.24 on ESP32\r\n>>> ", received=40)
-    other = Heard(refusals=["the board speaks protocol version 9"], received=40)
-    for heard, said in ((text, "'MicroPython v1.24 on ESP32 >>>'"), (other, "version 9")):
-        rows = board_rows(heard, ROBOT.control, SupervisorParams(), DoctorParams())
+    text = BoardSurvey(text="MicroPython v1.24 on ESP32\r\n>>> ", received=40)
+    other = BoardSurvey(refusals=["the board speaks protocol version 9"], received=40)
+    for survey, said in ((text, "'MicroPython v1.24 on ESP32 >>>'"), (other, "version 9")):
+        rows = [check.row("esp32", survey, ROBOT) for check in checks(survey, ROBOT)]
         assert len(rows) == 1
         assert said in rows[0].found
         assert "firmware/" in rows[0].cure
@@ -226,9 +230,8 @@ def test_fix_sets_what_drive_requires_and_says_what_has_to_follow() -> None:
     assert patient.fix() == [
         "servo 3 (at 1000000): max position limit 2200 -> 4095",
         "servo 3 (at 1000000): min position limit 1900 -> 0",
-        "servo 8 (at 1000000): drive mode 9 -> 0; see that its sign in layout.*.directions is "
-        "right",
-        "servo 9 (at 1000000): homing offset 500 -> 0; measure its place in layout.*.zeros anew",
+        "servo 8 (at 1000000): drive mode 9 -> 0; see that its sign in robot.*.directions is right",
+        "servo 9 (at 1000000): homing offset 500 -> 0; measure its place in robot.*.zeros anew",
         "servo 19 (at 1000000): velocity limit 100 -> 445",
     ]
     assert wrong(patient.examine()) == {}
@@ -251,9 +254,9 @@ def test_B18_fix_writes_nothing_where_nothing_differs() -> None:
     ],
 )
 def test_fix_gives_no_id_where_it_is_not_plain_whose_it_is(faults: tuple[str, ...]) -> None:
-    survey = Patient(*faults).examine(esp32=False).survey
+    survey = Patient(*faults).examine(esp32=False).bus
     assert survey is not None
-    assert [change for change in plan(survey, ROBOT.layout) if change.register == "id"] == []
+    assert [change for change in plan(survey, ROBOT.robot) if change.register == "id"] == []
 
 
 def test_fix_takes_torque_off_before_it_writes_eeprom() -> None:
@@ -264,7 +267,7 @@ def test_fix_takes_torque_off_before_it_writes_eeprom() -> None:
 
 def test_fix_says_so_if_a_servo_does_not_take_it(monkeypatch: pytest.MonkeyPatch) -> None:
     patient = Patient("servo:3=return_delay_time:250")
-    monkeypatch.setattr(Servo, "_store", lambda *_: None)
+    monkeypatch.setattr(Servo, "write", lambda *_: StatusError.NONE)
     with pytest.raises(BringUpError, match="return_delay_time 0 in servo 3, found 250"):
         patient.fix()
 

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from twin_rig import Rig, rig
 
 from antennate.cli import main
-from antennate.experiments.twin import Rig, TwinConfig, build, rig
 from antennate.hardware.driving.config import DriveConfig
 from antennate.hardware.driving.connect import prepare
 from antennate.hardware.driving.drive import drive
@@ -19,6 +19,7 @@ from antennate.hardware.driving.report import Report
 from antennate.hardware.driving.session import Session
 from antennate.hardware.safety.causes import Cause, State
 from antennate.params import TouchCheckParams
+from antennate.twin.config import TwinConfig, build
 from antennate.twin.faults import Faults, read
 from antennate.twin.lockstep import BoardPort, LockstepClock
 from antennate.types import AntennaFrame, Contact, JointCommand
@@ -99,7 +100,7 @@ class Unsure:
 
 def test_a_controller_that_never_decides_is_a_hold() -> None:
     made = rig(TwinConfig())
-    made.session.decider = Unsure(made.session.decider)
+    made.session.control.controller = Unsure(made.session.control.controller)
     made, report = driven(nothing, made)
     assert made.session.tally.sent == 0
     assert report.worst is State.HOLD
@@ -121,8 +122,8 @@ def test_B13_torque_that_went_off_while_walking_is_the_worst() -> None:
 @pytest.mark.parametrize(
     ("when", "worst", "said"),
     [
-        ("1.3s", State.OK, "Torque never came on. Not armed: HOLD STALE: no fresh sample"),
-        ("1.55s", State.HOLD, "Worst state HOLD (HOLD STALE: no fresh sample"),
+        ("1.3s", State.OK, "The robot was not armed: HOLD STALE: no fresh sample"),
+        ("1.55s", State.HOLD, "no command was sent; worst state HOLD (HOLD STALE: no fresh sample"),
     ],
 )
 def test_L8_a_drive_that_sent_no_pose_ends_with_2_and_says_so(
@@ -136,7 +137,7 @@ def test_L8_a_drive_that_sent_no_pose_ends_with_2_and_says_so(
     @contextlib.contextmanager
     def in_process(config: DriveConfig, *addresses: object) -> Iterator[Session]:
         robot = build(TwinConfig(), 5)
-        clock = LockstepClock(robot, Faults([read(f"esp32=silent@{when}")], config.layout.ids))
+        clock = LockstepClock(robot, Faults([read(f"esp32=silent@{when}")], config.robot.ids))
         yield prepare(config, BoardPort(robot, clock), clock, clock)
 
     monkeypatch.setattr("antennate.cli.drive.connect", in_process)
@@ -145,7 +146,6 @@ def test_L8_a_drive_that_sent_no_pose_ends_with_2_and_says_so(
     assert main([*argv, "--out", str(tmp_path), "--overwrite"]) == 2
     text = " ".join(capsys.readouterr().out.split())
     assert said in text
-    assert "It never walked: --arm was given, and no command was sent." in text
     result = json.loads((tmp_path / "result.json").read_text())
     assert result["worst_state"] == worst.name
     assert result["poses_sent"] == 0
@@ -158,5 +158,5 @@ def test_a_controller_that_does_not_exist_is_named_before_a_port_is_opened(
     ports = ["--esp32", "/no/board", "--bus", "/no/bus", "--out", str(tmp_path / "run")]
     assert main(["drive", *ports, "--controller", "clsoed"]) == 2
     said = capsys.readouterr().err
-    assert "--controller: expected one of open, paper, closed or MODULE:CLASS" in said
+    assert "controller: expected one of open, paper, closed, or MODULE:NAME" in said
     assert "/no/board" not in said

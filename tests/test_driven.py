@@ -5,22 +5,19 @@ from __future__ import annotations
 import math
 
 import pytest
+from driven_rig import driven, simulated_alike
 
-from antennate.control.controllers import Arm
-from antennate.experiments.driven import driven, simulated_alike
 from antennate.experiments.tunnel.run import TunnelConfig
 from antennate.hardware.safety.causes import State
-from antennate.robots.layout import LayoutParams
 from antennate.types import Maneuver
 
 CONFIG = TunnelConfig(seed=0)
-LAYOUT = LayoutParams()
 
 
-def same(arm: Arm, trial: int, ticks: float, phase: float = 0.0) -> tuple[set[int], int, str]:
+def same(name: str, trial: int, ticks: float, phase: float = 0.0) -> tuple[set[int], int, str]:
     """Both ways agree in every tick; the maneuvers, the number of ticks and the end."""
-    one = driven(CONFIG, arm, trial, LAYOUT, ticks, phase=phase)
-    other = simulated_alike(CONFIG, arm, trial, LAYOUT, one.start, ticks)
+    one = driven(CONFIG, name, trial, ticks, phase=phase)
+    other = simulated_alike(CONFIG, name, trial, one.start, ticks)
     assert one.walk.maneuvers == other.maneuvers
     assert one.walk.commands == other.commands
     assert one.walk.readings == other.readings
@@ -41,12 +38,12 @@ def test_M7_drive_decides_as_the_pure_simulation_from_the_first_reading_on(phase
 
 @pytest.mark.slow
 @pytest.mark.parametrize("phase", [0.0, 0.003])
-@pytest.mark.parametrize(("arm", "trial"), [("closed", 0), ("closed", 1), ("paper", 0)])
+@pytest.mark.parametrize(("name", "trial"), [("closed", 0), ("closed", 1), ("paper", 0)])
 def test_M7_drive_decides_as_the_pure_simulation_for_a_whole_trial(
-    arm: Arm, trial: int, phase: float
+    name: str, trial: int, phase: float
 ) -> None:
-    met, ticks, status = same(arm, trial, math.inf, phase)
+    met, ticks, status = same(name, trial, math.inf, phase)
     assert {Maneuver.HOLD, Maneuver.FORWARD} <= met
-    assert Maneuver.REVERSE in met or (arm, trial) != ("closed", 0)
+    assert Maneuver.REVERSE in met or (name, trial) != ("closed", 0)
     assert ticks > 900
     assert status == "success"

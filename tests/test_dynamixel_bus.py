@@ -22,10 +22,10 @@ from antennate.hardware.dynamixel.answers import (
 )
 from antennate.hardware.dynamixel.bringup import BringUpError
 from antennate.hardware.dynamixel.bus import Bus
+from antennate.hardware.dynamixel.monitor import ServoMonitor
 from antennate.hardware.dynamixel.packets import Status, StatusError
 from antennate.hardware.dynamixel.tables import XL330_M288
 from antennate.hardware.ports.port import PortError
-from antennate.hardware.safety.watch import ServoWatch
 from antennate.twin.bus import Fault, ServoBus, Trouble
 from antennate.twin.registers import Servo
 from antennate.twin.wire import SimulatedWire
@@ -516,7 +516,7 @@ def test_a_dead_wire_is_noted_by_the_watch_and_ends_nothing() -> None:
             raise PortError("the wire is gone")
 
     link = Dead(Rig().twin)
-    watch = ServoWatch(Bus(link, clock=link.now), tuple(IDS), link.now)
+    watch = ServoMonitor(Bus(link, clock=link.now), tuple(IDS), link.now)
     watch.step()
     assert watch.bus_error == "the wire is gone"
     assert set(watch.missed.values()) == {1}

@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 from antennate import figures as style
-from antennate.control.controllers import ARMS
+from antennate.control.registry import BUILT_IN
 from antennate.experiments.gait import figure as gait
 from antennate.experiments.tunnel import figure as tunnel
-from antennate.robots.anatomy import LINK_COUNT
 from antennate.types import Maneuver
 
 LIMIT = 50.0
@@ -18,9 +17,9 @@ WALLS = (np.array([[0.0, 0.3], [2.0, 0.3]]), np.array([[0.0, -0.3], [2.0, -0.3]]
 
 @dataclass
 class Row:
-    arm: str
+    controller: str
     trial: int
-    status: str
+    outcome: str
     time_s: float
 
 
@@ -28,30 +27,35 @@ class Row:
 class Path:
     head: np.ndarray
     maneuver: np.ndarray
-    walls: tuple[np.ndarray, np.ndarray]
-    cylinders: np.ndarray
+    fixed: list[np.ndarray]
+    before: list[np.ndarray]
+    after: list[np.ndarray]
+    exit: np.ndarray
     links: np.ndarray
 
 
 def path(end: float, samples: int = 40) -> Path:
     """A straight course along x, through all maneuvers one after the other."""
     x = np.linspace(0.0, end, samples)
-    stood = np.array([[0.5, 0.2], [1.0, -0.2]])
+    box = 0.07 * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+    stood = [box + np.array([0.5, 0.2]), box + np.array([1.0, -0.2])]
     return Path(
         head=np.stack([x, 0.1 * np.sin(5 * x)], axis=1),
         maneuver=np.arange(samples) * len(Maneuver) // max(samples, 1),
-        walls=WALLS,
-        cylinders=np.stack([stood, stood + 0.05]),
-        links=np.stack([end - 0.1 * np.arange(LINK_COUNT), np.zeros(LINK_COUNT)], axis=1),
+        fixed=list(WALLS),
+        before=stood,
+        after=[polygon + 0.05 for polygon in stood],
+        exit=np.array([wall[-1] for wall in WALLS]),
+        links=np.stack([end - 0.1 * np.arange(6), np.zeros(6)], axis=1),
     )
 
 
 def rows() -> list[Row]:
-    verdicts = [("success", 10.0), ("success", 20.0), ("timeout", LIMIT), ("left", LIMIT)]
-    return [Row(arm, k, *verdict) for arm in ARMS for k, verdict in enumerate(verdicts)]
+    outcomes = [("success", 10.0), ("success", 20.0), ("timeout", LIMIT), ("left", LIMIT)]
+    return [Row(name, k, *end) for name in BUILT_IN for k, end in enumerate(outcomes)]
 
 
-def arms() -> dict[str, dict]:
+def summaries() -> dict[str, dict]:
     one = {
         "trials": 4,
         "invalid": 0,
@@ -60,14 +64,14 @@ def arms() -> dict[str, dict]:
         "restricted_mean_time_s": 32.5,
         "restricted_mean_time_95": (12.5, 50.0),
     }
-    return dict.fromkeys(ARMS, one)
+    return dict.fromkeys(BUILT_IN, one)
 
 
 def trajectories():
     found = rows()
-    paths = {(row.arm, row.trial): path(2.0) for row in found}
+    paths = {(row.controller, row.trial): path(2.0) for row in found}
     paths["open", 3] = path(-40.0)  # far out of the entrance
-    return tunnel.trajectories(paths, ARMS, found, range(4), 0.07)
+    return tunnel.trajectories(paths, tuple(BUILT_IN), found, range(4))
 
 
 def walk_result() -> dict:
@@ -94,7 +98,7 @@ def study():
 
 
 def summary():
-    return tunnel.summary(arms(), rows(), LIMIT)
+    return tunnel.summary(summaries(), rows(), LIMIT)
 
 
 @pytest.mark.parametrize("draw", [trajectories, summary, study])
@@ -131,12 +135,12 @@ def test_axes_have_units():
 def test_trajectories_are_a_grid_with_the_verdict_of_each_trial():
     figure = trajectories()
     titles = [panel.get_title(loc="left") for panel in figure.axes]
-    assert len(titles) == len(ARMS) * 4
+    assert len(titles) == len(BUILT_IN) * 4
     assert titles[:4] == [
         "trial 0: out after 10.0 s",
         "trial 1: out after 20.0 s",
         "trial 2: out of time, 50 s",
-        "trial 3: left by the entrance",
+        "trial 3: left",
     ]
     assert len(figure.legends) == 1
 
@@ -154,15 +158,15 @@ def test_every_maneuver_has_its_own_colour_on_the_course():
     drawn = {line.get_color() for line in panel.lines}
     assert set(style.MANEUVER_COLOURS.values()) <= drawn
     assert len(set(style.MANEUVER_COLOURS.values())) == len(Maneuver)
-    assert set(ARMS) == set(style.ARM_COLOURS) == set(style.ARM_LINES)
+    assert set(BUILT_IN) == set(style.CONTROLLER_COLOURS) == set(style.CONTROLLER_LINES)
 
 
 def test_trials_without_a_course_leave_an_empty_panel():
     nothing = Path(
-        np.zeros((0, 2)), np.zeros(0), WALLS, np.zeros((2, 0, 2)), np.full((6, 2), np.nan)
+        np.zeros((0, 2)), np.zeros(0), list(WALLS), [], [], WALLS[0], np.full((6, 2), np.nan)
     )
     figure = tunnel.trajectories(
-        {("open", 0): nothing}, ("open",), [Row("open", 0, "invalid", LIMIT)], range(2), 0.07
+        {("open", 0): nothing}, ("open",), [Row("open", 0, "invalid", LIMIT)], range(2)
     )
     style.render(figure)
     assert [p.get_title(loc="left") for p in figure.axes] == [
@@ -179,8 +183,8 @@ def test_curve_drops_at_exits_and_failures_stay():
     assert curve.get_drawstyle() == "steps-post"
 
 
-def test_an_arm_without_a_valid_trial_is_left_blank():
-    empty = {**arms()["open"], "invalid": 4, "successes": 0, "restricted_mean_time_s": None}
+def test_a_controller_without_a_valid_trial_is_left_blank():
+    empty = {**summaries()["open"], "invalid": 4, "successes": 0, "restricted_mean_time_s": None}
     figure = tunnel.summary({"open": empty}, [Row("open", 0, "invalid", LIMIT)], LIMIT)
     style.render(figure)
     assert figure.axes[0].get_yticklabels()[0].get_text() == "open\nn = 0"

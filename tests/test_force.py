@@ -17,11 +17,11 @@ from antennate.experiments import reading
 from antennate.experiments.force import loads, post_traverse
 from antennate.experiments.force import run as force
 from antennate.params import BenchPhysicsParams, ConditioningParams
-from antennate.robots.antenna import AntennaParams
+from antennate.robots.antenna import AntennaSpec
 from antennate.robots.sensor import SensorParams
 from antennate.sim.bench import Bench
 
-BARE = AntennaParams(film_stiffness_n_mm_per_deg=0.0)
+BARE = AntennaSpec(film_stiffness_n_mm_per_deg=0.0)
 SENSOR = SensorParams()
 SMALL = loads.ForceConfig(
     profiles=("stiff", "compliant"), loads=12, place_step=0.25, traverses=4, speeds=(0.15,)
@@ -31,13 +31,13 @@ DATA = Path(__file__).parents[2] / "shared" / "data" / "whisker_force_location_r
 
 def test_largest_force_of_a_small_limit_is_that_of_the_base_hinge():
     """The tip load bends the base hinge most: k q = F L while angles are small."""
-    chain = Chain.of(with_profile(BARE, SENSOR, "stiff"), SENSOR)
+    chain = Chain.of(with_profile(BARE, "stiff"))
     wanted = chain.stiffness[0] * 1e-3 / chain.length
     assert loads.largest_force(chain, 1e-3) == pytest.approx(wanted, rel=1e-3)
 
 
 def test_largest_force_turns_the_most_bent_hinge_by_the_limit():
-    chain, limit = Chain.of(AntennaParams(), SENSOR), math.radians(30)
+    chain, limit = Chain.of(AntennaSpec()), math.radians(30)
     largest = loads.largest_force(chain, limit)
     rest = equilibrium(chain, np.array([chain.length]), np.array([[0.0, largest]]), follower=True)
     assert abs(rest.angles).max() == pytest.approx(limit, rel=1e-6)
@@ -47,9 +47,9 @@ def test_small_loads_bend_the_film_by_the_linear_sum():
     """Flex of a small load is F times the sum over covered hinges of (s - s_i) / k_i."""
     config = loads.ForceConfig(hinge_limit_deg=0.01, loads=3)
     points, left_out = loads.static_loads(config, "descending", 0.0)
-    chain = Chain.of(with_profile(config.antenna, SENSOR, "descending"), SENSOR)
+    chain = Chain.of(with_profile(config.antenna, "descending"))
     arms = np.maximum(points.place[:, None] * chain.length - chain.starts, 0.0)
-    covered = SENSOR.covered_hinges(config.antenna)
+    covered = config.antenna.sensed_hinges
     wanted = points.force * (arms / chain.stiffness)[:, :covered].sum(axis=1)
     np.testing.assert_allclose(points.scalars["flex"], wanted, rtol=1e-5)
     assert left_out == 0
@@ -60,7 +60,7 @@ def test_uniform_chains_without_film_differ_by_the_scale_of_force_alone():
     found = []
     for profile in ("stiff", "compliant"):
         points, _ = loads.static_loads(config, profile, 0.3)
-        chain = Chain.of(with_profile(BARE, SENSOR, profile), SENSOR)
+        chain = Chain.of(with_profile(BARE, profile))
         largest = loads.largest_force(chain, math.radians(30))
         found.append(force.score(points, "flex", 0.5, None, largest))
     assert found[0]["r2"] == pytest.approx(found[1]["r2"], abs=1e-6)
@@ -105,15 +105,15 @@ def test_slow_smooth_traverse_is_the_statics():
 
     The hinges relax in 40 ms, so flex lags: a hinge's torque is k (q + 0.04 s dq/dt).
     """
-    antenna = AntennaParams(friction=0.0)
+    antenna = AntennaSpec(friction=0.0)
     one = post_traverse.drag(
-        BenchPhysicsParams(), antenna, SENSOR, 0.8, 0.05, 0.003, math.radians(30), 100.0
+        BenchPhysicsParams(), antenna, 0.8, 0.05, 0.003, math.radians(30), 100.0
     )
     settled = (one.age > 0.3) & (one.place < 0.99)
-    chain = Chain.of(antenna, SENSOR)
+    chain = Chain.of(antenna)
     load = np.stack([np.zeros_like(one.force), one.force], axis=1)
     rest = equilibrium(chain, one.place * chain.length, load, follower=True)
-    flex = rest.angles[:, : SENSOR.covered_hinges(antenna)].sum(axis=1)
+    flex = rest.angles[:, : antenna.sensed_hinges].sum(axis=1)
     assert settled.sum() > 50
     ahead = one.flex + antenna.damping_time * np.gradient(one.flex, one.age)
     error = (ahead - flex)[settled] / flex[settled]
@@ -151,7 +151,7 @@ def test_result_does_not_depend_on_workers_and_covers_what_it_says():
         ({"nearest": 0.8}, "nearest must not exceed from_place, 0.5, got 0.8"),
         ({"profiles": ("stiff", "stiff")}, "profiles must differ"),
         ({"speeds": (0.1, 0.0)}, "speeds must be above 0"),
-        ({"sensor": {"rate": 300.0}}, "whole fraction of the physics rate 2000 Hz"),
+        ({"antenna": {"sensor": {"rate": 300.0}}}, "whole fraction of the physics rate 2000 Hz"),
     ],
 )
 def test_what_cannot_be_run_is_refused(values, message):

@@ -11,8 +11,10 @@ from hypothesis import strategies as st
 
 from antennate.control.gait import Gait, targets
 from antennate.params import GaitParams
+from antennate.robots.spec import RobotSpec
 from antennate.types import JointCommand, Maneuver
 
+ROBOT = RobotSpec()
 PARAMS = GaitParams(
     frequency=0.5,
     wave_number=1.0,
@@ -25,7 +27,7 @@ PERIOD = 0.01
 
 
 def pose_at(phase: float, offset: float = 0.0, params: GaitParams = PARAMS) -> JointCommand:
-    return targets(params, np.array([phase]), np.array([offset]))
+    return targets(params, ROBOT, np.array([phase]), np.array([offset]))
 
 
 def walk(gait: Gait, maneuvers: list[Maneuver]) -> tuple[np.ndarray, np.ndarray]:
@@ -73,13 +75,13 @@ def test_half_a_cycle_and_the_opposite_offset_mirror_the_pose() -> None:
 
 
 def test_one_cycle_takes_one_over_the_frequency() -> None:
-    gait = Gait(PARAMS, 1, PERIOD)
+    gait = Gait(PARAMS, ROBOT, 1, PERIOD)
     walk(gait, [Maneuver.FORWARD] * 200)
     assert gait.phase == pytest.approx([2 * math.pi])
 
 
 def test_reverse_retraces_the_poses_backwards() -> None:
-    gait = Gait(PARAMS, 1, PERIOD)
+    gait = Gait(PARAMS, ROBOT, 1, PERIOD)
     yaw, leg = walk(gait, [Maneuver.FORWARD] * 150)
     yaw_back, leg_back = walk(gait, [Maneuver.REVERSE] * 149)
     assert yaw_back == pytest.approx(yaw[-2::-1], abs=1e-9)
@@ -87,7 +89,7 @@ def test_reverse_retraces_the_poses_backwards() -> None:
 
 
 def test_hold_keeps_the_pose() -> None:
-    gait = Gait(PARAMS, 1, PERIOD)
+    gait = Gait(PARAMS, ROBOT, 1, PERIOD)
     yaw, leg = walk(gait, [Maneuver.TURN_L] * 7 + [Maneuver.HOLD] * 20)
     assert (yaw[6:] == yaw[6]).all()
     assert (leg[6:] == leg[6]).all()
@@ -95,7 +97,7 @@ def test_hold_keeps_the_pose() -> None:
 
 @given(st.lists(st.tuples(st.sampled_from(list(Maneuver)), st.integers(1, 40)), max_size=12))
 def test_no_target_jumps_however_the_maneuvers_switch(plan: list[tuple[Maneuver, int]]) -> None:
-    gait = Gait(PARAMS, 1, PERIOD)
+    gait = Gait(PARAMS, ROBOT, 1, PERIOD)
     yaw, leg = walk(gait, [Maneuver.FORWARD] + [m for m, n in plan for _ in range(n)])
     turn = 2 * math.pi * 0.5 * PERIOD
     assert abs(np.diff(yaw, axis=0)).max(initial=0) <= math.radians(25) * turn + 1.5 * PERIOD + 1e-9
@@ -104,7 +106,7 @@ def test_no_target_jumps_however_the_maneuvers_switch(plan: list[tuple[Maneuver,
 
 @pytest.mark.parametrize(("maneuver", "sign"), [(Maneuver.TURN_L, -1), (Maneuver.TURN_R, 1)])
 def test_the_offset_ramps_at_its_rate_and_stays_at_its_size(maneuver: Maneuver, sign: int) -> None:
-    gait = Gait(PARAMS, 1, PERIOD)
+    gait = Gait(PARAMS, ROBOT, 1, PERIOD)
     walk(gait, [maneuver] * 10)
     assert gait.offset == pytest.approx([sign * 0.15])
     walk(gait, [maneuver] * 40)
@@ -114,7 +116,7 @@ def test_the_offset_ramps_at_its_rate_and_stays_at_its_size(maneuver: Maneuver, 
 
 
 def test_a_turn_may_be_tighter_than_the_gaits_own() -> None:
-    gait = Gait(PARAMS, 1, PERIOD)
+    gait = Gait(PARAMS, ROBOT, 1, PERIOD)
     for _ in range(100):
         gait.step(np.array([Maneuver.TURN_R]), 0.52)
     assert gait.offset == pytest.approx([0.52])
@@ -126,16 +128,19 @@ SWEEPING = PARAMS.model_copy(
 
 
 def test_the_antenna_bases_stay_where_they_are_mounted_unless_told() -> None:
-    gait = Gait(GaitParams(), 3, PERIOD)
+    gait = Gait(GaitParams(), ROBOT, 3, PERIOD)
     for maneuver in Maneuver:
         assert (gait.step(np.full(3, maneuver)).antenna == np.zeros((3, 2))).all()
-    held = Gait(GaitParams(antenna_mean=-0.3), 1, PERIOD)
+    held = Gait(GaitParams(antenna_mean=-0.3), ROBOT, 1, PERIOD)
     assert held.step(np.array([Maneuver.FORWARD])).antenna.tolist() == [[-0.3, -0.3]]
 
 
 def test_the_antenna_bases_sweep_at_their_own_pace_and_stand_in_a_hold() -> None:
     """Row 0 walks, turns and backs off: 0.1 + 0.4 sin(2 pi 0.8 t); row 1 holds from 0.5 s on."""
-    gait, plan = Gait(SWEEPING, 2, PERIOD), [Maneuver.FORWARD, Maneuver.TURN_L, Maneuver.REVERSE]
+    gait, plan = (
+        Gait(SWEEPING, ROBOT, 2, PERIOD),
+        [Maneuver.FORWARD, Maneuver.TURN_L, Maneuver.REVERSE],
+    )
     swept = []
     for tick in range(150):
         maneuvers = [plan[tick // 50], plan[0] if tick < 50 else Maneuver.HOLD]
@@ -152,7 +157,7 @@ def test_the_antenna_bases_sweep_at_their_own_pace_and_stand_in_a_hold() -> None
 
 
 def test_reset_starts_its_rows_at_a_phase_and_straight() -> None:
-    gait = Gait(PARAMS, 2, PERIOD)
+    gait = Gait(PARAMS, ROBOT, 2, PERIOD)
     gait.step(np.array([Maneuver.TURN_R, Maneuver.TURN_R]))
     gait.reset(np.array([1]), 2.0)
     assert gait.phase.tolist() == [pytest.approx(0.01 * math.pi), 2.0]

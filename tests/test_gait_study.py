@@ -9,7 +9,7 @@ from pydantic import ValidationError
 from antennate.experiments.gait import run as study
 from antennate.experiments.gait.pace import Walk, measure, rolling_speed
 from antennate.params import GaitParams
-from antennate.robots.body import RobotParams
+from antennate.robots.spec import RobotSpec
 from antennate.types import Maneuver
 
 SHORT = study.GaitStudyConfig(cycles=2, settling_cycles=1, sweep_points=2)
@@ -63,7 +63,7 @@ def test_standing_has_no_cost_of_transport():
 
 
 def test_rolling_speed_is_that_of_the_rim():
-    gait, robot = GaitParams(frequency=0.5), RobotParams()
+    gait, robot = GaitParams(frequency=0.5), RobotSpec()
     assert rolling_speed(gait, robot) == pytest.approx(math.pi * 0.042)
 
 
@@ -78,7 +78,7 @@ def test_walks_come_out_the_same_twice():
     one, two = (study.walk_flat(config, "forward", gait, Maneuver.FORWARD) for _ in range(2))
     np.testing.assert_array_equal(one.centre, two.centre)
     assert one.t[-1] == pytest.approx(2 / gait.frequency)
-    assert one.weight == pytest.approx(RobotParams().mass * 9.81, rel=0.01)
+    assert one.weight == pytest.approx(RobotSpec().mass * 9.81, rel=0.01)
 
 
 def test_study_keeps_its_promises():

@@ -11,12 +11,12 @@ import servo_rig
 from test_turns import Walk
 
 from antennate.hardware.driving.session import Session
-from antennate.hardware.driving.turns import Turns
 from antennate.hardware.dynamixel.bringup import BringUpError
+from antennate.hardware.dynamixel.leg_turns import LegTurns
 from antennate.hardware.dynamixel.packets import StatusError
 from antennate.hardware.joints import Joints
 from antennate.hardware.safety.causes import Cause, State
-from antennate.robots.layout import LayoutParams
+from antennate.robots.spec import RobotSpec
 from antennate.twin.registers import Servo
 from antennate.types import Floats
 
@@ -41,7 +41,7 @@ class Stand:
                 servo.place(servo.position + FAR)
             servo.set("goal_position", round(servo.position))
             servo.set("torque_enable", 1)
-        self.turns = Turns(self.rig.bus, Joints(LayoutParams()))
+        self.turns = LegTurns(self.rig.bus, Joints(RobotSpec()))
         self.goals: Floats = np.array([servo.position for servo in self.rig.twin.servos])
         self.n, self.moved = 0, 0.0
 
@@ -163,9 +163,11 @@ class Paused:
 
     def __call__(self, walk: Walk, session: Session) -> None:
         out = session.outputs
-        if self.leg is None and session.turns._stage == HOLDING:
-            assert session.turns.loose is not None
-            self.leg = walk.rig.robot.servos[session.joints.ids.index(session.turns.loose)]
+        if self.leg is None and session.actuators.turns._stage == HOLDING:
+            assert session.actuators.turns.loose is not None
+            self.leg = walk.rig.robot.servos[
+                session.actuators.joints.ids.index(session.actuators.turns.loose)
+            ]
             walk.rig.clock.sleep_until(walk.rig.clock.now() + self.pause)
             self.leg.turn(600 / 4096)
         elif self.leg is not None and out is not None:

@@ -20,18 +20,18 @@ from antennate.antenna.statics import (
     with_profile,
 )
 from antennate.params import BenchPhysicsParams
-from antennate.robots.antenna import AntennaParams
+from antennate.robots.antenna import AntennaSpec
 from antennate.robots.sensor import SensorParams
 from antennate.sim.bench import Bench, compile_bench
 from antennate.types import Floats
 
-ANTENNA, SENSOR = AntennaParams(), SensorParams()
-BARE = AntennaParams(length=0.1, film_stiffness_n_mm_per_deg=0.0)
+ANTENNA, SENSOR = AntennaSpec(), SensorParams()
+BARE = AntennaSpec(length=0.1, film_stiffness_n_mm_per_deg=0.0)
 """The springs alone on 100 mm, as in the table of facts that the expected stiffnesses come from."""
 
 
 def chain() -> Chain:
-    return Chain.of(ANTENNA, SENSOR)
+    return Chain.of(ANTENNA)
 
 
 def loads(count: int, seed: int) -> tuple[Floats, Floats]:
@@ -69,8 +69,8 @@ def test_a_follower_keeps_its_lever() -> None:
     ("profile", "expected"), [("descending", 0.353), ("stiff", 0.621), ("compliant", 0.206)]
 )
 def test_tip_stiffness_of_bare_springs_on_100_mm(profile: str, expected: float) -> None:
-    bare = with_profile(BARE, SENSOR, profile)
-    assert 1 / tip_compliance(Chain.of(bare, SENSOR)) == pytest.approx(expected, rel=6e-3)
+    bare = with_profile(BARE, profile)
+    assert 1 / tip_compliance(Chain.of(bare)) == pytest.approx(expected, rel=6e-3)
 
 
 def test_a_small_load_gives_what_tip_compliance_says() -> None:
@@ -141,7 +141,7 @@ def test_the_engine_rests_where_statics_says() -> None:
     calm = ANTENNA.model_copy(
         update={"damping_time": 0.12}
     )  # comes to rest soon, at the same place
-    bench = Bench(compile_bench(BenchPhysicsParams(), calm, SENSOR), 5)
+    bench = Bench(compile_bench(BenchPhysicsParams(), calm), calm)
     for i in range(200):
         found = _rest(bench, float(place[i]), force[i])
         largest = abs(expected.angles[i]).max()
@@ -172,18 +172,18 @@ def test_pushing_beyond_buckling_is_called_unstable() -> None:
 
 
 def test_all_profiles_keep_to_their_meaning() -> None:
-    k = {p: np.array(with_profile(BARE, SENSOR, p).spring_stiffness()) for p in PROFILES}
+    k = {p: np.array(with_profile(BARE, p).spring_stiffness()) for p in PROFILES}
     assert k["descending"] == pytest.approx(k["ascending"][::-1])
     assert (k["stiff"] >= k["descending"]).all()
     assert (k["descending"] >= k["compliant"]).all()
-    give = {p: tip_compliance(Chain.of(with_profile(ANTENNA, SENSOR, p), SENSOR)) for p in PROFILES}
+    give = {p: tip_compliance(Chain.of(with_profile(ANTENNA, p))) for p in PROFILES}
     assert give["matched_uniform"] == pytest.approx(give["descending"], rel=1e-9)
     assert np.ptp(k["matched_uniform"]) == 0
 
 
 def test_an_unknown_profile_is_refused() -> None:
     with pytest.raises(ValueError, match="expected a profile of stiff, descending"):
-        with_profile(ANTENNA, SENSOR, "springy")
+        with_profile(ANTENNA, "springy")
 
 
 @pytest.mark.parametrize("place", [0.0, -0.1, 0.2, float("nan")])

@@ -12,10 +12,10 @@ from pathlib import Path
 
 import pytest
 from esp32_streams import encoded, hello, made
+from twin_rig import rig
 
 from antennate.cli import main
 from antennate.errors import BadInputError
-from antennate.experiments.twin import TwinConfig, rig
 from antennate.hardware.esp32.decoder import FrameDecoder
 from antennate.hardware.esp32.wire import Hello, Sample
 from antennate.hardware.ports.finder import finder
@@ -23,7 +23,8 @@ from antennate.hardware.ports.keys import read_key
 from antennate.hardware.ports.port import Port, PortError
 from antennate.hardware.ports.udp_port import UdpPort
 from antennate.params import NetworkParams
-from antennate.robots.layout import LayoutParams
+from antennate.robots.spec import RobotSpec
+from antennate.twin.config import TwinConfig
 from antennate.twin.faults import Faults
 from antennate.twin.serve import TwinServer
 from antennate.twin.tcp import TcpEndpoint
@@ -278,7 +279,7 @@ def test_X16_the_key_is_in_nothing_that_a_drive_over_udp_says(
     path = private(tmp_path, key.hex())
     server = TwinServer(
         rig(TwinConfig()).robot,
-        Faults([], LayoutParams().ids),
+        Faults([], RobotSpec().ids),
         UdpEndpoint("127.0.0.1", 0, key),
         TcpEndpoint("127.0.0.1", 0),
     )

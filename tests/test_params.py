@@ -15,9 +15,10 @@ from antennate.params import (
     PhysicsParams,
     TunnelParams,
 )
-from antennate.robots.antenna import AntennaParams
-from antennate.robots.body import RobotParams, ServoParams
+from antennate.robots.antenna import AntennaSpec
 from antennate.robots.sensor import SensorParams
+from antennate.robots.servos import ServoParams
+from antennate.robots.spec import RobotSpec
 
 SOURCES = ("paper", "datasheet", "measured", "fitted", "assumed")
 
@@ -69,7 +70,7 @@ def test_every_field_has_a_unit_and_a_source_of_a_known_kind(cls: type[Params], 
 
 
 def test_the_walk_over_all_groups_finds_the_known_ones() -> None:
-    assert {AntennaParams, GaitParams, PhysicsParams, RobotParams, ControlParams} <= set(groups())
+    assert {AntennaSpec, GaitParams, PhysicsParams, RobotSpec, ControlParams} <= set(groups())
 
 
 @pytest.mark.parametrize("cls", groups())
@@ -99,20 +100,21 @@ def test_a_physics_step_that_cannot_work_is_refused(timestep: float) -> None:
 
 
 def test_spring_stiffness_is_the_papers_table_in_si() -> None:
-    springs = AntennaParams().spring_stiffness()
+    springs = AntennaSpec().spring_stiffness()
     expected = [0.01570, 0.00785, 0.00785, 0.00523, 0.00523, 0.00523]
     assert springs == pytest.approx(expected, rel=1e-3)
 
 
 def test_spring_stiffness_rounds_to_the_papers_table_per_degree() -> None:
-    per_degree = [k * 1e3 * math.pi / 180 for k in AntennaParams().spring_stiffness()]
+    per_degree = [k * 1e3 * math.pi / 180 for k in AntennaSpec().spring_stiffness()]
     assert [round(k, 3) for k in per_degree] == [0.274, 0.137, 0.137, 0.091, 0.091, 0.091]
 
 
 def test_the_film_adds_its_stiffness_to_covered_hinges_only() -> None:
-    params = AntennaParams()
+    sensor = SensorParams(active_length=0.035)  # over two hinges, 20 mm apart
+    params = AntennaSpec(sensor=sensor)
     added = [
-        h - s for h, s in zip(params.hinge_stiffness(2), params.spring_stiffness(), strict=True)
+        h - s for h, s in zip(params.hinge_stiffness(), params.spring_stiffness(), strict=True)
     ]
     film = 0.048e-3 * 180 / math.pi
     assert added == pytest.approx([film, film, 0, 0, 0, 0], abs=1e-12)
@@ -121,7 +123,7 @@ def test_the_film_adds_its_stiffness_to_covered_hinges_only() -> None:
 @pytest.mark.parametrize(("length", "hinges"), [(0.12, 5), (0.06, 6), (0.24, 3), (0.4, 2)])
 def test_the_film_covers_the_hinges_it_reaches(length: float, hinges: int) -> None:
     # 95.3 mm of film over hinges at multiples of a sixth of the antenna's length, the first at zero
-    assert SensorParams().covered_hinges(AntennaParams(length=length)) == hinges
+    assert AntennaSpec(length=length).sensed_hinges == hinges
 
 
 def test_the_servo_follows_its_datasheet() -> None:
@@ -132,7 +134,7 @@ def test_the_servo_follows_its_datasheet() -> None:
 
 def test_a_robot_lighter_than_its_legs_is_refused() -> None:
     with pytest.raises(ValidationError, match="mass must leave more than 10 g a link"):
-        RobotParams(mass=0.305)
+        RobotSpec(mass=0.305)
 
 
 def test_calibration_counts_in_the_wrong_order_are_refused() -> None:

@@ -11,11 +11,11 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
+from pty_server import PtyServer
 from servo_rig import IDS, MODELS, servos
 
 from antennate.hardware.dynamixel.packets import ALERT
 from antennate.twin.bus import Fault, ServoBus, Trouble
-from antennate.twin.pty import PtyServer
 
 POSITION, GOAL = 132, 116
 TRUE = [100 * i for i in IDS]

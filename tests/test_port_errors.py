@@ -31,7 +31,7 @@ def terminal() -> object:
     [
         (OSError(errno.EACCES, "Permission denied"), "no permission; run `sudo "),
         (OSError(errno.EIO, "Input/output error"), "the device is gone; plug it in again"),
-        (ValueError("Failed to set custom baud rate"), "it cannot do 123 bit/s; set layout.baud"),
+        (ValueError("Failed to set custom baud rate"), "it cannot do 123 bit/s; set robot.baud"),
         (OSError(errno.EBUSY, "Device or resource busy"), "in use by another program; end that"),
     ],
 )
@@ -101,7 +101,7 @@ def test_L14_one_port_for_both_is_refused(capsys: pytest.CaptureFixture[str]) ->
         (["--esp32", "/dev/null", "--fix"], "--fix: expected --bus PORT"),
         (["--bus", "/dev/null", "--yes"], "--yes: expected --fix"),
         (["--bus", "/dev/null", "--fix"], "--fix: expected a terminal"),
-        (["--bus", "/dev/null", "--layout.baud", "7"], "--layout.baud: expected one of"),
+        (["--bus", "/dev/null", "--robot.baud", "7"], "--robot.baud: expected one of"),
     ],
 )
 def test_orders_that_cannot_be_are_refused_in_one_line(
@@ -117,7 +117,7 @@ def test_orders_that_cannot_be_are_refused_in_one_line(
 
 def test_bad_robot_toml_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / "robot.toml"
-    file.write_text("[layout]\nbuad = 1\n")
+    file.write_text("[robot]\nbuad = 1\n")
     assert main(["doctor", "--bus", "/dev/null", "--config", str(file)]) == BAD_INPUT
     assert "did you mean baud?" in capsys.readouterr().err
 

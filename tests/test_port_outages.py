@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from twin_rig import Rig, rig
 
 from antennate.control.loop import run_loop
 from antennate.errors import BadInputError
-from antennate.experiments.twin import Rig, TwinConfig, rig
 from antennate.hardware.driving.config import DriveConfig
 from antennate.hardware.driving.connect import prepare, require_servos
 from antennate.hardware.driving.drive import drive
@@ -19,7 +19,8 @@ from antennate.hardware.dynamixel.bringup import BringUpError
 from antennate.hardware.esp32.frame import SAMPLE_FRAME_SIZE
 from antennate.hardware.ports.port import Port, PortError
 from antennate.hardware.safety.causes import State
-from antennate.robots.layout import LayoutParams
+from antennate.robots.spec import RobotSpec
+from antennate.twin.config import TwinConfig
 from antennate.twin.lockstep import BoardPort
 
 ARM, OUT, BACK, AGAIN = 0.5, 1.2, 1.7, 2.2
@@ -58,7 +59,7 @@ class Story:
         self.rig = rig(TwinConfig())
         session: Any = self.rig.session
         self.board = session.board._port = Cable(session.board._port)
-        self.bus = session.bus._port = Cable(session.bus._port)
+        self.bus = session.actuators.bus._port = Cable(session.actuators.bus._port)
         self.waiting: list[bytes] = []
         self._act = act
         self.t: list[float] = []
@@ -80,7 +81,7 @@ class Story:
             self._act(self, t)
             return t < end
 
-        run_loop(session, session, session.period, go_on)
+        run_loop(session, session.control, session.period, go_on)
         return self
 
     def during(self, begin: float, end: float) -> list[int]:
@@ -166,7 +167,7 @@ def test_B6_a_drive_waits_for_a_lost_bus_to_take_the_torque_off(
     patience: float, safe: bool
 ) -> None:
     made: Rig = rig(TwinConfig())
-    inside: Any = made.session.bus
+    inside: Any = made.session.actuators.bus
     cable = inside._port = Cable(inside._port)
     back: list[float] = []
 
@@ -242,8 +243,8 @@ def test_L14_a_port_without_a_board_is_refused_within_2_s(what: str) -> None:
 def test_L14_a_board_on_the_port_of_the_bus_is_refused_by_name() -> None:
     made = rig(TwinConfig())
     session: Any = made.session
-    session.bus._port = Cable(BoardPort(made.robot, made.clock))
+    session.actuators.bus._port = Cable(BoardPort(made.robot, made.clock))
     begin = made.clock.now()
     with pytest.raises(BringUpError, match=r"--bus: .* swapped"):
-        require_servos(session.bus, LayoutParams())
+        require_servos(session.actuators.bus, RobotSpec())
     assert made.clock.now() - begin <= 10.0

@@ -105,4 +105,6 @@ def documented(member: object, text: str) -> None:
     if any(array in hints for array in ARRAYS):
         both = doc + text
         assert re.search(r"shape|\(n,\)|\(B", both), target
+    if "Floats" in hints:  # whole numbers are members of an enumeration
+        both = doc + text
         assert re.search(r"\[(m|s|N|rad|counts|N·m/rad)[\],]|0 to 1|0 straight", both), target

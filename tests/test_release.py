@@ -8,9 +8,9 @@ from typing import Any
 import pytest
 from servo_rig import IDS
 from servo_rig import Rig as Servos
+from twin_rig import Rig, rig
 
 from antennate.control.loop import run_loop
-from antennate.experiments.twin import Rig, TwinConfig, rig
 from antennate.hardware.driving.config import DriveConfig
 from antennate.hardware.driving.drive import drive
 from antennate.hardware.driving.session import Session
@@ -20,6 +20,7 @@ from antennate.hardware.dynamixel.parser import Parser
 from antennate.hardware.ports.port import PortError
 from antennate.hardware.safety.causes import Cause, State
 from antennate.twin.bus import Fault, Trouble
+from antennate.twin.config import TwinConfig
 
 CONFIG = DriveConfig(dry_run=0.5, duration=0.5)
 TORQUE, GOAL = b"\x40\0", b"\x74\0"
@@ -98,7 +99,7 @@ def test_B19_a_group_whose_release_fails_keeps_no_other_from_its_own(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     made, disable = rig(TwinConfig()), bringup.disable
-    first = made.session.joints.in_order_of_release[0]
+    first = made.session.actuators.joints.in_order_of_release[0]
 
     def broken(bus: Any, ids: Any, *words: Any) -> list[int]:
         if tuple(ids) == first:
@@ -176,7 +177,7 @@ def ticked(made: Rig, end: float, act: Callable[[float], None]) -> None:
         act(clock.now())
         return clock.now() < end
 
-    run_loop(session, session, session.period, go_on)
+    run_loop(session, session.control, session.period, go_on)
 
 
 def test_B19_servos_that_kept_their_torque_in_off_are_told_again_until_they_let_go() -> None:
@@ -200,7 +201,7 @@ def test_B19_servos_that_kept_their_torque_in_off_are_told_again_until_they_let_
     assert len(kept) > 20, "telling them takes no more than two ticks"
     assert {tuple(ids) for ids in kept} == {(4, 18)}
     assert not any(ids for t, ids in on.items() if t >= 2.6)
-    assert made.session.unreleased == []
+    assert made.session.actuators.left_on == []
 
 
 def test_B10_B19_a_servo_that_keeps_torque_after_half_an_arming_is_told_again() -> None:

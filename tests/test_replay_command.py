@@ -21,7 +21,7 @@ from antennate.telemetry.figure import replay as draw
 from antennate.telemetry.framing import framed
 from antennate.telemetry.header import Header
 from antennate.telemetry.reader import LogReader
-from antennate.telemetry.replay import ReplayBody, recorded_decider, replay
+from antennate.telemetry.replay import ReplayRobot, recorded_controller, replay
 from antennate.telemetry.ticks import JOINTS
 from antennate.telemetry.writer import LogWriter
 from antennate.types import Contact, JointCommand, Maneuver
@@ -91,7 +91,7 @@ def test_another_controller_is_compared(log: Path, capsys: pytest.CaptureFixture
     assert result["first_difference"]["replayed"] == "FORWARD"
     assert main(["replay", str(log), "--controller", "open"]) == 0
     out = capsys.readouterr().out
-    assert f"First difference: tick {result['first_difference']['tick']}, " in out
+    assert f"first in tick {result['first_difference']['tick']} at " in out
 
 
 def test_it_leaves_a_table_and_a_figure(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -154,7 +154,7 @@ def test_a_log_that_was_not_closed_is_no_error(
         (["."], "Is a directory"),
         (["text"], "no intact header, 0 intact ticks; damaged places: 1"),
         (["own"], "give --controller with this name if its code may run"),
-        (["own", "--controller", "zigzag"], "--controller: expected one of open, paper, closed"),
+        (["own", "--controller", "zigzag"], "controller: expected one of open, paper, closed"),
     ],
 )
 def test_what_cannot_be_replayed_is_refused_in_one_line(
@@ -174,14 +174,14 @@ def test_an_empty_log_is_replayed(tmp_path: Path, capsys: pytest.CaptureFixture[
     path = tmp_path / "empty"
     LogWriter(path, Header(controller="open", params=ControlParams())).close()
     assert said(capsys, str(path), "--out", "out")["ticks"] == 0
-    body = ReplayBody([])
+    body = ReplayRobot([])
     with pytest.raises(LogError, match="found the end of the log"):
         body.read()
 
 
 def test_a_controller_that_raises_is_counted_and_does_not_end_the_replay(log: Path) -> None:
     with LogReader(log) as reader:
-        sound = recorded_decider(reader.header)
+        sound = recorded_controller(reader.header)
 
         class Broken:
             maneuver, contact = sound.maneuver, sound.contact
@@ -202,7 +202,7 @@ def test_the_figure_shows_every_stretch_and_repeats_its_bytes() -> None:
     course = Course(
         t=0.01 * np.arange(n),
         reading=np.full((n, 2), 1800.0),
-        b=np.zeros((n, 2)),
+        level=np.zeros((n, 2)),
         contact=np.repeat([[Contact.FREE, Contact.CONTACT], [Contact.UNKNOWN, 9]], 50, axis=0),
         recorded=np.repeat([Maneuver.FORWARD, Maneuver.HOLD], 50).astype(int),
         replayed=np.repeat([Maneuver.FORWARD, 7], 50).astype(int),

@@ -13,10 +13,10 @@ from test_bad_calibrations import GOOD
 
 from antennate.cli import BAD_INPUT, main
 from antennate.cli.addresses import RobotOptions, parse_robot
-from antennate.cli.toml import to_toml
 from antennate.hardware.doctor.checkup import examine
 from antennate.hardware.robot_file import RobotFile
 from antennate.params.reading import read_file
+from antennate.studies.formats import to_toml
 
 PAGE = Path(__file__).parents[1] / "docs" / "hardware.md"
 TAKE: dict[str, Callable[[RobotFile], Any]] = {
@@ -65,7 +65,7 @@ def test_each_command_takes_its_own_numbers_and_a_flag_counts_more(file: Path) -
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("[layout]\nbuad = 1\n", "layout.buad: expected a known key of layout (did you mean"),
+        ("[robot]\nbuad = 1\n", "robot.buad: expected a known key of robot (did you mean"),
         ("[record]\nmark = [0, 1]\n", "record.mark: expected a known key of record"),
         ("marks = [0, 1]\n", "marks: expected a known key, found 'marks'"),
         ("[doctor]\nlisten = 0.0\n", "doctor.listen: expected a number above 0"),
@@ -96,7 +96,7 @@ def test_S9_doctor_names_the_board_to_which_the_films_do_not_belong(file: Path) 
     patient = Patient()
     robot = RobotFile(sensor_id="0" * 16).for_doctor()
     row = wrong(examine(robot, None, ("/dev/esp32", patient.esp32), patient.clock.now))[
-        "esp32: films"
+        "esp32: sensors"
     ]
     assert row.expected == f"on board {'0' * 16}"
     assert row.found == f"board {b'twin'.hex()}00000000"

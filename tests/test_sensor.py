@@ -95,8 +95,8 @@ def test_the_loop_is_as_wide_as_declared() -> None:
     params = SensorParams(hysteresis=0.1, creep=(0, 0))
     chain = sensor.SensorChain(params, (), 0.01)
     up = np.linspace(0, math.pi / 2, 1001)
-    there = np.array([float(chain.felt(x)) for x in up])
-    back = np.array([float(chain.felt(x)) for x in up[::-1]])[::-1]
+    there = np.array([float(chain.with_memory(x)) for x in up])
+    back = np.array([float(chain.with_memory(x)) for x in up[::-1]])[::-1]
     assert back[500] - there[500] == pytest.approx(0.1 * math.pi / 2, rel=1e-6)
     assert (back >= there - 1e-12).all()
 
@@ -107,14 +107,14 @@ def test_hysteresis_does_not_depend_on_pace() -> None:
     for count in (11, 1001):
         chain = sensor.SensorChain(params, (), 0.01)
         path = np.concatenate([np.linspace(0, 1, count), np.linspace(1, 0.3, count)])
-        ends.append([float(chain.felt(x)) for x in path][-1])
+        ends.append([float(chain.with_memory(x)) for x in path][-1])
     assert ends[0] == pytest.approx(ends[1], rel=1e-12)
 
 
 def test_a_held_bend_creeps_by_the_declared_share() -> None:
     params = SensorParams(hysteresis=0, creep=(0.03, 0.02), creep_time=(0.3, 10.0))
     chain = sensor.SensorChain(params, (), 0.01)
-    felt = np.array([float(chain.felt(np.array(1.0))) for _ in range(10_000)])
+    felt = np.array([float(chain.with_memory(np.array(1.0))) for _ in range(10_000)])
     assert felt[0] == pytest.approx(0.95, abs=2e-3)
     assert felt[30] == pytest.approx(0.95 + 0.03 * (1 - math.exp(-1)), abs=2e-3)
     assert felt[-1] == pytest.approx(1.0, abs=1e-4)

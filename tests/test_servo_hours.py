@@ -15,10 +15,10 @@ from servo_rig import IDS, Rig, positions, servos
 from antennate.hardware.dynamixel import packets
 from antennate.hardware.dynamixel.answers import POSITION, Value
 from antennate.hardware.dynamixel.bus import Bus
+from antennate.hardware.dynamixel.monitor import ServoMonitor
 from antennate.hardware.dynamixel.packets import LONGEST, Packet
 from antennate.hardware.dynamixel.parser import Parser
 from antennate.hardware.safety.causes import Cause, State
-from antennate.hardware.safety.watch import ServoWatch
 from antennate.twin.bus import ServoBus
 from antennate.twin.registers import Servo
 from antennate.twin.wire import SimulatedWire
@@ -50,7 +50,7 @@ def hold_up(cycles: int, loss: float) -> tuple[int, int]:
     rig = Rig()
     rig.twin.servos = standing()
     rig.twin.loss = loss
-    watch, ticker = ServoWatch(rig.bus, tuple(IDS), rig.link.now), Ticker()
+    watch, ticker = ServoMonitor(rig.bus, tuple(IDS), rig.link.now), Ticker()
     goals = {i: (100 * i).to_bytes(4, "little") for i in IDS}
     worst = 0
     for n in range(cycles):

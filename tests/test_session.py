@@ -8,14 +8,14 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from pty_server import PtyServer
+from twin_rig import Rig, rig
 
-from antennate.control.controllers import Controller
+from antennate.control.registry import make_controller
 from antennate.errors import BadInputError, ConfigError
-from antennate.experiments.twin import Rig, TwinConfig, rig
 from antennate.hardware.driving.adapter import require_quick
 from antennate.hardware.driving.config import DriveConfig
 from antennate.hardware.driving.connect import await_board, require_servos
-from antennate.hardware.driving.decider import chosen
 from antennate.hardware.driving.drive import drive
 from antennate.hardware.driving.report import Report
 from antennate.hardware.driving.session import Session
@@ -26,12 +26,12 @@ from antennate.hardware.dynamixel.parser import Parser
 from antennate.hardware.ports.port import PortError
 from antennate.hardware.safety.causes import Cause, State
 from antennate.params import ControlParams
-from antennate.robots.layout import LayoutParams
+from antennate.robots.spec import RobotSpec
 from antennate.telemetry.replay import replay
 from antennate.telemetry.ticks import Tick
 from antennate.twin.bus import Fault, Trouble
+from antennate.twin.config import TwinConfig
 from antennate.twin.faults import Faults, read
-from antennate.twin.pty import PtyServer
 from antennate.twin.registers import Servo
 from antennate.types import AntennaFrame, JointCommand, Maneuver
 
@@ -42,7 +42,7 @@ class Log:
     """What was seen after every tick: time, state, causes, maneuver and goals."""
 
     def __init__(self, rig: Rig, act: Callable[[Rig, float], None] | None = None) -> None:
-        self.rig, self._act = rig, act
+        self.rig, self._act, self.report = rig, act, Report()
         self.t: list[float] = []
         self.state: list[State] = []
         self.causes: list[set[Cause]] = []
@@ -67,7 +67,7 @@ class Log:
 def walked(act: Callable[[Rig, float], None] | None = None, config: DriveConfig = CONFIG) -> Log:
     made = rig(TwinConfig())
     log = Log(made, act)
-    drive(made.session, config, arm=True, on_tick=log)
+    log.report = drive(made.session, config, arm=True, on_tick=log)
     return log
 
 
@@ -77,7 +77,7 @@ def at(when: float, demand: str) -> Callable[[Rig, float], None]:
 
     def act(rig: Rig, t: float) -> None:
         if not faults:
-            faults.append(Faults([read(f"{demand}@{when}s")], tuple(LayoutParams().ids)))
+            faults.append(Faults([read(f"{demand}@{when}s")], tuple(RobotSpec().ids)))
         faults[0].apply(rig.robot, t)
 
     return act
@@ -139,6 +139,23 @@ def test_L8_L9_a_silent_board_makes_it_hold_within_100_ms_and_its_return_walk() 
     assert (state[t > 3.5] <= State.DEGRADED).all()
 
 
+@pytest.mark.parametrize("when", [0.3, 1.02, 2.0])
+def test_E1_every_tick_can_be_logged_whenever_the_board_resets(when: float) -> None:
+    """In the dry run, while arming, on the way."""
+    act = at(when, "esp32=reset")
+
+    def keep(session: Session, t: float) -> None:
+        act(made, t)
+        tick = Tick.unpack(Tick.of(session, t).pack())
+        lost.append(tick.lost)
+
+    made, lost = rig(TwinConfig()), list[int]()
+    report = drive(made.session, CONFIG, arm=True, on_tick=keep)
+    assert report.result(made.session)["resets"] == 1
+    assert len(lost) == made.session.tally.ticks
+    assert max(lost) < 10
+
+
 def test_E1_a_board_that_resets_is_counted_and_used_again_within_a_second_of_its_greeting() -> None:
     log = walked(at(2.0, "esp32=reset"))
     clock = log.rig.session.board.clock
@@ -149,11 +166,24 @@ def test_E1_a_board_that_resets_is_counted_and_used_again_within_a_second_of_its
     assert (state[t > 3.5] <= State.DEGRADED).all()
 
 
-def test_S1_an_open_wire_makes_it_hold_and_says_which_side() -> None:
-    log = walked(at(2.0, "esp32=open_left"))
+@pytest.mark.parametrize(
+    ("fault", "cause", "side"),
+    [
+        ("open_left", Cause.OPEN, "left"),
+        ("open_right", Cause.OPEN, "right"),
+        ("short_left", Cause.SHORT_LO, "left"),
+        ("right:4095", Cause.SHORT_HI, "right"),
+    ],
+)
+def test_S1_S2_a_broken_wire_is_named_with_its_side_through_bytes_within_100_ms(
+    fault: str, cause: Cause, side: str
+) -> None:
+    log = walked(at(2.0, f"esp32={fault}"))
+    assert log.first(cause) <= 2.0 + 0.1 + 0.02  # the reading after the fault, and its way here
     t, state = np.array(log.t), np.array(log.state)
     assert (state[t > 2.11] >= State.HOLD).all()
-    assert any("(l" in text or "l)" in text for text in log.texts[-5:])
+    assert log.texts[-1].startswith(f"HOLD {cause.name}: {cause.text} ({side})")
+    assert log.report.why.startswith(f"HOLD {cause.name}: ")
 
 
 def test_B1_a_silent_servo_is_named_within_100_ms_and_the_others_keep_their_torque() -> None:
@@ -222,7 +252,11 @@ def test_T2_a_controller_that_hangs_stops_every_servo_within_120_ms_of_the_last_
     """It never comes back from its decision: nobody sends, and nobody has to."""
 
     made = rig(TwinConfig())
-    sound, servos, wait = made.session.decider.step, made.robot.servos, made.clock.sleep_until
+    sound, servos, wait = (
+        made.session.control.controller.step,
+        made.robot.servos,
+        made.clock.sleep_until,
+    )
     tripped: list[float] = []
     seen: list[list[float]] = []
 
@@ -241,7 +275,7 @@ def test_T2_a_controller_that_hangs_stops_every_servo_within_120_ms_of_the_last_
             wait(made.clock.now() + 0.4)
         raise KeyboardInterrupt
 
-    made.session.decider.step = step  # type: ignore[method-assign]
+    made.session.control.controller.step = step  # type: ignore[method-assign]
     made.session.release = list  # type: ignore[method-assign]
     drive(made.session, CONFIG, arm=True)
     assert tripped[0] <= 0.120
@@ -256,7 +290,7 @@ def test_B8_servos_stop_within_120_ms_when_only_the_controller_fails(
 ) -> None:
     """The loop still reads the board in every tick; a packet to any servo would feed them all."""
     made = rig(TwinConfig())
-    sound, servos = made.session.decider.step, made.robot.servos
+    sound, servos = made.session.control.controller.step, made.robot.servos
     heard: list[float] = []
     tripped: list[float] = []
 
@@ -269,9 +303,9 @@ def test_B8_servos_stop_within_120_ms_when_only_the_controller_fails(
             tripped.append(made.clock.now())
         raise ValueError("a bug")
 
-    made.session.decider.step = step  # type: ignore[method-assign]
+    made.session.control.controller.step = step  # type: ignore[method-assign]
     drive(made.session, CONFIG, arm=True)
-    assert (made.session.watch.supply < 10.8) == (volts < 10.8)
+    assert (made.session.actuators.state.supply < 10.8) == (volts < 10.8)
     assert tripped
     assert tripped[0] - heard[0] <= 0.120 + 0.02  # its last tick, and the one that looks
 
@@ -306,7 +340,7 @@ def test_B8_a_controller_that_fails_does_not_feed_the_watchdogs() -> None:
             return command
 
     made = rig(TwinConfig())
-    made.session.decider = Broken(made.session.decider)
+    made.session.control.controller = Broken(made.session.control.controller)
     log = Log(made)
     drive(made.session, CONFIG, arm=True, on_tick=log)
     t = np.array(log.t)
@@ -338,7 +372,7 @@ def test_G6_a_robot_whose_record_is_required_holds_while_none_is_kept() -> None:
 @pytest.mark.parametrize("bad", [math.nan, math.inf])
 def test_S5_B14_a_pose_that_is_not_finite_never_reaches_the_bus(bad: float) -> None:
     made = rig(TwinConfig())
-    sound = made.session.decider.step
+    sound = made.session.control.controller.step
 
     def step(frame: AntennaFrame) -> JointCommand:
         command = sound(frame)
@@ -346,7 +380,7 @@ def test_S5_B14_a_pose_that_is_not_finite_never_reaches_the_bus(bad: float) -> N
             command.leg[0, 2, 1] = bad
         return command
 
-    made.session.decider.step = step  # type: ignore[method-assign]
+    made.session.control.controller.step = step  # type: ignore[method-assign]
     log = Log(made)
     drive(made.session, CONFIG, arm=True, on_tick=log)
     assert Cause.BAD_POSE in set().union(*log.causes)
@@ -419,13 +453,13 @@ def test_T6_tracebacks_of_a_controller_are_kept_once_a_second() -> None:
         def step(self, frame: object) -> object:
             raise ZeroDivisionError("of the plugin")
 
-    session.decider = Broken()  # type: ignore[assignment]
+    session.control.controller = Broken()  # type: ignore[assignment]
     session.clock.sleep_until(1.0)
     for tick in range(251):
         session.clock.sleep_until(1.0 + 0.01 * tick)
-        session.step(session.frame)
-    kept = session.tracebacks.kept
-    assert (len(kept), session.tracebacks.left_out) == (3, 248)
+        session.control.step(session.frame)
+    kept = session.control.tracebacks.kept
+    assert (len(kept), session.control.tracebacks.left_out) == (3, 248)
     assert "in step" in kept[0]
     assert "ZeroDivisionError: of the plugin" in kept[0]
     assert Report().result(session)["tracebacks"] == list(kept)
@@ -453,19 +487,19 @@ def test_B15_servos_that_are_not_as_expected_are_refused(
     made = rig(TwinConfig())
     spoil(made.robot)
     with pytest.raises(BringUpError, match=said):
-        require_servos(made.session.bus, LayoutParams())
+        require_servos(made.session.actuators.bus, RobotSpec())
 
 
 @pytest.mark.parametrize(
     "name", ["clsoed", "antennate.control.controllers:Nobody", "no_such_module:X"]
 )
 def test_a_controller_that_does_not_exist_is_refused(name: str) -> None:
-    with pytest.raises(ConfigError, match="--controller"):
-        chosen(name, ControlParams())
+    with pytest.raises(ConfigError, match="controller"):
+        make_controller(name, ControlParams())
 
 
 def test_a_controller_of_ones_own_is_taken() -> None:
-    made = chosen("antennate.control.controllers:Controller", ControlParams())
+    made = make_controller("antennate.control.controllers:closed_loop", ControlParams())
     assert int(made.maneuver[0]) == Maneuver.FORWARD
 
 
@@ -480,7 +514,7 @@ def test_a_controller_of_ones_own_is_taken() -> None:
 )
 def test_faults_that_do_not_exist_are_refused(text: str, said: str) -> None:
     with pytest.raises(BadInputError, match=said):
-        Faults([read(text)], LayoutParams().ids)
+        Faults([read(text)], RobotSpec().ids)
 
 
 def test_B11_a_servo_that_reboots_alone_is_a_fault_within_a_second() -> None:
@@ -536,7 +570,7 @@ def test_B11_a_restart_that_answers_at_once_is_a_fault_and_arming_sets_all_of_it
 
     def tick(n: int) -> None:
         for _ in range(n):
-            session.write(session.step(session.read()))
+            session.write(session.control.step(session.read()))
             assert session.outputs is not None
             causes.append({active.cause for active in session.outputs.causes})
             made.clock.sleep_until(made.clock.now() + session.period / 2)
@@ -584,7 +618,7 @@ def test_B13_a_supply_that_cannot_be_read_any_more_is_not_known_after_4_s() -> N
 
     def note(session: Session, t: float) -> None:
         log(session, t)
-        supply.append(session.watch.supply)
+        supply.append(session.actuators.state.supply)
 
     drive(made.session, DriveConfig(dry_run=7.0, duration=7.0), arm=False, on_tick=note)
     known = np.isfinite(supply)
@@ -596,7 +630,7 @@ def test_B13_a_supply_that_cannot_be_read_any_more_is_not_known_after_4_s() -> N
 @pytest.mark.parametrize("what", ["servo", "command"])
 def test_B10_arming_that_fails_half_way_leaves_no_servo_with_torque(what: str) -> None:
     made = rig(TwinConfig())
-    servos, sound = made.robot.servos, made.session.decider.step
+    servos, sound = made.robot.servos, made.session.control.controller.step
     had_torque: list[int] = []
 
     def step(frame: AntennaFrame) -> JointCommand:
@@ -608,7 +642,7 @@ def test_B10_arming_that_fails_half_way_leaves_no_servo_with_torque(what: str) -
     def note(session: Session, t: float) -> None:
         had_torque.append(sum(servo.torque for servo in servos))
 
-    made.session.decider.step = step  # type: ignore[method-assign]
+    made.session.control.controller.step = step  # type: ignore[method-assign]
     if what == "servo":
         servos[11].write = refusing(servos[11])  # type: ignore[method-assign]
     log = Log(made)
@@ -662,13 +696,13 @@ def test_B13_below_the_first_level_it_walks_at_half_the_pace_and_replays_alike()
     assert {Cause.SUPPLY_WARN} <= {active.cause for active in made.session.outputs.causes}
     assert legs[450] - legs[250] == pytest.approx(np.full(12, 2 * math.pi), rel=0.03)
     assert legs[790] - legs[590] == pytest.approx(np.full(12, math.pi), rel=0.03)
-    found = replay(ticks, Controller(ControlParams()), 0.01)
+    found = replay(ticks, make_controller("closed", ControlParams()), 0.01)
     assert (len(found.maneuvers), found.different, found.commands) == (len(ticks), 0, 0)
 
 
 def test_B19_torque_goes_off_in_the_configured_order() -> None:
-    layout = LayoutParams(release=("legs", "antennae", "yaw"))
-    made = rig(TwinConfig(layout=layout))
+    spec = RobotSpec(release=("legs", "antennae", "yaw"))
+    made = rig(TwinConfig(robot=spec))
     begun: list[int] = []
     receive = made.robot.bus.receive
 
@@ -677,14 +711,14 @@ def test_B19_torque_goes_off_in_the_configured_order() -> None:
         begun.extend(p.params[4] for p in packets if p.params[:2] == b"\x40\0")
         receive(t, data)
 
-    config = DriveConfig(dry_run=0.5, duration=0.5, layout=layout)
+    config = DriveConfig(dry_run=0.5, duration=0.5, robot=spec)
     made.robot.bus.receive = listen
     report = drive(made.session, config, arm=True)
     assert begun[-3:] == [6, 18, 1]
     assert report.safe
     assert not any(servo.torque for servo in made.robot.servos)
     with pytest.raises(ValueError, match="each group once"):
-        LayoutParams(release=("legs", "legs", "yaw"))
+        RobotSpec(release=("legs", "legs", "yaw"))
 
 
 @pytest.mark.parametrize("latency", [0.0, 0.016])

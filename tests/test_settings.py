@@ -6,8 +6,8 @@ import math
 from collections.abc import Callable
 
 import pytest
+from twin_rig import rig
 
-from antennate.experiments.twin import TwinConfig, rig
 from antennate.hardware.driving.config import DriveConfig
 from antennate.hardware.driving.connect import require_servos
 from antennate.hardware.driving.drive import drive
@@ -16,7 +16,8 @@ from antennate.hardware.dynamixel.bringup import BringUpError
 from antennate.hardware.dynamixel.packets import StatusError
 from antennate.hardware.dynamixel.tables import XC430_W240
 from antennate.hardware.safety.causes import State
-from antennate.robots.layout import LayoutParams
+from antennate.robots.spec import RobotSpec
+from antennate.twin.config import TwinConfig
 from antennate.twin.registers import Servo
 from antennate.twin.robot import DrivenServo
 
@@ -63,7 +64,7 @@ def test_B15_servos_that_are_set_otherwise_are_refused_with_the_cure(
     made = rig(TwinConfig())
     spoil(made.robot.servos)
     with pytest.raises(BringUpError, match=rf"{said}; `antennate doctor --fix`"):
-        require_servos(made.session.bus, LayoutParams())
+        require_servos(made.session.actuators.bus, RobotSpec())
     assert not any(servo.torque for servo in made.robot.servos)
 
 
@@ -72,18 +73,18 @@ def test_settings_that_leave_room_enough_are_taken() -> None:
     made = rig(TwinConfig())
     low, high = "min_position_limit", "max_position_limit"
     set_all((1, low, 1722), (1, high, 2374), (6, low, 2000), (6, high, 2001))(made.robot.servos)
-    narrow = LayoutParams.model_validate({"yaw": {"limit": 0.5}})
-    require_servos(made.session.bus, narrow)
+    narrow = RobotSpec.model_validate({"yaw": {"limit": 0.5}})
+    require_servos(made.session.actuators.bus, narrow)
     set_all((1, low, 1723))(made.robot.servos)
     with pytest.raises(BringUpError, match="at most 1722"):
-        require_servos(made.session.bus, narrow)
+        require_servos(made.session.actuators.bus, narrow)
 
 
 def test_all_that_is_wrong_is_said_at_once() -> None:
     made = rig(TwinConfig())
     set_all((8, "drive_mode", 9), (3, "homing_offset", 500))(made.robot.servos)
     with pytest.raises(BringUpError, match=r"drive mode .*\[8\]; homing offset .*\[3\]"):
-        require_servos(made.session.bus, LayoutParams())
+        require_servos(made.session.actuators.bus, RobotSpec())
 
 
 def test_B10_profiles_that_another_program_left_are_set_before_torque() -> None:
@@ -117,10 +118,10 @@ def test_B10_profiles_that_another_program_left_are_set_before_torque() -> None:
 def test_profiles_follow_the_fastest_of_their_group_and_stay_below_the_velocity_limit() -> None:
     """10 rad/s of an antenna base are 417 counts, 522 with a quarter more; its limit is 445."""
     made = rig(TwinConfig())
-    layout = LayoutParams.model_validate({"yaw": {"fastest": 1.0}, "antennae": {"fastest": 10.0}})
-    profiles = type(made.session.joints)(layout).profiles
+    robot = RobotSpec.model_validate({"yaw": {"fastest": 1.0}, "antennae": {"fastest": 10.0}})
+    profiles = type(made.session.actuators.joints)(robot).profiles
     assert [profiles[i] for i in (1, 5, 6, 17, 18, 19)] == [53, 53, COUNTS, COUNTS, 445, 445]
-    require_servos(made.session.bus, layout)
+    require_servos(made.session.actuators.bus, robot)
 
 
 def test_the_twin_gets_torque_by_a_goal_if_its_drive_mode_says_so() -> None:

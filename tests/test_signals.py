@@ -8,11 +8,12 @@ import threading
 from typing import Any
 
 import pytest
+from twin_rig import Rig, rig
 
-from antennate.experiments.twin import Rig, TwinConfig, rig
 from antennate.hardware.driving.config import DriveConfig
 from antennate.hardware.driving.drive import drive
 from antennate.hardware.driving.signals import STOPS, StopOnce
+from antennate.twin.config import TwinConfig
 
 CONFIG = DriveConfig(dry_run=0.5, duration=4.0)
 
@@ -48,14 +49,14 @@ def test_signals_are_left_alone_outside_the_main_thread() -> None:
 def walk_until(made: Rig, said: Any) -> None:
     """Replace what the controller does in one tick, the 50th of the walk and all after it."""
     session = made.session
-    sound = session.decider.step
+    sound = session.control.controller.step
 
     def step(frame: Any) -> Any:
         if session.tally.sent >= 50:
             said()
         return sound(frame)
 
-    session.decider.step = step  # type: ignore[method-assign]
+    session.control.controller.step = step  # type: ignore[method-assign]
 
 
 @pytest.mark.parametrize("number", STOPS)

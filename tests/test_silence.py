@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from esp32_streams import BOOT, encoded, hello
 from hardware_rig import FREE
+from pty_server import PtyServer
 from servo_rig import servos
 
 from antennate.hardware.driving.config import DriveConfig
@@ -25,7 +26,6 @@ from antennate.hardware.host_clock import HostClock
 from antennate.hardware.ports.serial_port import SerialPort
 from antennate.params import SupervisorParams
 from antennate.twin.bus import ServoBus
-from antennate.twin.pty import PtyServer
 from antennate.twin.serve import Terminal
 
 LIMIT = 0.1

@@ -8,21 +8,21 @@ import mujoco
 import numpy as np
 import pytest
 
-from antennate.errors import ArenaError
+from antennate.errors import SceneError
 from antennate.params import PhysicsParams, TunnelParams
-from antennate.robots.body import RobotParams
-from antennate.sim import geometry
-from antennate.sim.arena import Tunnel, draw_tunnel
+from antennate.robots.spec import RobotSpec
+from antennate.sim.scenes import geometry
+from antennate.sim.scenes.tunnel import Tunnel, TunnelScene
 from antennate.sim.world import World, compile_world
 
 MU, G, RADIUS = 0.4, 9.81, 0.07
 STRAIGHT = TunnelParams(segments=(2.0,), turns_deg=(), mirror="never")
 BENT = TunnelParams(segments=(1.0, 0.8, 1.2), turns_deg=(60.0, -90.0), mirror="never")
-ROBOT = RobotParams()
+ROBOT = RobotSpec()
 
 
 def draw(params: TunnelParams, seed: int = 0, **changes: object) -> Tunnel:
-    return draw_tunnel(params.model_copy(update=changes), ROBOT, np.random.default_rng(seed))
+    return TunnelScene(params.model_copy(update=changes)).draw(ROBOT, np.random.default_rng(seed))
 
 
 def gap_to_line(point: np.ndarray, line: np.ndarray) -> float:
@@ -41,7 +41,7 @@ def pushed(velocity: tuple[float, float], spin: float) -> np.ndarray:
         cylinders=np.array([[3.0, 3.0]]),
     )
     model = compile_world(PhysicsParams(), ROBOT, lone)
-    world = World(model, sensed_hinges=5)
+    world = World(model, ROBOT)
     world.step(20)
     first = {axis: model.joint(f"cylinder0_{axis}") for axis in ("x", "y", "spin")}
     before = np.array([world.data.qpos[j.qposadr[0]] for j in first.values()])
@@ -106,12 +106,12 @@ def test_the_corridor_between_the_linings_is_forty_centimetres_wide() -> None:
 
 
 def test_a_tunnel_narrower_than_the_robot_is_refused_with_both_widths() -> None:
-    with pytest.raises(ArenaError, match=r"0\.2 m.*0\.15 m"):
+    with pytest.raises(SceneError, match=r"0\.2 m.*0\.15 m"):
         draw(STRAIGHT, free_width=0.15)
 
 
 def test_more_strewn_cylinders_than_find_room_are_refused() -> None:
-    with pytest.raises(ArenaError, match="strewn asks for 40"):
+    with pytest.raises(SceneError, match="strewn asks for 40"):
         draw(STRAIGHT, strewn=40)
 
 

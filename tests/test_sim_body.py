@@ -8,15 +8,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from antennate.control.controllers import Controller
 from antennate.control.loop import run_loop
+from antennate.control.registry import make_controller
 from antennate.params import ControlParams, PhysicsParams, VariationParams
-from antennate.robots.body import RobotParams
+from antennate.robots.spec import RobotSpec
 from antennate.sim.sim_robot import Disturbance, SimRobot
 from antennate.sim.world import PREFIX, World, compile_world
 from antennate.types import AntennaFrame, JointCommand, Maneuver
 
-ROBOT, MIND = RobotParams(), ControlParams()
+ROBOT, MIND = RobotSpec(), ControlParams()
 PERIOD = MIND.period
 QUIET = VariationParams(joint_bias=0.0, slip_log_sd=0.0)
 
@@ -28,23 +28,21 @@ def _engine_log_goes_away(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> No
 
 def chance(seed: int, variation: VariationParams | None = None) -> Disturbance:
     rng = np.random.default_rng(seed)
-    return Disturbance(
-        rng, variation or VariationParams(), ROBOT.sensor, ROBOT.leg_friction, PERIOD
-    )
+    return Disturbance(rng, variation or VariationParams(), ROBOT, PERIOD)
 
 
 def body_of(*seeds: int | None) -> SimRobot:
     """A batch on flat floors, one row a seed, empty where there is none."""
-    body = SimRobot(len(seeds), ROBOT.sensor, PERIOD, PhysicsParams().timestep)
+    body = SimRobot(len(seeds), ROBOT, PERIOD, PhysicsParams().timestep)
     for row, seed in enumerate(seeds):
         if seed is not None:
-            body.load(row, World(compile_world(PhysicsParams(), ROBOT), 5), chance(seed))
+            body.load(row, World(compile_world(PhysicsParams(), ROBOT), ROBOT), chance(seed))
     return body
 
 
 def run(body: SimRobot, batch: int, ticks: int, spoil_at: int | None = None) -> list[AntennaFrame]:
     """Frames of some ticks; at one tick the world of row 0 is broken."""
-    control, frames = Controller(MIND, "closed", batch), []
+    control, frames = make_controller("closed", MIND, batch=batch), []
 
     def go_on(frame: AntennaFrame, command: JointCommand) -> bool:
         frames.append(frame)
@@ -84,7 +82,7 @@ def test_a_row_that_fails_reads_nan_and_the_others_go_on_as_if_alone() -> None:
 
 
 def test_an_empty_row_reads_nan_and_makes_the_mind_hold() -> None:
-    body, control = body_of(1, None), Controller(MIND, "closed", 2)
+    body, control = body_of(1, None), make_controller("closed", MIND, batch=2)
     frame = body.read()
     control.step(frame)
     assert np.isnan(frame.counts[1]).all()
@@ -96,7 +94,7 @@ def test_a_row_can_be_emptied_and_filled_again() -> None:
     body = body_of(1)
     body.unload(0)
     assert np.isnan(body.read().counts).all()
-    body.load(0, World(compile_world(PhysicsParams(), ROBOT), 5), chance(1))
+    body.load(0, World(compile_world(PhysicsParams(), ROBOT), ROBOT), chance(1))
     assert np.array_equal(body.read().counts, body_of(1).read().counts)
 
 
@@ -132,17 +130,17 @@ def test_a_command_that_is_no_number_fails_its_row_only() -> None:
 
 def test_straight_antennae_read_the_divider_at_ten_kiloohms() -> None:
     readings = []
-    body = SimRobot(1, ROBOT.sensor, PERIOD, PhysicsParams().timestep)
+    body = SimRobot(1, ROBOT, PERIOD, PhysicsParams().timestep)
     for seed in range(50):
-        body.load(0, World(compile_world(PhysicsParams(), ROBOT), 5), chance(seed))
+        body.load(0, World(compile_world(PhysicsParams(), ROBOT), ROBOT), chance(seed))
         readings.append(body.read().counts[0])
     assert np.mean(readings) == pytest.approx(1872, abs=1.0)
     assert np.std(readings) == pytest.approx(2.5, rel=0.3)
 
 
 def test_flex_and_pose_reach_the_frame_and_the_joints_in_their_order() -> None:
-    world = World(compile_world(PhysicsParams(), ROBOT), 5)
-    body = SimRobot(1, ROBOT.sensor, PERIOD, PhysicsParams().timestep)
+    world = World(compile_world(PhysicsParams(), ROBOT), ROBOT)
+    body = SimRobot(1, ROBOT, PERIOD, PhysicsParams().timestep)
     body.load(0, world, chance(0, QUIET))
     world.data.joint(PREFIX + "antenna_l_hinge0").qpos[0] = math.pi / 4
     left, right = body.read().counts[0]

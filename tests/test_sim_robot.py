@@ -9,23 +9,26 @@ import numpy as np
 import pytest
 
 from antennate.params import PhysicsParams
-from antennate.robots.anatomy import LEGS, LINKS, PITCH_JOINTS, YAW_JOINTS
-from antennate.robots.body import RobotParams
+from antennate.robots.antenna import AntennaSpec
+from antennate.robots.sensor import SensorParams
+from antennate.robots.spec import RobotSpec
 from antennate.sim.world import PREFIX, World, compile_world
 
 N_MM_PER_DEG = 1e-3 * 180 / math.pi
 DAMPING = 1.7 / (65 * 2 * math.pi / 60)
-SERVOS = (*YAW_JOINTS, *LEGS)
+ROBOT = RobotSpec()
+SERVOS = (*ROBOT.yaw_names, *ROBOT.leg_names)
 
 
 @pytest.fixture(scope="module")
 def model() -> mujoco.MjModel:
-    return compile_world(PhysicsParams(), RobotParams())
+    return compile_world(PhysicsParams(), RobotSpec())
 
 
 def bent(model: mujoco.MjModel, angle: float) -> tuple[World, np.ndarray]:
     """A world with every antenna hinge at an angle, and its tips (2, 3)."""
-    world = World(model, sensed_hinges=6)
+    long = SensorParams(active_length=0.12)  # over all six hinges
+    world = World(model, RobotSpec(antenna=AntennaSpec(sensor=long)))
     for side in "lr":
         for i in range(6):
             world.data.joint(f"{PREFIX}antenna_{side}_hinge{i}").qpos[0] = angle
@@ -83,7 +86,7 @@ def test_every_actuator_drives_the_joint_of_its_name(model: mujoco.MjModel, name
 
 
 def test_commands_follow_the_order_of_the_anatomy(model: mujoco.MjModel) -> None:
-    world = World(model, sensed_hinges=5)
+    world = World(model, RobotSpec())
     world.command(np.arange(19.0))
     names = (*SERVOS, "antenna_l_base", "antenna_r_base")
     assert [world.data.actuator(PREFIX + n).ctrl[0] for n in names] == list(range(19))
@@ -96,20 +99,20 @@ def test_links_hang_behind_one_another_head_first(model: mujoco.MjModel) -> None
 
 def test_legs_stand_at_the_sides_that_their_names_say(model: mujoco.MjModel) -> None:
     world, _ = bent(model, 0.0)
-    lateral = [world.data.body(PREFIX + n).xpos[1] for n in LEGS]
+    lateral = [world.data.body(PREFIX + n).xpos[1] for n in ROBOT.leg_names]
     assert lateral == pytest.approx([0.092, -0.092] * 6)  # 0.20 m over legs 16 mm wide
 
 
 def test_a_leg_at_angle_zero_is_at_its_longest_and_touches_the_floor(model: mujoco.MjModel) -> None:
     world, _ = bent(model, 0.0)
-    for name in LEGS:
+    for name in ROBOT.leg_names:
         ring = world.data.geom(PREFIX + name).xpos
         assert ring[2] == pytest.approx(0.030)  # centre one radius over the floor
         assert world.data.body(PREFIX + name).xpos[2] - ring[2] == pytest.approx(0.012)
 
 
 def test_legs_bring_their_own_friction_to_a_contact(model: mujoco.MjModel) -> None:
-    for name in LEGS:
+    for name in ROBOT.leg_names:
         geom = model.geom(PREFIX + name)
         assert geom.priority[0] > model.geom("floor").priority[0]
         assert geom.friction[0] == pytest.approx(0.6)
@@ -118,7 +121,7 @@ def test_legs_bring_their_own_friction_to_a_contact(model: mujoco.MjModel) -> No
 def test_the_pitch_joints_are_locked_stiffly(model: mujoco.MjModel) -> None:
     # a quarter of the robot's weight on a lever of one link must bend it by less than 1 deg
     torque = 2.0 * 9.81 / 4 * 0.1
-    for name in PITCH_JOINTS:
+    for name in ROBOT.pitch_names:
         assert torque / model.joint(PREFIX + name).stiffness[0] < math.radians(1)
 
 
@@ -168,4 +171,4 @@ def test_the_robot_never_touches_itself(model: mujoco.MjModel) -> None:
     robot = [i for i in range(model.ngeom) if model.geom(i).name.startswith(PREFIX)]
     kind, meets = model.geom_contype[robot], model.geom_conaffinity[robot]
     assert not (kind[:, None] & meets[None, :]).any()
-    assert len(LINKS) * 4 + 12 == len([i for i in robot if model.geom(i).name])
+    assert ROBOT.links * 4 + 12 == len([i for i in robot if model.geom(i).name])

@@ -10,8 +10,8 @@ import pytest
 
 from antennate.control.gait import Gait, targets
 from antennate.params import GaitParams, PhysicsParams, TunnelParams
-from antennate.robots.body import RobotParams
-from antennate.sim.arena import draw_tunnel
+from antennate.robots.spec import RobotSpec
+from antennate.sim.scenes.tunnel import TunnelScene
 from antennate.sim.world import World, compile_world
 from antennate.types import Maneuver
 
@@ -23,7 +23,7 @@ MIRROR = np.array([1.0, -1.0, 1.0, -1.0])
 
 @pytest.fixture(scope="module")
 def floor() -> mujoco.MjModel:
-    return compile_world(PhysicsParams(), RobotParams())
+    return compile_world(PhysicsParams(), RobotSpec())
 
 
 def walk(
@@ -35,9 +35,9 @@ def walk(
     start: tuple[float, float, float] = (0.0, 0.0, 0.0),
 ) -> tuple[np.ndarray, World]:
     """Head position and unwrapped heading (ticks, 4) under one maneuver, and the world after it."""
-    world, control = World(model, sensed_hinges=5), Gait(gait, 1, PERIOD)
+    world, control = World(model, RobotSpec()), Gait(gait, RobotSpec(), 1, PERIOD)
     control.reset(np.array([0]), phase)
-    command = targets(gait, control.phase, control.offset)
+    command = targets(gait, RobotSpec(), control.phase, control.offset)
     world.place(*start, command.yaw[0], command.leg[0])
     track = []
     for _ in range(ticks):
@@ -112,11 +112,12 @@ def test_a_mirrored_tunnel_is_walked_the_mirrored_way() -> None:
     tracks, moved = [], []
     for side, mirror, phase in ((1, "never", 0.0), (-1, "always", math.pi)):
         plan = TunnelParams(segments=(1.0,), turns_deg=(), mirror=mirror, strewn=0)
-        tunnel = draw_tunnel(plan, RobotParams(), np.random.default_rng(3))
-        model = compile_world(PhysicsParams(), RobotParams(), tunnel)
+        tunnel = TunnelScene(plan).draw(RobotSpec(), np.random.default_rng(3))
+        model = compile_world(PhysicsParams(), RobotSpec(), tunnel)
         track, world = walk(model, Maneuver.FORWARD, 300, phase=phase, start=(0.3, 0.0, side * 0.4))
         tracks.append(track)
-        moved.append(world.cylinders() - tunnel.cylinders)
+        stand = [world.data.body(f"cylinder{i}").xpos[:2] for i in range(len(tunnel.cylinders))]
+        moved.append(np.array(stand) - tunnel.cylinders)
     assert abs(moved[0]).max() > 0.005  # the robot did push something
     assert abs(tracks[1] - tracks[0] * MIRROR).max() < 1e-5
     assert abs(moved[1] - moved[0] * MIRROR[:2]).max() < 1e-5

@@ -11,9 +11,9 @@ import pytest
 
 from antennate.errors import SimulationError
 from antennate.params import PhysicsParams, TunnelParams
-from antennate.robots.body import RobotParams
+from antennate.robots.spec import RobotSpec
 from antennate.sim import world as world_module
-from antennate.sim.arena import draw_tunnel
+from antennate.sim.scenes.tunnel import TunnelScene
 from antennate.sim.world import PREFIX, World, compile_world, new_spec
 
 
@@ -26,14 +26,14 @@ def _engine_log_goes_away(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> No
 @pytest.fixture(scope="module")
 def model() -> mujoco.MjModel:
     plan = TunnelParams(segments=(1.0,), turns_deg=(), strewn=0, mirror="never")
-    tunnel = draw_tunnel(plan, RobotParams(), np.random.default_rng(3))
-    return compile_world(PhysicsParams(), RobotParams(), tunnel)
+    tunnel = TunnelScene(plan).draw(RobotSpec(), np.random.default_rng(3))
+    return compile_world(PhysicsParams(), RobotSpec(), tunnel)
 
 
 @pytest.fixture
 def world(model: mujoco.MjModel) -> World:
     """A world that stands and has run ten sound steps."""
-    fresh = World(model, sensed_hinges=5)
+    fresh = World(model, RobotSpec())
     fresh.place(0.3, 0.0, 0.0, np.zeros(5), np.zeros((6, 2)))
     fresh.command(np.zeros(19))
     fresh.step(10)
@@ -91,7 +91,7 @@ def test_a_cylinder_that_broke_in_its_sleep_is_noticed(world: World, state: str)
 
 def test_a_blow_up_is_noticed_every_time(model: mujoco.MjModel) -> None:
     for _ in range(3):
-        fresh = World(model, sensed_hinges=5)
+        fresh = World(model, RobotSpec())
         fresh.data.body(PREFIX + "link2").xfrc_applied[2] = 1e14
         with pytest.raises(SimulationError):
             fresh.step(1)
@@ -125,7 +125,7 @@ def test_running_out_of_the_engines_memory_ends_the_world(monkeypatch: pytest.Mo
         return spec
 
     monkeypatch.setattr(world_module, "new_spec", starved)
-    world = World(compile_world(PhysicsParams(), RobotParams()), sensed_hinges=5)
+    world = World(compile_world(PhysicsParams(), RobotSpec()), RobotSpec())
     with pytest.raises(SimulationError):
         world.step(5)
 
@@ -136,7 +136,7 @@ def test_a_sound_world_counts_its_time(world: World) -> None:
 
 
 def test_a_robot_is_placed_where_it_is_told(model: mujoco.MjModel) -> None:
-    placed = World(model, sensed_hinges=5)
+    placed = World(model, RobotSpec())
     placed.place(0.4, -0.1, 2.5, np.linspace(-0.2, 0.2, 5), np.arange(12.0).reshape(6, 2))
     assert placed.head[:2].tolist() == [0.4, -0.1]
     assert placed.heading == pytest.approx(2.5)
@@ -149,18 +149,18 @@ def test_a_robot_is_placed_where_it_is_told(model: mujoco.MjModel) -> None:
 def test_a_robot_in_the_clear_feels_no_obstacle_and_one_at_a_cylinder_does(
     model: mujoco.MjModel,
 ) -> None:
-    clear = World(model, sensed_hinges=5)
+    clear = World(model, RobotSpec())
     clear.place(0.3, 0.0, 0.0, np.zeros(5), np.zeros((6, 2)))
     clear.step(5)
     assert clear.obstacle_force() == 0.0
-    pressed = World(model, sensed_hinges=5)
+    pressed = World(model, RobotSpec())
     pressed.place(0.3, 0.08, 0.5, np.zeros(5), np.zeros((6, 2)))
     pressed.step(1)
     assert pressed.obstacle_force() > 0.0
 
 
 def test_leg_friction_reaches_the_engine() -> None:
-    world = World(compile_world(PhysicsParams(), RobotParams()), sensed_hinges=5)
+    world = World(compile_world(PhysicsParams(), RobotSpec()), RobotSpec())
     world.set_leg_friction(np.linspace(0.1, 1.2, 12))
     assert world.model.geom(PREFIX + "leg_l0").friction[0] == pytest.approx(0.1)
     assert world.model.geom(PREFIX + "leg_r5").friction[0] == pytest.approx(1.2)

@@ -27,10 +27,11 @@ from antennate.params import SupervisorParams
 from antennate.types import Contact, Maneuver
 
 
-def first_told(active: Active) -> tuple[int, int, float]:
-    """Of equal causes lost data explain what the control makes of it, never the other way round."""
+def first_told(active: Active) -> tuple[int, int, bool, float]:
+    """Lost data explain what the controller makes of them; those that are over explain least."""
     cause = active.cause
-    return -cause.severity, 0 if cause in DATA else 1 + (cause in OF_MIND), active.since
+    over = cause in DATA and not active.present
+    return -cause.severity, 0 if cause in DATA else 1 + (cause in OF_MIND), over, active.since
 
 
 def pairs() -> list[tuple[Cause, ...]]:

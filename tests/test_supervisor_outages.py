@@ -11,7 +11,7 @@ from esp32_streams import made
 from hardware_faults import causes
 from hardware_rig import BENT, FREE, LIMIT, PERIOD, Rig, armed, pose_change
 
-from antennate.control.controllers import Controller
+from antennate.control.registry import make_controller
 from antennate.hardware.esp32.clock import DeviceClock, Verdict
 from antennate.hardware.esp32.wire import Hello, Reset
 from antennate.hardware.safety.causes import Cause, Outputs, State
@@ -185,7 +185,7 @@ def test_L16_the_mean_covers_the_same_time_at_any_rate(rate: int) -> None:
         rig.step(
             [(n * PERIOD - k / rate, 1600.0 + k % 2, FREE + k % 2) for k in reversed(range(come))]
         )
-        settled.append(rig.control.b[0, 0])
+        settled.append(rig.control.level[0, 0])
     reached = next(n for n, b in enumerate(settled) if abs(b - settled[-1]) < 0.01)
     averaging = ControlParams().conditioning.averaging_time
     patience = max(1 / rate, 2 * PERIOD) * 3
@@ -208,7 +208,7 @@ class Moody:
     """A controller that raises in some ticks."""
 
     def __init__(self, bad: set[int]) -> None:
-        self._inner = Controller(ControlParams(), "open")
+        self._inner = make_controller("open", ControlParams())
         self._bad = bad
         self._n = 0
 

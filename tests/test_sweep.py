@@ -20,11 +20,11 @@ from antennate.params import (
     ShapeParams,
     SweepParams,
 )
-from antennate.robots.antenna import AntennaParams
+from antennate.robots.antenna import AntennaSpec
 from antennate.robots.sensor import SensorParams
 from antennate.sim.bench import Bench
 
-ANTENNA, SENSOR, SHAPE = AntennaParams(), SensorParams(), ShapeParams()
+ANTENNA, SENSOR, SHAPE = AntennaSpec(), SensorParams(), ShapeParams()
 SWEEP = SweepParams()
 SMALL = sweep.SweepConfig(
     profiles=("descending",),
@@ -38,7 +38,7 @@ SMALL = sweep.SweepConfig(
 
 
 def record(wall, params=SWEEP, antenna=ANTENNA, sweeps=1.0):
-    return sweeping.record(BenchPhysicsParams(), antenna, SENSOR, params, wall, sweeps)
+    return sweeping.record(BenchPhysicsParams(), antenna, params, wall, sweeps)
 
 
 def test_shapes_by_flex_and_place_of_the_tip():
@@ -116,10 +116,10 @@ def test_shares_of_time_add_up_and_shapes_point_ahead_near_a_wall():
 
 def test_statics_of_no_flex_are_those_of_a_straight_rod():
     base = np.radians([20.0, 47.0, 80.0])
-    found = reach.Statics(ANTENNA, SENSOR).distance(base, np.zeros(3))
+    found = reach.Statics(ANTENNA).distance(base, np.zeros(3))
     wanted = ANTENNA.length * np.sin(base) + ANTENNA.radius
     np.testing.assert_allclose(found, wanted, rtol=1e-3)  # base angles come in steps of 2.5 deg
-    assert np.isnan(reach.Statics(ANTENNA, SENSOR).distance(base, np.full(3, 9.0))).all()
+    assert np.isnan(reach.Statics(ANTENNA).distance(base, np.full(3, 9.0))).all()
 
 
 @pytest.mark.parametrize("share", [0.5, 0.7, 0.85])
@@ -127,7 +127,7 @@ def test_statics_find_the_wall_that_a_slow_smooth_sweep_touches(share):
     smooth = ANTENNA.model_copy(update={"friction": 0.0})
     wall = sweeping.Wall(share * ANTENNA.length)
     trace = record(wall, SweepParams(frequency=0.1), smooth, 0.5)
-    told = reach.Statics(smooth, SENSOR).distance(trace.base, -trace.flex)
+    told = reach.Statics(smooth).distance(trace.base, -trace.flex)
     bent = (-trace.flex > SHAPE.flex) & np.isfinite(told)
     assert bent.sum() > 50
     np.testing.assert_allclose(told[bent], wall.distance, rtol=0.015)
@@ -174,14 +174,14 @@ FORGETFUL = SENSOR.model_copy(update={"hysteresis": 0.0, "creep": (0.0, 0.0)})
 
 
 def setting(frequency=2.0, sensor=SENSOR):
+    antenna = ANTENNA.model_copy(update={"sensor": sensor})
     return estimates.Setting(
         0,
         EstimateParams(),
         SweepParams(frequency=frequency),
         SHAPE,
         ConditioningParams(),
-        ANTENNA,
-        sensor,
+        antenna,
         BenchPhysicsParams(),
         0.05,
     )
@@ -244,7 +244,7 @@ def test_result_does_not_depend_on_workers():
         ({"distances": (0.01,)}, "distances must exceed the antenna's radius, 0.025 of its length"),
         ({"estimate": {"distance": (0.9, 0.4)}}, "estimate.distance must rise"),
         ({"profiles": ("stiff", "stiff")}, "profiles must differ"),
-        ({"sensor": {"rate": 300.0}}, "whole fraction of the physics rate 2000 Hz"),
+        ({"antenna": {"sensor": {"rate": 300.0}}}, "whole fraction of the physics rate 2000 Hz"),
         ({"estimate": {"trials": 3}}, "greater than or equal to 6"),
     ],
 )
@@ -261,7 +261,7 @@ def test_command_writes_its_run(capsys, tmp_path, monkeypatch):
     assert main(words) == 0
     out = capsys.readouterr().out
     assert "sweep varied, with sensor noise" in out
-    assert "base to tip 7.75 %, gap 6.73 %" in out
+    assert "published for CITRAS: 7.75 % and 6.73 %" in out
     result = json.loads((tmp_path / "run" / "result.json").read_text())
     assert (result["schema"], result["command"], result["seed"]) == (1, "sweep", 0)
     with (tmp_path / "run" / "trials.csv").open(newline="") as file:

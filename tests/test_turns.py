@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from twin_rig import Rig, rig
 
-from antennate.control.controllers import Controller
-from antennate.experiments.twin import Rig, TwinConfig, rig
+from antennate.control.registry import make_controller
 from antennate.hardware.driving.config import DriveConfig
 from antennate.hardware.driving.drive import drive
 from antennate.hardware.driving.session import Session
@@ -18,6 +18,7 @@ from antennate.params import ControlParams
 from antennate.telemetry.replay import replay
 from antennate.telemetry.ticks import Tick
 from antennate.twin.bus import Fault, Trouble
+from antennate.twin.config import TwinConfig
 from antennate.types import AntennaFrame, JointCommand
 
 LEGS = slice(5, 17)
@@ -41,16 +42,16 @@ class Walk:
         self.ticks: list[Tick] = []
         self._act = act
         session = self.rig.session
-        think = session.decider.step
+        think = session.control.controller.step
 
         def step(frame: AntennaFrame) -> JointCommand:
             command = think(frame)
             if session.outputs is not None and session.outputs.clear:
                 self.frames.append(float(frame.t[0]))
-                self.maneuvers.append(int(session.decider.maneuver[0]))
+                self.maneuvers.append(int(session.control.controller.maneuver[0]))
             return command
 
-        session.decider.step = step  # type: ignore[method-assign]
+        session.control.controller.step = step  # type: ignore[method-assign]
         config = CONFIG.model_copy(update={"duration": duration})
         self.report = drive(session, config, arm=True, on_tick=self._note)
 
@@ -61,7 +62,7 @@ class Walk:
             servos = self.rig.robot.servos
             self.goals.append([servo.get("goal_position") for servo in servos])
             self.torque.append([servo.torque for servo in servos])
-            self.standing.append(session.turns.standing)
+            self.standing.append(session.actuators.turns.standing)
             self.states.append(session.outputs.state)
         if self._act is not None:
             self._act(self, session)
@@ -75,7 +76,7 @@ def far() -> Walk:
 
 def test_legs_near_the_limit_forget_their_turns_and_the_walk_goes_on(far: Walk) -> None:
     assert min(far.goals[0][LEGS]) > 249 * 4096
-    assert far.rig.session.turns.forgotten == 12
+    assert far.rig.session.actuators.turns.forgotten == 12
     assert max(abs(np.array(far.goals[-1][LEGS]))) < 4 * 4096
     assert max(far.states[30:]) <= State.DEGRADED
     first, last = far.standing.index(True), len(far.standing) - far.standing[::-1].index(True)
@@ -100,14 +101,14 @@ def test_one_leg_at_a_time_is_without_torque_and_all_have_it_afterwards(far: Wal
 
 
 def test_G7_its_log_replays_alike_for_the_controller_was_not_asked_meanwhile(far: Walk) -> None:
-    found = replay(far.ticks, Controller(ControlParams()), 0.01)
+    found = replay(far.ticks, make_controller("closed", ControlParams()), 0.01)
     assert (len(found.maneuvers), found.different, found.commands) == (len(far.ticks), 0, 0)
 
 
 def test_the_maneuvers_are_those_of_a_walk_without_it(far: Walk) -> None:
     """The controller's time stands still with the robot, so that no maneuver is cut short."""
     plain = Walk(0, duration=3.0)
-    assert plain.rig.session.turns.forgotten == 0
+    assert plain.rig.session.actuators.turns.forgotten == 0
     n = 250
     assert far.maneuvers[:n] == plain.maneuvers[:n]
     assert np.diff(far.frames).max() <= 0.0101
@@ -118,7 +119,7 @@ def test_a_leg_that_does_not_answer_is_a_fault_and_never_pulls_to_a_far_goal(fau
     away: list[float] = []
 
     def spoil(walk: Walk, session: Session) -> None:
-        if session.turns.forgotten == 3:
+        if session.actuators.turns.forgotten == 3:
             walk.rig.robot.bus.trouble[9] = Trouble(fault)
         servos = [servo for servo in walk.rig.robot.servos if servo.torque]
         away.extend(abs(servo.get("goal_position") - servo.position) for servo in servos)
@@ -135,7 +136,7 @@ def test_lost_answers_do_not_keep_legs_from_forgetting() -> None:
         walk.rig.robot.bus.loss = 0.01
 
     walk = Walk(253, duration=2.0, act=lose)
-    assert walk.rig.session.turns.forgotten == 12
+    assert walk.rig.session.actuators.turns.forgotten == 12
     assert max(walk.states) <= State.HOLD
 
 
@@ -143,10 +144,10 @@ def test_T7_while_it_holds_no_further_leg_loses_its_torque() -> None:
     """The board falls silent while the fourth leg forgets; that one gets its torque back."""
 
     def silence(walk: Walk, session: Session) -> None:
-        walk.rig.robot.board_silent |= session.turns.forgotten == 3
+        walk.rig.robot.board_silent |= session.actuators.turns.forgotten == 3
 
     walk = Walk(253, duration=2.5, act=silence)
-    assert walk.rig.session.turns.forgotten < 12
+    assert walk.rig.session.actuators.turns.forgotten < 12
     held = len(walk.states) - walk.states[::-1].index(State.OK)
     assert State.HOLD in walk.states[held:]
     loose = [row.count(False) for row in walk.torque]
@@ -157,10 +158,12 @@ def test_T7_while_it_holds_no_further_leg_loses_its_torque() -> None:
 
 def test_B10_legs_that_have_forgotten_go_on_from_where_they_were_when_the_board_is_back() -> None:
     def blink(walk: Walk, session: Session) -> None:
-        walk.rig.robot.board_silent = session.turns.forgotten == 3 and len(walk.goals) < 150
+        walk.rig.robot.board_silent = (
+            session.actuators.turns.forgotten == 3 and len(walk.goals) < 150
+        )
 
     walk = Walk(253, duration=4.0, act=blink)
-    assert walk.rig.session.turns.forgotten == 12
+    assert walk.rig.session.actuators.turns.forgotten == 12
     assert not any(row.count(False) > 1 for row in walk.torque)
     assert walk.states[-1] <= State.DEGRADED
 
@@ -171,11 +174,11 @@ def test_a_leg_without_torque_to_forget_its_turns_is_not_reported() -> None:
 
     def look(walk: Walk, session: Session) -> None:
         off = [servo.get("id") for servo in walk.rig.robot.servos if not servo.torque]
-        if session.watch.armed:
+        if session.actuators.state.armed:
             for servo in off or [6]:
-                session.watch._guard(servo)
-        disarmed.extend(session.watch.disarmed)
+                session.actuators.state._guard(servo)
+        disarmed.extend(session.actuators.state.disarmed)
 
     walk = Walk(253, duration=2.0, act=look)
-    assert walk.rig.session.turns.forgotten == 12
+    assert walk.rig.session.actuators.turns.forgotten == 12
     assert not disarmed

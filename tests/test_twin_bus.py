@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from pty_server import PtyServer
 from servo_rig import IDS, MODELS, Rig, positions, servos
 
 from antennate.hardware.dynamixel import packets
@@ -21,7 +22,6 @@ from antennate.hardware.dynamixel.parser import Parser
 from antennate.hardware.dynamixel.tables import TABLES, XC430_W240, XL330_M288, Table
 from antennate.hardware.ports.port import PortError
 from antennate.twin.bus import Fault, ServoBus, Trouble
-from antennate.twin.pty import PtyServer
 from antennate.twin.registers import BOOT_TIME, Servo
 
 GOAL, TORQUE, WATCHDOG = 116, 64, 98

@@ -6,9 +6,9 @@ from collections import defaultdict
 
 import numpy as np
 import pytest
+from twin_rig import Rig, rig
 
 from antennate.errors import BadInputError
-from antennate.experiments.twin import Rig, TwinConfig, build, rig
 from antennate.hardware.driving.config import DriveConfig
 from antennate.hardware.driving.drive import drive
 from antennate.hardware.driving.session import Session
@@ -16,12 +16,13 @@ from antennate.hardware.dynamixel.packets import Instruction
 from antennate.hardware.dynamixel.parser import Parser
 from antennate.hardware.safety.causes import State
 from antennate.params import BatteryParams
-from antennate.robots.layout import LayoutParams
+from antennate.robots.spec import RobotSpec
+from antennate.twin.config import TwinConfig, build
 from antennate.twin.faults import Faults, read
 from antennate.twin.noise import Noise
 from antennate.twin.robot import TwinRobot
 
-IDS = LayoutParams().ids
+IDS = RobotSpec().ids
 
 
 def broken(robot: TwinRobot, *texts: str) -> None:
@@ -116,7 +117,7 @@ def test_L1_B3_bit_errors_are_counted_and_no_wrong_value_is_ever_used(
         for servo in made.robot.servos:
             if t > 1.6:
                 assert servo.get("goal_position") in truth.goals[servo.get("id")]
-        for servo, position in session.watch.positions.items():
+        for servo, position in session.actuators.state.positions.items():
             assert position in truth.positions[servo]
 
     report = drive(made.session, DriveConfig(dry_run=0.5, duration=6.0), arm=True, on_tick=look)
@@ -124,7 +125,7 @@ def test_L1_B3_bit_errors_are_counted_and_no_wrong_value_is_ever_used(
     assert made.robot.bus.noise.wrong > 50
     assert made.robot.noise.wrong > 5
     assert result["crc_errors"] >= 3
-    assert made.session.bus.tally.misses > 100
+    assert made.session.actuators.bus.tally.misses > 100
     assert max(states[:-1]) <= worst
     assert (states[-1] is State.FAULT) == (worst is State.FAULT)
     assert not any(servo.torque for servo in made.robot.servos)

@@ -10,18 +10,18 @@ import tty
 
 import numpy as np
 
-from antennate.experiments.twin import TwinConfig, build
 from antennate.hardware.dynamixel import packets
 from antennate.hardware.dynamixel.parser import Parser
 from antennate.hardware.esp32.decoder import FrameDecoder
 from antennate.hardware.esp32.wire import Sample
-from antennate.robots.layout import LayoutParams
+from antennate.robots.spec import RobotSpec
+from antennate.twin.config import TwinConfig, build
 from antennate.twin.faults import Faults, read
 from antennate.twin.lockstep import BoardPort, LockstepClock
 from antennate.twin.robot import TwinRobot
 from antennate.twin.serve import TwinServer
 
-IDS = LayoutParams().ids
+IDS = RobotSpec().ids
 PERIOD = 0.01
 TICKS = 60
 

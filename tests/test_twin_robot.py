@@ -11,21 +11,22 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
+from twin_rig import Decisions, on_twin, simulated
 
-from antennate.control.controllers import ARMS, Arm, Controller
 from antennate.control.gait import targets
-from antennate.experiments.tunnel.passage import Passage
-from antennate.experiments.tunnel.run import TunnelConfig, prepare
-from antennate.experiments.twin import Decisions, on_twin, simulated
+from antennate.control.registry import BUILT_IN, make_controller
+from antennate.experiments.tunnel.run import TunnelConfig
 from antennate.hardware.joints import CommandError, Joints
 from antennate.params import ControlParams
-from antennate.robots.layout import LayoutParams
+from antennate.robots.spec import RobotSpec
+from antennate.sim.scenes.tunnel import TunnelScene
 from antennate.sim.world import World
+from antennate.twin.passage import Passage
 from antennate.twin.robot import TwinRobot
 from antennate.types import AntennaFrame, JointCommand, Maneuver
 
-LAYOUT = LayoutParams()
-MIRRORED = LayoutParams.model_validate(
+ROBOT = RobotSpec()
+MIRRORED = RobotSpec.model_validate(
     {
         "yaw": {"ids": (5, 4, 3, 2, 1), "directions": (-1,) * 5, "zeros": (1500,) * 5},
         "legs": {"ids": tuple(range(40, 52)), "directions": (1, -1) * 6, "zeros": (0,) * 12},
@@ -41,7 +42,7 @@ def command(yaw: float = 0.0, leg: float = 0.0) -> JointCommand:
 
 
 def test_a_quarter_turn_is_1024_ticks_from_the_middle_and_directions_count() -> None:
-    ticks = Joints(LAYOUT).ticks(command(yaw=math.pi / 2, leg=4 * math.pi))
+    ticks = Joints(ROBOT).ticks(command(yaw=math.pi / 2, leg=4 * math.pi))
     assert ticks[:5].tolist() == [3072] * 5
     assert ticks[5:17].tolist() == [2048 + 2 * 4096] * 12
     assert Joints(MIRRORED).ticks(command(yaw=math.pi / 2))[:5].tolist() == [1500 - 1024] * 5
@@ -51,25 +52,27 @@ def test_a_quarter_turn_is_1024_ticks_from_the_middle_and_directions_count() -> 
     ("change", "said"),
     [
         ({"yaw": {"ids": (1, 2)}}, "yaw.ids must have 5 entries, got 2"),
-        ({"antennae": {**LAYOUT.antennae.model_dump(), "ids": (1, 19)}}, "ids must differ, got 1"),
-        ({"yaw": {**LAYOUT.yaw.model_dump(), "zeros": (2048,) * 4 + (100,)}}, "quarter turn"),
+        ({"antennae": {**ROBOT.antennae.model_dump(), "ids": (1, 19)}}, "ids must differ, got 1"),
+        ({"yaw": {**ROBOT.yaw.model_dump(), "zeros": (2048,) * 4 + (100,)}}, "quarter turn"),
     ],
 )
-def test_a_layout_that_no_robot_can_have_is_refused(change: dict[str, object], said: str) -> None:
+def test_a_description_that_no_robot_can_have_is_refused(
+    change: dict[str, object], said: str
+) -> None:
     with pytest.raises(ValidationError, match=said):
-        LayoutParams.model_validate(change)
+        RobotSpec.model_validate(change)
 
 
-def test_a_layout_needs_only_what_differs() -> None:
+def test_a_description_needs_only_what_differs() -> None:
     ids = (101, 102, 103, 104, 105)
-    found = LayoutParams.model_validate({"yaw": {"ids": ids}})
-    assert found.yaw == LAYOUT.yaw.model_copy(update={"ids": ids})
-    assert (found.legs, found.antennae) == (LAYOUT.legs, LAYOUT.antennae)
+    found = RobotSpec.model_validate({"yaw": {"ids": ids}})
+    assert found.yaw == ROBOT.yaw.model_copy(update={"ids": ids})
+    assert (found.legs, found.antennae) == (ROBOT.legs, ROBOT.antennae)
 
 
-@pytest.mark.parametrize("layout", [LAYOUT, MIRRORED])
-def test_ticks_and_back_lose_half_a_tick_at_most(layout: LayoutParams) -> None:
-    joints, rng = Joints(layout), np.random.default_rng(5)
+@pytest.mark.parametrize("robot", [ROBOT, MIRRORED])
+def test_ticks_and_back_lose_half_a_tick_at_most(robot: RobotSpec) -> None:
+    joints, rng = Joints(robot), np.random.default_rng(5)
     sent = JointCommand(
         yaw=rng.uniform(-1, 1, (1, 5)),
         leg=rng.uniform(-300, 300, (1, 6, 2)),
@@ -86,20 +89,20 @@ def test_B14_a_goal_that_is_not_finite_or_too_far_is_refused_as_a_whole(bad: flo
     sent = command()
     sent.leg[0, 3, 1] = bad
     with pytest.raises(CommandError, match="servo 13"):
-        Joints(LAYOUT).ticks(sent)
+        Joints(ROBOT).ticks(sent)
 
 
 def test_B14_a_pose_of_two_robots_is_refused() -> None:
     two = JointCommand(np.zeros((2, 5)), np.zeros((2, 6, 2)), np.zeros((2, 2)))
     with pytest.raises(CommandError, match=r"found shape \(2, 5\)"):
-        Joints(LAYOUT).ticks(two)
+        Joints(ROBOT).ticks(two)
 
 
 def test_B14_a_yaw_or_an_antenna_beyond_its_limit_is_refused_as_a_whole() -> None:
-    narrow = LayoutParams.model_validate(
+    narrow = RobotSpec.model_validate(
         {
-            "yaw": {**LAYOUT.yaw.model_dump(), "limit": 1.0},
-            "antennae": {**LAYOUT.antennae.model_dump(), "limit": 0.5},
+            "yaw": {**ROBOT.yaw.model_dump(), "limit": 1.0},
+            "antennae": {**ROBOT.antennae.model_dump(), "limit": 0.5},
         }
     )
     joints = Joints(narrow)
@@ -114,10 +117,10 @@ def test_B14_a_yaw_or_an_antenna_beyond_its_limit_is_refused_as_a_whole() -> Non
 
 @given(
     angles=st.lists(st.floats(-2.0, 2.0) | st.floats(), min_size=19, max_size=19),
-    layout=st.sampled_from([LAYOUT, MIRRORED]),
+    robot=st.sampled_from([ROBOT, MIRRORED]),
 )
 def test_B14_what_is_not_refused_lies_within_one_turn_but_for_legs(
-    angles: list[float], layout: LayoutParams
+    angles: list[float], robot: RobotSpec
 ) -> None:
     said = np.array(angles)
     one = JointCommand(
@@ -125,7 +128,7 @@ def test_B14_what_is_not_refused_lies_within_one_turn_but_for_legs(
     )
     fit = all(abs(a) <= math.pi / 2 for i, a in enumerate(angles) if not 5 <= i < 17)
     try:
-        ticks = Joints(layout).ticks(one)
+        ticks = Joints(robot).ticks(one)
     except CommandError:
         edge = any(abs(a) > 1.57 for i, a in enumerate(angles) if not 5 <= i < 17)
         assert edge or not all(abs(a) <= 1600 for a in angles)
@@ -136,28 +139,28 @@ def test_B14_what_is_not_refused_lies_within_one_turn_but_for_legs(
     assert (abs(ticks[5:17]) <= 1_048_575).all()
 
 
-@pytest.mark.parametrize("arm", ARMS)
-def test_no_pose_of_a_gait_is_beyond_the_limits(arm: Arm) -> None:
-    joints, params = Joints(LAYOUT), ControlParams()
+@pytest.mark.parametrize("name", BUILT_IN)
+def test_no_pose_of_a_gait_is_beyond_the_limits(name: str) -> None:
+    joints, params = Joints(ROBOT), ControlParams()
     offset = max(params.gait.turn_offset, params.escape.turn_offset)
     for sign in (-1.0, 1.0):
         for phase in np.linspace(0.0, 2 * math.pi, 100):
-            joints.ticks(targets(params.gait, np.array([phase]), np.array([sign * offset])))
-    control = Controller(params, arm)
+            joints.ticks(targets(params.gait, ROBOT, np.array([phase]), np.array([sign * offset])))
+    control = make_controller(name, params)
     rng = np.random.default_rng(3)
     for tick in range(1000):
         counts = rng.uniform(0.0, 4095.0, (1, 2))
         joints.ticks(control.step(AntennaFrame(t=np.array([0.01 * tick]), counts=counts)))
 
 
-@pytest.mark.parametrize("layout", [LAYOUT, MIRRORED])
-@pytest.mark.parametrize(("arm", "trial"), [("closed", 1), ("paper", 0)])
+@pytest.mark.parametrize("robot", [ROBOT, MIRRORED])
+@pytest.mark.parametrize(("name", "trial"), [("closed", 1), ("paper", 0)])
 def test_a_whole_trial_through_bytes_is_decided_like_the_pure_simulation(
-    arm: str, trial: int, layout: LayoutParams
+    name: str, trial: int, robot: RobotSpec
 ) -> None:
-    config = TunnelConfig(seed=0)
-    pure = simulated(config, arm, trial, layout)
-    twin = on_twin(config, arm, trial, layout)
+    config = TunnelConfig(seed=0, robot=robot)
+    pure = simulated(config, name, trial)
+    twin = on_twin(config, name, trial)
     assert len({Maneuver.FORWARD, Maneuver.REVERSE} & set(pure.maneuvers)) == 2
     assert twin == pure
 
@@ -173,7 +176,7 @@ def test_a_board_that_falls_silent_makes_the_robot_hold_within_100_ms() -> None:
         if ticks > 100:
             robot.board_silent = True
 
-    found: Decisions = on_twin(config, "open", 0, LAYOUT, cut)
+    found: Decisions = on_twin(config, "open", 0, cut)
     first = found.maneuvers.index(Maneuver.HOLD)
     assert 100 < first <= 100 + 10
     assert set(found.maneuvers[first:]) == {Maneuver.HOLD}
@@ -181,14 +184,14 @@ def test_a_board_that_falls_silent_makes_the_robot_hold_within_100_ms() -> None:
 
 
 def test_the_twin_tells_when_its_head_passes_the_exit() -> None:
-    tunnel = prepare(TunnelConfig(), 0).tunnel
-    passage, length = Passage(tunnel), tunnel.params.length
+    tunnel = TunnelScene().draw(RobotSpec(), np.random.default_rng(0))
+    passage, length = Passage(tunnel), tunnel.length
     direction = tunnel.centre[-1] - tunnel.centre[-2]
     beyond = tunnel.centre[-1] + 0.1 * direction / np.hypot(*direction)
     for tick in range(1, 41):
         head = tunnel.centre[0] if tick <= 20 else beyond
         passage.watch(cast(World, SimpleNamespace(head=head, t=0.01 * tick)))
         if tick == 20:
-            assert passage.said == f"the head came 0.00 m of {length:.2f} m"
+            assert passage.summary == f"the head came 0.00 m of {length:.2f} m"
     assert passage.passed == pytest.approx(0.3), "the second look of ten ticks after it came out"
-    assert passage.said == "the head passed the exit after 0.3 s of walking"
+    assert passage.summary == "the head passed the exit after 0.3 s of walking"

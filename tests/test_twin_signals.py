@@ -38,7 +38,7 @@ def test_a_twin_ends_in_order_however_often_it_is_asked_to(pair: tuple[int, int]
         said = twin.communicate()[1]
     assert twin.returncode == 130
     *_, last, interrupted = said.splitlines()
-    assert last.startswith("antennate twin: ")
+    assert last.startswith("The twin has ended: ")
     assert "late" in last
     assert interrupted == "antennate twin: interrupted"
     assert "Traceback" not in said

@@ -37,10 +37,10 @@ def passed(tip_mm: list[float], touching: list[bool]) -> Traverse:
     )
 
 
-def fate(tip_mm: list[float], touching: list[bool], **rest: float) -> tuple[str, str]:
+def outcome_of(tip_mm: list[float], touching: list[bool], **rest: float) -> tuple[str, str]:
     config = WallConfig.model_validate({"wall": {"travel": 0.1, "start": 0.04, **rest}})
-    row = classify(config.wall, "stiff", 0, passed(tip_mm, touching))
-    return row.fate, row.fate_after_start
+    row = classify(config.wall, 1, 0, "stiff", passed(tip_mm, touching))
+    return row.outcome, row.outcome_after_start
 
 
 def test_least_advance_is_over_windows_of_the_travel() -> None:
@@ -77,25 +77,25 @@ def test_longest_gap_counts_from_the_first_touch(
 
 
 def test_a_tip_that_follows_and_touches_succeeds() -> None:
-    assert fate(list(range(100)), [True] * 100) == ("success", "success")
+    assert outcome_of(list(range(100)), [True] * 100) == ("success", "success")
 
 
 def test_a_tip_that_stands_for_over_19_mm_jams_and_early_jams_are_told_apart() -> None:
     early = [0.0] * 25 + [float(i) for i in range(75)]
     late = [float(i) for i in range(60)] + [60.0] * 25 + [60.0 + i for i in range(15)]
     short = [float(i) for i in range(60)] + [60.0] * 18 + [60.0 + i for i in range(1, 23)]
-    assert fate(early, [True] * 100) == ("jam", "success")
-    assert fate(late, [True] * 100) == ("jam", "jam")
-    assert fate(short, [True] * 100) == ("success", "success")
+    assert outcome_of(early, [True] * 100) == ("jam", "success")
+    assert outcome_of(late, [True] * 100) == ("jam", "jam")
+    assert outcome_of(short, [True] * 100) == ("success", "success")
 
 
 def test_contact_lost_for_over_800_ms_is_a_slip_and_a_jam_counts_before_it() -> None:
     tip = [float(i) for i in range(200)]
     lost = [True] * 90 + [False] * 85 + [True] * 25
     found = [True] * 90 + [False] * 79 + [True] * 31
-    assert fate(tip, lost, travel=0.2) == ("slip", "slip")
-    assert fate(tip, found, travel=0.2) == ("success", "success")
-    assert fate([0.0] * 200, lost, travel=0.2) == ("jam", "jam")
+    assert outcome_of(tip, lost, travel=0.2) == ("slip", "slip")
+    assert outcome_of(tip, found, travel=0.2) == ("success", "success")
+    assert outcome_of([0.0] * 200, lost, travel=0.2) == ("jam", "jam")
 
 
 def test_uniform_chains_take_the_same_shapes_and_forces_scale() -> None:
@@ -127,11 +127,11 @@ def test_trials_share_their_chance_across_arms_and_differ_among_each_other() -> 
 
 
 def test_same_table_on_one_and_two_workers() -> None:
-    config = WallConfig.model_validate({**SHORT, "arms": ["stiff", "descending"]})
+    config = WallConfig.model_validate({**SHORT, "profiles": ["stiff", "descending"]})
     one, two = run(config, 1), run(config, 2)
     assert one.rows == two.rows
     assert one.result() == two.result()
-    assert [(r.arm, r.trial) for r in one.rows] == [
+    assert [(r.profile, r.trial) for r in one.rows] == [
         ("stiff", 0),
         ("stiff", 1),
         ("descending", 0),
@@ -148,8 +148,8 @@ def test_trouble_in_the_physics_is_an_invalid_trial(monkeypatch: pytest.MonkeyPa
         return sound(config, arm, trial)
 
     monkeypatch.setattr(wall, "passage", burst)
-    outcome = run(WallConfig.model_validate({**SHORT, "arms": ["stiff", "descending"]}))
-    summary = outcome.result()["arms"]["stiff"]
+    outcome = run(WallConfig.model_validate({**SHORT, "profiles": ["stiff", "descending"]}))
+    summary = outcome.result()["profiles"]["stiff"]
     assert (summary["trials"], summary["invalid"]) == (2, 1)
     assert summary["successes"] + summary["jams"] + summary["slips"] == 1
     assert "engine warning" in outcome.rows[1].reason
@@ -159,7 +159,7 @@ def test_trouble_in_the_physics_is_an_invalid_trial(monkeypatch: pytest.MonkeyPa
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        ({"arms": ["stiff", "stiff"]}, "arms must differ"),
+        ({"profiles": ["stiff", "stiff"]}, "profiles must differ"),
         ({"wall": {"overlap": 0.09}}, "overlap must stay below"),
         ({"wall": {"travel": 0.05}}, "travel must exceed"),
         ({"physics": {"timestep": 0.0007, "contact_time": 0.0014}}, "timestep must divide"),
@@ -173,12 +173,12 @@ def test_impossible_walls_are_refused(change: dict[str, object], said: str) -> N
 def test_command_writes_its_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "run"
     flags = ["--wall.travel", "0.03", "--wall.start", "0.005", "--wall.speed", "0.02"]
-    flags += ["--trials", "1", "--arms", "descending", "--workers", "1", "--out", str(out)]
+    flags += ["--trials", "1", "--profiles", "descending", "--workers", "1", "--out", str(out)]
     code = main(["wall", "--json", *flags])
     assert code == 0
     result = json.loads(capsys.readouterr().out)
     assert result == json.loads((out / "result.json").read_text())
-    arm = result["arms"]["descending"]
+    arm = result["profiles"]["descending"]
     assert arm["trials"] == 1
     assert arm["successes"] + arm["jams"] + arm["slips"] == 1
     ends = (0.2065, 1.0) if arm["successes"] else (0.0, 0.7935)  # Wilson's for one trial

@@ -8,21 +8,22 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from antennate.control.controllers import Arm
+from twin_rig import Stage, before_twin, rig, simulation
+
 from antennate.control.loop import run_loop
 from antennate.experiments.tunnel.run import TunnelConfig
-from antennate.experiments.twin import Stage, TwinConfig, before_twin, rig, simulation
 from antennate.hardware.driving.connect import await_board
-from antennate.robots.layout import LayoutParams
+from antennate.robots.spec import RobotSpec
 from antennate.telemetry.header import Header
 from antennate.telemetry.reader import LogReader
-from antennate.telemetry.replay import ReplayBody, recorded_decider
+from antennate.telemetry.replay import ReplayRobot, recorded_controller
 from antennate.telemetry.ticks import Tick
 from antennate.telemetry.writer import LogWriter
+from antennate.twin.config import TwinConfig
 from antennate.types import AntennaFrame, Clock, JointCommand, Robot
 
 CONFIG = TunnelConfig(seed=0)
-LAYOUT = LayoutParams()
+LAYOUT = RobotSpec()
 TICKS = 260
 """Ticks that a world can at least be run."""
 ARMED_AT = 100
@@ -51,7 +52,7 @@ class World:
     body: Any
     control: Any
     header: Header
-    decider: Any
+    controller: Any
     go_on: Callable[[AntennaFrame, JointCommand], bool] = lambda frame, command: True
     tick_of: Callable[[AntennaFrame, JointCommand, int], Tick] | None = None
     seen: list[Seen] = field(default_factory=list)
@@ -62,12 +63,12 @@ class World:
 
         def go_on(frame: AntennaFrame, command: JointCommand) -> bool:
             number, now = len(self.seen) + 1, self.body.clock.now()
-            left, right = self.decider.contact[0].tolist()
-            maneuver = int(self.decider.maneuver[0])
+            left, right = self.controller.contact[0].tolist()
+            maneuver = int(self.controller.maneuver[0])
             self.seen.append(Seen(frame, command, maneuver, (left, right), now))
             if log is not None:
                 own = self.tick_of
-                plain = Tick.plain(self.decider, frame, command, number, now)
+                plain = Tick.plain(self.controller, frame, command, number, now)
                 log.write(plain if own is None else own(frame, command, number))
             return self.go_on(frame, command) and number < ticks
 
@@ -96,29 +97,29 @@ class Blinded:
         self._body.write(command)
 
 
-def _world(stage: Stage, arm: Arm, trial: int) -> World:
+def _world(stage: Stage, name: str, trial: int) -> World:
     header = Header(
-        controller=arm,
+        controller=name,
         params=CONFIG.control,
-        layout=LAYOUT,
+        robot=LAYOUT,
         seed=CONFIG.seed,
         trial=trial,
-        phase=float(stage.control.gait.phase[0]),
+        phase=float(stage.control.phase[0]),
     )
     return World(stage.body, stage.control, header, stage.control, stage.go_on)
 
 
-def simulated(folder: Path, arm: Arm, trial: int, blind: float = math.inf) -> World:
+def simulated(folder: Path, name: str, trial: int, blind: float = math.inf) -> World:
     """The pure simulation, rounded as servos and board do."""
-    world = _world(simulation(CONFIG, arm, trial, LAYOUT), arm, trial)
+    world = _world(simulation(CONFIG, name, trial), name, trial)
     world.body = Blinded(world.body, blind)
     return world
 
 
-def twin(folder: Path, arm: Arm, trial: int, blind: float = math.inf) -> World:
+def twin(folder: Path, name: str, trial: int, blind: float = math.inf) -> World:
     """The hardware code before the twin, in lock-step."""
-    stage = before_twin(CONFIG, arm, trial, LAYOUT)
-    world = _world(stage, arm, trial)
+    stage = before_twin(CONFIG, name, trial)
+    world = _world(stage, name, trial)
 
     def go_on(frame: AntennaFrame, command: JointCommand) -> bool:
         assert stage.robot is not None
@@ -129,11 +130,11 @@ def twin(folder: Path, arm: Arm, trial: int, blind: float = math.inf) -> World:
     return world
 
 
-def session(folder: Path, arm: Arm, trial: int, blind: float = math.inf) -> World:
+def session(folder: Path, name: str, trial: int, blind: float = math.inf) -> World:
     """The same with its supervisor; armed at tick ARMED_AT, blind for 30 ticks only."""
-    made = rig(TwinConfig(world=CONFIG, trial=trial), arm)
+    made = rig(TwinConfig(seed=CONFIG.seed, trial=trial), name)
     await_board(made.session.board, made.clock)
-    header = Header(controller=arm, params=CONFIG.control, layout=LAYOUT)
+    header = Header(controller=name, params=CONFIG.control, robot=LAYOUT)
 
     def go_on(frame: AntennaFrame, command: JointCommand) -> bool:
         made.session.orders.arm = len(world.seen) >= ARMED_AT
@@ -145,7 +146,9 @@ def session(folder: Path, arm: Arm, trial: int, blind: float = math.inf) -> Worl
         assert tick.number == number
         return Tick.unpack(tick.pack())
 
-    world = World(made.session, made.session, header, made.session.decider, go_on, tick_of)
+    world = World(
+        made.session, made.session.control, header, made.session.control.controller, go_on, tick_of
+    )
     return world
 
 
@@ -159,13 +162,13 @@ def recorded(world: World, path: Path, ticks: float = math.inf) -> Path:
 def replayed(path: Path) -> World:
     """The world that a log is."""
     with LogReader(path) as log:
-        body, control = ReplayBody(list(log)), recorded_decider(log.header)
+        body, control = ReplayRobot(list(log)), recorded_controller(log.header)
     return World(body, control, log.header, control, lambda frame, command: body.more)
 
 
-def replay_of_simulation(folder: Path, arm: Arm, trial: int, blind: float = math.inf) -> World:
+def replay_of_simulation(folder: Path, name: str, trial: int, blind: float = math.inf) -> World:
     """The third world: what the pure simulation left on disk."""
-    return replayed(recorded(simulated(folder, arm, trial, blind), folder / "log", TICKS))
+    return replayed(recorded(simulated(folder, name, trial, blind), folder / "log", TICKS))
 
 
 WORLDS = {
@@ -174,4 +177,4 @@ WORLDS = {
     "session": session,
     "replay": replay_of_simulation,
 }
-"""Makers of worlds; each takes a folder, an arm, a trial and the tick from which it is blind."""
+"""Makers of worlds; each takes a folder, a controller, a trial and the tick of its blindness."""

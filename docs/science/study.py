@@ -1,8 +1,9 @@
 """Everything that docs/science/tunnel.md reports, run again: `python docs/science/study.py PART`.
 
-Parts: `evaluation` (three arms, 100 fresh trials each), `ablation` (one change at a time) and `map`
-(success over corner angle and corridor width). Each writes docs/science/PART.json; the figures of
-the map are drawn from it. Results do not depend on the number of workers.
+Parts: `evaluation` (three controllers, 100 fresh trials each), `ablation` (one change at a time)
+and `map` (success over corner angle and corridor width). Each writes
+docs/science/PART.json; the figures of the map are drawn from it. Results do not depend on the
+number of workers.
 """
 
 from __future__ import annotations
@@ -37,31 +38,32 @@ ANGLES_DEG = (60.0, 75.0, 90.0, 105.0)
 WIDTHS_M = (0.32, 0.40, 0.50)
 
 
-def _config(trials: int, seed: int, arms: tuple[str, ...], **rest: Any) -> TunnelConfig:
-    return TunnelConfig.model_validate({"trials": trials, "seed": seed, "arms": arms, **rest})
+def _config(trials: int, seed: int, controllers: tuple[str, ...], **rest: Any) -> TunnelConfig:
+    given = {"trials": trials, "seed": seed, "controllers": controllers}
+    return TunnelConfig.model_validate({**given, **rest})
 
 
-def _arms(config: TunnelConfig, workers: int, name: str) -> dict[str, Any]:
+def _results(config: TunnelConfig, workers: int, name: str) -> dict[str, Any]:
     result = run(config, workers)
     print(f"{name}: done", file=sys.stderr)
     return result.result()
 
 
 def evaluation(trials: int, workers: int) -> dict[str, Any]:
-    """The three arms as they are, on fresh trials."""
-    return _arms(
+    """The three controllers as they are, on fresh trials."""
+    return _results(
         _config(trials, EVALUATION_SEED, ("open", "paper", "closed")), workers, "evaluation"
     )
 
 
 def ablation(trials: int, workers: int) -> dict[str, Any]:
-    """The closed arm with one part taken away at a time."""
+    """The closed controller with one part taken away at a time."""
     out = {}
     for name, change in ABLATIONS.items():
         config = _config(trials, ABLATION_SEED, ("closed",), controller=change)
-        out[name] = _arms(config, workers, name)["arms"]["closed"]
+        out[name] = _results(config, workers, name)["controllers"]["closed"]
     config = _config(trials, ABLATION_SEED, ("paper", "closed"), **FILM_ONE_WAY)
-    one_way = _arms(config, workers, "film")["arms"]
+    one_way = _results(config, workers, "film")["controllers"]
     out["closed, film that sees one direction"] = one_way["closed"]
     out["paper, film that sees one direction"] = one_way["paper"]
     return out
@@ -74,8 +76,8 @@ def success_grid(trials: int, workers: int) -> dict[str, Any]:
         for width in WIDTHS_M:
             tunnel = {"turns_deg": (angle,), "free_width": width}
             config = _config(trials, MAP_SEED, ("open", "closed"), tunnel=tunnel)
-            arms = _arms(config, workers, f"{angle:g} deg, {width:g} m")["arms"]
-            cells.append({"turn_deg": angle, "free_width_m": width, "arms": arms})
+            found = _results(config, workers, f"{angle:g} deg, {width:g} m")["controllers"]
+            cells.append({"turn_deg": angle, "free_width_m": width, "controllers": found})
     return {"trials": trials, "cells": cells}
 
 

@@ -1,7 +1,7 @@
 """Everything that docs/science/wall.md reports: `python docs/science/wall_study.py PART`.
 
-Parts: `map` (link mass, overlap, base angle and gravity, all five arms), `window` (finer, where the
-map tells arms apart), `cells` (the best cells of both on fresh seeds), `sticks` (how long a tip
+Parts: `map` (link mass, overlap, base angle and gravity, five profiles), `window` (finer, where the
+map tells profiles apart), `cells` (the best cells of both on fresh seeds), `sticks` (how long a tip
 stays behind, over the base angle), `scaling` (stiff against compliant without a second force scale)
 and `convergence` (half the timestep). Each writes docs/science/wall_PART.json; `map`, `window` and
 `sticks` a picture as well.
@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from antennate.experiments.wall.figure import fate_map
+from antennate.experiments.wall.figure import outcome_map
 from antennate.experiments.wall.figure import sticks as stick_lines
 from antennate.experiments.wall.run import WallConfig, passage, run
 from antennate.figures import render
@@ -81,24 +81,24 @@ def _grid(places: Iterable[tuple[float, float, float, str]], workers: int) -> di
     cells = []
     for where in places:
         config = _config(*where, trials=MAP_TRIALS, seed=MAP_SEED)
-        cells.append({**_cell(*where), "arms": run(config, workers).result()["arms"]})
+        cells.append({**_cell(*where), "profiles": run(config, workers).result()["profiles"]})
         print(where, file=sys.stderr)
     return {"trials": MAP_TRIALS, "seed": MAP_SEED, "cells": cells}
 
 
 def fits(cell: dict[str, Any], key: str | None) -> float:
-    """Share of trials of the three published arms that end as the paper says."""
+    """Share of trials of the three published profiles that end as the paper says."""
     names = {"jam": "jams", "success": "successes", "slip": "slips"}
     shares = []
-    for arm, fate in PATTERN.items():
-        counts = cell["arms"][arm][key] if key else cell["arms"][arm]
-        shares.append(counts[names[fate]] / counts["trials"])
+    for profile, outcome in PATTERN.items():
+        counts = cell["profiles"][profile][key] if key else cell["profiles"][profile]
+        shares.append(counts[names[outcome]] / counts["trials"])
     return min(shares)
 
 
 def lead(cell: dict[str, Any]) -> float:
     """How many more of `descending` pass than of the better of `stiff` and `compliant`."""
-    passed = {arm: cell["arms"][arm]["successes"] for arm in PATTERN}
+    passed = {profile: cell["profiles"][profile]["successes"] for profile in PATTERN}
     return passed["descending"] - max(passed["stiff"], passed["compliant"])
 
 
@@ -126,7 +126,7 @@ def best_cells(workers: int) -> dict[str, Any]:
             "score": best,
             "cells_of_this_score": len(tied),
             "cells": len(cells),
-            "arms": result["arms"],
+            "profiles": result["profiles"],
             "paired": result["paired"],
         }
         print(name, file=sys.stderr)
@@ -145,10 +145,10 @@ def sticks(workers: int) -> dict[str, Any]:
         rows += [
             {
                 "base_angle_deg": angle,
-                "arm": arm,
-                "sticks_mm": [r.longest_stick_mm for r in outcome.rows if r.arm == arm],
+                "profile": profile,
+                "sticks_mm": [r.longest_stick_mm for r in outcome.rows if r.profile == profile],
             }
-            for arm in config.arms
+            for profile in config.profiles
         ]
         print(angle, file=sys.stderr)
     return {"trials": STICK_TRIALS, "seed": FRESH_SEED, "rows": rows}
@@ -166,7 +166,7 @@ def scaling(workers: int) -> dict[str, Any]:
                 "antenna": {"film_stiffness_n_mm_per_deg": 0.0},
             }
         )
-        stiff, soft = (passage(config, arm, 0) for arm in ("stiff", "compliant"))
+        stiff, soft = (passage(config, profile, 0) for profile in ("stiff", "compliant"))
         apart = np.degrees(abs(stiff.hinges - soft.hinges))
         both = (stiff.touching > 0) & (soft.touching > 0)
         out[gravity] = {
@@ -186,10 +186,10 @@ def convergence(workers: int) -> dict[str, Any]:
         rows[timestep] = run(WallConfig.model_validate({"physics": physics}), workers)
     coarse, fine = rows.values()
     return {
-        "arms": {str(k): o.result()["arms"] for k, o in rows.items()},
+        "profiles": {str(k): o.result()["profiles"] for k, o in rows.items()},
         "trials": len(coarse.rows),
         "fates_that_differ": sum(
-            a.fate != b.fate for a, b in zip(coarse.rows, fine.rows, strict=True)
+            a.outcome != b.outcome for a, b in zip(coarse.rows, fine.rows, strict=True)
         ),
         "fates_after_start_that_differ": sum(
             a.fate_after_start != b.fate_after_start
@@ -217,7 +217,7 @@ def main() -> None:
     result = PARTS[options.part](options.workers)
     (HERE / f"wall_{options.part}.json").write_text(json.dumps(result, indent=1) + "\n")
     if options.part in ("map", "window"):
-        picture = render(fate_map(result["cells"]))["png"]
+        picture = render(outcome_map(result["cells"]))["png"]
         (HERE / f"wall_{options.part}.png").write_bytes(picture)
     if options.part == "sticks":
         limit = 1e3 * WallConfig().wall.jam_travel

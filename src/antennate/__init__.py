@@ -11,16 +11,27 @@ __version__ = "0.1.0"
 _PLACES = {
     "antennate.antenna.calibration": ("Calibration",),
     "antennate.antenna.fitting": ("fit_calibration",),
-    "antennate.antenna.springs": ("spring_stiffness", "windings"),
+    "antennate.antenna.springs": ("spring_stiffness",),
     "antennate.antenna.statics": ("Chain", "equilibrium"),
+    "antennate.control.registry": ("make_controller",),
     "antennate.errors": ("AntennateError", "BadInputError"),
+    "antennate.experiments.running": ("Result", "list_experiments", "run"),
     "antennate.hardware.esp32.recording": ("Esp32Recording", "read_esp32"),
+    "antennate.studies.run_directory": ("RunDirectory",),
+    "antennate.studies.simulate": ("simulate",),
     "antennate.telemetry.time_series": ("TimeSeries",),
-    "antennate.types": ("AntennaFrame", "Contact", "JointCommand", "Maneuver", "Robot"),
+    "antennate.types": (
+        "AntennaFrame",
+        "Contact",
+        "Controller",
+        "JointCommand",
+        "Maneuver",
+        "Robot",
+    ),
 }
 """Which module holds which public names; `__init__.pyi` says the same to type checkers."""
 
-__all__ = sorted(name for names in _PLACES.values() for name in names)
+__all__ = sorted(name for names in _PLACES.values() for name in names)  # pyright: ignore[reportUnsupportedDunderAll]
 
 
 def __getattr__(name: str) -> Any:

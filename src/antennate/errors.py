@@ -15,8 +15,8 @@ class ConfigError(BadInputError):
     """A configuration is not acceptable: unknown key, wrong type, value out of bounds."""
 
 
-class ArenaError(BadInputError):
-    """An arena cannot be built as described, or the robot does not fit into it."""
+class SceneError(BadInputError):
+    """A scene cannot be found, read or built as described, or the robot does not fit into it."""
 
 
 class OutputError(BadInputError):
@@ -49,5 +49,25 @@ class LogError(BadInputError):
     """The log of a drive cannot be written, read or replayed."""
 
 
+class ControllerError(AntennateError):
+    """A controller raised an exception, or answered in another form than its protocol says."""
+
+
 class MissingPackageError(AntennateError, ImportError):
     """An optional package is needed for this and not installed; the text says how to get it."""
+
+
+_LONGEST = 300
+"""Most characters of an exception that are quoted; it may hold anything."""
+
+
+def in_one_line(error: BaseException) -> str:
+    """Type and text of any exception in one line; the type alone if its text cannot be had."""
+    name = type(error).__name__
+    try:
+        text = " ".join(str(error).split())
+    except KeyboardInterrupt:
+        raise
+    except BaseException:  # noqa: BLE001 anybody's __str__ may raise anything
+        return name
+    return f"{name}: {text}"[:_LONGEST]

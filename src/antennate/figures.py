@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import io
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, ParamSpec, TypeVar
 
 import matplotlib as mpl
@@ -37,9 +37,18 @@ MANEUVER_NAMES = {
     Maneuver.HOLD: "hold",
 }
 
-ARM_COLOURS = {"open": "#8C8C8C", "paper": "#CC79A7", "closed": "#332288"}
-ARM_LINES = {"open": (0, (4, 1.5)), "paper": (0, (4, 1.5, 1, 1.5)), "closed": "solid"}
+CONTROLLER_COLOURS = {"open": "#8C8C8C", "paper": "#CC79A7", "closed": "#332288"}
+CONTROLLER_LINES = {"open": (0, (4, 1.5)), "paper": (0, (4, 1.5, 1, 1.5)), "closed": "solid"}
 """A second mark beside the colour, for print in grey."""
+
+PROFILE_LOOKS = {
+    "stiff": ("#0072B2", "o", "solid"),
+    "descending": ("#D55E00", "s", (0, (5, 1.5))),
+    "compliant": ("#009E73", "^", (0, (4, 1.5, 1, 1.5))),
+    "matched_uniform": ("#CC79A7", "D", (0, (1, 1.2))),
+    "ascending": ("#E69F00", "v", (0, (6, 1, 1, 1, 1, 1))),
+}
+"""Colour, marker and line of each profile: apart in grey, too."""
 
 SERIES = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#D55E00", "#56B4E9", "#332288")
 """For whatever has no colour of its own; after Okabe and Ito."""
@@ -88,6 +97,17 @@ def styled(draw: Callable[P, R]) -> Callable[P, R]:
 def series(count: int) -> list[str]:
     """As many colours, the first ones first; they repeat after seven."""
     return [SERIES[i % len(SERIES)] for i in range(count)]
+
+
+def controller_colours(names: Sequence[str]) -> dict[str, str]:
+    """A colour for each controller: ours have their own, others take those of `SERIES` in turn."""
+    others = [name for name in names if name not in CONTROLLER_COLOURS]
+    return {**CONTROLLER_COLOURS, **dict(zip(others, series(len(others)), strict=True))}
+
+
+def short_name(controller: str) -> str:
+    """The name of a controller for a label: only the last part of MODULE:NAME or FILE.py:NAME."""
+    return controller.rpartition(":")[2]
 
 
 def canvas(width: float, height: float) -> Figure:

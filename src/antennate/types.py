@@ -1,11 +1,11 @@
-"""What flows through the house: frames in, contact and maneuver inside, commands out.
+"""What flows between a robot and its controller, and the protocols of both.
 
 Arrays carry a leading batch axis of B robots; B is 1 for a single one.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import IntEnum
 from typing import Protocol
 
@@ -17,8 +17,11 @@ Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
 
+_EMPTY = np.zeros((0, 0))
+
+
 class Contact(IntEnum):
-    """What one antenna says: it touches, it is free, or it cannot tell."""
+    """State of one antenna: it touches something, it is free, or its reading cannot be used."""
 
     FREE = 0
     CONTACT = 1
@@ -53,22 +56,24 @@ class JointCommand:
     """Joint targets for one control period.
 
     Attributes:
-        yaw: Yaw joint angles [rad], shape (B, 5).
-        leg: Leg axle angles [rad], unwrapped, 0 at mid-stance, shape (B, 6, 2).
+        yaw: Yaw joint angles [rad], shape (B, Y).
+        leg: Leg axle angles [rad], unwrapped, 0 at mid-stance, shape (B, L, 2).
         antenna: Sweep angle of the antenna bases about their mounting angle [rad], positive
             towards the tail, shape (B, 2).
+        pitch: Pitch joint angles [rad], shape (B, P); empty where pitch is not actuated.
     """
 
     yaw: Floats
     leg: Floats
     antenna: Floats
+    pitch: Floats = field(default_factory=lambda: _EMPTY)
 
 
 class Clock(Protocol):
-    """Time of one world. In simulation, sleeping is what makes the physics advance."""
+    """Time of one robot. In simulation, sleeping is what makes the physics advance."""
 
     def now(self) -> float:
-        """Time [s] since the world began."""
+        """Time [s] since the start."""
         ...
 
     def sleep_until(self, t: float) -> None:
@@ -81,7 +86,7 @@ class Robot(Protocol):
 
     @property
     def clock(self) -> Clock:
-        """The world's clock."""
+        """The robot's clock."""
         ...
 
     def read(self) -> AntennaFrame:
@@ -90,4 +95,35 @@ class Robot(Protocol):
 
     def write(self, command: JointCommand) -> None:
         """Set new joint targets."""
+        ...
+
+
+class Controller(Protocol):
+    """Control of B robots at once: row i of every array belongs to robot i.
+
+    The rows never influence one another. A row whose reading is NaN answers HOLD and keeps its
+    joint targets. See docs/controllers.md.
+    """
+
+    @property
+    def maneuver(self) -> Ints:
+        """`Maneuver` of the last step, shape (B,)."""
+        ...
+
+    @property
+    def contact(self) -> Ints:
+        """`Contact` of each antenna in the last step, shape (B, 2)."""
+        ...
+
+    @property
+    def level(self) -> Floats:
+        """Bending level b of each antenna in the last step, 0 to 1, shape (B, 2)."""
+        ...
+
+    def reset(self, rows: Ints | Bools, phase: Floats | float = 0.0) -> None:
+        """Start some rows anew, indices (n,) or a mask (B,), their gait at a phase [rad]."""
+        ...
+
+    def step(self, frame: AntennaFrame) -> JointCommand:
+        """One control period: the joint targets for this frame."""
         ...

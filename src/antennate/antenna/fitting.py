@@ -14,7 +14,6 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from scipy.optimize import isotonic_regression, least_squares
 
 from antennate import __version__
 from antennate.antenna.calibration import FEWEST, NARROWEST_SPAN, Calibration, SpeedFit
@@ -37,14 +36,14 @@ class Samples:
 
     Attributes:
         counts: Readings [counts], shape (n,).
-        bend: Level of each, 0 straight and 1 full, shape (n,).
+        level: Level of each, 0 straight and 1 full, shape (n,).
         trial: Number of the push of each, shape (n,).
         speed: Pushing speed [m/s], NaN where unknown, shape (n,).
         row: Row of the file, for errors, shape (n,).
     """
 
     counts: Floats
-    bend: Floats
+    level: Floats
     trial: Ints
     speed: Floats
     row: Ints
@@ -53,7 +52,7 @@ class Samples:
         """Some rows."""
         return Samples(
             self.counts[chosen],
-            self.bend[chosen],
+            self.level[chosen],
             self.trial[chosen],
             self.speed[chosen],
             self.row[chosen],
@@ -66,7 +65,7 @@ def check(samples: Samples) -> None:
     Raises:
         CalibrationError: Names the row and the cure.
     """
-    counts, bend = samples.counts, samples.bend
+    counts, level = samples.counts, samples.level
     if len(counts) < FEWEST:
         raise CalibrationError(
             f"row {samples.row[-1] if len(counts) else 1}: expected at least {FEWEST} readings, "
@@ -80,10 +79,10 @@ def check(samples: Samples) -> None:
             f"{counts[first]:g} counts and {100 * railed.mean():.0f} % of all like it (saturated); "
             "choose another divider resistor"
         )
-    if np.ptp(bend) < 0.1:
+    if np.ptp(level) < 0.1:
         raise CalibrationError(
-            f"row {samples.row[0]}: expected bends over at least a tenth of the full one, found "
-            f"{bend.min():.3g} to {bend.max():.3g}; bend farther or declare the full bend"
+            f"row {samples.row[0]}: expected levels over at least a tenth of the full one, found "
+            f"{level.min():.3g} to {level.max():.3g}; bend it farther or declare the full flex"
         )
     low, high = np.percentile(counts, [1, 99])
     if high - low < NARROWEST_SPAN:
@@ -95,8 +94,8 @@ def check(samples: Samples) -> None:
 
 
 def _check_monotonic(samples: Samples, span: float) -> None:
-    edges = np.linspace(samples.bend.min(), samples.bend.max(), _BINS + 1)
-    place = np.clip(np.digitize(samples.bend, edges) - 1, 0, _BINS - 1)
+    edges = np.linspace(samples.level.min(), samples.level.max(), _BINS + 1)
+    place = np.clip(np.digitize(samples.level, edges) - 1, 0, _BINS - 1)
     held = [b for b in range(_BINS) if (place == b).any()]
     means = np.array([samples.counts[place == b].mean() for b in held])
     rising = polarity(samples) * means
@@ -107,14 +106,14 @@ def _check_monotonic(samples: Samples, span: float) -> None:
         raise CalibrationError(
             f"row {row}: expected readings that go one way with the level, found them turning back "
             f"by {-worst.min():.0f} of {span:.0f} counts near a level of "
-            f"{samples.bend[place == bad].mean():.2f} (non-monotonic); check that the sensor is "
-            "fixed and that time and bend belong together"
+            f"{samples.level[place == bad].mean():.2f} (non-monotonic); check that the sensor is "
+            "fixed and that time and flex belong together"
         )
 
 
 def polarity(samples: Samples) -> Literal[-1, 1]:
     """1 if readings rise with the level, -1 if they fall."""
-    return 1 if float((samples.bend - samples.bend.mean()) @ samples.counts) >= 0 else -1
+    return 1 if float((samples.level - samples.level.mean()) @ samples.counts) >= 0 else -1
 
 
 def curve(z: Floats, slope: float, midpoint: float) -> Floats:
@@ -122,19 +121,21 @@ def curve(z: Floats, slope: float, midpoint: float) -> Floats:
     return 1.0 / (1.0 + np.exp(-np.clip(slope * (z - midpoint), -700.0, 700.0)))
 
 
-def fit_sigmoid(x: Floats, bend: Floats, sign: int) -> tuple[float, float]:
+def fit_sigmoid(x: Floats, level: Floats, sign: int) -> tuple[float, float]:
     """Slope k and midpoint x0 that minimise the squared error of the level.
 
     Args:
         x: Normalised readings, shape (n,).
-        bend: Levels, shape (n,).
+        level: Levels, shape (n,).
         sign: Polarity, 1 or -1.
     """
+    from scipy.optimize import least_squares  # takes long; only where it is needed
+
     z = sign * x
-    start = (np.log(8.0), float(np.interp(0.5, *_sorted(bend, z))))
+    start = (np.log(8.0), float(np.interp(0.5, *_sorted(level, z))))
 
     def error(p: Floats) -> Floats:
-        return curve(z, float(np.exp(p[0])), float(p[1])) - bend
+        return curve(z, float(np.exp(p[0])), float(p[1])) - level
 
     found = least_squares(error, start, bounds=([-5.0, -3.0], [np.log(1000.0), 3.0])).x
     return float(np.exp(found[0])), sign * float(found[1])
@@ -174,14 +175,14 @@ def fit(
     sign = polarity(samples)
     low, high = (0.0, 4095.0) if full_scale else _ends(samples)
     x = (samples.counts - low) / (high - low)
-    slope, midpoint = fit_sigmoid(x, samples.bend, sign)
+    slope, midpoint = fit_sigmoid(x, samples.level, sign)
     predicted = curve(sign * x, slope, sign * midpoint)
-    r2 = _r2(predicted, samples.bend)
+    r2 = _r2(predicted, samples.level)
     if r2 < least_r2 or not -1 < midpoint < 2 or slope >= 999:
         raise CalibrationError(
-            f"expected a sigmoid that explains at least {100 * least_r2:.0f} % of the bend, found "
+            f"expected a sigmoid that explains at least {100 * least_r2:.0f} % of the level, found "
             f"{100 * r2:.0f} % with slope {slope:.3g} and midpoint {midpoint:.3g}; "
-            "check that time and bend belong together"
+            "check that time and flex belong together"
         )
     slopes, midpoints = _bootstrap(samples, x, sign, draws, seed)
     errors = cross_validate(samples, x, sign)
@@ -199,11 +200,11 @@ def fit(
         counts_high=high,
         threshold=threshold,
         valid_counts=(float(samples.counts.min()), float(samples.counts.max())),
-        valid_bend=(float(samples.bend.min()), float(samples.bend.max())),
+        valid_bend=(float(samples.level.min()), float(samples.level.max())),
         samples=len(x),
         trials=len(np.unique(samples.trial)),
         r2=r2,
-        rmse=_rmse(predicted, samples.bend),
+        rmse=_rmse(predicted, samples.level),
         speeds=tuple(_per_speed(samples, predicted)),
         cross_validated_rmse=rmse,  # pyright: ignore[reportArgumentType]
         better_than_sigmoid=_better(errors),
@@ -251,13 +252,13 @@ def _ends(samples: Samples) -> tuple[float, float]:
     return float(low), float(high)
 
 
-def _r2(predicted: Floats, bend: Floats) -> float:
-    spread = ((bend - bend.mean()) ** 2).sum()
-    return float(1.0 - ((predicted - bend) ** 2).sum() / spread) if spread > 0 else 0.0
+def _r2(predicted: Floats, level: Floats) -> float:
+    spread = ((level - level.mean()) ** 2).sum()
+    return float(1.0 - ((predicted - level) ** 2).sum() / spread) if spread > 0 else 0.0
 
 
-def _rmse(predicted: Floats, bend: Floats) -> float:
-    return float(np.sqrt(np.mean((predicted - bend) ** 2)))
+def _rmse(predicted: Floats, level: Floats) -> float:
+    return float(np.sqrt(np.mean((predicted - level) ** 2)))
 
 
 def _per_speed(samples: Samples, predicted: Floats) -> list[SpeedFit]:
@@ -269,8 +270,8 @@ def _per_speed(samples: Samples, predicted: Floats) -> list[SpeedFit]:
             SpeedFit(
                 speed_m_s=None if speed < 0 else speed,
                 samples=int(here.sum()),
-                r2=_r2(predicted[here], samples.bend[here]),
-                rmse=_rmse(predicted[here], samples.bend[here]),
+                r2=_r2(predicted[here], samples.level[here]),
+                rmse=_rmse(predicted[here], samples.level[here]),
             )
         )
     return found
@@ -292,7 +293,7 @@ def _bootstrap(
     found = []
     for _ in range(draws):
         rows = np.concatenate([groups[i] for i in rng.integers(0, len(groups), len(groups))])
-        found.append(fit_sigmoid(x[rows], samples.bend[rows], sign))
+        found.append(fit_sigmoid(x[rows], samples.level[rows], sign))
     low, high = np.percentile(np.array(found), [2.5, 97.5], axis=0)
     return (float(low[0]), float(high[0])), (float(low[1]), float(high[1]))
 
@@ -305,8 +306,8 @@ def cross_validate(samples: Samples, x: Floats, sign: int) -> dict[str, Floats]:
     for held in folds:
         rest = np.setdiff1d(np.arange(len(x)), held)
         for model in MODELS:
-            predicted = _predict(model, x[rest], samples.bend[rest], x[held], sign)
-            errors[model].append(_rmse(predicted, samples.bend[held]))
+            predicted = _predict(model, x[rest], samples.level[rest], x[held], sign)
+            errors[model].append(_rmse(predicted, samples.level[held]))
     return {model: np.array(e) for model, e in errors.items()}
 
 
@@ -315,14 +316,16 @@ def _deal(groups: list[Ints], parts: int) -> list[list[Ints]]:
     return [groups[i::parts] for i in range(min(parts, len(groups)))]
 
 
-def _predict(model: str, x: Floats, bend: Floats, at: Floats, sign: int) -> Floats:
+def _predict(model: str, x: Floats, level: Floats, at: Floats, sign: int) -> Floats:
+    from scipy.optimize import isotonic_regression  # takes long; only where it is needed
+
     if model == "sigmoid":
-        slope, midpoint = fit_sigmoid(x, bend, sign)
+        slope, midpoint = fit_sigmoid(x, level, sign)
         return curve(sign * at, slope, sign * midpoint)
     if model == "line":
-        straight = np.polyval(np.polyfit(x, bend, 1), at)
+        straight = np.polyval(np.polyfit(x, level, 1), at)
         return np.asarray(np.clip(straight, 0.0, 1.0), dtype=np.float64)
-    z, b = _sorted(sign * x, bend)
+    z, b = _sorted(sign * x, level)
     return np.asarray(np.interp(sign * at, z, isotonic_regression(b).x), dtype=np.float64)
 
 

@@ -1,16 +1,17 @@
-"""Flex of the antenna to 12-bit counts: film, voltage divider, ESP32 converter.
+"""Flex of the antenna [rad] to 12-bit counts: flex sensor, voltage divider, ESP32 converter.
 
-`counts` is the static curve. A real film also remembers: `SensorChain` adds hysteresis and creep of
-the bend it feels, both with the static curve as their mean.
+`counts` is the static curve. A real sensor also has a memory: `SensorChain` adds hysteresis and
+creep, both with the static curve as their mean.
 
-- Film: `flex`, resistance R0 (1 + a bend); or `fsr`, a pressure strip whose conductance rises in
-  proportion to the bend. It is the upper half of a divider, so counts fall with bending for `flex`
-  and rise for `fsr`.
-- Hysteresis: play operators (Prandtl-Ishlinskii). A play of half width r follows its input once the
-  slack is used up. Weights w and half widths r make a loop of the width 2 sum(w r).
+- Flex sensor: `flex`, resistance R0 (1 + a |flex|); or `fsr`, a pressure strip whose conductance
+  rises in proportion to the flex. It is the upper half of a voltage divider, so counts fall with
+  the flex for `flex` and rise for `fsr`.
+- Hysteresis: play operators (Prandtl-Ishlinskii). A play operator of half width r keeps its output
+  until the input is more than r away, then follows at that distance. Operators of weights w and
+  half widths r make a loop of the width 2 sum(w r).
 - Creep: a share c of the response follows with a time constant (Prony series).
-- Converter: the manufacturer's line fit at 11 dB up to 2880 counts and its table above; what is
-  below the line's offset reads zero.
+- Converter: the manufacturer's line fit at 11 dB up to 2880 counts and its table above; voltages
+  below the line's offset read zero.
 """
 
 from __future__ import annotations
@@ -32,34 +33,34 @@ from antennate.types import Bools, Floats, Ints
 
 FULL_SCALE = 4095
 RIGHT_ANGLE = math.pi / 2
-"""The bend to which hysteresis and the pressed resistance refer [rad]."""
+"""The flex to which hysteresis and the pressed resistance refer [rad]."""
 
 _PLAY_SHARES = (0.25, 0.6, 1.0)
-"""Half widths of the play operators over the widest one."""
+"""Half widths of the play operators, relative to the widest one."""
 _PLAY_WEIGHT = 0.2
-"""Weight of each; what is left follows at once."""
+"""Weight of each play operator; the rest of the response has no memory."""
 
 
-def bend(params: SensorParams, flex: Floats) -> Floats:
-    """Bend that the film feels [rad], at least 0, same shape as flex [rad]."""
+def sensed_flex(params: SensorParams, flex: Floats) -> Floats:
+    """The part of the flex [rad] that changes the resistance [rad], at least 0, same shape."""
     return np.abs(flex) if params.directions == "both" else np.maximum(flex, 0.0)
 
 
-def resistance(params: SensorParams, felt: Floats) -> Floats:
-    """Resistance of the film [Ohm] under a bend of at least 0 [rad], same shape."""
+def resistance(params: SensorParams, sensed: Floats) -> Floats:
+    """Resistance of the flex sensor [Ohm] at a sensed flex of at least 0 [rad], same shape."""
     if params.kind == "flex":
-        return params.flat_resistance * (1.0 + params.bend_gain * felt)
+        return params.flat_resistance * (1.0 + params.bend_gain * sensed)
     idle, pressed = 1.0 / params.unloaded_resistance, 1.0 / params.pressed_resistance
-    return 1.0 / (idle + (pressed - idle) * felt / RIGHT_ANGLE)
+    return 1.0 / (idle + (pressed - idle) * sensed / RIGHT_ANGLE)
 
 
-def divider(params: SensorParams, film: Floats) -> Floats:
-    """Voltage [V] over the fixed resistor below a film of this resistance [Ohm], same shape."""
-    return params.supply * params.divider_resistance / (film + params.divider_resistance)
+def divider(params: SensorParams, upper: Floats) -> Floats:
+    """Voltage [V] over the fixed resistor below a flex sensor of `upper` [Ohm], same shape."""
+    return params.supply * params.divider_resistance / (upper + params.divider_resistance)
 
 
 def transfer_curve(params: SensorParams) -> tuple[Floats, Floats]:
-    """Corners of the converter's curve: voltages [V] and readings [counts], both rising."""
+    """Corners of the converter's curve: voltages [V] and readings [counts], both rising, (n,)."""
     share = (params.reference - 1.0) / 0.2
     low, high = np.array(CONVERTER_AT_1_0_V), np.array(CONVERTER_AT_1_2_V)
     table = 1e-3 * (low + share * (high - low))
@@ -72,7 +73,9 @@ def transfer_curve(params: SensorParams) -> tuple[Floats, Floats]:
 def counts(params: SensorParams, flex: Floats, noise: Floats | float = 0.0) -> Floats:
     """Static reading [counts] at flex [rad]; noise [counts] comes before rounding and clipping."""
     volts, readings = transfer_curve(params)
-    return _read(divider(params, resistance(params, bend(params, flex))), noise, volts, readings)
+    return _read(
+        divider(params, resistance(params, sensed_flex(params, flex))), noise, volts, readings
+    )
 
 
 def _read(voltage: Floats, noise: Floats | float, volts: Floats, readings: Floats) -> Floats:
@@ -81,7 +84,7 @@ def _read(voltage: Floats, noise: Floats | float, volts: Floats, readings: Float
 
 
 def reading_noise(params: SensorParams, rng: np.random.Generator, shape: tuple[int, ...]) -> Floats:
-    """Noise of readings [counts]: each is a mean of samples with common noise and spikes."""
+    """Noise of readings [counts] of a given shape: each is a mean of samples, some with spikes."""
     noise = rng.normal(0.0, params.noise_counts, shape)
     spikes = rng.binomial(params.oversampling, params.outlier_share, shape)
     up = rng.binomial(spikes, 0.5)
@@ -89,11 +92,11 @@ def reading_noise(params: SensorParams, rng: np.random.Generator, shape: tuple[i
 
 
 class SensorChain:
-    """Films with memory, sampled at a steady rate.
+    """Flex sensors with hysteresis and creep, sampled at a steady rate.
 
     Args:
-        params: The chain.
-        shape: Shape of the films, such as (B, 2).
+        params: Sensor, divider and converter.
+        shape: Shape of the sensors, such as (B, 2).
         period: Time between samples [s].
     """
 
@@ -111,33 +114,33 @@ class SensorChain:
         self._volts, self._readings = transfer_curve(params)
 
     def reset(self, rows: int | Ints | Bools) -> None:
-        """Let some rows of films forget: straight for long."""
+        """Let the sensors of some rows forget, as if they had been straight for long."""
         self._play[:, rows] = 0.0
         self._crept[:, rows] = 0.0
 
     def step(self, flex: Floats, noise: Floats | float = 0.0) -> Floats:
-        """Sample all films once.
+        """Sample all sensors once.
 
         Args:
-            flex: Summed hinge angles under each film [rad], the shape given.
+            flex: Summed hinge angles under each sensor [rad], of the shape given.
             noise: Added before rounding and clipping [counts].
 
         Returns:
             Readings [counts], same shape.
         """
-        felt = self.felt(bend(self._params, flex))
+        sensed = self.with_memory(sensed_flex(self._params, flex))
         return _read(
-            divider(self._params, resistance(self._params, felt)),
+            divider(self._params, resistance(self._params, sensed)),
             noise,
             self._volts,
             self._readings,
         )
 
-    def felt(self, bent: Floats) -> Floats:
-        """Bend with memory [rad], at least 0, after a sample of the true bend [rad]."""
-        self._play = np.maximum(bent - self._slack, np.minimum(bent + self._slack, self._play))
+    def with_memory(self, sensed: Floats) -> Floats:
+        """Sensed flex [rad], at least 0, with hysteresis and creep after one more sample."""
+        self._play = np.maximum(sensed - self._slack, np.minimum(sensed + self._slack, self._play))
         share = 1.0 - _PLAY_WEIGHT * len(_PLAY_SHARES)
-        slack = share * bent + _PLAY_WEIGHT * self._play.sum(axis=0)
+        slack = share * sensed + _PLAY_WEIGHT * self._play.sum(axis=0)
         self._crept += self._pace * (slack - self._crept)
         return np.maximum(self._prompt * slack + (self._late * self._crept).sum(axis=0), 0.0)
 
@@ -148,8 +151,8 @@ def best_divider(
     """The fixed resistor that spreads readings farthest between straight and bent.
 
     Args:
-        params: The chain; its own divider is not looked at.
-        largest_flex: The bend to be told apart from none [rad].
+        params: Sensor and converter; its own divider is ignored.
+        largest_flex: The flex to be told apart from none [rad].
         candidates: Resistors to choose from [Ohm], shape (n,).
 
     Returns:

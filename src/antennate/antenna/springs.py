@@ -1,9 +1,9 @@
-"""The law of torsion springs, both ways: from wire and coils to stiffness, and back.
+"""The law of torsion springs: from wire and coils to stiffness, and back.
 
     rate per turn = E d^4 / (10.8 D N)
 
-with wire diameter d, mean coil diameter D and N active coils. "Per turn" matters: read per radian,
-springs come out 2 pi times too stiff, read per degree 360 times. Stress at the inside of the coil
+with Young's modulus E, wire diameter d, mean coil diameter D and N active coils. The rate is a
+torque per turn: divide it by 2 pi for a stiffness per radian. Stress at the inside of the coil
 is K_i 32 M / (pi d^3), K_i = (4 C^2 - C - 1) / (4 C (C - 1)), C = D / d (Shigley, section 10-12).
 """
 
@@ -19,7 +19,14 @@ from antennate.params.spring import RATE_FACTOR, STOCK_WIRES_MM, WIRES
 
 
 def spring_stiffness(modulus: float, wire: float, coil: float, coils: float) -> float:
-    """Stiffness [N·m/rad] from E [Pa], wire and mean coil diameter [m] and active coils."""
+    """Stiffness of a torsion spring [N·m/rad].
+
+    Args:
+        modulus: Young's modulus of the wire [Pa].
+        wire: Wire diameter [m].
+        coil: Mean coil diameter [m].
+        coils: Number of active coils.
+    """
     return modulus * wire**4 / (RATE_FACTOR * coil * coils) / (2.0 * math.pi)
 
 
@@ -54,14 +61,14 @@ def yield_angle(params: SpringParams, wire: float, coil: float, coils: float) ->
 
 @dataclass(frozen=True, slots=True)
 class Winding:
-    """One wire and one mandrel that give a whole set of springs.
+    """A set of springs wound of one wire on one mandrel.
 
     Attributes:
         wire: Wire diameter [m].
         coil: Mean coil diameter [m].
         coils: Active coils of each spring.
-        stiffness: What they then have [N·m/rad].
-        error: Largest relative error of these.
+        stiffness: The stiffness that each then has [N·m/rad].
+        error: Largest relative error of these stiffnesses.
         yield_angle: Smallest angle at which one of them yields [rad].
         length: Longest coil body, closely wound [m].
     """
@@ -76,19 +83,23 @@ class Winding:
 
     @property
     def index(self) -> float:
-        """Spring index."""
+        """Spring index, coil over wire diameter."""
         return self.coil / self.wire
 
 
 def windings(params: SpringParams, wanted: tuple[float, ...]) -> list[Winding]:
     """Sets of springs from stock wire that come near the wanted stiffnesses [N·m/rad].
 
-    Every stock wire meets every mandrel within the index limits; coils are rounded to what can be
-    wound. Of each wire the set with the smallest error is kept that bears the angle; sets whose
-    coils leave their limits are not wound.
+    Every stock wire is tried on every mandrel within the index limits, with coils rounded to what
+    can be wound. Sets with too few or too many coils, or that yield at the wanted angle, are left
+    out.
+
+    Args:
+        params: Kind of wire, limits and steps.
+        wanted: Stiffness of each spring [N·m/rad], shape (n,).
 
     Returns:
-        The best of each wire, the smallest error first.
+        Of each wire diameter the set with the smallest error, the smallest error first.
     """
     best: dict[float, Winding] = {}
     for wire, coil in _stock(params):
@@ -101,7 +112,7 @@ def windings(params: SpringParams, wanted: tuple[float, ...]) -> list[Winding]:
 
 
 def _stock(params: SpringParams) -> Iterator[tuple[float, float]]:
-    """Wire and mean coil diameters to be had [m]."""
+    """Wire and mean coil diameters [m] that can be had."""
     kind, step = WIRES[params.wire], 1e-3 * params.mandrel_step_mm
     low, high = params.index_limits
     for wire in (1e-3 * mm for mm in STOCK_WIRES_MM):

@@ -14,22 +14,22 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Literal, get_args
 
 import numpy as np
 
-from antennate.robots.antenna import AntennaParams
-from antennate.robots.sensor import SensorParams
+from antennate.robots.antenna import AntennaSpec
 from antennate.types import Bools, Floats, Ints
 
-PROFILES: dict[str, tuple[float, ...] | None] = {
-    "stiff": (3, 3, 3, 3, 3, 3),
-    "descending": (3, 6, 6, 9, 9, 9),
-    "compliant": (9, 9, 9, 9, 9, 9),
-    "matched_uniform": None,
-    "ascending": (9, 9, 9, 6, 6, 3),
-}
-"""Active coils, base to tip. `matched_uniform` has six equal springs, wound so that its tip is as
-compliant as that of `descending`; it and `ascending` are controls that the paper lacks."""
+Profile = Literal["stiff", "descending", "compliant", "matched_uniform", "ascending"]
+PROFILES: tuple[Profile, ...] = get_args(Profile)
+"""Names of profiles, all made of an antenna's own springs.
+
+`descending` is the antenna as it is, by default with 3, 6, 6, 9, 9, 9 coils from base to tip.
+`stiff` and `compliant` have its fewest and its most coils in every spring, `ascending` its springs
+the other way round, and `matched_uniform` equal springs with the tip compliance of `descending`.
+The last two are controls that the paper lacks.
+"""
 
 _LOAD_STEPS = 24
 _ITERATIONS = 40
@@ -52,9 +52,9 @@ class Chain:
     stiffness: Floats
 
     @classmethod
-    def of(cls, antenna: AntennaParams, sensor: SensorParams) -> Chain:
-        """The six springs of an antenna, stiffened by the film where it lies."""
-        stiffness = antenna.hinge_stiffness(sensor.covered_hinges(antenna))
+    def of(cls, antenna: AntennaSpec) -> Chain:
+        """The springs of an antenna, stiffened by the film where it lies."""
+        stiffness = antenna.hinge_stiffness()
         return cls(np.full(len(stiffness), antenna.link_length), np.array(stiffness))
 
     @property
@@ -197,26 +197,36 @@ def uniform_beam(length: float, bending_stiffness: float, count: int) -> Chain:
     return Chain(lengths, np.full(count, bending_stiffness / piece))
 
 
-def with_profile(antenna: AntennaParams, sensor: SensorParams, profile: str) -> AntennaParams:
+def with_profile(antenna: AntennaSpec, profile: str) -> AntennaSpec:
     """The antenna with the springs of a named profile.
 
     Raises:
         ValueError: There is no such profile.
     """
-    if profile not in PROFILES:
+    own = antenna.active_coils
+    if profile == "stiff":
+        coils = (min(own),) * len(own)
+    elif profile == "descending":
+        coils = own
+    elif profile == "compliant":
+        coils = (max(own),) * len(own)
+    elif profile == "matched_uniform":
+        coils = (_matched_coils(antenna),) * len(own)
+    elif profile == "ascending":
+        coils = own[::-1]
+    else:
         raise ValueError(f"expected a profile of {', '.join(PROFILES)}, found {profile}")
-    coils = PROFILES[profile] or (_matched_coils(antenna, sensor),) * 6
-    return AntennaParams.model_validate(antenna.model_dump() | {"active_coils": coils})
+    return antenna.model_copy(update={"active_coils": coils})
 
 
-def _matched_coils(antenna: AntennaParams, sensor: SensorParams) -> float:
-    """Coils of six equal springs with the tip compliance of `descending`, by bisection."""
-    wanted = tip_compliance(Chain.of(with_profile(antenna, sensor, "descending"), sensor))
+def _matched_coils(antenna: AntennaSpec) -> float:
+    """Coils of equal springs with the antenna's own tip compliance, by bisection."""
+    wanted = tip_compliance(Chain.of(antenna))
     low, high = 0.1, 100.0
     while high - low > 1e-12 * high:
         middle = math.sqrt(low * high)
-        uniform = antenna.model_copy(update={"active_coils": (middle,) * 6})
-        if tip_compliance(Chain.of(uniform, sensor)) < wanted:
+        uniform = antenna.model_copy(update={"active_coils": (middle,) * antenna.hinges})
+        if tip_compliance(Chain.of(uniform)) < wanted:
             low = middle
         else:
             high = middle

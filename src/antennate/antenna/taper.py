@@ -1,8 +1,8 @@
 """From diameters to the stiffness proxy of a tapering antenna, and the ladder that follows it.
 
 Bending stiffness E I of a round section goes with the fourth power of its diameter, so that the
-proxy is K = (d / d_1)^4 with d_1 at the base. Springs in a row add their angles, not their torques:
-the spring that stands for a stretch of antenna has the harmonic mean of the stretch.
+proxy is K = (d / d_1)^4 with d_1 at the base. The angles of springs in a row add up, each under the
+same torque: one spring that replaces a stretch of antenna has the harmonic mean of its stiffnesses.
 """
 
 from __future__ import annotations
@@ -35,8 +35,8 @@ def binned(values: Floats, bins: int) -> Floats:
     """Harmonic means of equal stretches of a row of segments, shape (bins,).
 
     Args:
-        values: Stiffness of each segment, shape (n,); a segment that two stretches share counts for
-            both by its parts.
+        values: Stiffness of each segment, shape (n,); a segment that lies in two stretches counts
+            for each by its share.
         bins: Number of stretches.
     """
     edges = np.linspace(0.0, len(values), bins + 1)

@@ -8,28 +8,18 @@ from __future__ import annotations
 
 import importlib
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from antennate import __version__
 
 OK, BAD_INPUT, INTERRUPTED = 0, 2, 130
 
-COMMANDS = {
-    "tunnel": "walk robots through a corridor of loose cylinders, with and without touch",
-    "gait": "walk on a flat floor: speed, turning and cost of the gait",
-    "springs": "torsion springs: stiffness from wire and coils, and back",
-    "taper": "stiffness along a tapering antenna, and the ladder of springs that follows it",
-    "calibrate": "readings to bend: fit a recording, or push a simulated antenna",
-    "wall": "pass a line of boulders with five antennae: success, jam or slip",
-    "sensor": "flex to counts: curve, hysteresis, creep, noise and the best divider",
-    "force": "how much of a contact's force the flex tells, with and without knowing the place",
-    "sweep": "sweep an antenna beside walls: its shapes, and the distances that active touch tells",
-    "twin": "serve a simulated robot as real bytes: an antenna board and a bus of 19 servos",
+ROBOT_COMMANDS = {
+    "twin": "serve a simulated robot as real bytes: an antenna board and a bus of servos",
     "doctor": "examine the real robot, or its twin: what is wrong, and the cure",
     "record": "antenna readings to a CSV file that calibrate takes",
     "drive": "let a controller walk the real robot, or its twin",
     "replay": "let a controller decide again upon the log of a drive",
-    "touch": "move an antenna along walls: sensed contact against true contact",
 }
 
 
@@ -45,7 +35,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     from antennate.cli.output import safe_streams
 
     words = list(sys.argv[1:] if argv is None else argv)
-    name = f"antennate {words[0]}" if words and words[0] in COMMANDS else "antennate"
+    name = f"antennate {words[0]}" if words and words[0] in commands() else "antennate"
     with safe_streams() as output:
         try:
             code = _run(words, name)
@@ -58,6 +48,27 @@ def main(argv: Sequence[str] | None = None) -> int:
         reason = output.error.strerror or output.error
         sys.stderr.write(f"{name}: error: standard output: expected to write, found: {reason}\n")
         return BAD_INPUT
+
+
+def commands() -> dict[str, str]:
+    """What each command does, by name: the experiments first."""
+    from antennate.experiments import summaries
+
+    return summaries() | ROBOT_COMMANDS
+
+
+def carry_out(name: str, argv: Sequence[str]) -> int:
+    """Run a command on its words and return its exit code.
+
+    Raises:
+        AntennateError: Something given cannot be used, or the run failed.
+    """
+    if name in ROBOT_COMMANDS:
+        return importlib.import_module(f"antennate.cli.{name}").command(list(argv))
+    from antennate.cli.experiment import command
+    from antennate.experiments import load
+
+    return command(load(name), list(argv))
 
 
 def _run(words: Sequence[str], name: str) -> int:
@@ -75,12 +86,12 @@ def _run(words: Sequence[str], name: str) -> int:
         if words[0] == "--completion":
             from antennate.cli.completion import script
 
-            sys.stdout.write(script(words[1:], COMMANDS))
+            sys.stdout.write(script(words[1:], commands()))
             return OK
-        if words[0] not in COMMANDS:
-            known = f"{nearest(words[0], COMMANDS)}, one of {', '.join(COMMANDS)}"
+        if words[0] not in commands():
+            known = f"{nearest(words[0], commands())}, one of {', '.join(commands())}"
             raise BadInputError(f"expected a command{known}, found {shortened(words[0])}")
-        return importlib.import_module(f"antennate.cli.{words[0]}").command(list(words[1:]))
+        return carry_out(words[0], words[1:])
     except HelpRequest as page:
         sys.stdout.write(str(page))
         return OK
@@ -90,19 +101,24 @@ def _run(words: Sequence[str], name: str) -> int:
 
 
 def _usage() -> str:
-    width = max(len(name) for name in COMMANDS)
+    from antennate.experiments import summaries
+
+    width = max(map(len, commands()))
     return "\n".join(
         [
             "usage: antennate COMMAND [OPTIONS]",
             "",
             "Simulate and study a pair of tactile antennae on a many-legged robot.",
             "",
-            "commands:",
-            *(f"  {name:<{width}}  {what}" for name, what in COMMANDS.items()),
-            "",
+            *_listed("experiments", summaries(), width),
+            *_listed("the robot and its twin", ROBOT_COMMANDS, width),
             "`antennate COMMAND --help` shows its options, `--help-all` every one;",
             "`antennate --completion bash` (zsh, fish) prints a script for the shell;",
             "`antennate --version` prints the version.",
             "",
         ]
     )
+
+
+def _listed(title: str, named: Mapping[str, str], width: int) -> list[str]:
+    return [f"{title}:", *(f"  {name:<{width}}  {what}" for name, what in named.items()), ""]

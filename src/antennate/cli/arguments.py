@@ -103,12 +103,16 @@ def parse_with(
         options: Its other options.
         read: Reads a file that holds more than this configuration.
     """
-    parameters, others = list(options_of(model())), list(options_of(options()))
+    every, others = list(options_of(model())), list(options_of(options()))
+    unread = {option.flag for option in every if ".".join(option.path) in model.unread}
+    parameters = [option for option in every if option.flag not in unread]
     if list(argv) == [OptionsRequest.WORD]:
         raise OptionsRequest([*others, *parameters])
     for word in argv:
         if word in ("-h", "--help"):
             raise HelpRequest(short_page(command, description, model, parameters, others))
+        if (name := word.partition("=")[0].replace("_", "-")) in unread:
+            raise ConfigError(f"{name}: expected a parameter that {command} reads, found this one")
         if word == "--help-all":
             raise HelpRequest(long_page(command, description, model, parameters, others))
     values = read_words(argv, [*others, *parameters])

@@ -11,7 +11,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from antennate.hardware.doctor.rows import Row
+from antennate.hardware.doctor.check import Row
 from antennate.messages import one_line
 
 _STYLES = {"ok": "green", "warn": "yellow", "bad": "bold red"}
@@ -37,4 +37,15 @@ def show_rows(rows: Sequence[Row], file: IO[str] | None = None) -> None:
         )
         console.print(line, soft_wrap=True)
     bad = sum(row.verdict == "bad" for row in wrong)
-    console.print(Text(f"Checks: {len(rows)}. Bad: {bad}. Warnings: {len(wrong) - bad}."))
+    console.print(Text(_sentence(len(rows), bad, len(wrong) - bad)), soft_wrap=True)
+
+
+def _sentence(checks: int, bad: int, warnings: int) -> str:
+    """What came out, in one sentence."""
+    if bad:
+        return (
+            f"The robot must not be driven yet: {bad} of {checks} checks are bad, {warnings} warn."
+        )
+    if warnings:
+        return f"The robot may be driven: no check is bad, {warnings} of {checks} warn."
+    return f"The robot may be driven: all {checks} checks are good."

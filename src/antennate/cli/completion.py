@@ -6,9 +6,9 @@ when it starts.
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Iterator, Mapping, Sequence
 
+from antennate.cli import carry_out
 from antennate.cli.arguments import OptionsRequest
 from antennate.cli.options import Option
 from antennate.errors import BadInputError
@@ -66,7 +66,7 @@ def script(words: Sequence[str], commands: Mapping[str, str]) -> str:
 def _options(command: str) -> Sequence[Option]:
     """The options of a command, which is asked for them in place of a run."""
     try:
-        importlib.import_module(f"antennate.cli.{command}").command([OptionsRequest.WORD])
+        carry_out(command, [OptionsRequest.WORD])
     except OptionsRequest as request:
         return request.options
     return ()

@@ -11,22 +11,25 @@ from pydantic.dataclasses import dataclass
 from antennate.cli import BAD_INPUT, OK
 from antennate.cli.addresses import RobotOptions, key_of, parse_robot, require_lossless
 from antennate.cli.checks import show_rows
-from antennate.cli.folder import RunFolder, to_json
 from antennate.cli.options import option
 from antennate.cli.progress import terminate_as_interrupt
 from antennate.errors import ConfigError
-from antennate.hardware.doctor.checkup import Checkup, DoctorConfig, examine
+from antennate.hardware.doctor.check import Opener
+from antennate.hardware.doctor.checkup import Checkup, examine
+from antennate.hardware.doctor.config import DoctorConfig
 from antennate.hardware.doctor.fix import Change, apply, plan
 from antennate.hardware.doctor.ports import opener_of, same
-from antennate.hardware.doctor.rows import Opener, worst
 from antennate.hardware.host_clock import HostClock
 from antennate.hardware.robot_file import RobotFile
+from antennate.studies.formats import to_json
+from antennate.studies.run_directory import RunDirectory
 
 DESCRIPTION = """\
 Examine the antenna board and the servo bus of a robot at rest, or of its twin: one line for each
-check, with the cure for what is not good. Torque never comes on. Nothing is written without --fix,
-which asks before each change of an id, a speed, an operating mode or a return delay, and reads it
-back. Either port may be left out. Exit code 2 if anything is bad."""
+check, with the cure for what is not good. Torque never comes on. Either port may be left out.
+
+Nothing is written without --fix, which asks before each change of an id, a speed, an
+operating mode or a return delay, and reads it back. The exit code is 2 if anything is bad."""
 _ROUNDS = 4
 """Servos that change their id or speed are looked at anew before the rest is put right."""
 
@@ -56,8 +59,8 @@ def command(argv: Sequence[str]) -> int:
     if orders.out is None:
         checkup, changes = _examine(robot, orders, key)
     else:
-        with RunFolder.open("doctor", orders.out, orders.overwrite) as folder:
-            folder.describe("doctor", argv, config)
+        with RunDirectory.create("doctor", orders.out, orders.overwrite) as folder:
+            folder.describe(config, ["antennate", "doctor", *argv])
             checkup, changes = _examine(robot, orders, key)
             folder.finish(checkup.result(changes), ())
             sys.stderr.write(f"written to {folder.path}\n")
@@ -65,7 +68,7 @@ def command(argv: Sequence[str]) -> int:
         sys.stdout.write(to_json(checkup.result(changes)))
     else:
         show_rows(checkup.rows)
-    return BAD_INPUT if worst(checkup.rows) == "bad" else OK
+    return BAD_INPUT if checkup.verdict == "bad" else OK
 
 
 def _check(orders: Orders) -> None:
@@ -113,9 +116,9 @@ def _fix(
     made: list[str] = []
     refused: set[Change] = set()
     for _ in range(_ROUNDS):
-        if checkup.survey is None:
+        if checkup.bus is None:
             break
-        todo = [one for one in plan(checkup.survey, robot.layout) if one not in refused]
+        todo = [one for one in plan(checkup.bus, robot.robot) if one not in refused]
         if not todo:
             break
         for change in todo:

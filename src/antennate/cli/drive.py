@@ -11,11 +11,10 @@ from pydantic.dataclasses import dataclass
 
 from antennate.cli import BAD_INPUT, OK, viewer
 from antennate.cli.addresses import RobotOptions, key_of, parse_robot, require_lossless
-from antennate.cli.folder import LOG, RunFolder, to_json
 from antennate.cli.options import option
 from antennate.cli.progress import terminate_as_interrupt
 from antennate.cli.tables import Cell, number, show
-from antennate.errors import ConfigError
+from antennate.errors import ConfigError, LogError
 from antennate.hardware.doctor.ports import same
 from antennate.hardware.driving.config import DriveConfig
 from antennate.hardware.driving.connect import connect
@@ -24,6 +23,8 @@ from antennate.hardware.driving.priority import Priority, urgent
 from antennate.hardware.driving.session import Session
 from antennate.hardware.robot_file import RobotFile
 from antennate.hardware.safety.causes import State
+from antennate.studies.formats import to_json
+from antennate.studies.run_directory import LOG, RunDirectory
 from antennate.telemetry.feed import Feed
 from antennate.telemetry.header import Header
 from antennate.telemetry.parts import part, parts
@@ -31,12 +32,13 @@ from antennate.telemetry.reader import count
 from antennate.telemetry.ticks import Tick
 
 DESCRIPTION = """\
-Let a controller walk the robot whose antenna board and servo bus hang on two serial ports, or its
-twin. An address is the path of a serial port, tcp://HOST:PORT, or, for a board on the network,
-udp://HOST:PORT with the key it was given. First a dry run: everything is read and nothing written.
-Then, with --arm only, torque comes on with every servo where it stands. Ctrl-C or SIGTERM ends it:
-command held, torque off, verified. A lost board or servo makes it hold; the watchdogs of the servos
-stop it if this program dies."""
+Let a controller walk the real robot, or its twin. First a dry run: everything is read and nothing
+written. Then, with --arm only, torque comes on with every servo where it stands, and the robot
+walks. Ctrl-C or SIGTERM ends it: command held, torque off, verified.
+
+A lost board or servo makes the robot hold; the watchdogs of the servos stop it if this program
+dies. The exit code is 2 if it ended in a FAULT or without supply, if torque was refused or is not
+off, and if it was armed and never walked."""
 
 
 @dataclass(frozen=True)
@@ -65,8 +67,8 @@ def command(argv: Sequence[str]) -> int:
     config = config.calibrated()
     require_lossless(orders.bus)
     key = key_of(orders)
-    with RunFolder.open("drive", orders.out, orders.overwrite) as folder:
-        folder.describe("drive", argv, config)
+    with RunDirectory.create("drive", orders.out, orders.overwrite) as folder:
+        folder.describe(config, ["antennate", "drive", *argv])
         folder.without_trials()
         wires = connect(config, orders.esp32, orders.bus, key)
         with wires as session, terminate_as_interrupt():
@@ -85,16 +87,24 @@ def command(argv: Sequence[str]) -> int:
 
 def _carry_out(config: DriveConfig, session: Session, orders: Orders, log: Path) -> dict[str, Any]:
     """Drive, with the log and the status line in a process of their own."""
-    header = Header(controller=config.controller, params=config.control, layout=config.layout)
+    header = Header(controller=config.controller, params=config.control, robot=config.robot)
     required = [viewer.REQUIRED] if config.record_required else []
 
     def words(number: int) -> list[str]:
         return [sys.executable, "-m", viewer.__name__, str(part(log, number)), *required]
 
     feed = Feed(words, header.pack())
+    unlogged = False
 
     def keep(session: Session, t: float) -> None:
-        feed.send(Tick.of(session, t).pack())
+        nonlocal unlogged
+        try:
+            feed.send(Tick.of(session, t).pack())
+        except LogError as error:  # the robot walks on without this tick in its log
+            feed.skip()
+            if not unlogged:
+                viewer.say(error)
+            unlogged = True
         session.unrecorded = config.record_required and not feed.keeps
 
     with feed, urgent() as priority:
@@ -116,22 +126,11 @@ def _idle(result: Mapping[str, Any]) -> bool:
 
 def _show(result: Mapping[str, Any]) -> None:
     show("Drive", {result["controller"]: result}, _ROWS, _note(result))
+    sys.stdout.write(_sentence(result) + "\n")
 
 
 def _note(result: Mapping[str, Any]) -> str:
-    why = f" ({result['why']})" if result["why"] else ""
-    if result["torque_off"] is None:
-        note = "Torque never came on.\n"
-    else:
-        note = (
-            f"Worst state {result['worst_state']}{why}.\nTorque is {_power(result['servos_on'])}.\n"
-        )
-    if not result["armed"]:
-        note += "A dry run: nothing was written to the servos; --arm lets it walk.\n"
-    if result["refusal"]:
-        note += f"Not armed: {result['refusal']}.\n"
-    if _idle(result):
-        note += "It never walked: --arm was given, and no command was sent.\n"
+    note = ""
     if result["priority"] == Priority.ORDINARY.value:
         note += "Real-time priority was not allowed; a busy machine will make it miss ticks.\n"
     if not result["log_complete"]:
@@ -139,10 +138,28 @@ def _note(result: Mapping[str, Any]) -> str:
     return note
 
 
-def _power(on: Sequence[int]) -> str:
-    if not on:
-        return "off, verified"
-    return f"NOT confirmed off: servos {', '.join(map(str, on))}; switch their supply off"
+def _sentence(result: Mapping[str, Any]) -> str:
+    """What came out, in one sentence."""
+    why = f" ({result['why']})" if result["why"] else ""
+    worst = f"worst state {result['worst_state']}{why}"
+    torque = _torque(result)
+    if result["refusal"]:
+        return f"The robot was not armed: {result['refusal']}; {worst}; {torque}."
+    if not result["armed"]:
+        return f"A dry run: nothing was written to the servos, {worst}; --arm lets the robot walk."
+    if _idle(result):
+        return f"The robot never walked, no command was sent; {worst}; {torque}."
+    sent = f"{result['poses_sent']} commands of `{result['controller']}` were sent"
+    return f"The robot walked: {sent}, {worst}; {torque}."
+
+
+def _torque(result: Mapping[str, Any]) -> str:
+    if result["torque_off"] is None:
+        return "torque never came on"
+    if not result["servos_on"]:
+        return "torque is off, verified"
+    names = ", ".join(map(str, result["servos_on"]))
+    return f"torque is NOT confirmed off: servos {names}; switch their supply off"
 
 
 def _pace(key: str, form: str, scale: float = 1.0) -> Cell:
@@ -167,7 +184,10 @@ _ROWS: list[tuple[str, Cell]] = [
     ("worst tick [ms]", _pace("worst_tick_s", ".1f", 1e3)),
     *(
         (name.replace("_", " "), lambda result, name=name: number(result[name], "d"))
-        for name in ("frames", "crc_errors", "lost_samples", "missed_answers", "stale_answers")
+        for name in (
+            *("frames", "crc_errors", "lost_samples", "resets"),
+            *("missed_answers", "stale_answers"),
+        )
     ),
     ("commands sent", lambda result: number(result["poses_sent"], "d")),
     ("commands refused", lambda result: number(result["poses_refused"], "d")),

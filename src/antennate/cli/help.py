@@ -96,9 +96,7 @@ def _block(option: Option) -> list[str]:
     head = option.metavar if option.positional else option.offered
     if not option.positional and option.metavar:
         head += f" {option.metavar}{'...' if option.many else ''}"
-    notes = [option.meaning, option.limits]
-    known = ", ".join(option.examples)
-    text = "; ".join(filter(None, [*notes, f"known: {known}" if known else ""]))
+    text = "; ".join(filter(None, [option.meaning, option.limits]))
     if option.default and option.metavar:
         text += f" (default: {option.default})"
     elif option.default:

@@ -151,6 +151,7 @@ def _option(path: tuple[str, ...], field: FieldInfo, default: Any) -> Option | N
     if not switch and not kinds & {*_METAVARS}:
         return None  # a list of tables, for a file only
     known = next((text for kind, text in _METAVARS.items() if kind in kinds), "")
+    known = "NAME" if field.examples else known
     metavar = "{" + ",".join(map(str, choices)) + "}" if choices else known
     return Option(
         path=path,

@@ -96,7 +96,7 @@ def _occupy() -> None:
         try:
             os.fstat(descriptor)
         except OSError:
-            os.open(os.devnull, os.O_RDWR)
+            os.set_inheritable(os.open(os.devnull, os.O_RDWR), True)
 
 
 def _plain(error: UnicodeError) -> tuple[str, int]:

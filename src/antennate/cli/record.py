@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 import select
 import shlex
@@ -19,6 +18,7 @@ from antennate.cli import OK
 from antennate.cli.addresses import RobotOptions, key_of, parse_robot
 from antennate.cli.options import option
 from antennate.cli.progress import terminate_as_interrupt
+from antennate.cli.status import StatusLine
 from antennate.errors import BadInputError, ConfigError, OutputError
 from antennate.hardware.doctor.ports import opener_of
 from antennate.hardware.esp32.board import BOARD_BAUD
@@ -32,8 +32,9 @@ DESCRIPTION = """\
 Record an antenna at a bench, into a CSV file that `antennate calibrate` takes. With --marks you
 hold the antenna at one place after the other and press Enter at each; with --speed a stage pushes
 it at a constant speed from Enter on; with neither, readings of both antennae are written until the
-duration is over or Ctrl-C. Every line is flushed; a file that exists is left alone."""
-_LINES_A_SECOND = 5
+duration is over or Ctrl-C.
+
+Every line is flushed; a file that exists is left alone."""
 _SHOWN = 100
 """Readings over which mean and noise are shown."""
 
@@ -63,13 +64,15 @@ def command(argv: Sequence[str]) -> int:
         status = Status(stream, params, now)
         with Lines(orders.out) as lines, terminate_as_interrupt():
             recorder = Recorder(stream, params, now, ask(status), lines.write, status)
+            then = "."
             try:
                 recorder.run()
+                then = f"; {_next(params, orders.out)}"
             finally:
-                where = f"written to {orders.out}" if recorder.rows else "nothing is written"
                 lost = stream.clock.sequence.lost
-                sys.stderr.write(f"\n{recorder.rows} readings, {lost} lost, {where}\n")
-    sys.stderr.write(_next(params, orders.out) + "\n")
+                where = f"are in {orders.out}" if recorder.rows else "came, so there is no file"
+                status.close()
+                sys.stderr.write(f"{recorder.rows} readings {where}, {lost} were lost{then}\n")
     return OK
 
 
@@ -116,24 +119,28 @@ class Status:
         self.said = ""
         self._stream, self._params, self._now = stream, params, now
         self._shown: deque[Reading] = deque(maxlen=_SHOWN)
-        self._due = -math.inf
-        terminal = sys.stderr.isatty()
-        self._end = "\r" if terminal else "\n"
-        self._every = 1.0 / _LINES_A_SECOND if terminal else 1.0
+        self._status = StatusLine()
 
     def __call__(self, reading: Reading) -> None:
         """Take a reading; show the line if it is time."""
         self._shown.append(reading)
-        if (now := self._now()) >= self._due:
-            self._due = now + self._every
-            sys.stderr.write(self.line() + self._end)
-            sys.stderr.flush()
+        if self._status.due(self._now()):
+            self._status.show(self.line())
+
+    def ask(self, text: str) -> None:
+        """Ask a person for something."""
+        self.said = text
+        self._status.say(text)
+
+    def close(self) -> None:
+        """End the line."""
+        self._status.close()
 
     def line(self) -> str:
         """The line."""
         span = self._shown[-1].now - self._shown[0].now
         rate = (len(self._shown) - 1) / span if span > 0 else 0.0
-        said = [f"{self.said:<44}" if self.said else "recording"]
+        said = ["waiting for Enter" if self.said else "recording"]
         for side in ("left", "right"):
             counts = [float(getattr(one.timed.sample, side)) for one in self._shown]
             said.append(f"{side} {fmean(counts):6.1f} ± {pstdev(counts):4.1f}")
@@ -148,9 +155,7 @@ def ask(status: Status) -> Callable[[str], Callable[[], bool]]:
     def asked(text: str) -> Callable[[], bool]:
         if sys.stdin.isatty():  # an Enter that was typed too early confirms nothing
             termios.tcflush(sys.stdin, termios.TCIFLUSH)
-        sys.stderr.write(f"\n{text}\n")
-        sys.stderr.flush()
-        status.said = text
+        status.ask(text)
 
         def confirmed() -> bool:
             if not _entered():
@@ -178,7 +183,7 @@ def _entered() -> bool:
 def _next(params: RecordParams, out: Path) -> str:
     """What to do with the file."""
     if not params.marks and params.speed is None:
-        return "no bends are known: the file shows rate, noise and drift; calibrate needs --marks"
+        return "they show rate, noise and drift; calibrate needs --marks or --speed."
     unit = params.unit if params.marks else "m"
     words = ["antennate", "calibrate", "--recording", str(out), "--columns.bend-unit", unit]
     return "next: " + shlex.join([*words, "--sensor-id", params.side])

@@ -13,13 +13,14 @@ from pydantic.dataclasses import dataclass
 
 from antennate.cli import BAD_INPUT, OK
 from antennate.cli.arguments import FromFile, parse_with
-from antennate.cli.folder import RunFolder, to_csv, to_json
 from antennate.cli.options import option
 from antennate.cli.tables import Cell, number, show
 from antennate.errors import ConfigError
 from antennate.messages import one_line
+from antennate.studies.formats import to_csv, to_json
+from antennate.studies.run_directory import RunDirectory
 from antennate.telemetry.reader import Damage, LogReader
-from antennate.telemetry.replay import ReplayConfig, Replayed, recorded_decider, replay
+from antennate.telemetry.replay import ReplayConfig, Replayed, recorded_controller, replay
 from antennate.telemetry.ticks import FIELDS, Tick
 from antennate.types import Maneuver
 
@@ -58,12 +59,12 @@ def command(argv: Sequence[str]) -> int:
         raise ConfigError("expected the log of a drive, found none")
     path = Path(options.log)
     with LogReader(path) as log:
-        decider = recorded_decider(log.header, config.controller)
-        found = replay(log, decider, log.header.params.period)
+        controller = recorded_controller(log.header, config.controller)
+        found = replay(log, controller, log.header.params.period)
     result = _result(log, found, config.controller)
     if options.out is not None:
-        with RunFolder.open("replay", options.out, options.overwrite) as folder:
-            folder.describe("replay", argv, config)
+        with RunDirectory.create("replay", options.out, options.overwrite) as folder:
+            folder.describe(config, ["antennate", "replay", *argv])
             _keep(folder, path, found)
             folder.finish(result, ())
             sys.stderr.write(f"written to {folder.path}\n")
@@ -119,7 +120,6 @@ def _result(log: LogReader, found: Replayed, controller: str | None) -> dict[str
 
 
 def _show(result: Mapping[str, Any]) -> None:
-    first = result["first_difference"]
     then = {"shares": result["recorded_shares"], "states": result["states"]}
     now = {**result, "states": {}}
     names = [
@@ -143,13 +143,20 @@ def _show(result: Mapping[str, Any]) -> None:
         f"{one_line(', '.join(result['parts']))}.\n"
         f"Recorded by {one_line(result['recorded_controller'])}, antennate "
         f"{one_line(result['version'])}; "
-        f"{'the log is complete' if result['closed'] else 'not ended: its program was killed'}.\n"
-        + (
-            f"First difference: tick {first['tick']}, {first['time_s']:.2f} s, "
-            f"{first['recorded']} then, {first['replayed']} now.\n"
-            if first
-            else "Every maneuver is the recorded one.\n"
-        ),
+        f"{'the log is complete' if result['closed'] else 'not ended: its program was killed'}.\n",
+    )
+    sys.stdout.write(_sentence(result) + "\n")
+
+
+def _sentence(result: Mapping[str, Any]) -> str:
+    """What came out, in one sentence."""
+    ticks, different = result["ticks"], result["different"]
+    if not different:
+        return f"The controller decided as recorded in all {ticks} ticks."
+    first = result["first_difference"]
+    return (
+        f"The controller decided otherwise in {different} of {ticks} ticks, first in tick "
+        f"{first['tick']} at {first['time_s']:.2f} s: {first['replayed']} for {first['recorded']}."
     )
 
 
@@ -169,7 +176,7 @@ def _name(maneuver: int) -> str:
     return Maneuver(maneuver).name if maneuver in set(Maneuver) else str(maneuver)
 
 
-def _keep(folder: RunFolder, path: Path, found: Replayed) -> None:
+def _keep(folder: RunDirectory, path: Path, found: Replayed) -> None:
     """Write the table and the figure, in a second pass over the log."""
     from antennate import figures as style
     from antennate.telemetry.figure import replay as draw
@@ -204,7 +211,7 @@ def _course(ticks: Iterable[Tick], replayed: Sequence[int]) -> Course:
     return Course(
         t=np.array([tick.now - start for tick, _ in kept]),
         reading=np.array([tick.reading for tick, _ in kept]),
-        b=np.array([tick.b for tick, _ in kept]),
+        level=np.array([tick.level for tick, _ in kept]),
         contact=np.array([tick.contact for tick, _ in kept]),
         recorded=np.array([tick.maneuver for tick, _ in kept]),
         replayed=np.array([maneuver for _, maneuver in kept]),

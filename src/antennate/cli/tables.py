@@ -1,4 +1,4 @@
-"""Result tables: measures are rows and arms are columns, so that they fit a narrow terminal."""
+"""Result tables on stdout."""
 
 from __future__ import annotations
 
@@ -6,25 +6,30 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from rich.box import SIMPLE_HEAD
-from rich.console import Console
-from rich.table import Table
-from rich.text import Text
+from antennate.studies.measures import Table, shown
 
-NONE = "-"
 Cell = Callable[[Mapping[str, Any]], str]
+number = shown
 
 
-def number(value: float | None, form: str = ".3f") -> str:
-    """A number, or a dash if there is none."""
-    return NONE if value is None else f"{value:{form}}"
+def print_table(table: Table) -> None:
+    """Print a table and its note; names of columns break at underscores, shown as spaces."""
+    from rich.box import SIMPLE_HEAD  # slow to import
+    from rich.console import Console
+    from rich.table import Table as Drawn
+    from rich.text import Text
 
-
-def span(interval: Sequence[float] | None, form: str = ".1f", scale: float = 1.0) -> str:
-    """An interval as `low to high`."""
-    if interval is None:
-        return NONE
-    return " to ".join(f"{scale * end:{form}}" for end in interval)
+    drawn = Drawn(title=table.title, title_justify="left", box=SIMPLE_HEAD, pad_edge=False)
+    drawn.add_column("", overflow="fold")
+    for name in table.columns:
+        drawn.add_column(Text(name.replace("_", " ")), justify="right", overflow="fold")
+    for name, cells in table.rows:
+        drawn.add_row(Text(name), *(Text(cell) for cell in cells))
+    console = Console(file=sys.stdout, highlight=False)
+    console.print(drawn)
+    if table.note:
+        console.print(Text(table.note), soft_wrap=True)
+        console.print()
 
 
 def show(
@@ -33,16 +38,6 @@ def show(
     rows: Sequence[tuple[str, Cell]],
     note: str,
 ) -> None:
-    """Print a table on stdout: one column per name, one row per measure, and a note under it.
-
-    Names break at underscores, which are shown as spaces.
-    """
-    table = Table(title=title, title_justify="left", box=SIMPLE_HEAD, pad_edge=False)
-    table.add_column("", overflow="fold")
-    for name in columns:
-        table.add_column(Text(name.replace("_", " ")), justify="right", overflow="fold")
-    for measure, cell in rows:
-        table.add_row(Text(measure), *(Text(cell(column)) for column in columns.values()))
-    console = Console(file=sys.stdout, highlight=False)
-    console.print(table)
-    console.print(Text(note), soft_wrap=True)
+    """Print a table of a column per name and a row per cell function, and a note under it."""
+    lines = [(name, [cell(column) for column in columns.values()]) for name, cell in rows]
+    print_table(Table(title, list(columns), lines, note.rstrip("\n")))

@@ -18,9 +18,9 @@ from antennate.cli.arguments import FromFile, parse_with
 from antennate.cli.options import option
 from antennate.cli.progress import end_at_first
 from antennate.errors import ConfigError
-from antennate.experiments.twin import TwinConfig, watched
 from antennate.hardware.driving.priority import LEVEL, urgent
 from antennate.hardware.ports.keys import read_key
+from antennate.twin.config import TwinConfig, watched
 from antennate.twin.endpoints import Endpoint
 from antennate.twin.faults import Faults, read
 from antennate.twin.serve import TwinServer
@@ -30,17 +30,19 @@ from antennate.twin.udp import UdpEndpoint
 _LAST_PORT = 65_534
 
 DESCRIPTION = """\
-Serve the simulated robot in a tunnel as real bytes on two pseudo-terminals: the frames of the
-antenna board, and a DYNAMIXEL bus of 19 servos. Prints one JSON line with the paths when ready.
-With --tcp both are TCP ports, with --udp the board is a UDP port that signs as the firmware does.
-Physics begins when the first servo gets torque. Faults, each with @Ts for its time:
-servo:ID=silent, bad_crc, truncated, late:SECONDS, doubled, wrong_id, oversized, voltage, overheat,
-encoder, shock, overload, reboot or REGISTER:VALUE; esp32=silent, reset, open_left, open_right,
-left:COUNTS, right:COUNTS or ber:SHARE; bus=silent, loss:SHARE, latency:SECONDS,
-discharge:VOLTS_A_SECOND or ber:SHARE; link=ber:SHARE (bits wrong) or loss:SHARE (bytes
-lost), on both wires both ways.
+Serve the simulated robot in a scene as real bytes on two pseudo-terminals: the frames of the
+antenna board, and a DYNAMIXEL bus with all its servos. Prints one JSON line with the paths when
+ready. Physics begins when the first servo gets torque. --fault and --touch may be repeated.
+
 --touch left@2s right@5s bends the antennae of the standing robot, as the check by touch of
-`antennate drive` wants it. --fault and --touch may be repeated."""
+`antennate drive` wants it.
+
+Faults, each with @Ts for its time:
+servo:ID=silent, bad_crc, truncated, late:SECONDS, doubled, wrong_id, oversized, voltage, overheat,
+encoder, shock, overload, reboot or REGISTER:VALUE;
+esp32=silent, reset, open_left, short_left (or right), left:COUNTS, right:COUNTS or ber:SHARE;
+bus=silent, loss:SHARE, latency:SECONDS, discharge:VOLTS_A_SECOND or ber:SHARE;
+link=ber:SHARE (bits wrong) or loss:SHARE (bytes lost), on both wires both ways."""
 
 
 @dataclass(frozen=True)
@@ -69,7 +71,7 @@ def command(argv: Sequence[str]) -> int:
 
 def _serve(argv: Sequence[str]) -> int:
     config, places = parse_with("twin", DESCRIPTION, TwinConfig, argv, Places)
-    faults = Faults([read(text) for text in config.fault], config.layout.ids)
+    faults = Faults([read(text) for text in config.fault], config.robot.ids)
     real = places.pace == "real"
     robot, passage = watched(config, boot_id=secrets.randbits(32) if real else None)
     end = float("inf") if config.duration is None else config.duration
@@ -82,8 +84,8 @@ def _serve(argv: Sequence[str]) -> int:
                 serve(lambda t: t < end and robot.failure is None)
         finally:
             invalid = f"physics became invalid: {robot.failure}; " if robot.failure else ""
-            late = f"latest tick {1e3 * server.late:.1f} ms late"
-            sys.stderr.write(f"antennate twin: {invalid}{passage.said}; {late}\n")
+            late = f"its latest tick was {1e3 * server.late:.1f} ms late"
+            sys.stderr.write(f"The twin has ended: {invalid}{passage.summary}; {late}.\n")
     return OK
 
 

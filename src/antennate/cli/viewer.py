@@ -9,11 +9,12 @@ from __future__ import annotations
 import contextlib
 import math
 import os
-import shutil
+import re
 import signal
 import sys
 from pathlib import Path
 
+from antennate.cli.status import StatusLine, write
 from antennate.errors import LogError
 from antennate.hardware.driving.signals import STOPS
 from antennate.messages import one_line
@@ -25,33 +26,27 @@ from antennate.types import Maneuver
 
 REQUIRED = "required"
 _STDOUT = 1
-_LINES_A_SECOND = 5
+_ASKED = re.compile(r"touch=\((.*?)\)")
+"""What a person is to do, within the note of a tick."""
 
 
-class StatusLine:
-    """One line on stderr now and then, over the last one on a terminal."""
+class Display:
+    """The ticks as they come: a status line, and above it what a person is to do."""
 
     def __init__(self) -> None:
-        self._terminal = sys.stderr.isatty()
-        self._every = 1.0 / _LINES_A_SECOND if self._terminal else 1.0
-        self._due = -math.inf
+        self.status = StatusLine()
+        self._asked = ""
 
     def show(self, message: Message) -> None:
-        """Show a tick, if one is due; nobody needs to be there to see it."""
+        """Show a tick, if one is due or if something new is asked."""
         tick = Tick.unpack(message.content)
-        if tick.now >= self._due:
-            self._due = tick.now + self._every
-            said = line(tick, message.dropped)
-            if self._terminal:  # a line that wraps could not be written over
-                said = "\r\x1b[K" + said[: shutil.get_terminal_size().columns - 1]
-            _write(said if self._terminal else said + "\n")
-
-
-def _write(text: str) -> None:
-    """Say it on stderr, or nowhere if that is gone, as with a lost terminal."""
-    with contextlib.suppress(OSError):
-        sys.stderr.write(text)
-        sys.stderr.flush()
+        match = _ASKED.search(tick.note)
+        asked = match[1] if match else ""
+        if asked not in ("", self._asked) and self.status.terminal:
+            self.status.say(f"{asked[0].upper()}{asked[1:]}.")
+        self._asked = asked
+        if self.status.due(tick.now):
+            self.status.show(line(tick, message.dropped))
 
 
 def line(tick: Tick, dropped: int) -> str:
@@ -79,7 +74,7 @@ def main() -> int:
     """
     for number in STOPS:  # the other end decides when it is over
         signal.signal(number, signal.SIG_IGN)
-    status = StatusLine()
+    display = Display()
     kept, required = False, REQUIRED in sys.argv[2:]
     stream = messages(sys.stdin.buffer)
     try:
@@ -91,13 +86,14 @@ def main() -> int:
                 os.write(_STDOUT, b"begun\n")
         for message in stream:
             kept = kept and _keep(log, message.content)
-            status.show(message)
+            display.show(message)
             if required and not kept:
                 break
         if log is not None and kept:
             log.close()
     except LogError as error:
-        kept = _say(error)
+        kept = say(error)
+    display.status.close()
     return int(not kept)
 
 
@@ -106,7 +102,7 @@ def _begin(path: Path, first: Message) -> LogWriter | None:
     try:
         return LogWriter(path, Header.unpack(first.content))
     except LogError as error:
-        _say(error)
+        say(error)
         return None
 
 
@@ -116,12 +112,13 @@ def _keep(log: LogWriter | None, content: bytes) -> bool:
         if log is not None:
             log.write(content)
     except LogError as error:
-        return _say(error)
+        return say(error)
     return log is not None
 
 
-def _say(error: LogError) -> bool:
-    _write(f"\nantennate drive: {one_line(str(error))}\n")
+def say(error: LogError) -> bool:
+    """Show an error of the log on stderr, below the status line; always False."""
+    write(f"\nantennate drive: {one_line(str(error))}\n")
     return False
 
 

@@ -29,8 +29,8 @@ def bending_level(params: ConditioningParams, counts: Floats) -> Floats:
     return 1.0 / (1.0 + np.exp(-z))
 
 
-def deflection(params: ConditioningParams, counts: Floats) -> Floats:
-    """Normalised reading from the straight antenna on: 0 straight, 1 fully bent, same shape."""
+def flex_fraction(params: ConditioningParams, counts: Floats) -> Floats:
+    """Flex as a fraction of the calibrated range: 0 straight, 1 fully bent, same shape."""
     x = (counts - params.counts_low) / (params.counts_high - params.counts_low)
     return x if params.polarity > 0 else 1.0 - x
 
@@ -54,4 +54,4 @@ class RunningMean:
         self._ring[self._next] = np.where(np.isfinite(counts), counts, np.nan)
         self._next = (self._next + 1) % self.length
         self._seen = np.minimum(self._seen + 1, self.length)
-        return self._ring.sum(axis=0) / self._seen[:, None]
+        return np.add.reduce(self._ring, axis=0) / self._seen[:, None]

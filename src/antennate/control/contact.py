@@ -11,12 +11,12 @@ _FREE, _CONTACT, _UNKNOWN = int(Contact.FREE), int(Contact.CONTACT), int(Contact
 """As plain integers: comparing an array with an enum costs four times as much."""
 
 
-def classify(params: RuleParams, b: Floats, before: Ints) -> Ints:
+def classify(params: RuleParams, level: Floats, before: Ints) -> Ints:
     """Contact of each side.
 
     Args:
         params: Threshold and hysteresis.
-        b: Bending levels, shape (B, 2); NaN where nothing can be said.
+        level: Bending levels, shape (B, 2); NaN where nothing can be said.
         before: Contact at the tick before, shape (B, 2).
 
     Returns:
@@ -24,8 +24,8 @@ def classify(params: RuleParams, b: Floats, before: Ints) -> Ints:
     """
     touching = before == _CONTACT
     bound = params.threshold - params.hysteresis * touching
-    state = np.where(b >= bound, _CONTACT, _FREE)
-    return np.where(np.isnan(b), _UNKNOWN, state)
+    state = np.where(level >= bound, _CONTACT, _FREE)
+    return np.where(np.isnan(level), _UNKNOWN, state)
 
 
 class ContactState:
@@ -39,7 +39,7 @@ class ContactState:
         """Some rows start free."""
         self._state[rows] = Contact.FREE
 
-    def step(self, b: Floats) -> Ints:
-        """Contact for bending levels b, shape (B, 2)."""
-        self._state = classify(self._params, b, self._state)
+    def step(self, level: Floats) -> Ints:
+        """Contact for bending levels, shape (B, 2)."""
+        self._state = classify(self._params, level, self._state)
         return self._state

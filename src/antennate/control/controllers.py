@@ -1,132 +1,143 @@
-"""The rooms composed: a frame goes in, a command comes out.
+"""Our controllers: a frame of readings goes in, a command for the joints comes out.
 
-Three controllers share the path from counts to contact and the gait, and differ in one decision:
+They share the way from counts to contact, and the gait. They differ in one decision:
 
 - `open` walks FORWARD whatever it feels;
-- `paper` follows the published table with its hold;
+- `paper` follows the published table and holds each maneuver for a time;
 - `closed` walks FORWARD until its readings repeat, then escapes.
-
-All work on a batch of B robots at once, row by row independent.
 """
 
 from __future__ import annotations
 
-from typing import Literal, Protocol, get_args
+from typing import Protocol
 
 import numpy as np
 
-from antennate.control.conditioning import RunningMean, bending_level, deflection
+from antennate.control.conditioning import RunningMean, bending_level, flex_fraction
 from antennate.control.contact import ContactState
 from antennate.control.escape import Escape
 from antennate.control.gait import Gait
 from antennate.control.maneuver import Hold, decide
 from antennate.control.repetition import RepetitionDetector
-from antennate.errors import ConfigError
 from antennate.params import ControlParams
+from antennate.robots.sides import LEFT, RIGHT
+from antennate.robots.spec import RobotSpec
 from antennate.types import AntennaFrame, Bools, Contact, Floats, Ints, JointCommand, Maneuver
 
-Arm = Literal["open", "paper", "closed"]
-ARMS: tuple[Arm, ...] = get_args(Arm)
 
+class Rule(Protocol):
+    """The decision of a controller.
 
-class _Rule(Protocol):
-    """One way to decide."""
+    Attributes:
+        turn_offset: Yaw offset of its turns [rad].
+    """
 
     turn_offset: float
 
-    def reset(self, rows: Ints | Bools) -> None: ...
+    def reset(self, rows: Ints | Bools) -> None:
+        """Forget everything about some rows."""
+        ...
 
-    def step(self, t: Floats, b: Floats, contact: Ints, bend: Floats) -> Ints: ...
+    def step(self, t: Floats, level: Floats, contact: Ints, flex: Floats) -> Ints:
+        """Decide.
+
+        Args:
+            t: Time of the frame [s], shape (B,).
+            level: Bending levels b, 0 to 1, shape (B, 2).
+            contact: One `Contact` an antenna, shape (B, 2).
+            flex: Flex as a fraction of the calibrated range, 0 straight, shape (B, 2).
+
+        Returns:
+            One `Maneuver` a row, shape (B,).
+        """
+        ...
 
 
 class _OpenRule:
-    """FORWARD, unless a sensor cannot be trusted."""
+    """FORWARD, unless a reading cannot be used."""
 
-    def __init__(self, params: ControlParams) -> None:
-        self.turn_offset = params.gait.turn_offset
+    def __init__(self, control: ControlParams) -> None:
+        self.turn_offset = control.gait.turn_offset
 
     def reset(self, rows: Ints | Bools) -> None:
         pass
 
-    def step(self, t: Floats, b: Floats, contact: Ints, bend: Floats) -> Ints:
-        unknown = (contact == Contact.UNKNOWN).any(axis=1)
+    def step(self, t: Floats, level: Floats, contact: Ints, flex: Floats) -> Ints:
+        unknown = (contact == int(Contact.UNKNOWN)).any(axis=1)
         return np.where(unknown, int(Maneuver.HOLD), int(Maneuver.FORWARD))
 
 
 class _PaperRule:
     """The published table, each maneuver held for T_hold."""
 
-    def __init__(self, params: ControlParams, batch: int) -> None:
-        self.turn_offset = params.gait.turn_offset
-        self._params = params.rule
+    def __init__(self, control: ControlParams, batch: int) -> None:
+        self.turn_offset = control.gait.turn_offset
+        self._params = control.rule
         self._hold = Hold(batch)
 
     def reset(self, rows: Ints | Bools) -> None:
         self._hold.reset(rows)
 
-    def step(self, t: Floats, b: Floats, contact: Ints, bend: Floats) -> Ints:
-        wanted = decide(self._params, contact, b)
+    def step(self, t: Floats, level: Floats, contact: Ints, flex: Floats) -> Ints:
+        wanted = decide(self._params, contact, level)
         return self._hold.step(t, wanted, self._params.hold_time)
 
 
 class _ClosedRule:
     """FORWARD until readings repeat, then escape."""
 
-    def __init__(self, params: ControlParams, batch: int) -> None:
-        self.turn_offset = params.escape.turn_offset
-        self._params = params
+    def __init__(self, control: ControlParams, batch: int) -> None:
+        self.turn_offset = control.escape.turn_offset
+        self._control = control
         self._detector = RepetitionDetector(
-            params.repetition, batch, params.period, params.gait.frequency
+            control.repetition, batch, control.period, control.gait.frequency
         )
-        self._escape = Escape(params.escape, batch, params.period)
+        self._escape = Escape(control.escape, batch, control.period)
 
     def reset(self, rows: Ints | Bools) -> None:
         self._detector.reset(rows)
         self._escape.reset(rows)
 
-    def step(self, t: Floats, b: Floats, contact: Ints, bend: Floats) -> Ints:
-        walking = (self._escape.maneuver == int(Maneuver.FORWARD)) & ~np.isnan(b).any(axis=1)
-        stuck = self._detector.step(bend, walking)
-        if self._params.escape.trigger == "contact":
-            stuck = decide(self._params.rule, contact, b) == Maneuver.REVERSE
-        pressed: Bools = np.any(bend > self._params.repetition.pressure, axis=1)
-        return self._escape.step(t, b, stuck, pressed)
+    def step(self, t: Floats, level: Floats, contact: Ints, flex: Floats) -> Ints:
+        unknown = np.isnan(level[:, LEFT] + level[:, RIGHT])
+        walking = (self._escape.maneuver == int(Maneuver.FORWARD)) & ~unknown
+        stuck = self._detector.step(flex, walking)
+        if self._control.escape.trigger == "contact":
+            stuck = decide(self._control.rule, contact, level) == Maneuver.REVERSE
+        left, right = (flex > self._control.repetition.pressure).T
+        return self._escape.step(t, level, stuck, left | right)
 
 
-class Controller:
-    """The control of B robots.
+class RuleController:
+    """Control of B robots by one rule.
 
     Args:
-        params: All its numbers.
-        arm: Which decision it takes.
+        rule: Decides the maneuver; made for B rows.
+        control: All numbers of the control.
+        robot: The robot.
         batch: Number of robots B.
 
     Attributes:
-        b: Bending levels of the last tick, shape (B, 2).
-        contact: `Contact` of the last tick, shape (B, 2).
-        maneuver: `Maneuver` of the last tick, shape (B,).
-
-    Raises:
-        ConfigError: The arm does not exist.
+        level: Bending levels b of the last step, shape (B, 2).
+        contact: `Contact` of the last step, shape (B, 2).
+        maneuver: `Maneuver` of the last step, shape (B,).
+        gait: The gait and its phase.
     """
 
-    def __init__(self, params: ControlParams, arm: Arm = "closed", batch: int = 1) -> None:
-        if arm not in ARMS:
-            raise ConfigError(f"arm must be one of {', '.join(ARMS)}, got {arm!r}")
-        self._params = params
-        self._mean = RunningMean(params.conditioning, batch, params.period)
-        self._contact = ContactState(params.rule, batch)
-        self._rule: _Rule
-        if arm == "open":
-            self._rule = _OpenRule(params)
-        elif arm == "paper":
-            self._rule = _PaperRule(params, batch)
-        else:
-            self._rule = _ClosedRule(params, batch)
-        self.gait = Gait(params.gait, batch, params.period)
-        self.b: Floats = np.zeros((batch, 2))
+    def __init__(self, rule: Rule, control: ControlParams, robot: RobotSpec, batch: int) -> None:
+        self._conditioning = control.conditioning
+        self._mean = RunningMean(control.conditioning, batch, control.period)
+        self._contact = ContactState(control.rule, batch)
+        self._rule = rule
+        self.gait = Gait(control.gait, robot, batch, control.period)
+        self.level: Floats = np.zeros((batch, 2))
         self.contact: Ints = np.full((batch, 2), int(Contact.FREE))
         self.maneuver: Ints = np.full(batch, int(Maneuver.FORWARD))
+
+    @property
+    def phase(self) -> Floats:
+        """Gait phase [rad], shape (B,)."""
+        return self.gait.phase
 
     def reset(self, rows: Ints | Bools, phase: Floats | float = 0.0) -> None:
         """Forget everything about some rows and start their gait at `phase` [rad]."""
@@ -136,10 +147,25 @@ class Controller:
         self.gait.reset(rows, phase)
 
     def step(self, frame: AntennaFrame) -> JointCommand:
-        """One tick: the command for this frame, both with B rows."""
+        """One control period: the command for this frame, both with B rows."""
         counts = self._mean.step(frame.counts)
-        self.b = bending_level(self._params.conditioning, counts)
-        self.contact = self._contact.step(self.b)
-        bend = deflection(self._params.conditioning, counts)
-        self.maneuver = self._rule.step(frame.t, self.b, self.contact, bend)
+        self.level = bending_level(self._conditioning, counts)
+        self.contact = self._contact.step(self.level)
+        flex = flex_fraction(self._conditioning, counts)
+        self.maneuver = self._rule.step(frame.t, self.level, self.contact, flex)
         return self.gait.step(self.maneuver, self._rule.turn_offset)
+
+
+def open_loop(control: ControlParams, robot: RobotSpec, batch: int) -> RuleController:
+    """`open`: walks FORWARD whatever it feels."""
+    return RuleController(_OpenRule(control), control, robot, batch)
+
+
+def paper(control: ControlParams, robot: RobotSpec, batch: int) -> RuleController:
+    """`paper`: the published table with its hold."""
+    return RuleController(_PaperRule(control, batch), control, robot, batch)
+
+
+def closed_loop(control: ControlParams, robot: RobotSpec, batch: int) -> RuleController:
+    """`closed`: walks FORWARD until its readings repeat, then escapes."""
+    return RuleController(_ClosedRule(control, batch), control, robot, batch)

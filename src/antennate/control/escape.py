@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 
 from antennate.params import EscapeParams
-from antennate.robots.anatomy import LEFT, RIGHT
+from antennate.robots.sides import LEFT, RIGHT
 from antennate.types import Bools, Floats, Ints, Maneuver
 
 
@@ -44,33 +44,33 @@ class Escape:
         self._past[:, rows] = 0.0
         self.touch[rows] = 0.0
 
-    def step(self, t: Floats, b: Floats, stuck: Bools, pressed: Bools) -> Ints:
+    def step(self, t: Floats, level: Floats, stuck: Bools, pressed: Bools) -> Ints:
         """The maneuver of every row.
 
         Args:
             t: Time [s], shape (B,).
-            b: Bending levels, shape (B, 2); a row with NaN answers HOLD and keeps its state.
+            level: Bending levels, shape (B, 2); a row with NaN answers HOLD and keeps its state.
             stuck: Rows found stuck, shape (B,).
             pressed: Rows that feel anything at all, shape (B,).
 
         Returns:
             One `Maneuver` a row, shape (B,).
         """
-        known = ~np.isnan(b).any(axis=1)
+        known = ~np.isnan(level[:, LEFT] + level[:, RIGHT])
         walking = known & (self.maneuver == int(Maneuver.FORWARD))
-        self.touch += np.where(walking[:, None], b - self.touch, 0.0) * self._memory_gain
+        self.touch += np.where(walking[:, None], level - self.touch, 0.0) * self._memory_gain
         before = self._remember()
         self._felt = np.where(walking & ~pressed, self._felt, t)
         over = known & ~walking & (t >= self._until)
-        if over.any():
+        if np.count_nonzero(over):
             backed = over & (self.maneuver == int(Maneuver.REVERSE))
             self._to(over & ~backed, int(Maneuver.FORWARD), t)
             self._turn(backed, t)
         stuck = walking & stuck
-        if stuck.any():
+        if np.count_nonzero(stuck):
             self._back_off(stuck, before, t)
         lost = walking & self._turned & (t - self._felt > self._params.lost_time)
-        if lost.any():
+        if np.count_nonzero(lost):
             self._return(lost, t)
         return np.where(known, self.maneuver, int(Maneuver.HOLD))
 
@@ -84,8 +84,8 @@ class Escape:
         self._ticks += 1
         before = self._past[at].copy()
         self._past[at] = self.touch
-        young = (before == 0.0).all(axis=1, keepdims=True)
-        return np.where(young, self.touch, before)
+        left, right = (before == 0.0).T
+        return np.where((left & right)[:, None], self.touch, before)
 
     def _back_off(self, rows: Bools, touch: Floats, t: Floats) -> None:
         params = self._params

@@ -1,10 +1,10 @@
 """Maneuver and phase to joint targets.
 
-The body carries the serpenoid wave of the paper, alpha_j = A sin(2 pi xi j / 5 - P + delta) +
-offset
-with P the gait phase: as P grows the crest travels from head to tail and the robot advances. Leg i
-turns with P - 2 pi xi i / 6, the right one half a turn later. The lead delta of the body over the
-legs decides the speed: it is best where the feet are down on the side towards which the body bends.
+The yaw joints j = 1 .. Y carry the serpenoid wave of the paper,
+alpha_j = A sin(2 pi xi j / Y - P + delta) + offset, with P the gait phase: as P grows the crest
+travels from head to tail and the robot advances. Leg i of L links turns with P - 2 pi xi i / L, the
+right one half a turn later. The lead delta of the body over the legs decides the speed: it is best
+where the feet are down on the side towards which the body bends.
 
 A positive offset bends every joint to the right-hand turn: joint j rotates the rear link against
 the front one, so the head points right of the tail.
@@ -21,7 +21,7 @@ from functools import lru_cache
 import numpy as np
 
 from antennate.params import GaitParams
-from antennate.robots.anatomy import LINK_COUNT, YAW_COUNT
+from antennate.robots.spec import RobotSpec
 from antennate.types import Bools, Floats, Ints, JointCommand
 
 _DIRECTION = np.array([1.0, 1.0, 1.0, -1.0, 0.0])
@@ -34,25 +34,31 @@ _SIDES = np.array([0.0, math.pi])
 
 
 @lru_cache
-def _lags(wave_number: float, body_phase: float) -> tuple[Floats, Floats]:
-    """Phase of each yaw joint and lag of each link [rad], shapes (5,) and (6,)."""
+def _lags(wave_number: float, body_phase: float, links: int) -> tuple[Floats, Floats]:
+    """Phase of each yaw joint and lag of each link [rad], shapes (Y,) and (L,)."""
     lag = 2.0 * math.pi * wave_number
-    joints = lag * np.arange(1, YAW_COUNT + 1) / YAW_COUNT + body_phase
-    return joints, lag * np.arange(LINK_COUNT) / LINK_COUNT
+    yaws = links - 1
+    joints = lag * np.arange(1, yaws + 1) / yaws + body_phase
+    return joints, lag * np.arange(links) / links
 
 
 def targets(
-    params: GaitParams, phase: Floats, offset: Floats, sweep: Floats | None = None
+    params: GaitParams,
+    robot: RobotSpec,
+    phase: Floats,
+    offset: Floats,
+    sweep: Floats | None = None,
 ) -> JointCommand:
     """Joint targets at a gait phase.
 
     Args:
         params: Wave and timing of the gait.
+        robot: The robot that walks.
         phase: Gait phase P [rad], shape (B,), unwrapped.
         offset: Yaw offset [rad], shape (B,); positive turns right.
         sweep: Phase S of the antenna bases [rad], shape (B,); 0 if absent.
     """
-    joints, links = _lags(params.wave_number, params.body_phase)
+    joints, links = _lags(params.wave_number, params.body_phase, robot.links)
     yaw = params.amplitude * np.sin(joints - phase[:, None]) + offset[:, None]
     leg = (phase[:, None] - links)[:, :, None] + _SIDES
     antenna = np.full((phase.shape[0], 2), params.antenna_mean)
@@ -64,8 +70,9 @@ def targets(
 class Gait:
     """The gait's memory: phases and offset. They are continuous whatever the maneuvers."""
 
-    def __init__(self, params: GaitParams, batch: int, period: float) -> None:
+    def __init__(self, params: GaitParams, robot: RobotSpec, batch: int, period: float) -> None:
         self.params = params
+        self._robot = robot
         self.phase: Floats = np.zeros(batch)
         self.offset: Floats = np.zeros(batch)
         self.sweep: Floats = np.zeros(batch)
@@ -92,4 +99,4 @@ class Gait:
         self.offset += change * _STEERS[maneuver]
         self.phase += _DIRECTION[maneuver] * self._advance
         self.sweep += _STEERS[maneuver] * self._swing
-        return targets(self.params, self.phase, self.offset, self.sweep)
+        return targets(self.params, self._robot, self.phase, self.offset, self.sweep)

@@ -11,8 +11,8 @@ from antennate.types import AntennaFrame, JointCommand, Robot
 _ROUNDING = 1e-6
 
 
-class Controller(Protocol):
-    """Anything that turns a frame into a command."""
+class Stepper(Protocol):
+    """The part of a controller that the loop needs."""
 
     def step(self, frame: AntennaFrame) -> JointCommand:
         """The joint targets for this tick."""
@@ -21,7 +21,7 @@ class Controller(Protocol):
 
 def run_loop(
     body: Robot,
-    control: Controller,
+    control: Stepper,
     period: float,
     go_on: Callable[[AntennaFrame, JointCommand], bool],
 ) -> int:
@@ -31,7 +31,7 @@ def run_loop(
     Ticks that have come due meanwhile are left out, never made up for in a burst.
 
     Args:
-        body: The world.
+        body: The robot.
         control: The controller.
         period: Control period [s].
         go_on: Called after each write with what was read and written; False ends the loop.

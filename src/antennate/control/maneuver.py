@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from antennate.params import RuleParams
-from antennate.robots.anatomy import LEFT, RIGHT
+from antennate.robots.sides import LEFT, RIGHT
 from antennate.types import Bools, Contact, Floats, Ints, Maneuver
 
 
-def decide(params: RuleParams, contact: Ints, b: Floats) -> Ints:
+def decide(params: RuleParams, contact: Ints, level: Floats) -> Ints:
     """The paper's table.
 
     No side in contact: FORWARD. Both strong and similar: REVERSE. Otherwise turn away from the side
@@ -18,16 +18,15 @@ def decide(params: RuleParams, contact: Ints, b: Floats) -> Ints:
     Args:
         params: Bounds of strong and similar.
         contact: One `Contact` a side, shape (B, 2).
-        b: Bending levels, shape (B, 2).
+        level: Bending levels, shape (B, 2).
 
     Returns:
         One `Maneuver` a row, shape (B,).
     """
     touch = contact == Contact.CONTACT
-    difference = b[:, LEFT] - b[:, RIGHT]
-    blocked = (
-        touch.all(axis=1) & (b >= params.strong).all(axis=1) & (np.abs(difference) < params.similar)
-    )
+    difference = level[:, LEFT] - level[:, RIGHT]
+    strong = (level >= params.strong).all(axis=1)
+    blocked = touch.all(axis=1) & strong & (np.abs(difference) < params.similar)
     lean = np.where(touch.all(axis=1), difference, touch[:, LEFT] * 1.0 - touch[:, RIGHT])
     turn = np.where(lean >= 0, int(Maneuver.TURN_R), int(Maneuver.TURN_L))
     chosen = np.where(touch.any(axis=1), turn, int(Maneuver.FORWARD))

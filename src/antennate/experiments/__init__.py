@@ -1,1 +1,71 @@
-"""One file per experiment: what varies, what is measured, what it returns."""
+"""The experiments. Every folder here is one; other packages add theirs by an entry point.
+
+A folder holds a module `experiment` with an object `EXPERIMENT`; the first line of its docstring is
+the summary. An entry point in the group `antennate.experiments` names such an object.
+"""
+
+from __future__ import annotations
+
+import importlib
+import pkgutil
+from typing import TYPE_CHECKING, Any
+
+from antennate.errors import BadInputError
+
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint
+
+    from antennate.studies.experiment import Experiment
+
+GROUP = "antennate.experiments"
+"""Group of the entry points."""
+
+
+def names() -> list[str]:
+    """Names of all experiments, ours first."""
+    return list(dict.fromkeys([*_folders(), *_entries()]))
+
+
+def summaries() -> dict[str, str]:
+    """Name and summary of every experiment; ours are not loaded for it."""
+    found = {}
+    for name in _folders():
+        text = importlib.import_module(f"{__name__}.{name}").__doc__ or ""
+        found[name] = text.splitlines()[0].rstrip(".")
+    for name in names():
+        if name not in found:
+            try:
+                found[name] = load(name).description.strip().partition(".")[0]
+            except BadInputError as error:
+                found[name] = f"({error})"
+    return found
+
+
+def load(name: str) -> Experiment[Any, Any]:
+    """The experiment of this name.
+
+    Raises:
+        BadInputError: There is none, or the one of another package cannot be loaded.
+    """
+    if name in _folders():
+        return importlib.import_module(f"{__name__}.{name}.experiment").EXPERIMENT
+    entries = _entries()
+    if name not in entries:
+        raise BadInputError(f"expected an experiment ({', '.join(summaries())}), found {name}")
+    try:
+        return entries[name].load()
+    except Exception as error:
+        raise BadInputError(
+            f"{name}: expected an experiment at {entries[name].value}, found: "
+            f"{type(error).__name__}: {error}"
+        ) from error
+
+
+def _folders() -> list[str]:
+    return [module.name for module in pkgutil.iter_modules(__path__) if module.ispkg]
+
+
+def _entries() -> dict[str, EntryPoint]:
+    from importlib.metadata import entry_points
+
+    return {entry.name: entry for entry in entry_points(group=GROUP)}

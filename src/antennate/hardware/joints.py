@@ -7,14 +7,12 @@ import math
 import numpy as np
 
 from antennate.errors import AntennateError
-from antennate.hardware import roster
 from antennate.hardware.settings import profile_velocities
-from antennate.robots.anatomy import LINK_COUNT, YAW_COUNT
-from antennate.robots.layout import MOST_TICKS, TICKS_A_TURN, LayoutParams
+from antennate.robots.servos import MOST_TICKS, TICKS_A_TURN
+from antennate.robots.spec import RobotSpec
 from antennate.types import Floats, Ints, JointCommand
 
 _STEP = 2.0 * math.pi / TICKS_A_TURN
-_SHAPES = {"yaw": (1, YAW_COUNT), "leg": (1, LINK_COUNT, 2), "antenna": (1, 2)}
 
 
 class CommandError(AntennateError):
@@ -22,33 +20,36 @@ class CommandError(AntennateError):
 
 
 class Joints:
-    """The 19 joints of one robot in the order yaws, legs, antennae.
+    """All joints of one robot that servos move, in the order of its description.
 
     Attributes:
         ids: Ids of their servos.
         models: Model numbers by id.
         profiles: Profile velocities by id [0.229 rev/min], above what goals are moved at.
         in_order_of_release: Ids of the groups in the order in which they lose their torque.
+        turning: Places in `ids` of the joints that turn without end.
     """
 
-    def __init__(self, layout: LayoutParams) -> None:
-        self.ids = layout.ids
-        self.models = roster.models(layout)
-        self.profiles = profile_velocities(layout)
-        self.in_order_of_release = layout.in_order_of_release
-        self._sign: Floats = np.array(layout.directions, float)
-        self._zero: Floats = np.array(layout.zeros, float)
-        self._limit: Floats = np.array(layout.limits)
-        self._fastest: Floats = np.array(layout.fastest)
+    def __init__(self, robot: RobotSpec) -> None:
+        self.ids = robot.ids
+        self.models = robot.models
+        self.profiles = profile_velocities(robot)
+        self.in_order_of_release = robot.in_order_of_release
+        self._shapes = robot.command_shapes()
+        self._sign: Floats = np.array(robot.directions, float)
+        self._zero: Floats = np.array(robot.zeros, float)
+        self._limit: Floats = np.array(robot.limits)
+        self._fastest: Floats = np.array(robot.fastest)
+        self.turning: Ints = np.flatnonzero(np.isinf(self._limit))
 
     def ticks(self, command: JointCommand) -> Ints:
-        """Goal positions [ticks] of a command of one robot, shape (19,).
+        """Goal positions [ticks] of a command of one robot, shape (n,).
 
         Raises:
             CommandError: It is not of one robot, not finite, or beyond a limit or what servos
                 count. It is refused as a whole.
         """
-        angles = _angles(command)
+        angles = self._angles(command)
         with np.errstate(over="ignore"):  # infinite then, and refused
             ticks = np.rint(self.positions(angles))
         turning = np.isinf(self._limit)
@@ -64,41 +65,42 @@ class Joints:
         return ticks.astype(np.int64)
 
     def reach(self, time: float) -> Floats:
-        """Ticks that each joint may go in a time [s], shape (19,)."""
+        """Ticks that each joint may go in a time [s], shape (n,)."""
         return self._fastest * time / _STEP
 
     def align(self, ticks: Ints | Floats, command: JointCommand) -> None:
         """Count whole turns of legs so that a command is nearest to where they stand [ticks]."""
-        away = (ticks - self.ticks(command))[YAW_COUNT:-2]
-        self._zero[YAW_COUNT:-2] += TICKS_A_TURN * np.rint(away / TICKS_A_TURN)
+        away = (ticks - self.ticks(command))[self.turning]
+        self._zero[self.turning] += TICKS_A_TURN * np.rint(away / TICKS_A_TURN)
 
     def shift(self, at: int, ticks: float) -> None:
         """Count the position of the joint at a place in `ids` from elsewhere by some ticks."""
         self._zero[at] += ticks
 
     def positions(self, angles: Floats) -> Floats:
-        """Positions, not rounded [ticks], of joint angles [rad], both of shape (19,)."""
+        """Positions, not rounded [ticks], of joint angles [rad], both of shape (n,)."""
         return np.asarray(self._zero + self._sign * angles / _STEP)
 
     def command(self, ticks: Ints | Floats) -> JointCommand:
-        """The command of one robot at these positions [ticks], shape (19,)."""
+        """The command of one robot at these positions [ticks], shape (n,)."""
         angles: Floats = (ticks - self._zero) * self._sign * _STEP
-        legs = angles[YAW_COUNT:-2].reshape(1, LINK_COUNT, 2)
-        return JointCommand(yaw=angles[None, :YAW_COUNT], leg=legs, antenna=angles[None, -2:])
+        parts = np.split(angles, np.cumsum([math.prod(shape) for shape in self._shapes.values()]))
+        named = zip(self._shapes.items(), parts, strict=False)
+        return JointCommand(**{name: part.reshape(shape) for (name, shape), part in named})
 
+    def plain(self, command: JointCommand) -> JointCommand:
+        """A copy of a command of one robot, which nobody else changes; it may have been anything.
 
-def plain(command: JointCommand) -> JointCommand:
-    """A copy of the command of one robot, which nobody else changes; it may have been anything.
+        Raises:
+            CommandError: It is no command of one robot.
+        """
+        shapes = self._shapes.items()
+        return JointCommand(**{name: _part(command, name, shape) for name, shape in shapes})
 
-    Raises:
-        CommandError: It is not of one robot.
-    """
-    return JointCommand(**{name: _part(command, name, shape) for name, shape in _SHAPES.items()})
-
-
-def _angles(command: JointCommand) -> Floats:
-    """Its joint angles [rad], shape (19,)."""
-    return np.concatenate([_part(command, name, shape).ravel() for name, shape in _SHAPES.items()])
+    def _angles(self, command: JointCommand) -> Floats:
+        """Its joint angles [rad], shape (n,)."""
+        parts = (_part(command, name, shape) for name, shape in self._shapes.items())
+        return np.concatenate([part.ravel() for part in parts])
 
 
 def _part(command: JointCommand, name: str, shape: tuple[int, ...]) -> Floats:
@@ -111,7 +113,5 @@ def _part(command: JointCommand, name: str, shape: tuple[int, ...]) -> Floats:
             f"expected a JointCommand with numbers in {name}, found a {type(command).__name__}"
         ) from None
     if part.shape != shape:
-        raise CommandError(
-            f"expected {name} of shape {shape} for 19 joints, found shape {part.shape}"
-        )
+        raise CommandError(f"expected {name} of shape {shape}, found shape {part.shape}")
     return part

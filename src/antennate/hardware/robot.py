@@ -13,7 +13,7 @@ from antennate.params import (
     SupervisorParams,
     number,
 )
-from antennate.robots.layout import LayoutParams
+from antennate.robots.spec import RobotSpec
 
 
 class RobotConfig(Params):
@@ -31,7 +31,7 @@ class RobotConfig(Params):
         "assumed: that of the calibration file",
         "name of the film; 16 hexadecimal digits name the board it is soldered to",
     )
-    layout: LayoutParams = LayoutParams()
+    robot: RobotSpec = RobotSpec()
     control: ControlParams = ControlParams()
     limits: SupervisorParams = SupervisorParams()
     network: NetworkParams = NetworkParams()

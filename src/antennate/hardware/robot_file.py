@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TypeVar
 
-from antennate.hardware.doctor.checkup import DoctorConfig
+from antennate.hardware.doctor.config import DoctorConfig
 from antennate.hardware.driving.config import DriveConfig
 from antennate.hardware.esp32.recorder import RecordConfig
 from antennate.hardware.robot import RobotConfig

@@ -1,9 +1,9 @@
 """How servos have to be set before any of them gets torque: one rule for drive and doctor.
 
-Drive Mode has to be 0: the layout's `directions` mirror joints, and bit 3 would let a goal bring
+Drive Mode has to be 0: the robot's `directions` mirror joints, and bit 3 would let a goal bring
 torque. With a homing offset a watchdog makes a servo in extended mode move, and zeros are not what
-the layout says. Position and velocity limits have to leave room for what is asked for; legs are in
-extended mode, where position limits do not act.
+its description says. Position and velocity limits have to leave room for what is asked for; rolling
+legs are in extended mode, where position limits do not act.
 """
 
 from __future__ import annotations
@@ -12,10 +12,10 @@ import math
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from antennate.hardware import roster
 from antennate.hardware.dynamixel.tables import POSITION_UNIT, TABLES, VELOCITY_UNIT
 from antennate.params import BusParams
-from antennate.robots.layout import TICKS_A_TURN, LayoutParams
+from antennate.robots.servos import TICKS_A_TURN
+from antennate.robots.spec import RobotSpec
 
 _ROOM = BusParams().profile_room
 
@@ -46,38 +46,38 @@ class Setting(NamedTuple):
 Settings = Mapping[str, Mapping[int, Setting]]
 
 
-def settings(layout: LayoutParams) -> Settings:
+def settings(robot: RobotSpec) -> Settings:
     """By register and id, in the order in which they are set."""
-    zero = dict.fromkeys(layout.ids, Setting(0, 0, 0))
-    low, high = _position_limits(layout)
+    zero = dict.fromkeys(robot.ids, Setting(0, 0, 0))
+    low, high = _position_limits(robot)
     return {
-        "operating_mode": {i: Setting(m, m, m) for i, m in roster.modes(layout).items()},
+        "operating_mode": {i: Setting(m, m, m) for i, m in robot.modes.items()},
         "drive_mode": zero,
         "homing_offset": zero,
-        "velocity_limit": _velocity_limits(layout),
+        "velocity_limit": _velocity_limits(robot),
         "max_position_limit": high,
         "min_position_limit": low,
     }
 
 
-def profile_velocities(layout: LayoutParams) -> dict[int, int]:
+def profile_velocities(robot: RobotSpec) -> dict[int, int]:
     """Profile velocity by id [0.229 rev/min]: `fastest` of its group with some room."""
-    models = roster.models(layout)
+    models = robot.models
     return {
         servo: min(math.ceil(_ROOM * fastest / VELOCITY_UNIT), _default_limit(models[servo]))
-        for servo, fastest in zip(layout.ids, layout.fastest, strict=True)
+        for servo, fastest in zip(robot.ids, robot.fastest, strict=True)
     }
 
 
-def wrong(known: Mapping[str, Mapping[int, int]], layout: LayoutParams) -> list[str]:
+def wrong(known: Mapping[str, Mapping[int, int]], robot: RobotSpec) -> list[str]:
     """What is not as it has to be, in words.
 
     Args:
         known: Values by register and id.
-        layout: The servos.
+        robot: The robot.
     """
     found: dict[str, list[int]] = {}
-    for name, wanted in settings(layout).items():
+    for name, wanted in settings(robot).items():
         for servo, setting in wanted.items():
             value = known[name][servo]
             if not setting.allows(value):
@@ -90,21 +90,21 @@ def _default_limit(model: int) -> int:
     return TABLES[model]["velocity_limit"].default or 0
 
 
-def _velocity_limits(layout: LayoutParams) -> dict[int, Setting]:
+def _velocity_limits(robot: RobotSpec) -> dict[int, Setting]:
     """A servo refuses a profile that is faster than its velocity limit."""
     found: dict[int, Setting] = {}
-    models = roster.models(layout)
-    for servo, least in profile_velocities(layout).items():
+    models = robot.models
+    for servo, least in profile_velocities(robot).items():
         register = TABLES[models[servo]]["velocity_limit"]
         found[servo] = Setting(least, register.high or 0, _default_limit(models[servo]))
     return found
 
 
-def _position_limits(layout: LayoutParams) -> tuple[dict[int, Setting], dict[int, Setting]]:
+def _position_limits(robot: RobotSpec) -> tuple[dict[int, Setting], dict[int, Setting]]:
     """Smallest and largest position limits, of joints that do not turn without end."""
     low: dict[int, Setting] = {}
     high: dict[int, Setting] = {}
-    for servo, zero, limit in zip(layout.ids, layout.zeros, layout.limits, strict=True):
+    for servo, zero, limit in zip(robot.ids, robot.zeros, robot.limits, strict=True):
         if math.isfinite(limit):
             reach, last = limit / POSITION_UNIT, TICKS_A_TURN - 1
             low[servo] = Setting(0, max(round(zero - reach), 0), 0)

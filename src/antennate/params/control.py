@@ -1,4 +1,4 @@
-"""Everything in front of the wall: from counts to joint targets."""
+"""Parameters of the controllers: from counts to joint targets."""
 
 from __future__ import annotations
 
@@ -225,7 +225,7 @@ class EscapeParams(Params):
     reverse_time: float = number(
         2.2,
         "s",
-        "fitted: study of the closed arm on 60 tuning tunnels; two thirds of the body length",
+        "fitted: study of the `closed` on 60 tuning tunnels; two thirds of the body length",
         "time to back off",
         gt=0,
         le=30,
@@ -233,7 +233,7 @@ class EscapeParams(Params):
     turn_time: float = number(
         1.3,
         "s",
-        "fitted: study of the closed arm on 60 tuning tunnels; about 60 deg at the offset below",
+        "fitted: study of the `closed` on 60 tuning tunnels; about 60 deg at the offset below",
         "time of the first turn",
         gt=0,
         le=30,
@@ -261,7 +261,7 @@ class EscapeParams(Params):
     second_turn: float = number(
         1.5,
         "1",
-        "fitted: closed arm on 200 tuning tunnels (seeds 31 and 32): 192 successes, 188 with 2.0",
+        "fitted: `closed` on 200 tuning tunnels (seeds 31 and 32): 192 successes, 188 with 2.0",
         "length of a turn the other way, in first turns",
         gt=0,
         le=5,
@@ -300,7 +300,7 @@ class EscapeParams(Params):
 
 
 class ControlParams(Params):
-    """Everything in front of the wall."""
+    """Conditioning, contact rule, maneuvers and gait of the controllers."""
 
     rate: float = number(
         100.0, "Hz", "paper: about 100 Hz over serial", "control ticks per second", gt=0, le=1000

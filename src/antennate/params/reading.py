@@ -84,6 +84,18 @@ def read_file(path: Path, model: type[Config]) -> Config:
         raise ConfigError(f"{path}: {describe(error, model)}") from None
 
 
+def from_values(model: type[Config], values: Mapping[str, Any]) -> Config:
+    """A configuration from values given in Python.
+
+    Raises:
+        ConfigError: A value is unknown, of the wrong type or out of bounds.
+    """
+    try:
+        return model.model_validate(dict(values))
+    except ValidationError as error:
+        raise ConfigError(describe(error, model)) from None
+
+
 def dotted(path: Place) -> str:
     """`("tunnel", "segments", 0)` as `tunnel.segments[0]`."""
     text = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in path)

@@ -182,25 +182,6 @@ class BusParams(Params):
         gt=0,
         le=1,
     )
-    patient_gap: float = number(
-        0.05,
-        "s",
-        "assumed: three times the 16 ms of a slow adapter",
-        "longest silence before an answer at an examination",
-        gt=0,
-        le=1,
-    )
-    patient_budget: float = number(
-        0.25,
-        "s",
-        "assumed: 19 slow answers of 16 ms come in lumps",
-        "time for one reading of all at an examination",
-        gt=0,
-        le=1,
-    )
-    patient_tries: int = number(
-        3, "1", "assumed: as pings", "readings of all at an examination", ge=1, le=100
-    )
 
 
 class BoardParams(Params):
@@ -256,12 +237,4 @@ class BoardParams(Params):
         "how much earlier than expected a sample may arrive; after a lie, also how much later",
         gt=0,
         le=1,
-    )
-    misplaced: float = number(
-        0.3,
-        "s",
-        "assumed: thirty samples",
-        "time in which an antenna board on the port of the bus is recognised",
-        gt=0,
-        le=10,
     )

@@ -1,4 +1,4 @@
-"""One antenna: a chain of springs with a film along its base."""
+"""One antenna: a chain of springs with a flex sensor along its base."""
 
 from __future__ import annotations
 
@@ -8,22 +8,31 @@ from typing import Annotated
 from pydantic import Field
 
 from antennate.params.base import Params, number
-from antennate.robots.anatomy import ANTENNA_LINK_COUNT
+from antennate.robots.sensor import SensorParams
 
 _Coils = Annotated[float, Field(gt=0)]
 
 N_MM_PER_DEG = 1e-3 * 180.0 / math.pi
 """One N·mm/deg in N·m/rad."""
+MOST_HINGES = 100
+"""More hinges than this are no chain of springs any more."""
+BASE = "base"
+"""Name of the joint that the base servo turns."""
 
 
-class AntennaParams(Params):
-    """One antenna: a chain of six torsion springs with a film sensor along its base."""
+class AntennaSpec(Params):
+    """One antenna: a chain of torsion springs with a flex sensor along its base.
 
-    active_coils: tuple[_Coils, _Coils, _Coils, _Coils, _Coils, _Coils] = number(
+    It has as many hinges, and links of equal length, as `active_coils` has entries.
+    """
+
+    active_coils: tuple[_Coils, ...] = number(
         (3.0, 6.0, 6.0, 9.0, 9.0, 9.0),
         "1",
         "paper: one spring of 3, two of 6 and three of 9 active coils, stiff base to soft tip",
-        "active coils of each spring, base to tip",
+        "active coils of each spring, base to tip; as many entries as the antenna has hinges",
+        min_length=1,
+        max_length=MOST_HINGES,
     )
     three_coil_stiffness_n_mm_per_deg: float = number(
         0.274,
@@ -96,18 +105,54 @@ class AntennaParams(Params):
         0.3, "1", "assumed: printed plastic on paper", "friction against obstacles", ge=0, le=2
     )
 
+    base_stiffness: float = number(
+        2.0,
+        "N·m/rad",
+        "assumed: a hundred times the stiffest spring, so that the base holds",
+        "stiffness of the base servo",
+        gt=0,
+    )
+    base_damping: float = number(
+        0.1, "N·m·s/rad", "assumed: settles within 0.05 s", "damping of the base servo", ge=0
+    )
+    base_armature: float = number(
+        1e-4, "kg·m²", "assumed: below that of the servo; it is driven stiffly", "its inertia", ge=0
+    )
+    sensor: SensorParams = SensorParams()
+
+    @property
+    def hinges(self) -> int:
+        """Number of hinges, which is also the number of links."""
+        return len(self.active_coils)
+
+    @property
+    def hinge_names(self) -> tuple[str, ...]:
+        """Names of hinges and links, base to tip."""
+        return tuple(f"hinge{i}" for i in range(self.hinges))
+
     @property
     def link_length(self) -> float:
         """Length of one link [m]."""
-        return self.length / ANTENNA_LINK_COUNT
+        return self.length / self.hinges
+
+    @property
+    def mass(self) -> float:
+        """Mass of the whole antenna [kg]."""
+        return self.hinges * self.link_mass + self.base_mass
+
+    @property
+    def sensed_hinges(self) -> int:
+        """Number of hinges, from the base, that lie under the flex sensor."""
+        reached = math.ceil(self.sensor.active_length / self.link_length - 1e-9)
+        return min(self.hinges, reached)
 
     def spring_stiffness(self) -> tuple[float, ...]:
-        """Stiffness of the six springs alone, base to tip [N·m/rad]."""
+        """Stiffness of the springs alone, base to tip [N·m/rad]."""
         per_coil = 3.0 * self.three_coil_stiffness_n_mm_per_deg * N_MM_PER_DEG
         return tuple(per_coil / coils for coils in self.active_coils)
 
-    def hinge_stiffness(self, covered: int) -> tuple[float, ...]:
-        """Stiffness of the six hinges with the film over the first `covered` of them [N·m/rad]."""
+    def hinge_stiffness(self) -> tuple[float, ...]:
+        """Stiffness of the hinges, stiffened by the sensor where it lies [N·m/rad]."""
         film = self.film_stiffness_n_mm_per_deg * N_MM_PER_DEG
         springs = self.spring_stiffness()
-        return tuple(k + film * (i < covered) for i, k in enumerate(springs))
+        return tuple(k + film * (i < self.sensed_hinges) for i, k in enumerate(springs))

@@ -8,8 +8,6 @@ from typing import Literal
 from pydantic import model_validator
 
 from antennate.params.base import Params, number
-from antennate.robots.anatomy import ANTENNA_LINK_COUNT
-from antennate.robots.antenna import AntennaParams
 
 CONVERTER_SLOPE = 196602 / 65536 / 4096
 """Volts per count and volt of reference: line fit at 11 dB, ESP-IDF adc_cali_line_fitting.c."""
@@ -34,7 +32,7 @@ CONVERTER_AT_1_2_V = (
 
 
 class SensorParams(Params):
-    """Flex film, voltage divider and the ESP32's converter."""
+    """Flex sensor, voltage divider and the ESP32's converter."""
 
     active_length: float = number(
         0.0953, "m", "datasheet: Spectra Symbol FS-L-0095-103, active length", "sensed length", gt=0
@@ -144,11 +142,6 @@ class SensorParams(Params):
     rate: float = number(
         100.0, "Hz", "paper: about 100 Hz over serial", "readings per second", gt=0, le=1000
     )
-
-    def covered_hinges(self, antenna: AntennaParams) -> int:
-        """Number of hinges, from the base, that lie under the film."""
-        pitch = antenna.link_length
-        return min(ANTENNA_LINK_COUNT, math.ceil(self.active_length / pitch - 1e-9))
 
     @property
     def noise_counts(self) -> float:

@@ -1,4 +1,4 @@
-"""One antenna as a part: a base servo hinge and six sprung links, along x, bending about z.
+"""One antenna as a part: a base servo hinge and a chain of sprung links, along x, bending about z.
 
 Positive angles bend towards the tail once the part is mounted: on the left as it is, on the right
 turned half about its own axis, which mirrors it.
@@ -8,35 +8,27 @@ from __future__ import annotations
 
 import mujoco
 
-from antennate.robots.anatomy import ANTENNA_BASE, ANTENNA_HINGES
-from antennate.robots.antenna import AntennaParams
-from antennate.robots.sensor import SensorParams
+from antennate.robots.antenna import BASE, AntennaSpec
 from antennate.sim import layers
 
-_BASE_STIFFNESS = 2.0
-"""Position gain of the base servo [N·m/rad]: a hundred times the stiffest spring."""
 
-
-def build(params: AntennaParams, sensor: SensorParams) -> mujoco.MjSpec:
-    """The part as an uncompiled spec: bodies `base` and `link0..5`, actuator `base`."""
+def build(params: AntennaSpec) -> mujoco.MjSpec:
+    """The part as an uncompiled spec: bodies `base`, `hinge0` and so on, actuator `base`."""
     spec = mujoco.MjSpec()
     spec.compiler.degree = False
-    base = spec.worldbody.add_body(name=ANTENNA_BASE)
+    base = spec.worldbody.add_body(name=BASE)
     base.add_joint(
-        name=ANTENNA_BASE,
+        name=BASE,
         type=mujoco.mjtJoint.mjJNT_HINGE,
         axis=[0, 0, 1],
-        damping=0.05 * _BASE_STIFFNESS,
-        armature=1e-4,
+        damping=params.base_damping,
+        armature=params.base_armature,
     )
-    servo = spec.add_actuator(
-        name=ANTENNA_BASE, trntype=mujoco.mjtTrn.mjTRN_JOINT, target=ANTENNA_BASE
-    )
-    servo.set_to_position(kp=_BASE_STIFFNESS)
+    servo = spec.add_actuator(name=BASE, trntype=mujoco.mjtTrn.mjTRN_JOINT, target=BASE)
+    servo.set_to_position(kp=params.base_stiffness)
 
-    stiffness = params.hinge_stiffness(sensor.covered_hinges(params))
     parent, where = base, [0.0, 0.0, 0.0]
-    for name, k in zip(ANTENNA_HINGES, stiffness, strict=True):
+    for name, k in zip(params.hinge_names, params.hinge_stiffness(), strict=True):
         parent = parent.add_body(name=name, pos=where)
         parent.add_joint(
             name=name,

@@ -16,9 +16,7 @@ import numpy as np
 
 from antennate.errors import SimulationError
 from antennate.params import PhysicsParams
-from antennate.robots.anatomy import ANTENNA_BASE, ANTENNA_HINGES
-from antennate.robots.antenna import AntennaParams
-from antennate.robots.sensor import SensorParams
+from antennate.robots.antenna import BASE, AntennaSpec
 from antennate.sim import antenna_part, layers
 from antennate.sim.world import new_spec
 from antennate.types import Floats, Ints
@@ -34,6 +32,8 @@ _SPEED_LIMIT = 1e4
 """No coordinate of a sound bench moves faster [m/s or rad/s]."""
 _ANGLE_LIMIT = 6.3
 """No hinge of a sound bench turns farther [rad]."""
+_WRENCH = 6
+"""Force and torque, as the engine gives them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,8 +58,7 @@ class Bar:
 
 def compile_bench(
     physics: PhysicsParams,
-    antenna: AntennaParams,
-    sensor: SensorParams,
+    antenna: AntennaSpec,
     obstacles: Sequence[Ball | Bar] = (),
     gravity: tuple[float, float] = (0.0, 0.0),
     probe_radius: float | None = None,
@@ -69,7 +68,6 @@ def compile_bench(
     Args:
         physics: Numerics; contacts take `contact_time`.
         antenna: The antenna; its friction holds against every obstacle.
-        sensor: Decides which hinges the film stiffens.
         obstacles: What stands there.
         gravity: Gravity in the plane [m/s²].
         probe_radius: Radius of a rod that moves on slides of its own [m]; none without.
@@ -85,7 +83,7 @@ def compile_bench(
             type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[probe_radius, 0, 0], **_OBSTACLE
         )
     frame = carriage.add_frame()
-    spec.attach(antenna_part.build(antenna, sensor), frame=frame, prefix=PREFIX)
+    spec.attach(antenna_part.build(antenna), frame=frame, prefix=PREFIX)
     for geom in spec.geoms:
         geom.solref[0] = physics.contact_time
         geom.solimp[:3] = [0.95, 0.99, 0.0005]
@@ -140,17 +138,17 @@ class Bench:
         model: The compiled model; `data` its state.
     """
 
-    def __init__(self, model: mujoco.MjModel, sensed_hinges: int) -> None:
+    def __init__(self, model: mujoco.MjModel, antenna: AntennaSpec) -> None:
         self.model = model
         self.data = mujoco.MjData(model)
-        names = [PREFIX + name for name in ANTENNA_HINGES]
+        names = [PREFIX + name for name in antenna.hinge_names]
         self._slides = self._addresses(_SLIDES)
-        self._base = self._addresses([PREFIX + ANTENNA_BASE])
+        self._base = self._addresses([PREFIX + BASE])
         self._hinges = self._addresses(names)
-        self._sensed = sensed_hinges
+        self._sensed = antenna.sensed_hinges
         self._links: Ints = np.array([model.body(name).id for name in names])
         self._end = 2.0 * float(model.geom(names[-1]).pos[0])
-        self._controls = self._actuators(*_SLIDES, PREFIX + ANTENNA_BASE)
+        self._controls = self._actuators(*_SLIDES, PREFIX + BASE)
         has_probe = any(model.body(i).name == "probe" for i in range(model.nbody))
         self._probe = self._addresses(_PROBE) if has_probe else None
         self._probe_controls = self._actuators(*_PROBE) if has_probe else None
@@ -248,7 +246,7 @@ class Bench:
             )
 
     def hinges(self) -> Floats:
-        """Angles of the six hinges [rad], shape (6,)."""
+        """Angles of the n hinges [rad], shape (n,)."""
         return self.data.qpos[self._hinges]
 
     def flex(self) -> float:
@@ -264,7 +262,7 @@ class Bench:
         return self.data.qpos[self._slides]
 
     def joints(self) -> Floats:
-        """Positions of the six hinges and the tip [m], shape (7, 2)."""
+        """Positions of the n hinges and the tip [m], shape (n + 1, 2)."""
         tip = self._end * self.data.xmat[self._links[-1]].reshape(3, 3)[:2, 0]
         origins = self.data.xpos[self._links, :2]
         return np.vstack([origins, origins[-1] + tip])
@@ -277,7 +275,7 @@ class Bench:
         """Force of all obstacles on the antenna in the last physics step [N], shape (2,)."""
         data = self.data
         total = np.zeros(2)
-        wrench = np.zeros(6)
+        wrench = np.zeros(_WRENCH)
         for i in range(data.ncon):
             mujoco.mj_contactForce(self.model, data, i, wrench)
             force = data.contact.frame[i].reshape(3, 3).T @ wrench[:3]

@@ -1,49 +1,67 @@
-"""The robot as a part: six links, five yaw and five locked pitch joints, twelve O-legs, antennae.
+"""The robot as a part: links with yaw and pitch joints between them, legs, antennae.
 
 The head (link 0) carries the free joint and looks along +x; every further link hangs behind the one
-before. A link is a spine along x and a cross-beam along y that houses the two leg servos; an O-leg
-is a crowned ring whose centre sits off its axle.
+before. A link is a spine along x and a cross-beam along y that houses the two leg servos. The foot
+of a leg is a crowned ring; that of a rolling leg sits off its axle.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from typing import Any
 
 import mujoco
 
-from antennate.robots.anatomy import (
-    ANTENNA_PREFIXES,
-    LEGS,
-    LINKS,
-    PITCH_JOINTS,
-    SIDE_SIGN,
-    YAW_JOINTS,
-)
-from antennate.robots.body import RobotParams, ServoParams
+from antennate.robots.servos import ServoParams
+from antennate.robots.sides import SIDE_SIGN, SIDES
+from antennate.robots.spec import ANTENNA_PREFIXES, RobotSpec
 from antennate.sim import antenna_part as antenna
 from antennate.sim import layers
 
+_YAW, _PITCH = (0.0, 0.0, 1.0), (0.0, 1.0, 0.0)
 
-def axle_height(params: RobotParams) -> float:
+
+def axle_height(params: RobotSpec) -> float:
     """Height of the leg axles with a leg at mid-stance [m]."""
     return params.leg_radius + params.leg_eccentricity
 
 
-def build(params: RobotParams) -> mujoco.MjSpec:
+def build(params: RobotSpec) -> mujoco.MjSpec:
     """The part as an uncompiled spec whose first body is the head, axle height at z = 0."""
     spec = mujoco.MjSpec()
     spec.compiler.degree = False
     parent = spec.worldbody
-    for i, name in enumerate(LINKS):
+    for i, name in enumerate(params.link_names):
         link = parent.add_body(name=name, pos=[-params.link_pitch if i else 0.0, 0.0, 0.0])
         if i:
             _add_link_joints(spec, link, i, params)
         _add_link_shape(link, params)
         for s, sign in enumerate(SIDE_SIGN):
-            _add_leg(spec, link, LEGS[2 * i + s], sign, params)
+            _add_leg(spec, link, params.leg_names[len(SIDES) * i + s], sign, params)
         parent = link
     _attach_antennae(spec, params)
     return spec
+
+
+def _add_hinge(
+    body: mujoco.MjsBody,
+    name: str,
+    axis: Sequence[float],
+    at: Sequence[float],
+    servo: ServoParams,
+    **more: Any,
+) -> None:
+    """A hinge with the friction and the inertia of its servo."""
+    body.add_joint(
+        name=name,
+        type=mujoco.mjtJoint.mjJNT_HINGE,
+        axis=axis,
+        pos=at,
+        damping=servo.damping,
+        armature=servo.armature,
+        **more,
+    )
 
 
 def _add_servo(spec: mujoco.MjSpec, joint: str, servo: ServoParams) -> None:
@@ -54,31 +72,22 @@ def _add_servo(spec: mujoco.MjSpec, joint: str, servo: ServoParams) -> None:
     actuator.forcerange = [-servo.stall_torque, servo.stall_torque]
 
 
-def _add_link_joints(
-    spec: mujoco.MjSpec, link: mujoco.MjsBody, i: int, params: RobotParams
-) -> None:
-    hinge_at = [params.link_pitch / 2, 0.0, 0.0]
-    link.add_joint(
-        name=YAW_JOINTS[i - 1],
-        type=mujoco.mjtJoint.mjJNT_HINGE,
-        axis=[0, 0, 1],
-        pos=hinge_at,
-        damping=params.servo.damping,
-        armature=params.servo.armature,
-    )
-    _add_servo(spec, YAW_JOINTS[i - 1], params.servo)
-    link.add_joint(
-        name=PITCH_JOINTS[i - 1],
-        type=mujoco.mjtJoint.mjJNT_HINGE,
-        axis=[0, 1, 0],
-        pos=hinge_at,
-        stiffness=params.pitch_stiffness,
-        damping=params.servo.damping,
-        armature=params.servo.armature,
-    )
+def _add_link_joints(spec: mujoco.MjSpec, link: mujoco.MjsBody, i: int, params: RobotSpec) -> None:
+    """A yaw joint with its servo, and a pitch joint that is locked or has one too."""
+    at = [params.link_pitch / 2, 0.0, 0.0]
+    yaw, pitch = params.yaw_names[i - 1], params.pitch_names[i - 1]
+    servo = params.servos.of(params.yaw.servo)
+    _add_hinge(link, yaw, _YAW, at, servo)
+    _add_servo(spec, yaw, servo)
+    servo = params.servos.of(params.pitch.servo)
+    if params.pitch_count:
+        _add_hinge(link, pitch, _PITCH, at, servo)
+        _add_servo(spec, pitch, servo)
+    else:
+        _add_hinge(link, pitch, _PITCH, at, servo, stiffness=params.pitch.stiffness)
 
 
-def _add_link_shape(link: mujoco.MjsBody, params: RobotParams) -> None:
+def _add_link_shape(link: mujoco.MjsBody, params: RobotSpec) -> None:
     half_spine = max(params.link_pitch / 2 - params.body_radius, 1e-3)
     half_beam = max(params.width / 2 - params.leg_width - params.body_radius, 1e-3)
     for half, along_x in ((half_spine, True), (half_beam, False)):
@@ -97,21 +106,19 @@ def _add_link_shape(link: mujoco.MjsBody, params: RobotParams) -> None:
 
 
 def _add_leg(
-    spec: mujoco.MjSpec, link: mujoco.MjsBody, name: str, sign: float, params: RobotParams
+    spec: mujoco.MjSpec, link: mujoco.MjsBody, name: str, sign: float, params: RobotSpec
 ) -> None:
+    """A rolling leg turns about its axle; a lifting one about the spine, upwards if positive."""
     lateral = sign * (params.width - params.leg_width) / 2
-    leg = link.add_body(name=name, pos=[0.0, lateral, 0.0])
-    leg.add_joint(
-        name=name,
-        type=mujoco.mjtJoint.mjJNT_HINGE,
-        axis=[0, 1, 0],
-        damping=params.servo.damping,
-        armature=params.servo.armature,
-    )
+    lifting = params.legs.kind == "lifting"
+    hip = sign * params.body_radius if lifting else lateral
+    servo = params.servos.of(params.legs.servo)
+    leg = link.add_body(name=name, pos=[0.0, hip, 0.0])
+    _add_hinge(leg, name, [sign, 0.0, 0.0] if lifting else _PITCH, [0.0, 0.0, 0.0], servo)
     leg.add_geom(
         name=name,
         type=mujoco.mjtGeom.mjGEOM_ELLIPSOID,
-        pos=[0.0, 0.0, -params.leg_eccentricity],
+        pos=[0.0, lateral - hip, -params.leg_eccentricity],
         size=[params.leg_radius, params.leg_width / 2, params.leg_radius],
         mass=params.leg_mass,
         friction=[params.leg_friction, 0, 0],
@@ -120,12 +127,12 @@ def _add_leg(
         contype=layers.LEG,
         conaffinity=layers.FLOOR | layers.OBSTACLE,
     )
-    _add_servo(spec, name, params.servo)
+    _add_servo(spec, name, servo)
 
 
-def _attach_antennae(spec: mujoco.MjSpec, params: RobotParams) -> None:
-    head = spec.body(LINKS[0])
-    part = antenna.build(params.antenna, params.sensor)
+def _attach_antennae(spec: mujoco.MjSpec, params: RobotSpec) -> None:
+    head = spec.body(params.link_names[0])
+    part = antenna.build(params.antenna)
     for prefix, sign in zip(ANTENNA_PREFIXES, SIDE_SIGN, strict=True):
         heading = sign * params.antenna.base_angle
         half = heading / 2
@@ -136,4 +143,4 @@ def _attach_antennae(spec: mujoco.MjSpec, params: RobotParams) -> None:
             pos=[params.link_pitch / 2, sign * params.antenna.base_spacing / 2, 0.0], quat=turn
         )
         spec.attach(part, frame=frame, prefix=prefix)
-        part = antenna.build(params.antenna, params.sensor)
+        part = antenna.build(params.antenna)

@@ -1,7 +1,7 @@
-"""The simulated body: a batch of worlds behind the wall, stepped in lockstep.
+"""The simulated robot: a batch of worlds stepped in lockstep.
 
 A row holds one world or none. An empty row, and one whose simulation failed, reads NaN, which the
-control takes for UNKNOWN. Rows never influence one another.
+controller takes for UNKNOWN. Rows never influence one another.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import numpy as np
 from antennate.antenna.sensor import SensorChain, reading_noise
 from antennate.errors import ConfigError, SimulationError
 from antennate.params import VariationParams
-from antennate.robots.sensor import SensorParams
+from antennate.robots.spec import RobotSpec
 from antennate.sim.world import World
 from antennate.types import AntennaFrame, Floats, JointCommand
 
@@ -25,17 +25,17 @@ class Disturbance:
         self,
         rng: np.random.Generator,
         variation: VariationParams,
-        params: SensorParams,
-        leg_friction: float,
+        robot: RobotSpec,
         period: float,
     ) -> None:
         self._rng = rng
-        self._params = params
+        self._params = robot.antenna.sensor
+        self._legs = robot.leg_count
         self._variation = variation
-        self._friction = leg_friction
+        self._friction = robot.leg_friction
         self._slip_ticks = max(1, round(variation.slip_time / period))
         self._noise = np.zeros((0, 2))
-        self.joint_bias: Floats = rng.normal(0.0, variation.joint_bias, 5)
+        self.joint_bias: Floats = rng.normal(0.0, variation.joint_bias, robot.yaw_count)
 
     def noise(self, tick: int) -> Floats:
         """Reading noise of one tick [counts], shape (2,)."""
@@ -45,30 +45,33 @@ class Disturbance:
         return self._noise[at]
 
     def leg_friction(self, tick: int) -> Floats | None:
-        """New friction of the 12 legs where this tick draws one, else None."""
+        """New friction of all legs where this tick draws one, else None."""
         if tick % self._slip_ticks:
             return None
-        factor = np.exp(self._rng.normal(0.0, self._variation.slip_log_sd, 12))
+        factor = np.exp(self._rng.normal(0.0, self._variation.slip_log_sd, self._legs))
         return np.clip(self._friction * factor, 0.02, 2.0)
 
 
 class _Row:
-    """One world of the batch with its chance and its tick count."""
+    """One world of the batch with its disturbance and its tick count."""
+
+    __slots__ = ("chance", "commanded", "failure", "hinges", "tick", "world")
 
     def __init__(self, world: World, chance: Disturbance) -> None:
         self.world = world
         self.chance = chance
+        self.hinges: Floats = np.zeros((2, world.sensed_hinges))
         self.tick = 0
         self.commanded = False
         self.failure: SimulationError | None = None
 
 
 class SimRobot:
-    """B worlds behind the wall; also their clock.
+    """B simulated robots; also their clock.
 
     Args:
         batch: Number of rows B.
-        params: Sensor chain of every row.
+        robot: The robot of every row.
         period: Control period [s]; a whole number of physics steps.
         timestep: Physics step [s].
 
@@ -76,9 +79,11 @@ class SimRobot:
         ConfigError: The period is not a whole number of physics steps.
     """
 
-    def __init__(self, batch: int, params: SensorParams, period: float, timestep: float) -> None:
-        self._rows: list[_Row | None] = [None] * batch
-        self._sensors = SensorChain(params, (batch, 2), period)
+    def __init__(self, batch: int, robot: RobotSpec, period: float, timestep: float) -> None:
+        self._rows: dict[int, _Row] = {}
+        self._batch = batch
+        self._yaws = robot.yaw_count
+        self._sensors = SensorChain(robot.antenna.sensor, (batch, 2), period)
         self._period = period
         self._substeps = round(period / timestep)
         if abs(self._substeps * timestep - period) > 1e-9:
@@ -93,7 +98,7 @@ class SimRobot:
 
     @property
     def clock(self) -> SimRobot:
-        """The body itself keeps the time."""
+        """The robot itself keeps the time."""
         return self
 
     def load(self, row: int, world: World, chance: Disturbance) -> None:
@@ -104,19 +109,18 @@ class SimRobot:
 
     def unload(self, row: int) -> None:
         """Empty a row."""
-        self._rows[row] = None
+        self._rows.pop(row, None)
         self._missing[row] = True
 
     def world(self, row: int) -> World:
         """The world in a row."""
-        held = self._rows[row]
-        if held is None:
+        if row not in self._rows:
             raise IndexError(f"row {row} holds no world")
-        return held.world
+        return self._rows[row].world
 
     def failure(self, row: int) -> SimulationError | None:
         """What ended the row's simulation, if anything did."""
-        held = self._rows[row]
+        held = self._rows.get(row)
         return held.failure if held else None
 
     def now(self) -> float:
@@ -125,43 +129,49 @@ class SimRobot:
 
     def read(self) -> AntennaFrame:
         """Sample both sensors of every row."""
-        t = np.full(len(self._rows), np.nan)
-        for i, row in enumerate(self._rows):
-            if row is not None:
-                t[i] = row.world.t
-                self._flex[i] = row.world.flex()
-                self._noise[i] = row.chance.noise(row.tick)
+        t = np.full(self._batch, np.nan)
+        for i, row in self._rows.items():
+            t[i] = row.world.data.time
+            row.world.read_hinges(row.hinges)
+            row.hinges.sum(axis=1, out=self._flex[i])
+            self._noise[i] = row.chance.noise(row.tick)
         counts = self._sensors.step(self._flex, self._noise)
         counts[self._missing] = np.nan
         return AntennaFrame(t=t, counts=counts)
 
     def write(self, command: JointCommand) -> None:
         """Command every row's joints."""
-        batch = len(self._rows)
         drive = np.concatenate(
-            [command.yaw, command.leg.reshape(batch, 12), command.antenna], axis=1
+            [command.yaw, command.leg.reshape(self._batch, -1), command.antenna], axis=1
         )
-        for i, row in enumerate(self._rows):
-            if row is not None and row.failure is None:
-                drive[i, :5] += row.chance.joint_bias
+        finite = bool(np.isfinite(drive).all())
+        for i, row in self._rows.items():
+            if row.failure is None:
+                drive[i, : self._yaws] += row.chance.joint_bias
                 row.commanded = True
-                self._guard(i, row, lambda row=row, i=i: row.world.command(drive[i]))
+                if finite:
+                    row.world.command_finite(drive[i])
+                    continue
+                try:
+                    row.world.command(drive[i])
+                except SimulationError as error:
+                    self._fail(i, row, error)
 
     def sleep_until(self, t: float) -> None:
         """Advance the physics of every row that has been commanded to time t [s]."""
         while self._ticks * self._period < t - 1e-9:
             self._ticks += 1
-            for i, row in enumerate(self._rows):
-                if row is not None and row.commanded and row.failure is None:
+            for i, row in self._rows.items():
+                if row.commanded and row.failure is None:
                     friction = row.chance.leg_friction(row.tick)
                     if friction is not None:
                         row.world.set_leg_friction(friction)
                     row.tick += 1
-                    self._guard(i, row, lambda row=row: row.world.step(self._substeps))
+                    try:
+                        row.world.step(self._substeps)
+                    except SimulationError as error:
+                        self._fail(i, row, error)
 
-    def _guard(self, i: int, row: _Row, action) -> None:
-        try:
-            action()
-        except SimulationError as error:
-            row.failure = error
-            self._missing[i] = True
+    def _fail(self, i: int, row: _Row, error: SimulationError) -> None:
+        row.failure = error
+        self._missing[i] = True

@@ -13,7 +13,7 @@ from typing import Literal
 
 import numpy as np
 
-from antennate.errors import ArenaError
+from antennate.errors import SceneError
 from antennate.params import TouchWallsParams
 from antennate.sim.bench import Ball, Bar
 from antennate.types import Floats
@@ -51,7 +51,7 @@ def outline(walls: TouchWallsParams, kind: WallKind, site: Site) -> list[Floats]
     """Surface lines of a wall, each of shape (n, 2) [m]; for boulders, their centres.
 
     Raises:
-        ArenaError: The wall does not fit into its length.
+        SceneError: The wall does not fit into its length.
     """
     if kind == "boulders":
         return [_boulders(walls, site)]
@@ -72,7 +72,7 @@ def build(walls: TouchWallsParams, kind: WallKind, site: Site, x: float) -> list
     """The obstacles of a wall that begins at x [m].
 
     Raises:
-        ArenaError: The wall does not fit into its length.
+        SceneError: The wall does not fit into its length.
     """
     lines = outline(walls, kind, site)
     if kind == "boulders":
@@ -99,7 +99,7 @@ def _between(kind: str, site: Site, entry_deg: float, middle: list[tuple[float, 
     end = site.length - _ramp(site, last, entry_deg)
     bounds = [begin, *(x for x, _ in middle), end]
     if bounds[1] - begin < _SHORTEST or end - bounds[-2] < _SHORTEST:
-        raise ArenaError(
+        raise SceneError(
             f"wall.{kind}: expected at least {_SHORTEST:g} m of surface between its ends, found "
             f"{min(bounds[1] - begin, end - bounds[-2]):.3g} m; make the wall longer or its ends "
             "steeper"
@@ -131,7 +131,7 @@ def _boulders(walls: TouchWallsParams, site: Site) -> Floats:
     row = walls.boulders
     count = 1 + math.floor((site.length - 2 * row.radius) / row.pitch)
     if count < 2:
-        raise ArenaError(
+        raise SceneError(
             f"wall.boulders: expected room for two spheres, found a pitch of {row.pitch:g} m and a "
             f"radius of {row.radius:g} m on {site.length:g} m"
         )
@@ -143,7 +143,7 @@ def _gapped(walls: TouchWallsParams, site: Site) -> list[Floats]:
     gap = walls.gap
     side = (site.length - gap.width) / 2
     if side < _SHORTEST:
-        raise ArenaError(
+        raise SceneError(
             f"wall.gap.width: expected at most {site.length - 2 * _SHORTEST:g} m on a wall of "
             f"{site.length:g} m, found {gap.width:g} m"
         )
@@ -157,7 +157,7 @@ def _cornered(walls: TouchWallsParams, site: Site) -> Floats:
     run = corner.rise / math.tan(math.radians(corner.turn_deg))
     begin, middle = _ramp(site, site.near, corner.entry_deg), site.length / 2
     if middle - begin < _SHORTEST or middle + run > site.length:
-        raise ArenaError(
+        raise SceneError(
             f"wall.corner: expected a rise of at most "
             f"{(site.length / 2) * math.tan(math.radians(corner.turn_deg)):.3g} m and "
             f"{_SHORTEST:g} m of surface before it on a wall of {site.length:g} m, "

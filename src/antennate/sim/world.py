@@ -12,20 +12,12 @@ import math
 import mujoco
 import numpy as np
 
-from antennate.errors import SimulationError
+from antennate.errors import SceneError, SimulationError, in_one_line
 from antennate.params import PhysicsParams
-from antennate.robots.anatomy import (
-    ANTENNA_BASE,
-    ANTENNA_HINGES,
-    ANTENNA_PREFIXES,
-    LEGS,
-    LINKS,
-    PITCH_JOINTS,
-    YAW_JOINTS,
-)
-from antennate.robots.body import RobotParams
-from antennate.sim import arena, layers
-from antennate.sim import robot_part as robot
+from antennate.robots.spec import ANTENNA_PREFIXES, RobotSpec
+from antennate.sim import layers, robot_part
+from antennate.sim.outline import outline
+from antennate.sim.scenes.scene import SceneInstance, add_floor
 from antennate.types import Floats, Ints
 
 mujoco.set_mju_user_warning(lambda message: None)
@@ -40,6 +32,8 @@ _ANGLE_LIMIT = 6.3
 """Yaw, pitch and antenna joints cannot turn farther [rad]; legs turn without end."""
 _HEIGHT_LIMIT = 0.3
 """A head above or below this left the world [m]."""
+
+_PLANE = int(mujoco.mjtGeom.mjGEOM_PLANE)
 
 
 def new_spec(physics: PhysicsParams) -> mujoco.MjSpec:
@@ -61,20 +55,38 @@ def new_spec(physics: PhysicsParams) -> mujoco.MjSpec:
 
 
 def compile_world(
-    physics: PhysicsParams, params: RobotParams, tunnel: arena.Tunnel | None = None
+    physics: PhysicsParams, robot: RobotSpec, scene: SceneInstance | None = None
 ) -> mujoco.MjModel:
-    """Robot on a floor, inside a tunnel if one is given; the head starts over the origin."""
+    """Robot in a scene, on a bare floor without one; the head is over the origin.
+
+    Raises:
+        SceneError: The engine cannot compile it.
+    """
     spec = new_spec(physics)
-    arena.add_floor(spec)
-    if tunnel is not None:
-        arena.add_tunnel(spec, tunnel)
-    frame = spec.worldbody.add_frame(pos=[0, 0, robot.axle_height(params)])
-    spec.attach(robot.build(params), frame=frame, prefix=PREFIX)
-    spec.body(PREFIX + LINKS[0]).add_freejoint(name=PREFIX + "root")
+    if scene is None:
+        add_floor(spec)
+    else:
+        scene.build(spec)
+        _meet_robot(spec)
+    frame = spec.worldbody.add_frame(pos=[0, 0, robot_part.axle_height(robot)])
+    spec.attach(robot_part.build(robot), frame=frame, prefix=PREFIX)
+    spec.body(PREFIX + robot.link_names[0]).add_freejoint(name=PREFIX + "root")
     for geom in spec.geoms:
         geom.solref[0] = physics.contact_time
         geom.solimp[:3] = [0.95, 0.99, 0.0005]
-    return spec.compile()
+    try:
+        return spec.compile()
+    except ValueError as error:
+        raise SceneError(f"the scene cannot be compiled: {in_one_line(error)}") from error
+
+
+def _meet_robot(spec: mujoco.MjSpec) -> None:
+    """Let geoms with the engine's default collision bits touch the robot; planes are floors."""
+    for geom in spec.geoms:
+        if geom.contype == geom.conaffinity == 1:
+            is_floor = int(geom.type) == _PLANE
+            geom.contype = layers.FLOOR if is_floor else layers.OBSTACLE
+            geom.conaffinity = 0 if is_floor else layers.OBSTACLE | layers.FLOOR
 
 
 class World:
@@ -82,37 +94,37 @@ class World:
 
     Attributes:
         model: The compiled model; `data` its state.
+        robot: The robot in it.
         t: Time since the world was made [s].
     """
 
-    def __init__(self, model: mujoco.MjModel, sensed_hinges: int) -> None:
+    def __init__(self, model: mujoco.MjModel, robot: RobotSpec) -> None:
+        self.robot = robot
         self.model = model
         self.data = mujoco.MjData(model)
-        self._yaw = self._addresses([PREFIX + n for n in YAW_JOINTS])
-        self._leg = self._addresses([PREFIX + n for n in LEGS])
-        hinges = [PREFIX + p + h for p in ANTENNA_PREFIXES for h in ANTENNA_HINGES[:sensed_hinges]]
-        self._flex = self._addresses(hinges).reshape(2, sensed_hinges)
-        bent = [PREFIX + p + h for p in ANTENNA_PREFIXES for h in ANTENNA_HINGES]
-        pitch = [PREFIX + n for n in PITCH_JOINTS]
-        self._bounded = np.concatenate([self._yaw, self._addresses([*pitch, *bent])])
-        bases = [p + ANTENNA_BASE for p in ANTENNA_PREFIXES]
-        names = [PREFIX + n for n in (*YAW_JOINTS, *LEGS, *bases)]
+        hinges = [PREFIX + p + h for p in ANTENNA_PREFIXES for h in robot.antenna.hinge_names]
+        bent = self._addresses(hinges)
+        self._yaw = self._addresses([PREFIX + n for n in robot.yaw_names])
+        self._leg = self._addresses([PREFIX + n for n in robot.leg_names])
+        self._flex = bent.reshape(len(ANTENNA_PREFIXES), -1)[:, : robot.antenna.sensed_hinges]
+        pitch = self._addresses([PREFIX + n for n in robot.pitch_names])
+        self._bounded = np.concatenate([self._yaw, pitch, bent])
+        names = [PREFIX + n for n in robot.joint_names]
         self._drive: Ints = np.array([model.actuator(n).id for n in names])
         self._driven = self._addresses(names)
         self._root: int = model.joint(PREFIX + "root").qposadr[0]
-        self._links: Ints = np.array([model.body(PREFIX + n).id for n in LINKS])
-        bodies = range(model.nbody)
-        self._cylinders: Ints = np.array(
-            [b for b in bodies if model.body(b).name.startswith("cylinder")], dtype=int
-        )
-        self._leg_geoms: Ints = np.array([model.geom(PREFIX + n).id for n in LEGS])
-        self._obstacle = model.geom_contype == layers.OBSTACLE
+        self._links: Ints = np.array([model.body(PREFIX + n).id for n in robot.link_names])
+        self._leg_geoms: Ints = np.array([model.geom(PREFIX + n).id for n in robot.leg_names])
+        self._obstacle = (model.geom_contype & layers.OBSTACLE) != 0
         owner = model.body_rootid[model.geom_bodyid]
-        self._robot = owner == model.body(PREFIX + LINKS[0]).id
+        self._robot = owner == model.body(PREFIX + robot.link_names[0]).id
         self._steps = 0
         data = self.data
         self._qpos, self._qvel, self._ctrl = data.qpos, data.qvel, data.ctrl
+        self._head: Floats = data.qpos[self._root : self._root + 3]
+        self._bent: Floats = np.zeros(len(self._bounded))
         self._warnings = data.warning.number
+        self._no_warning = self._warnings.tobytes()
 
     def _addresses(self, joints: list[str]) -> Ints:
         return np.array([self.model.joint(n).qposadr[0] for n in joints])
@@ -123,7 +135,7 @@ class World:
         return float(self.data.time)
 
     def place(self, x: float, y: float, heading: float, yaw: Floats, leg: Floats) -> None:
-        """Put the head at x, y [m] with a heading [rad], joints at yaw (5,), leg (6, 2) [rad]."""
+        """Put the head at x, y [m] with a heading [rad], joints at yaw (Y,), leg (L, 2) [rad]."""
         q = self.data.qpos
         q[self._root : self._root + 2] = x, y
         q[self._root + 3 : self._root + 7] = math.cos(heading / 2), 0.0, 0.0, math.sin(heading / 2)
@@ -132,7 +144,7 @@ class World:
         mujoco.mj_forward(self.model, self.data)
 
     def command(self, drive: Floats) -> None:
-        """Set all joint targets: 5 yaws, 12 legs, 2 antenna bases [rad], shape (19,).
+        """Set the targets of all joints that servos move, in the robot's order [rad], shape (n,).
 
         Raises:
             SimulationError: A target is not finite; nothing is set then.
@@ -143,10 +155,14 @@ class World:
                 self._steps,
                 f"target of actuator {self.model.actuator(self._drive[bad]).name} is {drive[bad]}",
             )
+        self.command_finite(drive)
+
+    def command_finite(self, drive: Floats) -> None:
+        """Set all joint targets as `command` does, without a check."""
         self._ctrl[self._drive] = drive
 
     def drives(self) -> Floats:
-        """Angles of all driven joints, in the order of `command` [rad], shape (19,)."""
+        """Angles of all driven joints, in the order of `command` [rad], shape (n,)."""
         return self._qpos[self._driven]
 
     def step(self, count: int) -> None:
@@ -164,8 +180,9 @@ class World:
         self._check(before)
 
     def _check(self, before: float) -> None:
-        x, y, height = self.head.tolist()
-        bent, speed = self._qpos[self._bounded], self._qvel
+        x, y, height = self._head.tolist()
+        bent, speed = self._bent, self._qvel
+        self._qpos.take(self._bounded, out=bent, mode="clip")
         sound = (
             abs(x) < _DISTANCE_LIMIT
             and abs(y) < _DISTANCE_LIMIT
@@ -173,7 +190,7 @@ class World:
             and self.data.time > before
             and bent.dot(bent) < _ANGLE_LIMIT**2  # no entry is larger than the norm
             and speed.dot(speed) < _SPEED_LIMIT**2
-            and not self._warnings.any()
+            and self._warnings.tobytes() == self._no_warning
         )
         if not sound:
             self._explain(before)
@@ -199,6 +216,15 @@ class World:
         if not 0.0 < height < _HEIGHT_LIMIT:
             raise SimulationError(self._steps, f"the head is at a height of {height:.3g} m")
 
+    def read_hinges(self, angles: Floats) -> None:
+        """Write the angles of all hinges under the flex sensors to `angles` [rad], shape (2, n)."""
+        self._qpos.take(self._flex, out=angles, mode="clip")
+
+    @property
+    def sensed_hinges(self) -> int:
+        """Number of hinges under one flex sensor."""
+        return self._flex.shape[1]
+
     def flex(self) -> Floats:
         """Summed hinge angles under each film [rad], shape (2,); positive towards the tail."""
         return self._qpos[self._flex].sum(axis=1)
@@ -206,7 +232,7 @@ class World:
     @property
     def head(self) -> Floats:
         """Position of the head link [m], shape (3,), a view of the state."""
-        return self._qpos[self._root : self._root + 3]
+        return self._head
 
     @property
     def heading(self) -> float:
@@ -215,12 +241,25 @@ class World:
         return math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
 
     def links(self) -> Floats:
-        """Plan positions of the six links, head first [m], shape (6, 2)."""
+        """Plan positions of the links, head first [m], shape (L, 2)."""
         return self.data.xpos[self._links, :2]
 
-    def cylinders(self) -> Floats:
-        """Plan positions of all cylinders [m], shape (m, 2)."""
-        return self.data.xpos[self._cylinders, :2]
+    def outlines(self) -> tuple[list[Floats], list[Floats]]:
+        """Polygons of all obstacles in plan [m], each (n, 2): those fixed, those that can move."""
+        solid = np.flatnonzero(self._obstacle & (self.model.geom_type != _PLANE))
+        fixed = self.model.body_weldid[self.model.geom_bodyid[solid]] == 0
+        polygons = [outline(self.model, self.data, geom) for geom in solid.tolist()]
+        return (
+            [polygon for polygon, still in zip(polygons, fixed, strict=True) if still],
+            [polygon for polygon, still in zip(polygons, fixed, strict=True) if not still],
+        )
+
+    def obstacle_overlap(self) -> float:
+        """How deep the robot is in obstacles at most [m]; 0 if it touches none."""
+        contact = self.data.contact
+        kind = self._obstacle[contact.geom]
+        meets = (kind[:, 0] != kind[:, 1]) & self._robot[contact.geom].any(axis=1)
+        return max(0.0, -float(contact.dist[meets].min(initial=0.0)))
 
     def obstacle_force(self) -> float:
         """Sum of the normal forces between robot and obstacles [N] in the last physics step."""
@@ -231,7 +270,7 @@ class World:
         return float(self.data.efc_force[address[address >= 0]].sum())
 
     def set_leg_friction(self, friction: Floats) -> None:
-        """Give every leg its own sliding friction, shape (12,)."""
+        """Give every leg its own sliding friction, shape (2 L,)."""
         self.model.geom_friction[self._leg_geoms, 0] = friction
 
 

@@ -1,19 +1,23 @@
-"""Tasks over processes: results at once, nothing lost when somebody presses Ctrl-C.
+"""Tasks over processes: each result at once, and nothing lost when somebody presses Ctrl-C.
 
-A task hands out results one by one through `emit`; they travel back at once. Processes are started
-fresh (spawn) and leave Ctrl-C to the parent. One worker means this process, without any start-up
-cost. Results come in no particular order; sort them.
+A task hands out results one by one through `emit`; they travel back at once, beside the executor,
+which returns a task's value only at its end. Processes are started fresh (spawn) and leave Ctrl-C
+to the parent. One worker means this process, without any start-up cost. Results come in no
+particular order; sort them.
 """
 
 from __future__ import annotations
 
+import contextlib
 import multiprocessing
 import os
+import pickle
 import queue
 import signal
 import threading
-from collections.abc import Callable, Sequence
-from multiprocessing.process import BaseProcess
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from typing import Any, TypeVar
 
 from antennate.errors import WorkerError
@@ -22,8 +26,10 @@ Task = TypeVar("Task")
 Emit = Callable[[Any], None]
 """Takes one result."""
 
-_POLL = 0.2
-"""How often the parent looks for dead workers while it waits [s]."""
+_POLL = 0.1
+"""How often the parent looks for finished tasks while it waits for results [s]."""
+_results: Any = None
+"""In a worker: the queue to the parent."""
 
 
 def core_count() -> int:
@@ -56,70 +62,76 @@ def run_tasks(
             function(task, on_result)
         return
     context = multiprocessing.get_context("spawn")
-    todo: Any = context.Queue()
-    done: Any = context.Queue()
+    results = context.Queue()
+    others = set(multiprocessing.active_children())
     count = min(workers, len(tasks))
-    for task in (*tasks, *[None] * count):
-        todo.put(task)
-    crew: list[BaseProcess] = [
-        context.Process(target=_work, args=(function, todo, done), daemon=True)
-        for _ in range(count)
-    ]
+    pool = ProcessPoolExecutor(count, context, initializer=_begin, initargs=(results,))
+    with _deaf():
+        futures = [pool.submit(_work, function, task) for task in tasks]
+    crew = set(multiprocessing.active_children()) - others
     try:
-        _start(crew)
-        _collect(crew, done, on_result)
+        _collect(futures, results, on_result)
+    except BrokenProcessPool:
+        codes = [p.exitcode for p in crew if p.exitcode not in (None, 0, -signal.SIGTERM)]
+        raise WorkerError(
+            f"a worker process ended with code {codes[0] if codes else 'unknown'} in the middle of "
+            "its work"
+        ) from None
     except KeyboardInterrupt:
-        while not done.empty():
-            kind, value = done.get()
-            if kind == "result":
-                on_result(value)
+        with contextlib.suppress(queue.Empty):
+            while True:
+                on_result(pickle.loads(results.get(timeout=_POLL)))  # noqa: S301
         raise
     finally:
-        for process in crew:
-            if process.pid is not None:
+        if any(not future.done() for future in futures):
+            for process in crew:
                 process.terminate()
-        todo.cancel_join_thread()
+        pool.shutdown(cancel_futures=True)
 
 
-def _start(crew: list[BaseProcess]) -> None:
-    """Start all workers deaf to Ctrl-C, which they inherit, so that none dies half begun."""
+def _collect(futures: Sequence[Future[int]], results: Any, on_result: Emit) -> None:
+    """Hand on results until all tasks have ended and all that they emitted has arrived."""
+    waiting, expected, received = set(futures), 0, 0
+    while waiting or received < expected:
+        with contextlib.suppress(queue.Empty):
+            on_result(pickle.loads(results.get(timeout=_POLL)))  # noqa: S301  (our own worker's)
+            received += 1
+        done = {future for future in waiting if future.done()}
+        waiting -= done
+        for future in done:
+            expected += future.result()
+
+
+@contextlib.contextmanager
+def _deaf() -> Iterator[None]:
+    """Start workers deaf to Ctrl-C, which they inherit, so that none dies half begun."""
     if threading.current_thread() is not threading.main_thread():
-        for process in crew:
-            process.start()
+        yield
         return
     before = signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
-        for process in crew:
-            process.start()
+        yield
     finally:
         signal.signal(signal.SIGINT, before)
 
 
-def _work(function: Callable[[Any, Emit], None], todo: Any, done: Any) -> None:
+def _begin(results: Any) -> None:
+    global _results
+    _results = results
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def _work(function: Callable[[Any, Emit], None], task: Any) -> int:
+    """Run one task in a worker; how many results it emitted."""
+    count = 0
+
+    def emit(result: Any) -> None:
+        nonlocal count
+        count += 1
+        _results.put(pickle.dumps(result))  # here, so that what cannot be pickled is an error
+
     try:
-        for task in iter(todo.get, None):
-            function(task, lambda result: done.put(("result", result)))
+        function(task, emit)
     except Exception as error:  # noqa: BLE001  (whatever it is, the parent must hear of it)
-        done.put(("error", f"{type(error).__name__}: {error}"))
-    done.put(("end", None))
-
-
-def _collect(crew: list[BaseProcess], done: Any, on_result: Emit) -> None:
-    running = len(crew)
-    while running:
-        try:
-            kind, value = done.get(timeout=_POLL)
-        except queue.Empty:
-            dead = [p for p in crew if p.exitcode not in (None, 0)]
-            if dead:
-                raise WorkerError(
-                    f"a worker process ended with code {dead[0].exitcode} in the middle of its work"
-                ) from None
-            continue
-        if kind == "result":
-            on_result(value)
-        elif kind == "end":
-            running -= 1
-        else:
-            raise WorkerError(f"a worker failed: {value}")
+        raise WorkerError(f"a worker failed: {type(error).__name__}: {error}") from None
+    return count

@@ -6,7 +6,6 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
-from scipy import optimize
 
 from antennate.types import Floats, Ints
 
@@ -28,6 +27,8 @@ class Curve:
     @classmethod
     def through(cls, x: Floats, y: Floats) -> Curve:
         """Fit to points x, y of shape (n,); points of equal x count as one of more weight."""
+        from scipy import optimize  # takes long; only where it is needed
+
         knots, where, weights = np.unique(x, return_inverse=True, return_counts=True)
         means = np.bincount(where, weights=y) / weights
         fitted = optimize.isotonic_regression(means, weights=weights).x

@@ -5,13 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
 
 from antennate.types import Bools, Floats
 
 
 def wilson95(successes: int, trials: int) -> tuple[float, float]:
     """Wilson 95 % interval of a success rate; (0, 1) without trials."""
+    from scipy import stats  # takes long; only where it is needed
+
     if trials == 0:
         return 0.0, 1.0
     interval = stats.binomtest(successes, trials).proportion_ci(0.95, method="wilson")
@@ -44,6 +45,8 @@ class Discordance:
 
 def mcnemar(ok: Bools) -> Discordance:
     """Compare the successes of two arms trial by trial, shape (n, 2)."""
+    from scipy import stats  # takes long; only where it is needed
+
     first, second = ok[:, 0], ok[:, 1]
     only_first, only_second = int((first & ~second).sum()), int((second & ~first).sum())
     discordant = only_first + only_second
@@ -76,6 +79,8 @@ class PairedTest:
 
 def compare(first_ok: Bools, second_ok: Bools, first_t: Floats, second_t: Floats) -> PairedTest:
     """Compare two arms trial by trial; arrays of shape (n,), times restricted to the limit [s]."""
+    from scipy import stats  # takes long; only where it is needed
+
     success = mcnemar(np.stack([first_ok, second_ok], axis=1))
     difference = first_t - second_t
     mean, low, high = mean95(difference)

@@ -126,6 +126,11 @@ class Feed:
         self._taken = done
         return done
 
+    def skip(self) -> None:
+        """Count a record that could not be made, and so is not sent."""
+        self.offered += 1
+        self.dropped += 1
+
     def _look_after(self) -> None:
         """Whenever the process dies, start the next one."""
         while True:

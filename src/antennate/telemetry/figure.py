@@ -33,7 +33,7 @@ class Course:
     Attributes:
         t: Time since the first tick [s], shape (n,).
         reading: What the board said [counts], shape (n, 2).
-        b: Bending levels, shape (n, 2).
+        level: Bending levels, shape (n, 2).
         contact: `Contact`, shape (n, 2).
         recorded: `Maneuver` decided then, shape (n,).
         replayed: `Maneuver` decided now, shape (n,).
@@ -42,7 +42,7 @@ class Course:
 
     t: Floats
     reading: Floats
-    b: Floats
+    level: Floats
     contact: Ints
     recorded: Ints
     replayed: Ints
@@ -57,7 +57,7 @@ def replay(course: Course) -> Figure:
     readings, levels, contacts, decisions = panels
     for side, (name, colour) in enumerate(zip(_SIDES, style.series(2), strict=True)):
         readings.plot(course.t, course.reading[:, side], color=colour, linewidth=1, label=name)
-        levels.plot(course.t, course.b[:, side], color=colour, linewidth=1, label=name)
+        levels.plot(course.t, course.level[:, side], color=colour, linewidth=1, label=name)
     readings.set(ylabel="reading [counts]", title="Readings")
     readings.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=7)
     levels.set(ylabel="b", ylim=(-0.05, 1.05), title="Bending level")

@@ -9,7 +9,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from antennate import __version__
 from antennate.errors import LogError
 from antennate.params import ControlParams
-from antennate.robots.layout import LayoutParams
+from antennate.robots.spec import RobotSpec
 from antennate.telemetry.framing import SCHEMA, Kind
 from antennate.telemetry.ticks import FIELDS, LAYOUT
 
@@ -20,9 +20,9 @@ class Header(BaseModel):
     """Who decided, with which numbers, on which robot. On disk it is JSON.
 
     Attributes:
-        controller: open, paper, closed, or MODULE:CLASS.
+        controller: Name of the controller.
         params: Numbers of the controller.
-        layout: Servos of the robot, None in simulation.
+        robot: The robot, None in simulation.
         seed: Seed of the world, None on a robot.
         trial: Trial of that seed.
         phase: Gait phase at the first tick [rad].
@@ -36,7 +36,7 @@ class Header(BaseModel):
 
     controller: str
     params: ControlParams
-    layout: LayoutParams | None = None
+    robot: RobotSpec | None = None
     seed: int | None = None
     trial: int | None = None
     phase: float = 0.0

@@ -1,4 +1,4 @@
-"""A log as a world: the control gets what was read then, and says what it would do now."""
+"""A log as a robot: a controller gets the readings of then, and decides upon them now."""
 
 from __future__ import annotations
 
@@ -7,30 +7,37 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 import numpy as np
+from pydantic import field_validator
 
-from antennate.control.controllers import ARMS, Controller
 from antennate.control.loop import run_loop
+from antennate.control.registry import BUILT_IN, CONTROLLERS, make_controller
 from antennate.errors import LogError
-from antennate.hardware.driving.decider import Decider, Decision, chosen, decision, nowhere
+from antennate.hardware.driving.decision import Decision, decision_of, no_command
 from antennate.params import Params, number
 from antennate.telemetry.header import Header
 from antennate.telemetry.ticks import Tick, angles_of
-from antennate.types import AntennaFrame, JointCommand
+from antennate.types import AntennaFrame, Controller, JointCommand
 
 
 class ReplayConfig(Params):
-    """Who decides upon the readings of a log."""
+    """Which controller decides upon the readings of a log."""
 
     controller: str | None = number(
         None,
         "1",
         "assumed: the one recorded",
-        "open, paper, closed, or MODULE:CLASS of your own, in place of the one recorded",
+        "open, paper, closed, or MODULE:NAME or FILE.py:NAME of your own, in place of the recorded",
+        examples=["open", "paper", "closed"],
     )
 
+    @field_validator("controller")
+    @classmethod
+    def _known(cls, name: str | None) -> str | None:
+        return None if name is None else CONTROLLERS.check(name)
 
-class ReplayBody:
-    """Recorded readings behind the wall; also their clock.
+
+class ReplayRobot:
+    """Recorded readings in place of a robot's; also their clock.
 
     Each sleep goes on to the next tick, however long it is, so that none is left out. Time is that
     of the sleeper; frames carry the recorded one.
@@ -51,8 +58,8 @@ class ReplayBody:
         self._next: Tick | None = next(self._ticks, None)
 
     @property
-    def clock(self) -> ReplayBody:
-        """The body itself keeps the time."""
+    def clock(self) -> ReplayRobot:
+        """The robot itself keeps the time."""
         return self
 
     @property
@@ -86,23 +93,26 @@ class ReplayBody:
 
 
 class _Guarded:
-    """A controller asked when it was then, whose exceptions give NaN, as in a session."""
+    """A controller that is asked in the ticks in which it was asked then.
 
-    def __init__(self, decider: Decider, body: ReplayBody) -> None:
-        self._decider, self._body = decider, body
+    Its exceptions give a command of NaN, as in a session.
+    """
+
+    def __init__(self, controller: Controller, robot: ReplayRobot) -> None:
+        self._controller, self._robot = controller, robot
         self._kept: JointCommand | None = None
         self._refused = self.failures = 0
         self.decision = Decision()
 
     def step(self, frame: AntennaFrame) -> JointCommand:
         """The command of this tick."""
-        tick = self._body.tick
+        tick = self._robot.tick
         if tick is not None and self._kept is not None and not tick.asked:
             return self._kept
         refused, self._refused = self._refused, 0 if tick is None else tick.refused
         try:
-            command = self._decider.step(frame)
-            self.decision = decision(self._decider)
+            command = self._controller.step(frame)
+            self.decision = decision_of(self._controller)
             if self._refused <= refused:
                 self._kept = command
             return command
@@ -110,7 +120,7 @@ class _Guarded:
             raise
         except BaseException:  # noqa: BLE001 a plugged-in controller may raise anything
             self.failures += 1
-            return nowhere()
+            return no_command()
 
 
 @dataclass(frozen=True, slots=True)
@@ -170,29 +180,29 @@ class Replayed:
             self.first = self.first or Difference(tick.number, tick.now, tick.maneuver, maneuver)
 
 
-def replay(ticks: Iterable[Tick], decider: Decider, period: float) -> Replayed:
+def replay(ticks: Iterable[Tick], controller: Controller, period: float) -> Replayed:
     """Let a controller that has just begun decide upon all ticks of a log.
 
     Args:
         ticks: The log, in order.
-        decider: The controller.
+        controller: The controller.
         period: Its period [s].
     """
-    body, found = ReplayBody(ticks), Replayed()
-    control = _Guarded(decider, body)
+    robot, found = ReplayRobot(ticks), Replayed()
+    control = _Guarded(controller, robot)
 
     def go_on(frame: AntennaFrame, command: JointCommand) -> bool:
-        if body.tick is not None:
-            found.note(body.tick, control.decision.maneuver, command)
-        return body.more
+        if robot.tick is not None:
+            found.note(robot.tick, control.decision.maneuver, command)
+        return robot.more
 
-    if body.tick is not None:
-        run_loop(body, control, period, go_on)
+    if robot.tick is not None:
+        run_loop(robot, control, period, go_on)
     found.failures = control.failures
     return found
 
 
-def recorded_decider(header: Header, name: str | None = None) -> Decider:
+def recorded_controller(header: Header, name: str | None = None) -> Controller:
     """The controller of a log as it began, or one of another name with the same numbers.
 
     Raises:
@@ -200,12 +210,11 @@ def recorded_decider(header: Header, name: str | None = None) -> Decider:
         ConfigError: There is none of that name.
     """
     wanted = header.controller if name is None else name
-    if name is None and wanted not in ARMS:
+    if name is None and wanted not in BUILT_IN:
         raise LogError(
-            f"expected a controller of {', '.join(ARMS)} in the log, found {wanted!r}; give "
+            f"expected one of {', '.join(BUILT_IN)} in the log, found {wanted!r}; give "
             "--controller with this name if its code may run"
         )
-    made = chosen(wanted, header.params)
-    if isinstance(made, Controller):
-        made.reset(np.array([0]), header.phase)
+    made = make_controller(wanted, header.params)
+    made.reset(np.array([0]), header.phase)
     return made

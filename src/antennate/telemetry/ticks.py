@@ -6,7 +6,6 @@ and infinities too.
 
 from __future__ import annotations
 
-import functools
 import math
 import struct
 from dataclasses import dataclass
@@ -15,19 +14,19 @@ from typing import Any
 import numpy as np
 
 from antennate.errors import LogError
-from antennate.hardware.driving.decider import Decided, Decision, decision
+from antennate.hardware.driving.decision import Decision, decision_of
 from antennate.hardware.driving.session import Session
-from antennate.robots.anatomy import LEGS, SIDES, YAW_JOINTS
+from antennate.robots.spec import RobotSpec
 from antennate.telemetry.framing import SCHEMA, Kind
-from antennate.types import AntennaFrame, JointCommand
+from antennate.types import AntennaFrame, Controller, JointCommand
 
-JOINTS = (*YAW_JOINTS, *LEGS, *(f"antenna_{side}" for side in SIDES))
+JOINTS = RobotSpec().joint_names
 """The order of angles."""
 LAYOUT = f"<BBQ?8d3q{len(JOINTS) + 2}d8QI"
 """For `struct`: all fields but the text, whose length in bytes comes last."""
 FIELDS = (
     *("schema", "kind", "number", "asked", "t", "now"),
-    *("counts_l", "counts_r", "reading_l", "reading_r", "b_l", "b_r"),
+    *("counts_l", "counts_r", "reading_l", "reading_r", "level_l", "level_r"),
     *("contact_l", "contact_r", "maneuver", "phase", *JOINTS, "age"),
     *("missed", "frames", "crc", "lost", "misses", "stale", "sent", "refused", "text"),
 )
@@ -50,7 +49,7 @@ class Tick:
         now: The loop's time [s].
         counts: Readings that the controller got [counts]; NaN is UNKNOWN.
         reading: Readings before the supervisor withheld them [counts].
-        b: Bending levels, NaN if the controller has none.
+        level: Bending levels, NaN if the controller has none.
         contact: One `Contact` a side.
         maneuver: The `Maneuver` decided.
         phase: Gait phase [rad], NaN if the controller has none.
@@ -75,7 +74,7 @@ class Tick:
     now: float
     counts: Pair
     reading: Pair
-    b: Pair
+    level: Pair
     contact: tuple[int, int]
     maneuver: int
     phase: float
@@ -97,18 +96,23 @@ class Tick:
     @classmethod
     def of(cls, session: Session, t: float) -> Tick:
         """The tick of a session that has just written, at the host's time t [s]."""
-        out, clock, bus = session.outputs, session.board.clock, session.bus.tally
-        left, right = (channel.reading.counts for channel in session.channels)
+        out, clock, bus = session.outputs, session.board.clock, session.actuators.tally
+        left, right = session.quality.counts
         bytes_ = session.board.decoder.counters
         return cls(
-            **_thought(session.decider, session.decision, session.frame, session.command),
+            **_decided(
+                session.control.controller,
+                session.control.decision,
+                session.frame,
+                session.control.command,
+            ),
             number=session.tally.ticks,
             now=t,
-            asked=session.asked,
+            asked=session.control.result.asked,
             reading=(left, right),
             state="" if out is None else out.state.name,
             causes=() if out is None else tuple(_clean(cause.text) for cause in out.causes),
-            note=_clean(session.trust.said),
+            note=_clean(session.quality.status),
             age=clock.age(t),
             missed=0 if session.timing is None else session.timing.report().missed_cycles,
             frames=bytes_.good,
@@ -117,27 +121,32 @@ class Tick:
             misses=bus.misses,
             stale=bus.stale,
             sent=session.tally.sent,
-            refused=session.tally.refused,
+            refused=session.control.refused,
         )
 
     @classmethod
     def plain(
-        cls, control: Decided, frame: AntennaFrame, command: JointCommand, number: int, now: float
+        cls,
+        controller: Controller,
+        frame: AntennaFrame,
+        command: JointCommand,
+        number: int,
+        now: float,
     ) -> Tick:
         """A tick of a controller without supervisor, as in simulation.
 
         Raises:
-            BadInputError: The controller decides otherwise than a `Decider` does.
+            ControllerError: The controller does not say what it has decided.
         """
-        thought = _thought(control, decision(control), frame, command)
-        return cls(**thought, number=number, now=now, reading=thought["counts"])
+        decided = _decided(controller, decision_of(controller), frame, command)
+        return cls(**decided, number=number, now=now, reading=decided["counts"])
 
     @property
     def values(self) -> tuple[float, ...]:
         """All numbers, in the order of FIELDS without schema, kind and text."""
         return (
             *(self.number, int(self.asked), self.t, self.now),
-            *(*self.counts, *self.reading, *self.b, *self.contact, self.maneuver, self.phase),
+            *(*self.counts, *self.reading, *self.level, *self.contact, self.maneuver, self.phase),
             *(*self.angles, self.age, self.missed, self.frames, self.crc, self.lost),
             *(self.misses, self.stale, self.sent, self.refused),
         )
@@ -175,46 +184,44 @@ class Tick:
             state, note, *causes = content[_STRUCT.size :].decode().split("\n")
         except ValueError:
             raise LogError("expected lines in UTF-8 as text of a tick, found others") from None
-        counts, reading, b, contact = (tuple(rest[i : i + 2]) for i in (0, 2, 4, 6))
+        counts, reading, level, contact = (tuple(rest[i : i + 2]) for i in (0, 2, 4, 6))
         maneuver, phase, *rest = rest[8:]
         angles, rest = tuple(rest[: len(JOINTS)]), rest[len(JOINTS) :]
         health = dict(zip(FIELDS[-10:-1], rest, strict=True))
         return cls(
-            *(number, t, now, counts, reading, b, contact, maneuver, phase, angles),
+            *(number, t, now, counts, reading, level, contact, maneuver, phase, angles),
             *(state, tuple(causes), asked, note),
             **health,
         )
 
 
 def angles_of(command: JointCommand) -> tuple[float, ...]:
-    """Joint targets of one robot [rad] in the order of JOINTS; NaN if they are not 19 numbers."""
+    """Joint targets of one robot [rad] in the order of JOINTS; NaN if there are not as many."""
     parts = (_flat(command, name) for name in ("yaw", "leg", "antenna"))
     angles = tuple(angle for part in parts for angle in part)
     return angles if len(angles) == len(JOINTS) else _NOWHERE
 
 
-def _thought(
-    control: Decided, said: Decision, frame: AntennaFrame, command: JointCommand
+def _decided(
+    controller: Controller, decision: Decision, frame: AntennaFrame, command: JointCommand
 ) -> dict[str, Any]:
-    """The fields that every world has; b of shape (1, 2) and gait.phase of (1,) where there are."""
-    phase = _flat(control, "gait", "phase")
-    b = _flat(control, "b")
+    """The fields that every world has; NaN for a level or a phase that the controller lacks."""
+    phase, level = _flat(controller, "phase"), _flat(controller, "level")
     return {
         "t": float(frame.t[0]),
         "counts": tuple(frame.counts[0].tolist()),
-        "b": b if len(b) == 2 else _NEITHER,
-        "contact": said.contact,
-        "maneuver": said.maneuver,
+        "level": level if len(level) == 2 else _NEITHER,
+        "contact": decision.contact,
+        "maneuver": decision.maneuver,
         "phase": phase[0] if len(phase) == 1 else math.nan,
         "angles": angles_of(command),
     }
 
 
-def _flat(owner: Any, *names: str) -> tuple[float, ...]:
-    """Numbers in an attribute of an attribute of what may be anybody's; empty if there are none."""
+def _flat(owner: Any, name: str) -> tuple[float, ...]:
+    """Numbers in an attribute of any object; empty if there are none."""
     try:
-        value = functools.reduce(getattr, names, owner)
-        return tuple(np.asarray(value, float).ravel().tolist())
+        return tuple(np.asarray(getattr(owner, name), float).ravel().tolist())
     except KeyboardInterrupt:
         raise
     except BaseException:  # noqa: BLE001 a property of anybody may raise anything

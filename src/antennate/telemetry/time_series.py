@@ -178,7 +178,9 @@ class TimeSeriesRecorder:
             (command, ("yaw", "leg", "antenna", "pitch")),
         ):
             for name in names:
-                self._ticks[name].append(np.array(getattr(source, name)[self._row]))
+                batch = getattr(source, name)
+                here = batch[self._row] if batch.size else ()  # pitch may have no joints
+                self._ticks[name].append(np.array(here))
         self._ticks["head"].append(np.array(self._head()))
 
     def series(self, meta: Mapping[str, str | int | float | None]) -> TimeSeries:

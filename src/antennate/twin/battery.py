@@ -7,8 +7,7 @@ from collections.abc import Sequence
 
 from antennate.hardware.dynamixel.tables import XC430_W240
 from antennate.params.twin import BatteryParams
-from antennate.robots.body import ServoParams
-from antennate.robots.layout import TICKS_A_TURN
+from antennate.robots.servos import TICKS_A_TURN, ServoParams
 from antennate.twin.registers import Servo
 
 _VOLTAGE_ERROR = 1

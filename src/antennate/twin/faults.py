@@ -25,7 +25,17 @@ _HARDWARE = {"voltage": 1, "overheat": 4, "encoder": 8, "shock": 16, "overload":
 _SIDES = ("left", "right")
 _KNOWN = {
     "servo": (*_SERVO, *_HARDWARE, "reboot"),
-    "esp32": ("silent", "reset", "open_left", "open_right", "left", "right", "ber"),
+    "esp32": (
+        "silent",
+        "reset",
+        "open_left",
+        "open_right",
+        "short_left",
+        "short_right",
+        "left",
+        "right",
+        "ber",
+    ),
     "bus": ("loss", "silent", "latency", "discharge", "ber"),
     "link": ("loss", "ber"),
 }

@@ -1,4 +1,4 @@
-"""The simulated robot behind real bytes: a bus of 19 servos and the stream of an antenna board.
+"""The simulated robot behind real bytes: a bus of servos and the stream of an antenna board.
 
 Time is an argument. Servos do not move by themselves: every control period the physics takes their
 goals and gives back their positions. Physics begins when the first servo has torque; until then the
@@ -16,16 +16,13 @@ from antennate.errors import SimulationError
 from antennate.hardware.dynamixel.packets import StatusError
 from antennate.hardware.dynamixel.tables import (
     BAUD_RATES,
-    EXTENDED_MODE,
-    XC430_W240,
-    XL330_M288,
-    Table,
+    TABLES,
 )
 from antennate.hardware.esp32 import frame
 from antennate.hardware.joints import Joints
 from antennate.params.twin import BatteryParams
-from antennate.robots.anatomy import YAW_COUNT
-from antennate.robots.layout import TICKS_A_TURN, LayoutParams
+from antennate.robots.servos import TICKS_A_TURN, ServoParams
+from antennate.robots.spec import RobotSpec
 from antennate.sim.sim_robot import SimRobot
 from antennate.sim.world import World
 from antennate.twin.battery import Battery
@@ -107,7 +104,7 @@ class TwinRobot:
 
     Args:
         body: Holds one world.
-        layout: Ids, directions and zeros of the servos.
+        robot: Its description: servos, directions, zeros and bus speed.
         period: Control period of the board and the physics [s].
         boot_id: Random number of the board's boot.
         standing_noise: Whether readings are noisy before the physics begins, as real ones are.
@@ -127,7 +124,7 @@ class TwinRobot:
     def __init__(
         self,
         body: SimRobot,
-        layout: LayoutParams,
+        robot: RobotSpec,
         period: float,
         boot_id: int,
         standing_noise: bool = False,
@@ -137,14 +134,15 @@ class TwinRobot:
     ) -> None:
         self._body = body
         self._watch = watch
-        self._joints = Joints(layout)
+        self._joints = Joints(robot)
         self._period = period
         self._encoder = frame.SampleEncoder(boot_id)
         self._boot_id = boot_id
         self._stream = bytearray()
         self._buffer = bytearray(frame.SAMPLE_FRAME_SIZE)
         self._ticks = self._walked = self._booted = 0
-        self._broken = [False, False]
+        self._wires = ["", ""]
+        self._floating = np.random.default_rng(boot_id)
         self._held = [math.nan, math.nan]
         self._chance = np.random.default_rng(boot_id) if standing_noise else None
         self.touch = touch
@@ -152,8 +150,8 @@ class TwinRobot:
         self.board_silent = False
         self.noise = Noise(seed=0)
         self.battery = Battery(battery or BatteryParams())
-        self.servos = [_servo(i, servo, layout.baud) for i, servo in enumerate(layout.ids)]
-        self.bus = ServoBus(self.servos, layout.baud)
+        self.servos = _servos(robot)
+        self.bus = ServoBus(self.servos, robot.baud)
         self._show(self._shafts())
         self._counts = body.read().counts[0]
         self._sample()
@@ -226,7 +224,10 @@ class TwinRobot:
             self._greet()
 
     def break_board(self, what: str) -> None:
-        """Let the board fall silent, start anew after BOOT_TICKS, or lose an antenna's wire."""
+        """Let the board fall silent, start anew after BOOT_TICKS, or break an antenna's wire.
+
+        An open wire leaves the converter's pin unconnected: it reads anything. A short reads 0.
+        """
         if what == "silent":
             self.board_silent = True
         elif what == "reset":
@@ -234,7 +235,8 @@ class TwinRobot:
             self._encoder = frame.SampleEncoder(self._boot_id)
             self._booted = self._ticks + BOOT_TICKS
         else:
-            self._broken[what == "open_right"] = True
+            kind, side = what.split("_")
+            self._wires[side == "right"] = kind
 
     def hold(self, side: int, counts: float) -> None:
         """Hold the reading of antenna 0 (left) or 1 at a value [counts]; NaN releases it."""
@@ -263,13 +265,20 @@ class TwinRobot:
             noise = noise + np.rint(self.touch.change(self._ticks * self._period, used))
         read = np.where(np.isnan(self._held), self._counts, self._held)
         left, right = (
-            0 if broken or math.isnan(counts) else min(max(int(counts), 0), frame.FULL_SCALE)
-            for counts, broken in zip(read + noise, self._broken, strict=True)
+            self._converted(counts, wire)
+            for counts, wire in zip(read + noise, self._wires, strict=True)
         )
         flags = _rail(left, frame.FLAG_LEFT_RAIL) | _rail(right, frame.FLAG_RIGHT_RAIL)
         ticks = round(1e6 * since * self._period) & frame.TICK_MASK
         size = self._encoder.encode_sample_into(self._buffer, since, ticks, left, right, flags, 0)
         self._stream += self._buffer[:size]
+
+    def _converted(self, counts: float, wire: str) -> int:
+        """What the converter gives for a reading behind a wire that may be broken."""
+        if wire == "open":
+            return int(self._floating.integers(frame.FULL_SCALE + 1))
+        shorted = wire == "short" or math.isnan(counts)
+        return 0 if shorted else min(max(int(counts), 0), frame.FULL_SCALE)
 
     def _greet(self) -> None:
         rate = round(1 / self._period)
@@ -282,13 +291,19 @@ def _rail(counts: int, flag: int) -> int:
     return flag if counts in (0, frame.FULL_SCALE) else 0
 
 
-def _servo(place: int, servo: int, baud: int) -> DrivenServo:
-    """A servo as the robot needs it: legs in extended mode, antennae of the small model."""
-    table: Table = XC430_W240 if place < YAW_COUNT + 12 else XL330_M288
-    made = DrivenServo(table, servo)
-    if YAW_COUNT <= place < YAW_COUNT + 12:
-        made.set("operating_mode", EXTENDED_MODE)
+def _servos(robot: RobotSpec) -> list[DrivenServo]:
+    """The servos as the robot needs them: of its models, in its operating modes."""
+    kinds = [robot.servos.of(group.servo) for _, group, count in robot.groups for _ in range(count)]
+    return [
+        _servo(servo, kind, robot.modes[servo], robot.baud)
+        for servo, kind in zip(robot.ids, kinds, strict=True)
+    ]
+
+
+def _servo(servo: int, kind: ServoParams, mode: int, baud: int) -> DrivenServo:
+    made = DrivenServo(TABLES[kind.model_number], servo)
+    made.set("operating_mode", mode)
     made.set("return_delay_time", 0)
     made.set("baud_rate", BAUD_RATES.index(baud))
-    made.set("present_input_voltage", 111 if table is XC430_W240 else 50)
+    made.set("present_input_voltage", round(10 * kind.voltage))
     return made

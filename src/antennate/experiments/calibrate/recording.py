@@ -233,7 +233,7 @@ def write(recording: Recording) -> str:
         s.speed.tolist(),
         recording.t.tolist(),
         s.counts.tolist(),
-        s.bend.tolist(),
+        s.level.tolist(),
         strict=True,
     ):
         writer.writerow([trial, repr(speed), f"{t:.6f}", f"{counts:g}", repr(bend)])

@@ -10,7 +10,7 @@ import hashlib
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -23,9 +23,9 @@ from antennate.control.conditioning import bending_level
 from antennate.experiments.calibrate.recording import Recording, RecordingParams, read, write
 from antennate.params import BenchPhysicsParams, BenchVariationParams, Params
 from antennate.params.base import number
-from antennate.robots.antenna import AntennaParams
-from antennate.robots.sensor import SensorParams
+from antennate.robots.antenna import AntennaSpec
 from antennate.sim.bench import Bench, compile_bench
+from antennate.studies.experiment import WithoutTrials
 from antennate.studies.pool import run_tasks
 from antennate.types import Floats
 
@@ -59,9 +59,19 @@ class RigParams(Params):
     )
 
 
+_OF_THE_RIG = ("rig", "antenna", "variation", "physics")
+
+
 class CalibrateConfig(Params):
     """Everything that decides a calibration."""
 
+    unread: ClassVar[tuple[str, ...]] = (
+        "antenna.base_angle",
+        "antenna.base_spacing",
+        "variation.base_angle",
+        "variation.friction",
+        "variation.overlap",
+    )
     recording: str | None = number(
         None, "1", "assumed: no recording", "CSV file to calibrate from; the rig if not given"
     )
@@ -99,10 +109,22 @@ class CalibrateConfig(Params):
     draws: int = number(500, "1", "assumed: usual", "bootstrap draws", ge=20, le=100000)
     seed: int = number(1, "1", "assumed: any", "seed of all chance", ge=0)
     rig: RigParams = RigParams()
-    antenna: AntennaParams = AntennaParams()
-    sensor: SensorParams = SensorParams()
+    antenna: AntennaSpec = AntennaSpec()
     variation: BenchVariationParams = BenchVariationParams()
     physics: BenchPhysicsParams = BenchPhysicsParams()
+
+    @model_validator(mode="after")
+    def _rig_or_recording(self) -> CalibrateConfig:
+        """A recording needs no rig, and the rig no columns."""
+        names = ("columns",) if self.recording is None else _OF_THE_RIG
+        for name in names:
+            if getattr(self, name) != type(self).model_fields[name].default:
+                without = "without" if self.recording is None else "with"
+                raise ValueError(
+                    f"{name}: expected the default, as {without} a recording it is not "
+                    "read, found another"
+                )
+        return self
 
     @model_validator(mode="after")
     def _on_the_antenna(self) -> CalibrateConfig:
@@ -120,7 +142,7 @@ class CalibrateConfig(Params):
 
 
 @dataclass(frozen=True)
-class CalibrateOutcome:
+class CalibrateOutcome(WithoutTrials):
     """A calibration and its data.
 
     Attributes:
@@ -163,15 +185,15 @@ def push(config: CalibrateConfig, trial: int) -> Recording:
     rig = config.rig
     speed = rig.speeds[trial // rig.pushes]
     rng = np.random.default_rng([config.seed, trial])
-    factors = np.exp(rng.normal(0.0, config.variation.stiffness, 6))
+    factors = np.exp(rng.normal(0.0, config.variation.stiffness, config.antenna.hinges))
     gap = 2 * rig.start_spread * rng.uniform(0.0, 1.0)
     bench = _bench(config, factors)
-    period = 1.0 / config.sensor.rate
+    period = 1.0 / config.antenna.sensor.rate
     touch = config.antenna.radius + rig.rod_radius
-    rate = config.sensor.rate
+    rate = config.antenna.sensor.rate
     ticks = int(np.ceil((gap + rig.depth) / speed * rate)) + 1
-    noise = reading_noise(config.sensor, rng, (ticks,))
-    sensor = SensorChain(config.sensor, (), period)
+    noise = reading_noise(config.antenna.sensor, rng, (ticks,))
+    sensor = SensorChain(config.antenna.sensor, (), period)
     bench.place(0.0, 0.0, 0.0)
     bench.place_probe(rig.place, -touch - gap)
     rows = []
@@ -197,12 +219,10 @@ def push(config: CalibrateConfig, trial: int) -> Recording:
 
 
 def _bench(config: CalibrateConfig, factors: Floats) -> Bench:
-    model = compile_bench(
-        config.physics, config.antenna, config.sensor, probe_radius=config.rig.rod_radius
-    )
+    model = compile_bench(config.physics, config.antenna, probe_radius=config.rig.rod_radius)
     for i, factor in enumerate(factors):
         model.joint(f"antenna/hinge{i}").stiffness *= factor
-    return Bench(model, config.sensor.covered_hinges(config.antenna))
+    return Bench(model, config.antenna)
 
 
 def _run_task(task: tuple[CalibrateConfig, int], emit: Callable[[Any], None]) -> None:
@@ -228,7 +248,7 @@ def record(
 
     run_tasks(_run_task, tasks, workers, take)
     parts = [found[trial] for trial in sorted(found)]
-    fields = ("counts", "bend", "trial", "speed", "row")
+    fields = ("counts", "level", "trial", "speed", "row")
     joined = [np.concatenate([getattr(p.samples, f) for p in parts]) for f in fields]
     joined[-1] = np.arange(2, len(joined[0]) + 2)
     whole = Recording(np.concatenate([p.t for p in parts]), Samples(*joined), "")
@@ -247,7 +267,7 @@ def averaged(recording: Recording, averaging_time: float) -> Recording:
         first = np.searchsorted(t, t - averaging_time + 1e-9)
         ends = np.arange(1, len(rows) + 1)
         counts[rows] = (total[ends] - total[first]) / (ends - first)
-    samples = Samples(counts, s.bend, s.trial, s.speed, s.row)
+    samples = Samples(counts, s.level, s.trial, s.speed, s.row)
     return Recording(recording.t, samples, recording.sha256)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -12,58 +12,14 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
 from antennate import figures as style
-from antennate.types import Floats
+from antennate.experiments.force.loads import Points
+from antennate.experiments.force.run import ProfileOutcome
 
-PROFILE_COLOURS = {
-    "stiff": "#0072B2",
-    "descending": "#D55E00",
-    "compliant": "#009E73",
-    "matched_uniform": "#CC79A7",
-    "ascending": "#7A6A00",
-}
 _SHOWN = "descending"
 
 
-class Points(Protocol):
-    """Contacts of one profile."""
-
-    @property
-    def scalars(self) -> Mapping[str, Floats]:
-        """What was felt, each of shape (n,)."""
-        ...
-
-    @property
-    def force(self) -> Floats:
-        """Size of the force [N], shape (n,)."""
-        ...
-
-    @property
-    def place(self) -> Floats:
-        """Place of contact over the length, shape (n,)."""
-        ...
-
-
-class Profile(Protocol):
-    """What is needed of one profile."""
-
-    @property
-    def profile(self) -> str:
-        """Its name."""
-        ...
-
-    @property
-    def statics(self) -> Points:
-        """Loads at rest."""
-        ...
-
-    @property
-    def traverses(self) -> Points:
-        """Samples of all traverses."""
-        ...
-
-
 @style.styled
-def study(result: Mapping[str, Any], profiles: Sequence[Profile]) -> Figure:
+def study(result: Mapping[str, Any], profiles: Sequence[ProfileOutcome]) -> Figure:
     """Force over flex at rest and on the move, and the share of force explained.
 
     Args:
@@ -110,7 +66,7 @@ def _draw_ranges(panel: Axes, result: Mapping[str, Any]) -> None:
         rows = profile["by_range"]
         place = [row["from_place"] for row in rows]
         low, high = np.array([row["r2_95"] for row in rows]).T
-        colour = PROFILE_COLOURS[name]
+        colour = style.PROFILE_LOOKS[name][0]
         panel.fill_between(place, low, high, color=colour, alpha=0.12, linewidth=0)
         panel.plot(place, [row["r2"] for row in rows], color=colour, label=name)
     panel.axvline(result["from_place"], color=style.MUTED, linewidth=1, linestyle=(0, (4, 2)))

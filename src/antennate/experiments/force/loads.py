@@ -4,26 +4,25 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Literal
+from typing import ClassVar
 
 import numpy as np
 from pydantic import model_validator
 
 from antennate.antenna import sensor as film
-from antennate.antenna.statics import PROFILES, Chain, equilibrium, with_profile
+from antennate.antenna.statics import PROFILES, Chain, Profile, equilibrium, with_profile
 from antennate.experiments import reading
 from antennate.experiments.force.post_traverse import Traverse
 from antennate.params import BenchPhysicsParams, ConditioningParams, Params, number
-from antennate.robots.antenna import AntennaParams
-from antennate.robots.sensor import SensorParams
+from antennate.params.base import require_different, require_whole_steps
+from antennate.robots.antenna import AntennaSpec
 from antennate.types import Bools, Floats, Ints
-
-Profile = Literal["stiff", "descending", "compliant", "matched_uniform", "ascending"]
 
 
 class ForceConfig(Params):
     """Everything that decides the outcome of `antennate force`."""
 
+    unread: ClassVar[tuple[str, ...]] = ("antenna.base_angle", "antenna.base_spacing")
     seed: int = number(0, "1", "assumed: any", "seed of all chance", ge=0)
     profiles: tuple[Profile, ...] = number(
         tuple(PROFILES),
@@ -76,25 +75,18 @@ class ForceConfig(Params):
     post_radius: float = number(
         0.003175, "m", "paper: spheres of 6.35 mm diameter", "radius of the post", gt=0, le=0.1
     )
-    antenna: AntennaParams = AntennaParams()
-    sensor: SensorParams = SensorParams()
+    antenna: AntennaSpec = AntennaSpec()
     conditioning: ConditioningParams = ConditioningParams()
     physics: BenchPhysicsParams = BenchPhysicsParams()
 
     @model_validator(mode="after")
     def _agree(self) -> ForceConfig:
-        steps = 1.0 / (self.sensor.rate * self.physics.timestep)
-        if steps < 0.5 or abs(steps - round(steps)) > 1e-6:
-            raise ValueError(
-                f"sensor.rate must be a whole fraction of the physics rate "
-                f"{1 / self.physics.timestep:g} Hz, got {self.sensor.rate:g} Hz"
-            )
+        require_whole_steps("antenna.sensor.rate", self.antenna.sensor.rate, self.physics.timestep)
         if self.nearest > self.from_place:
             raise ValueError(
                 f"nearest must not exceed from_place, {self.from_place:g}, got {self.nearest:g}"
             )
-        if len(set(self.profiles)) < len(self.profiles):
-            raise ValueError(f"profiles must differ, got {', '.join(self.profiles)}")
+        require_different("profiles", self.profiles)
         if min(self.speeds) <= 0:
             raise ValueError(f"speeds must be above 0, got {min(self.speeds):g}")
         return self
@@ -141,8 +133,8 @@ def static_loads(config: ForceConfig, profile: str, friction: float) -> tuple[Po
     Returns:
         The loads that keep every hinge within the limit, and how many did not.
     """
-    antenna = with_profile(config.antenna, config.sensor, profile)
-    chain, limit = Chain.of(antenna, config.sensor), math.radians(config.hinge_limit_deg)
+    antenna = with_profile(config.antenna, profile)
+    chain, limit = Chain.of(antenna), math.radians(config.hinge_limit_deg)
     rng = np.random.default_rng([config.seed, 0])
     places = config.places()
     place = np.repeat(places, 2 * config.loads)
@@ -151,11 +143,11 @@ def static_loads(config: ForceConfig, profile: str, friction: float) -> tuple[Po
     force = size[:, None] * np.stack([np.sin(lean), np.cos(lean)], axis=1)
     rest = equilibrium(chain, place * chain.length, force, follower=True)
     good = rest.solved & (abs(rest.angles).max(axis=1) <= limit * (1 + 1e-6))
-    covered = config.sensor.covered_hinges(antenna)
+    covered = antenna.sensed_hinges
     flex = rest.angles[:, :covered].sum(axis=1)
-    window = max(1, round(config.conditioning.averaging_time * config.sensor.rate))
-    noise = film.reading_noise(config.sensor, rng, (window, len(flex)))
-    repeated = film.counts(config.sensor, flex, noise)
+    window = max(1, round(config.conditioning.averaging_time * config.antenna.sensor.rate))
+    noise = film.reading_noise(config.antenna.sensor, rng, (window, len(flex)))
+    repeated = film.counts(config.antenna.sensor, flex, noise)
     points = Points(
         {
             "flex": flex[good],
@@ -176,9 +168,9 @@ def traverse_points(config: ForceConfig, traverses: list[Traverse]) -> Points:
     counts, levels = [np.zeros(0)], [np.zeros(0)]
     for k, one in enumerate(traverses):
         rng = np.random.default_rng([config.seed, 2, k])
-        noise = reading.noise(config.sensor, rng, len(one.flex))
-        counts.append(reading.recorded(config.sensor, one.flex, noise))
-        mean = reading.averaged(config.conditioning, counts[-1], config.sensor.rate)
+        noise = reading.noise(config.antenna.sensor, rng, len(one.flex))
+        counts.append(reading.recorded(config.antenna.sensor, one.flex, noise))
+        mean = reading.averaged(config.conditioning, counts[-1], config.antenna.sensor.rate)
         levels.append(reading.level(config.conditioning, mean))
     trial = np.repeat(np.arange(len(traverses)), [len(one.flex) for one in traverses])
     return Points(

@@ -12,8 +12,7 @@ import numpy as np
 
 from antennate.errors import SimulationError
 from antennate.params import BenchPhysicsParams
-from antennate.robots.antenna import AntennaParams
-from antennate.robots.sensor import SensorParams
+from antennate.robots.antenna import AntennaSpec
 from antennate.sim.bench import Ball, Bench, compile_bench
 from antennate.types import Floats
 
@@ -46,8 +45,7 @@ class Traverse:
 
 def drag(
     physics: BenchPhysicsParams,
-    antenna: AntennaParams,
-    sensor: SensorParams,
+    antenna: AntennaSpec,
     overlap: float,
     speed: float,
     post_radius: float,
@@ -59,7 +57,6 @@ def drag(
     Args:
         physics: Numerics.
         antenna: The antenna.
-        sensor: Its film and the rate at which it is read.
         overlap: Place of the first contact, over the length of the antenna.
         speed: Speed of the base [m/s].
         post_radius: Radius of the post [m].
@@ -67,7 +64,7 @@ def drag(
         rate: Samples a second [Hz].
     """
     post = Ball(overlap * antenna.length, -(post_radius + antenna.radius + _CLEARANCE), post_radius)
-    bench = Bench(compile_bench(physics, antenna, sensor, [post]), sensor.covered_hinges(antenna))
+    bench = Bench(compile_bench(physics, antenna, [post]), antenna)
     bench.place(0.0, 0.0, 0.0)
     steps = round(1.0 / (rate * physics.timestep))
     end = (_CLEARANCE + 2.0 * antenna.length) / speed + _RISE

@@ -24,7 +24,7 @@ from antennate.experiments.force.loads import (
     traverse_points,
 )
 from antennate.experiments.force.post_traverse import Traverse, drag
-from antennate.robots.antenna import AntennaParams
+from antennate.robots.antenna import AntennaSpec
 from antennate.studies.pool import run_tasks
 from antennate.studies.regression import by_group, explained
 from antennate.types import Floats, Ints
@@ -38,8 +38,9 @@ SCALARS = ("flex", "reading", "level")
 class TraverseRow:
     """One traverse, a row of trials.csv."""
 
-    profile: str
+    seed: int
     trial: int
+    profile: str
     status: str
     overlap: float
     speed_m_s: float
@@ -125,8 +126,8 @@ class _Task:
 
 def study_profile(config: ForceConfig, profile: str) -> ProfileOutcome:
     """Statics and traverses of one profile."""
-    antenna = with_profile(config.antenna, config.sensor, profile)
-    chain, limit = Chain.of(antenna, config.sensor), math.radians(config.hinge_limit_deg)
+    antenna = with_profile(config.antenna, profile)
+    chain, limit = Chain.of(antenna), math.radians(config.hinge_limit_deg)
     largest = largest_force(chain, limit)
     plain, left_out = static_loads(config, profile, 0.0)
     rubbed, also_out = static_loads(config, profile, config.antenna.friction)
@@ -162,7 +163,7 @@ def study_profile(config: ForceConfig, profile: str) -> ProfileOutcome:
 
 
 def _traverse_all(
-    config: ForceConfig, profile: str, antenna: AntennaParams, limit: float
+    config: ForceConfig, profile: str, antenna: AntennaSpec, limit: float
 ) -> tuple[list[TraverseRow], list[Traverse]]:
     rows, found = [], []
     for k in range(config.traverses):
@@ -173,18 +174,18 @@ def _traverse_all(
         one = drag(
             config.physics,
             antenna,
-            config.sensor,
             overlap,
             speed,
             config.post_radius,
             limit,
-            config.sensor.rate,
+            config.antenna.sensor.rate,
         )
         found.append(one)
         rows.append(
             TraverseRow(
-                profile,
+                config.seed,
                 k,
+                profile,
                 "invalid" if one.reason else "valid",
                 overlap,
                 speed,
@@ -204,7 +205,7 @@ def closed_form(chain: Chain, points: Points, config: ForceConfig, largest: floa
     grid = np.linspace(config.nearest, 1.0, 39)
     sizes = np.linspace(0.0, 2.0 * largest, 41)
     force = np.stack([np.zeros_like(sizes), sizes], axis=1)
-    covered = config.sensor.covered_hinges(config.antenna)
+    covered = config.antenna.sensed_hinges
     tables = []
     for at in grid:
         rest = equilibrium(chain, np.full(len(sizes), at * chain.length), force, follower=True)

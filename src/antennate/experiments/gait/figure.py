@@ -4,23 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any, Protocol
+from typing import Any
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MultipleLocator
 
 from antennate import figures as style
-from antennate.types import Floats, Maneuver
-
-
-class Walk(Protocol):
-    """What is needed of one walk."""
-
-    @property
-    def centre(self) -> Floats:
-        """Mean of the links over time [m], shape (n, 2)."""
-        ...
+from antennate.experiments.gait.pace import Walk
+from antennate.types import Maneuver
 
 
 @style.styled

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from antennate.params import GaitParams
-from antennate.robots.body import RobotParams
+from antennate.robots.spec import RobotSpec
 from antennate.types import Floats
 
 _STANDSTILL = 0.01
@@ -95,6 +95,6 @@ def _gain(t: Floats, value: Floats, start: Floats, period: float) -> Floats:
     return np.interp(start + period, t, value) - np.interp(start, t, value)
 
 
-def rolling_speed(gait: GaitParams, robot: RobotParams) -> float:
+def rolling_speed(gait: GaitParams, robot: RobotSpec) -> float:
     """Speed of legs that roll on their longest radius, 2 pi f (R + e) [m/s]."""
     return 2.0 * math.pi * gait.frequency * (robot.leg_radius + robot.leg_eccentricity)

@@ -9,18 +9,22 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from pydantic import model_validator
 
-from antennate.control.gait import Gait, targets
+from antennate.control.gait import Gait
 from antennate.control.loop import run_loop
 from antennate.experiments.gait.pace import Pace, Walk, measure, rolling_speed
 from antennate.params import GaitParams, Params, PhysicsParams, VariationParams, number
-from antennate.robots.body import RobotParams
+from antennate.params.base import require_whole_steps
+from antennate.robots.spec import HARDWARE_ALONE, RobotSpec
+from antennate.sim.scenes.flat import FlatScene
 from antennate.sim.sim_robot import Disturbance, SimRobot
-from antennate.sim.world import World, compile_world
+from antennate.sim.trial import make_world, place_at_start
+from antennate.sim.world import World
+from antennate.studies.experiment import WithoutTrials
 from antennate.studies.pool import run_tasks
 from antennate.types import AntennaFrame, Floats, JointCommand, Maneuver
 
@@ -32,6 +36,7 @@ WAVE_OFF = "wave_off"
 class GaitStudyConfig(Params):
     """Everything that decides the outcome of `antennate gait`."""
 
+    unread: ClassVar[tuple[str, ...]] = HARDWARE_ALONE
     cycles: int = number(
         4,
         "1",
@@ -59,23 +64,18 @@ class GaitStudyConfig(Params):
     rate: float = number(
         100.0, "Hz", "paper: about 100 Hz over serial", "control ticks per second", gt=0, le=1000
     )
-    robot: RobotParams = RobotParams()
+    robot: RobotSpec = RobotSpec()
     gait: GaitParams = GaitParams()
     physics: PhysicsParams = PhysicsParams()
 
     @model_validator(mode="after")
     def _whole_steps(self) -> GaitStudyConfig:
-        steps = 1.0 / (self.rate * self.physics.timestep)
-        if steps < 0.5 or abs(steps - round(steps)) > 1e-6:
-            raise ValueError(
-                f"rate must be a whole fraction of the physics rate "
-                f"{1 / self.physics.timestep:g} Hz, got {self.rate:g} Hz"
-            )
+        require_whole_steps("rate", self.rate, self.physics.timestep)
         return self
 
 
 @dataclass(frozen=True, slots=True)
-class GaitOutcome:
+class GaitOutcome(WithoutTrials):
     """All walks: four maneuvers by name, one without body wave, and the sweep over its lead."""
 
     config: GaitStudyConfig
@@ -136,8 +136,10 @@ class GaitOutcome:
 class _Fixed:
     """A control of one idea: always the same maneuver."""
 
-    def __init__(self, gait: GaitParams, maneuver: Maneuver, period: float) -> None:
-        self._gait = Gait(gait, 1, period)
+    def __init__(
+        self, gait: GaitParams, robot: RobotSpec, maneuver: Maneuver, period: float
+    ) -> None:
+        self._gait = Gait(gait, robot, 1, period)
         self._maneuver = np.array([int(maneuver)])
 
     def step(self, frame: AntennaFrame) -> JointCommand:
@@ -163,10 +165,10 @@ def walk_flat(config: GaitStudyConfig, name: str, gait: GaitParams, maneuver: Ma
         SimulationError: The physics became invalid.
     """
     robot, period = config.robot, 1.0 / config.rate
-    world = World(compile_world(config.physics, robot), robot.sensor.covered_hinges(robot.antenna))
-    start = targets(gait, np.zeros(1), np.zeros(1))
-    world.place(0.0, 0.0, 0.0, start.yaw[0], start.leg[0])
-    body = SimRobot(1, robot.sensor, period, config.physics.timestep)
+    scene = FlatScene().draw(robot, np.random.default_rng(0))
+    world = make_world(config.physics, robot, scene)
+    place_at_start(world, scene, gait)
+    body = SimRobot(1, robot, period, config.physics.timestep)
     body.load(0, world, _no_chance(robot, period))
     end = (config.settling_cycles + config.cycles) / gait.frequency
     ticks: list[tuple[float, Floats, float]] = []
@@ -178,9 +180,10 @@ def walk_flat(config: GaitStudyConfig, name: str, gait: GaitParams, maneuver: Ma
         ticks.append((world.t, world.links(), _positive_power(world)))
         return world.t < end - period / 2
 
-    run_loop(body, _Fixed(gait, maneuver, period), period, go_on)
+    run_loop(body, _Fixed(gait, robot, maneuver, period), period, go_on)
     links = np.array([tick[1] for tick in ticks])
-    axis = links[:, :3].mean(axis=1) - links[:, 3:].mean(axis=1)
+    half = robot.links // 2
+    axis = links[:, :half].mean(axis=1) - links[:, half:].mean(axis=1)
     return Walk(
         name=name,
         gait=gait,
@@ -194,10 +197,10 @@ def walk_flat(config: GaitStudyConfig, name: str, gait: GaitParams, maneuver: Ma
     )
 
 
-def _no_chance(robot: RobotParams, period: float) -> Disturbance:
+def _no_chance(robot: RobotSpec, period: float) -> Disturbance:
     """A disturbance that disturbs nothing; the control here does not look at sensor noise."""
     still = VariationParams(start_lateral=0, start_heading=0, joint_bias=0, slip_log_sd=0)
-    return Disturbance(np.random.default_rng(0), still, robot.sensor, robot.leg_friction, period)
+    return Disturbance(np.random.default_rng(0), still, robot, period)
 
 
 def _positive_power(world: World) -> float:

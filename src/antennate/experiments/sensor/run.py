@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from antennate.errors import ConfigError
 from antennate.params import Params
 from antennate.params.base import number
 from antennate.robots.sensor import SensorParams
+from antennate.studies.experiment import WithoutTrials
 from antennate.types import Floats
 
 E24 = (
@@ -25,6 +26,7 @@ E24 = (
 class SensorConfig(Params):
     """A film under a given range of bends."""
 
+    unread: ClassVar[tuple[str, ...]] = ("sensor.active_length",)
     largest_flex: float = number(
         math.pi / 2, "rad", "assumed: antenna bent to a right angle", "largest bend", gt=0.01, le=6
     )
@@ -42,7 +44,7 @@ class SensorConfig(Params):
 
 
 @dataclass(frozen=True)
-class SensorOutcome:
+class SensorOutcome(WithoutTrials):
     """What the sensor says.
 
     Attributes:
@@ -65,7 +67,7 @@ class SensorOutcome:
     def result(self) -> dict[str, Any]:
         """The content of result.json."""
         params = self.config.sensor
-        film = sensor.resistance(params, sensor.bend(params, self.flex))
+        film = sensor.resistance(params, sensor.sensed_flex(params, self.flex))
         volts = sensor.divider(params, film)
         readings = sensor.counts(params, self.flex)
         return {

@@ -1,1 +1,6 @@
-"""The experiment `sweep`."""
+"""Move an antenna's base to and fro beside walls: its shapes, and the distances that it tells.
+
+Which shapes appear at which distance, centre and amplitude of the base oscillation, with the base
+fixed and moving along; and how well flex and base angle together tell the distance of a wall and
+the width of a gap, beside what each tells alone.
+"""

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
+from typing import Annotated, ClassVar
 
-from pydantic import model_validator
+from pydantic import Field, model_validator
 
-from antennate.antenna.statics import PROFILES
-from antennate.experiments.force.loads import Profile
+from antennate.antenna.statics import PROFILES, Profile
 from antennate.params import (
     BenchPhysicsParams,
     ConditioningParams,
@@ -17,13 +17,17 @@ from antennate.params import (
     SweepParams,
     number,
 )
-from antennate.robots.antenna import AntennaParams
-from antennate.robots.sensor import SensorParams
+from antennate.params.base import require_different, require_whole_steps
+from antennate.robots.antenna import AntennaSpec
 
 
 class SweepConfig(Params):
     """Everything that decides the outcome of `antennate sweep`."""
 
+    unread: ClassVar[tuple[str, ...]] = (
+        "antenna.base_angle",
+        *(f"conditioning.{n}" for n in ConditioningParams.model_fields if n != "averaging_time"),
+    )
     seed: int = number(0, "1", "assumed: any", "seed of all chance", ge=0)
     profiles: tuple[Profile, ...] = number(
         tuple(PROFILES),
@@ -42,14 +46,14 @@ class SweepConfig(Params):
         "distances of the wall, over the length of the antenna",
         min_length=1,
     )
-    centres: tuple[float, ...] = number(
+    centres: tuple[Annotated[float, Field(ge=0, le=2.0)], ...] = number(
         tuple(math.radians(a) for a in (47.0, 70.0, 90.0)),
         "rad",
         "assumed: the mounting angle, and on to sideways",
         "centres of the sweep",
         min_length=1,
     )
-    amplitudes: tuple[float, ...] = number(
+    amplitudes: tuple[Annotated[float, Field(gt=0, le=1.5)], ...] = number(
         tuple(math.radians(a) for a in (15.0, 30.0, 45.0)),
         "rad",
         "assumed: half and one and a half times the default",
@@ -70,21 +74,14 @@ class SweepConfig(Params):
     sweep: SweepParams = SweepParams()
     shape: ShapeParams = ShapeParams()
     estimate: EstimateParams = EstimateParams()
-    antenna: AntennaParams = AntennaParams()
-    sensor: SensorParams = SensorParams()
+    antenna: AntennaSpec = AntennaSpec()
     conditioning: ConditioningParams = ConditioningParams()
     physics: BenchPhysicsParams = BenchPhysicsParams()
 
     @model_validator(mode="after")
     def _agree(self) -> SweepConfig:
-        steps = 1.0 / (self.sensor.rate * self.physics.timestep)
-        if steps < 0.5 or abs(steps - round(steps)) > 1e-6:
-            raise ValueError(
-                f"sensor.rate must be a whole fraction of the physics rate "
-                f"{1 / self.physics.timestep:g} Hz, got {self.sensor.rate:g} Hz"
-            )
-        if len(set(self.profiles)) < len(self.profiles):
-            raise ValueError(f"profiles must differ, got {', '.join(self.profiles)}")
+        require_whole_steps("antenna.sensor.rate", self.antenna.sensor.rate, self.physics.timestep)
+        require_different("profiles", self.profiles)
         least = self.antenna.radius / self.antenna.length
         for what, values in (
             ("distances", self.distances),

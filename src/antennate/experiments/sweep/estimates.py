@@ -30,8 +30,7 @@ from antennate.params import (
     ShapeParams,
     SweepParams,
 )
-from antennate.robots.antenna import AntennaParams
-from antennate.robots.sensor import SensorParams
+from antennate.robots.antenna import AntennaSpec
 from antennate.studies.statistics import mean95
 from antennate.types import Floats
 
@@ -50,8 +49,7 @@ class Setting:
     sweep: SweepParams
     shape: ShapeParams
     conditioning: ConditioningParams
-    antenna: AntennaParams
-    sensor: SensorParams
+    antenna: AntennaSpec
     physics: BenchPhysicsParams
     speed: float
 
@@ -103,7 +101,6 @@ def run_trial(setting: Setting, condition: str, split: str, number: int, side: s
     trace = record(
         setting.physics,
         setting.antenna.model_copy(update={"friction": friction}),
-        setting.sensor,
         sweep,
         Wall(distance, params.tilt_range * float(lean) if condition == "tilted" else 0.0),
         0.5,
@@ -112,8 +109,8 @@ def run_trial(setting: Setting, condition: str, split: str, number: int, side: s
     )
     if trace.reason:
         return Trial(condition, split, number, side, distance, sweep, None, None, trace.reason)
-    statics = Statics(setting.antenna, setting.sensor)
-    common = (setting.shape.flex, statics, setting.sensor, setting.conditioning, zero)
+    statics = Statics(setting.antenna)
+    common = (setting.shape.flex, statics, setting.antenna.sensor, setting.conditioning, zero)
     outward = 0.5 / sweep.frequency
     exact = feel(trace, outward, *common)
     noisy = feel(trace, outward, *common, gain, rng)

@@ -20,7 +20,7 @@ from antennate.antenna.statics import Chain, equilibrium, shape
 from antennate.experiments import reading
 from antennate.experiments.sweep.scan import Trace
 from antennate.params import ConditioningParams
-from antennate.robots.antenna import AntennaParams
+from antennate.robots.antenna import AntennaSpec
 from antennate.robots.sensor import SensorParams
 from antennate.types import Floats
 
@@ -64,10 +64,10 @@ class Felt:
 class Statics:
     """Distance to a wall that the tip touches without friction, from base angle and flex."""
 
-    def __init__(self, antenna: AntennaParams, sensor: SensorParams) -> None:
-        covered = sensor.covered_hinges(antenna)
-        stiffness = antenna.hinge_stiffness(covered)
-        self._table = _tip_curves(stiffness, antenna.link_length, antenna.radius, covered)
+    def __init__(self, antenna: AntennaSpec) -> None:
+        self._table = _tip_curves(
+            antenna.hinge_stiffness(), antenna.link_length, antenna.radius, antenna.sensed_hinges
+        )
 
     def distance(self, base: Floats, flex: Floats) -> Floats:
         """Distance of the wall [m] for base angles and sizes of flex [rad], shape (n,)."""

@@ -35,10 +35,11 @@ class SweepRow:
     Columns that do not apply are empty.
     """
 
+    seed: int
+    trial: int
     kind: Literal["map", "estimate"]
     profile: str
     condition: str
-    trial: int
     side: str
     status: str
     distance_m: float
@@ -113,6 +114,7 @@ class SweepOutcome:
 def _row(config: SweepConfig, trial: Trial) -> SweepRow:
     felt = trial.noisy
     return SweepRow(
+        seed=config.seed,
         kind="estimate",
         profile=config.profile,
         condition=trial.condition,
@@ -160,8 +162,7 @@ def map_cell(config: SweepConfig, cell: _Cell) -> SweepRow:
     wall = sweeping.Wall(cell.distance * config.antenna.length)
     trace = sweeping.record(
         config.physics,
-        with_profile(config.antenna, config.sensor, cell.profile),
-        config.sensor,
+        with_profile(config.antenna, cell.profile),
         sweep,
         wall,
         config.sweeps + 1,
@@ -173,6 +174,7 @@ def map_cell(config: SweepConfig, cell: _Cell) -> SweepRow:
         found = sweeping.shares(config.shape, trace, 1.0 / sweep.frequency)
         found["peak_flex_rad"] = float(abs(trace.flex).max())
     return SweepRow(
+        seed=config.seed,
         kind="map",
         profile=cell.profile,
         condition=cell.motion,
@@ -200,7 +202,7 @@ def _run_task(task: _Task, emit: Callable[[Any], None]) -> None:
 
 
 def _estimate(config: SweepConfig, condition: str, split: str, number: int, side: str) -> Trial:
-    antenna = with_profile(config.antenna, config.sensor, config.profile)
+    antenna = with_profile(config.antenna, config.profile)
     return estimates.run_trial(
         estimates.Setting(
             config.seed,
@@ -209,7 +211,6 @@ def _estimate(config: SweepConfig, condition: str, split: str, number: int, side
             config.shape,
             config.conditioning,
             antenna,
-            config.sensor,
             config.physics,
             config.speed,
         ),

@@ -16,8 +16,7 @@ import numpy as np
 from antennate.errors import SimulationError
 from antennate.experiments.force.post_traverse import speed_at, way
 from antennate.params import BenchPhysicsParams, ShapeParams, SweepParams
-from antennate.robots.antenna import AntennaParams
-from antennate.robots.sensor import SensorParams
+from antennate.robots.antenna import AntennaSpec
 from antennate.sim.bench import Bar, Bench, compile_bench
 from antennate.types import Bools, Floats, Ints
 
@@ -86,8 +85,7 @@ class Trace:
 
 def record(
     physics: BenchPhysicsParams,
-    antenna: AntennaParams,
-    sensor: SensorParams,
+    antenna: AntennaSpec,
     sweep: SweepParams,
     wall: Wall,
     sweeps: float,
@@ -99,19 +97,16 @@ def record(
     Args:
         physics: Numerics.
         antenna: The antenna.
-        sensor: Its film and the rate of samples.
         sweep: The sweep.
         wall: The wall.
         sweeps: How many sweeps.
         speed: Speed of the base along the heading [m/s].
         gap: Distance to the wall that counts as touching [m].
     """
-    bench = Bench(
-        compile_bench(physics, antenna, sensor, [wall.bar()]), sensor.covered_hinges(antenna)
-    )
+    bench, rate = Bench(compile_bench(physics, antenna, [wall.bar()]), antenna), antenna.sensor.rate
     bench.place(0.0, 0.0, 0.0)
-    steps = round(1.0 / (sensor.rate * physics.timestep))
-    end = _APPROACH + sweeps / sweep.frequency - 0.5 / sensor.rate
+    steps = round(1.0 / (rate * physics.timestep))
+    end = _APPROACH + sweeps / sweep.frequency - 0.5 / rate
     rows: list[tuple[float, float, float, float, float, bool]] = []
     try:
         while bench.t < end:

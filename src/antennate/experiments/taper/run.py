@@ -14,6 +14,7 @@ from antennate.antenna import taper
 from antennate.errors import BadInputError, ConfigError
 from antennate.params import TaperParams
 from antennate.params.base import number
+from antennate.studies.experiment import WithoutTrials
 from antennate.types import Floats
 
 COLUMN = "diameter_mm"
@@ -34,7 +35,7 @@ class TaperConfig(TaperParams):
 
 
 @dataclass(frozen=True)
-class TaperOutcome:
+class TaperOutcome(WithoutTrials):
     """A taper and two ladders.
 
     Attributes:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -12,82 +12,12 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MultipleLocator
 
 from antennate import figures as style
-from antennate.types import Bools, Floats
+from antennate.experiments.touch.run import Trace
+from antennate.experiments.touch.traverse import Traverse
 
-PROFILE_LOOKS = {
-    "stiff": ("#0072B2", "o", "solid"),
-    "descending": ("#D55E00", "s", (0, (5, 1.5))),
-    "compliant": ("#009E73", "^", (0, (4, 1.5, 1, 1.5))),
-    "matched_uniform": ("#CC79A7", "D", (0, (1, 1.2))),
-    "ascending": ("#E69F00", "v", (0, (6, 1, 1, 1, 1, 1))),
-}
-"""Colour, marker and line of each profile: apart in grey, too."""
 _TRUE, _SENSED = "#0072B2", "#D55E00"
 _SHAPES = 14
 """Shapes of the antenna drawn along a wall."""
-
-
-class _Course(Protocol):
-    @property
-    def x(self) -> Floats: ...
-    @property
-    def flex(self) -> Floats: ...
-    @property
-    def joints(self) -> Floats: ...
-
-
-class _Traverse(Protocol):
-    @property
-    def wall(self) -> str: ...
-    @property
-    def speed(self) -> float: ...
-    @property
-    def profile(self) -> str: ...
-    @property
-    def course(self) -> _Course: ...
-    @property
-    def outline(self) -> Sequence[Floats]: ...
-
-
-class _Verdict(Protocol):
-    @property
-    def truth(self) -> Bools: ...
-    @property
-    def alarm(self) -> Bools: ...
-
-
-class Trace(Protocol):
-    """What is needed of one traverse."""
-
-    @property
-    def traverse(self) -> _Traverse:
-        """The traverse itself."""
-        ...
-
-    @property
-    def verdict(self) -> _Verdict:
-        """The true and the sensed state, shape (n,)."""
-        ...
-
-    @property
-    def t(self) -> Floats:
-        """Time of every tick [s], shape (n,)."""
-        ...
-
-    @property
-    def b(self) -> Floats:
-        """Bending level, shape (n,)."""
-        ...
-
-    @property
-    def threshold(self) -> float:
-        """Theta."""
-        ...
-
-    @property
-    def hysteresis(self) -> float:
-        """How far below theta contact ends."""
-        ...
 
 
 @style.styled
@@ -122,7 +52,7 @@ def _points(
     interval: Sequence[Sequence[float] | None],
 ) -> None:
     """Points with their intervals; what does not exist is left out."""
-    colour, marker, _ = PROFILE_LOOKS[name]
+    colour, marker, _ = style.PROFILE_LOOKS[name]
     known = [(a, b, i) for a, b, i in zip(x, y, interval, strict=True) if b is not None]
     if not known:
         panel.plot([], [], color=colour, marker=marker, linestyle="", label=name)
@@ -198,7 +128,7 @@ def _draw_latency(panel: Axes, result: Mapping[str, Any], key: str) -> None:
         if known:
             panel.plot(
                 *zip(*known, strict=True),
-                color=PROFILE_LOOKS[name][0],
+                color=style.PROFILE_LOOKS[name][0],
                 marker="_",
                 markersize=11,
                 markeredgewidth=1.8,
@@ -255,7 +185,7 @@ def curves(result: Mapping[str, Any]) -> Figure:
 def _draw_curve(
     roc: Axes, over: Axes, result: Mapping[str, Any], name: str, found: Mapping[str, Any]
 ) -> None:
-    colour, marker, line = PROFILE_LOOKS[name]
+    colour, marker, line = style.PROFILE_LOOKS[name]
     points = [p for p in found["curve"] if None not in p.values()]
     if not points:
         return
@@ -335,7 +265,7 @@ def _draw_states(panel: Axes, example: Trace) -> None:
     panel.grid(visible=False, axis="y")
 
 
-def _draw_plan(panel: Axes, one: _Traverse) -> None:
+def _draw_plan(panel: Axes, one: Traverse) -> None:
     for line in one.outline:
         if one.wall == "boulders":
             panel.plot(*line.T, color=style.MUTED, marker="o", markersize=3, linestyle="")
@@ -344,7 +274,7 @@ def _draw_plan(panel: Axes, one: _Traverse) -> None:
     joints = one.course.joints
     if len(joints):
         shown = joints[np.linspace(0, len(joints) - 1, _SHAPES).astype(int)]
-        colour = PROFILE_LOOKS[one.profile][0]
+        colour = style.PROFILE_LOOKS[one.profile][0]
         panel.add_collection(LineCollection(list(shown), colors=colour, linewidths=1.3))
         panel.plot(*shown[:, 0].T, color=style.INK, marker="o", markersize=3, linestyle="")
     panel.set_aspect("equal", adjustable="datalim")

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
 
 from antennate.experiments.touch.sensing import Verdict
 from antennate.studies import statistics
@@ -183,6 +182,8 @@ def _below(free: Floats) -> Floats:
 
 def _auc(touching: Floats, free: Floats) -> float:
     """Chance that a touching tick scores above a free one, for scores (n,) and (m,)."""
+    from scipy import stats  # takes long; only where it is needed
+
     if not len(touching) or not len(free):
         return float("nan")
     test = stats.mannwhitneyu(touching, free)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -15,13 +15,12 @@ from antennate.antenna.statics import Chain
 from antennate.control.conditioning import bending_level
 from antennate.experiments import reading
 from antennate.experiments.touch import sensing
+from antennate.experiments.touch.config import TouchConfig
 from antennate.experiments.touch.measures import Pool, roc
 from antennate.experiments.touch.sensing import Judgement, Verdict
+from antennate.experiments.touch.traverse import Traverse
 from antennate.params import ConditioningParams
 from antennate.types import Floats
-
-if TYPE_CHECKING:
-    from antennate.experiments.touch.run import TouchConfig, Traverse
 
 SCHEMA = 1
 _FLEX = np.linspace(0.0, 2.0 * np.pi, 20001)
@@ -33,10 +32,11 @@ _STRONGEST = 1.0
 class TouchRow:
     """One traverse in the table; empty cells where the physics is invalid."""
 
+    seed: int
+    trial: int
     wall: str
     speed_m_s: float
     profile: str
-    trial: int
     status: str
     overlap_m: float
     contact_share: float | None = None
@@ -57,7 +57,7 @@ def judgement(
     averaging: float | None = None,
 ) -> Judgement:
     """How the truth is told; what is given replaces the configuration."""
-    rate = config.sensor.rate
+    rate = config.antenna.sensor.rate
     return Judgement(
         force=config.contact_force if force is None else force,
         merge=round((config.merge_time if merge is None else merge) * rate),
@@ -100,15 +100,17 @@ def _judge_batch(
 ) -> dict[int, Verdict]:
     ticks = len(batch[0].course.x)
     noises = {
-        trial: reading.noise(config.sensor, np.random.default_rng([config.seed, trial, 1]), ticks)
+        trial: reading.noise(
+            config.antenna.sensor, np.random.default_rng([config.seed, trial, 1]), ticks
+        )
         for trial in {t.trial for t in batch}
     }
     counts = reading.recorded(
-        config.sensor,
+        config.antenna.sensor,
         np.stack([t.course.flex for t in batch], axis=1),
         np.stack([noises[t.trial] for t in batch], axis=1),
     )
-    sensed = sensing.sense(conditioning, config.rule, counts, 1.0 / config.sensor.rate)
+    sensed = sensing.sense(conditioning, config.rule, counts, 1.0 / config.antenna.sensor.rate)
     level = sensing.logit(sensed.b)
     verdicts = {}
     for i, one in enumerate(batch):
@@ -133,7 +135,7 @@ def result(
     config: TouchConfig, traverses: Sequence[Traverse], verdicts: Sequence[Verdict]
 ) -> dict[str, Any]:
     """The content of result.json."""
-    pool = Pool(verdicts, config.trials, config.sensor.rate)
+    pool = Pool(verdicts, config.trials, config.antenna.sensor.rate)
 
     def of(**wanted: Any) -> dict[str, Any]:
         group = [v for v in verdicts if all(getattr(v, k) == w for k, w in wanted.items())]
@@ -148,7 +150,7 @@ def result(
         "seed": config.seed,
         "trials": config.trials,
         "invalid": len(traverses) - len(verdicts),
-        "rate_hz": config.sensor.rate,
+        "rate_hz": config.antenna.sensor.rate,
         "travel_m": config.travel,
         "contact_force_n": config.contact_force,
         "merge_time_s": config.merge_time,
@@ -178,7 +180,7 @@ def _needed(config: TouchConfig) -> dict[str, Any]:
 
 def _flex_at(config: TouchConfig, level: float) -> float | None:
     """Least steady flex without noise at which b reaches a level [rad]; None if none does."""
-    b = bending_level(config.conditioning, sensor.counts(config.sensor, _FLEX))
+    b = bending_level(config.conditioning, sensor.counts(config.antenna.sensor, _FLEX))
     enough = np.flatnonzero(b >= level)
     return float(_FLEX[enough[0]]) if len(enough) else None
 
@@ -192,12 +194,12 @@ def _with_flex(config: TouchConfig, found: dict[str, Any]) -> dict[str, Any]:
 
 def _tip_force(config: TouchConfig, profile: str, angle: float) -> float | None:
     """Force that turns with the tip and bends the film by an angle [rad]; None above 1 N."""
-    antenna = mechanics.with_profile(config.antenna, config.sensor, profile)
-    chain = Chain.of(antenna, config.sensor)
+    antenna = mechanics.with_profile(config.antenna, profile)
+    chain = Chain.of(antenna)
     force = np.geomspace(1e-4, _STRONGEST, 400)
     load = np.stack([np.zeros_like(force), force], axis=1)
     rest = mechanics.equilibrium(chain, np.full(len(force), chain.length), load, follower=True)
-    bent = rest.angles[:, : config.sensor.covered_hinges(antenna)].sum(axis=1)
+    bent = rest.angles[:, : antenna.sensed_hinges].sum(axis=1)
     within = (abs(rest.angles) < antenna.range).all(axis=1) & rest.solved
     enough = np.flatnonzero(bent >= angle)
     if not len(enough) or not within[: enough[0] + 1].all():
@@ -211,7 +213,7 @@ _SHORT = ("f1", "f1_95", "precision", "recall", "contacts", "missed", "false_per
 def _averaged(config: TouchConfig, traverses: Sequence[Traverse], time: float) -> dict[str, Any]:
     """All profiles together with another T_avg."""
     verdicts = score(config, traverses, averaging=time)
-    found = Pool(verdicts, config.trials, config.sensor.rate).measure(verdicts)
+    found = Pool(verdicts, config.trials, config.antenna.sensor.rate).measure(verdicts)
     return {
         "averaging_time_s": time,
         **{key: found[key] for key in (*_SHORT, "onset", "release", "auc", "auc_95")},
@@ -228,23 +230,24 @@ def _told(
     config: TouchConfig, traverses: Sequence[Traverse], force: float, merge: float
 ) -> dict[str, Any]:
     verdicts = score(config, traverses, rule=judgement(config, force=force, merge=merge))
-    found = Pool(verdicts, config.trials, config.sensor.rate).measure(verdicts)
+    found = Pool(verdicts, config.trials, config.antenna.sensor.rate).measure(verdicts)
     keys = ("contact_share", *_SHORT)
     return {"contact_force_n": force, "merge_time_s": merge, **{key: found[key] for key in keys}}
 
 
-def rows(traverses: Sequence[Traverse], verdicts: Sequence[Verdict]) -> list[TouchRow]:
+def rows(seed: int, traverses: Sequence[Traverse], verdicts: Sequence[Verdict]) -> list[TouchRow]:
     """One row for every traverse, in their order."""
     waiting = iter(verdicts)
-    return [_row(t, None if t.course.reason else next(waiting)) for t in traverses]
+    return [_row(seed, t, None if t.course.reason else next(waiting)) for t in traverses]
 
 
-def _row(one: Traverse, verdict: Verdict | None) -> TouchRow:
+def _row(seed: int, one: Traverse, verdict: Verdict | None) -> TouchRow:
     empty = TouchRow(
+        seed=seed,
+        trial=one.trial,
         wall=one.wall,
         speed_m_s=one.speed,
         profile=one.profile,
-        trial=one.trial,
         status="invalid" if verdict is None else "valid",
         overlap_m=one.overlap,
         reason=one.course.reason,

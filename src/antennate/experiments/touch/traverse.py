@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from antennate.antenna import statics as mechanics
+from antennate.antenna.statics import Profile
 from antennate.errors import SimulationError
 from antennate.params import BenchPhysicsParams, TouchWallsParams
-from antennate.robots.antenna import AntennaParams
-from antennate.robots.sensor import SensorParams
+from antennate.robots.antenna import AntennaSpec
 from antennate.sim import touch_wall
 from antennate.sim.bench import Bench, compile_bench
 from antennate.sim.touch_wall import Site, WallKind
@@ -21,7 +21,7 @@ CLEARANCE = 0.005
 """Free way between the straight antenna and what it must not touch yet [m]."""
 RUN_UP = 0.5
 """Time in which the carriage starts off, before the first tick [s]."""
-_MOVES = 5
+MOVES = 5
 """Updates of the carriage's target in one tick."""
 
 
@@ -33,7 +33,7 @@ class Draw:
         shift: Place of the wall beyond its first possible one [m].
         phase: Phase of a periodic wall, in turns.
         overlap: How far the straight tip would stand behind the surface [m].
-        springs: Factors of the six springs, shape (6,).
+        springs: Factors of the n springs, shape (n,).
     """
 
     shift: float
@@ -54,8 +54,7 @@ class Plan:
         travel: Way from the first tick to the last [m].
     """
 
-    antenna: AntennaParams
-    sensor: SensorParams
+    antenna: AntennaSpec
     physics: BenchPhysicsParams
     walls: TouchWallsParams
     kind: WallKind
@@ -67,7 +66,7 @@ class Plan:
     @property
     def ticks(self) -> int:
         """Number of ticks."""
-        return 1 + math.ceil(self.travel / self.speed * self.sensor.rate - 1e-9)
+        return 1 + math.ceil(self.travel / self.speed * self.antenna.sensor.rate - 1e-9)
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +77,7 @@ class Course:
         x: Way of the carriage [m], shape (n,).
         flex: Summed hinge angles under the film [rad], shape (n,).
         force: Force of all obstacles on the antenna, mean over the tick [N], shape (n,).
-        joints: Hinges and tip [m], shape (n, 7, 2); (0, 7, 2) if they were not kept.
+        joints: Hinges and tip [m], shape (t, n + 1, 2); (0, n + 1, 2) if they were not kept.
         reason: Why the physics is invalid; empty if it is sound.
     """
 
@@ -89,12 +88,32 @@ class Course:
     reason: str = ""
 
 
-def reach(antenna: AntennaParams) -> float:
+@dataclass(frozen=True, slots=True)
+class Traverse:
+    """One traverse as it came out of the engine.
+
+    Attributes:
+        wall, speed, profile, trial: Which one; speed in [m/s].
+        course: What the engine says.
+        overlap: Drawn overlap [m].
+        outline: Surface of the wall along the traverse, lines of shape (n, 2) [m].
+    """
+
+    wall: WallKind
+    speed: float
+    profile: Profile
+    trial: int
+    course: Course
+    overlap: float
+    outline: list[Floats]
+
+
+def reach(antenna: AntennaSpec) -> float:
     """Distance of the straight antenna's tip from the line of traverse [m]."""
     return antenna.length * math.sin(antenna.base_angle)
 
 
-def site(antenna: AntennaParams, overlap: float, length: float, phase: float) -> Site:
+def site(antenna: AntennaSpec, overlap: float, length: float, phase: float) -> Site:
     """Where a wall stands for an overlap [m]."""
     return Site(
         near=reach(antenna) - overlap,
@@ -105,11 +124,9 @@ def site(antenna: AntennaParams, overlap: float, length: float, phase: float) ->
     )
 
 
-def with_springs(
-    antenna: AntennaParams, sensor: SensorParams, profile: str, factors: Floats
-) -> AntennaParams:
+def with_springs(antenna: AntennaSpec, profile: str, factors: Floats) -> AntennaSpec:
     """The antenna with the springs of a profile, each off by its factor."""
-    nominal = mechanics.with_profile(antenna, sensor, profile)
+    nominal = mechanics.with_profile(antenna, profile)
     coils = tuple(float(c / f) for c, f in zip(nominal.active_coils, factors, strict=True))
     return nominal.model_copy(update={"active_coils": coils})
 
@@ -119,31 +136,30 @@ def run_traverse(plan: Plan, keep_joints: bool) -> Course:
     model = compile_bench(
         plan.physics,
         plan.antenna,
-        plan.sensor,
         touch_wall.build(plan.walls, plan.kind, plan.site, plan.wall_start),
     )
-    bench = Bench(model, plan.sensor.covered_hinges(plan.antenna))
+    bench = Bench(model, plan.antenna)
     ticks: list[tuple[float, float, float]] = []
     joints: list[Floats] = []
     reason = ""
     try:
         _start_off(bench, plan)
         for tick in range(plan.ticks):
-            force = _advance(bench, plan, (tick - 1) / plan.sensor.rate) if tick else 0.0
+            force = _advance(bench, plan, (tick - 1) / plan.antenna.sensor.rate) if tick else 0.0
             ticks.append((float(bench.carriage()[0]), bench.flex(), force))
             if keep_joints:
                 joints.append(bench.joints())
     except SimulationError as error:
         reason = str(error)
     x, flex, force = np.array(ticks).reshape(-1, 3).T
-    return Course(x, flex, force, np.array(joints).reshape(-1, 7, 2), reason)
+    return Course(x, flex, force, np.array(joints).reshape(-1, plan.antenna.hinges + 1, 2), reason)
 
 
 def _start_off(bench: Bench, plan: Plan) -> None:
     """Reach x = 0 at full speed, from rest, at a steady acceleration."""
     base, speed = plan.antenna.base_angle, plan.speed
     bench.place(-speed * RUN_UP / 2, 0.0, base)
-    moves = round(RUN_UP * plan.sensor.rate) * _MOVES
+    moves = round(RUN_UP * plan.antenna.sensor.rate) * MOVES
     for i in range(1, moves + 1):
         share = i / moves
         bench.command(speed * RUN_UP / 2 * (share**2 - 1.0), 0.0, share * speed, 0.0, base)
@@ -153,21 +169,15 @@ def _start_off(bench: Bench, plan: Plan) -> None:
 def _advance(bench: Bench, plan: Plan, since: float) -> float:
     """One tick on, `since` seconds after the first; the mean force in it [N]."""
     force = np.zeros(2)
-    pace = 1.0 / (plan.sensor.rate * _MOVES)
-    for i in range(1, _MOVES + 1):
+    pace = 1.0 / (plan.antenna.sensor.rate * MOVES)
+    for i in range(1, MOVES + 1):
         bench.command(
             plan.speed * (since + i * pace), 0.0, plan.speed, 0.0, plan.antenna.base_angle
         )
-        force += bench.press(_steps(plan)) / _MOVES
+        force += bench.press(_steps(plan)) / MOVES
     return float(np.linalg.norm(force))
 
 
 def _steps(plan: Plan) -> int:
     """Physics steps between two targets of the carriage."""
-    return round(1.0 / (plan.sensor.rate * _MOVES * plan.physics.timestep))
-
-
-def steps_fit(rate: float, timestep: float) -> bool:
-    """Whether a tick has a whole number of physics steps that its moves share."""
-    steps = 1.0 / (rate * _MOVES * timestep)
-    return steps > 0.5 and abs(steps - round(steps)) < 1e-6
+    return round(1.0 / (plan.antenna.sensor.rate * MOVES * plan.physics.timestep))

@@ -1,126 +1,72 @@
-"""Figures of `antennate tunnel`: trials seen from above, and the arms side by side."""
+"""Figures of `antennate tunnel`: trials seen from above, and the controllers side by side."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.collections import EllipseCollection
+from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator, PercentFormatter
 
 from antennate import figures as style
+from antennate.experiments.tunnel.monitor import TrialPath, TrialResult
 from antennate.types import Floats, Maneuver
 
 MARGIN = 0.3
 """Shown around the walls; what is farther out is cut off [m]."""
 
-_VERDICTS = {
+_OUTCOMES = {
     "success": "out after {:.1f} s",
     "timeout": "out of time, {:.0f} s",
-    "left": "left by the entrance",
+    "left": "left",
     "invalid": "invalid",
 }
 
 
-class Row(Protocol):
-    """What is needed of one row of the table."""
-
-    @property
-    def arm(self) -> str:
-        """The arm."""
-        ...
-
-    @property
-    def trial(self) -> int:
-        """The trial."""
-        ...
-
-    @property
-    def status(self) -> str:
-        """Success, timeout, left or invalid."""
-        ...
-
-    @property
-    def time_s(self) -> float:
-        """Time to exit, or the limit [s]."""
-        ...
-
-
-class Path(Protocol):
-    """What is needed of one trial's course; lengths in metres."""
-
-    @property
-    def head(self) -> Floats:
-        """Head positions, shape (n, 2)."""
-        ...
-
-    @property
-    def maneuver(self) -> Floats:
-        """`Maneuver` at these positions, shape (n,)."""
-        ...
-
-    @property
-    def walls(self) -> tuple[Floats, Floats]:
-        """The two walls as polylines."""
-        ...
-
-    @property
-    def cylinders(self) -> Floats:
-        """Cylinders at first and at the end, shape (2, m, 2)."""
-        ...
-
-    @property
-    def links(self) -> Floats:
-        """The robot at the end, head first, shape (6, 2)."""
-        ...
-
-
 @style.styled
 def trajectories(
-    paths: Mapping[tuple[str, int], Path],
-    arms: Sequence[str],
-    rows: Sequence[Row],
+    paths: Mapping[tuple[str, int], TrialPath],
+    controllers: Sequence[str],
+    rows: Sequence[TrialResult],
     trials: Sequence[int],
-    radius: float,
 ) -> Figure:
-    """Trials from above: a column for each trial, a row for each arm.
+    """Trials from above: a column for each trial, a row for each controller.
 
     Args:
-        paths: Courses by arm and trial; a missing one leaves its panel empty.
-        arms: Arms from top to bottom.
+        paths: Courses by controller and trial; a missing one leaves its panel empty.
+        controllers: Names from top to bottom.
         rows: The table.
         trials: Trials from left to right.
-        radius: Radius of a cylinder [m].
     """
-    table = {(row.arm, row.trial): row for row in rows}
-    boxes = {t: _box([paths[a, t] for a in arms if (a, t) in paths]) for t in trials}
+    table = {(row.controller, row.trial): row for row in rows}
+    boxes = {t: _box([paths[a, t] for a in controllers if (a, t) in paths]) for t in trials}
     sides = [box[1] - box[0] for box in boxes.values() if box is not None] or [np.ones(2)]
     aspect = float(max(side[1] for side in sides) / max(side[0] for side in sides))
     width = 0.5 + 2.3 * len(trials)
-    figure = style.canvas(max(width, 6.4), 0.9 + len(arms) * (2.0 * aspect + 0.35))
-    panels = figure.subplots(len(arms), len(trials), squeeze=False)
-    for i, arm in enumerate(arms):
+    figure = style.canvas(max(width, 6.4), 0.9 + len(controllers) * (2.0 * aspect + 0.35))
+    panels = figure.subplots(len(controllers), len(trials), squeeze=False)
+    for i, controller in enumerate(controllers):
         for j, trial in enumerate(trials):
             panel, box = panels[i, j], boxes[trial]
             _frame(panel, box)
-            if (arm, trial) in paths:
-                _draw_trial(panel, paths[arm, trial], radius)
-                row = table[arm, trial]
-                verdict = _VERDICTS[row.status].format(row.time_s)
-                panel.set_title(f"trial {trial}: {verdict}", fontsize=8.5)
+            if (controller, trial) in paths:
+                _draw_trial(panel, paths[controller, trial])
+                row = table[controller, trial]
+                outcome = _OUTCOMES[row.outcome].format(row.time_s)
+                panel.set_title(f"trial {trial}: {outcome}", fontsize=8.5)
             else:
                 panel.set_title(f"trial {trial}: not run", fontsize=8.5)
-            if i == len(arms) - 1:
+            if i == len(controllers) - 1:
                 panel.set_xlabel("x [m]")
         panels[i, 0].set_ylabel("y [m]")
         panels[i, 0].annotate(
-            arm,
+            style.short_name(controller),
             (0.0, 0.5),
             (-54.0, 0.0),
             xycoords="axes fraction",
@@ -135,11 +81,12 @@ def trajectories(
     return figure
 
 
-def _box(paths: Sequence[Path]) -> tuple[Floats, Floats] | None:
-    """Lower and upper corner of what is shown of one tunnel [m]; None without a course."""
+def _box(paths: Sequence[TrialPath]) -> tuple[Floats, Floats] | None:
+    """Lower and upper corner of what is shown of one scene [m]; None without a course."""
     if not paths:
         return None
-    points = np.concatenate(paths[0].walls)
+    path = paths[0]
+    points = np.concatenate([*path.fixed, *path.before, path.exit, path.head[:1]])
     return points.min(axis=0) - MARGIN, points.max(axis=0) + MARGIN
 
 
@@ -153,14 +100,16 @@ def _frame(panel: Axes, box: tuple[Floats, Floats] | None) -> None:
         panel.set_ylim(box[0][1], box[1][1])
 
 
-def _draw_trial(panel: Axes, path: Path, radius: float) -> None:
-    before, after = path.cylinders
-    _circles(panel, after, radius, facecolors=style.FAINT, edgecolors="none")
-    _circles(panel, before, radius, facecolors="none", edgecolors=style.MUTED, linewidths=0.4)
-    for wall in path.walls:
-        panel.plot(*wall.T, color=style.MUTED, linewidth=1.6, solid_capstyle="butt")
-    exit_line = np.array([wall[-1] for wall in path.walls])
-    panel.plot(*exit_line.T, color=style.MUTED, linewidth=1.0, linestyle=(0, (2, 2)))
+def _draw_trial(panel: Axes, path: TrialPath) -> None:
+    for polygons, face, edge in (
+        (path.after, style.FAINT, "none"),
+        (path.before, "none", style.MUTED),
+        (path.fixed, style.MUTED, style.MUTED),
+    ):
+        shapes = [polygon.tolist() for polygon in polygons]
+        drawn = PolyCollection(shapes, facecolors=face, edgecolors=edge, linewidths=0.4)
+        panel.add_collection(drawn, autolim=False)
+    panel.plot(*path.exit.T, color=style.MUTED, linewidth=1.0, linestyle=(0, (2, 2)))
     for maneuver, points in _stretches(path):
         colour = style.MANEUVER_COLOURS[maneuver]
         panel.plot(*points.T, color=colour, linewidth=1.4, zorder=3)
@@ -169,21 +118,7 @@ def _draw_trial(panel: Axes, path: Path, radius: float) -> None:
     panel.plot(*path.links[0], color=style.INK, marker="o", markersize=5.5, zorder=5)
 
 
-def _circles(panel: Axes, centres: Floats, radius: float, **look: Any) -> None:
-    size = np.full(len(centres), 2.0 * radius)
-    circles = EllipseCollection(
-        size,
-        size,
-        np.zeros(len(size)),
-        units="xy",
-        offsets=centres,
-        offset_transform=panel.transData,
-        **look,
-    )
-    panel.add_collection(circles, autolim=False)
-
-
-def _stretches(path: Path) -> Iterator[tuple[Maneuver, Floats]]:
+def _stretches(path: TrialPath) -> Iterator[tuple[Maneuver, Floats]]:
     """The course cut where the maneuver changes; a sample carries the maneuver that led to it."""
     cuts = [0, *(np.flatnonzero(np.diff(path.maneuver[1:])) + 1), len(path.head) - 1]
     for first, last in pairwise(cuts):
@@ -202,46 +137,47 @@ def _handles() -> list[Any]:
     return [
         *lines,
         robot,
-        Line2D([], [], color=style.MUTED, linewidth=1.6, label="wall"),
+        Patch(facecolor=style.MUTED, label="wall"),
         Line2D([], [], color=style.MUTED, linewidth=1.0, linestyle=(0, (2, 2)), label="exit"),
-        Patch(facecolor="white", edgecolor=style.MUTED, linewidth=0.6, label="cylinder at first"),
-        Patch(facecolor=style.FAINT, label="cylinder at the end"),
+        Patch(facecolor="white", edgecolor=style.MUTED, linewidth=0.6, label="obstacle at first"),
+        Patch(facecolor=style.FAINT, label="obstacle at the end"),
     ]
 
 
 @style.styled
 def summary(
-    arms: Mapping[str, Mapping[str, Any]], rows: Sequence[Row], time_limit: float
+    controllers: Mapping[str, Mapping[str, Any]], rows: Sequence[TrialResult], time_limit: float
 ) -> Figure:
-    """Success, time inside and restricted mean time of every arm.
+    """Success, time inside and restricted mean time of every controller.
 
     Args:
-        arms: Per arm what result.json says of it.
+        controllers: Per controller what result.json says of it.
         rows: The table.
         time_limit: Time after which a trial has failed [s].
     """
     figure = style.canvas(10.5, 3.4)
     rate, inside, mean = figure.subplots(1, 3, width_ratios=(1, 1.5, 1))
-    names = list(arms)
-    for i, (name, arm) in enumerate(arms.items()):
-        valid = arm["trials"] - arm["invalid"]
+    names, colours = list(controllers), style.controller_colours(list(controllers))
+    for i, (name, found) in enumerate(controllers.items()):
+        valid = found["trials"] - found["invalid"]
         if not valid:
             continue
-        _interval(rate, i, arm["successes"] / valid, arm["wilson95"], name)
-        _interval(mean, i, arm["restricted_mean_time_s"], arm["restricted_mean_time_95"], name)
-        exits = sorted(r.time_s for r in rows if r.arm == name and r.status == "success")
+        colour, time = colours[name], found["restricted_mean_time_s"]
+        _interval(rate, i, found["successes"] / valid, found["wilson95"], colour)
+        _interval(mean, i, time, found["restricted_mean_time_95"], colour)
+        exits = sorted(r.time_s for r in rows if r.controller == name and r.outcome == "success")
         left = 1.0 - np.arange(len(exits) + 1) / valid
         inside.step(
             [0.0, *exits, time_limit],
             [*left, left[-1]],
             where="post",
-            color=style.ARM_COLOURS.get(name, style.INK),
-            linestyle=style.ARM_LINES.get(name, "solid"),
+            color=colour,
+            linestyle=style.CONTROLLER_LINES.get(name, "solid"),
             linewidth=3.2 - 0.8 * i,
-            label=name,
+            label=style.short_name(name),
         )
     for panel in (rate, mean):
-        panel.set_yticks(range(len(names)), [_label(name, arms[name]) for name in names])
+        panel.set_yticks(range(len(names)), [_label(name, controllers[name]) for name in names])
         panel.tick_params(axis="y", labelsize=9, labelcolor=style.INK, length=0)
         panel.set_ylim(len(names) - 0.5, -0.5)
         panel.grid(visible=False, axis="y")
@@ -254,7 +190,7 @@ def summary(
         xlabel="restricted mean time [s]",
         title="Failures as the limit; bootstrap 95 %",
     )
-    mean.set_yticklabels(names)
+    mean.set_yticklabels([style.short_name(name) for name in names])
     inside.set(
         xlim=(0, time_limit),
         ylim=(-0.03, 1.03),
@@ -268,12 +204,11 @@ def summary(
     return figure
 
 
-def _label(name: str, arm: Mapping[str, Any]) -> str:
-    return f"{name}\nn = {arm['trials'] - arm['invalid']}"
+def _label(name: str, found: Mapping[str, Any]) -> str:
+    return f"{style.short_name(name)}\nn = {found['trials'] - found['invalid']}"
 
 
-def _interval(panel: Axes, at: int, value: float, ends: Sequence[float], name: str) -> None:
-    colour = style.ARM_COLOURS.get(name, style.INK)
+def _interval(panel: Axes, at: int, value: float, ends: Sequence[float], colour: str) -> None:
     panel.plot(
         list(ends), [at, at], color=colour, linewidth=2.4, solid_capstyle="butt", clip_on=False
     )

@@ -1,4 +1,4 @@
-"""Success over the shape of the tunnel: one panel per arm, corner angle against free width."""
+"""Success over corner angle and free width of the tunnel: one panel for each controller."""
 
 from __future__ import annotations
 
@@ -10,28 +10,28 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
-from antennate.figures import INK, canvas, styled
+from antennate.figures import INK, canvas, short_name, styled
 
 
 @styled
-def success_map(cells: Sequence[Mapping[str, Any]], arms: Sequence[str]) -> Figure:
+def success_map(cells: Sequence[Mapping[str, Any]], controllers: Sequence[str]) -> Figure:
     """Draw the map.
 
     Args:
-        cells: One a tunnel: `turn_deg`, `free_width_m`, and `arms` with `trials`, `successes` and
-            `wilson95` per arm.
-        arms: Panels, left to right.
+        cells: One a tunnel: `turn_deg`, `free_width_m`, and per name in `controllers` the numbers
+            `trials`, `successes` and `wilson95`.
+        controllers: Panels, left to right.
     """
     angles = sorted({cell["turn_deg"] for cell in cells})
     widths = sorted({cell["free_width_m"] for cell in cells})
-    figure = canvas(1.4 + 3.4 * len(arms), 1.2 + 0.75 * len(angles))
-    axes = np.atleast_1d(np.array(figure.subplots(1, len(arms), sharey=True)))
+    figure = canvas(1.4 + 3.4 * len(controllers), 1.2 + 0.75 * len(angles))
+    axes = np.atleast_1d(np.array(figure.subplots(1, len(controllers), sharey=True)))
     scale = ScalarMappable(Normalize(0.0, 1.0), "cividis")
-    for panel, arm in zip(axes, arms, strict=True):
+    for panel, controller in zip(axes, controllers, strict=True):
         share = np.full((len(angles), len(widths)), np.nan)
         for cell in cells:
             row, column = angles.index(cell["turn_deg"]), widths.index(cell["free_width_m"])
-            found = cell["arms"][arm]
+            found = cell["controllers"][controller]
             share[row, column] = found["successes"] / found["trials"]
             low, high = found["wilson95"]
             panel.text(
@@ -44,7 +44,7 @@ def success_map(cells: Sequence[Mapping[str, Any]], arms: Sequence[str]) -> Figu
                 color="white" if share[row, column] < 0.6 else INK,
             )
         panel.imshow(share, origin="lower", norm=scale.norm, cmap=scale.cmap, aspect="auto")
-        panel.set_title(arm)
+        panel.set_title(short_name(controller))
         panel.grid(visible=False)
         panel.set_xticks(range(len(widths)), [f"{w:.2f}" for w in widths])
         panel.set_yticks(range(len(angles)), [f"{a:.0f}" for a in angles])

@@ -1,6 +1,6 @@
 """What is measured on one trial while it runs, with the truth of the simulation at hand.
 
-The controller sees nothing of this. Progress is arc length along the tunnel's centre line. The
+The controller sees nothing of this. Progress is what the scene says of the head's position. The
 robot is stuck when its progress has gained less than STUCK_GAIN on its own maximum for STUCK_TIME;
 the episode ends, recovered, with the next such gain.
 """
@@ -12,19 +12,16 @@ from typing import Literal
 
 import numpy as np
 
-from antennate.sim import geometry
-from antennate.sim.arena import Tunnel
+from antennate.sim.scenes.scene import SceneInstance
 from antennate.sim.world import World
 from antennate.types import Floats, Maneuver
 
-Status = Literal["success", "timeout", "left", "invalid"]
+Outcome = Literal["success", "timeout", "left", "invalid"]
 
 STUCK_GAIN = 0.02
 """Gain of progress that counts as getting on [m]."""
 STUCK_TIME = 5.0
 """Time without such a gain after which the robot is stuck [s]."""
-LEFT_BEHIND = 0.8
-"""Distance behind the entrance at which the robot has left [m]: its length and more."""
 _EVERY = 10
 """Ticks between two looks: 10 Hz at the usual rate."""
 
@@ -34,10 +31,11 @@ class TrialResult:
     """One row of the table.
 
     Attributes:
-        status: success (the head passed the exit), timeout, left (out through the entrance) or
-            invalid.
+        seed: Seed of the run; with `trial` it decides all chance.
+        controller: Name of the controller.
+        outcome: success (the head passed the exit), timeout, left (out another way) or invalid.
         time_s: Time to exit [s]; the limit for every failure.
-        progress_m: Where the head ended, along the centre line, within [0, length] [m].
+        progress_m: How far the head came, within 0 and the length of the scene [m].
         stuck: Episodes of being stuck; `recovered` of them ended by getting on.
         share_forward: Share of ticks in each maneuver.
         force_mean_n: Mean over 10 Hz samples of the summed normal force on robot and antennae [N].
@@ -45,9 +43,10 @@ class TrialResult:
         reason: Why a trial is invalid, with the physics step; empty otherwise.
     """
 
-    arm: str
+    seed: int
     trial: int
-    status: Status
+    controller: str
+    outcome: Outcome
     time_s: float
     progress_m: float
     stuck: int
@@ -70,26 +69,40 @@ class TrialPath:
         t: Times of the samples [s], shape (n,).
         head: Head positions [m], shape (n, 2).
         maneuver: `Maneuver` at the samples, shape (n,).
-        walls: The two walls [m], polylines.
-        cylinders: Where the cylinders stood at first and at the end [m], shape (2, m, 2).
-        links: The robot's links at the end [m], shape (6, 2).
+        fixed: Obstacles that stand still, polygons in plan [m], each of shape (k, 2).
+        before: Obstacles that can move, likewise, at the start.
+        after: The same at the end.
+        exit: Ends of the exit line [m], shape (2, 2).
+        links: The robot's links at the end [m], shape (L, 2).
     """
 
     t: Floats
     head: Floats
     maneuver: Floats
-    walls: tuple[Floats, Floats]
-    cylinders: Floats
+    fixed: list[Floats]
+    before: list[Floats]
+    after: list[Floats]
+    exit: Floats
     links: Floats
 
 
 @dataclass
 class TrialMonitor:
-    """Watches one trial from its first tick to its verdict."""
+    """Watches one trial from its first tick to its outcome.
 
-    arm: str
+    Attributes:
+        seed, trial: What decides all chance.
+        controller: Name of the controller.
+        scene: Where it takes place.
+        before: Obstacles that can move, at the start, as in `TrialPath`.
+        time_limit: Time after which it has failed [s].
+    """
+
+    seed: int
     trial: int
-    tunnel: Tunnel
+    controller: str
+    scene: SceneInstance
+    before: list[Floats]
     time_limit: float
     _ticks: int = 0
     _best: float = 0.0
@@ -99,34 +112,27 @@ class TrialMonitor:
     _is_stuck: bool = False
     _forces: list[float] = field(default_factory=list)
     _samples: list[tuple[float, float, float, int]] = field(default_factory=list)
-    _counts: Floats = field(default_factory=lambda: np.zeros(len(Maneuver)))
+    _counts: list[int] = field(default_factory=lambda: [0] * len(Maneuver))
 
-    def watch(self, world: World, maneuver: int, failed: bool) -> Status | None:
-        """Look at the world after a tick; the verdict once there is one."""
+    def watch(self, world: World, maneuver: int, failed: bool) -> Outcome | None:
+        """Look at the world after a tick; the outcome once there is one."""
         if failed:
             return "invalid"
         self._counts[maneuver] += 1
         self._ticks += 1
-        t = world.t
+        t = world.data.time
         if self._ticks % _EVERY and t < self.time_limit:
             return None
-        x, y = float(world.head[0]), float(world.head[1])
-        progress = geometry.progress(self.tunnel.centre, np.array([x, y]))
+        head = world.head[:2].copy()
+        x, y = head.tolist()
         self._samples.append((t, x, y, maneuver))
         self._forces.append(world.obstacle_force())
-        self._note_progress(progress, t)
-        if progress >= self.tunnel.params.length:
+        self._note_progress(self.scene.progress(head), t)
+        if self.scene.succeeded(head):
             return "success"
-        if self._has_left(np.array([x, y]), progress):
+        if self.scene.left(head):
             return "left"
         return "timeout" if t >= self.time_limit else None
-
-    def _has_left(self, head: Floats, progress: float) -> bool:
-        """Far behind the entrance, or beside the tunnel: nobody reaches the exit from outside."""
-        if progress < 0.0:
-            return float(np.hypot(*head)) >= LEFT_BEHIND
-        left, right = self.tunnel.walls
-        return not geometry.contains(np.concatenate([left, right[::-1]]), head)
 
     def _note_progress(self, progress: float, t: float) -> None:
         if progress > self._best + STUCK_GAIN:
@@ -137,19 +143,20 @@ class TrialMonitor:
             self._is_stuck = True
             self._stuck += 1
 
-    def result(self, world: World, status: Status, reason: str) -> TrialResult:
+    def result(self, world: World, outcome: Outcome, reason: str) -> TrialResult:
         """The row of a trial that ended so."""
-        share = self._counts / max(1.0, self._counts.sum())
+        share = np.array(self._counts) / max(1, sum(self._counts))
         forces = np.array(self._forces) if self._forces else np.zeros(1)
-        progress = geometry.progress(self.tunnel.centre, world.head[:2].copy())
+        progress = self.scene.progress(world.head[:2].copy())
         if not np.isfinite(progress):
             progress = self._best
         return TrialResult(
-            arm=self.arm,
+            seed=self.seed,
             trial=self.trial,
-            status=status,
-            time_s=round(world.t, 6) if status == "success" else self.time_limit,
-            progress_m=round(float(np.clip(progress, 0.0, self.tunnel.params.length)), 6),
+            controller=self.controller,
+            outcome=outcome,
+            time_s=round(world.t, 6) if outcome == "success" else self.time_limit,
+            progress_m=round(float(np.clip(progress, 0.0, self.scene.length)), 6),
             stuck=self._stuck,
             recovered=self._recovered,
             share_forward=round(float(share[Maneuver.FORWARD]), 6),
@@ -165,11 +172,14 @@ class TrialMonitor:
     def path(self, world: World) -> TrialPath:
         """The trial as a figure draws it."""
         samples = np.array(self._samples).reshape(-1, 4)
+        fixed, after = world.outlines()
         return TrialPath(
             t=samples[:, 0],
             head=samples[:, 1:3],
             maneuver=samples[:, 3],
-            walls=self.tunnel.walls,
-            cylinders=np.stack([self.tunnel.cylinders, world.cylinders()]),
+            fixed=fixed,
+            before=self.before,
+            after=after,
+            exit=self.scene.exit,
             links=world.links().copy(),
         )

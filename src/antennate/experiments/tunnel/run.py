@@ -1,86 +1,29 @@
-"""The tunnel: does touch help? All arms meet the same tunnels, starts and disturbances."""
+"""The tunnel: does touch help? All controllers meet the same tunnels, starts and disturbances."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
-from itertools import combinations
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-from pydantic import model_validator
-
-from antennate.control.controllers import ARMS, Arm, Controller
-from antennate.control.gait import targets
-from antennate.control.loop import run_loop
-from antennate.experiments.tunnel.monitor import TrialMonitor, TrialPath, TrialResult
-from antennate.params import (
-    ControlParams,
-    Params,
-    PhysicsParams,
-    TunnelParams,
-    VariationParams,
-    number,
-)
-from antennate.robots.body import RobotParams
-from antennate.sim.arena import Tunnel, draw_tunnel
-from antennate.sim.sim_robot import Disturbance, SimRobot
-from antennate.sim.world import World, compile_world
-from antennate.studies import statistics
+from antennate.control.registry import CONTROLLERS, ControllerFactory, make_controller
+from antennate.experiments.tunnel import measures
+from antennate.experiments.tunnel.batch import run_trials
+from antennate.experiments.tunnel.config import TunnelConfig
+from antennate.experiments.tunnel.monitor import TrialPath, TrialResult
+from antennate.sim.scenes.registry import TUNNEL
+from antennate.sim.trial import check_start
 from antennate.studies.pool import run_tasks
-from antennate.types import AntennaFrame, JointCommand
 
-SCHEMA = 1
-_BATCH = 6
-"""Trials of one process stepped in lockstep: one NumPy call serves them all."""
+SCHEMA = 2
 _TASK = 12
 """Most trials handed to a process at once."""
 
 
-class TunnelConfig(Params):
-    """Everything that decides the outcome of `antennate tunnel`."""
-
-    trials: int = number(
-        10, "1", "paper: ten trials an arm", "trials of every arm", ge=1, le=100000
-    )
-    seed: int = number(0, "1", "assumed: any", "seed of all chance", ge=0)
-    arms: tuple[Arm, ...] = number(ARMS, "1", "assumed: all", "arms to run", min_length=1)
-    time_limit: float = number(
-        100.0,
-        "s",
-        "paper: open loop made 0.04 m/s over its successes; half of that on 2 m takes this long",
-        "time after which a trial has failed",
-        gt=0,
-        le=3600,
-    )
-    tunnel: TunnelParams = TunnelParams()
-    robot: RobotParams = RobotParams()
-    control: ControlParams = ControlParams()
-    variation: VariationParams = VariationParams()
-    physics: PhysicsParams = PhysicsParams()
-
-    @model_validator(mode="after")
-    def _agree(self) -> TunnelConfig:
-        if len(set(self.arms)) < len(self.arms):
-            raise ValueError(f"arms must differ, got {', '.join(self.arms)}")
-        steps = self.control.period / self.physics.timestep
-        if abs(steps - round(steps)) > 1e-6:
-            raise ValueError(
-                "control.rate must be a whole fraction of the physics rate "
-                f"{1 / self.physics.timestep:g} Hz, got {self.control.rate:g} Hz"
-            )
-        if self.tunnel.free_width < self.robot.width:
-            raise ValueError(
-                f"tunnel.free_width must be at least robot.width, {self.robot.width:g} m, "
-                f"got {self.tunnel.free_width:g} m"
-            )
-        return self
-
-
 @dataclass(frozen=True, slots=True)
 class TunnelOutcome:
-    """All rows in the order of arms and trials, what figures need, and the summary per arm."""
+    """All rows in the order of controllers and trials, and what figures need of them."""
 
     config: TunnelConfig
     rows: list[TrialResult]
@@ -90,198 +33,91 @@ class TunnelOutcome:
     def result(self) -> dict[str, Any]:
         """The content of result.json."""
         config = self.config
-        by_arm: dict[Arm, list[TrialResult]] = {
-            a: [r for r in self.rows if r.arm == a] for a in config.arms
+        by_name = {
+            name: [row for row in self.rows if row.controller == name]
+            for name in config.controllers
         }
         return {
             "schema": SCHEMA,
             "command": "tunnel",
             "seed": config.seed,
             "time_limit_s": config.time_limit,
-            "length_m": config.tunnel.length,
+            "length_m": config.tunnel.length if config.scene == TUNNEL else None,
             "interrupted": self.interrupted,
-            "arms": {a: summarise(rows, config.time_limit) for a, rows in by_arm.items()},
-            "paired": _paired(by_arm),
+            "controllers": {n: measures.summary(rows) for n, rows in by_name.items()},
+            "paired": measures.paired(by_name),
         }
 
 
-@dataclass(frozen=True, slots=True)
-class _Start:
-    world: World
-    chance: Disturbance
-    phase: float
-    tunnel: Tunnel
-
-
-def prepare(config: TunnelConfig, trial: int) -> _Start:
-    """Draw one trial: its tunnel, its start and its disturbances depend on seed and trial alone.
+def check(config: TunnelConfig) -> None:
+    """Find a bad scene or controller before anything is run.
 
     Raises:
-        ArenaError: The tunnel cannot be built.
+        ConfigError: There is no such scene or controller, or it cannot be made.
+        SceneError: The scene cannot be built, or the robot does not fit at its start.
     """
-    sequence = np.random.SeedSequence([config.seed, trial])
-    for_tunnel, for_start, for_chance = (np.random.default_rng(s) for s in sequence.spawn(3))
-    tunnel = draw_tunnel(config.tunnel, config.robot, for_tunnel)
-    sensed = config.robot.sensor.covered_hinges(config.robot.antenna)
-    world = World(compile_world(config.physics, config.robot, tunnel), sensed)
-    phase = float(for_start.uniform(0.0, 2.0 * math.pi))
-    lateral, heading = for_start.uniform(-1.0, 1.0, 2)
-    command = targets(config.control.gait, np.array([phase]), np.zeros(1))
-    world.place(
-        0.0,
-        lateral * config.variation.start_lateral,
-        heading * config.variation.start_heading,
-        command.yaw[0],
-        command.leg[0],
-    )
-    chance = Disturbance(
-        for_chance,
-        config.variation,
-        config.robot.sensor,
-        config.robot.leg_friction,
-        config.control.period,
-    )
-    return _Start(world, chance, phase, tunnel)
+    check_start(config)
+    for name in config.controllers:
+        make_controller(name, config.control, config.robot)
 
 
-def run_trials(
-    config: TunnelConfig,
-    arm: Arm,
-    trials: Sequence[int],
-    emit: Callable[[tuple[TrialResult, TrialPath]], None],
-    batch: int = _BATCH,
-) -> None:
-    """Run trials of one arm in lockstep, rows refilled as trials end; emit each as it ends."""
-    batch = min(batch, len(trials))
-    controller = Controller(config.control, arm, batch)
-    body = SimRobot(batch, config.robot.sensor, config.control.period, config.physics.timestep)
-    waiting = list(trials)
-    monitors: list[TrialMonitor | None] = [None] * batch
-
-    def fill(row: int) -> None:
-        body.unload(row)
-        monitors[row] = None
-        if waiting:
-            trial = waiting.pop(0)
-            start = prepare(config, trial)
-            body.load(row, start.world, start.chance)
-            controller.reset(np.array([row]), start.phase)
-            monitors[row] = TrialMonitor(arm, trial, start.tunnel, config.time_limit)
-
-    def go_on(frame: AntennaFrame, command: JointCommand) -> bool:
-        for row, monitor in enumerate(monitors):
-            if monitor is None:
-                continue
-            world, failure = body.world(row), body.failure(row)
-            status = monitor.watch(world, int(controller.maneuver[row]), failure is not None)
-            if status is not None:
-                emit((monitor.result(world, status, str(failure or "")), monitor.path(world)))
-                fill(row)
-        return any(monitor is not None for monitor in monitors)
-
-    for row in range(batch):
-        fill(row)
-    run_loop(body, controller, config.control.period, go_on)
+_Task = tuple[TunnelConfig, str, ControllerFactory | None, list[int]]
+"""Configuration, name of the controller, the controller if it was added in Python, trials."""
 
 
-def _run_task(task: tuple[TunnelConfig, Arm, list[int]], emit: Callable[[Any], None]) -> None:
-    run_trials(*task, emit)
+def _run_task(task: _Task, emit: Callable[[Any], None]) -> None:
+    config, name, added, trials = task
+    if added is not None:
+        CONTROLLERS.add(name, added)
+    run_trials(config, name, trials, emit)
 
 
 def run(
     config: TunnelConfig,
     workers: int = 1,
-    on_trial: Callable[[TrialResult, TrialPath], None] = lambda row, path: None,
+    on_step: Callable[[int, int], None] = lambda done, total: None,
+    on_row: Callable[[TrialResult], None] = lambda row: None,
 ) -> TunnelOutcome:
-    """Run all trials of all arms.
+    """Run all trials of all controllers.
 
     Args:
         config: What to run.
         workers: Processes to use; the outcome does not depend on it.
-        on_trial: Called after every trial, in no particular order.
+        on_step: Called after every trial with how many of how many are done.
+        on_row: Called with every trial, in no particular order.
 
     Raises:
-        ArenaError: A tunnel cannot be built as described.
+        SceneError: A scene cannot be built as described.
         WorkerError: A worker process died.
     """
-    prepare(config, 0)  # a bad arena is found before any worker starts
-    size = max(1, min(_TASK, math.ceil(config.trials * len(config.arms) / (3 * workers))))
+    total = config.trials * len(config.controllers)
+    size = max(1, min(_TASK, math.ceil(total / (3 * workers))))
     chunks = [
         list(range(first, min(first + size, config.trials)))
         for first in range(0, config.trials, size)
     ]
-    tasks: list[tuple[TunnelConfig, Arm, list[int]]] = [
-        (config, arm, chunk) for arm in config.arms for chunk in chunks
+    tasks: list[_Task] = [
+        (config, name, CONTROLLERS.added.get(name), chunk)
+        for name in config.controllers
+        for chunk in chunks
     ]
     found: list[tuple[TrialResult, TrialPath]] = []
 
     def take(item: tuple[TrialResult, TrialPath]) -> None:
         found.append(item)
-        on_trial(*item)
+        on_row(item[0])
+        on_step(len(found), total)
 
     interrupted = False
     try:
         run_tasks(_run_task, tasks, workers, take)
     except KeyboardInterrupt:
         interrupted = True
-    found.sort(key=lambda item: (config.arms.index(item[0].arm), item[0].trial))
+    order = {name: i for i, name in enumerate(config.controllers)}
+    found.sort(key=lambda item: (order[item[0].controller], item[0].trial))
     return TunnelOutcome(
         config=config,
         rows=[row for row, _ in found],
-        paths={(row.arm, row.trial): path for row, path in found},
+        paths={(row.controller, row.trial): path for row, path in found},
         interrupted=interrupted,
     )
-
-
-def summarise(rows: list[TrialResult], time_limit: float) -> dict[str, Any]:
-    """One arm in numbers; invalid trials are counted and left out of every other figure."""
-    valid = [r for r in rows if r.status != "invalid"]
-    won = [r for r in valid if r.status == "success"]
-    times = np.array([r.time_s for r in valid])
-    mean, low, high = statistics.mean95(times)
-    recovered, stuck = sum(r.recovered for r in valid), sum(r.stuck for r in valid)
-    return {
-        "trials": len(rows),
-        "successes": len(won),
-        "timeouts": sum(r.status == "timeout" for r in valid),
-        "left": sum(r.status == "left" for r in valid),
-        "invalid": len(rows) - len(valid),
-        "wilson95": statistics.wilson95(len(won), len(valid)),
-        "speed_m_s": _mean([r.progress_m / r.time_s for r in won]),
-        "time_over_successes_s": _mean([r.time_s for r in won]),
-        "progress_per_time_m_s": sum(r.progress_m for r in valid) / float(times.sum())
-        if valid
-        else None,
-        "restricted_mean_time_s": mean if valid else None,
-        "restricted_mean_time_95": (low, high) if valid else None,
-        "stuck": stuck,
-        "recovered": recovered,
-        "share": {
-            name: _mean([getattr(r, f"share_{name}") for r in valid])
-            for name in ("forward", "turn_l", "turn_r", "reverse", "hold")
-        },
-        "force_mean_n": _mean([r.force_mean_n for r in valid]),
-        "force_max_n": max((r.force_max_n for r in valid), default=None),
-    }
-
-
-def _mean(values: list[float]) -> float | None:
-    return float(np.mean(values)) if values else None
-
-
-def _paired(by_arm: dict[Arm, list[TrialResult]]) -> dict[str, Any]:
-    """Every two arms on the trials that are valid in both."""
-    tests = {}
-    for first, second in combinations(by_arm, 2):
-        ours = {r.trial: r for r in by_arm[first] if r.status != "invalid"}
-        theirs = {r.trial: r for r in by_arm[second] if r.status != "invalid"}
-        both = sorted(ours.keys() & theirs.keys())
-        if both:
-            test = statistics.compare(
-                np.array([ours[k].status == "success" for k in both]),
-                np.array([theirs[k].status == "success" for k in both]),
-                np.array([ours[k].time_s for k in both]),
-                np.array([theirs[k].time_s for k in both]),
-            )
-            tests[f"{first}-{second}"] = {"trials": len(both), **asdict(test)}
-    return tests

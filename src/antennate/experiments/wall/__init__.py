@@ -1,1 +1,6 @@
-"""The experiment `wall`."""
+"""Pass a line of boulders with five antennae: success, jam or slip.
+
+An antenna at a fixed angle moves along touching spheres. It jams if its tip stays while the base
+goes on, slips if it touches nothing for long, and succeeds if it does neither. The profiles are the
+paper's three and two controls; all meet the same walls and disturbances.
+"""

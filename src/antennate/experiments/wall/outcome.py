@@ -11,32 +11,34 @@ import numpy as np
 from antennate.params import WallParams
 from antennate.types import Floats
 
-Fate = Literal["success", "jam", "slip", "invalid"]
+Outcome = Literal["success", "jam", "slip", "invalid"]
 SAMPLE_PERIOD = 0.01
 """Time between samples of a passage [s]."""
 
 
 @dataclass(frozen=True, slots=True)
 class WallTrial:
-    """What became of one trial.
+    """One trial, a row of trials.csv.
 
     Attributes:
-        arm: Its profile; `trial` its number, which decides all chance.
-        fate: Over the whole travel; `fate_after_start` without the start.
+        seed: Seed of the run; with `trial` it decides all chance.
+        profile: Springs of the antenna.
+        outcome: Over the whole travel; `outcome_after_start` without the start.
         least_advance_mm: Smallest advance of the tip over any `jam_travel` of the base.
         longest_stick_mm: Longest travel of the base during which the tip never got ahead by
             `jam_advance`.
         longest_gap_s: Longest time without touch after the first one.
         touched: Share of samples that touch.
         force_mean_n: Mean contact force [N]; `force_max_n` the largest.
-        flex_max_deg: Largest flex under the film.
+        flex_max_deg: Largest flex under the flex sensor.
         reason: Why it is invalid.
     """
 
-    arm: str
+    seed: int
     trial: int
-    fate: Fate
-    fate_after_start: Fate
+    profile: str
+    outcome: Outcome
+    outcome_after_start: Outcome
     least_advance_mm: float
     longest_stick_mm: float
     longest_gap_s: float
@@ -56,9 +58,9 @@ class Traverse:
         tip: Advance of the tip along the wall since the travel began [m], shape (n,).
         touching: Whether a sphere is touched, shape (n,).
         force: Contact force [N], shape (n,).
-        flex: Flex under the film [rad], shape (n,).
-        hinges: Hinge angles [rad], shape (n, 6).
-        shapes: Hinges and tip in the plane [m] at every tenth of the travel, shape (11, 7, 2).
+        flex: Flex under the flex sensor [rad], shape (n,).
+        hinges: Hinge angles [rad], shape (t, n).
+        shapes: Hinges and tip in the plane [m] at every tenth of the travel, shape (11, n + 1, 2).
     """
 
     base: Floats
@@ -70,21 +72,22 @@ class Traverse:
     shapes: Floats
 
 
-def classify(wall: WallParams, arm: str, trial: int, seen: Traverse) -> WallTrial:
-    """What became of a passage, by the definitions of `wall`."""
+def classify(wall: WallParams, seed: int, trial: int, profile: str, seen: Traverse) -> WallTrial:
+    """The outcome of a passage, by the definitions of `wall`."""
     advance = least_advance(seen.base, seen.tip, wall.jam_travel)
     gap = longest_gap(seen.touching, SAMPLE_PERIOD)
     late = seen.base > wall.start
-    after = _fate(
+    after = _outcome(
         wall,
         least_advance(seen.base[late], seen.tip[late], wall.jam_travel),
         longest_gap(seen.touching[late], SAMPLE_PERIOD, True),
     )
     return WallTrial(
-        arm=arm,
+        seed=seed,
         trial=trial,
-        fate=_fate(wall, advance, gap),
-        fate_after_start=after,
+        profile=profile,
+        outcome=_outcome(wall, advance, gap),
+        outcome_after_start=after,
         least_advance_mm=1e3 * advance,
         longest_stick_mm=1e3 * longest_stick(seen.base, seen.tip, wall.jam_advance),
         longest_gap_s=gap,
@@ -120,7 +123,7 @@ def longest_gap(touching: Floats, period: float, from_start: bool = False) -> fl
     return float((np.diff(free) - 1).max(initial=0)) * period
 
 
-def _fate(wall: WallParams, advance: float, gap: float) -> Fate:
+def _outcome(wall: WallParams, advance: float, gap: float) -> Outcome:
     if advance < wall.jam_advance:
         return "jam"
     return "slip" if gap > wall.slip_time else "success"

@@ -11,27 +11,26 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
-from typing import Any, Literal
+from dataclasses import dataclass
+from typing import Any, ClassVar
 
 import numpy as np
 from pydantic import model_validator
 
-from antennate.antenna.statics import PROFILES, with_profile
+from antennate.antenna.statics import PROFILES, Profile, with_profile
 from antennate.errors import SimulationError
-from antennate.experiments.wall.outcome import SAMPLE_PERIOD, Fate, Traverse, WallTrial, classify
+from antennate.experiments.wall import measures
+from antennate.experiments.wall.outcome import SAMPLE_PERIOD, Traverse, WallTrial, classify
 from antennate.params import BenchPhysicsParams, BenchVariationParams, Params, WallParams
-from antennate.params.base import number
-from antennate.robots.antenna import AntennaParams
+from antennate.params.base import number, require_different
+from antennate.robots.antenna import AntennaSpec
 from antennate.robots.sensor import SensorParams
 from antennate.sim.bench import Ball, Bench, compile_bench
-from antennate.studies import statistics
 from antennate.studies.pool import run_tasks
 from antennate.types import Floats
 
-Profile = Literal["stiff", "descending", "compliant", "matched_uniform", "ascending"]
 REFERENCE: Profile = "descending"
-"""The arm that all others are compared with."""
+"""The profile that all others are compared with."""
 _COMMAND_PERIOD = 0.002
 """Time between commands to the carriage [s]."""
 _SAMPLES = round(SAMPLE_PERIOD / _COMMAND_PERIOD)
@@ -46,11 +45,16 @@ _GRAVITY = 9.81
 class WallConfig(Params):
     """Everything that decides the outcome of `antennate wall`."""
 
+    unread: ClassVar[tuple[str, ...]] = (
+        "antenna.base_angle",
+        "antenna.base_spacing",
+        *(f"antenna.sensor.{n}" for n in SensorParams.model_fields if n != "active_length"),
+    )
     trials: int = number(
-        20, "1", "paper: 20 trials a profile", "trials of every arm", ge=1, le=10000
+        20, "1", "paper: 20 trials a profile", "trials of every profile", ge=1, le=10000
     )
     seed: int = number(1, "1", "assumed: any", "seed of all chance", ge=0)
-    arms: tuple[Profile, ...] = number(
+    profiles: tuple[Profile, ...] = number(
         tuple(PROFILES),
         "1",
         "paper: stiff, descending, compliant; assumed: two controls it lacks",
@@ -58,15 +62,13 @@ class WallConfig(Params):
         min_length=1,
     )
     wall: WallParams = WallParams()
-    antenna: AntennaParams = AntennaParams()
-    sensor: SensorParams = SensorParams()
+    antenna: AntennaSpec = AntennaSpec()
     variation: BenchVariationParams = BenchVariationParams()
     physics: BenchPhysicsParams = BenchPhysicsParams()
 
     @model_validator(mode="after")
     def _sound(self) -> WallConfig:
-        if len(set(self.arms)) != len(self.arms):
-            raise ValueError(f"arms must differ, got {', '.join(self.arms)}")
+        require_different("profiles", self.profiles)
         reach = self.antenna.length * math.sin(self.wall.base_angle)
         if self.wall.overlap + self.variation.overlap >= reach / 2:
             raise ValueError(
@@ -92,8 +94,8 @@ class WallOutcome:
 
     Attributes:
         config: What was run.
-        rows: Sorted by arm and trial.
-        examples: The first trial of every arm.
+        rows: Sorted by profile and trial.
+        examples: The first trial of every profile.
     """
 
     config: WallConfig
@@ -102,76 +104,21 @@ class WallOutcome:
 
     def result(self) -> dict[str, Any]:
         """The content of result.json."""
-        by_arm: dict[Profile, list[WallTrial]] = {
-            a: [r for r in self.rows if r.arm == a] for a in self.config.arms
+        by_profile = {
+            p: [row for row in self.rows if row.profile == p] for p in self.config.profiles
         }
         return {
-            "schema": 1,
+            "schema": 2,
             "command": "wall",
             "seed": self.config.seed,
             "gravity": self.config.wall.gravity,
             "start_m": self.config.wall.start,
-            "arms": {arm: _summary(rows) for arm, rows in by_arm.items()},
-            "paired": _paired(by_arm),
+            "profiles": {p: measures.summary(rows) for p, rows in by_profile.items()},
+            "paired": measures.paired(REFERENCE, by_profile),
         }
 
 
-def _summary(rows: list[WallTrial]) -> dict[str, Any]:
-    valid = [r for r in rows if r.fate != "invalid"]
-    return {
-        **_counts([r.fate for r in rows]),
-        "after_start": _counts([r.fate_after_start for r in rows]),
-        "least_advance_mm": _median([r.least_advance_mm for r in valid]),
-        "longest_stick_mm": _median([r.longest_stick_mm for r in valid]),
-        "longest_gap_s": _median([r.longest_gap_s for r in valid]),
-        "touched": _median([r.touched for r in valid]),
-        "force_mean_n": _median([r.force_mean_n for r in valid]),
-        "force_max_n": max((r.force_max_n for r in valid), default=None),
-        "flex_max_deg": max((r.flex_max_deg for r in valid), default=None),
-    }
-
-
-def _counts(fates: list[Fate]) -> dict[str, Any]:
-    successes, invalid = fates.count("success"), fates.count("invalid")
-    return {
-        "trials": len(fates),
-        "successes": successes,
-        "jams": fates.count("jam"),
-        "slips": fates.count("slip"),
-        "invalid": invalid,
-        "wilson95": statistics.wilson95(successes, len(fates) - invalid),
-    }
-
-
-def _median(values: list[float]) -> float | None:
-    return float(np.median(values)) if values else None
-
-
-def _paired(by_arm: dict[Profile, list[WallTrial]]) -> dict[str, Any]:
-    """The reference against every other arm, on trials valid in both, with both counts."""
-    if REFERENCE not in by_arm:
-        return {}
-    tests = {}
-    for other, theirs in by_arm.items():
-        pairs = [
-            (a, b)
-            for a, b in zip(by_arm[REFERENCE], theirs, strict=True)
-            if "invalid" not in (a.fate, b.fate)
-        ]
-        if other != REFERENCE and pairs:
-            whole = [(a.fate == "success", b.fate == "success") for a, b in pairs]
-            late = [
-                (a.fate_after_start == "success", b.fate_after_start == "success") for a, b in pairs
-            ]
-            tests[f"{REFERENCE}-{other}"] = {
-                "trials": len(pairs),
-                **asdict(statistics.mcnemar(np.array(whole))),
-                "after_start": asdict(statistics.mcnemar(np.array(late))),
-            }
-    return tests
-
-
-def passage(config: WallConfig, arm: Profile, trial: int) -> Traverse:
+def passage(config: WallConfig, profile: Profile, trial: int) -> Traverse:
     """Move one antenna along the wall.
 
     Raises:
@@ -179,12 +126,12 @@ def passage(config: WallConfig, arm: Profile, trial: int) -> Traverse:
     """
     rng = np.random.default_rng([config.seed, trial])
     wall, variation = config.wall, config.variation
-    factors = np.exp(rng.normal(0.0, variation.stiffness, 6))
+    factors = np.exp(rng.normal(0.0, variation.stiffness, config.antenna.hinges))
     friction = max(0.0, config.antenna.friction + rng.normal(0.0, variation.friction))
     angle = wall.base_angle + rng.uniform(-1, 1) * variation.base_angle
     overlap = wall.overlap + rng.uniform(-1, 1) * variation.overlap
     phase = rng.uniform(0.0, 1.0) * wall.sphere_diameter
-    antenna = with_profile(config.antenna, config.sensor, arm)
+    antenna = with_profile(config.antenna, profile)
     antenna = antenna.model_copy(update={"friction": min(friction, 2.0)})
     bench = _bench(config, antenna, angle, phase, factors)
     crest = antenna.length * math.sin(angle) + antenna.radius + _CLEAR
@@ -192,7 +139,7 @@ def passage(config: WallConfig, arm: Profile, trial: int) -> Traverse:
 
 
 def _bench(
-    config: WallConfig, antenna: AntennaParams, angle: float, phase: float, factors: Floats
+    config: WallConfig, antenna: AntennaSpec, angle: float, phase: float, factors: Floats
 ) -> Bench:
     """Bench with spheres all along the way, their crests clear of the tip at first."""
     wall, pitch = config.wall, config.wall.sphere_diameter
@@ -202,11 +149,11 @@ def _bench(
     heights = np.arange(below + phase, above, pitch)
     balls = [Ball(x, float(y), pitch / 2) for y in heights]
     pull = {"down": -_GRAVITY, "up": _GRAVITY, "off": 0.0}[wall.gravity]
-    model = compile_bench(config.physics, antenna, config.sensor, balls, (0.0, pull))
+    model = compile_bench(config.physics, antenna, balls, (0.0, pull))
     for i, factor in enumerate(factors):
         joint = model.joint(f"antenna/hinge{i}")
         joint.stiffness *= factor
-    return Bench(model, config.sensor.covered_hinges(antenna))
+    return Bench(model, antenna)
 
 
 def _drive(
@@ -246,15 +193,15 @@ def _ramp(length: float, speed: float) -> list[float]:
 def _run_task(
     task: tuple[WallConfig, Profile, int], emit: Callable[[tuple[WallTrial, Traverse | None]], None]
 ) -> None:
-    config, arm, trial = task
+    config, profile, trial = task
     try:
-        seen = passage(config, arm, trial)
+        seen = passage(config, profile, trial)
     except SimulationError as error:
         none = [math.nan] * 7
-        row = WallTrial(arm, trial, "invalid", "invalid", *none, reason=str(error))
+        row = WallTrial(config.seed, trial, profile, "invalid", "invalid", *none, reason=str(error))
         emit((row, None))
         return
-    emit((classify(config.wall, arm, trial, seen), seen if trial == 0 else None))
+    emit((classify(config.wall, config.seed, trial, profile, seen), seen if trial == 0 else None))
 
 
 def run(
@@ -263,7 +210,7 @@ def run(
     on_step: Callable[[int, int], None] = lambda done, total: None,
     on_row: Callable[[WallTrial], None] = lambda row: None,
 ) -> WallOutcome:
-    """Run all trials of all arms.
+    """Run all trials of all profiles.
 
     Args:
         config: What to run.
@@ -275,7 +222,7 @@ def run(
         WorkerError: A worker process died.
     """
     tasks: list[tuple[WallConfig, Profile, int]] = [
-        (config, arm, trial) for trial in range(config.trials) for arm in config.arms
+        (config, profile, trial) for trial in range(config.trials) for profile in config.profiles
     ]
     rows: list[WallTrial] = []
     examples: dict[str, Traverse] = {}
@@ -284,10 +231,10 @@ def run(
         row, seen = item
         rows.append(row)
         if seen is not None:
-            examples[row.arm] = seen
+            examples[row.profile] = seen
         on_row(row)
         on_step(len(rows), len(tasks))
 
     run_tasks(_run_task, tasks, workers, take)
-    rows.sort(key=lambda row: (config.arms.index(row.arm), row.trial))
+    rows.sort(key=lambda row: (config.profiles.index(row.profile), row.trial))
     return WallOutcome(config, rows, examples)

@@ -6,25 +6,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
-import numpy as np
-
-from antennate.hardware.doctor.antenna import board_rows, film_rows
-from antennate.hardware.doctor.hearing import Heard, listen
-from antennate.hardware.doctor.pace import latency_row, slow_adapter
-from antennate.hardware.doctor.ports import port_row
-from antennate.hardware.doctor.rows import Opener, Row, worst
-from antennate.hardware.doctor.servos import bus_rows
-from antennate.hardware.doctor.survey import Survey, survey
+from antennate.hardware.doctor import board_checks, bus_checks
+from antennate.hardware.doctor.board_survey import BoardSurvey, survey_board
+from antennate.hardware.doctor.bus_survey import BusSurvey, survey_bus
+from antennate.hardware.doctor.check import Opener, Row, Verdict, worst
+from antennate.hardware.doctor.config import DoctorConfig
+from antennate.hardware.doctor.ports import latency_row, port_row
 from antennate.hardware.esp32.board import BOARD_BAUD
 from antennate.hardware.ports.port import PortError
-from antennate.hardware.robot import RobotConfig
-from antennate.params import DoctorParams
-
-
-class DoctorConfig(RobotConfig):
-    """The robot, and what is good."""
-
-    doctor: DoctorParams = DoctorParams()
 
 
 @dataclass(slots=True)
@@ -33,24 +22,28 @@ class Checkup:
 
     Attributes:
         rows: One for each check.
-        survey: Of the bus, None if there was no bus to look at.
-        heard: From the board, None likewise.
+        bus: Survey of the bus, None if there was no bus to look at.
+        board: Survey of the board, None likewise.
     """
 
     rows: list[Row] = field(default_factory=list[Row])
-    survey: Survey | None = None
-    heard: Heard | None = None
+    bus: BusSurvey | None = None
+    board: BoardSurvey | None = None
+
+    @property
+    def verdict(self) -> Verdict:
+        """The worst of all rows."""
+        return worst(row.verdict for row in self.rows)
 
     def result(self, changes: Sequence[str] = ()) -> dict[str, Any]:
         """The content of result.json, with the changes that were made before."""
-        verdict = worst(self.rows)
         return {
             "schema": 1,
             "command": "doctor",
-            "verdict": verdict,
+            "verdict": self.verdict,
             "rows": [asdict(row) for row in self.rows],
-            "bus": None if self.survey is None else _bus_result(self.survey),
-            "esp32": None if self.heard is None else _board_result(self.heard),
+            "bus": None if self.bus is None else self.bus.result(),
+            "esp32": None if self.board is None else self.board.result(),
             "changes": list(changes),
         }
 
@@ -69,27 +62,28 @@ def examine(
         esp32: The same of the antenna board.
         now: Monotonic time [s].
     """
-    found, params = Checkup(), robot.doctor
+    checkup = Checkup()
     if bus is not None:
 
-        def look(opener: Opener) -> list[Row]:
-            found.survey = seen = survey(opener, robot.layout, params, now)
-            latency = latency_row(bus[0], slow_adapter(seen, params), params)
-            return [latency, *bus_rows(seen, robot.layout, robot.limits, params)]
+        def look_at_bus(opener: Opener) -> list[Row]:
+            survey = checkup.bus = survey_bus(opener, robot.robot, robot.doctor, now)
+            latency = latency_row(bus[0], bus_checks.slow(survey, robot), robot.doctor)
+            checks = bus_checks.checks(survey, robot)
+            return [latency, *(check.row("bus", survey, robot) for check in checks)]
 
-        found.rows += _examined("bus", *bus, robot.layout.baud, look)
+        checkup.rows += _port("bus", *bus, robot.robot.baud, look_at_bus)
     if esp32 is not None:
 
-        def hear(opener: Opener) -> list[Row]:
-            found.heard = listen(opener, robot.layout, params, now)
-            rows = board_rows(found.heard, robot.control, robot.limits, params)
-            return rows + film_rows(found.heard.hello, robot.sensor_id)
+        def look_at_board(opener: Opener) -> list[Row]:
+            survey = checkup.board = survey_board(opener, robot.robot, robot.doctor, now)
+            checks = board_checks.checks(survey, robot)
+            return [check.row("esp32", survey, robot) for check in checks]
 
-        found.rows += _examined("esp32", *esp32, BOARD_BAUD, hear)
-    return found
+        checkup.rows += _port("esp32", *esp32, BOARD_BAUD, look_at_board)
+    return checkup
 
 
-def _examined(
+def _port(
     part: str, path: str, opener: Opener, baud: int, look: Callable[[Opener], list[Row]]
 ) -> list[Row]:
     """Rows of a port, and of what is behind it if it opens."""
@@ -99,35 +93,5 @@ def _examined(
     try:
         return [first, *look(opener)]
     except PortError as error:
-        return [first, _lost(part, path, error)]
-
-
-def _lost(part: str, path: str, error: PortError) -> Row:
-    cure = "plug it in again, with a cable that holds; then run doctor again"
-    return Row(part, "wire", "stays open", f"{path}: {error}", "bad", cure)
-
-
-def _bus_result(survey: Survey) -> dict[str, Any]:
-    return {
-        "baud": survey.baud,
-        "read_time_s": survey.read_time,
-        "answers_asked": survey.asked,
-        "answers_missed": survey.missed,
-        "servos": [asdict(seen) for seen in (*survey.here.values(), *survey.elsewhere)],
-    }
-
-
-def _board_result(heard: Heard) -> dict[str, Any]:
-    counts, hello = heard.counts, heard.hello
-    known = len(counts) > 0
-    return {
-        "device_id": None if hello is None else hello.device_id,
-        "firmware": None if hello is None else list(hello.firmware),
-        "reset": None if hello is None else hello.reset.name,
-        "rate_hz": heard.rate,
-        "readings": len(counts),
-        "lost": heard.lost,
-        "broken": heard.broken,
-        "median_counts": np.median(counts, axis=0).tolist() if known else None,
-        "noise_counts": counts.std(axis=0).tolist() if known else None,
-    }
+        cure = "plug it in again, with a cable that holds; then run doctor again"
+        return [first, Row(part, "wire", "stays open", f"{path}: {error}", "bad", cure)]

@@ -8,22 +8,23 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from antennate.hardware import roster, settings
-from antennate.hardware.doctor.rows import Opener
-from antennate.hardware.doctor.survey import Seen, Survey, look, master, read_some
+from antennate.hardware import settings
+from antennate.hardware.doctor.bus_survey import BusSurvey, master, read_some
+from antennate.hardware.doctor.check import Opener
 from antennate.hardware.dynamixel import bringup
 from antennate.hardware.dynamixel.bringup import BringUpError
 from antennate.hardware.dynamixel.bus import Bus
+from antennate.hardware.dynamixel.inquiry import look
 from antennate.hardware.dynamixel.tables import BAUD_RATES, XC430_W240
 from antennate.hardware.settings import Setting
-from antennate.robots.layout import LayoutParams
+from antennate.robots.spec import RobotSpec
 
 _ID, _BAUD = "id", "baud_rate"
 _MOVED = (_ID, _BAUD)
 """Registers after whose change a servo is found elsewhere."""
 _AFTER = {
-    "drive_mode": "see that its sign in layout.*.directions is right",
-    "homing_offset": "measure its place in layout.*.zeros anew",
+    "drive_mode": "see that its sign in robot.*.directions is right",
+    "homing_offset": "measure its place in robot.*.zeros anew",
 }
 """What a person has to do after a change, by register."""
 
@@ -51,49 +52,41 @@ class Change:
         values: tuple[object, object] = self.before, self.after
         if self.register == _BAUD:
             values = BAUD_RATES[self.before], BAUD_RATES[self.after]
-        said = f"servo {self.servo} (at {self.baud}): {name} {values[0]} -> {values[1]}"
-        return f"{said}; {_AFTER[self.register]}" if self.register in _AFTER else said
+        text = f"servo {self.servo} (at {self.baud}): {name} {values[0]} -> {values[1]}"
+        return f"{text}; {_AFTER[self.register]}" if self.register in _AFTER else text
 
 
-def plan(survey: Survey, layout: LayoutParams) -> list[Change]:
+def plan(survey: BusSurvey, robot: RobotSpec) -> list[Change]:
     """Changes that would put right what can be; those that move a servo come alone, first."""
-    return _moves(survey, layout) or _settings(survey, layout)
+    return _moves(survey, robot) or _settings(survey, robot)
 
 
-def _moves(survey: Survey, layout: LayoutParams) -> list[Change]:
-    missing = [servo for servo in layout.ids if servo not in survey.here]
-    strangers = [seen for i, seen in survey.here.items() if i not in layout.ids]
-    strangers += [seen for seen in survey.elsewhere if seen.servo not in missing]
-    if len(missing) == 1 and len(strangers) == 1 and strangers[0].state == "ok":
-        one = strangers[0]
-        if one.model == roster.models(layout)[missing[0]]:
-            return [Change(one.servo, one.baud, _ID, one.servo, missing[0])]
+def _moves(survey: BusSurvey, robot: RobotSpec) -> list[Change]:
+    missing = [servo for servo in robot.ids if servo not in survey.here]
+    extra = [(survey.baud, one) for i, one in survey.here.items() if i not in robot.ids]
+    extra += [(baud, one) for baud, one in survey.elsewhere if one.servo not in missing]
+    if len(missing) == 1 and len(extra) == 1:
+        baud, one = extra[0]
+        if one.state == "ok" and one.model == robot.models[missing[0]]:
+            return [Change(one.servo, baud, _ID, one.servo, missing[0])]
+    ids = [one.servo for _, one in survey.elsewhere]
     return [
-        Change(seen.servo, seen.baud, _BAUD, _speed(seen.baud), _speed(layout.baud))
-        for seen in survey.elsewhere
-        if seen.servo in missing and seen.state == "ok" and _alone(seen, survey)
+        Change(one.servo, baud, _BAUD, BAUD_RATES.index(baud), BAUD_RATES.index(robot.baud))
+        for baud, one in survey.elsewhere
+        if one.servo in missing and one.state == "ok" and ids.count(one.servo) == 1
     ]
 
 
-def _alone(seen: Seen, survey: Survey) -> bool:
-    return sum(other.servo == seen.servo for other in survey.elsewhere) == 1
-
-
-def _speed(baud: int) -> int:
-    return BAUD_RATES.index(baud)
-
-
-def _settings(survey: Survey, layout: LayoutParams) -> list[Change]:
-    delay = dict.fromkeys(layout.ids, Setting(0, 0, 0))
-    wanted = {**settings.settings(layout), "return_delay_time": delay}
+def _settings(survey: BusSurvey, robot: RobotSpec) -> list[Change]:
+    delay = dict.fromkeys(robot.ids, Setting(0, 0, 0))
+    wanted = {**settings.settings(robot), "return_delay_time": delay}
     return [
         Change(servo, survey.baud, name, there[name], setting.cure)
-        for servo, seen in survey.here.items()
-        if servo in layout.ids and seen.state == "ok"
-        for there in (seen.registers,)
-        for name, of in wanted.items()
+        for servo, there in survey.registers.items()
+        if servo in robot.ids
+        for name, rules in wanted.items()
         if name in there
-        and (setting := of.get(servo)) is not None
+        and (setting := rules.get(servo)) is not None
         and not setting.allows(there[name])
     ]
 
@@ -125,9 +118,9 @@ _POWER = "switch its supply off and on"
 
 
 def _require_alone(bus: Bus, change: Change) -> None:
-    seen = look(bus, change.servo)
-    if seen is None or seen.state != "ok":
-        state = "silent" if seen is None else seen.state
+    present = look(bus, change.servo)
+    state = "silent" if present is None else present.state
+    if state != "ok":
         raise BringUpError(
             f"expected servo {change.servo} alone at {change.baud}, found it {state}; "
             "leave it alone on the bus"

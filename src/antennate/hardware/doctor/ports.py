@@ -1,18 +1,22 @@
-"""Serial ports for an examination, and who else has them open."""
+"""Ports for an examination: who else has them open, and how late their adapters deliver."""
 
 from __future__ import annotations
 
 import contextlib
 import os
 from collections.abc import Iterator
+from pathlib import Path
 
-from antennate.hardware.doctor.rows import Opener, Row, row
+from antennate.hardware.doctor.check import Finding, Opener, Row
 from antennate.hardware.esp32.board import BOARD_BAUD
 from antennate.hardware.ports.errors import OpenError
 from antennate.hardware.ports.finder import finder
 from antennate.hardware.ports.holder import holders
 from antennate.hardware.ports.port import Port
-from antennate.params import NetworkParams
+from antennate.params import DoctorParams, NetworkParams
+
+_TIMERS = Path("/sys/bus/usb-serial/devices")
+_USUAL_NAME = "ttyUSB0"
 
 
 def opener_of(
@@ -37,21 +41,58 @@ def opener_of(
 
 def port_row(part: str, path: str, opener: Opener, baud: int = BOARD_BAUD) -> Row:
     """Whether a port is there, may be opened, and is nobody else's."""
-    expected = "opens, in use by nobody else"
+    return _port(path, opener, baud).row(part, "port", "opens, in use by nobody else")
+
+
+def _port(path: str, opener: Opener, baud: int) -> Finding:
     try:
         with opener(baud):
             others = holders(path)
     except OpenError as error:
-        return Row(part, "port", expected, f"{path}: {error.found}", "bad", error.cure)
-    used = f", in use by {', '.join(others)}" if others else ""
-    return row(
-        part,
-        "port",
-        expected,
-        f"{path}{used}",
-        "warn" if used else None,
-        "end that program: two readers take each other's bytes",
+        return Finding(f"{path}: {error.found}", "bad", error.cure)
+    if not others:
+        return Finding(path)
+    cure = "end that program: two readers take each other's bytes"
+    return Finding(f"{path}, in use by {', '.join(others)}", "warn", cure)
+
+
+def latency_row(path: str, slow: bool, params: DoctorParams, timers: Path = _TIMERS) -> Row:
+    """The latency timer of the bus's adapter.
+
+    Args:
+        path: Device file of the port.
+        slow: All answers were measured to come late.
+        params: The highest timer that is good.
+        timers: Where Linux shows them.
+    """
+    most = params.latency_timer
+    finding = _latency(path, slow, most, timers)
+    return finding.row("bus", "latency timer", f"at most {most} ms")
+
+
+def _latency(path: str, slow: bool, most: int, timers: Path) -> Finding:
+    name = Path(os.path.realpath(path)).name
+    file = timers / name / "latency_timer"
+    try:
+        value = int(file.read_text())
+    except (OSError, ValueError):
+        value = None
+        file = timers / (name if name.startswith("tty") else _USUAL_NAME) / "latency_timer"
+    found = "none is shown" if value is None else f"{value} ms"
+    if slow:
+        found += ", and answers come late"
+    set_it = (
+        f"run `echo {most} | sudo tee {file}`, or `setserial {path} low_latency`; again after "
+        "every plug-in"
     )
+    if value is None:
+        cure = f"if it is an FTDI adapter (U2D2), {set_it}; else use one"
+    elif value > most:
+        cure = set_it
+    else:
+        cure = "not the timer: plug the adapter into the computer itself, end busy programs"
+    high = value is not None and value > most
+    return Finding(found, "bad" if high or slow else "ok", cure)
 
 
 def same(one: str, other: str) -> bool:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from statistics import median
 
-from antennate.hardware.doctor.pace import latency_row
+from antennate.hardware.doctor.ports import latency_row
 from antennate.hardware.dynamixel.answers import Timing, Value
 from antennate.hardware.dynamixel.bringup import BringUpError
 from antennate.hardware.dynamixel.bus import Bus

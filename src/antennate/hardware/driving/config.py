@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from pydantic import field_validator
+
+from antennate.control.registry import CONTROLLERS
 from antennate.hardware.robot import RobotConfig
 from antennate.params import DriftParams, TouchCheckParams, number
 
@@ -10,7 +13,11 @@ class DriveConfig(RobotConfig):
     """The robot, its controller, and how long it runs."""
 
     controller: str = number(
-        "closed", "1", "assumed: our best", "open, paper, closed, or MODULE:CLASS of your own"
+        "closed",
+        "1",
+        "assumed: our best",
+        "open, paper, closed, or MODULE:NAME or FILE.py:NAME of your own",
+        examples=["open", "paper", "closed"],
     )
     dry_run: float = number(
         10.0, "s", "assumed: long enough to touch both antennae", "time before torque", ge=0, le=600
@@ -64,3 +71,8 @@ class DriveConfig(RobotConfig):
         gt=0,
         le=60,
     )
+
+    @field_validator("controller")
+    @classmethod
+    def _known(cls, name: str) -> str:
+        return CONTROLLERS.check(name)

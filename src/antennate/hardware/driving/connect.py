@@ -7,13 +7,14 @@ import math
 from collections.abc import Iterator
 from typing import Any
 
+from antennate.control.registry import make_controller
 from antennate.errors import BadInputError
-from antennate.hardware import roster, settings
+from antennate.hardware import settings
 from antennate.hardware.driving.adapter import require_quick
 from antennate.hardware.driving.config import DriveConfig
-from antennate.hardware.driving.decider import Decider, chosen
 from antennate.hardware.driving.session import Session
 from antennate.hardware.dynamixel import bringup
+from antennate.hardware.dynamixel.actuators import DynamixelActuators
 from antennate.hardware.dynamixel.answers import Timing
 from antennate.hardware.dynamixel.bringup import BringUpError
 from antennate.hardware.dynamixel.bus import Bus
@@ -25,9 +26,10 @@ from antennate.hardware.joints import Joints
 from antennate.hardware.ports.finder import finder
 from antennate.hardware.ports.port import Port, PortError
 from antennate.hardware.ports.reconnecting import Reconnecting
-from antennate.hardware.safety.trust import Trust
+from antennate.hardware.safety.signal_quality import SignalQuality
 from antennate.params import BusParams, DoctorParams
-from antennate.robots.layout import LayoutParams
+from antennate.robots.spec import RobotSpec
+from antennate.types import Controller
 
 _WHO = DoctorParams()
 _PATIENCE = 0.05
@@ -52,17 +54,17 @@ def connect(
         BadInputError: No antenna board speaks, or it is refused.
         BringUpError: The servos are not those expected.
     """
-    control = chosen(config.controller, config.control)
+    controller = make_controller(config.controller, config.control)
     with contextlib.ExitStack() as stack:
         lines: list[Port] = []
         for flag, address, baud in (
             ("--esp32", esp32, BOARD_BAUD),
-            ("--bus", bus, config.layout.baud),
+            ("--bus", bus, config.robot.baud),
         ):
             line = Reconnecting(finder(address, baud, flag, key, config.network))
             stack.callback(line.close)
             lines.append(line)
-        yield prepare(config, lines[0], lines[1], HostClock(), bus, control)
+        yield prepare(config, lines[0], lines[1], HostClock(), bus, controller)
 
 
 def prepare(
@@ -71,7 +73,7 @@ def prepare(
     bus: Port,
     clock: Any,
     path: str = "the bus",
-    decider: Decider | None = None,
+    controller: Controller | None = None,
 ) -> Session:
     """A session before two open ports, after both sides have said who they are.
 
@@ -80,22 +82,22 @@ def prepare(
     board = Board(esp32, config.limits.stale_age)
     await_board(board, clock, bus, config.swapped)
     require_film(board.hello, config.sensor_id)
-    require_quick(bus, config.layout.ids[:3], config.layout.baud, clock.now, path)
-    master = Bus(bus, Timing(config.layout.baud, doubt=DOUBT), clock=clock.now)
-    require_servos(master, config.layout)
+    require_quick(bus, config.robot.ids[:3], config.robot.baud, clock.now, path)
+    master = Bus(bus, Timing(config.robot.baud, doubt=DOUBT), clock=clock.now)
+    require_servos(master, config.robot)
     board.count_anew(clock.now())
     return Session(
         board=board,
-        bus=master,
-        joints=Joints(config.layout),
+        actuators=DynamixelActuators(master, Joints(config.robot), clock.now),
         clock=clock,
-        decider=decider or chosen(config.controller, config.control),
+        controller=controller or make_controller(config.controller, config.control),
         period=config.control.period,
-        conditioning=config.control.conditioning,
-        limits=config.limits,
-        trust=Trust(
-            config.control.conditioning, config.drift, config.touch if config.touch_check else None
+        quality=SignalQuality(
+            config.control.conditioning,
+            drift=config.drift,
+            touch=config.touch if config.touch_check else None,
         ),
+        limits=config.limits,
     )
 
 
@@ -157,24 +159,24 @@ def _unasked(bus: Port) -> int:
     return 0
 
 
-def require_servos(bus: Bus, layout: LayoutParams) -> None:
+def require_servos(bus: Bus, robot: RobotSpec) -> None:
     """All servos are there, of the right model and set as they have to be.
 
     Raises:
         BringUpError: Otherwise; names each id that is not, and the cure.
     """
     try:
-        bringup.require(bus, roster.models(layout))
+        bringup.require(bus, robot.models)
     except BringUpError as error:
         raise BringUpError(
-            f"--bus: {error}; check power, wiring, ids and baud {layout.baud}, or whether --esp32 "
+            f"--bus: {error}; check power, wiring, ids and baud {robot.baud}, or whether --esp32 "
             "and --bus are swapped; `antennate doctor` tells more, slow adapters too"
         ) from None
-    rules = settings.settings(layout)
+    rules = settings.settings(robot)
     known = {
         name: bringup.read_register(bus, list(of), XC430_W240[name]) for name, of in rules.items()
     }
-    if wrong := settings.wrong(known, layout):
+    if wrong := settings.wrong(known, robot):
         raise BringUpError(
             f"--bus: expected servos set for this robot, found {'; '.join(wrong)}; "
             "`antennate doctor --fix` puts it right"

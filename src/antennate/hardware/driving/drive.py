@@ -39,7 +39,7 @@ def drive(
     report, clock = Report(), session.clock
     start = clock.now()
     dry = DryRun(
-        session.trust, config.dry_run, config.touch.patience, arm, config.duration or math.inf
+        session.quality, config.dry_run, config.touch.patience, arm, config.duration or math.inf
     )
     failed_at = math.inf
 
@@ -70,7 +70,7 @@ def drive(
     with StopOnce() as stop:
         try:
             try:
-                run_loop(session, session, session.period, go_on)
+                run_loop(session, session.control, session.period, go_on)
             except KeyboardInterrupt:
                 pass
             finally:

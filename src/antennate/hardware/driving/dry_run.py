@@ -5,16 +5,16 @@ from __future__ import annotations
 import math
 
 from antennate.hardware.safety.causes import Outputs
-from antennate.hardware.safety.trust import Trust
+from antennate.hardware.safety.signal_quality import SignalQuality
 
 _SKIP = "; --no-touch-check arms without the check"
 
 
 class DryRun:
-    """Lasts its time, and longer until the antennae are trusted and the supervisor allows torque.
+    """Lasts its time, and longer until the antennae are checked and the supervisor allows torque.
 
     Args:
-        trust: What is known of the antennae.
+        quality: The check of the antennae.
         length: Its time [s].
         patience: By how much it is extended at most [s], by the check and by the supervisor each.
         arm: Whether torque is wanted afterwards.
@@ -28,9 +28,9 @@ class DryRun:
     """
 
     def __init__(
-        self, trust: Trust, length: float, patience: float, arm: bool, duration: float
+        self, quality: SignalQuality, length: float, patience: float, arm: bool, duration: float
     ) -> None:
-        self._trust, self._length, self._patience = trust, length, patience
+        self._quality, self._length, self._patience = quality, length, patience
         self._waits, self._duration = arm, duration
         self._first = math.inf
         self.over = math.inf
@@ -51,9 +51,11 @@ class DryRun:
             self._hear(t, out)
         elif self._first < math.inf:
             self._ask(t)
-        elif self._trust.refused or (t >= self._length + self._patience and self._trust.objections):
-            self._give_up(t, "; ".join(self._trust.objections) + _SKIP)
-        elif t >= self._length and not self._trust.objections:
+        elif self._quality.refused or (
+            t >= self._length + self._patience and self._quality.objections
+        ):
+            self._give_up(t, "; ".join(self._quality.objections) + _SKIP)
+        elif t >= self._length and not self._quality.objections:
             self._first = t
             self._ask(t)
 

@@ -24,12 +24,10 @@ class Tally:
 
     Attributes:
         ticks: Ticks run.
-        sent: Poses sent to the servos.
+        sent: Commands sent to the actuators.
         limited: Goals that moved slower than asked.
-        refused: Poses of the controller that must not be sent.
     """
 
     ticks: int = 0
     sent: int = 0
     limited: int = 0
-    refused: int = 0

@@ -31,6 +31,7 @@ class Report:
     on: list[int] | None = None
     _torque: bool = False
     _waits: str = field(default="", repr=False)
+    _causes: set[Cause] | None = field(default=None, repr=False)
 
     @property
     def safe(self) -> bool:
@@ -48,8 +49,17 @@ class Report:
         why = "; ".join(active.text for active in out.causes)
         if self.before is None and _only_undecided(out):
             self._waits = why
-        elif out.state > self.worst and not _ordered(out):
-            self.worst, self.why = out.state, why
+        elif out.state >= max(self.worst, State.DEGRADED) and not _ordered(out):
+            self._explain(out, why)
+        else:
+            self._causes = None
+
+    def _explain(self, out: Outputs, why: str) -> None:
+        """Keep why the worst state began; a cause found while it lasts makes it clearer."""
+        causes = {active.cause for active in out.causes}
+        known = self._causes
+        if out.state > self.worst or (known is not None and not causes <= known):
+            self.worst, self.why, self._causes = out.state, why, causes | (known or set[Cause]())
 
     def close(self, session: Session) -> None:
         """The last tick is over."""
@@ -59,7 +69,7 @@ class Report:
 
     def result(self, session: Session) -> dict[str, Any]:
         """All of it as plain numbers and words, for result.json."""
-        board, bus = session.board, session.bus.tally
+        board, answers = session.board, session.actuators.tally
         return {
             "worst_state": self.worst.name,
             "why": self.why,
@@ -71,13 +81,17 @@ class Report:
             "frames": board.decoder.counters.good,
             "crc_errors": board.decoder.counters.crc_errors,
             "lost_samples": board.lost,
-            "missed_answers": bus.misses,
-            "stale_answers": bus.stale,
-            "broken_answers": bus.bad_crc,
+            "resets": board.clock.resets,
+            "missed_answers": answers.misses,
+            "stale_answers": answers.stale,
+            "broken_answers": answers.bad_crc,
             "poses_sent": session.tally.sent,
             "poses_limited": session.tally.limited,
-            "poses_refused": session.tally.refused,
-            "tracebacks": list(session.tracebacks.kept),
+            "poses_refused": session.control.refused,
+            "tracebacks": [
+                *session.control.tracebacks.kept,
+                *session.actuators.state.tracebacks.kept,
+            ],
         }
 
 

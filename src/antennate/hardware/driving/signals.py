@@ -35,14 +35,15 @@ class StopOnce:
 
     def __enter__(self) -> StopOnce:
         if threading.current_thread() is threading.main_thread():
-            self._before = {number: signal.signal(number, self._hear) for number in STOPS}
+            self._before = {number: signal.signal(number, self.receive) for number in STOPS}
         return self
 
     def __exit__(self, *_: object) -> None:
         for number, handler in self._before.items():
             signal.signal(number, handler)
 
-    def _hear(self, number: int, frame: FrameType | None) -> None:
+    def receive(self, number: int, frame: FrameType | None) -> None:
+        """Handle a signal."""
         self.heard = True
         if not self.deaf:
             raise KeyboardInterrupt

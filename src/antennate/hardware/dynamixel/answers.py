@@ -91,23 +91,6 @@ class Timing:
         return self.wire(OVERHEAD + length) + self.gap
 
 
-@dataclass(slots=True)
-class Tally:
-    """What the bus has seen.
-
-    Attributes:
-        misses: Requests to one servo without a right answer.
-        stale: Answers that were right but not to the request, and were thrown away.
-        bad_crc: Packets with a wrong CRC, and broken parts of replies to fast sync reads.
-        drained: Bytes thrown away before a request.
-    """
-
-    misses: int = 0
-    stale: int = 0
-    bad_crc: int = 0
-    drained: int = 0
-
-
 def answer(status: Status) -> Answer:
     """What a status packet says."""
     if status.error != StatusError.NONE:

@@ -9,7 +9,7 @@ import contextlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from antennate.errors import AntennateError
+from antennate.hardware.actuators import ActuatorError
 from antennate.hardware.dynamixel import inquiry
 from antennate.hardware.dynamixel.answers import Span, Value
 from antennate.hardware.dynamixel.bus import Bus
@@ -33,7 +33,7 @@ _COMMON = XC430_W240.registers
 _TORQUE = _COMMON["torque_enable"]
 
 
-class BringUpError(AntennateError):
+class BringUpError(ActuatorError):
     """The servos are not fit to be moved; says which and why."""
 
 

@@ -13,16 +13,15 @@ Time is monotonic and comes from outside; nothing is kept that an exception coul
 
 from __future__ import annotations
 
-import threading
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
+from antennate.hardware.actuators import Tally
 from antennate.hardware.dynamixel import packets
 from antennate.hardware.dynamixel.answers import (
     SILENT,
     Answer,
     Span,
-    Tally,
     Timing,
     answer,
     cut,
@@ -30,7 +29,6 @@ from antennate.hardware.dynamixel.answers import (
 from antennate.hardware.dynamixel.doubts import Doubts
 from antennate.hardware.dynamixel.packets import HEADER, OVERHEAD, Packet, Status, StatusError
 from antennate.hardware.dynamixel.parser import Parser
-from antennate.hardware.dynamixel.turns import in_turn
 from antennate.hardware.ports.port import Port, PortError
 from antennate.params import BusParams
 
@@ -47,7 +45,7 @@ BUSY = BusParams().busy
 
 
 class Bus:
-    """Master of one bus. Threads that share it wait for each other, a whole request long.
+    """Master of one bus, for one thread.
 
     Args:
         port: The wire.
@@ -56,7 +54,8 @@ class Bus:
         clock: Monotonic time [s].
 
     Attributes:
-        turn: Held by the thread whose request is on the bus.
+        timing: Its speed and patience.
+        tally: What became of the answers.
     """
 
     def __init__(
@@ -68,7 +67,6 @@ class Bus:
     ) -> None:
         self.timing = timing or Timing()
         self.tally = Tally()
-        self.turn = threading.RLock()
         self._port = port
         self._clock = clock
         self._fast = fast
@@ -88,7 +86,6 @@ class Bus:
         """Requests in a row that a servo left unanswered, by id, of those it was asked."""
         return self._missed
 
-    @in_turn
     def write_all(self, address: int, data: Mapping[int, bytes], anyway: bool = False) -> None:
         """Write equally many bytes to several servos at once; none answers.
 
@@ -104,7 +101,6 @@ class Bus:
             raise PortError(f"expected a quiet bus, found it busy for {1e3 * BUSY:g} ms")
         self._calm = True
 
-    @in_turn
     def read_all(self, ids: Sequence[int], span: Span, budget: float = 0.010) -> dict[int, Answer]:
         """Read the same span of several servos.
 
@@ -137,32 +133,26 @@ class Bus:
                 answers[servo] = self._read_one(servo, span, end)
         return answers
 
-    @in_turn
     def read(self, servo: int, span: Span) -> Answer:
         """Read a span of one servo."""
         return self._read_one(servo, span, self._clock() + self.timing.doubt)
 
-    @in_turn
     def write(self, servo: int, address: int, data: bytes) -> Answer:
         """Write to one servo and wait for its answer; a Value without data is success."""
         return self._ask(servo, packets.write(servo, address, data), 0)
 
-    @in_turn
     def ping(self, servo: int) -> Answer:
         """Model number (2 bytes, low first) and firmware version of one servo."""
         return self._ask(servo, packets.ping(servo), PING_DATA)
 
-    @in_turn
     def reboot(self, servo: int) -> Answer:
         """Restart one servo; it does not listen for a while after it has answered."""
         return self._ask(servo, packets.reboot(servo), 0)
 
-    @in_turn
     def clear(self, servo: int) -> Answer:
         """Let one servo, standing still, forget its whole turns."""
         return self._ask(servo, packets.clear(servo), 0)
 
-    @in_turn
     def scan(self, window: float = 0.8) -> list[Status]:
         """Answers of all servos to a ping within a time [s], an id twice if it answers twice."""
         self.settle()
@@ -174,7 +164,6 @@ class Bus:
         self.tally.bad_crc += parser.counters.bad_crc
         return found
 
-    @in_turn
     def settle(self) -> None:
         """Wait until no late answer can come any more and noise is over, at most `doubt` seconds.
 
@@ -234,6 +223,24 @@ class Bus:
     def _exchange(
         self, request: bytes, ids: Sequence[int], length: int, end: float
     ) -> dict[int, Answer]:
+        """Send one request and take the answers to it, each from another servo.
+
+        An answer does not say which request it belongs to. It is taken if it comes from a servo
+        that was asked and has as many bytes of data as were asked for; of a servo that may still
+        answer an earlier request, a refusal, which has no data, could be to either and is not
+        taken. All else is counted as stale. A servo that answers twice is not believed at all: one
+        of the two answers is a late one of the same length. The wait ends as soon as all have
+        answered, or after a silence that is longer than any within a chain of answers.
+
+        Args:
+            request: The packet, to all of `ids` at once.
+            ids: The servos that are to answer, each with a packet of its own.
+            length: Bytes of data in each answer.
+            end: Time after which nothing more is waited for [s].
+
+        Returns:
+            An answer by id, of those that gave a right one.
+        """
         doubtful = {servo for servo in ids if self._doubts.holds(servo)}
         self._doubts.open(ids, length)
         if not self._send(request, end):
@@ -244,7 +251,7 @@ class Bus:
         while len(good) < len(ids) and (part := self._listen(wait, end)):
             wait = self.timing.answer(length)
             for packet in parser.feed(part):
-                status = _fitting(packet, length, doubtful)
+                status = fitting(packet, length, doubtful)
                 if status and status.id in ids and status.id not in good:
                     good[status.id] = answer(status)
                     continue
@@ -317,8 +324,14 @@ class Bus:
         return part
 
 
-def _fitting(packet: Packet, length: int, doubtful: set[int]) -> Status | None:
-    """The status, if it can be the answer to a request for so many bytes."""
+def fitting(packet: Packet, length: int, doubtful: set[int]) -> Status | None:
+    """The status in a packet, if it can be the answer to a request for so many bytes.
+
+    Args:
+        packet: Any packet.
+        length: Bytes of data asked for.
+        doubtful: Ids whose late answers may still come: a refusal of theirs may be to the last one.
+    """
     status = packets.as_status(packet)
     if status is None:
         return None

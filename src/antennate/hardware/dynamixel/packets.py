@@ -186,7 +186,7 @@ def fast_sync_read(ids: Sequence[int], address: int, length: int) -> bytes:
 
 def sync_write(address: int, data: Mapping[int, bytes]) -> bytes:
     """Write equally many bytes to the same address of several servos; none answers."""
-    _check_ids(data)
+    require_ids(data)
     lengths = {len(item) for item in data.values()}
     if len(lengths) != 1:
         raise PacketError(f"expected as many bytes for each servo, found {sorted(lengths)}")
@@ -278,11 +278,16 @@ def _fast_header(count: int, length: int) -> bytes:
 
 
 def _group(instruction: Instruction, ids: Sequence[int], address: int, length: int) -> bytes:
-    _check_ids(ids)
+    require_ids(ids)
     return encode(BROADCAST, instruction, _words(address, length) + bytes(ids))
 
 
-def _check_ids(ids: Iterable[int]) -> None:
+def require_ids(ids: Iterable[int]) -> None:
+    """Ids that a packet for several servos may name.
+
+    Raises:
+        PacketError: One cannot be, or stands twice.
+    """
     listed = list(ids)
     if not listed or len(set(listed)) < len(listed) or not all(0 <= i <= LAST_ID for i in listed):
         raise PacketError(f"expected different servo ids from 0 to {LAST_ID}, found {listed}")

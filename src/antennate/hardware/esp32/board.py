@@ -7,12 +7,7 @@ import math
 import numpy as np
 
 from antennate.hardware.esp32.clock import Timed
-from antennate.hardware.esp32.frame import (
-    FLAG_LEFT_RAIL,
-    FLAG_RIGHT_RAIL,
-    SAMPLE_FRAME_SIZE,
-    encode_request,
-)
+from antennate.hardware.esp32.frame import SAMPLE_FRAME_SIZE, encode_request
 from antennate.hardware.esp32.listener import CHUNK, Listener
 from antennate.hardware.ports.port import Port, PortError
 from antennate.params import BoardParams
@@ -24,7 +19,6 @@ KEPT = BoardParams().backlog * SAMPLE_FRAME_SIZE
 """Most bytes of a backlog that are looked at, the newest."""
 _CHUNKS = 64
 """Most chunks read at once: more than Linux keeps for a line."""
-_RAILS = (FLAG_LEFT_RAIL, FLAG_RIGHT_RAIL)
 
 
 class Board(Listener):
@@ -49,13 +43,13 @@ class Board(Listener):
 
     @property
     def lost(self) -> int:
-        """Samples that never came since `count_anew`."""
-        return self.clock.sequence.lost - self._lost_before
+        """Samples that never came since `count_anew`; 0 at least, though some may come late."""
+        return max(0, self.clock.lost - self._lost_before)
 
     def count_anew(self, now: float) -> None:
         """Forget what was lost by now [s], as while servos were looked for and nobody read."""
         self.poll(now)
-        self._lost_before = self.clock.sequence.lost
+        self._lost_before = self.clock.lost
 
     def poll(self, now: float) -> int:
         """Take the newest of what has come by now [s]; how many usable samples that were."""
@@ -85,11 +79,7 @@ class Board(Listener):
 
 
 def counts_of(timed: Timed | None) -> Floats:
-    """Readings of a sample [counts], shape (1, 2); NaN where there is none or it is at a rail."""
+    """Readings of a sample as they came [counts], shape (1, 2); NaN where there is none."""
     if timed is None:
         return np.full((1, 2), math.nan)
-    sample = timed.sample
-    read = (sample.left, sample.right)
-    return np.array(
-        [[math.nan if sample.flags & f else float(c) for c, f in zip(read, _RAILS, strict=True)]]
-    )
+    return np.array([[timed.sample.left, timed.sample.right]], float)

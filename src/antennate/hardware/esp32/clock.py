@@ -23,6 +23,8 @@ SETTLE_TIME = BoardParams().settle_time
 SETTLE_FALL = BoardParams().settle_fall
 EARLY = BoardParams().early
 RETIRED_BOOTS = 8
+HIDDEN_WRAP = 0.5
+"""Share of the span of the board's counter after which an outage may hide a wrap."""
 
 _SEQ = 1 << 32
 _WINDOW = 64
@@ -120,6 +122,7 @@ class DeviceClock:
         self.epoch = 0
         self.newest: Timed | None = None
         self.sequence = Sequence()
+        self._lost_before = 0
         self._boot: int | None = None
         self._retired: deque[int] = deque(maxlen=RETIRED_BOOTS)
         self._modulus = 0
@@ -143,9 +146,15 @@ class DeviceClock:
         self._modulus = 1 << hello.tick_bits
         self._period = 1e6 / hello.rate
         self.newest = None
+        self._lost_before += self.sequence.lost
         self.sequence = Sequence()
         self._doubts = 0
         return True
+
+    @property
+    def lost(self) -> int:
+        """Samples of all boots that never came; a late one lowers it again."""
+        return self._lost_before + self.sequence.lost
 
     def take(self, sample: Sample, now: float) -> Verdict:
         """Judge a sample that arrived at host's time now [s]; a USED one becomes `newest`."""
@@ -169,7 +178,7 @@ class DeviceClock:
         if place is not Verdict.USED:
             return place
         newest = self.newest
-        if newest is None or now - self._arrived >= 0.5e-6 * self._modulus:
+        if newest is None or now - self._arrived >= HIDDEN_WRAP * 1e-6 * self._modulus:
             self._rebase(sample, now)
             return Verdict.USED
         step = (sample.ticks - newest.sample.ticks) % self._modulus

@@ -55,7 +55,7 @@ def _why(path: str, baud: int, error: Exception) -> tuple[str, str]:
         return "the device is gone", f"plug it in again; ports here are: {known_ports()}"
     text = str(error)
     if isinstance(error, ValueError) or "baud" in text:
-        return f"it cannot do {baud} bit/s", "set layout.baud to a speed that the adapter can do"
+        return f"it cannot do {baud} bit/s", "set robot.baud to a speed that the adapter can do"
     if number == errno.EISDIR or not Path(path).is_char_device() or "ioctl" in text:
         return "not a serial port", f"give one of: {known_ports()}"
     return text, f"ports here are: {known_ports()}"

@@ -29,7 +29,7 @@ class Cause(Enum):
 
     SPIKY = (State.DEGRADED, "many readings are bad")
     OUT_OF_CAL = (State.DEGRADED, "readings lie beyond the calibrated range")
-    SATURATED = (State.DEGRADED, "readings are at the rail of a bent film")
+    SATURATED = (State.DEGRADED, "readings are at the rail of a bent flex sensor")
     DRIFT = (State.DEGRADED, "resting readings have drifted from the calibration")
     RATE = (State.DEGRADED, "samples do not come at the expected rate")
     LATE_ANSWERS = (State.DEGRADED, "servos answer late")
@@ -41,9 +41,9 @@ class Cause(Enum):
     STUCK = (State.HOLD, "a channel repeats one reading")
     OPEN = (
         State.HOLD,
-        "a channel floats: its wire is open, or its film bent far beyond its calibration",
+        "a channel floats: its wire is open, or its flex sensor bent far beyond its calibration",
     )
-    SHORT_LO = (State.HOLD, "a channel is shorted to ground, or its film torn off")
+    SHORT_LO = (State.HOLD, "a channel is shorted to ground, or its flex sensor torn off")
     SHORT_HI = (State.HOLD, "a channel is shorted to the supply")
     FAILED = (State.HOLD, "the controller raised an exception")
     UNDECIDED = (State.HOLD, "the controller took no decision in this tick")
@@ -206,7 +206,8 @@ class Outputs:
         clear: Whether data and actuators are well and the torque on. While it is False the
             controller gets NaN for counts in the next tick, so that its gait stands still.
         causes: All causes in force, the most severe first. Of equal ones those that explain first:
-            losses of data, then others, then those of the control; the oldest of each first.
+            losses of data, those still there before those that only wait for fresh samples; then
+            others; then those of the controller; the oldest of each first.
         refusal: Why an arm event of this tick was not accepted, empty if it was or none came.
     """
 

@@ -1,11 +1,12 @@
-"""Whether a film can be believed: counts of one channel in, counts to use and a finding out.
+"""State of one channel: its readings in, the counts to use and a finding out.
 
 Nothing here reads a clock. A reading that jumps, or lies far outside the calibrated range, is bad:
 the last good one stands in for it for a few readings, so a spike changes nothing. A jump that three
 readings in a row agree on is believed. Where nothing is left to believe, the counts are NaN.
 
-A film is the upper half of a divider, so one torn off its wire reads 0 like a short to ground, and
-both are SHORT_LO; OPEN is a converter pin that hangs in the air.
+The flex sensor is the upper half of a divider, so one torn off its wire reads 0 like a short to
+ground, and both are SHORT_LO. OPEN is a pin of the converter that is connected to nothing: its
+readings wander over the whole range.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from enum import Enum
 
 from antennate.antenna.sensor import FULL_SCALE
 from antennate.errors import CalibrationError
-from antennate.params import DiagnosisParams
+from antennate.params import ConditioningParams, DiagnosisParams
 
 
 class Finding(Enum):
@@ -26,11 +27,11 @@ class Finding(Enum):
     OK = "ok"
     OUT_OF_CAL = "beyond the calibrated range"
     SPIKY = "too many bad readings"
-    SATURATED = "at the rail of a bent film"
+    SATURATED = "at the rail of a bent flex sensor"
     LOST = "no good reading for too long"
     STUCK = "always the same reading"
     OPEN = "floating, wire open"
-    SHORT_LO = "short to ground, or film torn off"
+    SHORT_LO = "short to ground, or flex sensor torn off"
     SHORT_HI = "short to supply"
 
     @property
@@ -56,18 +57,25 @@ class Band:
     high: float
     polarity: int
 
+    @classmethod
+    def of(cls, conditioning: ConditioningParams) -> Band:
+        """The range of a calibration."""
+        return cls(conditioning.counts_low, conditioning.counts_high, conditioning.polarity)
+
 
 @dataclass(frozen=True, slots=True)
 class Reading:
     """A reading after diagnosis.
 
     Attributes:
-        counts: Reading to use [counts], within the band; NaN where nothing can be said.
+        counts: Reading to use [counts]; NaN where nothing can be said.
         finding: State of the channel.
+        taken: Reading as it came [counts]; NaN if it is beyond what a flex sensor can give.
     """
 
     counts: float
     finding: Finding
+    taken: float = math.nan
 
 
 _NOTHING = Reading(math.nan, Finding.LOST)
@@ -94,8 +102,8 @@ class ChannelDiagnosis:
         if not params.low_rail < band.low < band.high < params.high_rail:
             raise CalibrationError(
                 f"a calibrated range must lie within {params.low_rail:g} and {params.high_rail:g} "
-                f"counts, so that a broken wire can be told from a film; got {band.low:g} to "
-                f"{band.high:g}; choose another divider resistor"
+                f"counts, so that a broken wire can be told from a flex sensor; got {band.low:g} "
+                f"to {band.high:g}; choose another divider resistor"
             )
         self._params = params
         self._band = band
@@ -138,11 +146,11 @@ class ChannelDiagnosis:
         finding = self._find()
         value = self._used(finding) if finding.usable else math.nan
         self.counted[finding] += 1
-        self.reading = Reading(value, finding)
+        self.reading = Reading(value, finding, counts if self._plausible(counts) else math.nan)
         return self.reading
 
     def _used(self, finding: Finding) -> float:
-        """The reading to use; of a film at the rail nobody knows how far it is bent."""
+        """The reading to use; how far a flex sensor at the rail is bent is not known."""
         if finding is Finding.SATURATED:
             return min(max(self._good, self._band.low), self._band.high)
         return self._good
@@ -196,7 +204,7 @@ class ChannelDiagnosis:
         return Finding.OUT_OF_CAL if any(self._outside) else Finding.OK
 
     def _broken(self) -> Finding | None:
-        """A channel that says nothing about the film, as far as known."""
+        """A channel that says nothing about the flex sensor, as far as known."""
         params = self._params
         full = len(self._raw) == params.window
         if full and self._pinned(low=True):
@@ -209,13 +217,13 @@ class ChannelDiagnosis:
         return Finding.OPEN if full and floats else None
 
     def _at_both_rails(self) -> bool:
-        """Whether the window has two readings or more at either rail, which no film can reach."""
+        """Whether the window has two readings or more at either rail, which no flex sensor can."""
         low = sum(counts <= self._params.low_rail for counts in self._raw)
         high = sum(counts >= self._params.high_rail for counts in self._raw)
         return min(low, high) >= 2
 
     def _pinned(self, low: bool) -> bool:
-        """Whether the whole window is at one rail; a bent film that reaches it still has noise."""
+        """Whether the whole window is at one rail; that of a bent sensor there has noise."""
         params, bent_low = self._params, self._band.polarity < 0
         if low:
             bound = 0.0 if bent_low and self._plausible(params.low_rail) else params.low_rail

@@ -247,10 +247,11 @@ class Supervisor:
         return state
 
 
-def _rank(active: Active) -> tuple[int, bool, bool, float, str]:
+def _rank(active: Active) -> tuple[int, bool, bool, bool, float, str]:
     """The order in which causes are listed."""
     cause = active.cause
-    return -cause.severity, cause in OF_MIND, cause not in DATA, active.since, cause.name
+    over = cause in DATA and not active.present
+    return -cause.severity, cause in OF_MIND, cause not in DATA, over, active.since, cause.name
 
 
 def _name(found: dict[Cause, str], cause: Cause, ids: Iterable[int]) -> None:

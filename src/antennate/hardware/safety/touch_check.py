@@ -1,6 +1,6 @@
-"""A check by hand before arming: bend the left antenna, let go, bend the right one, let go.
+"""A check before arming, by touch: bend the left antenna, let go, bend the right one, let go.
 
-It finds channels that are swapped and films whose reading runs the wrong way.
+It finds channels that are swapped and flex sensors whose reading runs the wrong way.
 """
 
 from __future__ import annotations
@@ -104,5 +104,5 @@ class TouchCheck:
             return f"the {name} antenna was asked for and the {other} channel answered: swap them"
         return (
             f"the reading of the {name} antenna runs against its calibration: check the divider "
-            "or calibrate this film"
+            "or calibrate this flex sensor"
         )

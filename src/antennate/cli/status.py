@@ -1,0 +1,72 @@
+"""A status line on stderr: on a terminal over the last one, elsewhere a line a second."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import os
+import sys
+
+from antennate.messages import one_line
+
+_EVERY = 0.2
+"""Time between two lines on a terminal [s]."""
+_EVERY_PLAIN = 1.0
+_COLUMNS = 80
+_CLEAR = "\r\x1b[K"
+
+
+class StatusLine:
+    """One line that changes; nobody needs to be there to see it.
+
+    Attributes:
+        terminal: Whether it is written over the last one.
+    """
+
+    def __init__(self) -> None:
+        self.terminal = bool(
+            sys.stderr and sys.stderr.isatty() and os.environ.get("TERM", "dumb") != "dumb"
+        )
+        self._due = -math.inf
+        self._open = False
+
+    def due(self, now: float) -> bool:
+        """Whether a line is to be shown at a time [s]."""
+        if now < self._due:
+            return False
+        self._due = now + (_EVERY if self.terminal else _EVERY_PLAIN)
+        return True
+
+    def show(self, text: str) -> None:
+        """Show a line; on a terminal cut at its width, since a line that wraps stays."""
+        if self.terminal:
+            text = _CLEAR + one_line(text)[: self._columns() - 1]
+        self._open = self.terminal
+        write(text if self.terminal else text + "\n")
+
+    def say(self, text: str) -> None:
+        """Show something that stays, above the line."""
+        write(f"{_CLEAR if self._open else ''}{text}\n")
+        self._open = False
+
+    def close(self) -> None:
+        """End the line."""
+        if self._open:
+            write("\n")
+        self._open = False
+
+    @staticmethod
+    def _columns() -> int:
+        """Width of the terminal on stderr; stdout may be a file."""
+        try:
+            return os.get_terminal_size(sys.stderr.fileno()).columns or _COLUMNS
+        except (OSError, ValueError):
+            return _COLUMNS
+
+
+def write(text: str) -> None:
+    """Write on stderr, or nowhere if that is gone."""
+    if sys.stderr is not None:
+        with contextlib.suppress(OSError):  # it is closed or full, as with a lost terminal
+            sys.stderr.write(text)
+            sys.stderr.flush()

@@ -1,0 +1,221 @@
+"""Check that a controller keeps its protocol; for the tests of whoever writes one."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from antennate.control.checked import CheckedController
+from antennate.control.registry import ControllerFactory, make_controller
+from antennate.errors import AntennateError
+from antennate.params import ConditioningParams, ControlParams
+from antennate.robots.spec import RobotSpec
+from antennate.types import AntennaFrame, Contact, Floats, JointCommand, Maneuver
+
+_ROWS = 5
+_TICKS = 700
+_RESET_AT = 350
+"""Tick in which one row is reset while the others go on."""
+_BLIND_FROM, _BLIND_TO = 400, 420
+"""Ticks in which a row reads NaN."""
+_PARTS = ("yaw", "leg", "antenna")
+
+
+@dataclass(frozen=True, slots=True)
+class _Trace:
+    """All answers of a run, the first axis over ticks, the second over rows."""
+
+    commands: dict[str, Floats]
+    said: dict[str, Floats]
+
+    def differs(self, other: _Trace, mine: Sequence[int], its: Sequence[int]) -> str:
+        """The first answer in which these rows of the two differ, empty if none does."""
+        for name, values in (self.commands | self.said).items():
+            here, there = values[:, list(mine)], (other.commands | other.said)[name][:, list(its)]
+            equal = (here == there) | (np.isnan(here) & np.isnan(there))
+            if not equal.all():
+                return f"another {name} at tick {int(np.argwhere(~equal)[0][0])}"
+        return ""
+
+
+def check_controller(
+    factory: str | ControllerFactory,
+    robot: RobotSpec | None = None,
+    control: ControlParams | None = None,
+) -> None:
+    """Check a controller.
+
+    It can be made for one robot and for many. Its answers have the right shapes; angles are finite,
+    maneuvers and contacts exist, levels are within 0 and 1. The same readings give the same answers
+    again. Rows do not influence one another, whatever their order and number. A row that is reset
+    answers as a new controller, and the others go on. A reading that is not finite makes its
+    antenna UNKNOWN and its row HOLD, with joint targets that stand still. Frames are left as they
+    are. A command that was returned does not change later, and whoever changes it changes no
+    answer.
+
+    Args:
+        factory: The controller: its name, a class, or a function (control, robot, batch).
+        robot: The robot, the default one if None.
+        control: Numbers of the control, the defaults if None.
+
+    Raises:
+        AssertionError: It does not; the text says what was expected and found.
+    """
+    run = _Runs(factory, robot or RobotSpec(), control or ControlParams())
+    counts, rows = run.counts, list(range(_ROWS))
+    together = run.trace(counts, rows)
+    _expect(
+        "the same answers to the same readings",
+        run.trace(counts, rows).differs(together, rows, rows),
+    )
+    _expect(
+        "the same answers whatever becomes of a command that was returned",
+        run.trace(counts, rows, spoil=True).differs(together, rows, rows),
+    )
+    turned = rows[::-1]
+    _expect(
+        "the same answers from rows in another order",
+        run.trace(counts[:, turned], turned).differs(together, rows, turned),
+    )
+    for row in rows:
+        alone = run.trace(counts[:, [row]], [row])
+        _expect(f"row {row} alone to answer as in a batch", alone.differs(together, [0], [row]))
+    _check_reset(run, together)
+    _check_blind(run, together)
+
+
+class _Runs:
+    """Runs of fresh controllers over readings."""
+
+    def __init__(
+        self, factory: str | ControllerFactory, robot: RobotSpec, control: ControlParams
+    ) -> None:
+        self._factory, self._robot, self._control = factory, robot, control
+        self.counts = _readings(control.conditioning, control.period, control.gait.frequency)
+
+    def trace(
+        self,
+        counts: Floats,
+        rows: Sequence[int],
+        reset: int | None = None,
+        first: int = 0,
+        spoil: bool = False,
+    ) -> _Trace:
+        """Answers to counts (ticks, rows, 2) from tick `first` on; row `reset` is reset then.
+
+        Time and phase of a row depend on its number in `rows`. With `spoil` each command is
+        overwritten after it was noted.
+        """
+        batch, period = len(rows), self._control.period
+        offsets = 0.37 * np.array(rows, float)
+        try:
+            made = make_controller(self._factory, self._control, self._robot, batch)
+            checked = CheckedController(made, self._robot, batch)
+            checked.reset(np.arange(batch), offsets)
+            commands: list[JointCommand] = []
+            kept: list[list[Floats]] = []
+            said: dict[str, list[Floats]] = {name: [] for name in ("maneuver", "contact", "level")}
+            for tick, reading in enumerate(counts[first:], first):
+                if tick == _RESET_AT and reset is not None:
+                    checked.reset(np.array([reset]), offsets[[reset]])
+                t = offsets + period * tick
+                commands.append(_step(checked, t, reading))
+                kept.append([getattr(commands[-1], part).copy() for part in _PARTS])
+                for part in _PARTS if spoil else ():
+                    getattr(commands[-1], part)[...] = math.nan
+                for name, values in said.items():
+                    values.append(np.array(getattr(made, name), float))
+        except AntennateError as error:
+            raise AssertionError(f"{error} (with {batch} rows)") from error
+        for tick, (command, copies) in enumerate(zip(commands, kept, strict=True)):
+            if spoil:
+                break
+            for part, copy in zip(_PARTS, copies, strict=True):
+                same = np.array_equal(getattr(command, part), copy)
+                _expect(
+                    "a command that stays as it was returned",
+                    "" if same else f"another {part} in that of tick {tick} later",
+                )
+        arrays = {part: np.array([c[i] for c in kept]) for i, part in enumerate(_PARTS)}
+        found = _Trace(arrays, {name: np.array(values) for name, values in said.items()})
+        _check_values(found)
+        return found
+
+
+def _step(checked: CheckedController, t: Floats, reading: Floats) -> JointCommand:
+    frame = AntennaFrame(t=t.copy(), counts=reading.copy())
+    command = checked.step(frame)
+    same = np.array_equal(frame.t, t) and np.array_equal(frame.counts, reading, equal_nan=True)
+    _expect("a frame that is left as it is", "" if same else "other values in it after a step")
+    for row, fault in checked.faults.items():
+        raise AssertionError(f"{fault} in row {row}")
+    return command
+
+
+def _check_values(found: _Trace) -> None:
+    contact, level = found.said["contact"], found.said["level"]
+    known = np.isin(contact, [int(state) for state in Contact])
+    _expect("contacts of 0 to 2", "" if known.all() else f"{contact[~known][0]:g}")
+    wrong = (level < 0.0) | (level > 1.0)
+    _expect("levels of 0 to 1, or NaN", f"{level[wrong][0]:g}" if wrong.any() else "")
+
+
+def _check_reset(run: _Runs, together: _Trace) -> None:
+    rows = list(range(_ROWS))
+    after = run.trace(run.counts, rows, reset=1)
+    others = [row for row in rows if row != 1]
+    _expect("the other rows to go on when one is reset", after.differs(together, others, others))
+    fresh = run.trace(run.counts[:, [1]], [1], first=_RESET_AT)
+    again = _Trace(
+        *(
+            {name: values[_RESET_AT:] for name, values in part.items()}
+            for part in (after.commands, after.said)
+        )
+    )
+    _expect("a row that is reset to answer as a new one", again.differs(fresh, [1], [0]))
+
+
+def _check_blind(run: _Runs, together: _Trace) -> None:
+    rows = list(range(_ROWS))
+    blind = slice(_BLIND_FROM, _BLIND_TO)
+    for side in (0, 1):
+        for bad in (math.nan, math.inf):
+            counts = run.counts.copy()
+            counts[blind, 2, side] = bad
+            found = run.trace(counts, rows)
+            others = [row for row in rows if row != 2]
+            _expect(
+                f"the other rows to go on when one reads {bad}",
+                found.differs(together, others, others),
+            )
+            held = found.said["maneuver"][blind, 2] == int(Maneuver.HOLD)
+            unknown = found.said["contact"][blind, 2, side] == int(Contact.UNKNOWN)
+            _expect(f"HOLD while an antenna reads {bad}", "" if held.all() else "another maneuver")
+            _expect(f"UNKNOWN for a reading of {bad}", "" if unknown.all() else "another contact")
+            for part, values in found.commands.items():
+                still = (values[blind, 2] == values[_BLIND_FROM - 1, 2]).all()
+                _expect("joint targets that stand still in HOLD", "" if still else f"{part} moves")
+
+
+def _readings(conditioning: ConditioningParams, period: float, frequency: float) -> Floats:
+    """Counts (ticks, rows, 2): free, pressed on either side, blocked, and changing at random."""
+    rng = np.random.default_rng(0)
+    low, high = conditioning.counts_low, conditioning.counts_high
+    phase = 2.0 * math.pi * frequency * period * np.arange(_TICKS)
+    flex = np.zeros((_TICKS, _ROWS, 2))
+    flex[:, 1, 0] = 0.8 + 0.2 * np.sin(phase)
+    flex[:, 2, 1] = 0.7 + 0.2 * np.cos(phase)
+    flex[:, 3] = 0.95
+    flex[:, 4] = rng.uniform(0.0, 1.0, (_TICKS // 50, 2)).repeat(50, axis=0)
+    straight, bent = (high, low) if conditioning.polarity < 0 else (low, high)
+    noise = rng.normal(0.0, 2.5, flex.shape)
+    return np.rint(straight + (bent - straight) * flex + noise)
+
+
+def _expect(what: str, found: str) -> None:
+    """Fail if something was found."""
+    if found:
+        raise AssertionError(f"expected {what}, found {found}")

@@ -1,0 +1,106 @@
+"""A controller whose answers are checked at every step, for controllers from anywhere."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from antennate.errors import ControllerError, in_one_line
+from antennate.robots.spec import RobotSpec
+from antennate.types import AntennaFrame, Bools, Controller, Floats, Ints, JointCommand, Maneuver
+
+_LAST = max(Maneuver)
+
+
+class CheckedController:
+    """A controller, and what is wrong with its last step.
+
+    Whatever it raises, an array of another shape, or a decision that is no whole number concerns
+    all rows and becomes a `ControllerError`. Angles that are not finite, and numbers that are no
+    `Maneuver`, concern their own row and are listed in `faults`.
+
+    Args:
+        controller: The controller of `batch` robots.
+        robot: The robot.
+        batch: Number of robots B.
+
+    Attributes:
+        maneuver: `Maneuver` of the last step, shape (B,).
+        faults: What is wrong with a row of the last step, by row.
+    """
+
+    def __init__(self, controller: Controller, robot: RobotSpec, batch: int) -> None:
+        self._controller = controller
+        self._shapes = robot.command_shapes(batch)
+        self._said = {"maneuver": (batch,), "contact": (batch, 2), "level": (batch, 2)}
+        self.maneuver: Ints = np.full(batch, int(Maneuver.FORWARD))
+        self.faults: dict[int, str] = {}
+
+    def reset(self, rows: Ints | Bools, phase: Floats | float = 0.0) -> None:
+        """Start some rows anew.
+
+        Raises:
+            ControllerError: The controller raised an exception.
+        """
+        try:
+            self._controller.reset(rows, phase)
+        except KeyboardInterrupt:
+            raise
+        except BaseException as error:
+            raise ControllerError(f"reset raised {in_one_line(error)}") from error
+
+    def step(self, frame: AntennaFrame) -> JointCommand:
+        """One control period of all rows.
+
+        Raises:
+            ControllerError: The step raised an exception, or its answer has another form.
+        """
+        self.faults = {}
+        try:
+            command = self._controller.step(frame)
+            self._require_shapes(command)
+            self.maneuver = self._controller.maneuver
+            sound = self._all_sound(command)
+        except (KeyboardInterrupt, ControllerError):
+            raise
+        except BaseException as error:
+            raise ControllerError(f"step raised {in_one_line(error)}") from error
+        if not sound:
+            self._find_faults(command)
+        return command
+
+    def _require_shapes(self, command: JointCommand) -> None:
+        """Arrays of the right shapes.
+
+        Raises:
+            ControllerError: One is something else.
+        """
+        for owner, shapes in ((command, self._shapes), (self._controller, self._said)):
+            for name, shape in shapes.items():
+                value = getattr(owner, name)
+                if not isinstance(value, np.ndarray):
+                    raise ControllerError(
+                        f"expected an array as {name}, found {type(value).__name__}"
+                    )
+                if value.shape != shape:
+                    raise ControllerError(f"expected {name} of shape {shape}, found {value.shape}")
+        for name in ("maneuver", "contact"):
+            kind = getattr(self._controller, name).dtype
+            if kind.kind not in "iu":
+                raise ControllerError(f"expected whole numbers as {name}, found an array of {kind}")
+
+    def _all_sound(self, command: JointCommand) -> bool:
+        """Whether no row has a fault. A product that is finite has finite factors."""
+        maneuvers = self.maneuver.tolist()
+        angles = [getattr(command, name) for name in self._shapes]
+        squares = sum(float(np.vdot(a, a)) for a in angles)
+        return math.isfinite(squares) and min(maneuvers) >= 0 and max(maneuvers) <= _LAST
+
+    def _find_faults(self, command: JointCommand) -> None:
+        for name in self._shapes:
+            angles: Floats = getattr(command, name)
+            for row in np.flatnonzero(~np.isfinite(angles.reshape(len(angles), -1)).all(axis=1)):
+                self.faults[int(row)] = f"expected finite angles in {name}, found {angles[row]}"
+        for row in np.flatnonzero((self.maneuver < 0) | (self.maneuver > _LAST)):
+            self.faults[int(row)] = f"expected a maneuver of 0 to 4, found {self.maneuver[row]}"

@@ -1,0 +1,73 @@
+"""The experiment `force`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from antennate.experiments import force as package
+from antennate.experiments.force import run as force
+from antennate.experiments.force.loads import ForceConfig
+from antennate.studies.experiment import Experiment
+from antennate.studies.measures import Measure, Table, shown
+
+_PARTS = {
+    "at rest": "statics.frictionless",
+    "with friction": "statics.friction",
+    "dragged": "traverses",
+}
+"""Where a result holds each part."""
+EXPLAINED = tuple(
+    measure
+    for name, path in _PARTS.items()
+    for place in ("known", "unknown")
+    for measure in (
+        Measure(f"{path}.{place}.flex.r2", f"{name}, place {place}"),
+        Measure(f"{path}.{place}.flex.r2_95", "  95 %"),
+    )
+)
+MEASURES = (Measure("force_max_n", "largest force", "N", form=".4f"), *EXPLAINED)
+
+
+def tables(result: Mapping[str, Any]) -> Sequence[Table]:
+    """What flex explains, profile by profile."""
+    shares = Table.of(
+        "Share of the force that flex explains (R2)",
+        result["profiles"],
+        MEASURES,
+        f"Places from {result['from_place']:g} of the length to the tip, hinges up to "
+        f"{result['hinge_limit_deg']:g} deg; friction {result['friction']:g}.\n"
+        "Place known: one curve for every place; unknown: one for all.",
+    )
+    return (shares,)
+
+
+def sentence(result: Mapping[str, Any]) -> str:
+    """What flex explains at rest for the first profile of the paper."""
+    profiles = result["profiles"]
+    name = "descending" if "descending" in profiles else next(iter(profiles))
+    rest = profiles[name]["statics"]["frictionless"]
+    known, unknown = (rest[place]["flex"] for place in ("known", "unknown"))
+    return (
+        f"{name}: at rest, flex explains {shown(unknown['r2'])} of the force (95 % interval "
+        f"{shown(unknown['r2_95'])}) where the place is unknown, {shown(known['r2'])} "
+        f"({shown(known['r2_95'])}) where it is known."
+    )
+
+
+def _figures(outcome: force.ForceOutcome) -> Mapping[str, Any]:
+    from antennate.experiments.force.figure import study
+
+    return {"force": study(outcome.result(), outcome.profiles)}
+
+
+EXPERIMENT = Experiment(
+    name="force",
+    description=package.__doc__ or "",
+    config=ForceConfig,
+    run=force.run,
+    tables=tables,
+    sentence=sentence,
+    figures=_figures,
+    parts="profiles",
+)

@@ -1,0 +1,156 @@
+"""Run an experiment from Python and get what came out as one object."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from antennate import experiments
+from antennate.control.registry import CONTROLLERS, ControllerFactory
+from antennate.dataframe import from_rows
+from antennate.errors import ConfigError
+from antennate.params import Params
+from antennate.params.reading import from_values
+from antennate.studies.experiment import Experiment, Outcome
+from antennate.studies.run_directory import RunDirectory
+
+
+@dataclass(frozen=True)
+class Result:
+    """What came out of an experiment.
+
+    Attributes:
+        experiment: The experiment.
+        config: Its configuration.
+        outcome: Everything that was measured, of a type of its own for each experiment.
+        path: Its run directory, None if nothing was written.
+    """
+
+    experiment: Experiment[Any, Any]
+    config: Params
+    outcome: Outcome
+    path: Path | None = None
+
+    @property
+    def rows(self) -> Sequence[Any]:
+        """Finished trials, frozen dataclasses in a fixed order; names of fields end in units."""
+        return self.outcome.rows
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """The content of result.json; names end in units, see docs/results.md."""
+        return self.outcome.result()
+
+    @property
+    def sentence(self) -> str:
+        """What came out and how sure it is, in one sentence."""
+        return self.experiment.sentence(self.summary)
+
+    def figures(self) -> Mapping[str, Any]:
+        """Its figures by name, of matplotlib."""
+        return self.experiment.figures(self.outcome)
+
+    def to_dataframe(self) -> Any:
+        """A pandas DataFrame with a row for each trial and the columns of trials.csv.
+
+        Raises:
+            MissingPackageError: pandas is not installed.
+        """
+        return from_rows(self.rows)
+
+
+def run(
+    experiment: str | Params,
+    workers: int = 1,
+    out: str | Path | None = None,
+    overwrite: bool = False,
+    on_step: Callable[[int, int], None] = lambda done, total: None,
+    **settings: Any,
+) -> Result:
+    """Run an experiment.
+
+    Args:
+        experiment: Its name, one of `list_experiments()`, or its whole configuration.
+        workers: Processes to use; the result does not depend on it. With more than one, the calling
+            script needs `if __name__ == "__main__":`.
+        out: A run directory to write: configuration, versions, rows, result and figures; None
+            for none.
+        overwrite: Replace a run that `out` holds.
+        on_step: Called with how many of how many parts are done.
+        settings: Fields of its configuration where a name was given, with nested groups as objects
+            or dictionaries. `controllers` also takes classes.
+
+    Raises:
+        BadInputError: There is no such experiment, or a setting is unknown or out of bounds.
+        OutputError: The directory cannot be written, or holds another run.
+        AntennateError: The run failed.
+    """
+    found, config = _configured(experiment, settings, workers)
+    found.check(config)
+    if out is None:
+        return Result(found, config, found.run(config, workers, on_step, lambda row: None))
+    with RunDirectory.create(found.name, out, overwrite) as directory:
+        directory.describe(config)
+        outcome = found.run(config, workers, on_step, directory.append)
+        for name, content in found.files(outcome).items():
+            directory.write(name, content)
+        directory.finish(outcome.result(), outcome.rows)
+        directory.write_figures(found.figures(outcome))
+        return Result(found, config, outcome, directory.path)
+
+
+def list_experiments() -> dict[str, str]:
+    """Name and summary of every experiment that `run` takes."""
+    return experiments.summaries()
+
+
+def _configured(
+    experiment: str | Params, settings: Mapping[str, Any], workers: int
+) -> tuple[Experiment[Any, Any], Params]:
+    if isinstance(experiment, str):
+        found = experiments.load(experiment)
+        values = dict(settings)
+        if "controllers" in values:
+            values["controllers"] = _names(values["controllers"], workers)
+        return found, from_values(found.config, values)
+    if settings:
+        raise ConfigError(
+            f"run: expected settings only beside a name, found {', '.join(settings)} beside "
+            f"{type(experiment).__name__}"
+        )
+    for name in experiments.names():
+        found = experiments.load(name)
+        if type(experiment) is found.config:
+            return found, experiment
+    raise ConfigError(
+        f"run: expected a name or the configuration of an experiment, found "
+        f"{type(experiment).__name__}"
+    )
+
+
+def _names(controllers: Iterable[str | ControllerFactory], workers: int) -> tuple[str, ...]:
+    """Controllers by name; classes become known to this process under their own."""
+    names = []
+    for controller in [controllers] if isinstance(controllers, str) else controllers:
+        if isinstance(controller, str):
+            names.append(controller)
+            continue
+        name = controller.__name__
+        if workers > 1 and not _importable(controller):
+            raise ConfigError(
+                f"controllers: expected what worker processes can import, found {name} of a "
+                f"notebook or a function; put it into a file, or use 1 worker"
+            )
+        CONTROLLERS.add(name, controller)
+        names.append(name)
+    return tuple(names)
+
+
+def _importable(controller: ControllerFactory) -> bool:
+    """Whether a fresh process finds this class: at the top of a module that is a file."""
+    module = sys.modules.get(controller.__module__)
+    found = getattr(module, controller.__name__, None)
+    return found is controller and hasattr(module, "__file__")

@@ -1,0 +1,87 @@
+"""The experiment `sweep`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from antennate.experiments import sweep as package
+from antennate.experiments.sweep import run as sweep
+from antennate.studies.experiment import Experiment
+from antennate.studies.measures import Table, shown
+
+QUANTITIES = ("distance", "gap", "base_to_tip")
+
+
+def tables(result: Mapping[str, Any]) -> Sequence[Table]:
+    """The shares of the shapes, and the errors of the estimates."""
+    columns = {
+        f"{profile}, {motion}": row
+        for profile, motions in result["shapes"].items()
+        for motion, row in motions.items()
+        if profile == result["profile"] or result["profile"] not in result["shapes"]
+    }
+    shapes = Table(
+        "Share of time of each shape, mean over the map (95 %)",
+        list(columns),
+        [
+            (name, [_with_interval(*row["share"][name]) for row in columns.values()])
+            for name in (*sweep.SHAPES, "free")
+        ],
+    )
+    return shapes, *(_errors(name, noise) for name, noise in result["estimates"].items())
+
+
+def _errors(condition: str, by_noise: Mapping[str, Any]) -> Table:
+    noisy = by_noise["noisy"]
+    return Table(
+        f"Mean absolute error [%] (95 %), sweep {condition}, with sensor noise",
+        QUANTITIES,
+        [
+            (cue.replace("_", " "), [_error(noisy[quantity], cue) for quantity in QUANTITIES])
+            for cue in sweep.CUES
+        ],
+        f"{noisy['sweeps']} sweeps to judge, {noisy['missed']} felt nothing, "
+        f"{noisy['invalid']} invalid.",
+    )
+
+
+def _error(found: Mapping[str, Any], cue: str) -> str:
+    if cue not in found:
+        return shown(None)
+    return _with_interval(found[cue]["mape_percent"], *found[cue]["mape_95"])
+
+
+def _with_interval(mean: float | None, low: float | None, high: float | None) -> str:
+    return f"{shown(mean)} ({shown(low)}–{shown(high)})"
+
+
+def sentence(result: Mapping[str, Any]) -> str:
+    """How well active touch tells distances, beside the published figures."""
+    found = result["estimates"]["same"]["noisy"]
+    published = result["published_percent"]
+    return (
+        "Flex and base angle together tell the distance of a wall with an error of "
+        f"{_error(found['distance'], 'flex_and_base')} % (95 % interval), that of the tip "
+        f"{_error(found['base_to_tip'], 'flex_and_base')} % and a gap "
+        f"{_error(found['gap'], 'flex_and_base')} %; published for CITRAS: "
+        f"{published['base_to_tip']:g} % and {published['gap']:g} %."
+    )
+
+
+def _figures(outcome: sweep.SweepOutcome) -> Mapping[str, Any]:
+    from antennate.experiments.sweep.figure import study
+
+    return {"sweep": study(outcome.result())}
+
+
+EXPERIMENT = Experiment(
+    name="sweep",
+    description=package.__doc__ or "",
+    config=sweep.SweepConfig,
+    run=sweep.run,
+    tables=tables,
+    sentence=sentence,
+    figures=_figures,
+    parts="sweeps",
+)

@@ -1,0 +1,158 @@
+"""Everything that decides the outcome of `antennate touch`."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, ClassVar
+
+from pydantic import Field, model_validator
+
+from antennate.antenna.statics import Profile
+from antennate.errors import SceneError
+from antennate.experiments.touch.traverse import MOVES, reach, site
+from antennate.params import (
+    BenchPhysicsParams,
+    ConditioningParams,
+    Params,
+    RuleParams,
+    TouchWallsParams,
+    number,
+)
+from antennate.params.base import require_different, require_whole_steps
+from antennate.robots.antenna import AntennaSpec
+from antennate.sim import touch_wall
+from antennate.sim.touch_wall import WALLS, WallKind
+
+_Speed = Annotated[float, Field(ge=0.002, le=1.0)]
+_CLOSEST = 0.01
+"""No wall comes nearer to the line of traverse [m]."""
+_MOST_TICKS = 10**7
+"""Most ticks of a study: more would not fit into memory."""
+
+
+class TouchConfig(Params):
+    """Everything that decides the outcome of `antennate touch`."""
+
+    unread: ClassVar[tuple[str, ...]] = (
+        "antenna.base_spacing",
+        "rule.hold_time",
+        "rule.similar",
+        "rule.strong",
+    )
+    trials: int = number(
+        5,
+        "1",
+        "assumed: a minute on two cores",
+        "trials of every wall, speed and profile",
+        ge=1,
+        le=10000,
+    )
+    seed: int = number(0, "1", "assumed: any", "seed of all chance", ge=0)
+    walls: tuple[WallKind, ...] = number(WALLS, "1", "assumed: all", "walls", min_length=1)
+    speeds: tuple[_Speed, ...] = number(
+        (0.05, 0.10, 0.15),
+        "m/s",
+        "paper: speeds of the calibration; its boulder wall ran at 0.008",
+        "speeds of the carriage",
+        min_length=1,
+    )
+    profiles: tuple[Profile, ...] = number(
+        ("stiff", "descending", "compliant"),
+        "1",
+        "paper: its three profiles",
+        "springs of the antenna; they replace antenna.active_coils",
+        min_length=1,
+    )
+    overlap: float = number(
+        0.02, "m", "assumed: a sixth of the antenna", "mean of how far the tip would reach in", gt=0
+    )
+    overlap_spread: float = number(
+        0.015, "m", "assumed: from a brush to a firm press", "half range of the overlap", ge=0
+    )
+    spring_tolerance: float = number(
+        0.1, "1", "assumed: usual for wound springs", "half range of a spring's factor", ge=0, lt=1
+    )
+    wall_length: float = number(
+        0.4, "m", "assumed: three antennae and more", "length of every wall", ge=0.05, le=2
+    )
+    free_length: float = number(
+        0.08, "m", "assumed: free for half a second or more", "free way at both ends", ge=0.01, le=1
+    )
+    place_spread: float = number(
+        0.02, "m", "assumed: more than a tick at any speed", "range of the wall's place", ge=0, le=1
+    )
+    contact_force: float = number(
+        1e-4,
+        "N",
+        "assumed: a hundredth of the weight of a link",
+        "mean force in a tick above which an obstacle presses",
+        ge=0,
+        le=10,
+    )
+    merge_time: float = number(
+        0.05,
+        "s",
+        "assumed: half of T_avg; 7.5 mm at 0.15 m/s",
+        "gaps between presses shorter than this are contact",
+        ge=0,
+        le=10,
+    )
+    averaging_times: tuple[Annotated[float, Field(gt=0, le=5)], ...] = number(
+        (0.02, 0.05, 0.1, 0.15, 0.2, 0.3),
+        "s",
+        "assumed: a fifth of the default to three times it",
+        "further T_avg to try on the same readings",
+    )
+    antenna: AntennaSpec = AntennaSpec()
+    conditioning: ConditioningParams = ConditioningParams()
+    rule: RuleParams = RuleParams()
+    wall: TouchWallsParams = TouchWallsParams()
+    physics: BenchPhysicsParams = BenchPhysicsParams()
+
+    @property
+    def travel(self) -> float:
+        """Way of every traverse [m]."""
+        lead = self.antenna.length * math.cos(self.antenna.base_angle)
+        return (
+            lead + self.place_spread + self.wall_length + self.antenna.length + 2 * self.free_length
+        )
+
+    @model_validator(mode="after")
+    def _agree(self) -> TouchConfig:
+        for name in ("walls", "speeds", "profiles", "averaging_times"):
+            require_different(name, getattr(self, name))
+        rate, step = self.antenna.sensor.rate, self.physics.timestep
+        require_whole_steps("antenna.sensor.rate", rate, step, MOVES)
+        ticks = sum(self.travel / speed * self.antenna.sensor.rate for speed in self.speeds)
+        ticks *= self.trials * len(self.walls) * len(self.profiles)
+        if ticks > _MOST_TICKS:
+            raise ValueError(
+                f"trials: expected at most {_MOST_TICKS:,} ticks in all, found {ticks:,.0f}; ask "
+                "for fewer trials, walls or profiles, or higher speeds"
+            )
+        self._walls_stand()
+        return self
+
+    def _walls_stand(self) -> None:
+        """Every wall can be built at the smallest and the largest overlap."""
+        low, high = self.overlap - self.overlap_spread, self.overlap + self.overlap_spread
+        if low <= 0:
+            raise ValueError(
+                f"overlap_spread: expected less than overlap, {self.overlap:g} m, found "
+                f"{self.overlap_spread:g} m"
+            )
+        for kind in self.walls:
+            room = reach(self.antenna) - touch_wall.intrusion(self.wall, kind) - _CLOSEST
+            if high > room:
+                raise ValueError(
+                    f"overlap: expected overlap and spread of at most {max(room, 0.0):.3g} m "
+                    f"before the wall {kind}, whose antenna reaches {reach(self.antenna):.3g} m "
+                    f"to the side, found {high:.3g} m"
+                )
+            for overlap in (low, high):
+                try:
+                    touch_wall.outline(
+                        self.wall, kind, site(self.antenna, overlap, self.wall_length, 0.0)
+                    )
+                except SceneError as error:
+                    raise ValueError(str(error)) from None

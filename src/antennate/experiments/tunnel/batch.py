@@ -1,0 +1,125 @@
+"""Trials of one controller in lockstep: one NumPy call of the control serves them all."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from antennate.control.checked import CheckedController
+from antennate.control.loop import run_loop
+from antennate.control.registry import make_controller
+from antennate.errors import ConfigError, ControllerError
+from antennate.experiments.tunnel.config import TunnelConfig
+from antennate.experiments.tunnel.monitor import Outcome, TrialMonitor, TrialPath, TrialResult
+from antennate.sim.scenes.registry import make_scene
+from antennate.sim.sim_robot import SimRobot
+from antennate.sim.trial import draw_trial
+from antennate.types import AntennaFrame, JointCommand
+
+BATCH = 12
+"""Trials of one process stepped in lockstep."""
+Emit = Callable[[tuple[TrialResult, TrialPath]], None]
+
+
+def run_trials(
+    config: TunnelConfig,
+    controller: str,
+    trials: Sequence[int],
+    emit: Emit,
+    batch: int = BATCH,
+) -> None:
+    """Run trials of one controller; emit each as it ends.
+
+    A trial in which the controller fails is invalid, and the others go on. Angles that are not
+    finite, and a maneuver that does not exist, are faults of one row and end that trial alone. An
+    exception, or an array of another shape, cannot be told apart by rows: then each trial of the
+    batch that has not ended begins again with a controller of its own, and is invalid if that one
+    fails too.
+    """
+    rows = _Rows(config, controller, trials, emit, min(batch, len(trials)))
+    try:
+        rows.run()
+    except ControllerError as error:
+        if len(trials) == 1:
+            rows.end(0, "invalid", f"controller: {error}")
+            return
+        for trial in rows.unfinished:
+            run_trials(config, controller, [trial], emit)
+
+
+class _Rows:
+    """The trials that run at once; a row takes the next trial when its own has ended."""
+
+    def __init__(
+        self, config: TunnelConfig, name: str, trials: Sequence[int], emit: Emit, batch: int
+    ) -> None:
+        self._config, self._name, self._emit, self._batch = config, name, emit, batch
+        self._waiting = list(trials)
+        self._scene = make_scene(config.scene, config.tunnel)
+        self._monitors: list[TrialMonitor | None] = [None] * batch
+        period = config.control.period
+        self._robot = SimRobot(batch, config.robot, period, config.physics.timestep)
+
+    @property
+    def unfinished(self) -> list[int]:
+        """Trials that were not emitted, in order."""
+        running = [monitor.trial for monitor in self._monitors if monitor is not None]
+        return sorted(running + self._waiting)
+
+    def run(self) -> None:
+        """Run all trials.
+
+        Raises:
+            ControllerError: The controller failed as a whole; unfinished trials are left.
+        """
+        config = self._config
+        phases = [self._place(row) for row in range(self._batch)]
+        try:
+            made = make_controller(self._name, config.control, config.robot, self._batch)
+        except ConfigError as error:
+            raise ControllerError(str(error)) from error
+        control = CheckedController(made, config.robot, self._batch)
+        for row, phase in enumerate(phases):
+            control.reset(np.array([row]), phase)
+
+        def go_on(frame: AntennaFrame, command: JointCommand) -> bool:
+            for row, monitor in enumerate(self._monitors):
+                if monitor is not None and self._watch(row, monitor, control) and self._waiting:
+                    control.reset(np.array([row]), self._place(row))
+            return any(monitor is not None for monitor in self._monitors)
+
+        run_loop(self._robot, control, config.control.period, go_on)
+
+    def _place(self, row: int) -> float:
+        """Put the next trial into a row; its gait phase [rad]."""
+        config, trial = self._config, self._waiting.pop(0)
+        gait, period = config.control.gait, config.control.period
+        start = draw_trial(config, self._scene, trial, gait, period)
+        self._robot.load(row, start.world, start.chance)
+        before = start.world.outlines()[1]
+        self._monitors[row] = TrialMonitor(
+            config.seed, trial, self._name, start.scene, before, config.time_limit
+        )
+        return start.phase
+
+    def _watch(self, row: int, monitor: TrialMonitor, control: CheckedController) -> bool:
+        """Look at a row after a tick; whether its trial has ended."""
+        fault = control.faults.get(row)
+        if fault is not None:
+            self.end(row, "invalid", f"controller: {fault}")
+            return True
+        failure = self._robot.failure(row)
+        maneuver = int(control.maneuver[row])
+        outcome = monitor.watch(self._robot.world(row), maneuver, failure is not None)
+        if outcome is not None:
+            self.end(row, outcome, str(failure or ""))
+        return outcome is not None
+
+    def end(self, row: int, outcome: Outcome, reason: str) -> None:
+        """Emit the trial of a row, and empty the row."""
+        monitor, world = self._monitors[row], self._robot.world(row)
+        if monitor is not None:
+            self._emit((monitor.result(world, outcome, reason), monitor.path(world)))
+        self._robot.unload(row)
+        self._monitors[row] = None

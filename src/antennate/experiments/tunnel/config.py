@@ -1,0 +1,55 @@
+"""What `antennate tunnel` is told."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from pydantic import field_validator, model_validator
+
+from antennate.control.registry import BUILT_IN, CONTROLLERS
+from antennate.params import ControlParams, number
+from antennate.params.base import require_different, require_whole_steps
+from antennate.robots.spec import HARDWARE_ALONE
+from antennate.sim.trial import TrialConfig
+
+
+class TunnelConfig(TrialConfig):
+    """Everything that decides the outcome of `antennate tunnel`."""
+
+    unread: ClassVar[tuple[str, ...]] = HARDWARE_ALONE
+    trials: int = number(
+        30,
+        "1",
+        "assumed: the paper's ten leave an interval of half the range",
+        "trials of every controller",
+        ge=1,
+        le=100000,
+    )
+    controllers: tuple[str, ...] = number(
+        tuple(BUILT_IN),
+        "1",
+        "assumed: all of ours",
+        "controllers to run: open, paper, closed, or MODULE:NAME or FILE.py:NAME of your own",
+        min_length=1,
+        examples=["open", "paper", "closed"],
+    )
+    time_limit: float = number(
+        100.0,
+        "s",
+        "paper: open loop made 0.04 m/s over its successes; half of that on 2 m takes this long",
+        "time after which a trial has failed",
+        gt=0,
+        le=3600,
+    )
+    control: ControlParams = ControlParams()
+
+    @field_validator("controllers")
+    @classmethod
+    def _names(cls, names: tuple[str, ...]) -> tuple[str, ...]:
+        return tuple(map(CONTROLLERS.check, names))
+
+    @model_validator(mode="after")
+    def _agree(self) -> TunnelConfig:
+        require_different("controllers", self.controllers)
+        require_whole_steps("control.rate", self.control.rate, self.physics.timestep)
+        return self

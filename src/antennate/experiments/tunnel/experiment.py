@@ -1,0 +1,71 @@
+"""The experiment `tunnel`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from antennate.experiments import tunnel as package
+from antennate.experiments.tunnel import measures
+from antennate.experiments.tunnel import run as tunnel
+from antennate.studies.experiment import Experiment
+from antennate.studies.measures import Table, shown
+
+SHOWN_TRIALS = 5
+"""Trials drawn in the figure of trajectories."""
+
+
+def tables(result: Mapping[str, Any]) -> Sequence[Table]:
+    """The controllers one by one and two by two."""
+    controllers = result["controllers"]
+    counts = sorted({row["trials"] for row in controllers.values()})
+    many = " to ".join(str(n) for n in dict.fromkeys([counts[0], counts[-1]]))
+    one_by_one = Table.of(
+        "Controllers",
+        controllers,
+        measures.CONTROLLER,
+        f"{many} trials a controller, seed {result['seed']}. A failure counts as the time limit, "
+        f"{result['time_limit_s']:g} s; invalid trials\nare left out of all rows below theirs. "
+        "Intervals of means are bootstrapped.",
+    )
+    two_by_two = Table.of(
+        "Pairs, trial by trial",
+        result["paired"],
+        measures.PAIR,
+        "McNemar's test is exact; Wilcoxon's takes failures as the limit; both two-sided.",
+    )
+    return (one_by_one, two_by_two) if result["paired"] else (one_by_one,)
+
+
+def sentence(result: Mapping[str, Any]) -> str:
+    """Which controllers came through, and how sure it is."""
+    found = ", ".join(
+        f"{name} {row['successes']} of {row['trials'] - row['invalid']} ({shown(row['wilson95'])})"
+        for name, row in result["controllers"].items()
+    )
+    pair = next(iter(reversed(result["paired"].items())), None)
+    test = f"; McNemar p of {pair[0]} {pair[1]['mcnemar_p']:.2g}" if pair else ""
+    return f"Tunnels crossed (95 % interval): {found}{test}."
+
+
+def _figures(outcome: tunnel.TunnelOutcome) -> Mapping[str, Any]:
+    from antennate.experiments.tunnel.figure import summary, trajectories
+
+    config = outcome.config
+    trials = range(min(SHOWN_TRIALS, config.trials))
+    return {
+        "trajectories": trajectories(outcome.paths, config.controllers, outcome.rows, trials),
+        "summary": summary(outcome.result()["controllers"], outcome.rows, config.time_limit),
+    }
+
+
+EXPERIMENT = Experiment(
+    name="tunnel",
+    description=package.__doc__ or "",
+    config=tunnel.TunnelConfig,
+    run=tunnel.run,
+    tables=tables,
+    sentence=sentence,
+    figures=_figures,
+    check=tunnel.check,
+)

@@ -1,0 +1,98 @@
+"""What is told of the trials of each controller, and of two controllers on the same trials."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+
+from antennate.experiments.tunnel.monitor import TrialResult
+from antennate.studies import statistics
+from antennate.studies.measures import Measure, count, largest, mean, summarise, total
+
+SHARES = {
+    "forward": "forward [% of time]",
+    "turn_l": "turn left",
+    "turn_r": "turn right",
+    "reverse": "reverse",
+    "hold": "hold",
+}
+
+
+def _share(label: str, name: str) -> Measure:
+    return Measure(f"share.{name}", label, of=mean, form=".1f", scale=100.0)
+
+
+CONTROLLER = (
+    Measure("trials", "trials", form="d"),
+    Measure("successes", "successes", of=count("outcome", "success"), form="d"),
+    Measure("success_share", "  share", "%", form=".0f", scale=100.0),
+    Measure("wilson95", "  Wilson 95 %", "%", form=".0f", scale=100.0),
+    Measure("timeouts", "out of time", of=count("outcome", "timeout"), form="d"),
+    Measure("left", "left by the entrance", of=count("outcome", "left"), form="d"),
+    Measure("invalid", "invalid", form="d"),
+    Measure("speed_m_s", "speed over successes", "m/s", form=".3f"),
+    Measure("progress_per_time_m_s", "progress over time", "m/s", form=".3f"),
+    Measure("restricted_mean_time_s", "restricted mean time", "s", form=".1f"),
+    Measure("restricted_mean_time_95", "  95 %", "s", form=".1f"),
+    Measure("stuck", "stuck episodes", of=total, form="d"),
+    Measure("recovered", "  recovered", of=total, form="d"),
+    *(_share(label, name) for name, label in SHARES.items()),
+    Measure("force_mean_n", "contact force, mean", "N", of=mean),
+    Measure("force_max_n", "contact force, largest", "N", of=largest, form=".1f"),
+)
+PAIR = (
+    Measure("trials", "trials valid in both", form="d"),
+    Measure("only_first", "only the first succeeded", form="d"),
+    Measure("only_second", "only the second", form="d"),
+    Measure("both", "both succeeded", form="d"),
+    Measure("both_time_s", "  time, first and second", "s", form=".1f"),
+    Measure("mcnemar_p", "McNemar p", form=".3g"),
+    Measure("time_difference_s", "time, first - second", "s", form="+.1f"),
+    Measure("time_difference_95", "  95 %", "s", form="+.1f"),
+    Measure("wilcoxon_p", "Wilcoxon p", form=".3g"),
+)
+
+
+def summary(rows: Sequence[TrialResult]) -> dict[str, Any]:
+    """One controller in numbers; invalid trials are counted and left out of all others."""
+    valid = [row for row in rows if row.outcome != "invalid"]
+    won = [row for row in valid if row.outcome == "success"]
+    times = np.array([row.time_s for row in valid])
+    restricted, low, high = statistics.mean95(times)
+    progress = sum(row.progress_m for row in valid)
+    return {
+        "trials": len(rows),
+        "invalid": len(rows) - len(valid),
+        **summarise(CONTROLLER, valid),
+        "success_share": len(won) / len(valid) if valid else None,
+        "wilson95": statistics.wilson95(len(won), len(valid)),
+        "speed_m_s": float(np.mean([r.progress_m / r.time_s for r in won])) if won else None,
+        "time_over_successes_s": mean("time_s", won),
+        "progress_per_time_m_s": progress / float(times.sum()) if valid else None,
+        "restricted_mean_time_s": restricted if valid else None,
+        "restricted_mean_time_95": (low, high) if valid else None,
+    }
+
+
+def paired(by_controller: Mapping[str, Sequence[TrialResult]]) -> dict[str, Any]:
+    """Every two controllers on the trials that are valid in both."""
+    tests = {}
+    for first, second in combinations(by_controller, 2):
+        ours, theirs = (
+            {row.trial: row for row in by_controller[name] if row.outcome != "invalid"}
+            for name in (first, second)
+        )
+        both = sorted(ours.keys() & theirs.keys())
+        if both:
+            test = statistics.compare(
+                np.array([ours[k].outcome == "success" for k in both]),
+                np.array([theirs[k].outcome == "success" for k in both]),
+                np.array([ours[k].time_s for k in both]),
+                np.array([theirs[k].time_s for k in both]),
+            )
+            tests[f"{first}-{second}"] = {"trials": len(both), **asdict(test)}
+    return tests

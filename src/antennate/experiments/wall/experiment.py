@@ -1,0 +1,61 @@
+"""The experiment `wall`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from antennate.experiments import wall as package
+from antennate.experiments.wall import measures
+from antennate.experiments.wall import run as wall
+from antennate.studies.experiment import Experiment
+from antennate.studies.measures import Table, shown
+
+
+def tables(result: Mapping[str, Any]) -> Sequence[Table]:
+    """The profiles, and the reference against each other one."""
+    profiles = Table.of(
+        "Profiles",
+        result["profiles"],
+        measures.PROFILE,
+        f"Seed {result['seed']}, gravity {result['gravity']}. `after` leaves out the first "
+        f"{1e3 * result['start_m']:g} mm of travel.\nMedians over trials; invalid trials are left "
+        "out of them.",
+    )
+    pairs = Table.of(
+        f"{wall.REFERENCE} (first) against each, trial by trial",
+        {name.split("-")[1]: pair for name, pair in result["paired"].items()},
+        measures.PAIR,
+        "McNemar's test, exact, two-sided.",
+    )
+    return (profiles, pairs) if result["paired"] else (profiles,)
+
+
+def sentence(result: Mapping[str, Any]) -> str:
+    """Which profiles passed, and how sure it is."""
+    found = ", ".join(
+        f"{name} {row['successes']} of {row['trials'] - row['invalid']} ({shown(row['wilson95'])})"
+        for name, row in result["profiles"].items()
+    )
+    return f"Walls passed (95 % interval): {found}."
+
+
+def _figures(outcome: wall.WallOutcome) -> Mapping[str, Any]:
+    from antennate.experiments.wall.figure import outcomes, passages
+
+    figures = {"wall": outcomes(outcome.result())}
+    if outcome.examples:
+        ordered = {p: outcome.examples[p] for p in outcome.config.profiles if p in outcome.examples}
+        figures["passages"] = passages(ordered)
+    return figures
+
+
+EXPERIMENT = Experiment(
+    name="wall",
+    description=package.__doc__ or "",
+    config=wall.WallConfig,
+    run=wall.run,
+    tables=tables,
+    sentence=sentence,
+    figures=_figures,
+)

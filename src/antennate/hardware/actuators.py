@@ -1,0 +1,127 @@
+"""What moves the joints of one robot, whatever bus it hangs on."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Protocol
+
+from antennate.errors import AntennateError
+from antennate.hardware.tracebacks import Tracebacks
+from antennate.types import JointCommand
+
+
+class ActuatorError(AntennateError):
+    """Actuators are not fit to be moved, or did not do what they were told; says which and why."""
+
+
+@dataclass(slots=True)
+class Tally:
+    """What became of the answers of actuators.
+
+    Attributes:
+        misses: Requests to one of them without a right answer.
+        stale: Answers that were right but came too late, and were thrown away.
+        bad_crc: Answers that came broken.
+        drained: Bytes thrown away before a request.
+    """
+
+    misses: int = 0
+    stale: int = 0
+    bad_crc: int = 0
+    drained: int = 0
+
+
+@dataclass
+class ActuatorState:
+    """What is known of the actuators; ids are those of the robot's description.
+
+    Attributes:
+        missed: Answers missed in a row, by id.
+        errors: Hardware errors in words, by id.
+        watchdogs: Ids stopped by their watchdog.
+        disarmed: Ids that have lost their torque or their watchdog while they were to have it.
+        supply: Voltage [V], NaN if it is not known.
+        bus_error: What is wrong with the bus as a whole, empty if nothing is.
+        tracebacks: Of errors that nobody expected while torque was taken off.
+    """
+
+    missed: dict[int, int] = field(default_factory=dict[int, int])
+    errors: dict[int, str] = field(default_factory=dict[int, str])
+    watchdogs: tuple[int, ...] = ()
+    disarmed: tuple[int, ...] = ()
+    supply: float = math.nan
+    bus_error: str = ""
+    tracebacks: Tracebacks = field(default_factory=Tracebacks)
+
+    def silent(self, missed: int) -> bool:
+        """Whether none has answered so many times, or the bus is gone."""
+        return bool(self.bus_error) or min(self.missed.values(), default=0) >= missed
+
+
+class Actuators(Protocol):
+    """The actuators of one robot.
+
+    Calls raise PortError if the bus is gone, and ActuatorError if an actuator does not obey. Only
+    `look` and `disable` without `again` never raise.
+
+    Attributes:
+        left_on: Ids that were told to let go and did not confirm it.
+    """
+
+    left_on: list[int]
+
+    @property
+    def state(self) -> ActuatorState:
+        """What is known of them, as of the last `look`."""
+        ...
+
+    @property
+    def tally(self) -> Tally:
+        """What became of their answers."""
+        ...
+
+    @property
+    def enabled(self) -> bool:
+        """Whether they were given torque, and were not told since to let go."""
+        ...
+
+    @property
+    def resting(self) -> bool:
+        """Whether the robot has to stand still for them for a while."""
+        ...
+
+    def check(self, command: JointCommand) -> JointCommand:
+        """A copy of a command of one robot, which may have been anything.
+
+        Raises:
+            CommandError: It cannot be sent: a wrong shape, not finite, or beyond a limit.
+        """
+        ...
+
+    def enable(self, command: JointCommand) -> None:
+        """Torque on, every joint where it stands, or for none; `command` is what will follow."""
+        ...
+
+    def disable(self, again: bool = False) -> list[int]:
+        """Torque off, whatever the bus does: ids that did not confirm it.
+
+        With `again` one short try at those that did not confirm it before.
+        """
+        ...
+
+    def command(self, command: JointCommand | None, time: float = math.inf) -> int:
+        """Move goals towards a command [rad], as far as joints may go in a time [s].
+
+        Without a command the goals are sent again as they are. Returns how many joints the time
+        was too short for.
+        """
+        ...
+
+    def maintain(self, may_begin: bool) -> None:
+        """One tick's share of what they need besides; it may begin only while the robot walks."""
+        ...
+
+    def look(self) -> None:
+        """Bring `state` up to date; a bus that fails is noted there."""
+        ...

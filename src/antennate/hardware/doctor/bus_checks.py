@@ -1,0 +1,175 @@
+"""What a survey of a bus means: which servos are there, and how quickly they answer."""
+
+from __future__ import annotations
+
+from statistics import median
+
+from antennate.hardware.doctor.bus_survey import BusSurvey
+from antennate.hardware.doctor.check import Check, Finding, Verdict, grouped, ids_text
+from antennate.hardware.doctor.config import DoctorConfig
+from antennate.hardware.doctor.register_checks import FIX, OFF_AND_ON, REGISTER_CHECKS, known
+from antennate.hardware.dynamixel.tables import TABLES
+
+_STATES = {
+    "collides": (
+        "doubled",
+        "two servos have this id: give one its own, alone on the bus, with the manufacturer's "
+        "program DYNAMIXEL Wizard 2.0",
+    ),
+    "broken": ("never whole from", "two servos of one id, or a bad cable or plug there"),
+    "mute": ("pings only from", f"status return level 0: {OFF_AND_ON}"),
+}
+
+
+def checks(bus: BusSurvey, robot: DoctorConfig) -> tuple[Check[BusSurvey], ...]:
+    """The checks for which there is something to look at, in the order in which they are shown."""
+    if not (bus.here or bus.elsewhere):
+        return _SPEED
+    if not known(bus, robot):
+        return _SPEED + _SERVOS
+    times = _ANSWER_TIME if bus.ping_times else ()
+    return _SPEED + _SERVOS + REGISTER_CHECKS + times + (() if bus.read_time is None else _READS)
+
+
+def slow(bus: BusSurvey, robot: DoctorConfig) -> bool:
+    """All answers come late, as through an adapter that keeps bytes back."""
+    times = bus.ping_times.values()
+    return bool(times) and median(times) > robot.doctor.answer_time
+
+
+# which servos are there
+
+
+def _baud(bus: BusSurvey, robot: DoctorConfig) -> Finding:
+    here = [f"{len(bus.here)} at {bus.baud}"] if bus.here else []
+    if bus.elsewhere:
+        ids: dict[int, set[int]] = {}
+        for baud, servo in bus.elsewhere:
+            ids.setdefault(baud, set()).add(servo.servo)
+        others = [f"id {ids_text(ids[baud])} at {baud}" for baud in sorted(ids)]
+        cure = f"{FIX}, or set robot.baud to what the servos have"
+        return Finding(", ".join(here + others), "bad", cure)
+    if here:
+        return Finding(here[0])
+    if bus.board:
+        cure = "swap the ports of --esp32 and --bus"
+        return Finding("the antenna board is on this port", "bad", cure)
+    return Finding(
+        "nobody answers at any usual speed",
+        "bad",
+        "check the supply of the servos, the cable of the bus and its first plug; see whether "
+        "--esp32 and --bus are swapped",
+    )
+
+
+def _ids(bus: BusSurvey, robot: DoctorConfig) -> Finding:
+    missing = set(robot.robot.ids) - set(bus.here)
+    extra = set(bus.here) - set(robot.robot.ids)
+    parts = [f"missing {ids_text(missing)}"] if missing else []
+    parts += [f"not expected {ids_text(extra)}"] if extra else []
+    cures: list[str] = []
+    lone = len(missing) == 1 and len(extra) + len(bus.elsewhere) == 1
+    if lone:
+        cures.append(f"{FIX} to give the lone one its id or speed")
+    elif missing:
+        doubled = [i for i, seen in bus.here.items() if seen.state in ("collides", "broken")]
+        perhaps = f"perhaps a servo that answers as {ids_text(doubled)} is one; else "
+        cures.append(
+            f"{perhaps if doubled else ''}plug in the missing ones; if all behind one place are "
+            "missing, check that cable"
+        )
+    if extra and not lone:
+        cures.append("unplug those that are not expected, or name them under robot")
+    verdict: Verdict = "bad" if missing else "warn" if extra else "ok"
+    return Finding(", ".join(parts) or ids_text(bus.here), verdict, "; ".join(cures))
+
+
+def _answers(bus: BusSurvey, robot: DoctorConfig) -> Finding:
+    states = {state: [i for i, s in bus.here.items() if s.state == state] for state in _STATES}
+    parts = [f"{_STATES[state][0]} {ids_text(ids)}" for state, ids in states.items() if ids]
+    cures = [_STATES[state][1] for state, ids in states.items() if ids]
+    if not parts:
+        return Finding("all whole")
+    return Finding(", ".join(parts), "bad", "; ".join(cures))
+
+
+def _models(bus: BusSurvey, robot: DoctorConfig) -> Finding:
+    wanted = robot.robot.models
+    found = {i: seen.model for i, seen in bus.here.items() if seen.model is not None}
+    wrong = [i for i, model in found.items() if i in wanted and model != wanted[i]]
+    cure = f"{ids_text(wrong)}: put a servo of the expected model there, or correct robot.*.ids"
+    return Finding(grouped(found, _model), "bad" if wrong else "ok", cure)
+
+
+def _model(model: int) -> str:
+    return TABLES[model].name if model in TABLES else f"model {model}"
+
+
+def _firmware(bus: BusSurvey, robot: DoctorConfig) -> Finding:
+    here = bus.here.values()
+    found = {seen.servo: seen.firmware for seen in here if seen.firmware is not None}
+    least = {s.servo: TABLES[s.model].fast_read_firmware for s in here if s.model in TABLES}
+    old = [servo for servo, version in found.items() if version < least.get(servo, 0)]
+    cure = f"{ids_text(old)}: update with DYNAMIXEL Wizard; older ones take no fast reads"
+    return Finding(grouped(found), "warn" if old else "ok", cure)
+
+
+# pace
+
+
+def _answer_time(bus: BusSurvey, robot: DoctorConfig) -> Finding:
+    times = bus.ping_times
+    found = f"{1e3 * median(times.values()):.1f} ms"
+    late = [servo for servo, time in times.items() if time > robot.doctor.answer_time]
+    if not late:
+        return Finding(found)
+    if slow(bus, robot):
+        return Finding(found, "bad", "the adapter is slow: see latency timer")
+    found += f", up to {1e3 * max(times.values()):.1f} ms ({ids_text(late)})"
+    return Finding(found, "bad", f"{ids_text(late)}: check its return delay, then its cable")
+
+
+def _read_time(bus: BusSurvey, robot: DoctorConfig) -> Finding:
+    time = bus.read_time or 0.0
+    rate = f", {1.0 / time:.0f} a second" if time else ""
+    return Finding(
+        f"{1e3 * time:.1f} ms{rate}, {'fast' if bus.fast else 'slow'} reads of {len(bus.whole)}",
+        "bad" if time > robot.doctor.read_time else "ok" if bus.fast else "warn",
+        "cure answer time, answers and lost answers first, then return delay and firmware; then "
+        "end other programs, or raise robot.baud",
+    )
+
+
+def _lost_answers(bus: BusSurvey, robot: DoctorConfig) -> Finding:
+    share = bus.missed / bus.asked if bus.asked else 0.0
+    return Finding(
+        f"{bus.missed} of {bus.asked} ({100 * share:.1f} %)",
+        "warn" if bus.missed else "ok",
+        "check plugs, cables and the ground between adapter, supply and servos",
+    )
+
+
+_SPEED = (Check("baud", lambda bus, robot: f"all at {bus.baud}", _baud),)
+_SERVOS = (
+    Check("ids", lambda bus, robot: ids_text(robot.robot.ids), _ids),
+    Check("answers", "one whole answer of each", _answers),
+    Check("models", lambda bus, robot: grouped(robot.robot.models, _model), _models),
+    Check(
+        "firmware",
+        f"from {', '.join(f'{t.name} {t.fast_read_firmware}' for t in TABLES.values())} on",
+        _firmware,
+    ),
+)
+_ANSWER_TIME = (
+    Check(
+        "answer time",
+        lambda bus, robot: f"at most {1e3 * robot.doctor.answer_time:g} ms",
+        _answer_time,
+    ),
+)
+_READS = (
+    Check(
+        "read of all", lambda bus, robot: f"at most {1e3 * robot.doctor.read_time:g} ms", _read_time
+    ),
+    Check("lost answers", "none", _lost_answers),
+)

@@ -1,0 +1,75 @@
+"""What a session keeps of each step of its controller."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from antennate.errors import ControllerError
+from antennate.types import Contact, Controller, JointCommand, Maneuver
+
+_MOST = (1 << 31) - 1
+"""Largest number of a decision that is accepted; a log keeps 64 bits of each."""
+
+
+@dataclass(frozen=True, slots=True)
+class Decision:
+    """What a controller has decided; the defaults are those of one that was not asked yet.
+
+    Attributes:
+        maneuver: A `Maneuver`.
+        contact: A `Contact` a side.
+    """
+
+    maneuver: int = int(Maneuver.HOLD)
+    contact: tuple[int, int] = (int(Contact.UNKNOWN), int(Contact.UNKNOWN))
+
+
+@dataclass(slots=True)
+class StepResult:
+    """What became of the controller in one tick.
+
+    Attributes:
+        asked: Whether it was asked at all.
+        decided_at: When its step ended [s], -inf if it failed.
+        bad_command: Why its command cannot be used, empty if it can.
+        failure: The exception that it raised, empty if it raised none.
+    """
+
+    asked: bool = True
+    decided_at: float = -math.inf
+    bad_command: str = ""
+    failure: str = ""
+
+
+def decision_of(controller: Controller) -> Decision:
+    """The decision of a controller of one robot after its step.
+
+    Whether there is such a maneuver is for the supervisor to judge.
+
+    Raises:
+        ControllerError: `maneuver` or `contact` is not of the form that `Controller` asks for.
+    """
+    (maneuver,) = _integers(controller, "maneuver", (1,))
+    left, right = _integers(controller, "contact", (1, 2))
+    return Decision(maneuver, (left, right))
+
+
+def _integers(controller: Controller, name: str, shape: tuple[int, ...]) -> list[int]:
+    value: object = getattr(controller, name, None)
+    found = np.asarray(value)
+    fits = found.shape == shape and found.dtype.kind in "iu"
+    numbers = [int(number) for number in found.ravel()] if fits else []
+    if not numbers or max(map(abs, numbers)) > _MOST:
+        raise ControllerError(
+            f"expected {name} of shape {shape}, small whole numbers, found {value!r}; see "
+            f"antennate.types.{name.capitalize()}"
+        )
+    return numbers
+
+
+def no_command() -> JointCommand:
+    """The command in place of one that a controller did not give: NaN for every joint."""
+    return JointCommand(*(np.full(shape, math.nan) for shape in ((1, 5), (1, 6, 2), (1, 2))))

@@ -1,0 +1,100 @@
+"""A controller under supervision: what it raises is a cause, and its time may stand still."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from antennate.errors import in_one_line
+from antennate.hardware.driving.decision import Decision, StepResult, decision_of, no_command
+from antennate.hardware.joints import CommandError
+from antennate.hardware.tracebacks import Tracebacks
+from antennate.types import AntennaFrame, Controller, Floats, JointCommand, Maneuver
+
+
+class SupervisedController:
+    """Asks a controller for a command, and keeps what the supervisor has to know of it.
+
+    While the robot stands still for its actuators, the controller is not asked and its time stands
+    still: to stand is a decision of its own. So it is to go slowly, which leaves out single ticks,
+    but none after a failure.
+
+    Args:
+        controller: Of one robot; anybody's.
+        check: A copy of a command that can be sent, or CommandError.
+        now: The host's time [s].
+
+    Attributes:
+        standing: Whether the robot has to stand still.
+        rate: How fast the controller's time goes, 1 as the clock.
+        command: What it said last.
+        decision: What it decided, whenever it was asked last without failing.
+        result: What became of it in the last tick.
+        refused: Commands that could not be sent.
+        tracebacks: Of its failures.
+    """
+
+    def __init__(
+        self,
+        controller: Controller,
+        check: Callable[[JointCommand], JointCommand],
+        now: Callable[[], float],
+    ) -> None:
+        self.controller = controller
+        self.standing, self.rate = False, 1.0
+        self.command = no_command()
+        self.decision = Decision()
+        self.result = StepResult()
+        self.refused = 0
+        self.tracebacks = Tracebacks()
+        self._check, self._now = check, now
+        self._sound_command: JointCommand | None = None
+        self._sound = False
+        self._owed = self._seen = self._stood = 0.0
+
+    def time(self, t: Floats) -> Floats:
+        """The controller's time [s] at the time t [s] of a frame, shape (1,); call once a tick."""
+        now = float(t[0])
+        if self.standing or self.rate < 1.0:
+            self._stood += (now - self._seen) * (1.0 if self.standing else 1.0 - self.rate)
+        self._seen = now
+        return t - self._stood
+
+    def step(self, frame: AntennaFrame) -> JointCommand:
+        """The command of this tick; of one that failed, NaN for every joint."""
+        self.command = self._step(frame)
+        return self.command
+
+    def _step(self, frame: AntennaFrame) -> JointCommand:
+        due = self._due() or not self._sound
+        result = self.result = StepResult()
+        if self._sound_command is not None and (self.standing or not due):
+            result.asked, result.decided_at = False, self._now()
+            return self._sound_command
+        self._sound = False
+        try:
+            own = AntennaFrame(t=frame.t.copy(), counts=frame.counts.copy())
+            command = self.controller.step(own)  # which it may change
+            self.decision = decision_of(self.controller)
+        except KeyboardInterrupt:
+            raise
+        except BaseException as error:  # noqa: BLE001 a plugged-in controller may raise anything
+            result.failure = in_one_line(error)
+            self.tracebacks.keep(self._now(), error)
+            return no_command()
+        result.decided_at = self._now()
+        try:
+            command = self._sound_command = self._check(command)
+        except CommandError as error:
+            result.bad_command = str(error)
+            self.refused += 1
+        else:
+            self._sound = self.decision.maneuver in set(Maneuver)
+        return command
+
+    def _due(self) -> bool:
+        """Whether a period of the controller's own time has passed; call once a tick."""
+        self._owed += self.rate
+        if self._owed < 1.0:
+            return False
+        self._owed -= 1.0
+        return True

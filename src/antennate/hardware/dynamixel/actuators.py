@@ -1,0 +1,164 @@
+"""DYNAMIXEL servos as the actuators of a robot: angles [rad] to goals [ticks], and torque."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from antennate.errors import AntennateError
+from antennate.hardware.actuators import Tally
+from antennate.hardware.dynamixel import bringup
+from antennate.hardware.dynamixel.bus import Bus
+from antennate.hardware.dynamixel.leg_turns import LegTurns
+from antennate.hardware.dynamixel.monitor import ServoMonitor
+from antennate.hardware.dynamixel.tables import XC430_W240
+from antennate.hardware.joints import Joints
+from antennate.params import BusParams
+from antennate.types import Floats, JointCommand
+
+_GOAL = XC430_W240["goal_position"]
+"""At the same address in all models."""
+_AGAIN = BusParams().motion_budget
+"""Time for the answers of servos told again in a tick to let go [s]."""
+
+
+class DynamixelActuators:
+    """All servos of one robot on one bus, as `Actuators`; for one thread.
+
+    Any packet feeds the watchdogs of the servos: nothing is sent but by the calls below.
+
+    Args:
+        bus: The bus.
+        joints: Which servo moves what.
+        clock: Monotonic time [s].
+
+    Attributes:
+        state: The monitor of the servos.
+        turns: How far legs have turned.
+    """
+
+    def __init__(self, bus: Bus, joints: Joints, clock: Callable[[], float]) -> None:
+        self.bus, self.joints = bus, joints
+        self.state = ServoMonitor(bus, joints.ids, clock)
+        self.turns = LegTurns(bus, joints)
+        self.left_on: list[int] = []
+        self._now = clock
+        self._goals: Floats | None = None
+
+    @property
+    def tally(self) -> Tally:
+        """What the bus has seen."""
+        return self.bus.tally
+
+    @property
+    def enabled(self) -> bool:
+        """Whether torque was given and not taken."""
+        return self._goals is not None
+
+    @property
+    def resting(self) -> bool:
+        """Whether the robot has to stand still, as while a leg forgets its turns."""
+        return self.turns.standing
+
+    def check(self, command: JointCommand) -> JointCommand:
+        """A copy of a command that can be sent.
+
+        Raises:
+            CommandError: It cannot.
+        """
+        command = self.joints.plain(command)
+        self.joints.ticks(command)
+        return command
+
+    def enable(self, command: JointCommand) -> None:
+        """Torque on where everything stands, for all servos or for none.
+
+        Legs count their turns from where they stand, so that `command` is near.
+
+        Raises:
+            BringUpError: A servo is not fit, or did not take it.
+            PortError: The bus is gone.
+        """
+        try:
+            self._goals = self._enable(command)
+        except AntennateError:
+            self.disable()
+            raise
+        self.left_on = []
+        self.state.arm(True)
+
+    def _enable(self, command: JointCommand) -> Floats:
+        """Where everything stands [ticks]."""
+        bus, ids = self.bus, self.joints.ids
+        self.turns.reset()
+        bringup.require_models(bus, self.joints.models)
+        bringup.arm_watchdogs(bus, ids)
+        bringup.limit_speed(bus, self.joints.profiles)
+        stood = bringup.hold_here(bus, ids)
+        self.joints.align(np.array([stood[servo] for servo in ids], float), command)
+        present = bringup.enable(bus, ids)
+        return np.array([present[servo] for servo in ids], float)
+
+    def disable(self, again: bool = False) -> list[int]:
+        """Torque off, group by group, verified: ids that did not confirm it.
+
+        Raises:
+            PortError: Only with `again`: the bus is gone.
+        """
+        if again:
+            self.left_on = bringup.disable(self.bus, self.left_on, 1, _AGAIN)
+            return list(self.left_on)
+        self._goals = None
+        self.turns.reset()
+        self.state.arm(False)
+        self.left_on = []
+        for group in self.joints.in_order_of_release:
+            try:
+                self.left_on += bringup.disable(self.bus, group)
+            except Exception as error:  # noqa: BLE001 the next group has its turn whatever happens
+                self.left_on += group
+                self.state.tracebacks.keep(self._now(), error)
+        return list(self.left_on)
+
+    def command(self, command: JointCommand | None, time: float = math.inf) -> int:
+        """Send goals a time [s] nearer to a command, or as they are; joints too slow for it.
+
+        Raises:
+            CommandError: The command cannot be sent; nothing is.
+            PortError: The bus is gone.
+        """
+        goals, slow = self._goals, 0
+        if command is not None:
+            wanted: Floats = self.joints.ticks(command).astype(float)
+            if goals is not None and math.isfinite(time):
+                reach = self.joints.reach(time)
+                slow = int((abs(wanted - goals) > reach).sum())
+                wanted = goals + np.clip(wanted - goals, -reach, reach)
+            goals = wanted
+        if goals is None:
+            return 0
+        pairs = zip(self.joints.ids, np.rint(goals).astype(int).tolist(), strict=True)
+        self.bus.write_all(_GOAL.address, {servo: _GOAL.encode(goal) for servo, goal in pairs})
+        if self._goals is not None:
+            self._goals = goals
+        return slow
+
+    def maintain(self, may_begin: bool) -> None:
+        """Let legs that have turned far forget their turns, a step a tick.
+
+        Raises:
+            BringUpError: A leg did not do its part; it has no torque then.
+            PortError: The bus is gone.
+        """
+        if self._goals is None:
+            return
+        if may_begin:
+            self.turns.begin(self._goals)
+        self.turns.step(self._goals, self.state.positions, may_begin)
+
+    def look(self) -> None:
+        """Read all positions, and a little more in turn."""
+        self.state.loose = self.turns.loose
+        self.state.step()

@@ -1,0 +1,167 @@
+"""Legs that turn without end.
+
+A servo counts 256 turns either way and then takes no goal. Before that the robot stands still, and
+one leg after the other forgets its turns: torque off, clear, the goal where it stands, torque on.
+Each step takes one tick and is read back before the next. A leg without torque may be turned by
+weight or by hand, for as long as the program is stopped: it gets torque only after its position was
+read anew and its goal seen to be that. The others keep their torque, and the gait goes on at the
+same phase.
+Source of the instruction: https://emanual.robotis.com/docs/en/dxl/protocol2/#clear-0x10.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Mapping
+
+from antennate.hardware.dynamixel.answers import Span, Value
+from antennate.hardware.dynamixel.bringup import BringUpError
+from antennate.hardware.dynamixel.bus import Bus
+from antennate.hardware.dynamixel.tables import XC430_W240, Register
+from antennate.hardware.joints import Joints
+from antennate.params import TurnsParams
+from antennate.robots.servos import TICKS_A_TURN
+from antennate.types import Floats
+
+_TORQUE = XC430_W240["torque_enable"]
+_GOAL = XC430_W240["goal_position"]
+_PRESENT = XC430_W240["present_position"]
+_SPARE = {_TORQUE.name: 1, _GOAL.name: 12, _PRESENT.name: 12}
+"""Defined bytes after each, by which late answers are told apart."""
+
+
+class LegTurns:
+    """Watches how far legs have turned, and lets them forget it; for one thread.
+
+    Args:
+        bus: The servos.
+        joints: Which servo is which leg; told of every turn that is forgotten.
+        params: When, and how patiently.
+
+    Attributes:
+        forgotten: Legs that have forgotten their turns so far.
+    """
+
+    def __init__(self, bus: Bus, joints: Joints, params: TurnsParams | None = None) -> None:
+        self._bus, self._joints = bus, joints
+        self._params = params or TurnsParams()
+        self.forgotten = 0
+        self.reset()
+
+    def reset(self) -> None:
+        """Give up what was begun; torque is off, or comes on anew."""
+        self._left: deque[int] = deque()
+        self._stage = self._tried = self._waited = self._still = 0
+        self._before: Mapping[int, int] = {}
+        self._place = math.nan
+
+    @property
+    def standing(self) -> bool:
+        """Whether the robot has to stand still for it."""
+        return bool(self._left)
+
+    @property
+    def loose(self) -> int | None:
+        """Id of the leg whose torque may be off for it, None if there is none."""
+        begun = self.standing and (self._stage or self._tried)
+        return self._joints.ids[self._left[0]] if begun else None
+
+    def begin(self, goals: Floats) -> None:
+        """Stand still from now on if a leg has turned far enough.
+
+        Args:
+            goals: Of all servos [ticks], shape (n,).
+        """
+        turning = self._joints.turning
+        turned = abs(goals[turning]) / TICKS_A_TURN
+        if not self.standing and turned.max(initial=0.0) >= self._params.most:
+            self.reset()
+            far = turned >= 0.5 * self._params.most
+            self._left.extend(turning[far].tolist())
+
+    def step(self, goals: Floats, positions: Mapping[int, int], may_begin: bool = True) -> None:
+        """One tick's share; goals of legs that have forgotten are changed in place.
+
+        Args:
+            goals: Of all servos [ticks], shape (n,).
+            positions: Newest positions by id [ticks].
+            may_begin: Whether the next leg may lose its torque; one that has lost it goes on.
+
+        Raises:
+            BringUpError: A leg did not do its part; it has no torque then.
+            PortError: The bus is gone.
+        """
+        waits = self._stage == 0 and not may_begin
+        if not self.standing or waits or not self._calm(positions):
+            return
+        at = self._left[0]
+        stages = (self._release, self._forget, self._hold)
+        if stages[self._stage](at, goals):
+            self._tried = 0
+            self._stage += 1
+        else:
+            self._tried += 1
+        if self._stage == len(stages):
+            self._left.popleft()
+            self._stage = 0
+            self.forgotten += 1
+        if self._tried >= self._params.tries:
+            servo, stage = self._joints.ids[at], self._stage
+            self.reset()
+            what = ("lose its torque", "forget its turns", "get its torque back")[stage]
+            raise BringUpError(f"expected leg servo {servo} to {what}, found that it does not")
+
+    def _calm(self, positions: Mapping[int, int]) -> bool:
+        """Whether the legs have come to rest, or are not waited for any longer."""
+        params = self._params
+        if self._still >= params.calm or self._waited >= params.patience:
+            return True
+        self._waited += 1
+        moved = [abs(p - self._before.get(i, math.inf)) for i, p in positions.items()]
+        self._still = self._still + 1 if max(moved, default=math.inf) <= params.calm_ticks else 0
+        self._before = dict(positions)
+        return False
+
+    def _release(self, at: int, goals: Floats) -> bool:
+        servo = self._joints.ids[at]
+        place = self._read(servo, _PRESENT)
+        if place is None or not self._write(servo, _TORQUE, 0):
+            return False
+        self._place = place
+        return True
+
+    def _forget(self, at: int, goals: Floats) -> bool:
+        """Clear, without torque; from then on its turns are counted anew."""
+        servo = self._joints.ids[at]
+        if self._read(servo, _TORQUE) != 0:
+            return False
+        self._bus.clear(servo)  # its answer may get lost: the position tells
+        place = self._read(servo, _PRESENT)
+        slack = self._params.slack * TICKS_A_TURN
+        if place is None or not -slack <= place < TICKS_A_TURN + slack:
+            return False
+        shift = TICKS_A_TURN * round((place - self._place) / TICKS_A_TURN)
+        if abs(place - self._place - shift) > slack:
+            return False
+        self._joints.shift(at, shift)
+        goals[at] = place
+        return True
+
+    def _hold(self, at: int, goals: Floats) -> bool:
+        """The goal where the leg stands now, then torque."""
+        servo = self._joints.ids[at]
+        place = self._read(servo, _PRESENT)
+        if place is None or not self._write(servo, _GOAL, place):
+            return False
+        goals[at] = place
+        return self._write(servo, _TORQUE, 1)
+
+    def _write(self, servo: int, register: Register, value: int) -> bool:
+        self._bus.write_all(register.address, {servo: register.encode(value)})
+        return self._read(servo, register) == value
+
+    def _read(self, servo: int, register: Register) -> int | None:
+        span = Span(register.address, register.size, _SPARE[register.name])
+        said = self._bus.read_all([servo], span, self._params.budget)[servo]
+        return register.decode(said.data) if isinstance(said, Value) else None

@@ -1,0 +1,138 @@
+"""Health and positions of the servos, a little of it read in every tick."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from itertools import cycle
+
+from antennate.hardware.actuators import ActuatorState
+from antennate.hardware.dynamixel.answers import POSITION, Answer, Span, Value
+from antennate.hardware.dynamixel.bringup import WATCHDOG_COUNTS
+from antennate.hardware.dynamixel.bus import Bus
+from antennate.hardware.dynamixel.tables import XC430_W240, hardware_errors
+from antennate.hardware.ports.port import PortError
+from antennate.params import BusParams
+
+_ERRORS = Span(XC430_W240["hardware_error_status"].address, 1)
+_WATCHDOG = XC430_W240["bus_watchdog"]
+_TORQUE = XC430_W240["torque_enable"]
+_VOLTAGE = XC430_W240["present_input_voltage"]
+_POSITION = XC430_W240["present_position"]
+_VOLT = 0.1
+_ALONE = BusParams().single_budget
+_PATIENCE = BusParams().look_every
+SUPPLY_AGE = BusParams().supply_age
+
+
+class ServoMonitor(ActuatorState):
+    """Reads all positions every tick, and one servo's watchdog, torque and the supply in turn.
+
+    Args:
+        bus: The bus.
+        ids: All servos; the first one tells the voltage of the supply.
+        clock: Monotonic time [s].
+        budget: Time for the positions [s]; the rest waits for the next tick if they took all of it.
+
+    Attributes:
+        positions: Newest position by id [ticks].
+        armed: Whether torque and watchdogs are to be on; see `arm`.
+        loose: Id of a servo whose torque is off on purpose, None if there is none.
+    """
+
+    def __init__(
+        self,
+        bus: Bus,
+        ids: tuple[int, ...],
+        clock: Callable[[], float],
+        budget: float = BusParams().motion_budget,
+    ) -> None:
+        super().__init__(missed=dict.fromkeys(ids, 0))
+        self._bus = bus
+        self._clock = clock
+        self._ids = ids
+        self._budget = budget
+        self._turn = cycle(range(len(ids)))
+        self._waited = 0
+        self.positions: dict[int, int] = {}
+        self.armed = False
+        self.loose: int | None = None
+        self._measured = -math.inf
+
+    def arm(self, armed: bool) -> None:
+        """From now on torque and watchdogs are on, or off on purpose."""
+        self.armed = armed
+        self.loose = None
+        self.disarmed = ()
+        if armed:
+            self.watchdogs = ()
+
+    def step(self) -> None:
+        """One tick's share. A dead wire is noted, not raised."""
+        try:
+            self._look()
+            self.bus_error = ""
+        except PortError as error:
+            self.bus_error = str(error)
+            self.missed = {servo: count + 1 for servo, count in self.missed.items()}
+        if self._clock() - self._measured > SUPPLY_AGE:
+            self.supply = math.nan
+
+    def _look(self) -> None:
+        end = self._clock() + self._budget
+        answers = self._bus.read_all(self._ids, POSITION, self._budget)
+        dead = not any(isinstance(said, Value) for said in answers.values())
+        for servo, said in answers.items():
+            self._note(servo, said, dead)
+        self._waited += 1
+        if self._clock() + _ALONE > end and self._waited < _PATIENCE:
+            return
+        self._waited = 0
+        at = next(self._turn)
+        servo = self._ids[at]
+        if self.missed[servo]:
+            return
+        self._guard(servo)
+        if at == 0 and (volts := self._one(servo, Span(_VOLTAGE.address, 2))) is not None:
+            self.supply = _VOLT * _VOLTAGE.decode(volts)
+            self._measured = self._clock()
+
+    def _guard(self, servo: int) -> None:
+        """Whether a servo still has the watchdog and the torque that it was given."""
+        said = self._one(servo, Span(_WATCHDOG.address, _WATCHDOG.size))
+        if said is None:
+            return
+        watchdog = _WATCHDOG.decode(said)
+        self.watchdogs = _with(self.watchdogs, servo, watchdog < 0)
+        if not self.armed or servo == self.loose:
+            return
+        lost = 0 <= watchdog != WATCHDOG_COUNTS
+        torque = self._one(servo, Span(_TORQUE.address, _TORQUE.size, spare=1))
+        if torque is not None or lost:
+            lost |= torque is not None and not _TORQUE.decode(torque)
+            self.disarmed = _with(self.disarmed, servo, lost)
+
+    def _note(self, servo: int, said: Answer, dead: bool) -> None:
+        if not isinstance(
+            said, Value
+        ):  # one that was not asked for want of time has missed nothing
+            asked = self._bus.missed.get(servo, 0)
+            self.missed[servo] = self.missed[servo] + 1 if dead else max(self.missed[servo], asked)
+            return
+        self.missed[servo] = 0
+        self.positions[servo] = _POSITION.decode(said.data)
+        if said.alert:
+            bits = self._one(servo, _ERRORS)
+            words = hardware_errors(bits[0]) if bits else []
+            self.errors[servo] = ", ".join(words) or "alert"
+        else:
+            self.errors.pop(servo, None)
+
+    def _one(self, servo: int, span: Span) -> bytes | None:
+        said = self._bus.read_all([servo], span, _ALONE)[servo]
+        return said.data if isinstance(said, Value) else None
+
+
+def _with(ids: Iterable[int], servo: int, is_in: bool) -> tuple[int, ...]:
+    others = tuple(i for i in ids if i != servo)
+    return (*others, servo) if is_in else others

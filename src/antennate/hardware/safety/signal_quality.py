@@ -1,0 +1,108 @@
+"""What the readings of both antennae are worth: judged here, once, from the counts as they came.
+
+A channel may be broken, beyond its calibration or at a rail (`diagnosis`), its resting reading may
+have drifted (`drift`), and before walking each antenna is touched once (`touch_check`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from antennate.hardware.safety.diagnosis import Band, ChannelDiagnosis, Finding
+from antennate.hardware.safety.drift import Drift
+from antennate.hardware.safety.touch_check import Ask, TouchCheck
+from antennate.params import (
+    ConditioningParams,
+    DiagnosisParams,
+    DriftParams,
+    TouchCheckParams,
+)
+from antennate.types import Contact
+
+_SIDES = ("left", "right")
+_RESTING = {Finding.OK, Finding.OUT_OF_CAL}
+
+
+class SignalQuality:
+    """Judges the readings of both antennae of one robot.
+
+    Args:
+        conditioning: Their calibrated range.
+        diagnosis: Windows and limits by which a broken channel is told.
+        drift: How drift is followed.
+        touch: What counts as a touch, None if they are not checked by touch.
+
+    Attributes:
+        channels: Diagnosis of the left and the right antenna.
+        check: The check by touch, None if it is skipped.
+        drifts: Of the left and the right antenna.
+    """
+
+    def __init__(
+        self,
+        conditioning: ConditioningParams,
+        diagnosis: DiagnosisParams | None = None,
+        drift: DriftParams | None = None,
+        touch: TouchCheckParams | None = None,
+    ) -> None:
+        band = Band.of(conditioning)
+        self.channels = [ChannelDiagnosis(diagnosis or DiagnosisParams(), band) for _ in _SIDES]
+        self.check = None if touch is None else TouchCheck(touch, (band, band))
+        self.drifts = [Drift(drift or DriftParams(), band) for _ in _SIDES]
+        self._t = -math.inf
+
+    def step(self, t: float, counts: Sequence[float], contact: Sequence[int]) -> None:
+        """Take the newest readings.
+
+        Args:
+            t: Time at which they were taken [s].
+            counts: Left and right as they came, rails included [counts]; NaN if there is none.
+            contact: `Contact` that the controller saw in the tick before, left and right.
+        """
+        fresh, self._t = t > self._t, t
+        found = [channel.step(t, c) for channel, c in zip(self.channels, counts, strict=True)]
+        if self.check is not None and fresh:
+            self.check.step(*(reading.taken for reading in found))
+        for drift, reading, seen in zip(self.drifts, found, contact, strict=True):
+            resting = reading.taken if reading.finding in _RESTING else math.nan
+            drift.step(t, resting, seen == Contact.FREE)
+
+    @property
+    def counts(self) -> list[float]:
+        """What contact may be decided on, left and right [counts]; NaN where nothing can be."""
+        return [channel.reading.counts for channel in self.channels]
+
+    @property
+    def findings(self) -> tuple[Finding, Finding]:
+        """State of the left and the right channel."""
+        left, right = (channel.reading.finding for channel in self.channels)
+        return left, right
+
+    @property
+    def objections(self) -> tuple[str, ...]:
+        """Why not to arm, empty if nothing speaks against it."""
+        return () if self.check is None or not self.check.objection else (self.check.objection,)
+
+    @property
+    def refused(self) -> bool:
+        """Whether the check has failed: to go on with it is of no use."""
+        return self.check is not None and self.check.ask is Ask.NOTHING and bool(self.objections)
+
+    @property
+    def drifted(self) -> str:
+        """Sides beyond the band and by how much, empty if none is."""
+        return ", ".join(
+            f"{side} by {100 * drift.share:+.0f} % of the span"
+            for side, drift in zip(_SIDES, self.drifts, strict=True)
+            if drift.beyond
+        )
+
+    @property
+    def status(self) -> str:
+        """For the status line: the check, or what the person is to do, and the drift."""
+        touch = "skipped" if self.check is None else "passed"
+        if self.objections and self.check is not None:
+            touch = f"({self.check.objection if self.refused else self.check.ask.value})"
+        left, right = (100 * drift.share for drift in self.drifts)
+        return f"touch={touch} drift={left:+.0f},{right:+.0f}%"

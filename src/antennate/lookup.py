@@ -1,0 +1,129 @@
+"""Find an object by name: one of ours, of another installed package, or of the user's own code."""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+import sys
+from collections.abc import Mapping
+from importlib.metadata import entry_points
+from pathlib import Path
+from types import ModuleType
+from typing import Any, Generic, TypeVar, cast
+
+from antennate.errors import ConfigError, in_one_line
+from antennate.messages import nearest, shown
+
+T = TypeVar("T")
+
+
+class Registry(Generic[T]):
+    """Objects of one kind by name.
+
+    A name is one of these:
+
+    - a name of ours, or one given to `add`;
+    - an entry point that an installed package declares in `group`;
+    - `module:Name`, for a module that Python can import;
+    - `folder/file.py:Name`, the path relative to the working directory. Modules beside the file can
+      be imported from it.
+
+    Args:
+        kind: What the objects are, in the singular, for messages.
+        group: Entry-point group.
+        ours: The objects of this package.
+
+    Attributes:
+        added: Objects that were given to `add`, by name.
+    """
+
+    def __init__(self, kind: str, group: str, ours: Mapping[str, T]) -> None:
+        self._kind, self._group = kind, group
+        self._ours: dict[str, T] = dict(ours)
+        self.added: dict[str, T] = {}
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """All names that need no code of the user, ours first."""
+        others = (point.name for point in entry_points(group=self._group))
+        return tuple(dict.fromkeys((*self._ours, *others, *self.added)))
+
+    def add(self, name: str, found: T) -> None:
+        """Make an object known under a name, in this process; a later one takes its place.
+
+        Raises:
+            ConfigError: The name is that of another object, or holds a colon.
+        """
+        if ":" in name or name in set(self.names) - set(self.added):
+            raise ConfigError(
+                f"expected a new name without a colon for a {self._kind}, found {name!r}"
+            )
+        self.added[name] = found
+
+    def check(self, name: str) -> str:
+        """Return the name if it may be valid; no code of the user runs.
+
+        Raises:
+            ConfigError: It is neither a known name nor MODULE:NAME nor FILE.py:NAME.
+        """
+        place, _, attribute = name.rpartition(":")
+        if name in self.names or (place and attribute):
+            return name
+        raise ConfigError(
+            f"expected one of {', '.join(self.names)}, or MODULE:NAME or FILE.py:NAME of your own "
+            f"{self._kind}, found {shown(name)}{nearest(name, self.names)}"
+        )
+
+    def find(self, name: str) -> T:
+        """The object of a name. This imports its module.
+
+        Raises:
+            ConfigError: There is none of that name, or its module cannot be imported.
+        """
+        for known in (self._ours, self.added):
+            if name in known:
+                return known[name]
+        self.check(name)
+        try:
+            found = self._load(name)
+        except KeyboardInterrupt:
+            raise
+        except BaseException as error:
+            raise ConfigError(
+                f"expected a {self._kind} at {name!r}, found {in_one_line(error)}"
+            ) from error
+        if not callable(found):
+            raise ConfigError(
+                f"expected a class or a function at {name!r}, found {type(found).__name__}"
+            )
+        return cast("T", found)
+
+    def _load(self, name: str) -> Any:
+        for point in entry_points(group=self._group, name=name):
+            return point.load()
+        place, _, attribute = name.rpartition(":")
+        if place.endswith(".py"):
+            return getattr(_module_of(Path(place)), attribute)
+        return getattr(importlib.import_module(place), attribute)
+
+
+def _module_of(path: Path) -> ModuleType:
+    """Import a file once a process; its folder comes last in the search for modules."""
+    path = path.resolve()
+    name = f"antennate_user_code.{path.with_suffix('')}"
+    if name in sys.modules:
+        return sys.modules[name]
+    if not path.is_file():
+        raise FileNotFoundError(f"no file {path}")
+    spec = importlib.util.spec_from_file_location(name, path)
+    if spec is None or spec.loader is None:
+        raise ImportError(f"no Python file: {path}")
+    if str(path.parent) not in sys.path:
+        sys.path.append(str(path.parent))
+    module = sys.modules[name] = importlib.util.module_from_spec(spec)
+    try:
+        spec.loader.exec_module(module)
+    except BaseException:
+        del sys.modules[name]
+        raise
+    return module

@@ -1,0 +1,138 @@
+"""Groups of joints: which servo moves which joint, and how its ticks become an angle."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from antennate.params.base import Params, number
+from antennate.robots.servos import MOST_TICKS, TICKS_A_TURN, ServoName
+
+STRAIGHT = TICKS_A_TURN // 2
+"""Zero of a joint whose zeros are not given: the middle of a turn [ticks]."""
+QUARTER = TICKS_A_TURN // 4
+_RIGHT_ANGLE = 0.5 * math.pi
+
+_Id = Annotated[int, Field(ge=0, le=252)]
+_Direction = Literal[-1, 1]
+_Zero = Annotated[int, Field(ge=-MOST_TICKS, le=MOST_TICKS)]
+
+
+class JointParams(Params):
+    """One group of joints, in the order of the robot's joints."""
+
+    servo: ServoName = number(
+        "xc430_w240", "1", "paper: XC430-W240 in the body", "model of the group's servos"
+    )
+    ids: tuple[_Id, ...] = number(
+        (),
+        "1",
+        "assumed: set by hand; not given, all joints are numbered from 1",
+        "ids on the bus",
+    )
+    directions: tuple[_Direction, ...] = number(
+        (),
+        "1",
+        "assumed: mounted alike; not given, all are 1",
+        "sign between ticks and angle",
+    )
+    zeros: tuple[_Zero, ...] = number(
+        (),
+        "ticks",
+        "assumed: the middle of a turn, 2048, if not given",
+        "position at the angle 0",
+    )
+    fastest: float = number(
+        4.5,
+        "rad/s",
+        "assumed: two thirds of an unloaded XC430-W240 at 11.1 V, 6.8 rad/s (datasheet)",
+        "fastest that goals move",
+        gt=0,
+    )
+
+    @property
+    def largest(self) -> float:
+        """Largest angle either way [rad], inf for a joint that turns without end."""
+        return math.inf
+
+
+class YawParams(JointParams):
+    """The yaw joints between links, head first."""
+
+    limit: float = number(
+        _RIGHT_ANGLE,
+        "rad",
+        "assumed: links at a right angle nearly meet; the gaits stay within 0.96",
+        "largest angle either way",
+        gt=0,
+        le=_RIGHT_ANGLE,
+    )
+
+    @property
+    def largest(self) -> float:
+        """Largest angle either way [rad]."""
+        return self.limit
+
+
+class PitchParams(YawParams):
+    """The pitch joints between links, head first: held by a stiffness, or moved by servos."""
+
+    kind: Literal["locked", "actuated"] = number(
+        "locked", "1", "paper: pitch is left unused", "whether servos on the bus move them"
+    )
+    stiffness: float = number(
+        30.0,
+        "N·m/rad",
+        "assumed: a servo that holds; the paper leaves pitch unused",
+        "stiffness of a locked pitch joint",
+        gt=0,
+    )
+
+
+class LegParams(JointParams):
+    """The legs of all links, head first, left before right."""
+
+    kind: Literal["rolling", "lifting"] = number(
+        "rolling",
+        "1",
+        "paper: O-legs",
+        "rolling legs turn about the pitch axis without end, lifting legs about the roll axis",
+    )
+    limit: float = number(
+        _RIGHT_ANGLE,
+        "rad",
+        "assumed: a leg that points straight up or down",
+        "largest angle of a lifting leg either way",
+        gt=0,
+        le=_RIGHT_ANGLE,
+    )
+
+    @property
+    def largest(self) -> float:
+        """Largest angle either way [rad], inf for rolling legs."""
+        return self.limit if self.kind == "lifting" else math.inf
+
+
+class BaseParams(YawParams):
+    """The bases of both antennae, left before right."""
+
+    servo: ServoName = number(
+        "xl330_m288", "1", "paper: XL330 at the antennae", "model of the group's servos"
+    )
+    fastest: float = number(
+        4.5,
+        "rad/s",
+        "assumed: as the other joints; an unloaded XL330-M288 makes 10.8 rad/s at 5 V (datasheet)",
+        "fastest that goals move",
+        gt=0,
+    )
+    limit: float = number(
+        _RIGHT_ANGLE,
+        "rad",
+        "assumed: further outwards an antenna lies along the body, inwards it crosses the other",
+        "largest angle either way from the mounting angle",
+        gt=0,
+        le=_RIGHT_ANGLE,
+    )

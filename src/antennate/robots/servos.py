@@ -1,0 +1,108 @@
+"""Servo models: what a robot's description may name, with the numbers that its physics needs."""
+
+from __future__ import annotations
+
+import math
+from typing import ClassVar, Literal
+
+from antennate.params.base import Params, number
+
+TICKS_A_TURN = 4096
+"""Datasheet of both models: 4096 pulses a revolution."""
+MOST_TICKS = 1_048_575
+"""Farthest position in extended mode, 256 turns either way [ticks]."""
+POSITION_MODE = 3
+"""Operating mode: position within one turn."""
+EXTENDED_MODE = 4
+"""Operating mode: position over many turns."""
+
+ServoName = Literal["xc430_w240", "xl330_m288"]
+_RPM = 2.0 * math.pi / 60.0
+_PWM_LIMIT = 885
+"""Datasheet of both models: counts of the full drive."""
+
+
+class ServoParams(Params):
+    """A servo in position mode, a DYNAMIXEL XC430-W240-T at 11.1 V.
+
+    Torque follows the position error up to the torque-speed line. Another model is a subclass with
+    its own numbers.
+
+    Attributes:
+        model_number: What the servo answers when it is asked for its model.
+        voltage: Recommended supply [V].
+    """
+
+    model_number: ClassVar[int] = 1080
+    voltage: ClassVar[float] = 11.1
+
+    stall_torque: float = number(
+        1.7, "N·m", "datasheet: XC430-W240, 11.1 V", "torque at standstill", gt=0
+    )
+    no_load_speed: float = number(
+        65.0 * _RPM,
+        "rad/s",
+        "datasheet: XC430-W240, 65 rpm at 11.1 V",
+        "speed unloaded",
+        gt=0,
+    )
+    position_gain: float = number(
+        700 / 128 * TICKS_A_TURN / (2 * math.pi) / _PWM_LIMIT,
+        "1/rad",
+        "datasheet: Position P Gain 700, scaled by 1/128 to PWM counts a tick of 1/4096 turn, PWM "
+        "limit 885",
+        "share of the full drive per radian of position error",
+        gt=0,
+    )
+    armature: float = number(
+        0.003,
+        "kg·m²",
+        "assumed: rotor of about 5e-8 kg·m² behind a 245:1 gear",
+        "inertia at the output",
+        ge=0,
+    )
+
+    @property
+    def stiffness(self) -> float:
+        """Torque per radian of position error, before saturation [N·m/rad]."""
+        return self.stall_torque * self.position_gain
+
+    @property
+    def damping(self) -> float:
+        """Slope of the torque-speed line [N·m·s/rad]: full drive holds no_load_speed unloaded."""
+        return self.stall_torque / self.no_load_speed
+
+
+class XL330Params(ServoParams):
+    """DYNAMIXEL XL330-M288-T at 5 V."""
+
+    model_number: ClassVar[int] = 1200
+    voltage: ClassVar[float] = 5.0
+
+    stall_torque: float = number(
+        0.52, "N·m", "datasheet: XL330-M288, 5 V", "torque at standstill", gt=0
+    )
+    no_load_speed: float = number(
+        103.0 * _RPM, "rad/s", "datasheet: XL330-M288, 103 rpm at 5 V", "speed unloaded", gt=0
+    )
+    position_gain: float = number(
+        400 / 256 * TICKS_A_TURN / (2 * math.pi) / _PWM_LIMIT,
+        "1/rad",
+        "datasheet: Position P Gain 400, PWM limit 885; a recording of one shows a scale of 1/256",
+        "share of the full drive per radian of position error",
+        gt=0,
+    )
+    armature: float = number(
+        0.0014, "kg·m²", "measured: on a recording of one", "inertia at the output", ge=0
+    )
+
+
+class ServosParams(Params):
+    """The servo models by name; a joint group names one of them."""
+
+    xc430_w240: ServoParams = ServoParams()
+    xl330_m288: XL330Params = XL330Params()
+
+    def of(self, name: ServoName) -> ServoParams:
+        """The model of a name."""
+        return getattr(self, name)

@@ -1,0 +1,290 @@
+"""A robot as data: geometry, joints and servos, antennae. Every array shape follows from it.
+
+Links run head first, left before right. The joints of a robot stand in the order yaw, legs,
+antennae, and the pitch joints where servos move them: ids, angles and goals keep that order.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Literal
+
+from pydantic import model_validator
+
+from antennate.params.base import Params, number
+from antennate.robots.antenna import BASE, AntennaSpec
+from antennate.robots.joints import (
+    QUARTER,
+    STRAIGHT,
+    BaseParams,
+    JointParams,
+    LegParams,
+    PitchParams,
+    YawParams,
+)
+from antennate.robots.servos import EXTENDED_MODE, POSITION_MODE, TICKS_A_TURN, ServosParams
+from antennate.robots.sides import SIDES
+
+GroupName = Literal["yaw", "legs", "antennae", "pitch"]
+HARDWARE_ALONE = (
+    *(
+        f"robot.{group}.{name}"
+        for group in ("yaw", "legs", "antennae", "pitch")
+        for name in ("ids", "directions", "zeros", "limit", "fastest")
+    ),
+    "robot.antennae.servo",
+    "robot.antenna.sensor.rate",
+    "robot.baud",
+    "robot.release",
+)
+"""Parameters that only the robot's hardware, or its twin, reads; the simulation alone does not."""
+ANTENNA_PREFIXES = tuple(f"antenna_{side}_" for side in SIDES)
+
+
+class RobotSpec(Params):
+    """A walking robot: links with a pair of legs each, yaw joints between them, two antennae."""
+
+    links: int = number(6, "1", "paper: six links", "number of links", ge=2, le=50)
+    link_pitch: float = number(
+        0.10,
+        "m",
+        "assumed: one yaw servo and two leg servos (28.5 x 46.5 x 34 mm) a link",
+        "joint spacing",
+        gt=0.03,
+    )
+    mass: float = number(
+        2.0,
+        "kg",
+        "assumed: 17 servos of 65 g (datasheet) and as much again in frames and legs",
+        "total mass",
+        gt=0.3,
+    )
+    width: float = number(
+        0.20,
+        "m",
+        "paper: a free section of 0.40 m is called about twice the robot's width",
+        "width over the legs",
+        gt=0.08,
+    )
+    leg_radius: float = number(
+        0.030,
+        "m",
+        "assumed: a ring under the 34 mm body that gives 0.12 m/s within the servo's speed",
+        "outer radius of an O-leg",
+        gt=0,
+    )
+    leg_eccentricity: float = number(
+        0.012, "m", "assumed: as leg_radius", "distance of the ring's centre from its axle", ge=0
+    )
+    leg_width: float = number(
+        0.016, "m", "assumed: printed ring with a rubber tread", "thickness of an O-leg", gt=0
+    )
+    leg_mass: float = number(0.020, "kg", "assumed: printed ring", "mass of one O-leg", gt=0)
+    leg_friction: float = number(
+        0.6,
+        "1",
+        "assumed: rubber on a laboratory floor, 0.5 to 0.8",
+        "friction of a leg on the floor",
+        gt=0,
+        le=2,
+    )
+    body_friction: float = number(
+        0.3,
+        "1",
+        "assumed: printed plastic on paper",
+        "friction of the body against obstacles",
+        ge=0,
+        le=2,
+    )
+    body_radius: float = number(
+        0.020,
+        "m",
+        "assumed: half the height of the servo and its frame",
+        "radius of spine and cross-beams",
+        gt=0,
+    )
+    baud: Literal[57600, 115200, 1000000, 2000000, 3000000, 4000000] = number(
+        1_000_000,
+        "bit/s",
+        "assumed: write and read of 19 servos then take 4.3 of 10 ms",
+        "bus speed",
+    )
+    release: tuple[GroupName, ...] = number(
+        ("antennae", "yaw", "legs"),
+        "1",
+        "assumed: what carries the robot goes last; actuated pitch joints follow if not named",
+        "order in which the groups lose their torque",
+    )
+    yaw: YawParams = YawParams()
+    pitch: PitchParams = PitchParams()
+    legs: LegParams = LegParams()
+    antennae: BaseParams = BaseParams()
+    servos: ServosParams = ServosParams()
+    antenna: AntennaSpec = AntennaSpec()
+
+    @property
+    def yaw_count(self) -> int:
+        """Number of yaw joints, one between two links."""
+        return self.links - 1
+
+    @property
+    def leg_count(self) -> int:
+        """Number of legs, two a link."""
+        return len(SIDES) * self.links
+
+    @property
+    def pitch_count(self) -> int:
+        """Number of pitch joints that servos move."""
+        return self.links - 1 if self.pitch.kind == "actuated" else 0
+
+    @property
+    def length(self) -> float:
+        """Robot length without antennae [m]."""
+        return self.links * self.link_pitch
+
+    @property
+    def link_mass(self) -> float:
+        """Mass of one link without its legs [kg]."""
+        return (self.mass - self.leg_count * self.leg_mass - 2 * self.antenna.mass) / self.links
+
+    @property
+    def link_names(self) -> tuple[str, ...]:
+        """Names of the links, head first."""
+        return tuple(f"link{i}" for i in range(self.links))
+
+    @property
+    def yaw_names(self) -> tuple[str, ...]:
+        """Names of the yaw joints, head first."""
+        return tuple(f"yaw{j}" for j in range(1, self.links))
+
+    @property
+    def pitch_names(self) -> tuple[str, ...]:
+        """Names of all pitch joints, locked or not, head first."""
+        return tuple(f"pitch{j}" for j in range(1, self.links))
+
+    @property
+    def leg_names(self) -> tuple[str, ...]:
+        """Names of the legs in the order of an array over (link, side)."""
+        return tuple(f"leg_{side}{i}" for i in range(self.links) for side in SIDES)
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """Names of all joints that servos move."""
+        bases = tuple(prefix + BASE for prefix in ANTENNA_PREFIXES)
+        return self.yaw_names + self.leg_names + bases + self.pitch_names[: self.pitch_count]
+
+    @property
+    def groups(self) -> tuple[tuple[GroupName, JointParams, int], ...]:
+        """Name, description and number of joints of each group, in the order of the joints."""
+        return (
+            ("yaw", self.yaw, self.yaw_count),
+            ("legs", self.legs, self.leg_count),
+            ("antennae", self.antennae, len(SIDES)),
+            ("pitch", self.pitch, self.pitch_count),
+        )
+
+    def places(self, name: GroupName) -> slice:
+        """Where the joints of a group stand among all."""
+        first = 0
+        for known, _, count in self.groups:
+            if known == name:
+                return slice(first, first + count)
+            first += count
+        raise KeyError(name)
+
+    def command_shapes(self, batch: int = 1) -> dict[str, tuple[int, ...]]:
+        """Shapes of the arrays of a `JointCommand` for some robots, in the order of the joints."""
+        shapes = {
+            "yaw": (batch, self.yaw_count),
+            "leg": (batch, self.links, len(SIDES)),
+            "antenna": (batch, len(SIDES)),
+        }
+        return shapes | ({"pitch": (batch, self.pitch_count)} if self.pitch_count else {})
+
+    @property
+    def ids(self) -> tuple[int, ...]:
+        """Servo ids of all joints."""
+        found: list[int] = []
+        for _, group, count in self.groups:
+            first = len(found) + 1
+            found += group.ids or range(first, first + count)
+        return tuple(found)
+
+    @property
+    def directions(self) -> tuple[int, ...]:
+        """Sign of each joint between ticks and angle."""
+        return tuple(s for _, group, n in self.groups for s in group.directions or (1,) * n)
+
+    @property
+    def zeros(self) -> tuple[int, ...]:
+        """Position of each joint at the angle 0 [ticks]."""
+        return tuple(z for _, group, n in self.groups for z in group.zeros or (STRAIGHT,) * n)
+
+    @property
+    def limits(self) -> tuple[float, ...]:
+        """Largest angle of each joint either way [rad], inf for rolling legs."""
+        return tuple(group.largest for _, group, count in self.groups for _ in range(count))
+
+    @property
+    def fastest(self) -> tuple[float, ...]:
+        """Fastest that the goal of each joint moves [rad/s]."""
+        return tuple(group.fastest for _, group, count in self.groups for _ in range(count))
+
+    @property
+    def models(self) -> dict[int, int]:
+        """Model number of each servo by id."""
+        numbers = [
+            self.servos.of(group.servo).model_number
+            for _, group, n in self.groups
+            for _ in range(n)
+        ]
+        return dict(zip(self.ids, numbers, strict=True))
+
+    @property
+    def modes(self) -> dict[int, int]:
+        """Operating mode of each servo by id."""
+        modes = (POSITION_MODE if math.isfinite(limit) else EXTENDED_MODE for limit in self.limits)
+        return dict(zip(self.ids, modes, strict=True))
+
+    @property
+    def in_order_of_release(self) -> tuple[tuple[int, ...], ...]:
+        """Ids of the groups in the order in which they lose their torque."""
+        names: list[GroupName] = [name for name, _, _ in self.groups]
+        order = dict.fromkeys((*self.release, *names))
+        ids = (self.ids[self.places(name)] for name in order)
+        return tuple(group for group in ids if group)
+
+    @model_validator(mode="after")
+    def _agree(self) -> RobotSpec:
+        for name, group, count in self.groups:
+            _check_group(name, group, count)
+            speed = self.servos.of(group.servo).no_load_speed
+            if group.fastest > speed:
+                raise ValueError(
+                    f"{name}.fastest must be at most {speed:.4g} rad/s, the unloaded speed of "
+                    f"{group.servo}, got {group.fastest:g}"
+                )
+        if len(set(self.release)) < len(self.release):
+            raise ValueError(f"release must name each group once, got {', '.join(self.release)}")
+        ids = self.ids
+        if doubled := sorted({i for i in ids if ids.count(i) > 1}):
+            raise ValueError(f"ids must differ, got {', '.join(map(str, doubled))} more than once")
+        if self.link_mass <= 0.01:
+            raise ValueError(
+                f"mass must leave more than 10 g a link beside legs and antennae, got {self.mass} "
+                "kg"
+            )
+        return self
+
+
+def _check_group(name: GroupName, group: JointParams, count: int) -> None:
+    """Refuse lists of a wrong length, and zeros without room for a quarter turn either way."""
+    for what in ("ids", "directions", "zeros"):
+        if (found := len(getattr(group, what))) not in (0, count):
+            raise ValueError(f"{name}.{what} must have {count} entries, got {found}")
+    for zero in group.zeros if math.isfinite(group.largest) else ():
+        if not QUARTER <= zero <= TICKS_A_TURN - QUARTER:
+            raise ValueError(
+                f"{name}.zeros must leave a quarter turn to both sides, {QUARTER} to "
+                f"{TICKS_A_TURN - QUARTER} ticks, got {zero}"
+            )

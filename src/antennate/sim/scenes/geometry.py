@@ -1,0 +1,105 @@
+"""The plan of a tunnel: centre line, walls and lining as plain arrays, seen from above.
+
+The centre line starts at the origin along +x. Walls are the centre line moved sideways, mitred at
+the turns; at a turn the outer wall may be rounded.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from antennate.params import TunnelParams
+from antennate.types import Floats
+
+
+def centre_line(params: TunnelParams) -> Floats:
+    """Corner points of the centre line [m], shape (segments + 1, 2)."""
+    heading = 0.0
+    points = [np.zeros(2)]
+    for length, turn in zip(params.segments, (*params.turns_deg, 0.0), strict=True):
+        points.append(points[-1] + length * np.array([math.cos(heading), math.sin(heading)]))
+        heading += math.radians(turn)
+    return np.array(points)
+
+
+def offset_line(points: Floats, distance: float, corner_radius: float = 0.0) -> Floats:
+    """The polyline moved sideways by `distance` [m], positive to the left, shape (n, 2).
+
+    Corners are mitred; where the moved line is the outer one it is rounded by `corner_radius` [m].
+    """
+    along = np.diff(points, axis=0)
+    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    normal = np.stack([-along[:, 1], along[:, 0]], axis=1)
+    moved = [points[0] + distance * normal[0]]
+    for i in range(1, len(points) - 1):
+        before, after = normal[i - 1], normal[i]
+        mitre = points[i] + distance * (before + after) / (1.0 + before @ after)
+        into, out = along[i - 1], along[i]
+        turn = math.atan2(into[0] * out[1] - into[1] * out[0], into @ out)
+        if turn * distance < 0 and corner_radius > 0:
+            moved.extend(_fillet(mitre, into, out, turn, corner_radius))
+        else:
+            moved.append(mitre)
+    moved.append(points[-1] + distance * normal[-1])
+    return np.array(moved)
+
+
+def _fillet(corner: Floats, into: Floats, out: Floats, turn: float, radius: float) -> list[Floats]:
+    """Points of an arc of `radius` that touches both lines at a corner."""
+    back = radius * math.tan(abs(turn) / 2)
+    start = corner - back * into
+    side = math.copysign(1.0, turn) * np.array([-into[1], into[0]])
+    centre = start + radius * side
+    angles = np.linspace(0.0, turn, max(3, math.ceil(abs(turn) / 0.2) + 1))
+    spoke = start - centre
+    cos, sin = np.cos(angles), np.sin(angles)
+    return [
+        centre + np.array([c * spoke[0] - s * spoke[1], s * spoke[0] + c * spoke[1]])
+        for c, s in zip(cos, sin, strict=True)
+    ]
+
+
+def resample(points: Floats, spacing: Floats) -> Floats:
+    """Points at growing arc lengths `spacing` [m] along a polyline, up to its end, shape (n, 2)."""
+    step = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    arc = np.concatenate([[0.0], np.cumsum(step)])
+    spacing = spacing[spacing <= arc[-1]]
+    return np.stack([np.interp(spacing, arc, points[:, k]) for k in range(2)], axis=1)
+
+
+def progress(points: Floats, where: Floats) -> float:
+    """Arc length of the centre line's nearest point [m]; it goes on straight past its ends."""
+    x, y = where.tolist()
+    corners = points.tolist()
+    best, best_distance, done = 0.0, math.inf, 0.0
+    last = len(corners) - 2
+    for i in range(last + 1):
+        (x0, y0), (x1, y1) = corners[i], corners[i + 1]
+        dx, dy = x1 - x0, y1 - y0
+        length = math.hypot(dx, dy)
+        s = ((x - x0) * dx + (y - y0) * dy) / length
+        if i > 0:
+            s = max(s, 0.0)
+        if i < last:
+            s = min(s, length)
+        part = s / length
+        distance = math.hypot(x - x0 - dx * part, y - y0 - dy * part)
+        if distance < best_distance:
+            best, best_distance = done + s, distance
+        done += length
+    return best
+
+
+def contains(polygon: Floats, where: Floats) -> bool:
+    """Whether a point lies inside a closed polygon of corners (n, 2), by counting crossings."""
+    x, y = where.tolist()
+    corners = polygon.tolist()
+    inside = False
+    x0, y0 = corners[-1]
+    for x1, y1 in corners:
+        if (y0 > y) != (y1 > y) and x < x0 + (y - y0) / (y1 - y0) * (x1 - x0):
+            inside = not inside
+        x0, y0 = x1, y1
+    return inside

@@ -1,0 +1,127 @@
+"""Read an MJCF file of unknown origin.
+
+The engine's own reader opens any file that a model names and accepts models without end and numbers
+that are not numbers. So the file is read and bounded here first, and the engine gets a text and the
+contents of the files it names, all of them from the folder of the model or below.
+"""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from xml.etree import ElementTree
+
+import mujoco
+
+from antennate.errors import SceneError, in_one_line
+
+LARGEST_MODEL = 5_000_000
+"""Most bytes of a model."""
+LARGEST_ASSET = 20_000_000
+"""Most bytes of a mesh, texture or height field."""
+MOST_ELEMENTS = 20_000
+"""Most elements of a model, those of `replicate` and the like counted as often as they come."""
+_REFUSED = ("include", "extension", "plugin", "attach", "model", "size")
+_COUNTED = ("replicate", "composite", "flexcomp")
+_DIRECTORIES = ("assetdir", "meshdir", "texturedir")
+_LARGEST_SIDE = 4096
+"""Most rows or columns of a height field or texture."""
+_TEXTS = ("name", "class", "childclass", "file", "content_type")
+
+
+def read_spec(path: Path) -> mujoco.MjSpec:
+    """Read a model as a spec.
+
+    Raises:
+        SceneError: It cannot be read, is too large, or holds what a scene must not hold.
+    """
+    try:
+        data = _read(path, LARGEST_MODEL)
+        if b"<!DOCTYPE" in data or b"<!ENTITY" in data:
+            raise SceneError("expected no DOCTYPE and no ENTITY")
+        root = ElementTree.fromstring(data)  # noqa: S314 without DOCTYPE there are no entities
+        _check(root)
+        assets = _take_assets(root, path.parent)
+        text = ElementTree.tostring(root, encoding="unicode")
+        return mujoco.MjSpec.from_string(text, assets=assets)
+    except SceneError as error:
+        raise SceneError(f"{path}: {error}") from error
+    except (ElementTree.ParseError, ValueError, mujoco.FatalError) as error:
+        raise SceneError(f"{path}: expected an MJCF model, found {in_one_line(error)}") from error
+
+
+def _read(path: Path, largest: int) -> bytes:
+    try:
+        with path.open("rb") as file:
+            data = file.read(largest + 1)
+    except OSError as error:
+        raise SceneError(f"cannot read {path.name}: {error.strerror}") from error
+    if len(data) > largest:
+        raise SceneError(f"expected at most {largest} bytes in {path.name}, found more")
+    return data
+
+
+def _check(root: ElementTree.Element) -> None:
+    """Refuse what a scene must not hold, and bound what it may."""
+    if root.tag != "mujoco":
+        raise SceneError(f"expected an MJCF model, found the element <{root.tag}>")
+    total, waiting = 0, [(root, 1)]
+    while waiting:
+        element, copies = waiting.pop()
+        total += copies
+        if element.tag in _REFUSED:
+            raise SceneError(f"expected no <{element.tag}> in a scene, found one")
+        if element.tag in ("option", "flag") and element.attrib:
+            raise SceneError(
+                f"expected no <{element.tag}> with values in a scene, found "
+                f"{', '.join(element.attrib)}; the parameters `physics` set the numerics"
+            )
+        _check_numbers(element)
+        if element.tag in _COUNTED:
+            copies *= math.prod(max(1, int(float(n))) for n in element.get("count", "1").split())
+        if total > MOST_ELEMENTS or copies > MOST_ELEMENTS:
+            raise SceneError(f"expected at most {MOST_ELEMENTS} elements, copies counted")
+        waiting.extend((child, copies) for child in element)
+
+
+def _check_numbers(element: ElementTree.Element) -> None:
+    for key, text in element.attrib.items():
+        if key in _TEXTS:
+            continue
+        for word in text.split():
+            try:
+                value = float(word)
+            except ValueError:
+                continue
+            if not math.isfinite(value):
+                raise SceneError(f"expected finite numbers, found {key}={text!r:.60}")
+            if key in ("nrow", "ncol", "width", "height") and value > _LARGEST_SIDE:
+                raise SceneError(f"expected {key} of at most {_LARGEST_SIDE}, found {word}")
+
+
+def _take_assets(root: ElementTree.Element, folder: Path) -> dict[str, bytes]:
+    """Read the files that a model names, and let it name them by number."""
+    directories = dict.fromkeys(_DIRECTORIES, "")
+    for compiler in root.iter("compiler"):
+        for key in _DIRECTORIES:
+            directories[key] = compiler.attrib.pop(key, directories[key])
+    assets: dict[str, bytes] = {}
+    for element in root.iter():
+        own = directories["texturedir" if element.tag == "texture" else "meshdir"]
+        for key in [key for key in element.attrib if key.startswith("file")]:
+            named = element.get(key, "")
+            data = _read(_below(folder, Path(own or directories["assetdir"], named)), LARGEST_ASSET)
+            element.attrib.setdefault("name", Path(named).stem)
+            element.set(key, f"{len(assets)}{Path(named).suffix}")
+            assets[element.get(key, "")] = data
+    return assets
+
+
+def _below(folder: Path, named: Path) -> Path:
+    """The path of a file, which must be below the folder, links resolved."""
+    path = (folder / named).resolve()
+    if named.is_absolute() or not path.is_relative_to(folder.resolve()):
+        raise SceneError(
+            f"expected files in the folder of the model or below, found {str(named)!r}"
+        )
+    return path

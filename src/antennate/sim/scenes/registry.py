@@ -1,0 +1,62 @@
+"""Find a scene by name: one of ours, an MJCF file, or a class of the user's own."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from antennate.errors import AntennateError, SceneError, in_one_line
+from antennate.lookup import Registry
+from antennate.params import TunnelParams
+from antennate.sim.scenes.flat import FlatScene
+from antennate.sim.scenes.mjcf import MjcfScene
+from antennate.sim.scenes.scene import Scene
+from antennate.sim.scenes.tunnel import TunnelScene
+
+TUNNEL = "tunnel"
+SCENES: Registry[Callable[[], Scene]] = Registry(
+    "scene", "antennate.scenes", {TUNNEL: TunnelScene, "flat": FlatScene}
+)
+
+
+def check_name(name: str) -> None:
+    """Refuse a name that cannot be one of a scene; no code of the user runs.
+
+    Raises:
+        ConfigError: The name has another form.
+    """
+    if not _is_file(name):
+        SCENES.check(name)
+
+
+def make_scene(name: str, tunnel: TunnelParams | None = None) -> Scene:
+    """The scene of a name.
+
+    Args:
+        name: `tunnel`, `flat`, the path of an MJCF file that ends in .xml, or, for a class of the
+            user's own, `module:Class`, `path/file.py:Class` or an entry point of the group
+            `antennate.scenes`. Its constructor is called without arguments.
+        tunnel: Parameters of `tunnel`; no other scene takes them.
+
+    Raises:
+        ConfigError: There is no such scene.
+        SceneError: The file cannot be used, or the constructor failed.
+    """
+    if name == TUNNEL:
+        return TunnelScene(tunnel)
+    if _is_file(name):
+        return MjcfScene(name)
+    return _called(name, SCENES.find(name))
+
+
+def _called(name: str, make: Callable[[], Any]) -> Scene:
+    try:
+        return make()
+    except AntennateError:
+        raise
+    except Exception as error:
+        raise SceneError(f"scene {name!r} cannot be made: {in_one_line(error)}") from error
+
+
+def _is_file(name: str) -> bool:
+    return name.endswith(".xml")

@@ -1,0 +1,222 @@
+"""The tunnel: a corridor with turns, lined and strewn with cylinders that can be pushed.
+
+A cylinder slides and spins under one foot contact of four dimensions: with the elliptic cone its
+limit surface is the ellipsoid usual for a sliding patch, isotropic in the plane. Above the floor it
+is a vertical capsule whose straight part covers the robot's height, which collides like a cylinder
+there.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from antennate.errors import SceneError
+from antennate.params import CylinderParams, TunnelParams
+from antennate.robots.spec import RobotSpec
+from antennate.sim import layers
+from antennate.sim.scenes import geometry
+from antennate.sim.scenes.scene import LEFT_BEHIND, add_floor
+from antennate.types import Floats
+
+_WALL_HALF_THICKNESS = 0.02
+_WALL_HEIGHT = 0.25
+_FOOT_RADIUS = 0.01
+_SETTLE_GAP = 0.002
+"""Cylinders are set at least this far apart and off the walls [m]."""
+
+
+class TunnelScene:
+    """Draws tunnels.
+
+    Args:
+        params: Shape of the corridor, and its cylinders.
+    """
+
+    random = True
+
+    def __init__(self, params: TunnelParams | None = None) -> None:
+        self._params = params or TunnelParams()
+
+    def draw(self, robot: RobotSpec, rng: np.random.Generator) -> Tunnel:
+        """Draw one tunnel.
+
+        Raises:
+            SceneError: The robot does not fit, or the strewn cylinders do not.
+        """
+        params = self._params
+        if params.free_width < robot.width:
+            raise SceneError(
+                f"tunnel.free_width must be at least the robot's width of {robot.width} m, got "
+                f"{params.free_width} m"
+            )
+        mirrored = params.mirror == "always"
+        if params.mirror == "random":
+            mirrored = bool(rng.random() < 0.5)
+        centre = geometry.centre_line(params)
+        walls = (
+            geometry.offset_line(centre, params.wall_distance, params.corner_radius),
+            geometry.offset_line(centre, -params.wall_distance, params.corner_radius),
+        )
+        cylinders = _place_cylinders(params, robot, centre, walls, rng)
+        if mirrored:
+            flip = np.array([1.0, -1.0])
+            centre, cylinders = centre * flip, cylinders * flip
+            walls = (walls[1] * flip, walls[0] * flip)
+        return Tunnel(params=params, centre=centre, walls=walls, cylinders=cylinders)
+
+
+@dataclass(frozen=True, slots=True)
+class Tunnel:
+    """One drawn tunnel. Progress is arc length along its centre line.
+
+    Attributes:
+        centre: Corner points of the centre line [m], shape (n, 2).
+        walls: Two polylines [m], left and right.
+        cylinders: Where the cylinders stand at first [m], shape (m, 2).
+    """
+
+    params: TunnelParams
+    centre: Floats
+    walls: tuple[Floats, Floats]
+    cylinders: Floats
+
+    @property
+    def start(self) -> tuple[float, float, float]:
+        """The origin, facing along the first piece."""
+        return 0.0, 0.0, 0.0
+
+    @property
+    def length(self) -> float:
+        """Length of the centre line [m]."""
+        return self.params.length
+
+    @property
+    def exit(self) -> Floats:
+        """The line between the ends of the walls."""
+        return np.array([wall[-1] for wall in self.walls])
+
+    def build(self, spec: mujoco.MjSpec) -> None:
+        """Add floor, walls and cylinders."""
+        add_floor(spec)
+        friction = self.params.cylinder.contact_friction
+        for side, out, line in zip("lr", (1.0, -1.0), self.walls, strict=True):
+            for i in range(len(line) - 1):
+                _add_wall(spec, f"wall_{side}{i}", line[i], line[i + 1], out, friction)
+        for i, where in enumerate(self.cylinders):
+            _add_cylinder(spec, f"cylinder{i}", where, self.params.cylinder)
+
+    def progress(self, head: Floats) -> float:
+        """Arc length of the nearest point of the centre line [m]."""
+        return geometry.progress(self.centre, head)
+
+    def succeeded(self, head: Floats) -> bool:
+        """Whether the head has passed the end of the centre line."""
+        return self.progress(head) >= self.length
+
+    def left(self, head: Floats) -> bool:
+        """Whether it is far behind the entrance, or beside the walls."""
+        if self.progress(head) < 0.0:
+            return math.hypot(*head) >= LEFT_BEHIND
+        left, right = self.walls
+        return not geometry.contains(np.concatenate([left, right[::-1]]), head)
+
+
+def _place_cylinders(
+    params: TunnelParams,
+    robot: RobotSpec,
+    centre: Floats,
+    walls: tuple[Floats, Floats],
+    rng: np.random.Generator,
+) -> Floats:
+    placed: list[Floats] = []
+    diameter = 2 * params.cylinder.radius + _SETTLE_GAP
+    reach = params.free_width / 2 + params.cylinder.radius - _SETTLE_GAP
+    for distance in (reach, -reach):
+        line = geometry.offset_line(
+            centre, distance, max(0.0, params.corner_radius - params.cylinder.radius)
+        )
+        gaps = diameter + rng.uniform(0.0, 2.0 * params.lining_gap, size=1000)
+        start = rng.uniform(0.0, diameter)
+        for point in geometry.resample(line, start + np.cumsum(gaps)):
+            if _is_free(point, placed, diameter):
+                placed.append(point)
+    room = params.free_width / 2 - params.cylinder.radius
+    wanted = len(placed) + params.strewn
+    start_zone = robot.link_pitch + robot.antenna.length + 2 * params.cylinder.radius
+    for _ in range(200 * params.strewn):
+        if len(placed) == wanted:
+            break
+        point = geometry.resample(centre, np.array([rng.uniform(start_zone, params.length)]))[0]
+        point = point + rng.uniform(-max(room, 0.0), max(room, 0.0), size=2)
+        if _is_free(point, placed, diameter):
+            placed.append(point)
+    if len(placed) < wanted:
+        raise SceneError(
+            f"tunnel.strewn asks for {params.strewn} cylinders in the corridor, only "
+            f"{params.strewn - wanted + len(placed)} find room; widen or lengthen the tunnel, or "
+            "strew fewer"
+        )
+    return np.array(placed).reshape(-1, 2)
+
+
+def _is_free(point: Floats, placed: list[Floats], distance: float) -> bool:
+    return all(math.hypot(*(point - other)) >= distance for other in placed)
+
+
+def _add_wall(
+    spec: mujoco.MjSpec, name: str, start: Floats, end: Floats, out: float, friction: float
+) -> None:
+    along = end - start
+    length = float(np.linalg.norm(along))
+    normal = out * np.array([-along[1], along[0]]) / length
+    middle = (start + end) / 2 + normal * _WALL_HALF_THICKNESS
+    half = math.atan2(along[1], along[0]) / 2
+    spec.worldbody.add_geom(
+        name=name,
+        type=mujoco.mjtGeom.mjGEOM_BOX,
+        pos=[middle[0], middle[1], _WALL_HEIGHT / 2],
+        quat=[math.cos(half), 0, 0, math.sin(half)],
+        size=[length / 2, _WALL_HALF_THICKNESS, _WALL_HEIGHT / 2],
+        friction=[friction, 0, 0],
+        condim=3,
+        contype=layers.OBSTACLE,
+        conaffinity=layers.OBSTACLE,
+    )
+
+
+def _add_cylinder(spec: mujoco.MjSpec, name: str, where: Floats, params: CylinderParams) -> None:
+    body = spec.worldbody.add_body(name=name, pos=[where[0], where[1], 0.0])
+    axes = {"x": [1, 0, 0], "y": [0, 1, 0], "z": [0, 0, 1]}
+    for axis, direction in axes.items():
+        body.add_joint(name=f"{name}_{axis}", type=mujoco.mjtJoint.mjJNT_SLIDE, axis=direction)
+    body.add_joint(name=f"{name}_spin", type=mujoco.mjtJoint.mjJNT_HINGE, axis=[0, 0, 1])
+    body.explicitinertial = True
+    body.mass = params.mass
+    body.ipos = [0, 0, params.height / 2]
+    spin = params.mass * params.radius**2
+    body.inertia = [spin, spin, spin]
+    body.add_geom(
+        name=name,
+        type=mujoco.mjtGeom.mjGEOM_CAPSULE,
+        fromto=[0, 0, 0, 0, 0, params.height],
+        size=[params.radius, 0, 0],
+        friction=[params.contact_friction, 0, 0],
+        condim=3,
+        contype=layers.OBSTACLE,
+        conaffinity=layers.OBSTACLE,
+    )
+    body.add_geom(
+        name=f"{name}_foot",
+        type=mujoco.mjtGeom.mjGEOM_SPHERE,
+        pos=[0, 0, _FOOT_RADIUS],
+        size=[_FOOT_RADIUS, 0, 0],
+        friction=[params.friction, params.spin_friction, 0],
+        priority=1,
+        condim=4,
+        contype=0,
+        conaffinity=layers.FLOOR,
+    )

@@ -1,0 +1,187 @@
+"""One trial: its scene, the robot's start and its disturbances, from a seed and a number."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+import numpy as np
+from pydantic import model_validator
+
+from antennate.control.gait import targets
+from antennate.errors import AntennateError, SceneError, in_one_line
+from antennate.params import (
+    GaitParams,
+    Params,
+    PhysicsParams,
+    TunnelParams,
+    VariationParams,
+    number,
+)
+from antennate.robots.spec import RobotSpec
+from antennate.sim.scenes.registry import TUNNEL, check_name, make_scene
+from antennate.sim.scenes.scene import Scene, SceneInstance
+from antennate.sim.sim_robot import Disturbance
+from antennate.sim.world import World, compile_world
+
+MOST_OVERLAP = 0.005
+"""Deepest that the robot may be in an obstacle at the start [m]: legs stand on edges."""
+
+
+class TrialConfig(Params):
+    """What decides how a trial starts."""
+
+    seed: int = number(0, "1", "assumed: any", "seed of all chance", ge=0)
+    scene: str = number(
+        TUNNEL,
+        "1",
+        "paper: a cluttered tunnel",
+        "tunnel, flat, a MJCF file.xml, MODULE:CLASS or file.py:CLASS",
+        examples=["tunnel", "flat"],
+    )
+    tunnel: TunnelParams = TunnelParams()
+    robot: RobotSpec = RobotSpec()
+    variation: VariationParams = VariationParams()
+    physics: PhysicsParams = PhysicsParams()
+
+    @model_validator(mode="after")
+    def _scene_and_robot_agree(self) -> TrialConfig:
+        check_name(self.scene)
+        if self.scene != TUNNEL:
+            if self.tunnel != TunnelParams():
+                raise ValueError(
+                    f"tunnel belongs to the scene {TUNNEL!r}, got the scene {self.scene!r}"
+                )
+        elif self.tunnel.free_width < self.robot.width:
+            raise ValueError(
+                f"tunnel.free_width must be at least robot.width, {self.robot.width:g} m, "
+                f"got {self.tunnel.free_width:g} m"
+            )
+        return self
+
+
+@dataclass(frozen=True, slots=True)
+class Trial:
+    """A trial at its start.
+
+    Attributes:
+        world: The robot in its scene, placed.
+        chance: What chance does to it.
+        phase: Gait phase [rad].
+        scene: The scene that was drawn.
+    """
+
+    world: World
+    chance: Disturbance
+    phase: float
+    scene: SceneInstance
+
+
+def draw_trial(
+    config: TrialConfig, scene: Scene, trial: int, gait: GaitParams, period: float
+) -> Trial:
+    """Draw and compile one trial; it depends on the seed and its number alone.
+
+    Args:
+        config: What to draw from.
+        scene: The scene of that name, made once for many trials.
+        trial: Its number.
+        gait: The pose at the start is one of this gait.
+        period: Control period [s].
+
+    Raises:
+        SceneError: The scene cannot be built.
+    """
+    for_scene, for_start, for_chance = _generators(config.seed, trial)
+    robot, variation = config.robot, config.variation
+    with _errors_of(config.scene):
+        drawn = scene.draw(robot, for_scene)
+        world = make_world(config.physics, robot, drawn)
+    phase = float(for_start.uniform(0.0, 2.0 * math.pi))
+    lateral, heading = for_start.uniform(-1.0, 1.0, 2)
+    lateral, heading = lateral * variation.start_lateral, heading * variation.start_heading
+    place_at_start(world, drawn, gait, phase, lateral, heading)
+    chance = Disturbance(for_chance, variation, robot, period)
+    return Trial(world, chance, phase, drawn)
+
+
+def check_start(config: TrialConfig) -> None:
+    """Find a bad scene before anything is run: draw trial 0, and compile it if it is not ours.
+
+    Raises:
+        ConfigError: There is no such scene.
+        SceneError: It cannot be read, drawn or built, or the robot does not fit at its start.
+    """
+    scene = make_scene(config.scene, config.tunnel)
+    with _errors_of(config.scene):
+        drawn = scene.draw(config.robot, _generators(config.seed, 0)[0])
+        if config.scene != TUNNEL:
+            world = make_world(config.physics, config.robot, drawn)
+            place_at_start(world, drawn, GaitParams())
+            require_room(world)
+
+
+@contextmanager
+def _errors_of(name: str) -> Iterator[None]:
+    """Name the scene in whatever its code raises."""
+    try:
+        yield
+    except AntennateError:
+        raise
+    except Exception as error:
+        raise SceneError(f"scene {name!r} failed: {in_one_line(error)}") from error
+
+
+def require_room(world: World) -> None:
+    """Check that the robot stands free.
+
+    Raises:
+        SceneError: It is inside an obstacle, deeper than MOST_OVERLAP.
+    """
+    overlap = world.obstacle_overlap()
+    if overlap > MOST_OVERLAP:
+        raise SceneError(
+            "expected room for the robot at the start of the scene, found an obstacle "
+            f"{overlap:.3f} m deep in it"
+        )
+
+
+def make_world(physics: PhysicsParams, robot: RobotSpec, scene: SceneInstance) -> World:
+    """Compile the robot in a scene."""
+    return World(compile_world(physics, robot, scene), robot)
+
+
+def place_at_start(
+    world: World,
+    scene: SceneInstance,
+    gait: GaitParams,
+    phase: float = 0.0,
+    lateral: float = 0.0,
+    heading: float = 0.0,
+) -> None:
+    """Put the robot at the start of its scene, in the pose of a gait phase [rad].
+
+    Args:
+        world: Where it is.
+        scene: Says where the start is.
+        gait: Gives the pose.
+        phase: Gait phase [rad].
+        lateral: Offset to the left of the start [m].
+        heading: Turn to the left from the start's heading [rad].
+    """
+    x, y, ahead = scene.start
+    command = targets(gait, world.robot, np.array([phase]), np.zeros(1))
+    world.place(
+        x - lateral * math.sin(ahead),
+        y + lateral * math.cos(ahead),
+        ahead + heading,
+        command.yaw[0],
+        command.leg[0],
+    )
+
+
+def _generators(seed: int, trial: int) -> list[np.random.Generator]:
+    """Generators of the scene, the start and the disturbances."""
+    return [np.random.default_rng(s) for s in np.random.SeedSequence([seed, trial]).spawn(3)]

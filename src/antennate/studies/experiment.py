@@ -1,0 +1,77 @@
+"""What an experiment is: a configuration, a function that runs it, and how to tell what came out.
+
+An experiment is one object. `antennate NAME` parses its configuration, runs it, keeps its rows and
+its result in a run directory, prints its tables and its closing sentence, and draws its figures.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
+
+from antennate.params import Params
+from antennate.studies.measures import Table
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+OnStep = Callable[[int, int], None]
+"""Takes how many of how many parts are done."""
+OnRow = Callable[[Any], None]
+"""Takes a finished row, a dataclass."""
+
+
+class Outcome(Protocol):
+    """What a run returns: the rows of trials.csv, and the content of result.json."""
+
+    @property
+    def rows(self) -> Sequence[Any]:
+        """Finished trials, dataclasses, in a fixed order; empty where there are none."""
+        ...
+
+    def result(self) -> dict[str, Any]:
+        """The content of result.json; `interrupted` is true if trials are missing."""
+        ...
+
+
+class WithoutTrials:
+    """The rows of an outcome that has none."""
+
+    @property
+    def rows(self) -> Sequence[Any]:
+        """No rows."""
+        return ()
+
+
+Config = TypeVar("Config", bound=Params)
+Found = TypeVar("Found", bound=Outcome)
+
+
+@dataclass(frozen=True)
+class Experiment(Generic[Config, Found]):
+    """An experiment.
+
+    Attributes:
+        name: Name of the command.
+        description: What `--help` says; its first sentence is the summary in the list of commands.
+        config: Its configuration.
+        run: run(config, workers, on_step, on_row) -> outcome.
+        tables: Tables of a result.
+        sentence: One plain sentence: what came out, and how sure it is.
+        figures: Figures of an outcome by name.
+        files: Further files of an outcome by name.
+        check: Raises if a configuration cannot be run; called before anything is written.
+        parts: What `on_step` counts.
+    """
+
+    name: str
+    description: str
+    config: type[Config]
+    run: Callable[[Config, int, OnStep, OnRow], Found]
+    tables: Callable[[Mapping[str, Any]], Sequence[Table]]
+    sentence: Callable[[Mapping[str, Any]], str]
+    figures: Callable[[Found], Mapping[str, Figure]] = lambda outcome: {}
+    files: Callable[[Found], Mapping[str, str]] = lambda outcome: {}
+    check: Callable[[Config], None] = lambda config: None
+    parts: str = "trials"

@@ -1,0 +1,100 @@
+"""Configurations as TOML, results as strict JSON, rows as CSV; and rows back from CSV."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any
+
+from antennate.params import Params
+
+_CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f]+")
+_FORMULA = ("=", "+", "-", "@")
+
+
+def strict(value: Any) -> Any:
+    """The value with every NaN and infinity as None, fit for strict JSON."""
+    if isinstance(value, Mapping):
+        return {key: strict(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [strict(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def to_json(value: Any) -> str:
+    """Strict JSON, indented, as result.json holds it."""
+    return json.dumps(strict(value), indent=2, allow_nan=False) + "\n"
+
+
+def to_csv(rows: Iterable[Mapping[str, Any]]) -> str:
+    """A table with a header; text that a spreadsheet would take for a formula gets a quote."""
+    file = io.StringIO()
+    writer = csv.writer(file, lineterminator="\n")
+    for number, row in enumerate(rows):
+        if not number:
+            writer.writerow(row)
+        writer.writerow([_cell(value) for value in row.values()])
+    return file.getvalue()
+
+
+def from_csv(text: str) -> list[dict[str, Any]]:
+    """Rows of such a table; numbers as int or float, empty cells as None."""
+    return [
+        {key: _value_of(cell) for key, cell in row.items()}
+        for row in csv.DictReader(io.StringIO(text))
+    ]
+
+
+def _cell(value: Any) -> Any:
+    if not isinstance(value, str):
+        return value
+    text = _CONTROL.sub(" ", value)
+    return f"'{text}" if text.startswith(_FORMULA) else text
+
+
+def _value_of(cell: str | None) -> Any:
+    if not cell:
+        return None
+    if cell in ("True", "False"):
+        return cell == "True"
+    for kind in (int, float):
+        try:
+            return kind(cell)
+        except ValueError:
+            pass
+    return cell[1:] if cell.startswith("'") and cell[1:].startswith(_FORMULA) else cell
+
+
+def to_toml(config: Params) -> str:
+    """The complete configuration, each number with its unit and meaning.
+
+    Reading it back gives an equal one.
+    """
+    return "\n".join(_lines(config, ())) + "\n"
+
+
+def _lines(group: Params, path: tuple[str, ...]) -> Iterator[str]:
+    if path:
+        yield ""
+        yield f"[{'.'.join(path)}]"
+    groups = []
+    for name, field in type(group).model_fields.items():
+        value = getattr(group, name)
+        if isinstance(value, Params):
+            groups.append((name, value))
+        elif value is None:
+            yield f"# {name} is not set: {field.description}"
+        else:
+            yield f"{name} = {_toml(value)}  # {field.description}"
+    for name, value in groups:
+        yield from _lines(value, (*path, name))
+
+
+def _toml(value: Any) -> str:
+    if isinstance(value, tuple):
+        return f"[{', '.join(_toml(item) for item in value)}]"
+    return json.dumps(value) if isinstance(value, str | bool) else repr(value)

@@ -1,0 +1,129 @@
+"""Measures: what a study tells of many trials, each named once for JSON, tables and figures."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+NONE = "-"
+"""Shown where there is no number."""
+Of = Callable[[str, Sequence[Any]], Any]
+"""of(name, rows): the value of a measure of this name over rows."""
+
+
+@dataclass(frozen=True, slots=True)
+class Measure:
+    """One number, or the ends of an interval.
+
+    Attributes:
+        name: Key in result.json; a dot leads into a part (`share.forward`). It ends with the unit.
+        label: What tables and figures call it; a measure without one is not shown.
+        unit: Its unit as shown.
+        of: How rows make it; None if it is computed elsewhere.
+        form: Its format.
+        scale: Factor to the unit shown.
+    """
+
+    name: str
+    label: str = ""
+    unit: str = ""
+    of: Of | None = None
+    form: str = ".2f"
+    scale: float = 1.0
+
+    @property
+    def title(self) -> str:
+        """Label and unit."""
+        return f"{self.label} [{self.unit}]" if self.unit else self.label
+
+    def value(self, summary: Mapping[str, Any]) -> Any:
+        """Its value in a summary; None where there is none."""
+        found: Any = summary
+        for part in self.name.split("."):
+            found = found.get(part) if isinstance(found, Mapping) else None
+        return found
+
+    def cell(self, summary: Mapping[str, Any]) -> str:
+        """Its value in a summary as a table shows it."""
+        return shown(self.value(summary), self.form, self.scale)
+
+
+def shown(value: Any, form: str = ".2f", scale: float = 1.0) -> str:
+    """A number, an interval as `low to high`, a text, or a dash for None and NaN."""
+    if isinstance(value, str):
+        return value
+    if isinstance(value, Sequence | np.ndarray):
+        return " to ".join(f"{scale * end:{form}}" for end in value)
+    if value is None or value != value:
+        return NONE
+    return f"{scale * value if scale != 1.0 else value:{form}}"
+
+
+def summarise(measures: Iterable[Measure], rows: Sequence[Any]) -> dict[str, Any]:
+    """Every measure that is made from rows, as an object of result.json."""
+    summary: dict[str, Any] = {}
+    for measure in measures:
+        if measure.of is not None:
+            *path, last = measure.name.split(".")
+            place = summary
+            for part in path:
+                place = place.setdefault(part, {})
+            place[last] = measure.of(measure.name.replace(".", "_"), rows)
+    return summary
+
+
+def mean(name: str, rows: Sequence[Any]) -> float | None:
+    """Mean of a column; None without rows."""
+    return float(np.mean([getattr(row, name) for row in rows])) if rows else None
+
+
+def median(name: str, rows: Sequence[Any]) -> float | None:
+    """Median of a column; None without rows."""
+    return float(np.median([getattr(row, name) for row in rows])) if rows else None
+
+
+def largest(name: str, rows: Sequence[Any]) -> float | None:
+    """Largest value of a column; None without rows."""
+    return max((getattr(row, name) for row in rows), default=None)
+
+
+def total(name: str, rows: Sequence[Any]) -> int:
+    """Sum of a column."""
+    return sum(getattr(row, name) for row in rows)
+
+
+def count(column: str, value: Any) -> Of:
+    """How many rows hold a value in a column."""
+    return lambda name, rows: sum(getattr(row, column) == value for row in rows)
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """A table to be shown: measures are rows, so that it fits a narrow terminal.
+
+    Attributes:
+        title: Above it.
+        columns: Names of the columns.
+        rows: Name and cells of every row.
+        note: Under it.
+    """
+
+    title: str
+    columns: Sequence[str]
+    rows: Sequence[tuple[str, Sequence[str]]]
+    note: str = ""
+
+    @classmethod
+    def of(
+        cls,
+        title: str,
+        columns: Mapping[str, Mapping[str, Any]],
+        measures: Iterable[Measure],
+        note: str = "",
+    ) -> Table:
+        """The measures that have a label, for a summary in each column."""
+        rows = [(m.title, [m.cell(c) for c in columns.values()]) for m in measures if m.label]
+        return cls(title, list(columns), rows, note)

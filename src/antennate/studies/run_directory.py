@@ -1,0 +1,262 @@
+"""The run directory: everything about one run in one place, and nothing half written.
+
+Files are written whole. While a run goes on, finished trials are appended to
+`trials.partial.jsonl`. A directory that holds a run is left alone unless told otherwise; then the
+files of that run go first, so that nothing old stands beside the new. Only a calibration stays
+until the next one replaces it, so that a robot is never without.
+
+```python
+with RunDirectory.create("tunnel", "runs/mine") as run:
+    run.describe(config)
+    run.finish(outcome.result(), outcome.rows)
+RunDirectory.open("runs/mine").rows()
+```
+"""
+
+from __future__ import annotations
+
+import contextlib
+import itertools
+import json
+import os
+import platform
+import shlex
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict
+from importlib import metadata
+from pathlib import Path
+from typing import IO, Any
+
+from antennate import __version__
+from antennate.errors import BadInputError, OutputError
+from antennate.files import write_whole
+from antennate.params import Params
+from antennate.params.log import MOST_PARTS
+from antennate.params.reading import Config, read_file
+from antennate.studies.formats import from_csv, strict, to_csv, to_json, to_toml
+from antennate.telemetry.parts import part
+
+RESULT, TABLE, PARTIAL = "result.json", "trials.csv", "trials.partial.jsonl"
+CONFIG, VERSIONS, COMMAND = "config.toml", "versions.json", "command.txt"
+FIGURES = "figures"
+"""Folder of the figures; what it holds as svg and png belongs to the run."""
+CALIBRATION, LOG = "calibration.json", "drive.log"
+_LOGS = tuple(part(Path(LOG), number).name for number in range(1, MOST_PARTS + 1))
+_FILES = (CALIBRATION, "conditioning.toml", "recording.csv", "ticks.csv", *_LOGS)
+_NAMES = (RESULT, PARTIAL, TABLE, CONFIG, VERSIONS, COMMAND, *_FILES)
+"""Every file that a run may write beside its figures."""
+
+
+class RunDirectory:
+    """The directory of one run; as a context it removes itself if it ends without anything to keep.
+
+    Attributes:
+        path: Where it is.
+    """
+
+    def __init__(self, path: Path, created: Sequence[Path] = (), partial: IO[str] | None = None):
+        self.path = path
+        self._created = created
+        self._partial = partial
+        self._kept = partial is None
+
+    @classmethod
+    def create(
+        cls, command: str, path: str | Path | None = None, overwrite: bool = False
+    ) -> RunDirectory:
+        """Claim a directory for a run of `command`.
+
+        Args:
+            command: Name of the experiment or command.
+            path: The directory; the next free `runs/COMMAND-N` if not given.
+            overwrite: Remove the run that it holds.
+
+        Raises:
+            OutputError: It cannot be made or written to, or it holds another run.
+        """
+        if path == "":
+            raise OutputError("expected the name of a folder, found an empty one")
+        place = _free(command) if path is None else Path(path)
+        with _writing(place):
+            missing = [p for p in (place, *place.parents) if not p.exists()]
+            place.mkdir(parents=True, exist_ok=path is not None)
+            held = _held(place)
+            if held and not overwrite:
+                raise OutputError(
+                    f"expected a folder without a run, found {held[0]}; "
+                    "choose another or give --overwrite"
+                )
+            for file in held:
+                if (command, file.name) != ("calibrate", CALIBRATION):
+                    file.unlink()
+            return cls(place, missing, (place / PARTIAL).open("x", encoding="utf-8"))
+
+    @classmethod
+    def open(cls, path: str | Path) -> RunDirectory:
+        """A directory that a run has left, to read.
+
+        Raises:
+            BadInputError: It holds no run.
+        """
+        place = Path(path)
+        if not any((place / name).exists() for name in (RESULT, PARTIAL, CONFIG)):
+            raise BadInputError(f"{place}: expected the folder of a run, found no {RESULT}")
+        return cls(place)
+
+    def result(self) -> dict[str, Any]:
+        """The content of result.json.
+
+        Raises:
+            BadInputError: There is none, or it is damaged.
+        """
+        return self._decoded(RESULT, json.loads)
+
+    def rows(self) -> list[dict[str, Any]]:
+        """The finished trials: those of trials.csv, or of a run that was stopped.
+
+        Raises:
+            BadInputError: The file is damaged.
+        """
+        if (self.path / TABLE).exists():
+            return self._decoded(TABLE, from_csv)
+        if (self.path / PARTIAL).exists():
+            return self._decoded(PARTIAL, lambda text: list(map(json.loads, text.splitlines())))
+        return []
+
+    def config(self, model: type[Config]) -> Config:
+        """The configuration of the run.
+
+        Raises:
+            BadInputError: It is missing or damaged, or is of another command.
+        """
+        return read_file(self.path / CONFIG, model)
+
+    def _decoded(self, name: str, decode: Any) -> Any:
+        path = self.path / name
+        try:
+            return decode(path.read_text("utf-8"))
+        except OSError as error:
+            raise BadInputError(
+                f"expected a readable file, found {path}: {error.strerror}"
+            ) from None
+        except ValueError as error:
+            raise BadInputError(
+                f"{path}: expected a whole file of this kind, found: {str(error).splitlines()[0]}"
+            ) from None
+
+    def describe(self, config: Params, command: Sequence[str] = ()) -> None:
+        """Write what is known before the run: configuration, versions and command.
+
+        Args:
+            config: The configuration.
+            command: Words of the command line, if it was one.
+        """
+        self.write(CONFIG, to_toml(config))
+        self.write(VERSIONS, to_json(_versions()))
+        if command:
+            self.write(COMMAND, shlex.join(command) + "\n")
+
+    def without_trials(self) -> None:
+        """Say that this run has none, so that no empty file of them is left if it is killed."""
+        self._drop_partial()
+
+    def append(self, row: Any) -> None:
+        """Keep one finished trial, a dataclass or a mapping, at once."""
+        if self._partial is None:
+            raise OutputError(f"{self.path}: expected a run that goes on, found a finished one")
+        with _writing(self.path / PARTIAL):
+            self._partial.write(json.dumps(strict(_plain(row))) + "\n")
+            self._partial.flush()
+        self._kept = True
+
+    def finish(self, result: Mapping[str, Any], rows: Iterable[Any] = ()) -> None:
+        """Write the result and, if there are rows, their table; then drop the partial file."""
+        table = to_csv(_plain(row) for row in rows)
+        if table:
+            self.write(TABLE, table)
+        self.write(RESULT, to_json(result))
+        self._kept = True
+        self._drop_partial()
+
+    def write(self, name: str, content: str | bytes) -> None:
+        """Put one file into the directory, whole or not at all.
+
+        Raises:
+            OutputError: It cannot be written.
+        """
+        path = self.path / name
+        with _writing(path):
+            path.parent.mkdir(exist_ok=True)
+        data = content.encode("utf-8") if isinstance(content, str) else content
+        write_whole(path, data, overwrite=True)
+
+    def write_figures(self, figures: Mapping[str, Any]) -> None:
+        """Put figures into the directory, each as svg and png, by name."""
+        from antennate.figures import render
+
+        for name, figure in figures.items():
+            for suffix, data in render(figure).items():
+                self.write(f"{FIGURES}/{name}.{suffix}", data)
+
+    def _drop_partial(self) -> None:
+        if self._partial is None:
+            return
+        with _writing(self.path / PARTIAL):
+            self._partial.close()
+            (self.path / PARTIAL).unlink(missing_ok=True)
+
+    def __enter__(self) -> RunDirectory:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._kept:
+            if self._partial is not None:
+                with contextlib.suppress(OSError):
+                    self._partial.close()
+            return
+        with contextlib.suppress(OSError, OutputError):
+            self._drop_partial()
+            for name in (CONFIG, VERSIONS, COMMAND) if self._created else ():
+                (self.path / name).unlink(missing_ok=True)
+            for path in self._created:
+                path.rmdir()
+
+
+def _held(place: Path) -> list[Path]:
+    """Files of a run that a directory holds."""
+    figures = place / FIGURES
+    drawn = [p for p in figures.iterdir() if p.suffix in (".svg", ".png")] if _is(figures) else []
+    return [place / name for name in _NAMES if os.path.lexists(place / name)] + sorted(drawn)
+
+
+def _is(folder: Path) -> bool:
+    return folder.is_dir() and not folder.is_symlink()
+
+
+def _plain(row: Any) -> Mapping[str, Any]:
+    return row if isinstance(row, Mapping) else asdict(row)
+
+
+def _versions() -> dict[str, str]:
+    """What the numbers may depend on."""
+    return {
+        "antennate": __version__,
+        "python": platform.python_version(),
+        "numpy": metadata.version("numpy"),
+        "scipy": metadata.version("scipy"),
+        "mujoco": metadata.version("mujoco-core"),
+        "platform": f"{platform.system()} {platform.machine()}",
+    }
+
+
+def _free(command: str) -> Path:
+    runs = Path("runs")
+    return next(path for n in itertools.count(1) if not (path := runs / f"{command}-{n}").exists())
+
+
+@contextlib.contextmanager
+def _writing(path: Path) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        raise OutputError(f"expected to write {path}, found: {error.strerror or error}") from None

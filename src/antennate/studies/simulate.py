@@ -1,0 +1,81 @@
+"""One simulated trial and its time series."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from antennate.control.loop import run_loop
+from antennate.control.registry import ControllerFactory, make_controller
+from antennate.params import ControlParams
+from antennate.params.reading import from_values
+from antennate.sim.scenes.registry import make_scene
+from antennate.sim.sim_robot import SimRobot
+from antennate.sim.trial import TrialConfig, draw_trial
+from antennate.telemetry.time_series import TimeSeries, TimeSeriesRecorder
+from antennate.types import AntennaFrame, JointCommand
+
+_EVERY = 10
+"""Ticks between two looks at the scene: 10 Hz at the usual rate, as in the experiments."""
+
+
+def simulate(
+    controller: str | ControllerFactory = "closed",
+    trial: int = 0,
+    time_limit: float = 100.0,
+    control: ControlParams | None = None,
+    **settings: Any,
+) -> TimeSeries:
+    """Run one trial of one robot and return what was read, decided and commanded at each tick.
+
+    It meets the same scene, start and disturbances as that trial of `antennate tunnel`.
+
+    Args:
+        controller: A name, as `closed` or `file.py:Class`, or a controller class.
+        trial: Number of the trial.
+        time_limit: Time after which it ends [s]; it ends earlier at the exit, or when the robot has
+            left the scene or the physics failed.
+        control: Parameters of the controller, the defaults if not given.
+        settings: Fields of the trial: seed, scene, robot, tunnel, variation, physics.
+
+    Returns:
+        The series; `meta["outcome"]` is success, timeout, left or invalid.
+
+    Raises:
+        ConfigError: A setting is unknown or out of bounds, or there is no such controller.
+        SceneError: The scene cannot be built.
+    """
+    config, control = from_values(TrialConfig, settings), control or ControlParams()
+    scene = make_scene(config.scene, config.tunnel)
+    start = draw_trial(config, scene, trial, control.gait, control.period)
+    controlling = make_controller(controller, control, config.robot, 1)
+    robot = SimRobot(1, config.robot, control.period, config.physics.timestep)
+    robot.load(0, start.world, start.chance)
+    controlling.reset(np.array([0]), start.phase)
+    recorder = TimeSeriesRecorder(controlling, lambda: start.world.head[:2])
+    ticks, outcome = 0, "timeout"
+
+    def go_on(frame: AntennaFrame, command: JointCommand) -> bool:
+        nonlocal ticks, outcome
+        recorder.take(frame, command)
+        ticks += 1
+        if robot.failure(0) is not None:
+            outcome = "invalid"
+        elif ticks % _EVERY == 0 and start.scene.succeeded(start.world.head[:2]):
+            outcome = "success"
+        elif ticks % _EVERY == 0 and start.scene.left(start.world.head[:2]):
+            outcome = "left"
+        return outcome == "timeout" and start.world.t < time_limit
+
+    run_loop(robot, controlling, control.period, go_on)
+    return recorder.series(
+        {
+            "controller": controller if isinstance(controller, str) else controller.__name__,
+            "scene": config.scene,
+            "seed": config.seed,
+            "trial": trial,
+            "period_s": control.period,
+            "outcome": outcome,
+        }
+    )

@@ -1,0 +1,6 @@
+"""Checks for the tests of whoever writes a controller or a scene of their own."""
+
+from antennate.control.check_controller import check_controller
+from antennate.sim.check_scene import check_scene
+
+__all__ = ["check_controller", "check_scene"]

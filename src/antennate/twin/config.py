@@ -1,0 +1,79 @@
+"""What `antennate twin` serves: the robot at the start of a trial, behind real bytes."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from antennate.params import ConditioningParams, GaitParams, Params, number
+from antennate.params.base import GATHERED
+from antennate.params.twin import BatteryParams
+from antennate.robots.spec import RobotSpec
+from antennate.sim.scenes.registry import make_scene
+from antennate.sim.sim_robot import SimRobot
+from antennate.sim.trial import TrialConfig, draw_trial
+from antennate.twin.passage import Passage
+from antennate.twin.robot import TwinRobot
+from antennate.twin.touch import TouchStimulus
+
+
+class TwinControlParams(Params):
+    """What the twin needs of the control: it has no controller of its own."""
+
+    rate: float = number(
+        100.0, "Hz", "paper: about 100 Hz over serial", "samples per second", gt=0, le=1000
+    )
+    gait: GaitParams = GaitParams()
+    conditioning: ConditioningParams = ConditioningParams()
+
+    @property
+    def period(self) -> float:
+        """Time between samples [s]."""
+        return 1.0 / self.rate
+
+
+class TwinConfig(TrialConfig):
+    """The robot that `antennate twin` serves, and the trial at whose start it stands."""
+
+    trial: int = number(0, "1", "assumed: the first", "trial of the seed", ge=0)
+    duration: float | None = number(
+        None, "s", "assumed: until it is stopped", "time to serve", gt=0
+    )
+    fault: Annotated[tuple[str, ...], GATHERED] = number(
+        (), "1", "assumed: nothing is broken", "faults, such as servo:7=silent@3s"
+    )
+    touch: Annotated[tuple[str, ...], GATHERED] = number(
+        (),
+        "1",
+        "assumed: nobody is there",
+        "antennae touched before it walks, such as left@2s; from the first packet on the bus",
+    )
+    battery: BatteryParams = BatteryParams()
+    robot: RobotSpec = RobotSpec()
+    control: TwinControlParams = TwinControlParams()
+
+
+def build(config: TwinConfig, boot_id: int | None = None) -> TwinRobot:
+    """The robot at the start of its trial; each start of a real board has a boot id of its own."""
+    return watched(config, boot_id)[0]
+
+
+def watched(config: TwinConfig, boot_id: int | None = None) -> tuple[TwinRobot, Passage]:
+    """The same, and how far it comes."""
+    control, period = config.control, config.control.period
+    scene = make_scene(config.scene, config.tunnel)
+    start = draw_trial(config, scene, config.trial, control.gait, period)
+    body = SimRobot(1, config.robot, period, config.physics.timestep)
+    body.load(0, start.world, start.chance)
+    boot = config.trial + 1 if boot_id is None else boot_id
+    touch, passage = TouchStimulus(config.touch, control.conditioning), Passage(start.scene)
+    robot = TwinRobot(
+        body,
+        config.robot,
+        period,
+        boot,
+        standing_noise=True,
+        touch=touch,
+        watch=passage.watch,
+        battery=config.battery,
+    )
+    return robot, passage

@@ -1,0 +1,47 @@
+"""How far a twin has come in its scene."""
+
+from __future__ import annotations
+
+import math
+
+from antennate.sim.scenes.scene import SceneInstance
+from antennate.sim.world import World
+
+_EVERY = 10
+"""Ticks between two looks: 10 Hz at the usual rate, as in a trial."""
+
+
+class Passage:
+    """Follows the head through a scene.
+
+    Args:
+        scene: Where the robot walks.
+
+    Attributes:
+        progress: How far the head has come [m].
+        passed: Time of walking at which the head passed the exit [s], inf before.
+    """
+
+    def __init__(self, scene: SceneInstance) -> None:
+        self._scene = scene
+        self._ticks = 0
+        self.progress = 0.0
+        self.passed = math.inf
+
+    def watch(self, world: World) -> None:
+        """Look at the world after a tick."""
+        self._ticks += 1
+        if self._ticks % _EVERY:
+            return
+        head = world.head[:2].copy()
+        self.progress = self._scene.progress(head)
+        if self._scene.succeeded(head):
+            self.passed = min(self.passed, world.t)
+
+    @property
+    def summary(self) -> str:
+        """The same in one sentence."""
+        length = self._scene.length
+        if self.passed < math.inf:
+            return f"the head passed the exit after {self.passed:.1f} s of walking"
+        return f"the head came {self.progress:.2f} m of {length:.2f} m"

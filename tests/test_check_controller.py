@@ -1,0 +1,216 @@
+"""check_controller accepts what keeps the protocol, and names what is broken in the rest."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from antennate.control.controllers import closed_loop
+from antennate.testing import check_controller
+from antennate.types import AntennaFrame, JointCommand
+
+
+@pytest.mark.parametrize("name", ["open", "paper", "closed"])
+def test_our_controllers_keep_the_protocol(name: str) -> None:
+    check_controller(name)
+
+
+class Around:
+    """`closed`, to be broken in one place by those below."""
+
+    def __init__(self, control: Any, robot: Any, batch: int) -> None:
+        self.inner, self.batch, self.ticks = closed_loop(control, robot, batch), batch, 0
+        self.noise = np.random.default_rng()
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.inner, name)
+
+    def reset(self, rows: Any, phase: Any = 0.0) -> None:
+        self.inner.reset(rows, phase)
+
+    def step(self, frame: AntennaFrame) -> JointCommand:
+        self.ticks += 1
+        return self.inner.step(frame)
+
+
+class ForOneOnly(Around):
+    def __init__(self, control: Any, robot: Any, batch: int) -> None:
+        super().__init__(control, robot, 1)
+
+
+class FewJoints(Around):
+    def step(self, frame: AntennaFrame) -> JointCommand:
+        command = super().step(frame)
+        return JointCommand(command.yaw[:, :2], command.leg, command.antenna)
+
+
+class NoArray(Around):
+    def step(self, frame: AntennaFrame) -> JointCommand:
+        command = super().step(frame)
+        self.level = self.inner.level.tolist()
+        return command
+
+
+class NoManeuver(Around):
+    def step(self, frame: AntennaFrame) -> JointCommand:
+        command = super().step(frame)
+        self.maneuver = self.inner.maneuver + 7
+        return command
+
+
+class FloatManeuver(Around):
+    def step(self, frame: AntennaFrame) -> JointCommand:
+        command = super().step(frame)
+        self.maneuver = self.inner.maneuver.astype(float)
+        return command
+
+
+class NoContact(Around):
+    def step(self, frame: AntennaFrame) -> JointCommand:
+        command = super().step(frame)
+        self.contact = self.inner.contact + 5
+        return command
+
+
+class LevelInPercent(Around):
+    def step(self, frame: AntennaFrame) -> JointCommand:
+        command = super().step(frame)
+        self.level = 100.0 * self.inner.level
+        return command
+
+
+class NotFinite(Around):
+    def step(self, frame: AntennaFrame) -> JointCommand:
+        command = super().step(frame)
+        command.leg[0, 0, 0] = math.nan
+        return command
+
+
+class Raises(Around):
+    def step(self, frame: AntennaFrame) -> JointCommand:
+        raise ZeroDivisionError("of my own")
+
+
+class ByChance(Around):
+    def step(self, frame: AntennaFrame) -> JointCommand:
+        command = super().step(frame)
+        command.antenna[:] += self.noise.normal(0.0, 0.01)
+        return command
+
+
+class RowsTogether(Around):
+    def step(self, frame: AntennaFrame) -> JointCommand:
+        command = super().step(frame)
+        command.yaw[:] += np.nanmean(frame.counts) * 1e-6
+        return command
+
+
+class FirstRowDiffers(Around):
+    def step(self, frame: AntennaFrame) -> JointCommand:
+        command = super().step(frame)
+        command.yaw[0] += 0.01
+        return command
+
+
+class BatchCounts(Around):
+    def step(self, frame: AntennaFrame) -> JointCommand:
+        command = super().step(frame)
+        command.yaw[:] += 0.01 * self.batch
+        return command
+
+
+class ResetsAll(Around):
+    def reset(self, rows: Any, phase: Any = 0.0) -> None:
+        self.inner.reset(np.arange(self.batch), np.broadcast_to(phase, self.batch))
+
+
+class ResetsNothing(Around):
+    def reset(self, rows: Any, phase: Any = 0.0) -> None:
+        if not self.ticks:
+            self.inner.reset(rows, phase)
+
+
+class WalksBlind(Around):
+    def step(self, frame: AntennaFrame) -> JointCommand:
+        counts = np.where(np.isfinite(frame.counts), frame.counts, 1872.0)
+        return super().step(AntennaFrame(t=frame.t, counts=counts))
+
+
+class CreepsBlind(Around):
+    def step(self, frame: AntennaFrame) -> JointCommand:
+        command = super().step(frame)
+        command.leg[:] += 1e-4 * frame.t[:, None, None]
+        return command
+
+
+class KnowsBlind(Around):
+    def step(self, frame: AntennaFrame) -> JointCommand:
+        command = super().step(frame)
+        self.contact = np.where(self.inner.contact == 2, 1, self.inner.contact)
+        return command
+
+
+class Scribbles(Around):
+    def step(self, frame: AntennaFrame) -> JointCommand:
+        command = super().step(frame)
+        frame.counts[:] = 0.0
+        return command
+
+
+class KeepsBuffer(Around):
+    def step(self, frame: AntennaFrame) -> JointCommand:
+        command = super().step(frame)
+        self.buffer = getattr(self, "buffer", command.leg)
+        self.buffer[...] = command.leg
+        return JointCommand(command.yaw, self.buffer, command.antenna)
+
+
+class TrustsItsCommand(Around):
+    last = None
+
+    def step(self, frame: AntennaFrame) -> JointCommand:
+        command = super().step(frame)
+        if self.last is not None and not np.isfinite(self.last.yaw).all():
+            command.yaw[:] = 0.0
+        self.last = command
+        return command
+
+
+BROKEN = {
+    ForOneOnly: "IndexError.*with 5 rows",
+    FewJoints: r"expected yaw of shape \(5, 5\), found \(5, 2\)",
+    NoArray: "expected an array as level, found list",
+    NoManeuver: "expected a maneuver of 0 to 4, found 7",
+    FloatManeuver: "expected whole numbers as maneuver, found an array of float64",
+    NoContact: "expected contacts of 0 to 2",
+    LevelInPercent: "expected levels of 0 to 1",
+    NotFinite: "expected finite angles in leg",
+    Raises: "step raised ZeroDivisionError: of my own",
+    ByChance: "expected the same answers to the same readings, found another antenna",
+    RowsTogether: "alone to answer as in a batch, found another yaw",
+    FirstRowDiffers: "from rows in another order, found another yaw",
+    BatchCounts: "alone to answer as in a batch, found another yaw",
+    ResetsAll: "the other rows to go on when one is reset",
+    ResetsNothing: "a row that is reset to answer as a new one",
+    WalksBlind: "expected HOLD while an antenna reads nan",
+    CreepsBlind: "expected joint targets that stand still in HOLD, found leg moves",
+    KnowsBlind: "expected UNKNOWN for a reading of nan",
+    Scribbles: "expected a frame that is left as it is",
+    KeepsBuffer: "expected a command that stays as it was returned",
+    TrustsItsCommand: "whatever becomes of a command that was returned",
+}
+
+
+@pytest.mark.parametrize("kind", BROKEN, ids=lambda kind: kind.__name__)
+def test_a_broken_controller_is_told_what_is_broken(kind: Any) -> None:
+    with pytest.raises(AssertionError, match=BROKEN[kind]):
+        check_controller(kind)
+
+
+@pytest.mark.parametrize("name", ["nobody", "no_such_module:Nobody"])
+def test_a_controller_that_is_not_there_fails_the_check(name: str) -> None:
+    with pytest.raises(AssertionError, match=name):
+        check_controller(name)

@@ -1,0 +1,86 @@
+"""What a shell offers after `source <(antennate --completion bash)`."""
+
+from __future__ import annotations
+
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from antennate.cli import main
+
+ASK = """\
+source "$1"; shift
+COMP_WORDS=("$@"); COMP_CWORD=$(($# - 1))
+_antennate
+printf '%s\\n' "${COMPREPLY[@]}"
+"""
+
+
+@pytest.fixture(scope="module")
+def script(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The script for bash."""
+    path = tmp_path_factory.mktemp("completion") / "antennate.bash"
+    with pytest.MonkeyPatch.context() as patch, path.open("w") as file:
+        patch.setattr("sys.stdout", file)
+        assert main(["--completion", "bash"]) == 0
+    return path
+
+
+def offered(script: Path, *words: str) -> list[str]:
+    """What bash offers for the last word."""
+    done = subprocess.run(
+        ["bash", "-c", ASK, "bash", script, "antennate", *words],
+        capture_output=True, text=True, check=True, timeout=30,
+    )  # fmt: skip
+    assert done.stderr == ""
+    return done.stdout.split()
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        (["tu"], ["tunnel"]),
+        (["--comp"], ["--completion"]),
+        (["tunnel", "--sce"], ["--scene"]),
+        (["tunnel", "--contr"], ["--controllers"]),
+        (["tunnel", "--trials", "3", "--tunnel.mir"], ["--tunnel.mirror"]),
+        (["tunnel", "--tunnel.mirror", ""], ["random", "never", "always"]),
+        (["wall", "--wall.gravity", "o"], ["off"]),
+        (["tunnel", "--controllers", "open", "cl"], ["closed"]),
+        (["drive", "--control", "pa"], []),
+        (["drive", "--controller", "pa"], ["paper"]),
+        (["drive", "--bu"], ["--bus"]),
+        (["nothing", "--a"], []),
+    ],
+)
+def test_bash_offers(script: Path, words: list[str], expected: list[str]) -> None:
+    found = offered(script, *words)
+    assert set(expected) <= set(found)
+    assert all(word.startswith(words[-1]) for word in found)
+    assert expected or not found
+
+
+def test_every_flag_of_a_command_is_offered(script: Path) -> None:
+    flags = offered(script, "springs", "--")
+    assert {"--config", "--out", "--wire", "--wanted-n-mm-per-deg", "--help-all"} <= set(flags)
+    assert len(flags) == len(set(flags))
+
+
+def test_fish_gets_a_line_for_each_flag(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["--completion", "fish"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert all(line.startswith("complete -c antennate ") for line in lines)
+    springs = "'__fish_seen_subcommand_from springs' -l wire -xa 'stainless_302 music_wire"
+    assert sum(springs in line for line in lines) == 1
+
+
+def test_zsh_reads_the_script_of_bash(script: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["--completion", "zsh"]) == 0
+    assert capsys.readouterr().out.endswith(script.read_text())
+
+
+@pytest.mark.parametrize("words", [[], ["tcsh"], ["bash", "zsh"]])
+def test_another_shell_is_refused(words: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["--completion", *words]) == 2
+    assert "expected one of bash, zsh, fish" in capsys.readouterr().err

@@ -1,0 +1,40 @@
+"""Every example runs as a user would run it, and shows what it says."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+EXAMPLES = Path(__file__).parents[1] / "examples"
+
+
+def ran(name: str, folder: Path) -> str:
+    """What an example prints; warnings are errors, and nothing may be left behind."""
+    done = subprocess.run(
+        [sys.executable, "-W", "error", str(EXAMPLES / f"{name}.py")],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        timeout=300,
+    )
+    assert done.returncode == 0, done.stderr
+    assert list(folder.iterdir()) == []
+    return done.stdout
+
+
+def test_trials_become_a_data_frame(tmp_path: Path) -> None:
+    out = ran("data_frame", tmp_path)
+    assert re.search(r"open +\d+\.\d+ +\d\.\d+", out)
+    assert re.search(r"closed +\d+\.\d+ +\d\.\d+", out)
+    assert "level_0" in out
+
+
+@pytest.mark.parametrize("path", sorted(EXAMPLES.glob("*.py")), ids=lambda path: path.stem)
+def test_examples_are_short_and_say_what_they_are(path: Path) -> None:
+    text = path.read_text()
+    assert len(text.splitlines()) <= 60
+    assert text.startswith('"""')

@@ -1,0 +1,96 @@
+"""Standard streams that are full, closed or know ASCII alone: what was computed is kept."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from terminal import Terminal
+
+RUN = [sys.executable, "-m", "antennate", "springs", "--out", "run"]
+SHELL = ["bash", "-c"]
+
+
+def run(redirection: str, folder: Path, **environment: str) -> subprocess.CompletedProcess[str]:
+    """`antennate springs` with its streams redirected by a shell."""
+    words = [*SHELL, f'"$@" {redirection}', "bash", *RUN]
+    known = {**os.environ, **environment}
+    return subprocess.run(
+        words, cwd=folder, env=known, capture_output=True, text=True, timeout=120, check=False
+    )
+
+
+def is_whole(folder: Path) -> bool:
+    """Whether the run left its result and its figure."""
+    assert json.loads((folder / "run" / "result.json").read_text())["command"] == "springs"
+    return (folder / "run" / "figures" / "springs.svg").stat().st_size > 1000
+
+
+@pytest.mark.parametrize(
+    ("redirection", "reason"),
+    [("> /dev/full", "No space left on device"), (">&-", "it is closed")],
+)
+def test_an_output_that_cannot_be_written_costs_no_result(
+    redirection: str, reason: str, tmp_path: Path
+) -> None:
+    done = run(redirection, tmp_path)
+    assert done.returncode == 2
+    assert done.stderr.splitlines() == [
+        "written to run",
+        f"antennate springs: error: standard output: expected to write, found: {reason}",
+    ]
+    assert is_whole(tmp_path)
+
+
+def test_a_reader_that_goes_early_is_no_error(tmp_path: Path) -> None:
+    done = run('| head -1; exit "${PIPESTATUS[0]}"', tmp_path)
+    assert done.returncode == 0
+    assert done.stdout.count("\n") == 1
+    assert "rror" not in done.stderr
+    assert is_whole(tmp_path)
+
+
+def test_a_table_for_an_output_that_knows_ascii_alone(tmp_path: Path) -> None:
+    done = run("", tmp_path, PYTHONIOENCODING="ascii")
+    assert done.returncode == 0, done.stderr
+    assert "stiffness [N.mm/deg]" in done.stdout
+    assert is_whole(tmp_path)
+
+
+@pytest.mark.parametrize("redirection", ["2> /dev/full", "2>&- >&- <&-"])
+def test_a_standard_error_that_cannot_be_written_costs_nothing(
+    redirection: str, tmp_path: Path
+) -> None:
+    done = run(redirection, tmp_path)
+    assert done.returncode == (2 if ">&-" in redirection else 0)
+    assert ("stiffness" in done.stdout) == (done.returncode == 0)
+    assert is_whole(tmp_path)
+
+
+@pytest.mark.parametrize("command", [["--version"], ["springs", "--help"]])
+def test_help_for_a_full_disk_is_an_error(command: list[str], tmp_path: Path) -> None:
+    with Path("/dev/full").open("w") as full:
+        words = [sys.executable, "-m", "antennate", *command]
+        done = subprocess.run(
+            words, stdout=full, stderr=subprocess.PIPE, text=True, timeout=60, check=False
+        )
+    assert done.returncode == 2
+    assert done.stderr.count("\n") == 1
+
+
+@pytest.mark.parametrize("term", ["xterm", "dumb"])
+def test_a_terminal_of_twenty_columns(term: str, tmp_path: Path) -> None:
+    terminal = Terminal(20)
+    words = [sys.executable, "-m", "antennate", "gait", "--cycles", "2", "--sweep-points", "2"]
+    environment = {"TERM": term, "NO_COLOR": "1"}
+    more = ["--settling-cycles", "0", "--no-figures", "--workers", "1"]
+    process = terminal.start([*words, *more], environment, cwd=tmp_path)
+    terminal.until(lambda _: False)
+    assert process.wait(30) == 0
+    assert "Traceback" not in terminal.text
+    assert "written to runs/gait-1" in terminal.text
+    assert ("\x1b" in terminal.text) == (term == "xterm")

@@ -1,0 +1,222 @@
+"""A controller of one's own: found by every name, run everywhere, and invalid where it fails."""
+
+from __future__ import annotations
+
+from importlib.metadata import EntryPoint
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from antennate import lookup
+from antennate.cli import main
+from antennate.control.controllers import RuleController, closed_loop, open_loop
+from antennate.control.registry import CONTROLLERS, make_controller
+from antennate.errors import ConfigError
+from antennate.experiments.tunnel.run import TunnelConfig, run
+from antennate.hardware.driving.config import DriveConfig
+from antennate.hardware.driving.connect import prepare
+from antennate.hardware.driving.drive import drive
+from antennate.hardware.driving.session import Session
+from antennate.hardware.safety.causes import State
+from antennate.sim.scenes.registry import make_scene
+from antennate.sim.trial import draw_trial
+from antennate.testing import check_controller
+from antennate.twin.config import TwinConfig, build
+from antennate.twin.lockstep import BoardPort, LockstepClock
+from antennate.types import AntennaFrame, JointCommand, Maneuver
+
+EXAMPLE = f"{Path(__file__).parents[1] / 'examples/own_controller.py'}:OwnController"
+SHORT = {"trials": 3, "time_limit": 1.5, "seed": 3}
+
+
+@pytest.fixture(autouse=True)
+def _nothing_added(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(CONTROLLERS, "added", {})
+
+
+def rows_of(name: str, **changes: Any) -> list[Any]:
+    """The table of short trials."""
+    return run(TunnelConfig.model_validate({**SHORT, "controllers": [name], **changes})).rows
+
+
+def phase_of(trial: int) -> float:
+    """Gait phase at the start of a trial [rad]."""
+    config = TunnelConfig.model_validate(SHORT)
+    scene, control = make_scene(config.scene, config.tunnel), config.control
+    return draw_trial(config, scene, trial, control.gait, control.period).phase
+
+
+# names
+
+
+def test_a_controller_is_found_by_module_and_by_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "beside.py").write_text("OFFSET = 1\n")
+    text = "from beside import OFFSET\nfrom antennate.control.controllers import paper as Mine\n"
+    (tmp_path / "mine.py").write_text(text)
+    monkeypatch.chdir(tmp_path)
+    assert isinstance(make_controller("mine.py:Mine"), RuleController)
+    assert isinstance(make_controller("antennate.control.controllers:paper"), RuleController)
+
+
+def test_an_installed_package_can_bring_a_controller(monkeypatch: pytest.MonkeyPatch) -> None:
+    point = EntryPoint("theirs", "antennate.control.controllers:paper", "antennate.controllers")
+    monkeypatch.setattr(
+        lookup, "entry_points", lambda group, name="theirs": [point] if name == "theirs" else []
+    )
+    assert CONTROLLERS.names[-1] == "theirs"
+    assert isinstance(make_controller("theirs"), RuleController)
+
+
+@pytest.mark.parametrize(
+    ("name", "what"),
+    [
+        ("clsoed", r"expected one of open, paper, closed, .*did you mean closed\?"),
+        ("missing.py:Mine", "no file"),
+        ("no_such_module:Mine", "No module named 'no_such_module'"),
+        ("antennate.control.controllers:Nobody", "no attribute 'Nobody'"),
+        ("math:pi", "expected a class or a function at 'math:pi', found float"),
+        ("math:sqrt", "made from .control, robot, batch."),
+        ("builtins:max", "made from .control, robot, batch.|without reset"),
+    ],
+)
+def test_a_name_without_a_controller_is_refused(name: str, what: str) -> None:
+    with pytest.raises(ConfigError, match=what) as found:
+        make_controller(name)
+    assert "\n" not in str(found.value)
+
+
+def test_a_controller_can_be_added_in_python_but_not_in_place_of_ours() -> None:
+    CONTROLLERS.add("added", open_loop)
+    CONTROLLERS.add("added", closed_loop)
+    assert CONTROLLERS.find("added") is closed_loop
+    with pytest.raises(ConfigError, match="expected a new name"):
+        CONTROLLERS.add("paper", open_loop)
+
+
+# the example
+
+
+def test_the_example_keeps_the_protocol() -> None:
+    check_controller(EXAMPLE)
+
+
+def test_the_example_is_short() -> None:
+    assert len(Path(EXAMPLE.rpartition(":")[0]).read_text().splitlines()) <= 40
+
+
+def test_the_example_runs_in_the_tunnel_in_worker_processes(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["--trials", "2", "--time-limit", "1.5", "--workers", "2", "--no-figures"]
+    out = ["--out", str(tmp_path / "run")]
+    assert main(["tunnel", *words, *out, "--controllers", "open", EXAMPLE]) == 0
+    table = (tmp_path / "run" / "trials.csv").read_text()
+    assert table.count(EXAMPLE) == 2
+    assert "invalid" not in table
+    assert "OwnController" in capsys.readouterr().out
+
+
+def test_the_example_drives_the_twin() -> None:
+    """By the code of `drive`, all of it through bytes, in lock-step."""
+    robot = build(TwinConfig())
+    clock = LockstepClock(robot)
+    config = DriveConfig(controller=EXAMPLE, dry_run=0.5, duration=3.0, touch_check=False)
+    session = prepare(config, BoardPort(robot, clock), clock, clock)
+    maneuvers: list[int] = []
+    goals: set[tuple[int, ...]] = set()
+
+    def on_tick(session: Session, now: float) -> None:
+        maneuvers.append(session.control.decision.maneuver)
+        goals.add(tuple(servo.get("goal_position") for servo in robot.servos))
+
+    report = drive(session, config, True, on_tick)
+    assert report.worst < State.HOLD, report.why
+    assert set(maneuvers[-200:]) <= {Maneuver.FORWARD, Maneuver.TURN_R}
+    assert len(goals) > 200
+
+
+# controllers that fail
+
+
+class Clumsy:
+    """`open`, which fails in one trial: that whose gait begins at a given phase."""
+
+    phase = 0.0
+
+    def __init__(self, control: Any, robot: Any, batch: int) -> None:
+        self.inner = open_loop(control, robot, batch)
+        self.bad, self.ticks = np.zeros(batch, bool), np.zeros(batch, int)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.inner, name)
+
+    def reset(self, rows: Any, phase: Any = 0.0) -> None:
+        self.inner.reset(rows, phase)
+        self.bad[rows], self.ticks[rows] = abs(phase - self.phase) < 1e-9, 0
+
+    def step(self, frame: AntennaFrame) -> JointCommand:
+        self.ticks += 1
+        return self.fail(self.inner.step(frame), self.bad & (self.ticks > 50))
+
+    def fail(self, command: JointCommand, bad: Any) -> JointCommand:
+        return command
+
+
+class NotFinite(Clumsy):
+    def fail(self, command: JointCommand, bad: Any) -> JointCommand:
+        command.yaw[bad, 2] = np.nan
+        return command
+
+
+class NoManeuver(Clumsy):
+    def fail(self, command: JointCommand, bad: Any) -> JointCommand:
+        self.maneuver = np.where(bad, -1, self.inner.maneuver)
+        return command
+
+
+class Raises(Clumsy):
+    def fail(self, command: JointCommand, bad: Any) -> JointCommand:
+        if bad.any():
+            raise SystemExit("of my own")
+        return command
+
+
+class WrongShape(Clumsy):
+    def fail(self, command: JointCommand, bad: Any) -> JointCommand:
+        joints = 4 if bad.any() else 5
+        return JointCommand(command.yaw[:, :joints], command.leg, command.antenna)
+
+
+class BadReset(Clumsy):
+    def reset(self, rows: Any, phase: Any = 0.0) -> None:
+        super().reset(rows, phase)
+        if self.bad.any():
+            raise KeyError("of my own")
+
+
+@pytest.mark.parametrize(
+    ("kind", "reason"),
+    [
+        (NotFinite, "controller: expected finite angles in yaw, found"),
+        (NoManeuver, "controller: expected a maneuver of 0 to 4, found -1"),
+        (Raises, "controller: step raised SystemExit: of my own"),
+        (WrongShape, "controller: expected yaw of shape (1, 5), found (1, 4)"),
+        (BadReset, "controller: reset raised KeyError: 'of my own'"),
+    ],
+    ids=lambda what: getattr(what, "__name__", ""),
+)
+def test_a_controller_that_fails_makes_its_trial_invalid_and_no_other(
+    kind: type[Clumsy], reason: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(Clumsy, "phase", phase_of(1))
+    CONTROLLERS.add("clumsy", kind)
+    sound, found = rows_of("open"), rows_of("clumsy")
+    assert [row.outcome for row in found] == ["timeout", "invalid", "timeout"]
+    assert found[1].reason.startswith(reason)
+    for mine, theirs in zip(found, sound, strict=True):
+        if mine.trial != 1:
+            assert (mine.progress_m, mine.force_mean_n) == (theirs.progress_m, theirs.force_mean_n)

@@ -1,0 +1,175 @@
+"""An experiment of another package: one object and an entry point, and every command knows it."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+import pytest
+
+from antennate import experiments
+from antennate.cli import main
+from antennate.errors import BadInputError
+from antennate.studies.run_directory import RunDirectory
+
+DICE = '''
+"""Throw dice. Each of them has six sides."""
+from dataclasses import dataclass
+import numpy as np
+from antennate.params import Params, number
+from antennate.studies.experiment import Experiment
+from antennate.studies.measures import Measure, Table, mean, summarise
+
+class Config(Params):
+    trials: int = number(4, "1", "assumed: few", "throws", ge=1)
+    seed: int = number(0, "1", "assumed: any", "seed of all chance", ge=0)
+
+@dataclass(frozen=True)
+class Row:
+    seed: int
+    trial: int
+    eyes: int
+
+MEASURES = (Measure("eyes", "eyes, mean", of=mean),)
+
+@dataclass(frozen=True)
+class Throws:
+    config: Config
+    rows: list[Row]
+    def result(self):
+        return {"schema": 1, "command": "dice", **summarise(MEASURES, self.rows)}
+
+def run(config, workers, on_step, on_row):
+    rng = np.random.default_rng(config.seed)
+    rows = [Row(config.seed, i, int(rng.integers(1, 7))) for i in range(config.trials)]
+    for row in rows:
+        on_row(row)
+    return Throws(config, rows)
+
+EXPERIMENT = Experiment("dice", __doc__, Config, run,
+    tables=lambda result: [Table.of("Dice", {"throws": result}, MEASURES)],
+    sentence=lambda result: f"Dice show {result['eyes']:.1f} eyes.")
+'''
+
+
+@pytest.fixture
+def dice(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder in which a package with an experiment is installed."""
+    site = tmp_path / "site"
+    about = site / "dice_study-1.0.dist-info"
+    about.mkdir(parents=True)
+    (site / "dice_study.py").write_text(DICE)
+    (about / "METADATA").write_text("Metadata-Version: 2.1\nName: dice-study\nVersion: 1.0\n")
+    (about / "entry_points.txt").write_text(
+        "[antennate.experiments]\ndice = dice_study:EXPERIMENT\nbroken = dice_study:NOTHING\n"
+    )
+    monkeypatch.syspath_prepend(str(site))
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.delitem(sys.modules, "dice_study", raising=False)
+    return tmp_path
+
+
+def test_it_runs_and_leaves_a_directory_like_ours(
+    dice: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert DICE.count("\n") <= 40
+    assert main(["dice", "--trials", "3", "--seed", "7", "--out", "run"]) == 0
+    out, err = capsys.readouterr()
+    assert "eyes, mean" in out
+    assert out.splitlines()[-1].startswith("Dice show ")
+    assert err.endswith("written to run\n")
+    run = RunDirectory.open(dice / "run")
+    assert [(row["seed"], row["trial"]) for row in run.rows()] == [(7, 0), (7, 1), (7, 2)]
+    assert run.result()["eyes"] == pytest.approx(sum(r["eyes"] for r in run.rows()) / 3)
+    assert "trials = 3" in (dice / "run" / "config.toml").read_text()
+
+
+def test_help_and_errors_know_it(dice: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert "Throw dice" in experiments.load("dice").description
+    assert main(["dise"]) == 2
+    assert "did you mean dice?" in capsys.readouterr().err
+    assert main(["dice", "--trials", "0"]) == 2
+    assert "--trials: expected a number of at least 1, found 0" in capsys.readouterr().err
+
+
+def test_one_that_cannot_be_loaded_is_named_and_does_not_hide_the_others(
+    dice: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(BadInputError, match="dice_study:NOTHING"):
+        experiments.load("broken")
+    assert main(["--help"]) == 0
+    out = capsys.readouterr().out
+    assert "dice" in out
+    assert "tunnel" in out
+
+
+def test_each_of_ours_has_one_object_of_its_own_name() -> None:
+    for name in experiments.names():
+        experiment = experiments.load(name)
+        assert experiment.name == name
+        assert experiment.description.splitlines()[0].endswith(".")
+
+
+def test_a_directory_is_written_and_read_from_python(tmp_path: Path) -> None:
+    config = experiments.load("wall").config(trials=3)
+    rows = [{"trial": 0, "force_n": 0.1, "why": "=1+1"}, {"trial": 1, "force_n": None, "why": ""}]
+    with RunDirectory.create("wall", tmp_path / "a") as run:
+        run.describe(config)
+        run.append(rows[0])
+        assert RunDirectory.open(run.path).rows() == [rows[0]]
+        run.finish({"mean": float("nan")}, rows)
+    again = RunDirectory.open(tmp_path / "a")
+    assert again.config(type(config)) == config
+    assert again.result() == {"mean": None}
+    assert again.rows() == [rows[0], {**rows[1], "why": None}]
+    assert not (again.path / "command.txt").exists()
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "ask"),
+    [
+        ("result.json", "{", "result"),
+        ("trials.partial.jsonl", '{"a": 1}\n{"a"', "rows"),
+        ("config.toml", "trials = ", "config"),
+        ("config.toml", "no_such_key = 1", "config"),
+    ],
+)
+def test_a_damaged_directory_is_one_line(tmp_path: Path, name: str, text: str, ask: str) -> None:
+    (tmp_path / name).write_text(text)
+    run = RunDirectory.open(tmp_path)
+    wants = (experiments.load("springs").config,) if ask == "config" else ()
+    with pytest.raises(BadInputError, match=name) as error:
+        getattr(run, ask)(*wants)
+    assert "\n" not in str(error.value)
+
+
+def test_what_is_no_run_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(BadInputError, match=r"expected the folder of a run, found no result\.json"):
+        RunDirectory.open(tmp_path)
+    with pytest.raises(BadInputError, match="found an empty one"):
+        RunDirectory.create("wall", "")
+
+
+def test_a_disk_that_is_full_at_the_end_keeps_and_shows_what_was_measured(
+    dice: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import antennate.files
+
+    def full(*args: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    whole = RunDirectory.write
+
+    def write(self: RunDirectory, name: str, content: str | bytes) -> None:
+        if name == "trials.csv":
+            monkeypatch.setattr(antennate.files.os, "fsync", full)
+        whole(self, name, content)
+
+    monkeypatch.setattr(RunDirectory, "write", write)
+    assert main(["dice", "--trials", "2", "--out", "run"]) == 2
+    out, err = capsys.readouterr()
+    assert "eyes, mean" in out
+    assert "No space left on device" in err
+    kept = (dice / "run" / "trials.partial.jsonl").read_text().splitlines()
+    assert [json.loads(line)["trial"] for line in kept] == [0, 1]

@@ -1,0 +1,248 @@
+"""No command accepts a parameter that it does not read: each is seen read in tiny runs, or refused.
+
+A configuration records which of its parameters are read while an experiment runs; checks of the
+configuration itself, and writing it down, do not count.
+"""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+import antennate
+from antennate import experiments
+from antennate.cli import main
+from antennate.control.registry import make_controller
+from antennate.hardware.doctor.checkup import DoctorConfig
+from antennate.hardware.driving.config import DriveConfig
+from antennate.hardware.esp32.recorder import RecordConfig
+from antennate.params import Params
+from antennate.telemetry.replay import ReplayConfig
+from antennate.twin.config import TwinConfig
+from antennate.types import AntennaFrame
+
+RECORDING = "time,counts,bend,trial,speed_m_s\n" + "".join(
+    f"{0.01 * i:.2f},{1600 + 60 * np.log((k + 1) / (20 - k)):.0f},{k / 19},{trial},0.1\n"
+    for trial in range(6)
+    for i in range(20)
+    for k in [i]
+)
+OTHER_SENSOR = {"kind": "fsr"}
+TINY: dict[str, list[dict[str, Any]]] = {
+    "tunnel": [
+        {"trials": 1, "time_limit": 0.1, "robot": {"antenna": {"sensor": OTHER_SENSOR}}},
+        {
+            "trials": 1,
+            "time_limit": 0.1,
+            "control": {"rate": 25.0},
+            "robot": {"yaw": {"servo": "xl330_m288"}},
+        },
+    ],
+    "gait": [
+        {
+            "cycles": 2,
+            "settling_cycles": 0,
+            "sweep_points": 2,
+            "gait": {"frequency": 1.0},
+            "robot": {"yaw": {"servo": servo}, "antenna": {"sensor": sensor}},
+        }
+        for servo, sensor in (("xl330_m288", OTHER_SENSOR), ("xc430_w240", {}))
+    ],
+    "wall": [
+        {
+            "trials": 1,
+            "profiles": ["descending"],
+            "wall": {"travel": 0.03, "start": 0.002, "speed": 0.2},
+        }
+    ],
+    "touch": [
+        {
+            "trials": 1,
+            "speeds": [1.0],
+            "profiles": ["stiff"],
+            "averaging_times": [0.1],
+            "antenna": {"sensor": sensor},
+        }
+        for sensor in (OTHER_SENSOR, {})
+    ],
+    "force": [
+        {
+            "traverses": 4,
+            "loads": 2,
+            "profiles": ["descending"],
+            "place_step": 0.5,
+            "speeds": [0.5],
+            "antenna": {"sensor": sensor},
+        }
+        for sensor in (OTHER_SENSOR, {})
+    ],
+    "sweep": [
+        {
+            "profiles": ["descending"],
+            "distances": [0.6],
+            "centres": [1.2],
+            "amplitudes": [0.5],
+            "sweeps": 1,
+            "sweep": {"frequency": 2.0},
+            "estimate": {"trials": 6},
+            "antenna": {"sensor": sensor},
+        }
+        for sensor in (OTHER_SENSOR, {})
+    ],
+    "calibrate": [
+        {"rig": {"pushes": 2, "speeds": [0.3]}, "draws": 20},
+        {"rig": {"pushes": 2, "speeds": [0.3]}, "antenna": {"sensor": OTHER_SENSOR}, "draws": 20},
+        {"recording": "recording.csv", "draws": 20},
+    ],
+    "sensor": [{"hold_time": 1.0}, {"sensor": OTHER_SENSOR}],
+    "springs": [{}],
+    "taper": [{}],
+}
+HARDWARE = {
+    "twin": TwinConfig,
+    "drive": DriveConfig,
+    "doctor": DoctorConfig,
+    "record": RecordConfig,
+    "replay": ReplayConfig,
+}
+
+
+@contextmanager
+def recorded(config: Params) -> Iterator[set[str]]:
+    """Yield the dotted parameters of this configuration that are read within the block."""
+    read: set[str] = set()
+    held: dict[int, tuple[Params, tuple[str, ...]]] = {}
+    plain, copied = object.__getattribute__, Params.model_copy
+
+    def watch(group: Params, path: tuple[str, ...]) -> None:
+        held[id(group)] = group, path
+        for name in type(group).model_fields:
+            if isinstance(inner := plain(group, name), Params):
+                watch(inner, (*path, name))
+
+    def get(self: Params, name: str) -> Any:
+        if id(self) in held and name in type(self).model_fields:
+            read.add(".".join((*held[id(self)][1], name)))
+        return plain(self, name)
+
+    def copy(self: Params, **changes: Any) -> Any:
+        new = copied(self, **changes)
+        if id(self) in held:
+            watch(new, held[id(self)][1])
+        return new
+
+    watch(config, ())
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Params, "__getattribute__", get, raising=False)
+        patch.setattr(Params, "model_copy", copy)
+        yield read
+
+
+def leaves(model: type[Params], path: tuple[str, ...] = ()) -> Iterator[str]:
+    """Every parameter of a configuration, dotted."""
+    for name, field in model.model_fields.items():
+        kind = field.annotation
+        if isinstance(kind, type) and issubclass(kind, Params):
+            yield from leaves(kind, (*path, name))
+        else:
+            yield ".".join((*path, name))
+
+
+def act(config: Any) -> None:
+    """Let our controllers be pressed for longer than any of their times."""
+    period = config.control.period
+    for name in config.controllers:
+        controller = make_controller(name, config.control, config.robot, 1)
+        controller.reset(np.zeros(1, dtype=np.int64))
+        for tick in range(round(60.0 / period)):
+            pressed = 1.0 < tick * period < 35.0
+            counts = np.array([[1400.0 if pressed else 1870.0, 1410.0 if pressed else 1870.0]])
+            controller.step(AntennaFrame(t=np.array([tick * period]), counts=counts))
+
+
+@cache
+def used() -> set[str]:
+    """Every attribute that our code reads."""
+    files = Path(antennate.__file__).parent.rglob("*.py")
+    nodes = [node for file in files for node in ast.walk(ast.parse(file.read_text("utf-8")))]
+    read = [n for n in nodes if isinstance(n, ast.Attribute) and isinstance(n.ctx, ast.Load)]
+    return {node.attr for node in read}
+
+
+@pytest.mark.parametrize("name", TINY)
+def test_every_parameter_of_an_experiment_is_read_or_refused(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("recording.csv").write_text(RECORDING)
+    experiment = experiments.load(name)
+    read: set[str] = set()
+    for values in TINY[name]:
+        config = experiment.config.model_validate(values)
+        with recorded(config) as found:
+            outcome = experiment.run(config, 1, lambda done, total: None, lambda row: None)
+            outcome.result()
+            if name == "tunnel" and config.control.rate < 50.0:
+                act(config)
+        read |= found
+    every = set(leaves(experiment.config))
+    assert every - read == set(experiment.config.unread) & every
+    assert set(experiment.config.unread) <= every
+
+
+def test_all_experiments_of_ours_are_walked() -> None:
+    assert set(TINY) == set(experiments.names())
+
+
+@pytest.mark.parametrize("command", HARDWARE)
+def test_every_parameter_of_a_command_of_the_robot_is_used_somewhere(command: str) -> None:
+    names = {leaf.rpartition(".")[2] for leaf in leaves(HARDWARE[command])}
+    assert names - used() == set()
+
+
+def test_the_walk_sees_what_is_not_read() -> None:
+    config = experiments.load("springs").config()
+    with recorded(config) as read:
+        assert config.wire_mm > 0
+        config.model_copy(update={"coil_mm": 3.0}).coil_mm  # noqa: B018
+        config.model_dump()
+    assert read == {"wire_mm", "coil_mm"}
+
+
+@pytest.mark.parametrize(
+    ("name", "flag", "value"),
+    [
+        ("wall", "--antenna.base-angle", "0.5"),
+        ("wall", "--antenna.base-spacing=0.05", ""),
+        ("wall", "--antenna.sensor.hysteresis", "0.1"),
+        ("touch", "--rule.hold_time", "1"),
+        ("sweep", "--conditioning.slope", "10"),
+        ("calibrate", "--variation.overlap", "0.001"),
+        ("tunnel", "--robot.yaw.ids", "1"),
+    ],
+)
+def test_a_flag_that_is_not_read_is_refused(
+    name: str, flag: str, value: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main([name, flag, *([value] if value else [])]) == 2
+    err = capsys.readouterr().err
+    assert f"expected a parameter that {name} reads, found this one" in err
+    assert err.count("\n") == 1
+
+
+def test_a_value_that_is_not_read_is_refused_in_a_file_too() -> None:
+    config = experiments.load("wall").config
+    default = config().antenna.base_angle
+    assert config.model_validate({"antenna": {"base_angle": default}}) == config()
+    with pytest.raises(ValidationError, match=r"antenna\.base_angle: expected .* not read here"):
+        config.model_validate({"antenna": {"base_angle": 0.5}})
+    with pytest.raises(ValidationError, match="columns: expected the default"):
+        experiments.load("calibrate").config.model_validate({"columns": {"time_unit": "ms"}})

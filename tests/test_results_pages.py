@@ -1,0 +1,82 @@
+"""The pages on result files name every measure and every column."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import fields
+from pathlib import Path
+
+import pytest
+
+from antennate.experiments.force.experiment import MEASURES as FORCE
+from antennate.experiments.force.run import TraverseRow
+from antennate.experiments.gait.experiment import MANEUVER
+from antennate.experiments.sweep.run import SweepRow
+from antennate.experiments.touch.experiment import AVERAGING, PROFILE
+from antennate.experiments.tunnel import measures as tunnel
+from antennate.experiments.tunnel.monitor import TrialResult
+from antennate.experiments.wall import measures as wall
+from antennate.experiments.wall.outcome import WallTrial
+from antennate.studies.measures import Measure, count, mean, shown, summarise
+
+DOCS = Path(__file__).parents[1] / "docs"
+MEASURES = {
+    ("results.md", "tunnel"): (*tunnel.CONTROLLER, *tunnel.PAIR),
+    ("results.md", "gait"): MANEUVER,
+    ("results-bench.md", "wall"): (*wall.PROFILE, *wall.PAIR),
+    ("results-bench.md", "touch"): (*PROFILE, *AVERAGING),
+    ("results-bench.md", "force"): FORCE,
+}
+ROWS = {
+    ("results.md", "tunnel"): TrialResult,
+    ("results-bench.md", "wall"): WallTrial,
+    ("results-bench.md", "force"): TraverseRow,
+}
+
+
+def words(page: str, command: str) -> set[str]:
+    """Words in backticks of a command's part of a page; that of `trials.csv` belongs to it."""
+    parts = re.split(r"^## ", (DOCS / page).read_text(), flags=re.MULTILINE)
+    own = [p for p in parts if f"`antennate {command}`" in p.splitlines()[0]]
+    own += [p for p in parts if p.startswith("`trials.csv`")]
+    assert own
+    marked = re.findall(r"`([^`\n]+)`", "\n".join(own))
+    return {word for text in marked for word in text.split(".")}
+
+
+@pytest.mark.parametrize("where", MEASURES, ids="-".join)
+def test_every_measure_is_explained(where: tuple[str, str]) -> None:
+    known = words(*where)
+    asked = {part for m in MEASURES[where] for part in m.name.split(".")}
+    # a key with _95 is the interval of the one without
+    assert {name for name in asked if name not in known} <= {f"{name}_95" for name in known}
+
+
+@pytest.mark.parametrize("where", ROWS, ids="-".join)
+def test_every_column_is_explained(where: tuple[str, str]) -> None:
+    assert {field.name for field in fields(ROWS[where])} <= words(*where)
+
+
+def test_a_measure_is_made_of_rows_and_shown_with_its_unit() -> None:
+    rows = [TrialResult(0, k, "open", "success", 10.0 * k, *[k] * 10, "") for k in (1, 2)]
+    measures = (
+        Measure("time_s", "time", "s", mean, ".1f"),
+        Measure("share.hold", "hold", "%", mean, ".0f", 100.0),
+        Measure("won", "won", of=count("outcome", "success"), form="d"),
+    )
+    summary = summarise(measures, rows)
+    assert summary == {"time_s": 15.0, "share": {"hold": 1.5}, "won": 2}
+    assert [f"{m.title}: {m.cell(summary)}" for m in measures] == [
+        "time [s]: 15.0",
+        "hold [%]: 150",
+        "won: 2",
+    ]
+    assert (shown(None), shown(float("nan")), shown((0.25, 1.0), ".2f")) == (
+        "-",
+        "-",
+        "0.25 to 1.00",
+    )
+
+
+def test_the_columns_of_sweep_are_known() -> None:
+    assert {"seed", "trial", "profile", "condition"} <= {f.name for f in fields(SweepRow)}

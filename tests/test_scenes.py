@@ -1,0 +1,340 @@
+"""Scenes: ours, those of MJCF files, and one's own keep the protocol; bad ones are refused."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+
+from antennate.cli import main
+from antennate.errors import AntennateError, ConfigError, SceneError
+from antennate.params import GaitParams, PhysicsParams
+from antennate.robots.spec import RobotSpec
+from antennate.sim.scenes.flat import FlatScene
+from antennate.sim.scenes.mjcf import MjcfScene
+from antennate.sim.scenes.registry import make_scene
+from antennate.sim.scenes.scene import Route
+from antennate.sim.scenes.tunnel import TunnelScene
+from antennate.sim.trial import TrialConfig, check_start, make_world, place_at_start
+from antennate.testing import check_scene
+
+EXAMPLE = Path(__file__).parent.parent / "examples" / "own_scene.py"
+SITES = '<site name="start"/><site name="exit" pos="2 0 0"/>'
+WALL = '<geom name="wall" type="box" size="1 .02 .1" pos="1 .4 .1"/>'
+
+
+def mjcf(folder: Path, world: str, before: str = "") -> Path:
+    path = folder / "scene.xml"
+    path.write_text(f"<mujoco>{before}<worldbody>{world}</worldbody></mujoco>")
+    return path
+
+
+def drawn(scene, seed: int = 0):
+    return scene.draw(RobotSpec(), np.random.default_rng(seed))
+
+
+def test_ours_keep_the_protocol(tmp_path):
+    for scene in (TunnelScene(), FlatScene(), MjcfScene(mjcf(tmp_path, SITES + WALL))):
+        check_scene(scene)
+
+
+@pytest.mark.skipif(not EXAMPLE.is_file(), reason="examples are not part of this copy")
+def test_a_scene_of_ones_own_is_walked_without_touching_the_package(tmp_path, capsys):
+    check_scene(make_scene(f"{EXAMPLE}:Pillars"))
+    out = ["--out", str(tmp_path / "run"), "--no-figures", "--workers", "1"]
+    words = ["tunnel", "--scene", f"{EXAMPLE}:Pillars", "--trials", "1", "--time-limit", "0.5"]
+    assert main([*words, *out]) == 0
+    assert len((tmp_path / "run" / "trials.csv").read_text().splitlines()) > 1
+    assert "Traceback" not in capsys.readouterr().err
+
+
+class Broken(Route):
+    """A straight route of 1 m that keeps the protocol but for what a test changes."""
+
+    def __init__(self):
+        super().__init__(np.array([[0.0, 0.0], [1.0, 0.0]]))
+
+
+class Blocked(Broken):
+    def build(self, spec):
+        super().build(spec)
+        spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=[0.1, 0.1, 0.1])
+
+
+class Twice(Broken):
+    def build(self, spec):
+        super().build(spec)
+        spec.worldbody.add_geom(size=[0.0, 0.0, 0.0], pos=[5, 0, 0])
+
+
+class Elsewhere(Broken):
+    def progress(self, head):
+        return super().progress(head) + 0.1
+
+
+class Backwards(Broken):
+    def progress(self, head):
+        return -super().progress(head)
+
+
+class NeverThere(Broken):
+    def succeeded(self, head):
+        return False
+
+
+class AtOnce(Broken):
+    def succeeded(self, head):
+        return True
+
+
+class Endless(Broken):
+    def left(self, head):
+        return False
+
+
+class GoneAtOnce(Broken):
+    def left(self, head):
+        return True
+
+
+class Short(Broken):
+    def __init__(self):
+        super().__init__()
+        self.length = 0.0
+
+
+class Drawing:
+    def __init__(self, draw, random: bool = False):
+        self.random = random
+        self._draw = draw
+
+    def draw(self, robot, rng):
+        return self._draw(rng)
+
+
+def shifted(rng):
+    return Placed(rng.uniform(0.5, 0.9))
+
+
+class Placed(Broken):
+    def __init__(self, x):
+        super().__init__()
+        self._x = x
+
+    def build(self, spec):
+        super().build(spec)
+        spec.worldbody.add_geom(size=[0.05, 0, 0], pos=[self._x, 0.4, 0.05])
+
+
+def test_a_sound_one_passes():
+    check_scene(Drawing(lambda rng: Broken()))
+    check_scene(Drawing(shifted, random=True))
+
+
+@pytest.mark.parametrize(
+    ("scene", "told"),
+    [
+        (Drawing(lambda rng: Blocked()), "room for the robot"),
+        (Drawing(lambda rng: Twice()), "cannot be compiled"),
+        (Drawing(lambda rng: Elsewhere()), "progress 0 m at the start"),
+        (Drawing(lambda rng: Backwards()), "to grow"),
+        (Drawing(lambda rng: NeverThere()), "success past the exit"),
+        (Drawing(lambda rng: AtOnce()), "no success at the start"),
+        (Drawing(lambda rng: Endless()), "to have left"),
+        (Drawing(lambda rng: GoneAtOnce()), "a start inside"),
+        (Drawing(lambda rng: Short()), "a length above 0"),
+        (Drawing(shifted), "random is False"),
+        (Drawing(lambda rng: Broken(), random=True), "random is True"),
+        (Drawing(lambda rng: Placed(np.random.default_rng().uniform(0.5, 0.9)), True), "again"),
+    ],
+)
+def test_the_check_finds_what_is_broken(scene, told):
+    with pytest.raises(AssertionError, match=told):
+        check_scene(scene)
+
+
+def touching(world) -> set[str]:
+    """First letters of the robot's geoms that touch something named wall."""
+    found = set()
+    for contact in world.data.contact:
+        names = [world.model.geom(g).name for g in contact.geom]
+        if any("wall" in name for name in names):
+            found |= {name.removeprefix("robot/")[:3] for name in names if "robot/" in name}
+    return found
+
+
+@pytest.mark.parametrize("movable", [False, True])
+def test_a_geom_with_default_bits_meets_body_legs_and_antennae(tmp_path, movable):
+    wall = '<geom name="wall" type="box" size="1 .5 .02" pos="0 0 .042" mass="1"/>'
+    if movable:
+        wall = f"<body><freejoint/>{wall}</body>"
+    instance = drawn(MjcfScene(mjcf(tmp_path, SITES + wall)))
+    world = make_world(PhysicsParams(), RobotSpec(), instance)
+    place_at_start(world, instance, GaitParams())
+    assert touching(world) == {"lin", "leg", "ant"}
+    assert world.obstacle_overlap() > 0.0
+
+
+@pytest.mark.parametrize(
+    ("plane", "floors"),
+    [
+        ("", {"floor"}),
+        ('<geom name="ground" type="plane" size="5 5 1"/>', {"scene/ground"}),
+        ('<geom name="slope" type="plane" size="5 5 1" pos="0 0 -.2" euler="0 5 0"/>', {"floor"}),
+    ],
+)
+def test_a_level_plane_of_the_file_is_the_floor_or_one_is_added(tmp_path, plane, floors):
+    instance = drawn(MjcfScene(mjcf(tmp_path, SITES + plane)))
+    world = make_world(PhysicsParams(), RobotSpec(), instance)
+    place_at_start(world, instance, GaitParams())
+    world.command(world.drives().copy())
+    world.step(100)
+    named = [{world.model.geom(g).name for g in c.geom} for c in world.data.contact]
+    assert len(named) >= 3, "the robot stands on its legs"
+    assert {min(pair - {name for name in pair if "robot/" in name}) for pair in named} == floors
+    assert all(any("leg" in name for name in pair) for pair in named)
+
+
+def test_obstacles_are_outlined_from_above(tmp_path):
+    lying = '<geom type="capsule" fromto="1 1 .1 2 1 .1" size=".1"/>'
+    tilted = '<geom type="box" size=".1 .2 .3" pos="1 -1 .1" euler="0 0 90"/>'
+    pillar = '<geom type="cylinder" size=".3 .2" pos="5 0 .2"/>'
+    ball = '<body pos="3 3 .1"><freejoint/><geom type="ellipsoid" size=".1 .2 .1"/></body>'
+    scene = MjcfScene(mjcf(tmp_path, SITES + lying + tilted + pillar + ball))
+    instance = drawn(scene)
+    world = make_world(PhysicsParams(), RobotSpec(), instance)
+    place_at_start(world, instance, GaitParams())
+    fixed, movable = world.outlines()
+    boxes = [np.concatenate([p.min(axis=0), p.max(axis=0)]) for p in [*fixed, *movable]]
+    expected = [
+        (0.9, 0.9, 2.1, 1.1),
+        (0.8, -1.1, 1.2, -0.9),
+        (4.7, -0.3, 5.3, 0.3),
+        (2.9, 2.8, 3.1, 3.2),
+    ]
+    assert np.array(boxes) == pytest.approx(np.array(expected), abs=1e-3)
+    assert len(movable) == 1
+
+
+def test_geoms_of_a_file_touch_one_another_as_they_did(tmp_path):
+    balls = (
+        '<body pos="9 0 .1"><freejoint/><geom name="a" size=".1"/></body>'
+        '<body pos="9 .15 .1"><freejoint/><geom name="b" size=".1" contype="2" conaffinity="2"/>'
+        "</body>"
+        '<body pos="9 .05 .22"><freejoint/><geom name="c" size=".1" contype="1" conaffinity="2"/>'
+        "</body>"
+    )
+    alone = mujoco.MjModel.from_xml_path(str(mjcf(tmp_path, SITES + balls)))
+    data = mujoco.MjData(alone)
+    mujoco.mj_forward(alone, data)
+
+    def pairs(model, contacts):
+        named = [{model.geom(g).name.removeprefix("scene/") for g in c.geom} for c in contacts]
+        return {frozenset(n) for n in named if n <= {"a", "b", "c"}}
+
+    world = make_world(PhysicsParams(), RobotSpec(), drawn(MjcfScene(tmp_path / "scene.xml")))
+    mujoco.mj_forward(world.model, world.data)
+    assert pairs(alone, data.contact) == {frozenset("ac"), frozenset("bc")}
+    assert pairs(world.model, world.data.contact) == pairs(alone, data.contact)
+
+
+def test_progress_follows_the_sites_on_the_way(tmp_path):
+    sites = (
+        '<site name="start" pos="1 1 .3"/><site name="via0" pos="1 3 0"/>'
+        '<site name="via1" pos="4 3 0"/><site name="exit" pos="4 2 0"/>'
+    )
+    instance = drawn(MjcfScene(mjcf(tmp_path, sites)))
+    assert instance.length == pytest.approx(2.0 + 3.0 + 1.0)
+    assert instance.start == pytest.approx((1.0, 1.0, math.pi / 2))
+    assert instance.progress(np.array([2.0, 3.2])) == pytest.approx(3.0)
+    assert instance.succeeded(np.array([4.1, 1.9]))
+    assert not instance.succeeded(np.array([4.6, 1.9])), "beside the exit, 0.5 m from its middle"
+    assert not instance.left(np.array([4.7, 3.7]))
+    assert instance.left(np.array([4.9, 3.0])), "farther than 0.8 m from the route"
+
+
+def test_meshes_are_read_from_the_folder_of_the_file(tmp_path):
+    (tmp_path / "parts").mkdir()
+    corners = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)]
+    (tmp_path / "parts" / "stone.obj").write_text(
+        "".join(f"v {x} {y} {z}\n" for x, y, z in corners) + "f 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
+    )
+    assets = '<compiler meshdir="parts"/><asset><mesh file="stone.obj" scale=".2 .2 .2"/></asset>'
+    stone = '<geom name="wall" type="mesh" mesh="stone" pos="1 .5 0"/>'
+    instance = drawn(MjcfScene(mjcf(tmp_path, SITES + stone, assets)))
+    world = make_world(PhysicsParams(), RobotSpec(), instance)
+    (polygon,) = world.outlines()[0]
+    assert polygon.min(axis=0) == pytest.approx([1.0, 0.5], abs=1e-6)
+    assert polygon.max(axis=0) == pytest.approx([1.2, 0.7], abs=1e-6)
+    assert len(polygon) == 3
+
+
+GRID = '<replicate count="200" offset=".1 0 0"><replicate count="200" offset="0 .1 0">{}'
+BAD = {
+    "no exit": ('<site name="start"/>', "", "'exit'.*found start"),
+    "no start": ('<site name="exit"/>', "", "'start'"),
+    "no sites": (WALL, "", "'start'.*no site"),
+    "same place": ('<site name="start"/><site name="exit"/>', "", "1 mm apart"),
+    "option": (SITES, '<option timestep="0.01"/>', "no <option>.*timestep"),
+    "flag": (SITES, '<option><flag gravity="disable"/></option>', "no <flag>"),
+    "include": (SITES + '<include file="/etc/passwd"/>', "", "no <include>"),
+    "extension": (SITES, '<extension><plugin plugin="x"/></extension>', "no <extension>"),
+    "memory": (SITES, '<size memory="200G"/>', "no <size>"),
+    "absolute": (SITES, '<asset><mesh file="/etc/passwd"/></asset>', "folder of the model"),
+    "above": (SITES, '<asset><mesh file="../x.obj"/></asset>', "folder of the model"),
+    "missing": (SITES, '<asset><mesh file="x.obj"/></asset>', "cannot read x.obj"),
+    "nan": (SITES + '<geom size="nan"/>', "", "finite"),
+    "infinite": (SITES + '<body><geom size="1" mass="1e999"/></body>', "", "finite"),
+    "bomb": (SITES + GRID.format(WALL) + "</replicate></replicate>", "", "at most 20000 elements"),
+    "unknown": (SITES + "<gem/>", "", "gem"),
+    "not xml": ("<", "", "MJCF model"),
+    "no mass": (SITES + "<body><freejoint/></body>", "", "mass"),
+}
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_a_bad_file_is_refused_in_one_line(tmp_path, name):
+    world, before, told = BAD[name]
+    with pytest.raises(SceneError, match=told) as found:
+        MjcfScene(mjcf(tmp_path, world, before))
+    assert "\n" not in str(found.value)
+    assert "scene.xml" in str(found.value)
+
+
+def test_entities_and_large_files_are_refused(tmp_path):
+    path = tmp_path / "scene.xml"
+    path.write_text('<!DOCTYPE m [<!ENTITY a "aaaa">]><mujoco model="&a;"/>')
+    with pytest.raises(SceneError, match="no DOCTYPE"):
+        MjcfScene(path)
+    path.write_bytes(b" " * 5_000_001)
+    with pytest.raises(SceneError, match="at most 5000000 bytes"):
+        MjcfScene(path)
+    with pytest.raises(SceneError, match=r"cannot read none\.xml"):
+        MjcfScene(tmp_path / "none.xml")
+
+
+def test_a_bad_scene_is_told_before_anything_is_written(tmp_path, capsys):
+    path = mjcf(tmp_path, SITES + '<geom type="box" size=".1 .1 .1"/>')
+    assert main(["tunnel", "--scene", str(path), "--out", str(tmp_path / "run")]) == 2
+    assert "room for the robot" in capsys.readouterr().err
+    assert not (tmp_path / "run").exists()
+
+
+def test_names_of_scenes_are_checked():
+    with pytest.raises(ValueError, match="tunnel, flat"):
+        TrialConfig(scene="tunnle")
+    with pytest.raises(ValueError, match="tunnel belongs to the scene"):
+        TrialConfig.model_validate({"scene": "flat", "tunnel": {"strewn": 2}})
+    with pytest.raises(ConfigError, match="no_such_module"):
+        check_start(TrialConfig(scene="no_such_module:Scene"))
+
+
+def test_an_error_in_ones_own_scene_names_it(tmp_path):
+    (tmp_path / "mine.py").write_text(
+        "class Mine:\n    random = False\n    def draw(self, robot, rng):\n        return 1 / 0\n"
+    )
+    with pytest.raises(AntennateError, match=r"mine\.py:Mine.*ZeroDivisionError"):
+        check_start(TrialConfig(scene=f"{tmp_path / 'mine.py'}:Mine"))
