@@ -19,7 +19,7 @@ class OwnController:
         self.conditioning = control.conditioning
         self.mean = RunningMean(control.conditioning, batch, control.period)
         self.state = ContactState(control.rule, batch)
-        self.gait = Gait(control.gait, batch, control.period)
+        self.gait = Gait(control.gait, robot, batch, control.period)
         self.felt, self.eased, self.until = self.times = np.zeros((3, batch))  # [s]
 
     def reset(self, rows, phase=0.0):

@@ -21,7 +21,6 @@ _RESET_AT = 350
 """Tick in which one row is reset while the others go on."""
 _BLIND_FROM, _BLIND_TO = 400, 420
 """Ticks in which a row reads NaN."""
-_PARTS = ("yaw", "leg", "antenna")
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,6 +93,7 @@ class _Runs:
         self, factory: str | ControllerFactory, robot: RobotSpec, control: ControlParams
     ) -> None:
         self._factory, self._robot, self._control = factory, robot, control
+        self._parts = tuple(robot.command_shapes(1))
         self.counts = _readings(control.conditioning, control.period, control.gait.frequency)
 
     def trace(
@@ -123,8 +123,8 @@ class _Runs:
                     checked.reset(np.array([reset]), offsets[[reset]])
                 t = offsets + period * tick
                 commands.append(_step(checked, t, reading))
-                kept.append([getattr(commands[-1], part).copy() for part in _PARTS])
-                for part in _PARTS if spoil else ():
+                kept.append([getattr(commands[-1], part).copy() for part in self._parts])
+                for part in self._parts if spoil else ():
                     getattr(commands[-1], part)[...] = math.nan
                 for name, values in said.items():
                     values.append(np.array(getattr(made, name), float))
@@ -133,13 +133,13 @@ class _Runs:
         for tick, (command, copies) in enumerate(zip(commands, kept, strict=True)):
             if spoil:
                 break
-            for part, copy in zip(_PARTS, copies, strict=True):
+            for part, copy in zip(self._parts, copies, strict=True):
                 same = np.array_equal(getattr(command, part), copy)
                 _expect(
                     "a command that stays as it was returned",
                     "" if same else f"another {part} in that of tick {tick} later",
                 )
-        arrays = {part: np.array([c[i] for c in kept]) for i, part in enumerate(_PARTS)}
+        arrays = {part: np.array([c[i] for c in kept]) for i, part in enumerate(self._parts)}
         found = _Trace(arrays, {name: np.array(values) for name, values in said.items()})
         _check_values(found)
         return found
