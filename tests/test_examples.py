@@ -26,6 +26,14 @@ def ran(name: str, folder: Path) -> str:
     return done.stdout
 
 
+def test_a_cart_stops_at_a_wall_that_its_antennae_feel(tmp_path: Path) -> None:
+    out = ran("antenna_on_my_robot", tmp_path)
+    gap, *flex, force = map(float, re.findall(r"-?\d+\.\d+", out))
+    assert 0.02 < gap < 0.12  # within the length of the antennae and clear of the wall
+    assert min(flex) > 0.1
+    assert force > 0.001
+
+
 def test_trials_become_a_data_frame(tmp_path: Path) -> None:
     out = ran("data_frame", tmp_path)
     assert re.search(r"open +\d+\.\d+ +\d\.\d+", out)

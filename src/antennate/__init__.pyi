@@ -13,6 +13,10 @@ from antennate.experiments.running import list_experiments as list_experiments
 from antennate.experiments.running import run as run
 from antennate.hardware.esp32.recording import Esp32Recording as Esp32Recording
 from antennate.hardware.esp32.recording import read_esp32 as read_esp32
+from antennate.robots.antenna import AntennaSpec as AntennaSpec
+from antennate.robots.spec import RobotSpec as RobotSpec
+from antennate.sim.attach import AntennaReader as AntennaReader
+from antennate.sim.attach import attach_antenna as attach_antenna
 from antennate.studies.run_directory import RunDirectory as RunDirectory
 from antennate.studies.simulate import simulate as simulate
 from antennate.telemetry.time_series import TimeSeries as TimeSeries

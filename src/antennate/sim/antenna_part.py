@@ -6,10 +6,36 @@ turned half about its own axis, which mirrors it.
 
 from __future__ import annotations
 
+import math
+from typing import Literal
+
 import mujoco
 
+from antennate.errors import ConfigError
 from antennate.robots.antenna import BASE, AntennaSpec
 from antennate.sim import layers
+
+Side = Literal["left", "right"]
+
+
+def mounting_quaternion(angle: float, side: Side) -> tuple[float, float, float, float]:
+    """How to turn the part on a body whose x is the heading, y the left and z up.
+
+    Args:
+        angle: From the heading outwards [rad].
+        side: The right antenna is the mirror image of the left one: half a turn about its own axis
+            makes its positive angles bend towards the tail too.
+
+    Returns:
+        Unit quaternion, real part first.
+
+    Raises:
+        ConfigError: The side is unknown.
+    """
+    c, s = math.cos(angle / 2), math.sin(angle / 2)
+    if side not in ("left", "right"):
+        raise ConfigError(f"side: expected left or right, found {side}")
+    return (c, 0.0, 0.0, s) if side == "left" else (0.0, c, -s, 0.0)
 
 
 def build(params: AntennaSpec) -> mujoco.MjSpec:

@@ -7,7 +7,6 @@ of a leg is a crowned ring; that of a rolling leg sits off its axle.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -134,11 +133,8 @@ def _attach_antennae(spec: mujoco.MjSpec, params: RobotSpec) -> None:
     head = spec.body(params.link_names[0])
     part = antenna.build(params.antenna)
     for prefix, sign in zip(ANTENNA_PREFIXES, SIDE_SIGN, strict=True):
-        heading = sign * params.antenna.base_angle
-        half = heading / 2
-        turn = [math.cos(half), 0.0, 0.0, math.sin(half)]
-        if sign < 0:  # half a turn about the antenna's own axis mirrors it
-            turn = [0.0, math.cos(half), math.sin(half), 0.0]
+        side = "left" if sign > 0 else "right"
+        turn = antenna.mounting_quaternion(params.antenna.base_angle, side)
         frame = head.add_frame(
             pos=[params.link_pitch / 2, sign * params.antenna.base_spacing / 2, 0.0], quat=turn
         )

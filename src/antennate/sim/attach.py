@@ -1,0 +1,174 @@
+"""Our antenna on anybody's robot: a part of one's own `MjSpec`, and its readings from `MjData`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Literal
+
+import mujoco
+import numpy as np
+
+from antennate.antenna.sensor import SensorChain, reading_noise
+from antennate.errors import ConfigError
+from antennate.robots.antenna import AntennaSpec
+from antennate.sim import antenna_part
+from antennate.types import AntennaFrame, Floats, Ints
+
+Side = Literal["left", "right"]
+
+_TOUCH_MARGIN = 1.5
+"""Radius of a touch sensor's volume over that of its link: contacts lie inside it."""
+
+
+def attach_antenna(
+    spec: mujoco.MjSpec,
+    body: str,
+    antenna: AntennaSpec,
+    side: Side = "left",
+    position: Sequence[float] = (0.0, 0.0, 0.0),
+    angle: float | None = None,
+    name: str | None = None,
+    contype: int = 0,
+    conaffinity: int = 1,
+) -> str:
+    """Add one antenna with its base servo and its sensors to a body of your own model.
+
+    The antenna bends in the x-y plane of the body, whose x is the heading and y the left. Positive
+    hinge angles bend it towards the tail, on both sides. Everything it adds is named
+    `NAME/…`: joints and actuator `base`, joints and geoms `hinge0`, … from base to tip, sensors
+    `angle0`, … [rad] and `touch0`, … [N, sum of normal forces on that link].
+
+    Args:
+        spec: Your model; it is changed.
+        body: Name of the body that carries the antenna. The two never collide with each other.
+        antenna: The antenna.
+        side: The right antenna is the mirror image of the left one.
+        position: Of the antenna's base in the frame of the body [m], shape (3,).
+        angle: From the heading outwards [rad]; None for the antenna's own mounting angle.
+        name: First part of all names; None for `antenna_left` or `antenna_right`.
+        contype: Collision bits of the links, as of `mjsGeom`. With the default pair they meet every
+            geom whose `contype` has bit 1, MuJoCo's default, and never another antenna.
+        conaffinity: The same.
+
+    Returns:
+        The name.
+
+    Raises:
+        ConfigError: There is no such body, the name is taken, or the side is unknown.
+    """
+    name = f"antenna_{side}" if name is None else name
+    carrier = spec.body(body)
+    if carrier is None:
+        known = ", ".join(b.name for b in spec.bodies if b.name) or "none"
+        raise ConfigError(f"body: expected the name of a body, {known}, found {body}")
+    if spec.body(f"{name}/base") is not None:
+        raise ConfigError(f"name: expected one that is not taken, found {name} twice")
+    part = antenna_part.build(antenna)
+    for geom in part.geoms:
+        if geom.name:  # the links; the base is no obstacle to anything
+            geom.contype, geom.conaffinity = contype, conaffinity
+    _add_sensors(part, antenna)
+    outwards = antenna.base_angle if angle is None else angle
+    quaternion = antenna_part.mounting_quaternion(outwards, side)
+    frame = carrier.add_frame(pos=list(position), quat=quaternion)
+    spec.attach(part, frame=frame, prefix=f"{name}/")
+    for link in [b.name for b in spec.bodies if b.name.startswith(f"{name}/")]:
+        spec.add_exclude(name=f"{link}-{body}", bodyname1=body, bodyname2=link)
+    return name
+
+
+def _add_sensors(part: mujoco.MjSpec, antenna: AntennaSpec) -> None:
+    """A position and a touch sensor for each hinge and its link."""
+    for i, hinge in enumerate(antenna.hinge_names):
+        link = part.body(hinge)
+        link.add_site(
+            name=f"touch{i}",
+            type=mujoco.mjtGeom.mjGEOM_CAPSULE,
+            fromto=[0, 0, 0, antenna.link_length, 0, 0],
+            size=[_TOUCH_MARGIN * antenna.radius, 0, 0],
+            group=4,  # not drawn by default
+        )
+        part.add_sensor(
+            name=f"angle{i}",
+            type=mujoco.mjtSensor.mjSENS_JOINTPOS,
+            objtype=mujoco.mjtObj.mjOBJ_JOINT,
+            objname=hinge,
+        )
+        part.add_sensor(
+            name=f"touch{i}",
+            type=mujoco.mjtSensor.mjSENS_TOUCH,
+            objtype=mujoco.mjtObj.mjOBJ_SITE,
+            objname=f"touch{i}",
+        )
+
+
+class AntennaReader:
+    """Reads attached antennae of one kind as their electronics would: in counts, with memory.
+
+    Args:
+        model: Your compiled model.
+        names: Names that `attach_antenna` returned, left before right.
+        antenna: What was attached, with its sensor.
+        period: Time between two calls of `read` [s].
+        seed: Seed of the sensor noise, None for none.
+
+    Raises:
+        ConfigError: The model has no such antenna.
+    """
+
+    def __init__(
+        self,
+        model: mujoco.MjModel,
+        names: Sequence[str],
+        antenna: AntennaSpec,
+        period: float,
+        seed: int | None = None,
+    ) -> None:
+        self._angle = _sensor_addresses(model, names, "angle", antenna.hinges)
+        self._touch = _sensor_addresses(model, names, "touch", antenna.hinges)
+        self._covered = antenna.sensed_hinges
+        self._sensor = antenna.sensor
+        self._chain = SensorChain(antenna.sensor, (1, len(names)), period)
+        self._rng = None if seed is None else np.random.default_rng(seed)
+
+    def angles(self, data: mujoco.MjData) -> Floats:
+        """Hinge angles [rad], base to tip, shape (antennae, hinges)."""
+        return data.sensordata[self._angle]
+
+    def touch(self, data: mujoco.MjData) -> Floats:
+        """Normal force on each link [N], base to tip, shape (antennae, hinges)."""
+        return data.sensordata[self._touch]
+
+    def flex(self, data: mujoco.MjData) -> Floats:
+        """Summed angle of the hinges under the flex sensor [rad], shape (antennae,)."""
+        return self.angles(data)[:, : self._covered].sum(axis=1)
+
+    def read(self, data: mujoco.MjData) -> AntennaFrame:
+        """Sample all flex sensors once: counts of shape (1, antennae) at t [s] of shape (1,).
+
+        Call it once every period: hysteresis, creep and noise go on with each call.
+        """
+        noise = (
+            0.0
+            if self._rng is None
+            else reading_noise(self._sensor, self._rng, (1, len(self._angle)))
+        )
+        counts = self._chain.step(self.flex(data)[None, :], noise)
+        return AntennaFrame(t=np.array([data.time]), counts=counts)
+
+    def reset(self) -> None:
+        """Let the sensors forget what they felt, as after `mj_resetData`."""
+        self._chain.reset(0)
+
+
+def _sensor_addresses(model: mujoco.MjModel, names: Sequence[str], kind: str, count: int) -> Ints:
+    """Index into `sensordata` of each sensor, shape (antennae, hinges)."""
+    try:
+        return np.array(
+            [[model.sensor(f"{name}/{kind}{i}").adr[0] for i in range(count)] for name in names]
+        )
+    except KeyError as error:
+        raise ConfigError(
+            f"names: expected antennae of {count} hinges that attach_antenna added, found "
+            f"{', '.join(names)}: {str(error.args[0]).splitlines()[0]}"
+        ) from None
