@@ -16,6 +16,7 @@ RENAMED = {
     "arm": ("controller", "profile"),
     "fate": ("outcome",),
     "fate_after_start": ("outcome_after_start",),
+    "status": ("outcome",),
 }
 KEYS = ("arm", "kind", "wall", "speed_m_s", "profile", "condition", "trial", "side")
 VERSIONED = ("schema",)
