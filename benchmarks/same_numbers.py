@@ -1,8 +1,8 @@
 """Compare two run directories value by value: `python benchmarks/same_numbers.py OLD NEW`.
 
-Text of the cells of `trials.csv` is compared, so that not one bit may differ; columns may be renamed
-or added, and the new run may have fewer trials. Every number of the old `result.json` must be in the
-new one; its keys may be renamed. Ends with 1 if anything differs.
+Not one bit may differ: cells of `trials.csv` are compared as text. Columns may be renamed or added,
+and the new run may have fewer trials. Every number of the old `result.json` must be in the new one;
+its keys may be renamed. Ends with 1 if anything differs.
 """
 
 import csv
