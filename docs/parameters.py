@@ -15,8 +15,11 @@ HEAD = """\
 
 Every physical number of the project: its default, its unit, what it means and where it comes from.
 A source begins with `paper` (arXiv:2603.07795), `datasheet`, `measured`, `fitted` or `assumed`.
-This page is generated: change `src/antennate/params/`, then run `python docs/parameters.py`.
+This page is generated: change `src/antennate/params/` or `robots/`, then run
+`python docs/parameters.py`.
 """
+ROBOTS = ("spec", "joints", "servos", "antenna", "sensor")
+"""Modules of `antennate.robots` that describe robots."""
 OTHERS = (
     "antennate.hardware.robot_file",
     "antennate.hardware.robot",
@@ -80,7 +83,8 @@ def table(group: type[params.Params]) -> str:
 
 def main() -> int:
     """Write the page, or compare it; return the exit status."""
-    parts = [table(group) for group in groups(params)]
+    robots = [importlib.import_module(f"antennate.robots.{name}") for name in ROBOTS]
+    parts = [table(group) for module in (params, *robots) for group in groups(module)]
     page = "\n".join([HEAD, *parts, COMMANDS, *(table(group) for group in commands())])
     if "--check" not in sys.argv[1:]:
         PAGE.write_text(page, encoding="utf-8")

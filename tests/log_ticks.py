@@ -10,7 +10,7 @@ from functools import lru_cache
 from antennate.params import ControlParams
 from antennate.robots.spec import RobotSpec
 from antennate.telemetry.header import Header
-from antennate.telemetry.ticks import JOINTS, Tick
+from antennate.telemetry.ticks import Tick
 
 HEADER = Header(
     controller="closed",
@@ -47,7 +47,7 @@ def tick(number: int) -> Tick:
         contact=(chance.randrange(3), chance.randrange(3)),
         maneuver=chance.randrange(-(2**63), 2**63),
         phase=real(),
-        angles=tuple(real() for _ in JOINTS),
+        angles=tuple(real() for _ in RobotSpec().joint_names),
         state=chance.choice(["", "OK", "HOLD", "FAULT"]),
         causes=tuple(chance.sample(CAUSES, chance.randrange(len(CAUSES)))),
         age=real(),

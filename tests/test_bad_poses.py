@@ -15,7 +15,8 @@ from twin_rig import rig
 from antennate.hardware.safety.causes import Cause, State
 from antennate.hardware.safety.supervisor import Supervisor
 from antennate.params import SupervisorParams
-from antennate.telemetry.ticks import JOINTS, Tick
+from antennate.robots.spec import RobotSpec
+from antennate.telemetry.ticks import Tick
 from antennate.twin.config import TwinConfig
 from antennate.types import JointCommand
 
@@ -146,7 +147,9 @@ def test_B14_a_bad_pose_is_refused_as_a_whole_and_counted_and_the_goal_held(
 @given(seed=st.integers(0, 1000))
 @settings(max_examples=20, deadline=None)
 def test_B14_a_pose_within_all_limits_is_not_refused(seed: int) -> None:
-    angles = sound_angles() + np.random.default_rng(seed).uniform(-0.05, 0.05, len(JOINTS))
+    angles = sound_angles() + np.random.default_rng(seed).uniform(
+        -0.05, 0.05, len(RobotSpec().joint_names)
+    )
     made, refused = robot(), robot().session.control.refused
     assert made.step(pose_of(np.clip(angles, -1.5, 1.5))) in (State.OK, State.DEGRADED)
     assert made.session.control.refused == refused

@@ -285,9 +285,15 @@ def test_G4_a_log_that_cannot_begin_is_refused(tmp_path: Path) -> None:
 def test_a_tick_that_does_not_fit_is_refused() -> None:
     with pytest.raises(LogError, match="numbers that fit"):
         replace(tick(1), missed=-1).pack()
-    with pytest.raises(LogError, match="numbers that fit"):
-        replace(tick(1), angles=(0.0,)).pack()
     assert issubclass(LogError, AntennateError)
+
+
+def test_a_tick_of_a_robot_with_other_joints_comes_back_and_a_short_one_is_refused() -> None:
+    other = replace(tick(1), angles=(0.5, -0.25))
+    packed = other.pack()
+    assert Tick.unpack(packed).angles == (0.5, -0.25)
+    with pytest.raises(LogError, match="expected a tick of 2 joints"):
+        Tick.unpack(packed[:100])
 
 
 @pytest.mark.parametrize(
@@ -302,5 +308,6 @@ def test_a_header_of_defaults_names_its_fields() -> None:
     content = Header(controller="open", params=ControlParams()).pack()
     said = json.loads(content[2:])
     assert said["version"] == antennate.__version__
-    assert said["fields"][:5] == ["schema", "kind", "number", "asked", "t"]
+    assert said["fields"][:5] == ["schema", "kind", "joints", "number", "asked"]
+    assert said["fields"][17:19] == ["yaw1", "yaw2"]
     assert said["params"]["gait"]["frequency"] == 0.5

@@ -16,13 +16,13 @@ from antennate import figures as style
 from antennate.cli import main
 from antennate.errors import LogError
 from antennate.params import ControlParams
+from antennate.robots.spec import RobotSpec
 from antennate.telemetry.figure import Course
 from antennate.telemetry.figure import replay as draw
 from antennate.telemetry.framing import framed
 from antennate.telemetry.header import Header
 from antennate.telemetry.reader import LogReader
 from antennate.telemetry.replay import ReplayRobot, recorded_controller, replay
-from antennate.telemetry.ticks import JOINTS
 from antennate.telemetry.writer import LogWriter
 from antennate.types import Contact, JointCommand, Maneuver
 
@@ -107,7 +107,7 @@ def test_it_leaves_a_table_and_a_figure(tmp_path: Path, capsys: pytest.CaptureFi
         angles = np.concatenate(
             [seen.command.yaw[0], seen.command.leg.ravel(), seen.command.antenna[0]]
         )
-        assert [float(row[name]) for name in JOINTS] == angles.tolist()
+        assert [float(row[name]) for name in RobotSpec().joint_names] == angles.tolist()
         counts = np.array([float(row["counts_l"]), float(row["counts_r"])])
         np.testing.assert_array_equal(counts, seen.frame.counts[0])
         assert int(row["maneuver"]) == int(row["replayed"]) == seen.maneuver
@@ -192,7 +192,7 @@ def test_a_controller_that_raises_is_counted_and_does_not_end_the_replay(log: Pa
         ticks = list(reader)
     found = replay(ticks, Broken(), 0.01)  # type: ignore[arg-type]
     assert (found.failures, found.commands, len(found.maneuvers)) == (TICKS, TICKS, TICKS)
-    nowhere = (math.nan,) * len(JOINTS)
+    nowhere = (math.nan,) * len(RobotSpec().joint_names)
     failed = [dataclasses.replace(tick, angles=nowhere) for tick in ticks]
     assert replay(failed, Broken(), 0.01).commands == 0  # type: ignore[arg-type]
 

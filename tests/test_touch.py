@@ -21,7 +21,7 @@ from antennate.experiments.touch import traverse as wall_traverse
 from antennate.experiments.touch.episodes import match, merged, runs
 from antennate.experiments.touch.measures import Pool, roc
 from antennate.experiments.touch.run import TouchConfig
-from antennate.experiments.touch.sensing import Judgement, Verdict
+from antennate.experiments.touch.sensing import Comparison, ContactCriteria
 from antennate.params import BenchPhysicsParams, ConditioningParams, RuleParams, TouchWallsParams
 from antennate.robots.antenna import AntennaSpec
 from antennate.robots.sensor import SensorParams
@@ -79,16 +79,16 @@ def test_matches_by_hand(truth, alarm, found, carried, false, onset, release):
     assert m.alarms == len(runs(states(alarm)))
 
 
-def verdict(trial, truth, alarm, level, grace=2) -> Verdict:
+def comparison(trial, truth, alarm, level, grace=2) -> Comparison:
     truth, alarm, level = states(truth), states(alarm), np.array(level, float)
-    return Verdict(
+    return Comparison(
         "flat", 0.1, "stiff", trial, 2.0, truth, alarm, level, level, match(truth, alarm, grace)
     )
 
 
 def test_measures_by_hand():
-    first = verdict(0, ".###..#.", "..##...#", [0, 1, 5, 6, 0, 0, 2, 1], grace=0)
-    second = verdict(1, "....", "..#.", [0, 0, 3, 0])
+    first = comparison(0, ".###..#.", "..##...#", [0, 1, 5, 6, 0, 0, 2, 1], grace=0)
+    second = comparison(1, "....", "..#.", [0, 0, 3, 0])
     found = Pool([first, second], trials=2, rate=100.0).measure([first, second])
     # ticks: 2 hits, 2 wrong, 2 lost; the second alarm comes too late for the second contact
     assert found["f1"] == pytest.approx(4 / 8)
@@ -112,7 +112,9 @@ def test_the_area_agrees_with_mann_and_whitney_and_chance_is_a_half():
         truth = rng.random(2000) < 0.3
         level = truth * 1.0 + rng.standard_normal(2000)
         none = match(truth, ~truth, 0)
-        group.append(Verdict("flat", 0.1, "stiff", trial, 1.0, truth, ~truth, level, level, none))
+        group.append(
+            Comparison("flat", 0.1, "stiff", trial, 1.0, truth, ~truth, level, level, none)
+        )
     found = Pool(group, 4, 100.0).measure(group)
     truth, level = (np.concatenate([getattr(v, k) for v in group]) for k in ("truth", "level"))
     exact = stats.mannwhitneyu(level[truth], level[~truth]).statistic
@@ -126,7 +128,7 @@ def test_the_area_agrees_with_mann_and_whitney_and_chance_is_a_half():
 
 
 def test_a_perfect_alarm_is_perfect_and_the_curve_goes_from_corner_to_corner():
-    one = verdict(0, "..####..", "..####..", [-9, -9, 9, 9, 9, 9, -9, -9])
+    one = comparison(0, "..####..", "..####..", [-9, -9, 9, 9, 9, 9, -9, -9])
     found = Pool([one], 1, 100.0).measure([one])
     assert [found[k] for k in ("f1", "precision", "recall", "auc")] == [1.0] * 4
     assert found["f1_95"] is None  # one trial says nothing about others
@@ -157,7 +159,7 @@ def test_the_mind_answers_a_step_of_flex_when_the_mean_has_crossed():
 
 
 def test_truth_merges_short_gaps_of_strong_presses():
-    rule = Judgement(force=0.1, merge=3, grace=0)
+    rule = ContactCriteria(force=0.1, merge=3, grace=0)
     force = np.array([0.0, 0.2, 0.05, 0.1, 0.2, 0.0])
     np.testing.assert_array_equal(sensing.true_state(rule, force), states(".####."))
 
@@ -298,8 +300,8 @@ def test_the_study_counts_what_it_ran(outcome):
     added = long["release"]["median_ms"] - short["release"]["median_ms"]
     assert 0.0 < added < 1000 * (0.3 - 0.02)
     assert result["truths"][0]["f1"] == pytest.approx(
-        sum(2 * (v.truth & v.alarm).sum() for v in outcome.verdicts)
-        / sum(v.truth.sum() + v.alarm.sum() for v in outcome.verdicts)
+        sum(2 * (v.truth & v.alarm).sum() for v in outcome.comparisons)
+        / sum(v.truth.sum() + v.alarm.sum() for v in outcome.comparisons)
     )
 
 

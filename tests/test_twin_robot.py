@@ -51,8 +51,11 @@ def test_a_quarter_turn_is_1024_ticks_from_the_middle_and_directions_count() -> 
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        ({"yaw": {"ids": (1, 2)}}, "yaw.ids must have 5 entries, got 2"),
-        ({"antennae": {**ROBOT.antennae.model_dump(), "ids": (1, 19)}}, "ids must differ, got 1"),
+        ({"yaw": {"ids": (1, 2)}}, "yaw.ids: expected one for each of the 5 joints, found 2"),
+        (
+            {"antennae": {**ROBOT.antennae.model_dump(), "ids": (1, 19)}},
+            "ids: expected each once, found 1",
+        ),
         ({"yaw": {**ROBOT.yaw.model_dump(), "zeros": (2048,) * 4 + (100,)}}, "quarter turn"),
     ],
 )

@@ -24,7 +24,7 @@ from antennate.cli.options import (
     read_words,
 )
 from antennate.errors import ConfigError
-from antennate.params.reading import Config, describe, group_of, read_file
+from antennate.params.reading import Config, describe, group_of, put_over, read_file
 
 
 class HelpRequest(Exception):
@@ -131,17 +131,19 @@ _Model = TypeVar("_Model")
 def _filled(
     model: type[_Model], base: Mapping[str, Any], values: Mapping[tuple[str, ...], Any]
 ) -> _Model:
-    """The model with these values over those of a file."""
+    """The model with these values over those of a file, and both over groups that are named."""
+    named = {path: table for path in values if (table := _table(model, path, values[path]))}
+    plain = {path: value for path, value in values.items() if path not in named}
     try:
-        whole = {path: _table(model, path, value) for path, value in values.items()}
-        return TypeAdapter(model).validate_python(merged(base, whole))
+        whole = merged(put_over(merged({}, named), base), plain)
+        return TypeAdapter(model).validate_python(whole)
     except ValidationError as error:
         raise ConfigError(describe(error, model, flag_of, found)) from None
 
 
-def _table(model: Any, path: tuple[str, ...], value: Any) -> Any:
-    """The value; of a named group its table."""
+def _table(model: Any, path: tuple[str, ...], value: Any) -> dict[str, Any] | None:
+    """The table of a group that is given by its name, None if a plain value is given."""
     kind: Any = model
     for part in path:
         kind = group_of(fields_of(kind)[part].annotation)
-    return value if kind is None else kind.named(value).model_dump()
+    return None if kind is None else kind.named(value).model_dump()

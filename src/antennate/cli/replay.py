@@ -21,7 +21,7 @@ from antennate.studies.formats import to_csv, to_json
 from antennate.studies.run_directory import RunDirectory
 from antennate.telemetry.reader import Damage, LogReader
 from antennate.telemetry.replay import ReplayConfig, Replayed, recorded_controller, replay
-from antennate.telemetry.ticks import FIELDS, Tick
+from antennate.telemetry.ticks import Tick, fields
 from antennate.types import Maneuver
 
 if TYPE_CHECKING:
@@ -182,7 +182,8 @@ def _keep(folder: RunDirectory, path: Path, found: Replayed) -> None:
     from antennate.telemetry.figure import replay as draw
 
     with LogReader(path) as log:
-        folder.write(TICKS, to_csv(_rows(log, found.maneuvers)))
+        names = fields(log.header.robot)
+        folder.write(TICKS, to_csv(_rows(names, log, found.maneuvers)))
     if found.maneuvers:
         with LogReader(path) as log:
             figure = draw(_course(log, found.maneuvers))
@@ -190,10 +191,12 @@ def _keep(folder: RunDirectory, path: Path, found: Replayed) -> None:
             folder.write(f"figures/replay.{suffix}", data)
 
 
-def _rows(ticks: Iterable[Tick], replayed: Sequence[int]) -> Iterator[dict[str, Any]]:
+def _rows(
+    names: Sequence[str], ticks: Iterable[Tick], replayed: Sequence[int]
+) -> Iterator[dict[str, Any]]:
     """One row a tick; numbers as they are, so that they come back exactly."""
     for tick, maneuver in zip(ticks, replayed, strict=True):
-        row = dict(zip(FIELDS[2:-1], tick.values, strict=True))
+        row = dict(zip(names, tick.values, strict=True))
         yield row | {
             "replayed": maneuver,
             "state": tick.state,

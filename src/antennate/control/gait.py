@@ -64,7 +64,10 @@ def targets(
     antenna = np.full((phase.shape[0], 2), params.antenna_mean)
     if sweep is not None:
         antenna += params.antenna_amplitude * np.sin(sweep)[:, None]
-    return JointCommand(yaw=yaw, leg=leg, antenna=antenna)
+    if not robot.pitch_count:
+        return JointCommand(yaw=yaw, leg=leg, antenna=antenna)
+    level = np.zeros((phase.shape[0], robot.pitch_count))
+    return JointCommand(yaw=yaw, leg=leg, antenna=antenna, pitch=level)
 
 
 class Gait:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from antennate.antenna import sensor as film
+from antennate.antenna import sensor as flex_sensor
 from antennate.control.conditioning import bending_level
 from antennate.params import ConditioningParams
 from antennate.robots.sensor import SensorParams
@@ -13,18 +13,18 @@ from antennate.types import Floats
 
 def noise(sensor: SensorParams, rng: np.random.Generator, count: int) -> Floats:
     """Noise of one record [counts], shape (count,)."""
-    return film.reading_noise(sensor, rng, (count,))
+    return flex_sensor.reading_noise(sensor, rng, (count,))
 
 
 def recorded(sensor: SensorParams, flex: Floats, noise: Floats) -> Floats:
-    """Readings [counts] of films that remember, for their flex over time [rad].
+    """Readings [counts] of flex sensors that remember, for their flex over time [rad].
 
     Args:
         sensor: The chain; its rate is that of the rows.
         flex: Shape (n,) or (n, B).
         noise: Added before rounding [counts], same shape.
     """
-    chain = film.SensorChain(sensor, flex.shape[1:], 1.0 / sensor.rate)
+    chain = flex_sensor.SensorChain(sensor, flex.shape[1:], 1.0 / sensor.rate)
     found = [chain.step(f, n) for f, n in zip(flex, noise, strict=True)]
     return np.array(found).reshape(flex.shape)
 
@@ -51,7 +51,7 @@ def flex_of(sensor: SensorParams, counts: Floats) -> Floats:
 
     The reading does not tell the side of the bend: its sign has to be known from elsewhere.
     """
-    volts, readings = film.transfer_curve(sensor)
+    volts, readings = flex_sensor.transfer_curve(sensor)
     voltage = np.interp(counts, readings, volts)
     resistance = sensor.divider_resistance * (sensor.supply / voltage - 1.0)
     return np.maximum((resistance / sensor.flat_resistance - 1.0) / sensor.bend_gain, 0.0)

@@ -8,6 +8,7 @@ from typing import Protocol
 
 from antennate.errors import AntennateError
 from antennate.hardware.tracebacks import Tracebacks
+from antennate.robots.spec import RobotSpec
 from antennate.types import JointCommand
 
 
@@ -70,6 +71,11 @@ class Actuators(Protocol):
     """
 
     left_on: list[int]
+
+    @property
+    def robot(self) -> RobotSpec:
+        """The robot whose joints they move."""
+        ...
 
     @property
     def state(self) -> ActuatorState:

@@ -23,6 +23,7 @@ class Joints:
     """All joints of one robot that servos move, in the order of its description.
 
     Attributes:
+        robot: The description.
         ids: Ids of their servos.
         models: Model numbers by id.
         profiles: Profile velocities by id [0.229 rev/min], above what goals are moved at.
@@ -31,6 +32,7 @@ class Joints:
     """
 
     def __init__(self, robot: RobotSpec) -> None:
+        self.robot = robot
         self.ids = robot.ids
         self.models = robot.models
         self.profiles = profile_velocities(robot)

@@ -7,7 +7,7 @@ import tomllib
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import UnionType
-from typing import Any, TypeVar, Union, get_args, get_origin
+from typing import Any, TypeVar, Union, cast, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 
@@ -47,18 +47,37 @@ _KINDS = {
 """What pydantic's families of error types ask for, by the first word of the type."""
 
 
-def read_file(path: Path, model: type[Config]) -> Config:
+def read_file(path: Path, model: type[Config], flag: str = "--config") -> Config:
     """A configuration from a TOML file with the model's keys.
+
+    Where the model has a group of which some are known by name, such as a robot, the file may hold
+    that name or the path of a file, or a table whose `base` is one; a path starts at the folder of
+    the file that holds it.
+
+    Args:
+        path: The file.
+        model: What it holds.
+        flag: Who named the file, for errors.
 
     Raises:
         ConfigError: The file cannot be read, is no TOML, or holds what the model refuses.
     """
+    table = with_bases(_table_of(path, flag), model, path.parent)
+    try:
+        return model.model_validate_json(json.dumps(table, default=str), strict=True)
+    except ValidationError as error:
+        raise ConfigError(f"{path}: {describe(error, model)}") from None
+    except RecursionError:
+        raise ConfigError(f"{path}: expected plain tables, found them nested too deeply") from None
+
+
+def _table_of(path: Path, flag: str) -> dict[str, Any]:
     try:
         with path.open("rb") as file:
             content = file.read(LARGEST_FILE + 1)
     except OSError as error:
         raise ConfigError(
-            f"--config: expected a readable file, found {path}: {error.strerror}"
+            f"{flag}: expected a readable file, found {path}: {error.strerror}"
         ) from None
     if len(content) > LARGEST_FILE:
         raise ConfigError(f"{path}: expected at most {LARGEST_FILE} bytes, found more")
@@ -69,7 +88,7 @@ def read_file(path: Path, model: type[Config]) -> Config:
                 raise ConfigError(
                     f"{path}: line {number}: expected at most {_MOST_DOTS} dots, found more"
                 )
-        data = json.dumps(tomllib.loads(text), default=str)
+        return tomllib.loads(text)
     except UnicodeDecodeError as error:
         raise ConfigError(
             f"{path}: expected UTF-8 text, found byte {content[error.start]:#04x} at {error.start}"
@@ -78,10 +97,38 @@ def read_file(path: Path, model: type[Config]) -> Config:
         raise ConfigError(f"{path}: expected TOML, found: {error}") from None
     except RecursionError:
         raise ConfigError(f"{path}: expected plain tables, found them nested too deeply") from None
-    try:
-        return model.model_validate_json(data, strict=True)
-    except ValidationError as error:
-        raise ConfigError(f"{path}: {describe(error, model)}") from None
+
+
+def with_bases(table: Mapping[str, Any], model: type[BaseModel], folder: Path) -> dict[str, Any]:
+    """The table with names and bases of known groups replaced by what they stand for."""
+    result = dict(table)
+    for name, field in model.model_fields.items():
+        group, value = group_of(field.annotation), table.get(name)
+        named = getattr(group, "named", None)
+        if group is None:
+            continue
+        if named is not None and isinstance(value, str):
+            value = {"base": value}
+        if isinstance(value, dict):
+            value = with_bases(cast("dict[str, Any]", value), group, folder)
+            if named is not None and isinstance(base := value.get("base"), str):
+                known = named(base, folder).model_dump(mode="json")
+                value = put_over(known, {k: v for k, v in value.items() if k != "base"})
+            result[name] = value
+    return result
+
+
+def put_over(base: Mapping[str, Any], table: Mapping[str, Any]) -> dict[str, Any]:
+    """Nested tables: the values of `table` over those of `base`."""
+    result = dict(base)
+    for key, value in table.items():
+        old = result.get(key)
+        if isinstance(old, dict) and isinstance(value, dict):
+            old, value = cast("dict[str, Any]", old), cast("dict[str, Any]", value)
+            result[key] = put_over(old, value)
+        else:
+            result[key] = value
+    return result
 
 
 def from_values(model: type[Config], values: Mapping[str, Any]) -> Config:

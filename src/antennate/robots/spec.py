@@ -7,11 +7,16 @@ antennae, and the pitch joints where servos move them: ids, angles and goals kee
 from __future__ import annotations
 
 import math
-from typing import Literal
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Literal, Self
 
 from pydantic import model_validator
 
+from antennate.errors import ConfigError
+from antennate.messages import nearest, shown
 from antennate.params.base import Params, number
+from antennate.params.reading import read_file
 from antennate.robots.antenna import BASE, AntennaSpec
 from antennate.robots.joints import (
     QUARTER,
@@ -26,6 +31,8 @@ from antennate.robots.servos import EXTENDED_MODE, POSITION_MODE, TICKS_A_TURN, 
 from antennate.robots.sides import SIDES
 
 GroupName = Literal["yaw", "legs", "antennae", "pitch"]
+ROBOTS: Mapping[str, Mapping[str, Any]] = {"scuttle": {}}
+"""Robots that are known by name: what differs from the defaults."""
 HARDWARE_ALONE = (
     *(
         f"robot.{group}.{name}"
@@ -121,6 +128,28 @@ class RobotSpec(Params):
     antennae: BaseParams = BaseParams()
     servos: ServosParams = ServosParams()
     antenna: AntennaSpec = AntennaSpec()
+
+    @classmethod
+    def named(cls, text: str | Path, folder: Path = Path()) -> Self:
+        """The robot of a name, or of a TOML file with the keys of this model.
+
+        Args:
+            text: The name, or the path of the file.
+            folder: Where a path that is not absolute starts.
+
+        Raises:
+            ConfigError: There is no such robot, or its file cannot be used.
+        """
+        if (table := ROBOTS.get(str(text))) is not None:
+            return cls.model_validate(table)
+        path = folder / text
+        if path.suffix != ".toml" and not path.exists():
+            known = ", ".join(ROBOTS)
+            raise ConfigError(
+                f"--robot: expected {known} or a TOML file{nearest(str(text), ROBOTS)}, found "
+                f"{shown(str(text))}"
+            )
+        return read_file(path, cls, "--robot")
 
     @property
     def yaw_count(self) -> int:
@@ -268,7 +297,9 @@ class RobotSpec(Params):
             raise ValueError(f"release must name each group once, got {', '.join(self.release)}")
         ids = self.ids
         if doubled := sorted({i for i in ids if ids.count(i) > 1}):
-            raise ValueError(f"ids must differ, got {', '.join(map(str, doubled))} more than once")
+            raise ValueError(
+                f"ids: expected each once, found {', '.join(map(str, doubled))} more than once"
+            )
         if self.link_mass <= 0.01:
             raise ValueError(
                 f"mass must leave more than 10 g a link beside legs and antennae, got {self.mass} "
@@ -281,7 +312,9 @@ def _check_group(name: GroupName, group: JointParams, count: int) -> None:
     """Refuse lists of a wrong length, and zeros without room for a quarter turn either way."""
     for what in ("ids", "directions", "zeros"):
         if (found := len(getattr(group, what))) not in (0, count):
-            raise ValueError(f"{name}.{what} must have {count} entries, got {found}")
+            raise ValueError(
+                f"{name}.{what}: expected one for each of the {count} joints, found {found}"
+            )
     for zero in group.zeros if math.isfinite(group.largest) else ():
         if not QUARTER <= zero <= TICKS_A_TURN - QUARTER:
             raise ValueError(

@@ -83,6 +83,7 @@ class SimRobot:
         self._rows: dict[int, _Row] = {}
         self._batch = batch
         self._yaws = robot.yaw_count
+        self._parts = list(robot.command_shapes())
         self._sensors = SensorChain(robot.antenna.sensor, (batch, 2), period)
         self._period = period
         self._substeps = round(period / timestep)
@@ -141,9 +142,8 @@ class SimRobot:
 
     def write(self, command: JointCommand) -> None:
         """Command every row's joints."""
-        drive = np.concatenate(
-            [command.yaw, command.leg.reshape(self._batch, -1), command.antenna], axis=1
-        )
+        parts = [getattr(command, name).reshape(self._batch, -1) for name in self._parts]
+        drive = np.concatenate(parts, axis=1)
         finite = bool(np.isfinite(drive).all())
         for i, row in self._rows.items():
             if row.failure is None:

@@ -31,10 +31,10 @@ def mean95(values: Floats, seed: int = 0) -> tuple[float, float, float]:
 
 @dataclass(frozen=True, slots=True)
 class Discordance:
-    """Two arms on the same trials, by success alone.
+    """Two conditions on the same trials, by success alone.
 
     Attributes:
-        only_first: Trials on which only the first arm succeeded; `only_second` likewise.
+        only_first: Trials on which only the first succeeded; `only_second` likewise.
         mcnemar_p: Exact two-sided McNemar test on those.
     """
 
@@ -44,7 +44,7 @@ class Discordance:
 
 
 def mcnemar(ok: Bools) -> Discordance:
-    """Compare the successes of two arms trial by trial, shape (n, 2)."""
+    """Compare the successes of two conditions trial by trial, shape (n, 2)."""
     from scipy import stats  # takes long; only where it is needed
 
     first, second = ok[:, 0], ok[:, 1]
@@ -56,15 +56,15 @@ def mcnemar(ok: Bools) -> Discordance:
 
 @dataclass(frozen=True, slots=True)
 class PairedTest:
-    """Two arms on the same seeds.
+    """Two conditions on the same seeds.
 
     Attributes:
-        only_first: Seeds on which only the first arm succeeded; `only_second` likewise.
+        only_first: Seeds on which only the first succeeded; `only_second` likewise.
         mcnemar_p: Exact two-sided McNemar test on those.
         time_difference_s: Mean of restricted time, first minus second [s], with its 95 % interval.
         wilcoxon_p: Two-sided signed-rank test on restricted times.
         both: Seeds on which both succeeded; `both_time_s` are the mean times of the first and the
-            second arm on those [s], None without any.
+            second on those [s], None without any.
     """
 
     only_first: int
@@ -78,7 +78,7 @@ class PairedTest:
 
 
 def compare(first_ok: Bools, second_ok: Bools, first_t: Floats, second_t: Floats) -> PairedTest:
-    """Compare two arms trial by trial; arrays of shape (n,), times restricted to the limit [s]."""
+    """Compare two conditions by trial; arrays of shape (n,), times restricted to the limit [s]."""
     from scipy import stats  # takes long; only where it is needed
 
     success = mcnemar(np.stack([first_ok, second_ok], axis=1))

@@ -13,7 +13,7 @@ from typing import BinaryIO
 
 from antennate.hardware.esp32.frame import CRC_SIZE, stuff_into, unstuff
 
-SCHEMA = 2
+SCHEMA = 3
 """Number of the layout of all records; rises with every change."""
 LONGEST = 1 << 17
 """Most bytes between two delimiters that are held; more cannot be a record."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from typing import Any
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
@@ -11,7 +12,7 @@ from antennate.errors import LogError
 from antennate.params import ControlParams
 from antennate.robots.spec import RobotSpec
 from antennate.telemetry.framing import SCHEMA, Kind
-from antennate.telemetry.ticks import FIELDS, LAYOUT
+from antennate.telemetry.ticks import fields, layout
 
 _START = bytes((SCHEMA, Kind.HEADER))
 
@@ -22,31 +23,34 @@ class Header(BaseModel):
     Attributes:
         controller: Name of the controller.
         params: Numbers of the controller.
-        robot: The robot, None in simulation.
+        robot: The robot.
         seed: Seed of the world, None on a robot.
         trial: Trial of that seed.
         phase: Gait phase at the first tick [rad].
         version: Version of antennate that wrote it.
-        record: Layout of a tick for other readers, in the words of Python's `struct`; its text is
-            as long as the last field says.
-        fields: What it holds, in order.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     controller: str
     params: ControlParams
-    robot: RobotSpec | None = None
+    robot: RobotSpec = RobotSpec()
     seed: int | None = None
     trial: int | None = None
     phase: float = 0.0
     version: str = __version__
-    record: str = LAYOUT
-    fields: tuple[str, ...] = FIELDS
 
     def pack(self) -> bytes:
         """The content of its record."""
-        return _START + json.dumps(self.model_dump()).encode()
+        return _START + json.dumps(self.model_dump() | self._of_ticks()).encode()
+
+    def _of_ticks(self) -> dict[str, Any]:
+        """For other readers: layout of a tick in the words of `struct`, and what it holds.
+
+        Its text is as long as the last number says.
+        """
+        names = ("schema", "kind", "joints", *fields(self.robot), "text")
+        return {"record": layout(len(self.robot.ids)), "fields": names}
 
     @classmethod
     def unpack(cls, content: bytes) -> Header:
@@ -63,8 +67,11 @@ class Header(BaseModel):
         if content[:2] != _START:
             raise LogError("expected a header as first record, found another kind")
         try:
-            return cls.model_validate(json.loads(content[2:]))
-        except (ValueError, RecursionError) as error:
+            table = json.loads(content[2:])
+            for name in ("record", "fields"):  # the robot says the same
+                table.pop(name, None)
+            return cls.model_validate(table)
+        except (AttributeError, TypeError, ValueError, RecursionError) as error:
             raise LogError(f"expected a header of a log, found {_fault(error)}") from None
 
 

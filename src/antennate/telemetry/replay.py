@@ -14,6 +14,7 @@ from antennate.control.registry import BUILT_IN, CONTROLLERS, make_controller
 from antennate.errors import LogError
 from antennate.hardware.driving.decision import Decision, decision_of, no_command
 from antennate.params import Params, number
+from antennate.robots.spec import RobotSpec
 from antennate.telemetry.header import Header
 from antennate.telemetry.ticks import Tick, angles_of
 from antennate.types import AntennaFrame, Controller, JointCommand
@@ -120,7 +121,7 @@ class _Guarded:
             raise
         except BaseException:  # noqa: BLE001 a plugged-in controller may raise anything
             self.failures += 1
-            return no_command()
+            return no_command(RobotSpec())
 
 
 @dataclass(frozen=True, slots=True)
@@ -174,7 +175,9 @@ class Replayed:
         self.maneuvers.append(maneuver)
         self.recorded[tick.maneuver] += 1
         self.states[tick.state] += 1
-        self.commands += not np.array_equal(angles_of(command), tick.angles, equal_nan=True)
+        self.commands += not np.array_equal(
+            angles_of(command, len(tick.angles)), tick.angles, equal_nan=True
+        )
         if maneuver != tick.maneuver:
             self.different += 1
             self.first = self.first or Difference(tick.number, tick.now, tick.maneuver, maneuver)
@@ -215,6 +218,6 @@ def recorded_controller(header: Header, name: str | None = None) -> Controller:
             f"expected one of {', '.join(BUILT_IN)} in the log, found {wanted!r}; give "
             "--controller with this name if its code may run"
         )
-    made = make_controller(wanted, header.params)
+    made = make_controller(wanted, header.params, header.robot)
     made.reset(np.array([0]), header.phase)
     return made

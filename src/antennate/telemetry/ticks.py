@@ -1,7 +1,7 @@
 """One tick of a drive, as it is kept: what was read, decided and commanded, and how all were.
 
-Packed it is bytes of a fixed layout and a text after them. Every float comes back bit by bit, NaN
-and infinities too.
+Packed it is bytes, whose layout follows from the number of joints, and a text after them. Every
+float comes back bit by bit, NaN and infinities too.
 """
 
 from __future__ import annotations
@@ -20,20 +20,16 @@ from antennate.robots.spec import RobotSpec
 from antennate.telemetry.framing import SCHEMA, Kind
 from antennate.types import AntennaFrame, Controller, JointCommand
 
-JOINTS = RobotSpec().joint_names
-"""The order of angles."""
-LAYOUT = f"<BBQ?8d3q{len(JOINTS) + 2}d8QI"
-"""For `struct`: all fields but the text, whose length in bytes comes last."""
-FIELDS = (
-    *("schema", "kind", "number", "asked", "t", "now"),
+_HEAD = struct.Struct("<BBH")
+"""Schema, kind and number of joints."""
+_BEFORE = (
+    *("number", "asked", "t", "now"),
     *("counts_l", "counts_r", "reading_l", "reading_r", "level_l", "level_r"),
-    *("contact_l", "contact_r", "maneuver", "phase", *JOINTS, "age"),
-    *("missed", "frames", "crc", "lost", "misses", "stale", "sent", "refused", "text"),
+    *("contact_l", "contact_r", "maneuver", "phase"),
 )
-
-_STRUCT = struct.Struct(LAYOUT)
+_HEALTH = ("age", "missed", "frames", "crc", "lost", "misses", "stale", "sent", "refused")
+"""What stands before and after the angles of the joints."""
 _LONGEST_CAUSE = 160
-_NOWHERE = (math.nan,) * len(JOINTS)
 _NEITHER = (math.nan, math.nan)
 
 Pair = tuple[float, float]
@@ -53,7 +49,7 @@ class Tick:
         contact: One `Contact` a side.
         maneuver: The `Maneuver` decided.
         phase: Gait phase [rad], NaN if the controller has none.
-        angles: Joint targets decided [rad] in the order of JOINTS; NaN if it failed.
+        angles: Joint targets decided [rad] in the order of the robot's joints; NaN if it failed.
         state: The supervisor's state, empty without one.
         causes: Its causes in force, the most severe first.
         asked: Whether the controller was asked; if not, its last command was kept.
@@ -100,12 +96,8 @@ class Tick:
         left, right = session.quality.counts
         bytes_ = session.board.decoder.counters
         return cls(
-            **_decided(
-                session.control.controller,
-                session.control.decision,
-                session.frame,
-                session.control.command,
-            ),
+            **_decided(session.control.controller, session.control.decision, session.frame),
+            angles=angles_of(session.control.command, len(session.control.robot.ids)),
             number=session.tally.ticks,
             now=t,
             asked=session.control.result.asked,
@@ -138,12 +130,18 @@ class Tick:
         Raises:
             ControllerError: The controller does not say what it has decided.
         """
-        decided = _decided(controller, decision_of(controller), frame, command)
-        return cls(**decided, number=number, now=now, reading=decided["counts"])
+        decided = _decided(controller, decision_of(controller), frame)
+        return cls(
+            **decided,
+            angles=angles_of(command),
+            number=number,
+            now=now,
+            reading=decided["counts"],
+        )
 
     @property
     def values(self) -> tuple[float, ...]:
-        """All numbers, in the order of FIELDS without schema, kind and text."""
+        """All numbers, in the order of `fields`."""
         return (
             *(self.number, int(self.asked), self.t, self.now),
             *(*self.counts, *self.reading, *self.level, *self.contact, self.maneuver, self.phase),
@@ -163,7 +161,8 @@ class Tick:
         """
         text = "\n".join((self.state, self.note, *self.causes)).encode("utf-8", "backslashreplace")
         try:
-            fixed = _STRUCT.pack(SCHEMA, Kind.TICK, *self.values, len(text))
+            joints = len(self.angles)
+            fixed = struct.pack(layout(joints), SCHEMA, Kind.TICK, joints, *self.values, len(text))
         except struct.error as error:
             raise LogError(f"expected a tick of numbers that fit, found: {error}") from None
         return fixed + text
@@ -175,19 +174,23 @@ class Tick:
         Raises:
             LogError: It is no tick of this schema.
         """
-        if len(content) < _STRUCT.size or content[:2] != bytes((SCHEMA, Kind.TICK)):
+        if len(content) < _HEAD.size or content[:2] != bytes((SCHEMA, Kind.TICK)):
             raise LogError(f"expected a tick of schema {SCHEMA}, found {len(content)} other bytes")
-        _, _, number, asked, t, now, *rest, length = _STRUCT.unpack_from(content)
-        if len(content) != _STRUCT.size + length:
+        joints = _HEAD.unpack_from(content)[2]
+        fixed = struct.Struct(layout(joints))
+        if len(content) < fixed.size:
+            raise LogError(f"expected a tick of {joints} joints, found {len(content)} bytes")
+        _, _, _, number, asked, t, now, *rest, length = fixed.unpack_from(content)
+        if len(content) != fixed.size + length:
             raise LogError(f"expected a text of {length} bytes, found another length")
         try:
-            state, note, *causes = content[_STRUCT.size :].decode().split("\n")
+            state, note, *causes = content[fixed.size :].decode().split("\n")
         except ValueError:
             raise LogError("expected lines in UTF-8 as text of a tick, found others") from None
         counts, reading, level, contact = (tuple(rest[i : i + 2]) for i in (0, 2, 4, 6))
         maneuver, phase, *rest = rest[8:]
-        angles, rest = tuple(rest[: len(JOINTS)]), rest[len(JOINTS) :]
-        health = dict(zip(FIELDS[-10:-1], rest, strict=True))
+        angles, rest = tuple(rest[:joints]), rest[joints:]
+        health = dict(zip(_HEALTH, rest, strict=True))
         return cls(
             *(number, t, now, counts, reading, level, contact, maneuver, phase, angles),
             *(state, tuple(causes), asked, note),
@@ -195,16 +198,29 @@ class Tick:
         )
 
 
-def angles_of(command: JointCommand) -> tuple[float, ...]:
-    """Joint targets of one robot [rad] in the order of JOINTS; NaN if there are not as many."""
-    parts = (_flat(command, name) for name in ("yaw", "leg", "antenna"))
+def layout(joints: int) -> str:
+    """For `struct`: a tick of a robot with so many joints; the length of its text comes last."""
+    return f"<BBHQ?8d3q{joints + 2}d8QI"
+
+
+def fields(robot: RobotSpec) -> tuple[str, ...]:
+    """Names of all numbers of a tick, without schema, kind, number of joints and text."""
+    return (*_BEFORE, *robot.joint_names, *_HEALTH)
+
+
+def angles_of(command: JointCommand, joints: int | None = None) -> tuple[float, ...]:
+    """Joint targets of one robot [rad] in the order of its joints.
+
+    Args:
+        command: The command; it may be anything.
+        joints: Number of joints; all angles are NaN if the command has others.
+    """
+    parts = (_flat(command, name) for name in ("yaw", "leg", "antenna", "pitch"))
     angles = tuple(angle for part in parts for angle in part)
-    return angles if len(angles) == len(JOINTS) else _NOWHERE
+    return angles if joints in (None, len(angles)) else (math.nan,) * joints
 
 
-def _decided(
-    controller: Controller, decision: Decision, frame: AntennaFrame, command: JointCommand
-) -> dict[str, Any]:
+def _decided(controller: Controller, decision: Decision, frame: AntennaFrame) -> dict[str, Any]:
     """The fields that every world has; NaN for a level or a phase that the controller lacks."""
     phase, level = _flat(controller, "phase"), _flat(controller, "level")
     return {
@@ -214,7 +230,6 @@ def _decided(
         "contact": decision.contact,
         "maneuver": decision.maneuver,
         "phase": phase[0] if len(phase) == 1 else math.nan,
-        "angles": angles_of(command),
     }
 
 

@@ -80,13 +80,13 @@ class CalibrateConfig(Params):
         None,
         "1",
         "assumed: `simulated` for the rig, `unnamed` for a recording",
-        "name of the film",
+        "name of the flex sensor",
         pattern=r"^[A-Za-z0-9._-]{1,64}$",
     )
     averaging_time: float = number(
         0.0,
         "s",
-        "assumed: a curve belongs to the film; a mean over time adds lag that grows with speed",
+        "assumed: a mean over time adds lag that grows with speed, and is no part of the sensor",
         "mean over readings before fitting",
         ge=0,
         le=5,

@@ -53,7 +53,7 @@ def _scatter(
         rasterized=True,
     )
     panel.set(
-        xlabel="flex under the film [deg]",
+        xlabel="flex under the flex sensor [deg]",
         ylabel="contact force [N]",
         title=f"{title} (n = {within.sum()})",
         xlim=(0, None),

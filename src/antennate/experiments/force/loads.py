@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 from pydantic import model_validator
 
-from antennate.antenna import sensor as film
+from antennate.antenna import sensor as flex_sensor
 from antennate.antenna.statics import PROFILES, Chain, Profile, equilibrium, with_profile
 from antennate.experiments import reading
 from antennate.experiments.force.post_traverse import Traverse
@@ -32,7 +32,12 @@ class ForceConfig(Params):
         min_length=1,
     )
     nearest: float = number(
-        0.25, "1", "assumed: nearer contacts hardly bend the film", "nearest place", gt=0, lt=1
+        0.25,
+        "1",
+        "assumed: nearer contacts hardly bend the flex sensor",
+        "nearest place",
+        gt=0,
+        lt=1,
     )
     from_place: float = number(
         0.5,
@@ -146,8 +151,8 @@ def static_loads(config: ForceConfig, profile: str, friction: float) -> tuple[Po
     covered = antenna.sensed_hinges
     flex = rest.angles[:, :covered].sum(axis=1)
     window = max(1, round(config.conditioning.averaging_time * config.antenna.sensor.rate))
-    noise = film.reading_noise(config.antenna.sensor, rng, (window, len(flex)))
-    repeated = film.counts(config.antenna.sensor, flex, noise)
+    noise = flex_sensor.reading_noise(config.antenna.sensor, rng, (window, len(flex)))
+    repeated = flex_sensor.counts(config.antenna.sensor, flex, noise)
     points = Points(
         {
             "flex": flex[good],

@@ -29,7 +29,7 @@ class Traverse:
     """What was recorded of one traverse while the post pressed.
 
     Attributes:
-        flex: Flex under the film [rad], shape (n,).
+        flex: Flex under the flex sensor [rad], shape (n,).
         force: Size of the contact force, averaged over the time of a sample [N], shape (n,).
         place: Where the post touches, along the antenna over its length, shape (n,).
         age: Time since the post first touched [s], shape (n,).

@@ -24,7 +24,7 @@ E24 = (
 
 
 class SensorConfig(Params):
-    """A film under a given range of bends."""
+    """A flex sensor under a given range of flex."""
 
     unread: ClassVar[tuple[str, ...]] = ("sensor.active_length",)
     largest_flex: float = number(
@@ -34,7 +34,7 @@ class SensorConfig(Params):
         19, "1", "assumed: every five degrees of a right angle", "bends of the table", ge=3, le=1000
     )
     loop_time: float = number(
-        4.0, "s", "assumed: slow against the film's rise", "time of a loop", gt=0.1, le=1000
+        4.0, "s", "assumed: slow against the flex sensor's rise", "time of a loop", gt=0.1, le=1000
     )
     hold_time: float = number(
         30.0, "s", "assumed: three slow time constants", "time of the held bend", gt=0.1, le=10000
@@ -67,8 +67,8 @@ class SensorOutcome(WithoutTrials):
     def result(self) -> dict[str, Any]:
         """The content of result.json."""
         params = self.config.sensor
-        film = sensor.resistance(params, sensor.sensed_flex(params, self.flex))
-        volts = sensor.divider(params, film)
+        ohms = sensor.resistance(params, sensor.sensed_flex(params, self.flex))
+        volts = sensor.divider(params, ohms)
         readings = sensor.counts(params, self.flex)
         return {
             "schema": 1,
@@ -79,7 +79,7 @@ class SensorOutcome(WithoutTrials):
             "curve": [
                 {"flex_deg": math.degrees(f), "resistance_ohm": r, "voltage_v": v, "counts": c}
                 for f, r, v, c in zip(
-                    *(a.tolist() for a in (self.flex, film, volts, readings)), strict=True
+                    *(a.tolist() for a in (self.flex, ohms, volts, readings)), strict=True
                 )
             ],
             "counts_span": float(abs(readings[-1] - readings[0])),

@@ -122,10 +122,10 @@ def feel(
         outward: Time at which the base turns back [s].
         threshold: Flex at which a touch begins [rad].
         statics: Of the antenna.
-        sensor: The film; its sign is known, as nothing else bends the antenna on the way out.
+        sensor: The flex sensor; the sign is known, as on the way out the wall alone bends it.
         conditioning: T_avg; flex and base angle are averaged alike.
         base_zero: Error of the base's zero [rad].
-        gain_error: Relative error of the film's gain in this trial.
+        gain_error: Relative error of the flex sensor's gain in this trial.
         rng: Noise of the readings; without one, the exact flex and no averaging.
     """
     until = trace.t <= outward

@@ -67,7 +67,7 @@ class Trace:
     Attributes:
         t: Time since the sweep began [s], negative while the base comes from the heading.
         base: Angle of the base from the heading [rad].
-        flex: Summed hinge angles under the film [rad].
+        flex: Summed hinge angles under the flex sensor [rad].
         offset: Angle of the tip, seen from the base, off the base's direction [rad].
         reach: Distance from base to tip [m].
         touching: Whether the antenna touches the wall.
@@ -139,8 +139,8 @@ def commanded(sweep: SweepParams, t: float) -> float:
 def classify(params: ShapeParams, flex: Floats, offset: Floats) -> Ints:
     """Shape of a touching antenna, one `Shape` for every flex and offset of the tip [rad].
 
-    FORWARD points ahead: film and tip both bend towards the heading. BACKWARD points to the tail:
-    both bend there. STRAIGHT does neither. All else is a TRANSITION, like an S.
+    FORWARD points ahead: flex sensor and tip both bend towards the heading. BACKWARD points to the
+    tail: both bend there. STRAIGHT does neither. All else is a TRANSITION, like an S.
     """
     straight = (abs(flex) < params.flex) & (abs(offset) < params.offset)
     forward = (flex <= -params.flex) & (offset <= -params.offset)

@@ -226,7 +226,7 @@ def trace(example: Trace) -> Figure:
             t,
             0,
             1,
-            where=example.verdict.truth.tolist(),
+            where=example.comparison.truth.tolist(),
             color=_TRUE,
             alpha=0.08,
             transform=panel.get_xaxis_transform(),
@@ -257,8 +257,10 @@ def _draw_level(panel: Axes, example: Trace) -> None:
 
 
 def _draw_states(panel: Axes, example: Trace) -> None:
-    t, verdict = example.t, example.verdict
-    for row, (states, colour) in enumerate(((verdict.alarm, _SENSED), (verdict.truth, _TRUE))):
+    t, comparison = example.t, example.comparison
+    for row, (states, colour) in enumerate(
+        ((comparison.alarm, _SENSED), (comparison.truth, _TRUE))
+    ):
         panel.fill_between(t, row + 0.1, row + 0.9, where=states.tolist(), color=colour, step="mid")
     panel.set(xlim=(t[0], t[-1]), ylim=(0, 2), xlabel="time [s]")
     panel.set_yticks([0.5, 1.5], ["sensed", "true"])

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from antennate.experiments.touch.sensing import Verdict
+from antennate.experiments.touch.sensing import Comparison
 from antennate.studies import statistics
 from antennate.types import Floats, Ints
 
@@ -19,23 +19,23 @@ _LEVELS = np.arange(-13.0, 13.01, 0.25)
 
 
 class Pool:
-    """Measures of groups of verdicts; intervals resample trials, the same way in every group.
+    """Measures of groups of comparisons; intervals resample trials, the same way in every group.
 
     Args:
-        verdicts: All valid traverses.
+        comparisons: All valid traverses.
         trials: Number of trials; a trial without valid traverses weighs nothing.
         rate: Ticks per second [Hz].
     """
 
-    def __init__(self, verdicts: Sequence[Verdict], trials: int, rate: float) -> None:
+    def __init__(self, comparisons: Sequence[Comparison], trials: int, rate: float) -> None:
         self._trials, self._tick_ms = trials, 1e3 / rate
         rng = np.random.default_rng(0)
         draws = rng.multinomial(trials, np.full(trials, 1.0 / trials), _DRAWS)
         self._weights = draws.astype(float)
-        self._level_edges = _edges([v.level for v in verdicts])
-        self._flex_edges = _edges([abs(v.flex) for v in verdicts])
+        self._level_edges = _edges([v.level for v in comparisons])
+        self._flex_edges = _edges([abs(v.flex) for v in comparisons])
 
-    def measure(self, group: Sequence[Verdict]) -> dict[str, Any]:
+    def measure(self, group: Sequence[Comparison]) -> dict[str, Any]:
         """All measures of one group."""
         matches = [v.matches for v in group]
         contacts = sum(len(m.contacts) for m in matches)
@@ -64,7 +64,7 @@ class Pool:
             **self._area("auc_flex", group, [abs(v.flex) for v in group], self._flex_edges),
         }
 
-    def _per_tick(self, group: Sequence[Verdict]) -> dict[str, Any]:
+    def _per_tick(self, group: Sequence[Comparison]) -> dict[str, Any]:
         hit, wrong, lost = self._ticks(group)
         truth, ticks = hit + lost, self._sum(group, lambda v: len(v.truth))
         return {
@@ -74,7 +74,7 @@ class Pool:
             **self._ratio("recall", hit, truth),
         }
 
-    def _ticks(self, group: Sequence[Verdict]) -> tuple[Floats, Floats, Floats]:
+    def _ticks(self, group: Sequence[Comparison]) -> tuple[Floats, Floats, Floats]:
         """True positive, false positive and false negative ticks by trial, each (trials,)."""
         return (
             self._sum(group, lambda v: (v.truth & v.alarm).sum()),
@@ -82,7 +82,9 @@ class Pool:
             self._sum(group, lambda v: (v.truth & ~v.alarm).sum()),
         )
 
-    def f1_difference(self, first: Sequence[Verdict], second: Sequence[Verdict]) -> dict[str, Any]:
+    def f1_difference(
+        self, first: Sequence[Comparison], second: Sequence[Comparison]
+    ) -> dict[str, Any]:
         """F1 of the first group less that of the second, trials resampled in both at once."""
         ends = []
         for group in (first, second):
@@ -94,11 +96,11 @@ class Pool:
             "f1_difference_95": self._interval(ones - twos),
         }
 
-    def _sum(self, group: Sequence[Verdict], value: Any) -> Floats:
-        """Sums of value(verdict) by trial, shape (trials,)."""
+    def _sum(self, group: Sequence[Comparison], value: Any) -> Floats:
+        """Sums of value(comparison) by trial, shape (trials,)."""
         total = np.zeros(self._trials)
-        for verdict in group:
-            total[verdict.trial] += value(verdict)
+        for comparison in group:
+            total[comparison.trial] += value(comparison)
         return total
 
     def _drawn(self, part: Floats, whole: Floats) -> tuple[float, Floats]:
@@ -119,7 +121,7 @@ class Pool:
         low, high = np.percentile(drawn, [2.5, 97.5])
         return float(low), float(high)
 
-    def _latency(self, group: Sequence[Verdict], ticks: Sequence[Ints]) -> dict[str, Any]:
+    def _latency(self, group: Sequence[Comparison], ticks: Sequence[Ints]) -> dict[str, Any]:
         """Median with its interval and 90th percentile [ms], and the median way meanwhile [mm]."""
         values = np.concatenate([np.zeros(0, dtype=np.int64), *ticks])
         empty = {"n": 0, "median_ms": None, "median_95_ms": None, "p90_ms": None}
@@ -145,15 +147,15 @@ class Pool:
         }
 
     def _area(
-        self, name: str, group: Sequence[Verdict], scores: Sequence[Floats], edges: Floats
+        self, name: str, group: Sequence[Comparison], scores: Sequence[Floats], edges: Floats
     ) -> dict[str, Any]:
         """Area under the ROC curve, ties counted half, from histograms by trial."""
         touching = np.zeros((self._trials, len(edges) + 1))
         free = np.zeros_like(touching)
-        for verdict, score in zip(group, scores, strict=True):
+        for comparison, score in zip(group, scores, strict=True):
             place = np.searchsorted(edges, score)
-            for state, counts in ((verdict.truth, touching), (~verdict.truth, free)):
-                counts[verdict.trial] += np.bincount(place[state], minlength=counts.shape[1])
+            for state, counts in ((comparison.truth, touching), (~comparison.truth, free)):
+                counts[comparison.trial] += np.bincount(place[state], minlength=counts.shape[1])
         order = touching @ _below(free).T  # ordered pairs of a trial's touching and another's free
         pairs = np.outer(touching.sum(axis=1), free.sum(axis=1))
         weights = self._weights
@@ -190,7 +192,7 @@ def _auc(touching: Floats, free: Floats) -> float:
     return float(test.statistic) / (len(touching) * len(free))
 
 
-def roc(group: Sequence[Verdict], threshold: float) -> dict[str, Any]:
+def roc(group: Sequence[Comparison], threshold: float) -> dict[str, Any]:
     """ROC curve of b without hysteresis, and where a threshold lies on it.
 
     Args:

@@ -17,7 +17,7 @@ from antennate.experiments import reading
 from antennate.experiments.touch import sensing
 from antennate.experiments.touch.config import TouchConfig
 from antennate.experiments.touch.measures import Pool, roc
-from antennate.experiments.touch.sensing import Judgement, Verdict
+from antennate.experiments.touch.sensing import Comparison, ContactCriteria
 from antennate.experiments.touch.traverse import Traverse
 from antennate.params import ConditioningParams
 from antennate.types import Floats
@@ -50,15 +50,15 @@ class TouchRow:
     reason: str = ""
 
 
-def judgement(
+def criteria(
     config: TouchConfig,
     force: float | None = None,
     merge: float | None = None,
     averaging: float | None = None,
-) -> Judgement:
+) -> ContactCriteria:
     """How the truth is told; what is given replaces the configuration."""
     rate = config.antenna.sensor.rate
-    return Judgement(
+    return ContactCriteria(
         force=config.contact_force if force is None else force,
         merge=round((config.merge_time if merge is None else merge) * rate),
         grace=round((averaging or config.conditioning.averaging_time) * rate),
@@ -69,8 +69,8 @@ def score(
     config: TouchConfig,
     traverses: Sequence[Traverse],
     averaging: float | None = None,
-    rule: Judgement | None = None,
-) -> list[Verdict]:
+    rule: ContactCriteria | None = None,
+) -> list[Comparison]:
     """Let the control read all valid traverses, those of one speed side by side.
 
     Args:
@@ -79,25 +79,25 @@ def score(
         averaging: T_avg instead of the configured one [s].
         rule: How the truth is told, instead of the configured way.
     """
-    rule = rule or judgement(config, averaging=averaging)
+    rule = rule or criteria(config, averaging=averaging)
     conditioning = config.conditioning
     if averaging is not None:
         conditioning = conditioning.model_copy(update={"averaging_time": averaging})
     valid = [t for t in traverses if not t.course.reason]
-    found: dict[int, Verdict] = {}
+    found: dict[int, Comparison] = {}
     for speed in config.speeds:
         batch = [t for t in valid if t.speed == speed]
         if batch:
-            found |= _judge_batch(config, conditioning, rule, batch)
+            found |= _compare_batch(config, conditioning, rule, batch)
     return [found[id(t)] for t in valid]
 
 
-def _judge_batch(
+def _compare_batch(
     config: TouchConfig,
     conditioning: ConditioningParams,
-    rule: Judgement,
+    rule: ContactCriteria,
     batch: Sequence[Traverse],
-) -> dict[int, Verdict]:
+) -> dict[int, Comparison]:
     ticks = len(batch[0].course.x)
     noises = {
         trial: reading.noise(
@@ -112,11 +112,11 @@ def _judge_batch(
     )
     sensed = sensing.sense(conditioning, config.rule, counts, 1.0 / config.antenna.sensor.rate)
     level = sensing.logit(sensed.b)
-    verdicts = {}
+    comparisons = {}
     for i, one in enumerate(batch):
         truth = sensing.true_state(rule, one.course.force)
         alarm = sensed.alarm[:, i]
-        verdicts[id(one)] = Verdict(
+        comparisons[id(one)] = Comparison(
             wall=one.wall,
             speed=one.speed,
             profile=one.profile,
@@ -128,28 +128,28 @@ def _judge_batch(
             flex=one.course.flex,
             matches=sensing.compare(truth, alarm, rule),
         )
-    return verdicts
+    return comparisons
 
 
 def result(
-    config: TouchConfig, traverses: Sequence[Traverse], verdicts: Sequence[Verdict]
+    config: TouchConfig, traverses: Sequence[Traverse], comparisons: Sequence[Comparison]
 ) -> dict[str, Any]:
     """The content of result.json."""
-    pool = Pool(verdicts, config.trials, config.antenna.sensor.rate)
+    pool = Pool(comparisons, config.trials, config.antenna.sensor.rate)
 
     def of(**wanted: Any) -> dict[str, Any]:
-        group = [v for v in verdicts if all(getattr(v, k) == w for k, w in wanted.items())]
+        group = [v for v in comparisons if all(getattr(v, k) == w for k, w in wanted.items())]
         names = {"speed_m_s" if k == "speed" else k: w for k, w in wanted.items()}
         return {**names, **pool.measure(group)}
 
     walls, speeds, profiles = config.walls, config.speeds, config.profiles
-    mine = {p: [v for v in verdicts if v.profile == p] for p in profiles}
+    mine = {p: [v for v in comparisons if v.profile == p] for p in profiles}
     return {
         "schema": SCHEMA,
         "command": "touch",
         "seed": config.seed,
         "trials": config.trials,
-        "invalid": len(traverses) - len(verdicts),
+        "invalid": len(traverses) - len(comparisons),
         "rate_hz": config.antenna.sensor.rate,
         "travel_m": config.travel,
         "contact_force_n": config.contact_force,
@@ -193,7 +193,7 @@ def _with_flex(config: TouchConfig, found: dict[str, Any]) -> dict[str, Any]:
 
 
 def _tip_force(config: TouchConfig, profile: str, angle: float) -> float | None:
-    """Force that turns with the tip and bends the film by an angle [rad]; None above 1 N."""
+    """Force that turns with the tip and bends the flex sensor by an angle [rad]; None above 1 N."""
     antenna = mechanics.with_profile(config.antenna, profile)
     chain = Chain.of(antenna)
     force = np.geomspace(1e-4, _STRONGEST, 400)
@@ -212,8 +212,8 @@ _SHORT = ("f1", "f1_95", "precision", "recall", "contacts", "missed", "false_per
 
 def _averaged(config: TouchConfig, traverses: Sequence[Traverse], time: float) -> dict[str, Any]:
     """All profiles together with another T_avg."""
-    verdicts = score(config, traverses, averaging=time)
-    found = Pool(verdicts, config.trials, config.antenna.sensor.rate).measure(verdicts)
+    comparisons = score(config, traverses, averaging=time)
+    found = Pool(comparisons, config.trials, config.antenna.sensor.rate).measure(comparisons)
     return {
         "averaging_time_s": time,
         **{key: found[key] for key in (*_SHORT, "onset", "release", "auc", "auc_95")},
@@ -229,32 +229,34 @@ def _truths(config: TouchConfig) -> list[tuple[float, float]]:
 def _told(
     config: TouchConfig, traverses: Sequence[Traverse], force: float, merge: float
 ) -> dict[str, Any]:
-    verdicts = score(config, traverses, rule=judgement(config, force=force, merge=merge))
-    found = Pool(verdicts, config.trials, config.antenna.sensor.rate).measure(verdicts)
+    comparisons = score(config, traverses, rule=criteria(config, force=force, merge=merge))
+    found = Pool(comparisons, config.trials, config.antenna.sensor.rate).measure(comparisons)
     keys = ("contact_share", *_SHORT)
     return {"contact_force_n": force, "merge_time_s": merge, **{key: found[key] for key in keys}}
 
 
-def rows(seed: int, traverses: Sequence[Traverse], verdicts: Sequence[Verdict]) -> list[TouchRow]:
+def rows(
+    seed: int, traverses: Sequence[Traverse], comparisons: Sequence[Comparison]
+) -> list[TouchRow]:
     """One row for every traverse, in their order."""
-    waiting = iter(verdicts)
+    waiting = iter(comparisons)
     return [_row(seed, t, None if t.course.reason else next(waiting)) for t in traverses]
 
 
-def _row(seed: int, one: Traverse, verdict: Verdict | None) -> TouchRow:
+def _row(seed: int, one: Traverse, comparison: Comparison | None) -> TouchRow:
     empty = TouchRow(
         seed=seed,
         trial=one.trial,
         wall=one.wall,
         speed_m_s=one.speed,
         profile=one.profile,
-        status="invalid" if verdict is None else "valid",
+        status="invalid" if comparison is None else "valid",
         overlap_m=one.overlap,
         reason=one.course.reason,
     )
-    if verdict is None:
+    if comparison is None:
         return empty
-    matches, truth, alarm = verdict.matches, verdict.truth, verdict.alarm
+    matches, truth, alarm = comparison.matches, comparison.truth, comparison.alarm
     whole = int(truth.sum() + alarm.sum())
     return replace(
         empty,

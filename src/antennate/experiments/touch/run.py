@@ -13,7 +13,7 @@ from antennate.antenna.statics import Profile
 from antennate.experiments.touch import result as touch_result
 from antennate.experiments.touch.config import TouchConfig
 from antennate.experiments.touch.result import TouchRow
-from antennate.experiments.touch.sensing import Verdict
+from antennate.experiments.touch.sensing import Comparison
 from antennate.experiments.touch.traverse import (
     Draw,
     Plan,
@@ -34,7 +34,7 @@ class Trace:
     """One traverse with everything a figure of it needs, tick by tick."""
 
     traverse: Traverse
-    verdict: Verdict
+    comparison: Comparison
     t: Floats
     b: Floats
     threshold: float
@@ -48,13 +48,13 @@ class TouchOutcome:
     Attributes:
         config: What was run.
         traverses: All of them.
-        verdicts: Those whose physics is valid, in the same order.
+        comparisons: Those whose physics is valid, in the same order.
         summary: The content of result.json.
     """
 
     config: TouchConfig
     traverses: list[Traverse]
-    verdicts: list[Verdict]
+    comparisons: list[Comparison]
     summary: dict[str, Any]
 
     def result(self) -> dict[str, Any]:
@@ -64,7 +64,7 @@ class TouchOutcome:
     @property
     def rows(self) -> list[TouchRow]:
         """The rows of trials.csv."""
-        return touch_result.rows(self.config.seed, self.traverses, self.verdicts)
+        return touch_result.rows(self.config.seed, self.traverses, self.comparisons)
 
     def example(self) -> Trace | None:
         """Trial 0 of one traverse: a gap, the middle speed and `descending` where there are."""
@@ -73,12 +73,12 @@ class TouchOutcome:
         profile = "descending" if "descending" in config.profiles else config.profiles[0]
         speed = sorted(config.speeds)[len(config.speeds) // 2]
         valid = [one for one in self.traverses if not one.course.reason]
-        for one, verdict in zip(valid, self.verdicts, strict=True):
+        for one, comparison in zip(valid, self.comparisons, strict=True):
             if (one.wall, one.profile, one.speed, one.trial) == (wall, profile, speed, 0):
                 rule = config.rule
-                t = np.arange(len(verdict.truth)) / config.antenna.sensor.rate
-                b = 1.0 / (1.0 + np.exp(-verdict.level))
-                return Trace(one, verdict, t, b, rule.threshold, rule.hysteresis)
+                t = np.arange(len(comparison.truth)) / config.antenna.sensor.rate
+                b = 1.0 / (1.0 + np.exp(-comparison.level))
+                return Trace(one, comparison, t, b, rule.threshold, rule.hysteresis)
         return None
 
 
@@ -158,5 +158,5 @@ def run(
 
     run_tasks(_run_task, tasks, workers, take)
     found.sort(key=lambda one: place[one.wall, one.speed, one.profile, one.trial])
-    verdicts = touch_result.score(config, found)
-    return TouchOutcome(config, found, verdicts, touch_result.result(config, found, verdicts))
+    comparisons = touch_result.score(config, found)
+    return TouchOutcome(config, found, comparisons, touch_result.result(config, found, comparisons))

@@ -46,7 +46,7 @@ def sense(
 
 
 @dataclass(frozen=True, slots=True)
-class Judgement:
+class ContactCriteria:
     """How the truth is told from forces, and how late an alarm may come.
 
     Attributes:
@@ -61,7 +61,7 @@ class Judgement:
 
 
 @dataclass(frozen=True, slots=True)
-class Verdict:
+class Comparison:
     """One traverse compared with the truth.
 
     Attributes:
@@ -92,14 +92,14 @@ class Verdict:
         return np.array([abs(self.flex[begin:end]).max() for begin, end in lost])
 
 
-def true_state(judgement: Judgement, force: Floats) -> Bools:
+def true_state(criteria: ContactCriteria, force: Floats) -> Bools:
     """Whether an obstacle presses, for forces over time [N], shape (n,)."""
-    return merged(force > judgement.force, judgement.merge)
+    return merged(force > criteria.force, criteria.merge)
 
 
-def compare(truth: Bools, alarm: Bools, judgement: Judgement) -> Matches:
+def compare(truth: Bools, alarm: Bools, criteria: ContactCriteria) -> Matches:
     """Contacts against alarms, both of shape (n,)."""
-    return match(truth, alarm, judgement.grace)
+    return match(truth, alarm, criteria.grace)
 
 
 def logit(b: Floats) -> Floats:

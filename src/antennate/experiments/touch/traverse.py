@@ -75,7 +75,7 @@ class Course:
 
     Attributes:
         x: Way of the carriage [m], shape (n,).
-        flex: Summed hinge angles under the film [rad], shape (n,).
+        flex: Summed hinge angles under the flex sensor [rad], shape (n,).
         force: Force of all obstacles on the antenna, mean over the tick [N], shape (n,).
         joints: Hinges and tip [m], shape (t, n + 1, 2); (0, n + 1, 2) if they were not kept.
         reason: Why the physics is invalid; empty if it is sound.

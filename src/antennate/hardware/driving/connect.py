@@ -54,7 +54,7 @@ def connect(
         BadInputError: No antenna board speaks, or it is refused.
         BringUpError: The servos are not those expected.
     """
-    controller = make_controller(config.controller, config.control)
+    controller = make_controller(config.controller, config.control, config.robot)
     with contextlib.ExitStack() as stack:
         lines: list[Port] = []
         for flag, address, baud in (
@@ -90,7 +90,7 @@ def prepare(
         board=board,
         actuators=DynamixelActuators(master, Joints(config.robot), clock.now),
         clock=clock,
-        controller=controller or make_controller(config.controller, config.control),
+        controller=controller or make_controller(config.controller, config.control, config.robot),
         period=config.control.period,
         quality=SignalQuality(
             config.control.conditioning,

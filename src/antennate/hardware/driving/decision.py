@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from antennate.errors import ControllerError
+from antennate.robots.spec import RobotSpec
 from antennate.types import Contact, Controller, JointCommand, Maneuver
 
 _MOST = (1 << 31) - 1
@@ -70,6 +71,7 @@ def _integers(controller: Controller, name: str, shape: tuple[int, ...]) -> list
     return numbers
 
 
-def no_command() -> JointCommand:
+def no_command(robot: RobotSpec) -> JointCommand:
     """The command in place of one that a controller did not give: NaN for every joint."""
-    return JointCommand(*(np.full(shape, math.nan) for shape in ((1, 5), (1, 6, 2), (1, 2))))
+    shapes = robot.command_shapes().items()
+    return JointCommand(**{name: np.full(shape, math.nan) for name, shape in shapes})

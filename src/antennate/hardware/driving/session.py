@@ -66,7 +66,7 @@ class Session:
     ) -> None:
         self.board, self.actuators, self.clock = board, actuators, clock
         self.period, self.quality = period, quality
-        self.control = SupervisedController(controller, actuators.check, clock.now)
+        self.control = SupervisedController(controller, actuators.robot, actuators.check, clock.now)
         self._limits = limits or SupervisorParams()
         self.supervisor = Supervisor(self._limits)
         self.robot = HardwareRobot(board, actuators, clock)

@@ -8,6 +8,7 @@ from antennate.errors import in_one_line
 from antennate.hardware.driving.decision import Decision, StepResult, decision_of, no_command
 from antennate.hardware.joints import CommandError
 from antennate.hardware.tracebacks import Tracebacks
+from antennate.robots.spec import RobotSpec
 from antennate.types import AntennaFrame, Controller, Floats, JointCommand, Maneuver
 
 
@@ -20,6 +21,7 @@ class SupervisedController:
 
     Args:
         controller: Of one robot; anybody's.
+        robot: The robot.
         check: A copy of a command that can be sent, or CommandError.
         now: The host's time [s].
 
@@ -36,12 +38,13 @@ class SupervisedController:
     def __init__(
         self,
         controller: Controller,
+        robot: RobotSpec,
         check: Callable[[JointCommand], JointCommand],
         now: Callable[[], float],
     ) -> None:
-        self.controller = controller
+        self.controller, self.robot = controller, robot
         self.standing, self.rate = False, 1.0
-        self.command = no_command()
+        self.command = no_command(self.robot)
         self.decision = Decision()
         self.result = StepResult()
         self.refused = 0
@@ -80,7 +83,7 @@ class SupervisedController:
         except BaseException as error:  # noqa: BLE001 a plugged-in controller may raise anything
             result.failure = in_one_line(error)
             self.tracebacks.keep(self._now(), error)
-            return no_command()
+            return no_command(self.robot)
         result.decided_at = self._now()
         try:
             command = self._sound_command = self._check(command)

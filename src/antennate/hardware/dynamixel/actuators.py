@@ -16,6 +16,7 @@ from antennate.hardware.dynamixel.monitor import ServoMonitor
 from antennate.hardware.dynamixel.tables import XC430_W240
 from antennate.hardware.joints import Joints
 from antennate.params import BusParams
+from antennate.robots.spec import RobotSpec
 from antennate.types import Floats, JointCommand
 
 _GOAL = XC430_W240["goal_position"]
@@ -56,6 +57,11 @@ class DynamixelActuators:
     def enabled(self) -> bool:
         """Whether torque was given and not taken."""
         return self._goals is not None
+
+    @property
+    def robot(self) -> RobotSpec:
+        """The robot whose joints they move."""
+        return self.joints.robot
 
     @property
     def resting(self) -> bool:

@@ -1,0 +1,143 @@
+"""Robots as data: other numbers of links and hinges walk and are driven, bad files refused."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+from twin_rig import on_twin, simulated
+
+from antennate.cli import BAD_INPUT, main
+from antennate.errors import ConfigError
+from antennate.experiments.tunnel.run import TunnelConfig
+from antennate.hardware.joints import Joints
+from antennate.params import PhysicsParams
+from antennate.params.reading import read_file
+from antennate.robots.antenna import AntennaSpec
+from antennate.robots.spec import RobotSpec
+from antennate.sim.world import PREFIX, World, compile_world
+from antennate.studies.formats import to_toml
+from antennate.testing import check_robot
+
+EXAMPLES = Path(__file__).parent.parent / "examples"
+
+
+def robot_of(links: int, hinges: int) -> RobotSpec:
+    coils = tuple(np.linspace(3.0, 9.0, hinges).tolist())
+    return RobotSpec(links=links, mass=links / 3, antenna=AntennaSpec(active_coils=coils))
+
+
+SIZES = [(4, 4), (6, 10), (8, 6)]
+
+
+@pytest.mark.parametrize(("links", "hinges"), SIZES)
+def test_a_robot_of_any_size_stands_and_obeys(links: int, hinges: int) -> None:
+    robot = robot_of(links, hinges)
+    check_robot(robot)
+    model = compile_world(PhysicsParams(), robot)
+    joints = [model.joint(i).name for i in range(model.njnt)]
+    assert sum("hinge" in name for name in joints) == 2 * hinges
+    assert (model.nu, len(robot.ids)) == (3 * links + 1, 3 * links + 1)
+
+
+@pytest.mark.parametrize(("links", "hinges"), SIZES)
+def test_a_robot_of_any_size_is_decided_alike_in_simulation_and_through_bytes(
+    links: int, hinges: int
+) -> None:
+    config = TunnelConfig(time_limit=1.0, robot=robot_of(links, hinges))
+    assert on_twin(config, "closed", 0) == simulated(config, "closed", 0)
+
+
+@pytest.mark.parametrize(("links", "hinges"), SIZES)
+def test_a_robot_of_any_size_goes_through_the_commands(
+    links: int, hinges: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "mine.toml"
+    file.write_text(to_toml(robot_of(links, hinges)))
+    out = ["--robot", str(file), "--no-figures", "--workers", "1", "--out"]
+    short = ["--trials", "1", "--time-limit", "0.5", "--controllers", "closed"]
+    assert main(["tunnel", *short, *out, str(tmp_path / "tunnel")]) == 0
+    short = ["--cycles", "2", "--settling-cycles", "0", "--sweep-points", "2"]
+    assert main(["gait", *short, *out, str(tmp_path / "gait")]) == 0
+    assert f"links = {links}" in (tmp_path / "gait" / "config.toml").read_text()
+
+
+@pytest.mark.parametrize("name", ["eight_links.toml", "four_hinges.toml"])
+def test_the_examples_are_robots_and_come_back_from_toml(name: str, tmp_path: Path) -> None:
+    robot = RobotSpec.named(EXAMPLES / name)
+    assert robot != RobotSpec()
+    check_robot(robot)
+    (tmp_path / "again.toml").write_text(to_toml(robot))
+    assert RobotSpec.named("again.toml", tmp_path) == robot
+
+
+def test_ids_and_the_order_of_release_follow_from_the_joints() -> None:
+    robot = RobotSpec.model_validate({"links": 3, "pitch": {"kind": "actuated"}})
+    assert robot.joint_names[-4:] == ("antenna_l_base", "antenna_r_base", "pitch1", "pitch2")
+    assert robot.ids == tuple(range(1, 13))
+    assert robot.in_order_of_release == ((9, 10), (1, 2), (3, 4, 5, 6, 7, 8), (11, 12))
+    assert set(robot.modes.values()) == {3, 4}
+    assert [servo for servo, mode in robot.modes.items() if mode == 4] == [3, 4, 5, 6, 7, 8]
+    check_robot(robot)
+
+
+def test_a_lifting_leg_rises_on_its_own_side_and_does_not_turn_without_end() -> None:
+    robot = RobotSpec.model_validate({"links": 3, "legs": {"kind": "lifting"}})
+    assert not Joints(robot).turning.size
+    world = World(compile_world(PhysicsParams(), robot), robot)
+    for name in robot.leg_names:
+        foot = world.data.geom(PREFIX + name)
+        before = float(foot.xpos[2])
+        world.data.joint(PREFIX + name).qpos[0] = 0.3
+        mujoco.mj_kinematics(world.model, world.data)
+        lateral = robot.width / 2 - robot.leg_width / 2 - robot.body_radius
+        drop = robot.leg_eccentricity
+        rise = lateral * math.sin(0.3) + drop * (1 - math.cos(0.3))
+        assert float(foot.xpos[2]) - before == pytest.approx(rise, abs=1e-9)
+
+
+BAD = [
+    ("[legs]\nids = [6, 7, 8]", "legs.ids: expected one for each of the 12 joints, found 3"),
+    ("[yaw]\nids = [1, 2, 3, 4, 4]", "ids: expected each once, found 4 more than once"),
+    ("[yaw]\ndirections = [1, -1]", "yaw.directions: expected one for each of the 5 joints"),
+    ("[antenna]\nactive_coils = []", "antenna.active_coils: expected at least 1 value"),
+    ("links = 1", "links: expected a number of at least 2, found 1"),
+    ("links = 'six'", "links: expected a whole number, found 'six'"),
+    ("lynks = 8", "lynks: expected a known key (did you mean links?)"),
+    ("[yaw]\nservo = 'ax12'", "yaw.servo: expected one of xc430_w240 or xl330_m288"),
+    ("[antennae]\nfastest = 11.0", "antennae.fastest"),
+    ("links =", "expected TOML"),
+]
+
+
+@pytest.mark.parametrize("command", ["tunnel", "gait", "drive", "doctor", "twin"])
+@pytest.mark.parametrize(("text", "said"), BAD)
+def test_a_bad_robot_file_is_refused_in_one_line(
+    text: str, said: str, command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "bad.toml"
+    file.write_text(text)
+    assert main([command, "--robot", str(file)]) == BAD_INPUT
+    told = capsys.readouterr().err
+    assert f"{file}: {said}" in told
+    assert told.count("\n") == 1
+
+
+def test_an_unknown_robot_is_refused_with_the_known_ones() -> None:
+    with pytest.raises(
+        ConfigError, match=r"expected scuttle or a TOML file .*did you mean scuttle"
+    ):
+        RobotSpec.named("scutle")
+
+
+def test_a_configuration_names_its_robot_and_changes_it(tmp_path: Path) -> None:
+    (tmp_path / "mine.toml").write_text("links = 4\n[yaw]\nlimit = 1.0\n")
+    config = tmp_path / "config.toml"
+    config.write_text('robot = "mine.toml"\n')
+    assert read_file(config, TunnelConfig).robot == RobotSpec.named("mine.toml", tmp_path)
+    config.write_text('[robot]\nbase = "mine.toml"\nmass = 1.5\n[robot.yaw]\nfastest = 2.0\n')
+    found = read_file(config, TunnelConfig).robot
+    assert (found.links, found.mass, found.yaw.limit, found.yaw.fastest) == (4, 1.5, 1.0, 2.0)
