@@ -18,9 +18,9 @@ import pytest
 from antennate.telemetry.reader import count
 
 ANTENNATE = [sys.executable, "-c", "import sys; from antennate.cli import main; sys.exit(main())"]
-FAULTS = (("reset", 3.5), ("reset", 7.0), ("open_left", 8.5))
+FAULTS = (("reset", 5.0), ("reset", 10.5), ("open_left", 12.5))
 """What happens to the board, and when [s]: in the dry run, while walking, and at its end."""
-DRY_RUN, WALK = 5.0, 5.5
+DRY_RUN, WALK = 5.0, 6.0
 """How long they last [s]."""
 START = 1.5
 """Time in which a twin is ready on an idle machine [s]; faults come later where it takes longer."""
@@ -63,7 +63,7 @@ def driven(tmp_path_factory: pytest.TempPathFactory) -> Drive:
     """A drive with all the faults."""
     began = time.monotonic()
     with twin():
-        later = 2.0 * max(0.0, time.monotonic() - began - START)
+        later = 3.0 * max(0.0, time.monotonic() - began - START)
     folder = tmp_path_factory.mktemp("drive") / "run"
     words = ["drive", "--arm", "--no-touch-check", "--out", str(folder)]
     words += ["--dry-run", f"{DRY_RUN + later}", "--duration", f"{WALK + later}"]
@@ -88,6 +88,5 @@ def test_E1_a_reset_or_a_broken_wire_ends_no_drive(driven: Drive) -> None:
     assert result["lost_samples"] < 100
     assert (result["unlogged"], result["log_complete"]) == (0, True)
     assert count(driven.folder / result["logs"][0]) == result["pace"]["ticks"]
-    assert "HOLD OPEN: a channel floats: its wire is open" in result["why"]
     assert " HOLD (OPEN: a channel floats: its wire is open" in driven.lines[-2]
     assert result["poses_sent"] > 150  # it walked on after the reset

@@ -8,6 +8,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
+from driven_rig import driven, simulated_alike
 from twin_rig import on_twin, simulated
 
 from antennate.cli import BAD_INPUT, main
@@ -49,6 +50,17 @@ def test_a_robot_of_any_size_is_decided_alike_in_simulation_and_through_bytes(
 ) -> None:
     config = TunnelConfig(time_limit=1.0, robot=robot_of(links, hinges))
     assert on_twin(config, "closed", 0) == simulated(config, "closed", 0)
+
+
+@pytest.mark.parametrize(("links", "hinges"), SIZES)
+def test_a_robot_of_any_size_is_driven_as_in_simulation(links: int, hinges: int) -> None:
+    config = TunnelConfig(robot=robot_of(links, hinges))
+    one = driven(config, "closed", 0, 60)
+    other = simulated_alike(config, "closed", 0, one.start, 60)
+    assert len(one.walk.maneuvers) == 60
+    assert one.walk.maneuvers == other.maneuvers
+    assert one.walk.commands == other.commands
+    assert one.walk.readings == other.readings
 
 
 @pytest.mark.parametrize(("links", "hinges"), SIZES)

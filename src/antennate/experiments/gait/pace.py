@@ -26,7 +26,7 @@ class Walk:
         gait: The gait that was walked.
         t: Times of the ticks [s], shape (n,).
         head: Plan positions of the head [m], shape (n, 2).
-        centre: Mean of the six links [m], shape (n, 2).
+        centre: Mean of the links [m], shape (n, 2).
         heading: Direction from the rear three links to the front three [rad], shape (n,).
         power: Mechanical power of all servos that do positive work [W], shape (n,).
         weight: Weight of the robot [N].

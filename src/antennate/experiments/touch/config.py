@@ -60,7 +60,7 @@ class TouchConfig(Params):
         ("stiff", "descending", "compliant"),
         "1",
         "paper: its three profiles",
-        "springs of the antenna; they replace antenna.active_coils",
+        "springs of the antenna: `descending` are antenna.active_coils as they are",
         min_length=1,
     )
     overlap: float = number(
