@@ -16,6 +16,7 @@ from antennate.hardware.joints import CommandError
 from antennate.hardware.safety.causes import State
 from antennate.hardware.safety.signal_quality import SignalQuality
 from antennate.params import ConditioningParams
+from antennate.robots.spec import RobotSpec
 from antennate.twin.config import TwinConfig
 from antennate.types import JointCommand
 
@@ -24,6 +25,8 @@ CONFIG = DriveConfig(dry_run=0.5, duration=1.0, stand=0.1, fault_time=0.2, bus_r
 
 class Motors:
     """Motors that are where they are told to be, on no bus at all."""
+
+    robot = RobotSpec()
 
     def __init__(self) -> None:
         self.state, self.tally = ActuatorState(missed={1: 0}, supply=12.0), Tally()

@@ -268,7 +268,7 @@ def test_G7_another_controller_differs_and_the_first_difference_is_named(tmp_pat
 
 
 def test_a_tick_of_a_controller_of_anybody_is_kept_too() -> None:
-    """It has no b and no phase, and its command is of another robot."""
+    """It has no level and no phase, and its command is of a robot with one joint less."""
 
     class Odd:
         maneuver = np.array([3])
@@ -279,5 +279,7 @@ def test_a_tick_of_a_controller_of_anybody_is_kept_too() -> None:
     seen.command.yaw.resize((1, 4), refcheck=False)
     tick = Tick.plain(Odd(), seen.frame, seen.command, 1, 0.5)
     assert (tick.maneuver, tick.contact) == (3, (0, 1))
-    assert all(map(math.isnan, (*tick.level, tick.phase, *tick.angles)))
+    assert all(map(math.isnan, (*tick.level, tick.phase)))
+    parts = (seen.command.yaw, seen.command.leg, seen.command.antenna)
+    assert tick.angles == tuple(np.concatenate([part.ravel() for part in parts]).tolist())
     assert Tick.unpack(tick.pack()).pack() == tick.pack()
