@@ -198,27 +198,7 @@ def _run_task(task: _Task, emit: Callable[[Any], None]) -> None:
         if isinstance(part, _Cell):
             emit((k, map_cell(config, part)))
         else:
-            emit((k, _estimate(config, *part)))
-
-
-def _estimate(config: SweepConfig, condition: str, split: str, number: int, side: str) -> Trial:
-    antenna = with_profile(config.antenna, config.profile)
-    return estimates.run_trial(
-        estimates.Setting(
-            config.seed,
-            config.estimate,
-            config.sweep,
-            config.shape,
-            config.conditioning,
-            antenna,
-            config.physics,
-            config.speed,
-        ),
-        condition,
-        split,
-        number,
-        side,
-    )
+            emit((k, estimates.run_trial(config, *part)))
 
 
 def run(
