@@ -19,7 +19,7 @@ import test_esp32_decoder as test_decoder
 import test_esp32_frame as test_frame
 import test_maneuver
 import test_touch_check
-from guard_tools import Guard, around, before, constant, given, put, together
+from guard_tools import Guard, around, before, constant, put, together
 from hardware_rig import BAND
 
 from antennate.control import conditioning, contact, maneuver
@@ -27,7 +27,6 @@ from antennate.hardware.esp32 import board, clock, decoder, frame, listener
 from antennate.hardware.esp32.clock import DeviceClock, Verdict
 from antennate.hardware.esp32.wire import Reset
 from antennate.hardware.safety import diagnosis, touch_check
-from antennate.params import DiagnosisParams
 from antennate.types import Maneuver
 
 
@@ -164,7 +163,7 @@ CLOCK = [
 FILMS = [
     Guard(
         "open wire",
-        given(test_diagnosis, DiagnosisParams, open_bad=10**6, high_rail=1e6),
+        together(put(diagnosis, "OPEN_BAD", 10**6), put(diagnosis, "HIGH_RAIL", 1e6)),
         partial(
             test_diagnosis.test_S1_a_floating_wire_is_open_within_ten_readings,
             test_diagnosis.rail_to_rail,
@@ -173,7 +172,7 @@ FILMS = [
     ),
     Guard(
         "short circuit",
-        given(test_diagnosis, DiagnosisParams, low_rail=-1.0),
+        put(diagnosis, "LOW_RAIL", -1.0),
         partial(
             test_diagnosis.test_S2_shorts_are_named_at_the_tenth_reading,
             [0.0] * 10,
@@ -184,28 +183,28 @@ FILMS = [
     ),
     Guard(
         "stuck reading",
-        given(test_diagnosis, DiagnosisParams, stuck=10**6),
+        put(diagnosis, "STUCK", 10**6),
         test_diagnosis.test_S4_a_repeated_reading_is_stuck_after_100,
         by=(ValueError,),
     ),
     Guard(
         "isolated spikes",
-        given(test_diagnosis, DiagnosisParams, agree=1),
+        put(diagnosis, "AGREE", 1),
         test_diagnosis.test_S6_a_real_jump_is_believed_after_three_readings,
     ),
     Guard(
         "share of bad readings",
-        given(test_diagnosis, DiagnosisParams, share=1.0),
+        put(diagnosis, "SHARE", 1.0),
         partial(test_diagnosis.test_S6_more_than_a_fifth_bad_is_degraded_or_worse, 0.3),
     ),
     Guard(
         "a sensor at its rail is flagged",
-        given(test_diagnosis, DiagnosisParams, saturated=10**6),
+        put(diagnosis, "SATURATED", 10**6),
         test_diagnosis.test_S3_a_saturated_film_is_flagged_and_still_contact,
     ),
     Guard(
         "readings far beyond the range",
-        given(test_diagnosis, DiagnosisParams, beyond=1e6),
+        put(diagnosis, "BEYOND", 1e6),
         test_diagnosis.test_S11_far_beyond_is_not_believed,
     ),
     Guard(
@@ -220,7 +219,7 @@ FILMS = [
     ),
     Guard(
         "gap in time",
-        given(test_diagnosis, DiagnosisParams, gap=1e6),
+        put(diagnosis, "GAP", 1e6),
         test_diagnosis.test_a_gap_in_time_forgets_what_was_before,
     ),
     Guard(

@@ -19,7 +19,7 @@ import test_settings
 import test_turns
 import test_twin_bus
 import test_twin_robot
-from guard_tools import Guard, after, around, constant, given, put
+from guard_tools import Guard, after, around, constant, put
 
 from antennate.hardware import joints, settings
 from antennate.hardware.driving import session
@@ -30,7 +30,6 @@ from antennate.hardware.dynamixel.doubts import Doubts
 from antennate.hardware.dynamixel.leg_turns import LegTurns
 from antennate.hardware.dynamixel.tables import XC430_W240
 from antennate.hardware.ports import serial_port
-from antennate.params import TurnsParams
 from antennate.robots.spec import RobotSpec
 from antennate.twin.wire import SimulatedWire
 
@@ -390,12 +389,12 @@ SERVOS = [
     ),
     Guard(
         "turns are forgotten",
-        put(turns, "TurnsParams", partial(TurnsParams.model_construct, slack=300.0)),
+        put(turns, "SLACK", 300.0),
         test_loose_leg.test_a_leg_that_did_not_forget_gets_no_torque,
     ),
     Guard(
         "turns that cannot be told",
-        put(turns, "TurnsParams", partial(TurnsParams.model_construct, slack=300.0)),
+        put(turns, "SLACK", 300.0),
         partial(
             test_loose_leg.test_a_leg_turned_so_far_that_its_turns_cannot_be_told_gets_no_torque,
             1300,
@@ -403,7 +402,7 @@ SERVOS = [
     ),
     Guard(
         "legs stand still before one is let go",
-        given(turns, TurnsParams, calm=0),
+        put(turns, "CALM", 0),
         test_loose_leg.test_no_leg_loses_its_torque_before_all_have_stood_still_for_five_ticks,
     ),
     Guard(

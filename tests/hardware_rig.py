@@ -15,7 +15,6 @@ from antennate.hardware.safety.supervisor import Supervisor
 from antennate.params import (
     ConditioningParams,
     ControlParams,
-    DiagnosisParams,
     SupervisorParams,
 )
 from antennate.types import AntennaFrame, Contact, JointCommand, Maneuver
@@ -74,7 +73,7 @@ class Rig:
 
     def __init__(self, name: str = "paper", control: Any = None) -> None:
         self.control = control or make_controller(name, ControlParams())
-        self.films = [ChannelDiagnosis(DiagnosisParams(), BAND) for _ in range(2)]
+        self.films = [ChannelDiagnosis(BAND) for _ in range(2)]
         self.supervisor = Supervisor(SupervisorParams())
         self.n = -1
         self.newest = -math.inf

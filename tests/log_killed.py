@@ -14,7 +14,6 @@ from pathlib import Path
 
 from log_ticks import HEADER, tick
 
-from antennate.params import LogParams
 from antennate.telemetry.reader import LogReader
 from antennate.telemetry.writer import LogWriter
 
@@ -23,7 +22,7 @@ SHOWN = 50
 
 def write(path: Path, said: int) -> None:
     """Write ticks for ever; say each one's number after its write."""
-    log = LogWriter(path, HEADER, LogParams(least_free=0.0))
+    log = LogWriter(path, HEADER, least_free=0.0)
     packed = [tick(number).pack() for number in range(1, SHOWN + 1)]
     os.write(said, bytes(8))
     number = 0

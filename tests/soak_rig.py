@@ -16,7 +16,7 @@ from antennate.hardware.esp32.board import Board
 from antennate.hardware.safety.causes import Cause, Inputs, Outputs, State
 from antennate.hardware.safety.diagnosis import ChannelDiagnosis
 from antennate.hardware.safety.supervisor import Supervisor
-from antennate.params import DiagnosisParams, SupervisorParams
+from antennate.params import SupervisorParams
 from antennate.types import Contact, Maneuver
 
 DRIFT = 50e-6
@@ -148,7 +148,7 @@ class Soak:
         self._board = Board(self._source, SupervisorParams().stale_age)
         nobody: Any = None
         self._body = HardwareRobot(self._board, nobody, self._clock)
-        self._films = [ChannelDiagnosis(DiagnosisParams(), BAND) for _ in range(2)]
+        self._films = [ChannelDiagnosis(BAND) for _ in range(2)]
         self._supervisor = Supervisor(SupervisorParams())
         self._events = events
         self._next = 0

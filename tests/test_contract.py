@@ -21,7 +21,7 @@ from antennate.control.registry import BUILT_IN
 from antennate.hardware.driving.hardware_robot import HardwareRobot
 from antennate.hardware.esp32.clock import Timed
 from antennate.hardware.esp32.wire import Sample
-from antennate.params import ControlParams, LogParams
+from antennate.params import ControlParams
 from antennate.telemetry.header import Header
 from antennate.telemetry.reader import LogReader
 from antennate.telemetry.replay import recorded_controller, replay
@@ -238,7 +238,7 @@ def test_G7_logs_of_wandering_readings_are_replayed_to_the_bit(
         control = recorded_controller(header)
         body = Wandering(seed, header.params.period)
         path = tmp_path / str(seed)
-        with LogWriter(path, header, LogParams(least_free=0.0)) as out:
+        with LogWriter(path, header, least_free=0.0) as out:
 
             def go_on(frame: AntennaFrame, command: JointCommand) -> bool:
                 tick = Tick.plain(control, frame, command, out.written + 1, body.now())  # noqa: B023

@@ -14,14 +14,13 @@ import pytest
 from hardware_rig import BAND, BENT, FREE, PERIOD, Rig
 from hypothesis import given
 from hypothesis import strategies as st
-from pydantic import ValidationError
 from scipy.stats import binom, norm
 
 from antennate.antenna.sensor import reading_noise
 from antennate.errors import CalibrationError
+from antennate.hardware.safety import diagnosis
 from antennate.hardware.safety.causes import Cause, State
 from antennate.hardware.safety.diagnosis import Band, ChannelDiagnosis, Finding, Reading
-from antennate.params import DiagnosisParams
 from antennate.robots.sensor import SensorParams
 
 RECORDED = Path(__file__).parents[2] / "shared/data/flex_static_12bit/derived/flex_static.csv"
@@ -33,7 +32,7 @@ Pattern = Callable[[np.random.Generator, int], list[float]]
 
 
 def channel(band: Band = BAND) -> ChannelDiagnosis:
-    return ChannelDiagnosis(DiagnosisParams(), band)
+    return ChannelDiagnosis(band)
 
 
 def quiet(rng: np.random.Generator, count: int, level: float = FREE) -> list[float]:
@@ -203,7 +202,7 @@ def noise_law() -> tuple[list[float], list[float]]:
 
 def test_S4_false_alarms_on_quiet_data_are_below_one_a_day() -> None:
     """By computation, for two channels and 24 h, from the law of the noise of a reading."""
-    params, sigma = DiagnosisParams(), SensorParams().noise_counts
+    sigma = SensorParams().noise_counts
     assert 2.0 <= sigma <= 3.0
     shifts, weights = noise_law()
     assert sum(weights) == pytest.approx(1)
@@ -212,15 +211,15 @@ def test_S4_false_alarms_on_quiet_data_are_below_one_a_day() -> None:
         w * (norm.cdf(codes + 0.5, s, sigma) - norm.cdf(codes - 0.5, s, sigma))
         for s, w in zip(shifts, weights, strict=True)
     )
-    stuck = 2 * DAY * float((share**params.stuck).sum())
+    stuck = 2 * DAY * float((share**diagnosis.STUCK).sum())
     beyond = sum(
-        w * float(2 * norm.sf(params.margin - s, scale=sigma))
+        w * float(2 * norm.sf(diagnosis.MARGIN - s, scale=sigma))
         for s, w in zip(shifts, weights, strict=True)
     )
     assert stuck < 1e-60
     assert 2 * DAY * beyond < 1
     # a jump, and all that rests on it, needs more than the margin
-    assert params.jump * (BAND.high - BAND.low) > 2 * params.margin
+    assert diagnosis.JUMP * (BAND.high - BAND.low) > 2 * diagnosis.MARGIN
 
 
 def test_S1_readings_that_do_not_come_are_no_open_wire() -> None:
@@ -246,14 +245,14 @@ def test_S4_a_real_film_held_still_gives_no_alarm_in_24_hours() -> None:
         assert {reading.finding for reading in found[3:]} == {Finding.OK}
         drawn = np.random.default_rng(1).choice(readings, DAY // 10)
         changes = np.flatnonzero(np.diff(drawn))
-        assert np.diff(changes).max() < DiagnosisParams().stuck / 4
+        assert np.diff(changes).max() < diagnosis.STUCK / 4
 
 
 def test_S4_noise_of_a_third_of_a_count_is_enough_to_be_alive() -> None:
     """At 0.35 counts 100 equal readings come less than once a day; films have seven times that."""
     sigma = 0.35
     centre = float(norm.cdf(0.5, scale=sigma) - norm.cdf(-0.5, scale=sigma))
-    runs = DAY * (1 - centre) * centre ** DiagnosisParams().stuck
+    runs = DAY * (1 - centre) * centre**diagnosis.STUCK
     assert runs < 1
 
 
@@ -392,8 +391,3 @@ def test_a_gap_in_time_forgets_what_was_before() -> None:
     assert film.step(2.0, 1800.0).finding is Finding.LOST
     found = [film.step(2.0 + n * PERIOD, 1800.0) for n in range(1, 10)]
     assert [r.finding for r in found] == [Finding.LOST, *[Finding.OK] * 8]
-
-
-def test_windows_that_do_not_fit_are_refused() -> None:
-    with pytest.raises(ValidationError, match="must fit into window"):
-        DiagnosisParams(open_bad=11)

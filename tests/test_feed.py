@@ -16,7 +16,7 @@ import pytest
 from antennate.cli.viewer import REQUIRED
 from antennate.errors import LogError
 from antennate.hardware.driving.signals import STOPS
-from antennate.params import ControlParams, LogParams
+from antennate.params import ControlParams
 from antennate.telemetry.feed import Feed, messages
 from antennate.telemetry.header import Header
 from antennate.telemetry.parts import part
@@ -88,7 +88,7 @@ def test_G5_a_reader_that_stands_still_costs_no_time_and_what_it_misses_is_count
 
 def test_G6_a_reader_that_dies_ends_nothing() -> None:
     """It dies at once, and so do those that follow: after three of them no more is started."""
-    with Feed(script("pass"), b"first", params=LogParams(restarts=3)) as feed:
+    with Feed(script("pass"), b"first", restarts=3) as feed:
         until(lambda: feed.failed, feed)
         assert not feed.send(b"tick")
         assert not feed.keeps

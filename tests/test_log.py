@@ -18,14 +18,14 @@ from log_ticks import HEADER, ODD, tick
 
 import antennate
 from antennate.errors import AntennateError, LogError
-from antennate.params import ControlParams, LogParams
+from antennate.params import ControlParams
 from antennate.telemetry.framing import LONGEST, SCHEMA, framed, opened, pieces
 from antennate.telemetry.header import Header
 from antennate.telemetry.reader import LogReader
 from antennate.telemetry.ticks import Tick
 from antennate.telemetry.writer import LogWriter
 
-ROOM = LogParams(least_free=0.0)
+ROOM = 0.0
 
 
 def written(path: Path, ticks: int) -> bytes:
@@ -269,7 +269,7 @@ def test_G4_a_disk_that_takes_nothing_more_is_said_once(tmp_path: Path) -> None:
 def test_G4_a_log_that_cannot_begin_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "log"
     with pytest.raises(LogError, match="expected 1e\\+12 GB free"):
-        LogWriter(path, HEADER, LogParams(least_free=1e21))
+        LogWriter(path, HEADER, 1e21)
     assert not path.exists()
     with pytest.raises(LogError, match="No such file"):
         LogWriter(tmp_path / "gone" / "log", HEADER, ROOM)

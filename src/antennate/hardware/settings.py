@@ -13,11 +13,12 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 from antennate.hardware.dynamixel.tables import POSITION_UNIT, TABLES, VELOCITY_UNIT
-from antennate.params import BusParams
 from antennate.robots.servos import TICKS_A_TURN
 from antennate.robots.spec import RobotSpec
 
-_ROOM = BusParams().profile_room
+_ROOM = 1.25
+"""Profile velocity by the fastest that goals move, so that a joint that lags catches up
+(assumed)."""
 
 
 class Setting(NamedTuple):

@@ -10,10 +10,9 @@ import traceback
 from collections import deque
 
 from antennate.errors import in_one_line
-from antennate.params import HostParams
 
-EVERY = HostParams().traceback_period
-"""Shortest time between two that are kept [s]."""
+EVERY = 1.0
+"""Shortest time between two that are kept [s], so that one a tick floods nothing (assumed)."""
 _KEPT = 16
 _LONGEST_TEXT = 20_000
 """Characters; an exception may quote anything."""

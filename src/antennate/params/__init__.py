@@ -17,12 +17,10 @@ from antennate.params.control import (
     RuleParams,
 )
 from antennate.params.doctor import DoctorParams
-from antennate.params.endurance import DriftParams, TurnsParams
-from antennate.params.host import HostParams
-from antennate.params.log import LogParams
+from antennate.params.endurance import DriftParams
 from antennate.params.network import NetworkParams
 from antennate.params.record import RecordParams
-from antennate.params.safety import DiagnosisParams, SupervisorParams, TouchCheckParams
+from antennate.params.safety import SupervisorParams, TouchCheckParams
 from antennate.params.scene import (
     BenchPhysicsParams,
     CylinderParams,
@@ -42,20 +40,16 @@ from antennate.params.touch import (
     TouchWallsParams,
 )
 from antennate.params.twin import BatteryParams
-from antennate.params.wires import BoardParams, BusParams, PortParams
 
 __all__ = [
     "BatteryParams",
     "BenchPhysicsParams",
     "BenchVariationParams",
-    "BoardParams",
     "BouldersWallParams",
-    "BusParams",
     "ConditioningParams",
     "ControlParams",
     "CornerWallParams",
     "CylinderParams",
-    "DiagnosisParams",
     "DoctorParams",
     "DriftParams",
     "EscapeParams",
@@ -63,12 +57,9 @@ __all__ = [
     "FlatWallParams",
     "GaitParams",
     "GapWallParams",
-    "HostParams",
-    "LogParams",
     "NetworkParams",
     "Params",
     "PhysicsParams",
-    "PortParams",
     "RecordParams",
     "RepetitionParams",
     "RuleParams",
@@ -82,7 +73,6 @@ __all__ = [
     "TouchCheckParams",
     "TouchWallsParams",
     "TunnelParams",
-    "TurnsParams",
     "VariationParams",
     "WallParams",
     "number",

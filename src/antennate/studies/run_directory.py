@@ -31,10 +31,9 @@ from antennate import __version__
 from antennate.errors import BadInputError, OutputError
 from antennate.files import write_whole
 from antennate.params import Params
-from antennate.params.log import MOST_PARTS
 from antennate.params.reading import Config, read_file
 from antennate.studies.formats import from_csv, strict, to_csv, to_json, to_toml
-from antennate.telemetry.parts import part
+from antennate.telemetry.parts import MOST_PARTS, part
 
 RESULT, TABLE, PARTIAL = "result.json", "trials.csv", "trials.partial.jsonl"
 CONFIG, VERSIONS, COMMAND = "config.toml", "versions.json", "command.txt"

@@ -21,13 +21,14 @@ from select import PIPE_BUF
 from typing import BinaryIO
 
 from antennate.errors import LogError
-from antennate.params import HostParams, LogParams
 
 _HEAD = struct.Struct("<II")
 _ROOM = 1 << 20
 """Bytes that the pipe may hold: half a minute of ticks."""
-_PATIENCE = HostParams().log_patience
-"""Time for the other process to write the last ticks [s]."""
+_PATIENCE = 5.0
+"""Time for the other process to write the last ticks to a slow disk under load [s]; assumed."""
+RESTARTS = 3
+"""Processes that may follow the first; a defect that more of them meet is not cured (assumed)."""
 _LONGEST = 1 << 17
 
 
@@ -54,7 +55,7 @@ class Feed:
         words: The command line of the n-th process, 1 the first. It reads messages from its
             standard input, and writes anything to its standard output once it keeps them.
         first: The content of the first message, of any length.
-        params: How many processes may follow the first.
+        restarts: How many processes may follow the first.
 
     Attributes:
         offered: Ticks that were to be sent.
@@ -67,10 +68,10 @@ class Feed:
         self,
         words: Callable[[int], Sequence[str]],
         first: bytes,
-        params: LogParams | None = None,
+        restarts: int = RESTARTS,
     ) -> None:
         self._words, self._first = words, first
-        self._most = 1 + (params or LogParams()).restarts
+        self._most = 1 + restarts
         self._process: subprocess.Popen[bytes] | None = None
         self._pipe = -1
         self._ending = False

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from antennate.params.log import MOST_PARTS
+MOST_PARTS = 10
+"""Files that one log can have."""
 
 
 def part(path: Path, number: int) -> Path:

@@ -12,10 +12,12 @@ import shutil
 from pathlib import Path
 
 from antennate.errors import LogError
-from antennate.params import LogParams
 from antennate.telemetry.framing import SCHEMA, Kind, framed
 from antennate.telemetry.header import Header
 from antennate.telemetry.ticks import Tick
+
+LEAST_FREE = 1e9
+"""Room for seven hours of ticks at 100 Hz [byte]: 40 kB a second (assumed)."""
 
 
 class LogWriter:
@@ -24,7 +26,7 @@ class LogWriter:
     Args:
         path: A file that does not exist yet.
         header: What stands at its beginning.
-        params: When there is too little room to begin.
+        least_free: Free space below which it is not begun [byte].
 
     Attributes:
         path: Where it is.
@@ -35,11 +37,11 @@ class LogWriter:
         LogError: The file exists or cannot be written, or the disk is nearly full.
     """
 
-    def __init__(self, path: Path, header: Header, params: LogParams | None = None) -> None:
+    def __init__(self, path: Path, header: Header, least_free: float = LEAST_FREE) -> None:
         self.path = path
         self.written = 0
         self.failure = ""
-        self._require_room((params or LogParams()).least_free)
+        self._require_room(least_free)
         try:
             self._file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o644)
         except FileExistsError:

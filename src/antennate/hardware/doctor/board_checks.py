@@ -14,11 +14,9 @@ from antennate.hardware.esp32.film import require_film
 from antennate.hardware.esp32.wire import Reset, objections
 from antennate.hardware.safety import diagnosis
 from antennate.hardware.safety.diagnosis import Band, ChannelDiagnosis
-from antennate.params import DiagnosisParams
 
 _LONGEST_TEXT = 60
 _COPY = "copy the three files of firmware/ to the board again"
-_DIAGNOSIS = DiagnosisParams()
 _CURES = {
     diagnosis.Finding.OPEN: "the wire of this antenna is broken, or its plug is out",
     diagnosis.Finding.SHORT_LO: "the sensor is torn off its wire, its plug is out, or it is "
@@ -136,8 +134,8 @@ def _antenna(
     )
     found = [_measured(f"{name} noise", f"at most {robot.doctor.noise:g} counts", quiet)]
     try:
-        band = Band(curve.counts_low, curve.counts_high, curve.polarity)
-        channel = ChannelDiagnosis(_DIAGNOSIS, band)
+        band = Band.of(curve)
+        channel = ChannelDiagnosis(band)
     except CalibrationError as error:
         wrong = Finding(str(error), "bad", "calibrate again, with another divider resistor")
         return [*found, _measured(f"{name} calibration", "leaves the rails free", wrong)]
@@ -155,7 +153,7 @@ def _antenna(
 
 def _at_rest(robot: DoctorConfig, name: str, counts: float) -> Check[BoardSurvey]:
     curve, threshold = robot.control.conditioning, robot.control.rule.threshold
-    low, high = curve.counts_low - _DIAGNOSIS.margin, curve.counts_high + _DIAGNOSIS.margin
+    low, high = curve.counts_low - diagnosis.MARGIN, curve.counts_high + diagnosis.MARGIN
     level = float(bending_level(curve, np.array(counts)))
     finding = Finding(
         f"{counts:.0f} counts, b = {level:.2f}",

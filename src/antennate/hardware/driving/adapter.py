@@ -10,9 +10,15 @@ from antennate.hardware.dynamixel.answers import Timing, Value
 from antennate.hardware.dynamixel.bringup import BringUpError
 from antennate.hardware.dynamixel.bus import Bus
 from antennate.hardware.ports.port import Port
-from antennate.params import BusParams, DoctorParams
+from antennate.params import DoctorParams
 
-_PARAMS = BusParams()
+_PINGS = 5
+"""Pings timed: a median that two late ones do not move (assumed)."""
+_SLOW = 0.008
+"""Median time to an answer from which on an adapter is refused [s]: half the 16 ms of an FTDI
+adapter's default (AN232B-04), which a busy computer does not reach (assumed)."""
+_PATIENCE = 0.05
+"""Longest wait for the answer to such a ping [s]: three times those 16 ms (assumed)."""
 
 
 def require_quick(
@@ -30,14 +36,10 @@ def require_quick(
     Raises:
         BringUpError: Answers come too late; with the command that cures it.
     """
-    bus = Bus(
-        port,
-        Timing(baud, gap=_PARAMS.adapter_patience, doubt=_PARAMS.adapter_patience),
-        clock=clock,
-    )
+    bus = Bus(port, Timing(baud, gap=_PATIENCE, doubt=_PATIENCE), clock=clock)
     times: list[float] = []
     for servo in ids:
-        while len(times) < _PARAMS.adapter_pings:
+        while len(times) < _PINGS:
             begin = clock()
             if not isinstance(bus.ping(servo), Value):
                 break
@@ -46,7 +48,7 @@ def require_quick(
             break
     if not times:
         return None
-    found, most = median(times), _PARAMS.slow_adapter
+    found, most = median(times), _SLOW
     if found > most:
         cure = latency_row(path, True, DoctorParams()).cure
         raise BringUpError(

@@ -27,13 +27,14 @@ from antennate.hardware.ports.finder import finder
 from antennate.hardware.ports.port import Port, PortError
 from antennate.hardware.ports.reconnecting import Reconnecting
 from antennate.hardware.safety.signal_quality import SignalQuality
-from antennate.params import BusParams, DoctorParams
+from antennate.params import DoctorParams
 from antennate.robots.spec import RobotSpec
 from antennate.types import Controller
 
 _WHO = DoctorParams()
 _PATIENCE = 0.05
-DOUBT = BusParams().doubt_walking
+DOUBT = 0.07
+"""Latest answer while servos have torque [s]: less than the 100 ms of their watchdogs (assumed)."""
 
 
 @contextlib.contextmanager

@@ -13,9 +13,9 @@ import os
 from collections.abc import Iterator
 from enum import Enum
 
-from antennate.params import HostParams
-
-LEVEL = HostParams().priority
+LEVEL = 20
+"""Real-time level of the loop: above ordinary programs, below the threads of interrupts at 50
+(sched(7)). The twin's is one higher."""
 _LINUX = hasattr(os, "sched_setscheduler")
 
 

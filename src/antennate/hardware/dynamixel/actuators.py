@@ -10,19 +10,17 @@ import numpy as np
 from antennate.errors import AntennateError
 from antennate.hardware.actuators import Tally
 from antennate.hardware.dynamixel import bringup
+from antennate.hardware.dynamixel.answers import MOTION_BUDGET
 from antennate.hardware.dynamixel.bus import Bus
 from antennate.hardware.dynamixel.leg_turns import LegTurns
 from antennate.hardware.dynamixel.monitor import ServoMonitor
 from antennate.hardware.dynamixel.tables import XC430_W240
 from antennate.hardware.joints import Joints
-from antennate.params import BusParams
 from antennate.robots.spec import RobotSpec
 from antennate.types import Floats, JointCommand
 
 _GOAL = XC430_W240["goal_position"]
 """At the same address in all models."""
-_AGAIN = BusParams().motion_budget
-"""Time for the answers of servos told again in a tick to let go [s]."""
 
 
 class DynamixelActuators:
@@ -114,7 +112,7 @@ class DynamixelActuators:
             PortError: Only with `again`: the bus is gone.
         """
         if again:
-            self.left_on = bringup.disable(self.bus, self.left_on, 1, _AGAIN)
+            self.left_on = bringup.disable(self.bus, self.left_on, 1, MOTION_BUDGET)
             return list(self.left_on)
         self._goals = None
         self.turns.reset()

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from antennate.hardware.dynamixel.packets import OVERHEAD, Status, StatusError
-from antennate.params import BusParams
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,6 +62,10 @@ MOTION = Span(126, 10, spare=12)
 defined, so that more may be read."""
 POSITION = Span(132, 4, spare=12)
 """The position of both models."""
+MOTION_BUDGET = 0.007
+"""Time for the positions of all servos [s]: what a tick of 10 ms leaves for reading (assumed)."""
+_GAP = 0.002
+"""The 1 ms of a USB adapter and as much again [s] (assumed)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,13 +77,14 @@ class Timing:
         gap: Longest silence inside an answer or before it, beyond the time on the wire [s]; more
             than the return delay of the servos and the latency of the adapter.
         quiet: Silence after which nothing more is expected [s].
-        doubt: An answer later than this never comes [s].
+        doubt: An answer later than this never comes [s]: six times the 16 ms of a slow adapter
+            (assumed).
     """
 
     baud: int = 1_000_000
-    gap: float = BusParams().gap
-    quiet: float = BusParams().gap
-    doubt: float = BusParams().doubt
+    gap: float = _GAP
+    quiet: float = _GAP
+    doubt: float = 0.1
 
     def wire(self, count: int) -> float:
         """Time of so many bytes on the wire [s]."""

@@ -21,13 +21,14 @@ from antennate.hardware.dynamixel.tables import (
     Register,
 )
 from antennate.hardware.ports.port import PortError
-from antennate.params import BusParams
 
-WATCHDOG_COUNTS = BusParams().watchdog
-"""Bus watchdog: a servo stops 100 ms after the last packet."""
+WATCHDOG_COUNTS = 5
+"""Bus watchdog [20 ms]: a servo stops 100 ms, ten ticks, after the last packet (assumed)."""
 
-_TRIES = BusParams().tries
-_BUDGET = BusParams().budget
+_TRIES = 5
+"""Tries until servos are given up: at 1 % loss five in a row are one in 10^10 (assumed)."""
+_BUDGET = 0.1
+"""Time for one reading of all outside the loop [s]: ten times what 19 answers take (assumed)."""
 _COMMON = XC430_W240.registers
 """Both models have the registers used here at the same addresses."""
 _TORQUE = _COMMON["torque_enable"]

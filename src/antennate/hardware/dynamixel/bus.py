@@ -13,7 +13,6 @@ Time is monotonic and comes from outside; nothing is kept that an exception coul
 
 from __future__ import annotations
 
-import threading
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
@@ -28,26 +27,24 @@ from antennate.hardware.dynamixel.answers import (
     cut,
 )
 from antennate.hardware.dynamixel.doubts import Doubts
-from antennate.hardware.dynamixel.exclusive import exclusive
 from antennate.hardware.dynamixel.packets import HEADER, OVERHEAD, Packet, Status, StatusError
 from antennate.hardware.dynamixel.parser import Parser
 from antennate.hardware.ports.port import Port, PortError
-from antennate.params import BusParams
 
 CHUNK = 1024
 PING_DATA = 3
 """Bytes of the answer to a ping: model number and firmware version."""
-FAST_TRIES = BusParams().fast_tries
-"""Fast reads without any answer, but answers to a slow one, after which fast ones are given up."""
-
-ALONE = BusParams().alone
-"""Misses in a row after which a servo no longer holds up the others."""
-BUSY = BusParams().busy
-"""How long goals wait for a quiet bus [s]."""
+FAST_TRIES = 3
+"""Fast reads without any answer, but answers to a slow one, after which fast ones are given up: at
+1 % loss three in a row are one in 10^6 (assumed)."""
+ALONE = 2
+"""Misses in a row after which a servo no longer holds up the others; noise loses one (assumed)."""
+BUSY = 0.010
+"""How long goals wait for a quiet bus [s]: one tick (assumed)."""
 
 
 class Bus:
-    """Master of one bus. Threads that share it wait for each other, a whole request long.
+    """Master of one bus; for one thread.
 
     Args:
         port: The wire.
@@ -58,7 +55,6 @@ class Bus:
     Attributes:
         timing: Its speed and patience.
         tally: What became of the answers.
-        turn: Held by the thread whose request is on the bus.
     """
 
     def __init__(
@@ -70,7 +66,6 @@ class Bus:
     ) -> None:
         self.timing = timing or Timing()
         self.tally = Tally()
-        self.turn = threading.RLock()
         self._port = port
         self._clock = clock
         self._fast = fast
@@ -90,7 +85,6 @@ class Bus:
         """Requests in a row that a servo left unanswered, by id, of those it was asked."""
         return self._missed
 
-    @exclusive
     def write_all(self, address: int, data: Mapping[int, bytes], anyway: bool = False) -> None:
         """Write equally many bytes to several servos at once; none answers.
 
@@ -106,7 +100,6 @@ class Bus:
             raise PortError(f"expected a quiet bus, found it busy for {1e3 * BUSY:g} ms")
         self._calm = True
 
-    @exclusive
     def read_all(self, ids: Sequence[int], span: Span, budget: float = 0.010) -> dict[int, Answer]:
         """Read the same span of several servos.
 
@@ -139,32 +132,26 @@ class Bus:
                 answers[servo] = self._read_one(servo, span, end)
         return answers
 
-    @exclusive
     def read(self, servo: int, span: Span) -> Answer:
         """Read a span of one servo."""
         return self._read_one(servo, span, self._clock() + self.timing.doubt)
 
-    @exclusive
     def write(self, servo: int, address: int, data: bytes) -> Answer:
         """Write to one servo and wait for its answer; a Value without data is success."""
         return self._ask(servo, packets.write(servo, address, data), 0)
 
-    @exclusive
     def ping(self, servo: int) -> Answer:
         """Model number (2 bytes, low first) and firmware version of one servo."""
         return self._ask(servo, packets.ping(servo), PING_DATA)
 
-    @exclusive
     def reboot(self, servo: int) -> Answer:
         """Restart one servo; it does not listen for a while after it has answered."""
         return self._ask(servo, packets.reboot(servo), 0)
 
-    @exclusive
     def clear(self, servo: int) -> Answer:
         """Let one servo, standing still, forget its whole turns."""
         return self._ask(servo, packets.clear(servo), 0)
 
-    @exclusive
     def scan(self, window: float = 0.8) -> list[Status]:
         """Answers of all servos to a ping within a time [s], an id twice if it answers twice."""
         self.settle()
@@ -176,7 +163,6 @@ class Bus:
         self.tally.bad_crc += parser.counters.bad_crc
         return found
 
-    @exclusive
     def settle(self) -> None:
         """Wait until no late answer can come any more and noise is over, at most `doubt` seconds.
 

@@ -20,7 +20,6 @@ from antennate.hardware.dynamixel.bringup import BringUpError
 from antennate.hardware.dynamixel.bus import Bus
 from antennate.hardware.dynamixel.tables import XC430_W240, Register
 from antennate.hardware.joints import Joints
-from antennate.params import TurnsParams
 from antennate.robots.servos import TICKS_A_TURN
 from antennate.types import Floats
 
@@ -29,6 +28,23 @@ _GOAL = XC430_W240["goal_position"]
 _PRESENT = XC430_W240["present_position"]
 _SPARE = {_TORQUE.name: 1, _GOAL.name: 12, _PRESENT.name: 12}
 """Defined bytes after each, by which late answers are told apart."""
+MOST_TURNS = 250.0
+"""Turns from which on legs forget them: of the 256 of an XC430-W240 (datasheet) six are left, 12 s
+of walking."""
+CALM = 5
+"""Ticks without motion before the first is let go: 50 ms (assumed)."""
+_CALM_TICKS = 2.0
+"""Change of a position from tick to tick that is no motion [ticks]: twice the resolution
+(assumed)."""
+_PATIENCE = 100
+"""Ticks to wait for that: 1 s (assumed)."""
+_TRIES = 20
+"""Ticks that one step of a leg may take: twice as long as a late answer is waited for (assumed)."""
+_BUDGET = 0.005
+"""Time for one reading [s]: half a tick; one answer takes 1 ms at most at 1 Mbit/s (assumed)."""
+SLACK = 0.25
+"""Turn of a leg without torque that is put up with [turns]: 245:1 gears hold, and half a turn could
+not be told (assumed)."""
 
 
 class LegTurns:
@@ -37,15 +53,13 @@ class LegTurns:
     Args:
         bus: The servos.
         joints: Which servo is which leg; told of every turn that is forgotten.
-        params: When, and how patiently.
 
     Attributes:
         forgotten: Legs that have forgotten their turns so far.
     """
 
-    def __init__(self, bus: Bus, joints: Joints, params: TurnsParams | None = None) -> None:
+    def __init__(self, bus: Bus, joints: Joints) -> None:
         self._bus, self._joints = bus, joints
-        self._params = params or TurnsParams()
         self.forgotten = 0
         self.reset()
 
@@ -75,9 +89,9 @@ class LegTurns:
         """
         turning = self._joints.turning
         turned = abs(goals[turning]) / TICKS_A_TURN
-        if not self.standing and turned.max(initial=0.0) >= self._params.most:
+        if not self.standing and turned.max(initial=0.0) >= MOST_TURNS:
             self.reset()
-            far = turned >= 0.5 * self._params.most
+            far = turned >= 0.5 * MOST_TURNS
             self._left.extend(turning[far].tolist())
 
     def step(self, goals: Floats, positions: Mapping[int, int], may_begin: bool = True) -> None:
@@ -106,7 +120,7 @@ class LegTurns:
             self._left.popleft()
             self._stage = 0
             self.forgotten += 1
-        if self._tried >= self._params.tries:
+        if self._tried >= _TRIES:
             servo, stage = self._joints.ids[at], self._stage
             self.reset()
             what = ("lose its torque", "forget its turns", "get its torque back")[stage]
@@ -114,12 +128,11 @@ class LegTurns:
 
     def _calm(self, positions: Mapping[int, int]) -> bool:
         """Whether the legs have come to rest, or are not waited for any longer."""
-        params = self._params
-        if self._still >= params.calm or self._waited >= params.patience:
+        if self._still >= CALM or self._waited >= _PATIENCE:
             return True
         self._waited += 1
         moved = [abs(p - self._before.get(i, math.inf)) for i, p in positions.items()]
-        self._still = self._still + 1 if max(moved, default=math.inf) <= params.calm_ticks else 0
+        self._still = self._still + 1 if max(moved, default=math.inf) <= _CALM_TICKS else 0
         self._before = dict(positions)
         return False
 
@@ -138,7 +151,7 @@ class LegTurns:
             return False
         self._bus.clear(servo)  # its answer may get lost: the position tells
         place = self._read(servo, _PRESENT)
-        slack = self._params.slack * TICKS_A_TURN
+        slack = SLACK * TICKS_A_TURN
         if place is None or not -slack <= place < TICKS_A_TURN + slack:
             return False
         shift = TICKS_A_TURN * round((place - self._place) / TICKS_A_TURN)
@@ -163,5 +176,5 @@ class LegTurns:
 
     def _read(self, servo: int, register: Register) -> int | None:
         span = Span(register.address, register.size, _SPARE[register.name])
-        said = self._bus.read_all([servo], span, self._params.budget)[servo]
+        said = self._bus.read_all([servo], span, _BUDGET)[servo]
         return register.decode(said.data) if isinstance(said, Value) else None

@@ -7,12 +7,11 @@ from collections.abc import Callable, Iterable
 from itertools import cycle
 
 from antennate.hardware.actuators import ActuatorState
-from antennate.hardware.dynamixel.answers import POSITION, Answer, Span, Value
+from antennate.hardware.dynamixel.answers import MOTION_BUDGET, POSITION, Answer, Span, Value
 from antennate.hardware.dynamixel.bringup import WATCHDOG_COUNTS
 from antennate.hardware.dynamixel.bus import Bus
 from antennate.hardware.dynamixel.tables import XC430_W240, hardware_errors
 from antennate.hardware.ports.port import PortError
-from antennate.params import BusParams
 
 _ERRORS = Span(XC430_W240["hardware_error_status"].address, 1)
 _WATCHDOG = XC430_W240["bus_watchdog"]
@@ -20,9 +19,13 @@ _TORQUE = XC430_W240["torque_enable"]
 _VOLTAGE = XC430_W240["present_input_voltage"]
 _POSITION = XC430_W240["present_position"]
 _VOLT = 0.1
-_ALONE = BusParams().single_budget
-_PATIENCE = BusParams().look_every
-SUPPLY_AGE = BusParams().supply_age
+_ALONE = 0.003
+"""Time for one servo asked alone [s]: the rest of the tick (assumed)."""
+_PATIENCE = 10
+"""Ticks after which watchdog and supply are read even if time is short: a round of all 19 then
+takes 2 s at the slowest (assumed)."""
+SUPPLY_AGE = 4.0
+"""Age from which on the supply is not known [s]: two such rounds (assumed)."""
 
 
 class ServoMonitor(ActuatorState):
@@ -45,7 +48,7 @@ class ServoMonitor(ActuatorState):
         bus: Bus,
         ids: tuple[int, ...],
         clock: Callable[[], float],
-        budget: float = BusParams().motion_budget,
+        budget: float = MOTION_BUDGET,
     ) -> None:
         super().__init__(missed=dict.fromkeys(ids, 0))
         self._bus = bus

@@ -10,13 +10,12 @@ from antennate.hardware.esp32.clock import Timed
 from antennate.hardware.esp32.frame import SAMPLE_FRAME_SIZE, encode_request
 from antennate.hardware.esp32.listener import CHUNK, Listener
 from antennate.hardware.ports.port import Port, PortError
-from antennate.params import BoardParams
 from antennate.types import Floats
 
-BOARD_BAUD = BoardParams().baud
-"""Bits per second of the board's port."""
-KEPT = BoardParams().backlog * SAMPLE_FRAME_SIZE
-"""Most bytes of a backlog that are looked at, the newest."""
+BOARD_BAUD = 115_200
+"""Bits per second of the board's port: MicroPython on an ESP32, UART 0."""
+KEPT = 64 * SAMPLE_FRAME_SIZE
+"""Most bytes of a backlog that are looked at: 0.64 s; what is older is not acted upon (assumed)."""
 _CHUNKS = 64
 """Most chunks read at once: more than Linux keeps for a line."""
 

@@ -15,13 +15,18 @@ from dataclasses import dataclass
 from enum import Enum, auto
 
 from antennate.hardware.esp32.wire import Hello, Reset, Sample
-from antennate.params import BoardParams
 
-DRIFT = BoardParams().drift
-SETTLE_SAMPLES = BoardParams().settle_samples
-SETTLE_TIME = BoardParams().settle_time
-SETTLE_FALL = BoardParams().settle_fall
-EARLY = BoardParams().early
+DRIFT = 250e-6
+"""Most by which two clocks run apart: crystals within 100 ppm each, and a margin (assumed)."""
+SETTLE_SAMPLES = 10
+"""Samples that a new lowest delay must last until ages are believed: 100 ms (assumed)."""
+SETTLE_TIME = 0.05
+"""Time that it must last likewise [s]: the age of stale data (assumed)."""
+SETTLE_FALL = 0.005
+"""How far the lowest delay may fall meanwhile [s]: half a period. A backlog that drains makes it
+fall faster (assumed)."""
+EARLY = 0.02
+"""How much earlier than expected a sample may come [s], after a lie also later; two periods."""
 RETIRED_BOOTS = 8
 HIDDEN_WRAP = 0.5
 """Share of the span of the board's counter after which an outage may hide a wrap."""

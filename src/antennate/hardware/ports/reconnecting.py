@@ -10,12 +10,12 @@ from queue import Empty, SimpleQueue
 from typing import Protocol
 
 from antennate.hardware.ports.port import Port, PortError
-from antennate.params import PortParams
 
-RETRY = PortParams().retry
-"""Time between two looks for a port that is gone [s]."""
-_FAREWELL = PortParams().farewell
-"""Longest that closing waits for a look that is under way [s]."""
+RETRY = 0.2
+"""Time between two looks for a port that is gone [s]; short beside the handling of a plug
+(assumed)."""
+_FAREWELL = 1.0
+"""Longest that closing waits for a look that is under way [s]; one takes a tenth (assumed)."""
 
 
 class Line(Port, Protocol):

@@ -8,12 +8,12 @@ from collections.abc import Generator
 from contextlib import contextmanager
 
 from antennate.hardware.ports.port import PortError
-from antennate.params import PortParams
 
-_OPENING_TIME = PortParams().opening_time
-"""Longest wait for a connection [s]."""
-_WRITING_TIME = PortParams().writing_time
-"""Longest wait until all is sent [s], as of a serial line."""
+_OPENING_TIME = 3.0
+"""Longest wait for a connection [s]: a lost packet of the handshake is sent again after 1 and 3
+s."""
+_WRITING_TIME = 0.1
+"""Longest wait until all is sent [s], as of a serial line: 1 kB at 115 200 bit/s (assumed)."""
 
 
 class TcpPort:

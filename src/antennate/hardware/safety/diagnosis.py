@@ -18,7 +18,45 @@ from enum import Enum
 
 from antennate.antenna.sensor import FULL_SCALE
 from antennate.errors import CalibrationError
-from antennate.params import ConditioningParams, DiagnosisParams
+from antennate.params import ConditioningParams
+
+LOW_RAIL = 5.0
+"""Readings up to this are at the lower rail [counts]: two sigma of the noise above 0 (assumed)."""
+HIGH_RAIL = 4090.0
+"""Readings from this on are at the upper rail [counts]: two sigma below full scale (assumed)."""
+WINDOW = 10
+"""Readings from which a broken wire is told: 100 ms at 100 Hz, as long as it may take."""
+OPEN_BAD = 6
+"""Bad readings in the window that mean an open wire: a floating input fails one window in 10^4, and
+20 % of spikes pass 99 in 100 (assumed)."""
+SATURATED = 3
+"""Readings in the window at the rail of a bent sensor that mean saturation: more than 1 % of spikes
+brings (assumed)."""
+STUCK = 100
+"""Equal readings in a row that mean a stuck converter: 1 s; a sensor at rest has noise of 2 to 3
+counts, so they do not happen (assumed)."""
+JUMP = 1 / 3
+"""Change between readings that is doubted [spans]: a flex sensor bends fully in three or more
+(assumed)."""
+AGREE = 3
+"""Doubted readings in a row that agree and are believed: three spikes that do are rarer than one in
+10^7 readings at 1 % (assumed). At most one more than LONGEST_HOLD."""
+LONGEST_HOLD = 4
+"""Bad readings in a row that the last good one stands in for: 40 ms, below the age at which data
+are stale (assumed)."""
+SHARE_WINDOW = 100
+"""Readings over which bad ones are counted: 1 s (assumed)."""
+SHARE = 0.2
+"""Share of bad readings above which a side is degraded; averages are no longer worth much then
+(assumed)."""
+MARGIN = 20.0
+"""Reading beyond the calibrated range still taken for noise [counts]: eight sigma (assumed)."""
+BEYOND = 0.8
+"""Distance from the calibrated range up to which a reading is believed [spans]: simulated sensors
+bend up to 0.70 beyond (measured), and a tenth for drift."""
+GAP = 0.1
+"""Time without a reading after which nothing before it is remembered [s]: twice the age at which
+data are stale (assumed)."""
 
 
 class Finding(Enum):
@@ -85,7 +123,6 @@ class ChannelDiagnosis:
     """Judges the readings of one antenna.
 
     Args:
-        params: Windows and limits.
         band: The channel's calibrated range.
 
     Attributes:
@@ -98,14 +135,13 @@ class ChannelDiagnosis:
         CalibrationError: The band is empty or reaches a rail, where a broken wire looks alive.
     """
 
-    def __init__(self, params: DiagnosisParams, band: Band) -> None:
-        if not params.low_rail < band.low < band.high < params.high_rail:
+    def __init__(self, band: Band) -> None:
+        if not LOW_RAIL < band.low < band.high < HIGH_RAIL:
             raise CalibrationError(
-                f"a calibrated range must lie within {params.low_rail:g} and {params.high_rail:g} "
+                f"a calibrated range must lie within {LOW_RAIL:g} and {HIGH_RAIL:g} "
                 f"counts, so that a broken wire can be told from a flex sensor; got {band.low:g} "
                 f"to {band.high:g}; choose another divider resistor"
             )
-        self._params = params
         self._band = band
         self._span = band.high - band.low
         self.counted = dict.fromkeys(Finding, 0)
@@ -115,15 +151,14 @@ class ChannelDiagnosis:
 
     def reset(self) -> None:
         """Forget all readings; the counters stay."""
-        window = self._params.window
         self.reading = _NOTHING
         self._t = -math.inf
-        self._raw: deque[float] = deque(maxlen=window)
-        self._bad: deque[bool] = deque(maxlen=window)
-        self._share: deque[bool] = deque(maxlen=self._params.share_window)
-        self._outside: deque[bool] = deque(maxlen=window)
+        self._raw: deque[float] = deque(maxlen=WINDOW)
+        self._bad: deque[bool] = deque(maxlen=WINDOW)
+        self._share: deque[bool] = deque(maxlen=SHARE_WINDOW)
+        self._outside: deque[bool] = deque(maxlen=WINDOW)
         self._good = math.nan
-        self._bad_run = self._params.longest_hold + 1
+        self._bad_run = LONGEST_HOLD + 1
         self._doubted: list[float] = []
         self._equal = 0
         self._share_bad = 0
@@ -137,7 +172,7 @@ class ChannelDiagnosis:
         """
         if not t > self._t:
             return self.reading
-        if t - self._t > self._params.gap:
+        if t - self._t > GAP:
             self.reset()
         self._t = t
         self._equal = self._equal + 1 if self._raw and counts == self._raw[-1] else 1
@@ -156,11 +191,11 @@ class ChannelDiagnosis:
         return self._good
 
     def _plausible(self, counts: float) -> bool:
-        reach = self._params.beyond * self._span
+        reach = BEYOND * self._span
         return self._band.low - reach <= counts <= self._band.high + reach
 
     def _near(self, one: float, other: float) -> bool:
-        return abs(one - other) <= self._params.jump * self._span
+        return abs(one - other) <= JUMP * self._span
 
     def _believe(self, counts: float) -> None:
         """Accept a reading as the good one, or count it as bad."""
@@ -169,7 +204,7 @@ class ChannelDiagnosis:
             doubted = self._doubted
             follows = doubted and self._near(counts, doubted[-1])
             self._doubted = [*doubted, counts] if follows else [counts]
-            good = len(self._doubted) >= self._params.agree
+            good = len(self._doubted) >= AGREE
         elif not good:
             self._doubted = []
         if good:
@@ -179,7 +214,7 @@ class ChannelDiagnosis:
         self._count(good, counts)
 
     def _count(self, good: bool, counts: float) -> None:
-        margin = self._params.margin
+        margin = MARGIN
         outside = not self._band.low - margin <= counts <= self._band.high + margin
         self._outside.append(good and outside)
         self.outside += good and outside
@@ -191,48 +226,46 @@ class ChannelDiagnosis:
         self._bad.append(not good and not math.isnan(counts))
 
     def _find(self) -> Finding:
-        params = self._params
         broken = self._broken()
         if broken is not None:
             return broken
-        if self._bad_run > params.longest_hold:
+        if self._bad_run > LONGEST_HOLD:
             return Finding.LOST
-        if self._at_bent_rail() >= params.saturated:
+        if self._at_bent_rail() >= SATURATED:
             return Finding.SATURATED
-        if self._share_bad > params.share * params.share_window:
+        if self._share_bad > SHARE * SHARE_WINDOW:
             return Finding.SPIKY
         return Finding.OUT_OF_CAL if any(self._outside) else Finding.OK
 
     def _broken(self) -> Finding | None:
         """A channel that says nothing about the flex sensor, as far as known."""
-        params = self._params
-        full = len(self._raw) == params.window
+        full = len(self._raw) == WINDOW
         if full and self._pinned(low=True):
             return Finding.SHORT_LO
         if full and self._pinned(low=False):
             return Finding.SHORT_HI
-        if self._equal >= params.stuck:
+        if self._equal >= STUCK:
             return Finding.STUCK
-        floats = sum(self._bad) >= params.open_bad or self._at_both_rails()
+        floats = sum(self._bad) >= OPEN_BAD or self._at_both_rails()
         return Finding.OPEN if full and floats else None
 
     def _at_both_rails(self) -> bool:
         """Whether the window has two readings or more at either rail, which no flex sensor can."""
-        low = sum(counts <= self._params.low_rail for counts in self._raw)
-        high = sum(counts >= self._params.high_rail for counts in self._raw)
+        low = sum(counts <= LOW_RAIL for counts in self._raw)
+        high = sum(counts >= HIGH_RAIL for counts in self._raw)
         return min(low, high) >= 2
 
     def _pinned(self, low: bool) -> bool:
         """Whether the whole window is at one rail; that of a bent sensor there has noise."""
-        params, bent_low = self._params, self._band.polarity < 0
+        bent_low = self._band.polarity < 0
         if low:
-            bound = 0.0 if bent_low and self._plausible(params.low_rail) else params.low_rail
+            bound = 0.0 if bent_low and self._plausible(LOW_RAIL) else LOW_RAIL
             return all(counts <= bound for counts in self._raw)
-        bent = not bent_low and self._plausible(params.high_rail)
-        bound = FULL_SCALE if bent else params.high_rail
+        bent = not bent_low and self._plausible(HIGH_RAIL)
+        bound = FULL_SCALE if bent else HIGH_RAIL
         return all(counts >= bound for counts in self._raw)
 
     def _at_bent_rail(self) -> int:
         if self._band.polarity > 0:
-            return sum(counts >= self._params.high_rail for counts in self._raw)
-        return sum(counts <= self._params.low_rail for counts in self._raw)
+            return sum(counts >= HIGH_RAIL for counts in self._raw)
+        return sum(counts <= LOW_RAIL for counts in self._raw)

@@ -14,7 +14,6 @@ from antennate.hardware.safety.drift import Drift
 from antennate.hardware.safety.touch_check import Ask, TouchCheck
 from antennate.params import (
     ConditioningParams,
-    DiagnosisParams,
     DriftParams,
     TouchCheckParams,
 )
@@ -29,7 +28,6 @@ class SignalQuality:
 
     Args:
         conditioning: Their calibrated range.
-        diagnosis: Windows and limits by which a broken channel is told.
         drift: How drift is followed.
         touch: What counts as a touch, None if they are not checked by touch.
 
@@ -42,12 +40,11 @@ class SignalQuality:
     def __init__(
         self,
         conditioning: ConditioningParams,
-        diagnosis: DiagnosisParams | None = None,
         drift: DriftParams | None = None,
         touch: TouchCheckParams | None = None,
     ) -> None:
         band = Band.of(conditioning)
-        self.channels = [ChannelDiagnosis(diagnosis or DiagnosisParams(), band) for _ in _SIDES]
+        self.channels = [ChannelDiagnosis(band) for _ in _SIDES]
         self.check = None if touch is None else TouchCheck(touch, (band, band))
         self.drifts = [Drift(drift or DriftParams(), band) for _ in _SIDES]
         self._t = -math.inf
