@@ -53,7 +53,7 @@ class Chain:
 
     @classmethod
     def of(cls, antenna: AntennaSpec) -> Chain:
-        """The springs of an antenna, stiffened by the film where it lies."""
+        """The springs of an antenna, stiffened by the flex sensor where it lies."""
         stiffness = antenna.hinge_stiffness()
         return cls(np.full(len(stiffness), antenna.link_length), np.array(stiffness))
 

@@ -1,4 +1,4 @@
-"""The door: the only place that talks to people.
+"""The command line: the only place that talks to people.
 
 `antennate COMMAND ...` ends with 0 when done, 2 on bad input and 130 when interrupted. Bad input is
 answered with one line on stderr. What a command needs is imported when it runs.
@@ -11,8 +11,7 @@ import sys
 from collections.abc import Mapping, Sequence
 
 from antennate import __version__
-
-OK, BAD_INPUT, INTERRUPTED = 0, 2, 130
+from antennate.cli.exit_codes import BAD_INPUT, INTERRUPTED, OK
 
 ROBOT_COMMANDS = {
     "twin": "serve a simulated robot as real bytes: an antenna board and a bus of servos",
@@ -86,7 +85,7 @@ def _run(words: Sequence[str], name: str) -> int:
         if words[0] == "--completion":
             from antennate.cli.completion import script
 
-            sys.stdout.write(script(words[1:], commands()))
+            sys.stdout.write(script(words[1:], commands(), carry_out))
             return OK
         if words[0] not in commands():
             known = f"{nearest(words[0], commands())}, one of {', '.join(commands())}"

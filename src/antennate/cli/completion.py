@@ -6,9 +6,8 @@ when it starts.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 
-from antennate.cli import carry_out
 from antennate.cli.arguments import OptionsRequest
 from antennate.cli.options import Option
 from antennate.errors import BadInputError
@@ -44,12 +43,17 @@ _HELP = ("--help", "--help-all")
 _OWN = ("--help", "--version", "--completion")
 
 
-def script(words: Sequence[str], commands: Mapping[str, str]) -> str:
+def script(
+    words: Sequence[str],
+    commands: Mapping[str, str],
+    carry_out: Callable[[str, Sequence[str]], int],
+) -> str:
     """The script for a shell.
 
     Args:
         words: Name of the shell.
         commands: What each command does, by name.
+        carry_out: Runs a command of that name on its words.
 
     Raises:
         BadInputError: The shell is not one of `SHELLS`.
@@ -57,13 +61,13 @@ def script(words: Sequence[str], commands: Mapping[str, str]) -> str:
     if len(words) != 1 or words[0] not in SHELLS:
         found = one_line(" ".join(words)) or "none"
         raise BadInputError(f"--completion: expected one of {', '.join(SHELLS)}, found {found}")
-    options = {name: _options(name) for name in commands}
+    options = {name: _options(name, carry_out) for name in commands}
     if words[0] == "fish":
         return "".join(f"{line}\n" for line in _fish(commands, options))
     return (_ZSH if words[0] == "zsh" else "") + _bash(options)
 
 
-def _options(command: str) -> Sequence[Option]:
+def _options(command: str, carry_out: Callable[[str, Sequence[str]], int]) -> Sequence[Option]:
     """The options of a command, which is asked for them in place of a run."""
     try:
         carry_out(command, [OptionsRequest.WORD])

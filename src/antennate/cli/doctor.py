@@ -8,9 +8,9 @@ from pathlib import Path
 
 from pydantic.dataclasses import dataclass
 
-from antennate.cli import BAD_INPUT, OK
 from antennate.cli.addresses import RobotOptions, key_of, parse_robot, require_lossless
 from antennate.cli.checks import show_rows
+from antennate.cli.exit_codes import BAD_INPUT, OK
 from antennate.cli.options import option
 from antennate.cli.progress import terminate_as_interrupt
 from antennate.errors import ConfigError

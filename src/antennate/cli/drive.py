@@ -9,8 +9,9 @@ from typing import Any
 
 from pydantic.dataclasses import dataclass
 
-from antennate.cli import BAD_INPUT, OK, viewer
+from antennate.cli import viewer
 from antennate.cli.addresses import RobotOptions, key_of, parse_robot, require_lossless
+from antennate.cli.exit_codes import BAD_INPUT, OK
 from antennate.cli.options import option
 from antennate.cli.progress import terminate_as_interrupt
 from antennate.cli.tables import Cell, number, show

@@ -6,8 +6,8 @@ import sys
 from collections.abc import Sequence
 from typing import Any
 
-from antennate.cli import INTERRUPTED, OK
 from antennate.cli.arguments import Options, parse
+from antennate.cli.exit_codes import INTERRUPTED, OK
 from antennate.cli.progress import progress, terminate_as_interrupt
 from antennate.cli.tables import print_table
 from antennate.errors import OutputError

@@ -14,8 +14,8 @@ from statistics import fmean, pstdev
 
 from pydantic.dataclasses import dataclass
 
-from antennate.cli import OK
 from antennate.cli.addresses import RobotOptions, key_of, parse_robot
+from antennate.cli.exit_codes import OK
 from antennate.cli.options import option
 from antennate.cli.progress import terminate_as_interrupt
 from antennate.cli.status import StatusLine

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from pydantic.dataclasses import dataclass
 
-from antennate.cli import BAD_INPUT, OK
 from antennate.cli.arguments import FromFile, parse_with
+from antennate.cli.exit_codes import BAD_INPUT, OK
 from antennate.cli.options import option
 from antennate.cli.tables import Cell, number, show
 from antennate.errors import ConfigError

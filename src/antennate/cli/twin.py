@@ -13,8 +13,8 @@ from typing import Literal
 
 from pydantic.dataclasses import dataclass
 
-from antennate.cli import OK
 from antennate.cli.arguments import FromFile, parse_with
+from antennate.cli.exit_codes import OK
 from antennate.cli.options import option
 from antennate.cli.progress import end_at_first
 from antennate.errors import ConfigError

@@ -17,7 +17,7 @@ from antennate.robots.spec import RobotSpec
 
 
 class RobotConfig(Params):
-    """One robot: its servos, its films, its controller's numbers and its network."""
+    """One robot: its servos, its flex sensors, its controller's numbers and its network."""
 
     calibration: str | None = number(
         None,
@@ -29,7 +29,7 @@ class RobotConfig(Params):
         None,
         "1",
         "assumed: that of the calibration file",
-        "name of the film; 16 hexadecimal digits name the board it is soldered to",
+        "name of the flex sensor; 16 hexadecimal digits name the board it is soldered to",
     )
     robot: RobotSpec = RobotSpec()
     control: ControlParams = ControlParams()
@@ -37,7 +37,7 @@ class RobotConfig(Params):
     network: NetworkParams = NetworkParams()
 
     def calibrated(self) -> Self:
-        """The same with the curve and the film of the calibration file in place of its name.
+        """The same with the curve and the flex sensor of the calibration file in place of its name.
 
         Raises:
             CalibrationError: The file cannot be used.
@@ -45,6 +45,6 @@ class RobotConfig(Params):
         """
         if self.calibration is None:
             return self
-        control, film = calibrated(self.control, Path(self.calibration), self.sensor_id)
-        known = {"control": control, "sensor_id": film.sensor_id, "calibration": None}
+        control, sensor = calibrated(self.control, Path(self.calibration), self.sensor_id)
+        known = {"control": control, "sensor_id": sensor.sensor_id, "calibration": None}
         return self.model_copy(update=known)

@@ -112,7 +112,7 @@ class ConditioningParams(Params):
     polarity: Literal[-1, 1] = number(
         -1,
         "1",
-        "paper: called a decreasing sigmoid; counts fall when the film bends",
+        "paper: called a decreasing sigmoid; counts fall when the flex sensor bends",
         "+1 if the reading rises with bending",
     )
     counts_low: float = number(

@@ -82,7 +82,7 @@ class DoctorParams(Params):
     noise: float = number(
         10.0,
         "counts",
-        "assumed: four times that of a resting film",
+        "assumed: four times that of a resting flex sensor",
         "highest standard deviation of the readings at rest",
         gt=0,
         le=1000,

@@ -27,7 +27,7 @@ class DriftParams(Params):
     band: float = number(
         0.15,
         "1",
-        "measured: light touches and the memory of the film let 90 s in a simulated tunnel show 7 "
+        "measured: light touches and a sensor's memory let 90 s in a simulated tunnel show 7 "
         "%; no false contact in 24 h up to 30 % (row S7)",
         "drift from which on a side is degraded, in spans",
         gt=0,

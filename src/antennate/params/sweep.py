@@ -49,7 +49,7 @@ class ShapeParams(Params):
         math.radians(5.0),
         "rad",
         "assumed: twice the 2.3 deg of inertia in free air, and far above the noise of a reading",
-        "summed hinge angles under the film below which the antenna is straight",
+        "summed hinge angles under the flex sensor below which the antenna is straight",
         gt=0,
         le=1,
     )
@@ -123,8 +123,8 @@ class EstimateParams(Params):
     gain: float = number(
         0.05,
         "1",
-        "assumed: film strips repeat within 10 %, taken as two standard deviations",
-        "standard deviation of the film's gain from trial to trial, where there is sensor noise",
+        "assumed: flex sensor strips repeat within 10 %, taken as two standard deviations",
+        "standard deviation of the sensor's gain from trial to trial, where there is sensor noise",
         ge=0,
         le=1,
     )

@@ -45,7 +45,7 @@ class AntennaSpec(Params):
         0.048,
         "N·mm/deg",
         "assumed: bending stiffness of a 10 x 0.25 mm PET strip, E 3.5 GPa, per 16.7 mm hinge",
-        "stiffness the sensor film adds to each hinge it covers",
+        "stiffness the flex sensor adds to each hinge it covers",
         ge=0,
     )
     length: float = number(

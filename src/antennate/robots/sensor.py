@@ -1,4 +1,4 @@
-"""The sensor: flex film, voltage divider, and the converter of an ESP32."""
+"""The flex sensor, its voltage divider, and the converter of an ESP32."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class SensorParams(Params):
         "flex",
         "1",
         "assumed: the paper's ZD10-100 is sold as a pressure strip and used as a flex sensor",
-        "film whose resistance rises with bending (flex) or falls with it (fsr)",
+        "flex sensor whose resistance rises with bending (flex) or falls with it (fsr)",
     )
     flat_resistance: float = number(
         10e3,
@@ -61,14 +61,14 @@ class SensorParams(Params):
         10e6,
         "Ohm",
         "datasheet: ZD10-100, above 10 MOhm",
-        "resistance of an unbent fsr film",
+        "resistance of an unbent fsr sensor",
         gt=0,
     )
     pressed_resistance: float = number(
         5e3,
         "Ohm",
         "assumed: unpublished for bending; strips of this size reach a few kOhm at full load",
-        "resistance of an fsr film at a right angle",
+        "resistance of an fsr sensor at a right angle",
         gt=0,
     )
     hysteresis: float = number(
@@ -82,7 +82,7 @@ class SensorParams(Params):
     creep: tuple[float, float] = number(
         (0.025, 0.025),
         "1",
-        "assumed: 5 % in all, as viscoelastic films show",
+        "assumed: 5 % in all, as viscoelastic flex sensors show",
         "shares of the response that come late",
     )
     creep_time: tuple[float, float] = number(
@@ -93,12 +93,12 @@ class SensorParams(Params):
         "1",
         "assumed: the paper's ZD10-100 is sold as a pressure strip, which answers bending either "
         "way",
-        "whether the film sees bending towards the tail only (one) or either way",
+        "whether the flex sensor sees bending towards the tail only (one) or either way",
     )
     divider_resistance: float = number(
         10e3,
         "Ohm",
-        "assumed: the value makers pair with this film",
+        "assumed: the value makers pair with this flex sensor",
         "fixed resistor to ground",
         gt=0,
     )
@@ -114,7 +114,7 @@ class SensorParams(Params):
     oversampling: int = number(
         16,
         "1",
-        "assumed: 100 readings a second of two films leave time for 16 samples each",
+        "assumed: 100 readings a second of two flex sensors leave time for 16 samples each",
         "samples averaged to one reading",
         ge=1,
         le=1024,

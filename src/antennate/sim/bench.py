@@ -250,7 +250,7 @@ class Bench:
         return self.data.qpos[self._hinges]
 
     def flex(self) -> float:
-        """Summed hinge angles under the film [rad]."""
+        """Summed hinge angles under the flex sensor [rad]."""
         return float(self.hinges()[: self._sensed].sum())
 
     def base_angle(self) -> float:

@@ -226,7 +226,7 @@ class World:
         return self._flex.shape[1]
 
     def flex(self) -> Floats:
-        """Summed hinge angles under each film [rad], shape (2,); positive towards the tail."""
+        """Summed hinge angles under each sensor [rad], shape (2,); positive towards the tail."""
         return self._qpos[self._flex].sum(axis=1)
 
     @property

@@ -1,4 +1,4 @@
-"""Which film is on the robot, and its calibration file in place of numbers typed by hand."""
+"""Which flex sensor is on the robot, and its calibration file in place of numbers typed by hand."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def calibrated(
     Args:
         control: Its numbers, without a curve of their own.
         path: The file; one curve serves both antennae.
-        sensor_id: The film it has to belong to, None for any.
+        sensor_id: The flex sensor it has to belong to, None for any.
 
     Raises:
         CalibrationError: The file cannot be used.
@@ -45,7 +45,7 @@ def calibrated(
 
 
 def require_film(hello: Hello | None, sensor_id: str | None) -> None:
-    """Refuse a board to which the calibrated film is not soldered, where its id names a board.
+    """Refuse a board to which the calibrated sensor is not soldered, where its id names a board.
 
     Args:
         hello: What the board has said of itself.
@@ -59,5 +59,5 @@ def require_film(hello: Hello | None, sensor_id: str | None) -> None:
     if hello.device_id != sensor_id:
         raise CalibrationError(
             f"--calibration: expected the board {sensor_id} of its sensor_id, found board "
-            f"{hello.device_id}; calibrate the films of this board"
+            f"{hello.device_id}; calibrate the flex sensors of this board"
         )

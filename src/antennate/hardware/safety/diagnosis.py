@@ -30,13 +30,13 @@ OPEN_BAD = 6
 """Bad readings in the window that mean an open wire: a floating input fails one window in 10^4, and
 20 % of spikes pass 99 in 100 (assumed)."""
 SATURATED = 3
-"""Readings in the window at the rail of a bent film that mean saturation: more than 1 % of spikes
+"""Readings in the window at the rail of a bent sensor that mean saturation: more than 1 % of spikes
 brings (assumed)."""
 STUCK = 100
-"""Equal readings in a row that mean a stuck converter: 1 s; a film at rest has noise of 2 to 3
+"""Equal readings in a row that mean a stuck converter: 1 s; a sensor at rest has noise of 2 to 3
 counts, so they do not happen (assumed)."""
 JUMP = 1 / 3
-"""Change between readings that is doubted [spans]: a film bends fully in three or more
+"""Change between readings that is doubted [spans]: a flex sensor bends fully in three or more
 (assumed)."""
 AGREE = 3
 """Doubted readings in a row that agree and are believed: three spikes that do are rarer than one in
@@ -52,7 +52,7 @@ SHARE = 0.2
 MARGIN = 20.0
 """Reading beyond the calibrated range still taken for noise [counts]: eight sigma (assumed)."""
 BEYOND = 0.8
-"""Distance from the calibrated range up to which a reading is believed [spans]: simulated films
+"""Distance from the calibrated range up to which a reading is believed [spans]: simulated sensors
 bend up to 0.70 beyond (measured), and a tenth for drift."""
 GAP = 0.1
 """Time without a reading after which nothing before it is remembered [s]: twice the age at which
