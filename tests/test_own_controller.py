@@ -222,7 +222,9 @@ def test_a_controller_that_fails_makes_its_trial_invalid_and_no_other(
             assert (mine.progress_m, mine.force_mean_n) == (theirs.progress_m, theirs.force_mean_n)
 
 
-def test_a_failing_controller_is_named_by_its_path_and_its_invalid_trials_are_told(capsys, tmp_path):
+def test_a_failing_controller_is_named_by_its_path_and_its_invalid_trials_are_told(
+    capsys, tmp_path
+):
     (tmp_path / "my_file.py").write_text(
         "from antennate.control.controllers import open_loop\n"
         "def Fails(control, robot, batch):\n"
