@@ -20,11 +20,12 @@ def tables(result: Mapping[str, Any]) -> Sequence[Table]:
     controllers = result["controllers"]
     counts = sorted({row["trials"] for row in controllers.values()})
     many = " to ".join(str(n) for n in dict.fromkeys([counts[0], counts[-1]]))
+    many += " trial" if many == "1" else " trials"
     one_by_one = Table.of(
         "Controllers",
         controllers,
         measures.CONTROLLER,
-        f"{many} {'trial' if many == '1' else 'trials'} a controller, seed {result['seed']}. A failure counts as the time limit, "
+        f"{many} a controller, seed {result['seed']}. A failure counts as the time limit, "
         f"{result['time_limit_s']:g} s; invalid trials\nare left out of all rows below theirs. "
         "Intervals of means are bootstrapped.",
     )
