@@ -23,7 +23,7 @@ from guard_tools import Guard, around, before, constant, put, together
 from hardware_rig import BAND
 
 from antennate.control import conditioning, contact, maneuver
-from antennate.hardware.esp32 import board, clock, decoder, frame, listener
+from antennate.hardware.esp32 import board, clock, decoder, frame
 from antennate.hardware.esp32.clock import DeviceClock, Verdict
 from antennate.hardware.esp32.wire import Reset
 from antennate.hardware.safety import diagnosis, touch_check
@@ -106,7 +106,7 @@ STREAM = [
             "at most 4095",
         ),
     ),
-    Guard("firmware", put(listener, "objections", constant(())), OLD_FIRMWARE),
+    Guard("firmware", put(board, "objections", constant(())), OLD_FIRMWARE),
     Guard(
         "age limit of readings",
         put(board.Board, "newest", lambda self, now: self.clock.newest),

@@ -257,7 +257,7 @@ def test_a_run_leaves_a_folder_that_explains_itself(capsys, tmp_path):
     assert main([*SMALL, "--seed", "5", "--out", "deep/run"]) == 0
     out, err = capsys.readouterr()
     assert err.endswith("written to deep/run\n")
-    assert "1 trials a controller, seed 5" in out
+    assert "1 trial a controller, seed 5" in out
     assert "A failure counts as the time limit, 1 s" in out
     assert max(map(len, out.splitlines())) <= 100
     run = tmp_path / "deep" / "run"

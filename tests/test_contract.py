@@ -127,7 +127,7 @@ def test_M7_time_of_a_board_follows_the_host_whatever_comes_and_never_goes_back(
         def newest(self, now: float) -> Timed | None:
             if now < 0.2 or rng.random() < 0.1:
                 return None
-            return Timed(EMPTY, self.epoch, 0, round(1e6 * self.taken), 0.0)
+            return Timed(EMPTY, self.epoch, 0, round(1e6 * self.taken), 0.0, 0.0)
 
     clock = Wandering(0, 0.01)
     body = HardwareRobot(Chance(), None, clock)  # type: ignore[arg-type]

@@ -16,8 +16,8 @@ from antennate.errors import BadInputError, OutputError
 from antennate.experiments.calibrate.recording import RecordingParams
 from antennate.experiments.calibrate.run import CalibrateConfig, run
 from antennate.hardware.esp32 import frame
+from antennate.hardware.esp32.board import Board
 from antennate.hardware.esp32.recorder import Recorder
-from antennate.hardware.esp32.stream import Stream
 from antennate.params import RecordParams
 
 
@@ -41,7 +41,7 @@ class Bench:
     def record(self, **settings: object) -> Recorder:
         clock = self.patient.clock
         recorder = Recorder(
-            Stream(self.patient.board, clock.now),
+            Board(self.patient.board),
             RecordParams.model_validate(settings),
             clock.now,
             self.ask,
@@ -146,9 +146,9 @@ def test_E8_readings_of_a_board_with_old_firmware_are_not_recorded(
 ) -> None:
     port = Pieces(hello() + b"".join(encoded(made(n)) for n in range(9)))
     monkeypatch.setattr(frame, "FIRMWARE", (99, 0, 0))
-    stream = Stream(port, lambda: 0.0)
-    assert stream.take(0.0) == []
-    assert "this host needs 99.0.0" in stream.refusals[0]
+    board = Board(port)
+    assert board.wait(0.0, lambda: 0.0) == []
+    assert "this host needs 99.0.0" in board.refusals[0]
 
 
 def test_a_file_is_never_overwritten_and_one_without_readings_is_not_left(tmp_path: Path) -> None:

@@ -21,9 +21,9 @@ from antennate.cli.progress import terminate_as_interrupt
 from antennate.cli.status import StatusLine
 from antennate.errors import BadInputError, ConfigError, OutputError
 from antennate.hardware.doctor.ports import opener_of
-from antennate.hardware.esp32.board import BOARD_BAUD
+from antennate.hardware.esp32.board import BOARD_BAUD, Board
+from antennate.hardware.esp32.clock import Timed
 from antennate.hardware.esp32.recorder import Recorder
-from antennate.hardware.esp32.stream import Reading, Stream
 from antennate.hardware.host_clock import HostClock
 from antennate.hardware.robot_file import RobotFile
 from antennate.params import RecordParams
@@ -60,16 +60,16 @@ def command(argv: Sequence[str]) -> int:
     key, now = key_of(orders), HostClock().now
     opener = opener_of(orders.esp32, "--esp32", key, params.network)
     with opener(BOARD_BAUD) as port:
-        stream = Stream(port, now)
-        status = Status(stream, params, now)
+        board = Board(port)
+        status = Status(board, params, now)
         with Lines(orders.out) as lines, terminate_as_interrupt():
-            recorder = Recorder(stream, params, now, ask(status), lines.write, status)
+            recorder = Recorder(board, params, now, ask(status), lines.write, status)
             then = "."
             try:
                 recorder.run()
                 then = f"; {_next(params, orders.out)}"
             finally:
-                lost = stream.clock.sequence.lost
+                lost = board.clock.sequence.lost
                 where = f"are in {orders.out}" if recorder.rows else "came, so there is no file"
                 status.close()
                 sys.stderr.write(f"{recorder.rows} readings {where}, {lost} were lost{then}\n")
@@ -115,13 +115,13 @@ class Lines:
 class Status:
     """One line on stderr now and then: readings, their noise, rate and losses."""
 
-    def __init__(self, stream: Stream, params: RecordParams, now: Callable[[], float]) -> None:
+    def __init__(self, board: Board, params: RecordParams, now: Callable[[], float]) -> None:
         self.said = ""
-        self._stream, self._params, self._now = stream, params, now
-        self._shown: deque[Reading] = deque(maxlen=_SHOWN)
+        self._board, self._params, self._now = board, params, now
+        self._shown: deque[Timed] = deque(maxlen=_SHOWN)
         self._status = StatusLine()
 
-    def __call__(self, reading: Reading) -> None:
+    def __call__(self, reading: Timed) -> None:
         """Take a reading; show the line if it is time."""
         self._shown.append(reading)
         if self._status.due(self._now()):
@@ -138,14 +138,14 @@ class Status:
 
     def line(self) -> str:
         """The line."""
-        span = self._shown[-1].now - self._shown[0].now
+        span = self._shown[-1].arrived - self._shown[0].arrived
         rate = (len(self._shown) - 1) / span if span > 0 else 0.0
         said = ["waiting for Enter" if self.said else "recording"]
         for side in ("left", "right"):
-            counts = [float(getattr(one.timed.sample, side)) for one in self._shown]
+            counts = [float(getattr(one.sample, side)) for one in self._shown]
             said.append(f"{side} {fmean(counts):6.1f} ± {pstdev(counts):4.1f}")
-        bytes_ = self._stream.decoder.counters
-        lost = self._stream.clock.sequence.lost
+        bytes_ = self._board.decoder.counters
+        lost = self._board.clock.sequence.lost
         return f"{'  '.join(said)}  {rate:5.1f} Hz  lost {lost}  crc {bytes_.crc_errors} "
 
 

@@ -140,7 +140,7 @@ def _antenna(
         wrong = Finding(str(error), "bad", "calibrate again, with another divider resistor")
         return [*found, _measured(f"{name} calibration", "leaves the rails free", wrong)]
     for reading, value in zip(board.readings, counts, strict=True):
-        channel.step(1e-6 * reading.timed.elapsed_us, value)
+        channel.step(1e-6 * reading.elapsed_us, value)
     shown = channel.reading.finding
     signal = Finding(
         f"{shown.value} ({middle:.0f} counts)",

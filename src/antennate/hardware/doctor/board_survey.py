@@ -10,9 +10,9 @@ import numpy as np
 
 from antennate.hardware.doctor.bus_survey import master
 from antennate.hardware.doctor.check import Opener
-from antennate.hardware.esp32.board import BOARD_BAUD
+from antennate.hardware.esp32.board import BOARD_BAUD, Board
+from antennate.hardware.esp32.clock import Timed
 from antennate.hardware.esp32.decoder import Counters
-from antennate.hardware.esp32.stream import Reading, Stream
 from antennate.hardware.esp32.wire import Hello
 from antennate.params import DoctorParams
 from antennate.robots.spec import RobotSpec
@@ -43,7 +43,7 @@ class BoardSurvey:
     refusals: list[str] = field(default_factory=list[str])
     text: str = ""
     received: int = 0
-    readings: list[Reading] = field(default_factory=list[Reading])
+    readings: list[Timed] = field(default_factory=list[Timed])
     lost: int = 0
     dropped: int = 0
     broken: int = 0
@@ -53,13 +53,13 @@ class BoardSurvey:
     @property
     def counts(self) -> Floats:
         """Readings of both antennae [counts], shape (n, 2)."""
-        pairs = [(r.timed.sample.left, r.timed.sample.right) for r in self.readings]
+        pairs = [(r.sample.left, r.sample.right) for r in self.readings]
         return np.array(pairs, float).reshape(-1, 2)
 
     @property
     def rate(self) -> float | None:
         """Samples per second as they arrived [Hz], None of fewer than two."""
-        span = self.readings[-1].now - self.readings[0].now if self.readings else 0.0
+        span = self.readings[-1].arrived - self.readings[0].arrived if self.readings else 0.0
         return (len(self.readings) - 1) / span if span > 0 else None
 
     def result(self) -> dict[str, Any]:
@@ -90,31 +90,31 @@ def survey_board(
     survey = BoardSurvey()
     with opener(BOARD_BAUD) as port:
         port.drain()
-        stream = Stream(port, now)
+        board = Board(port)
         end = now() + params.greeting
-        while (stream.hello is None or stream.clock.newest is None) and now() < end:
-            stream.take(_PATIENCE)
-        if stream.hello is not None:
-            _read(stream, survey, params.listen, now)
-        survey.hello, survey.refusals = stream.hello, stream.refusals
-        survey.text, survey.received = stream.decoder.take_text(), stream.decoder.counters.received
+        while (board.hello is None or board.clock.newest is None) and now() < end:
+            board.wait(_PATIENCE, now)
+        if board.hello is not None:
+            _read(board, survey, params.listen, now)
+        survey.hello, survey.refusals = board.hello, board.refusals
+        survey.text, survey.received = board.decoder.take_text(), board.decoder.counters.received
     if survey.hello is None and not survey.refusals:
         with opener(robot.baud) as port:
             survey.servos = bool(master(port, robot.baud, now).scan())
     return survey
 
 
-def _read(stream: Stream, survey: BoardSurvey, seconds: float, now: Callable[[], float]) -> None:
-    counters, clock = stream.decoder.counters, stream.clock
+def _read(board: Board, survey: BoardSurvey, seconds: float, now: Callable[[], float]) -> None:
+    counters, clock = board.decoder.counters, board.clock
     broken, boots, lost = _broken(counters), clock.resets, clock.sequence.lost
     end = now() + seconds
     while now() < end:
-        survey.readings += stream.take(_PATIENCE)
+        survey.readings += board.wait(_PATIENCE, now)
     survey.boots = clock.resets - boots
     survey.lost = clock.sequence.lost - (0 if survey.boots else lost)
     survey.broken = _broken(counters) - broken
     if survey.readings and not survey.boots:
-        first, last = survey.readings[0].timed.sample, survey.readings[-1].timed.sample
+        first, last = survey.readings[0].sample, survey.readings[-1].sample
         survey.dropped = (last.drops - first.drops) % (1 << 16)
 
 

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 from antennate.hardware.actuators import ActuatorError
 from antennate.hardware.dynamixel import inquiry
@@ -38,48 +37,27 @@ class BringUpError(ActuatorError):
     """The servos are not fit to be moved; says which and why."""
 
 
-@dataclass(frozen=True, slots=True)
-class Found:
-    """One id on the bus.
+def require(bus: Bus, expected: Mapping[int, int]) -> None:
+    """Whether there is on the bus what is expected, and nothing else; asks nobody to move.
 
-    Attributes:
-        servo: The id.
-        model: Model number, None if it does not answer.
-        firmware: Firmware version, None if it does not answer.
-        verdict: "ok", or what is wrong with it.
-    """
-
-    servo: int
-    model: int | None
-    firmware: int | None
-    verdict: str
-
-
-def inventory(bus: Bus, expected: Mapping[int, int]) -> list[Found]:
-    """What is on the bus, next to the model numbers expected by id; asks nobody to move."""
-    table = [_look(bus, servo, model) for servo, model in expected.items()]
-    strangers = {status.id: status.data for status in bus.scan() if status.id not in expected}
-    for servo, data in sorted(strangers.items()):
-        table.append(Found(servo, *inquiry.model_of(data), "not expected"))
-    return table
-
-
-def require(bus: Bus, expected: Mapping[int, int]) -> list[Found]:
-    """The inventory, if all of it is as expected.
+    Args:
+        bus: The bus.
+        expected: Model numbers by id.
 
     Raises:
         BringUpError: Otherwise; the text says each id that is not, and why.
     """
-    table = inventory(bus, expected)
+    verdicts = {i: _verdict(inquiry.look(bus, i), model) for i, model in expected.items()}
+    strangers = {status.id for status in bus.scan()} - verdicts.keys()
+    verdicts |= dict.fromkeys(sorted(strangers), "not expected")
     wrong: dict[str, list[int]] = {}
-    for row in table:
-        if row.verdict != "ok":
-            wrong.setdefault(row.verdict, []).append(row.servo)
+    for servo, verdict in verdicts.items():
+        if verdict != "ok":
+            wrong.setdefault(verdict, []).append(servo)
     if wrong:
-        fit = len(table) - sum(map(len, wrong.values()))
+        fit = len(verdicts) - sum(map(len, wrong.values()))
         said = "; ".join(f"{_named(ids, len(expected))}: {why}" for why, ids in wrong.items())
         raise BringUpError(f"expected {len(expected)} servos, found {fit} fit; {said}")
-    return table
 
 
 def _named(ids: Sequence[int], count: int) -> str:
@@ -203,14 +181,10 @@ def _write_checked(bus: Bus, register: Register, values: Mapping[int, int]) -> N
         raise BringUpError(f"could not write {register.name}, servos still have {wrong}")
 
 
-def _look(bus: Bus, servo: int, model: int) -> Found:
-    found = inquiry.look(bus, servo)
+def _verdict(found: Present | None, model: int) -> str:
+    """What is wrong with a servo, or that it is "ok"."""
     if found is None:
-        return Found(servo, None, None, "silent")
-    return Found(servo, found.model, found.firmware, _verdict(found, model))
-
-
-def _verdict(found: Present, model: int) -> str:
+        return "silent"
     if found.model not in (None, model):
         name = TABLES[model].name if model in TABLES else str(model)
         return f"expected model {name}, found number {found.model}"

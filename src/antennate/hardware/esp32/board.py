@@ -1,14 +1,16 @@
-"""The antenna board behind its port, for a loop that never waits: its newest reading."""
+"""The antenna board behind its port: bytes in, its usable samples out, never another board's."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 
-from antennate.hardware.esp32.clock import Timed
+from antennate.hardware.esp32.clock import DeviceClock, Timed, Verdict
+from antennate.hardware.esp32.decoder import FrameDecoder
 from antennate.hardware.esp32.frame import SAMPLE_FRAME_SIZE, encode_request
-from antennate.hardware.esp32.listener import CHUNK, Listener
+from antennate.hardware.esp32.wire import Hello, Sample, objections
 from antennate.hardware.ports.port import Port, PortError
 from antennate.types import Floats
 
@@ -16,24 +18,39 @@ BOARD_BAUD = 115_200
 """Bits per second of the board's port: MicroPython on an ESP32, UART 0."""
 KEPT = 64 * SAMPLE_FRAME_SIZE
 """Most bytes of a backlog that are looked at: 0.64 s; what is older is not acted upon (assumed)."""
+CHUNK = 4096
+"""Most bytes that are read from a port at once."""
+_REFUSALS = 8
 _CHUNKS = 64
 """Most chunks read at once: more than Linux keeps for a line."""
 
 
-class Board(Listener):
-    """Reads what has come from a board. If its port is gone, it is merely silent.
+class Board:
+    """Reads what has come from a board, always the one that greeted first.
+
+    A loop that never waits calls `poll`, and a port that is gone is merely silent there; `wait` is
+    for measuring, which needs every sample.
 
     Args:
         port: Its wire.
-        age_limit: Readings older than this are not to be acted upon [s].
+        age_limit: Readings older than this are not to be acted upon [s]; not used by `wait`.
 
     Attributes:
+        decoder: With the counters of its bytes.
+        clock: With the verdicts on its samples.
+        hello: The newest greeting, None before the first; of a board that is refused no sample is
+            ever used.
+        refusals: Why boards or frames were refused: each reason once, newest last, at most 8.
         skipped: Bytes of backlogs that were not looked at.
         trouble: What is wrong with its port, empty if nothing is.
     """
 
-    def __init__(self, port: Port, age_limit: float) -> None:
-        super().__init__()
+    def __init__(self, port: Port, age_limit: float = math.inf) -> None:
+        self.decoder = FrameDecoder()
+        self.clock = DeviceClock()
+        self.hello: Hello | None = None
+        self.refusals: list[str] = []
+        self._first: Hello | None = None
         self.skipped = 0
         self.trouble = ""
         self._port = port
@@ -52,7 +69,16 @@ class Board(Listener):
 
     def poll(self, now: float) -> int:
         """Take the newest of what has come by now [s]; how many usable samples that were."""
-        return len(self.hear(self._read(), now))
+        return len(self._hear(self._read(), now))
+
+    def wait(self, timeout: float, clock: Callable[[], float]) -> list[Timed]:
+        """Usable samples that have come, or come within `timeout` [s]; `clock` tells the time [s].
+
+        Raises:
+            PortError: The port is gone.
+        """
+        data = self._port.read(CHUNK, timeout)
+        return self._hear(data, clock())
 
     def _read(self) -> bytes:
         """What has come, of a backlog the end; a board that is back is asked to greet."""
@@ -75,6 +101,42 @@ class Board(Listener):
     def newest(self, now: float) -> Timed | None:
         """The newest usable sample, or None if it is too old or its age is not known."""
         return self.clock.newest if self.clock.age(now) <= self._limit else None
+
+    def _hear(self, data: bytes, now: float) -> list[Timed]:
+        """Usable samples in bytes that have come by now [s]."""
+        used: list[Timed] = []
+        for frame in self.decoder.feed(data):
+            if isinstance(frame, Hello):
+                self._greet(frame)
+            elif not isinstance(frame, Sample):
+                self._refuse(frame.reason)
+            elif self.clock.take(frame, now) is Verdict.USED and self.clock.newest is not None:
+                used.append(self.clock.newest)
+        return used
+
+    def _greet(self, hello: Hello) -> None:
+        self.hello = hello
+        if reasons := self._objections(hello):
+            self._refuse(*reasons)
+            return
+        self._first = self._first or hello
+        self.clock.greet(hello)
+
+    def _refuse(self, *reasons: str) -> None:
+        others = [reason for reason in self.refusals if reason not in reasons]
+        self.refusals = [*others, *reasons][-_REFUSALS:]
+
+    def _objections(self, hello: Hello) -> tuple[str, ...]:
+        """What speaks against a board, also that it is not the one that greeted first."""
+        first = self._first
+        if first is None:
+            return objections(hello)
+        if hello.device_id != first.device_id:
+            return (
+                f"expected the board {first.device_id} that greeted first, found another one, "
+                f"{hello.device_id}; begin anew with it",
+            )
+        return objections(hello, first.config_hash)
 
 
 def counts_of(timed: Timed | None) -> Floats:

@@ -99,6 +99,7 @@ class Timed:
         seq: Its number, unwrapped.
         elapsed_us: The board's time since the epoch began [us], unwrapped.
         t: Host's time at which it was taken [s], as known when it arrived.
+        arrived: Host's time at which it arrived [s].
     """
 
     sample: Sample
@@ -106,6 +107,7 @@ class Timed:
     seq: int
     elapsed_us: int
     t: float
+    arrived: float
 
 
 class DeviceClock:
@@ -240,7 +242,7 @@ class DeviceClock:
             self._settle(now)
         self._doubts = 0
         t = self._floor + 1e-6 * elapsed_us
-        self.newest = Timed(sample, self.epoch, self._number(), elapsed_us, t)
+        self.newest = Timed(sample, self.epoch, self._number(), elapsed_us, t, now)
 
     def _settle(self, now: float) -> None:
         """Believe ages once the lowest difference has stopped falling."""

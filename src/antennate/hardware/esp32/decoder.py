@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 from binascii import crc32
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 from antennate.hardware.esp32 import frame
 from antennate.hardware.esp32.wire import Frame, Refused, parse
@@ -69,16 +69,8 @@ class Counters:
     @property
     def accounted(self) -> int:
         """Bytes whose fate is known."""
-        return (
-            self.delimiters
-            + self.good_bytes
-            + self.refused_bytes
-            + self.crc_bytes
-            + self.cobs_bytes
-            + self.oversize_bytes
-            + self.noise_bytes
-            + self.text_bytes
-        )
+        of_pieces = (getattr(self, each.name) for each in fields(self) if "_bytes" in each.name)
+        return self.delimiters + sum(of_pieces)
 
 
 class FrameDecoder:

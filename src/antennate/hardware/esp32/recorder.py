@@ -10,7 +10,8 @@ from collections.abc import Callable, Iterator
 from typing import TypeAlias
 
 from antennate.errors import BadInputError
-from antennate.hardware.esp32.stream import Reading, Stream
+from antennate.hardware.esp32.board import Board
+from antennate.hardware.esp32.clock import Timed
 from antennate.params import DoctorParams, NetworkParams, RecordParams
 
 Ask: TypeAlias = Callable[[str], Callable[[], bool]]
@@ -33,7 +34,7 @@ class Recorder:
     """Rows of one recording.
 
     Args:
-        stream: The board's readings.
+        board: The board.
         params: What to record.
         now: Monotonic time [s].
         ask: Asks for a mark or a push.
@@ -46,17 +47,17 @@ class Recorder:
 
     def __init__(
         self,
-        stream: Stream,
+        board: Board,
         params: RecordParams,
         now: Callable[[], float],
         ask: Ask,
         write: Callable[[str], None],
-        on_reading: Callable[[Reading], None] = lambda reading: None,
+        on_reading: Callable[[Timed], None] = lambda reading: None,
     ) -> None:
         self.rows = 0
-        self._stream, self._params, self._now = stream, params, now
+        self._board, self._params, self._now = board, params, now
         self._ask, self._write, self._on_reading = ask, write, on_reading
-        self._last: tuple[Reading, float] | None = None
+        self._last: tuple[Timed, float] | None = None
 
     def run(self) -> None:
         """Write the header, then all rows.
@@ -98,15 +99,15 @@ class Recorder:
     def _free(self) -> None:
         self._write("time,left,right")
         for reading, t in self._for(self._params.duration or math.inf):
-            sample = reading.timed.sample
+            sample = reading.sample
             self._row(f"{t:.6f},{sample.left},{sample.right}")
 
     def _row(self, line: str) -> None:
         self._write(line)
         self.rows += 1
 
-    def _counts(self, reading: Reading) -> int:
-        sample = reading.timed.sample
+    def _counts(self, reading: Timed) -> int:
+        sample = reading.sample
         return sample.left if self._params.side == "left" else sample.right
 
     def _wait(self, text: str) -> None:
@@ -116,7 +117,7 @@ class Recorder:
             if confirmed():
                 return
 
-    def _for(self, seconds: float) -> Iterator[tuple[Reading, float]]:
+    def _for(self, seconds: float) -> Iterator[tuple[Timed, float]]:
         """Readings of the next so many seconds of the board."""
         begin = math.nan
         for reading, t in self._readings():
@@ -125,31 +126,31 @@ class Recorder:
                 return
             yield reading, t
 
-    def _readings(self) -> Iterator[tuple[Reading, float]]:
+    def _readings(self) -> Iterator[tuple[Timed, float]]:
         """All readings from now on, each with its time since the first of all [s]."""
         heard = self._now()
         while True:
-            for reading in self._stream.take(_PATIENCE):
-                heard = reading.now
+            for reading in self._board.wait(_PATIENCE, self._now):
+                heard = reading.arrived
                 self._last = (reading, self._time(reading))
                 self._on_reading(reading)
                 yield self._last
             if self._now() - heard > SILENCE:
                 raise BadInputError(self._silent())
 
-    def _time(self, reading: Reading) -> float:
+    def _time(self, reading: Timed) -> float:
         if self._last is None:
             return 0.0
         last, t = self._last
-        if reading.timed.epoch != last.timed.epoch:
-            return t + max(reading.now - last.now, 1e-6)
-        return t + 1e-6 * (reading.timed.elapsed_us - last.timed.elapsed_us)
+        if reading.epoch != last.epoch:
+            return t + max(reading.arrived - last.arrived, 1e-6)
+        return t + 1e-6 * (reading.elapsed_us - last.elapsed_us)
 
     def _silent(self) -> str:
-        came = self._stream.decoder.counters
+        came = self._board.decoder.counters
         why = (
-            self._stream.refusals[-1]
-            if self._stream.refusals
+            self._board.refusals[-1]
+            if self._board.refusals
             else f"{came.received} bytes and {came.good} frames in all"
         )
         return (
