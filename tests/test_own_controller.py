@@ -77,7 +77,7 @@ def test_an_installed_package_can_bring_a_controller(monkeypatch: pytest.MonkeyP
         ("clsoed", r"expected one of open, paper, closed, .*did you mean closed\?"),
         ("missing.py:Mine", "no file"),
         ("no_such_module:Mine", "No module named 'no_such_module'"),
-        ("antennate.control.controllers:Nobody", "no attribute 'Nobody'"),
+        ("antennate.control.controllers:Nobody", "no Nobody in antennate.control.controllers$"),
         ("math:pi", "expected a class or a function at 'math:pi', found float"),
         ("math:sqrt", "made from .control, robot, batch."),
         ("builtins:max", "made from .control, robot, batch.|without reset"),
@@ -220,3 +220,23 @@ def test_a_controller_that_fails_makes_its_trial_invalid_and_no_other(
     for mine, theirs in zip(found, sound, strict=True):
         if mine.trial != 1:
             assert (mine.progress_m, mine.force_mean_n) == (theirs.progress_m, theirs.force_mean_n)
+
+
+def test_a_failing_controller_is_named_by_its_path_and_its_invalid_trials_are_told(
+    capsys, tmp_path
+):
+    (tmp_path / "my_file.py").write_text(
+        "from antennate.control.controllers import open_loop\n"
+        "def Fails(control, robot, batch):\n"
+        "    made = open_loop(control, robot, batch)\n"
+        "    made.step = lambda frame: 1 / 0\n"
+        "    return made\n"
+    )
+    name = f"{tmp_path / 'my_file.py'}:Fails"
+    argv = ["tunnel", "--trials", "1", "--workers", "1", "--time-limit", "0.2", "--no-figures"]
+    assert main([*argv, "--controllers", name, "--out", str(tmp_path / "run")]) == 0
+    out = capsys.readouterr().out
+    assert "my_file.py" in out.replace("\n", "")
+    assert "my file" not in out
+    assert out.endswith("Invalid trials: 1; trials.csv gives the reason of each.\n")
+    assert "ZeroDivisionError" in (tmp_path / "run" / "trials.csv").read_text()

@@ -13,9 +13,9 @@ from antennate.errors import SimulationError
 from antennate.experiments.sweep import estimates, reach
 from antennate.experiments.sweep import run as sweep
 from antennate.experiments.sweep import scan as sweeping
+from antennate.experiments.sweep.config import SweepConfig
 from antennate.params import (
     BenchPhysicsParams,
-    ConditioningParams,
     EstimateParams,
     ShapeParams,
     SweepParams,
@@ -26,7 +26,7 @@ from antennate.sim.bench import Bench
 
 ANTENNA, SENSOR, SHAPE = AntennaSpec(), SensorParams(), ShapeParams()
 SWEEP = SweepParams()
-SMALL = sweep.SweepConfig(
+SMALL = SweepConfig(
     profiles=("descending",),
     distances=(0.6,),
     centres=(math.radians(47),),
@@ -175,16 +175,7 @@ FORGETFUL = SENSOR.model_copy(update={"hysteresis": 0.0, "creep": (0.0, 0.0)})
 
 def setting(frequency=2.0, sensor=SENSOR):
     antenna = ANTENNA.model_copy(update={"sensor": sensor})
-    return estimates.Setting(
-        0,
-        EstimateParams(),
-        SweepParams(frequency=frequency),
-        SHAPE,
-        ConditioningParams(),
-        antenna,
-        BenchPhysicsParams(),
-        0.05,
-    )
+    return SweepConfig(sweep=SweepParams(frequency=frequency), shape=SHAPE, antenna=antenna)
 
 
 def test_flex_and_base_angle_tell_a_distance_and_flex_alone_needs_a_known_sweep():
@@ -250,7 +241,7 @@ def test_result_does_not_depend_on_workers():
 )
 def test_what_cannot_be_run_is_refused(values, message):
     with pytest.raises(ValidationError, match=message):
-        sweep.SweepConfig(**values)
+        SweepConfig(**values)
 
 
 def test_command_writes_its_run(capsys, tmp_path, monkeypatch):

@@ -25,6 +25,20 @@ def read_limited(path: Path, largest: int, error: type[BadInputError] = BadInput
     return data
 
 
+def decoded(path: Path, data: bytes, error: type[BadInputError] = BadInputError) -> str:
+    """The text of a file, with or without a byte order mark.
+
+    Raises:
+        BadInputError: Of the given type: it is not UTF-8.
+    """
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError as cause:
+        raise error(
+            f"{path}: expected UTF-8 text, found byte {data[cause.start]:#04x} at {cause.start}"
+        ) from None
+
+
 def write_whole(path: Path, data: bytes, overwrite: bool = False) -> None:
     """Write a file so that a crash at any moment leaves either all of it or nothing.
 

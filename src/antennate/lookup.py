@@ -103,8 +103,12 @@ class Registry(Generic[T]):
             return point.load()
         place, _, attribute = name.rpartition(":")
         if place.endswith(".py"):
-            return getattr(_module_of(Path(place)), attribute)
-        return getattr(importlib.import_module(place), attribute)
+            module = _module_of(Path(place))
+        else:
+            module = importlib.import_module(place)
+        if not hasattr(module, attribute):
+            raise ConfigError(f"no {attribute} in {place}")
+        return getattr(module, attribute)
 
 
 def _module_of(path: Path) -> ModuleType:

@@ -13,7 +13,7 @@ number = shown
 
 
 def print_table(table: Table) -> None:
-    """Print a table and its note; names of columns break at underscores, shown as spaces."""
+    """Print a table and its note; underscores of a name are shown as spaces, of a path not."""
     from rich.box import SIMPLE_HEAD  # slow to import
     from rich.console import Console
     from rich.table import Table as Drawn
@@ -22,7 +22,8 @@ def print_table(table: Table) -> None:
     drawn = Drawn(title=table.title, title_justify="left", box=SIMPLE_HEAD, pad_edge=False)
     drawn.add_column("", overflow="fold")
     for name in table.columns:
-        drawn.add_column(Text(name.replace("_", " ")), justify="right", overflow="fold")
+        heading = name if ":" in name else name.replace("_", " ")
+        drawn.add_column(Text(heading), justify="right", overflow="fold")
     for name, cells in table.rows:
         drawn.add_row(Text(name), *(Text(cell) for cell in cells))
     console = Console(file=sys.stdout, highlight=False)

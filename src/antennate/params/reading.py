@@ -12,6 +12,7 @@ from typing import Any, TypeVar, Union, cast, get_args, get_origin
 from pydantic import BaseModel, ValidationError
 
 from antennate.errors import ConfigError
+from antennate.files import decoded, read_limited
 from antennate.messages import nearest, one_line, shown
 from antennate.params.base import Params
 
@@ -47,7 +48,7 @@ _KINDS = {
 """What pydantic's families of error types ask for, by the first word of the type."""
 
 
-def read_file(path: Path, model: type[Config], flag: str = "--config") -> Config:
+def read_file(path: Path, model: type[Config]) -> Config:
     """A configuration from a TOML file with the model's keys.
 
     Where the model has a group of which some are known by name, such as a robot, the file may hold
@@ -57,12 +58,11 @@ def read_file(path: Path, model: type[Config], flag: str = "--config") -> Config
     Args:
         path: The file.
         model: What it holds.
-        flag: Who named the file, for errors.
 
     Raises:
         ConfigError: The file cannot be read, is no TOML, or holds what the model refuses.
     """
-    table = with_bases(_table_of(path, flag), model, path.parent)
+    table = with_bases(_table_of(path), model, path.parent)
     try:
         return model.model_validate_json(json.dumps(table, default=str), strict=True)
     except ValidationError as error:
@@ -71,28 +71,15 @@ def read_file(path: Path, model: type[Config], flag: str = "--config") -> Config
         raise ConfigError(f"{path}: expected plain tables, found them nested too deeply") from None
 
 
-def _table_of(path: Path, flag: str) -> dict[str, Any]:
+def _table_of(path: Path) -> dict[str, Any]:
+    text = decoded(path, read_limited(path, LARGEST_FILE, ConfigError), ConfigError)
     try:
-        with path.open("rb") as file:
-            content = file.read(LARGEST_FILE + 1)
-    except OSError as error:
-        raise ConfigError(
-            f"{flag}: expected a readable file, found {path}: {error.strerror}"
-        ) from None
-    if len(content) > LARGEST_FILE:
-        raise ConfigError(f"{path}: expected at most {LARGEST_FILE} bytes, found more")
-    try:
-        text = content.decode("utf-8")
         for number, line in enumerate(text.splitlines(), 1):
             if line.count(".") > _MOST_DOTS:
                 raise ConfigError(
                     f"{path}: line {number}: expected at most {_MOST_DOTS} dots, found more"
                 )
         return tomllib.loads(text)
-    except UnicodeDecodeError as error:
-        raise ConfigError(
-            f"{path}: expected UTF-8 text, found byte {content[error.start]:#04x} at {error.start}"
-        ) from None
     except tomllib.TOMLDecodeError as error:
         raise ConfigError(f"{path}: expected TOML, found: {error}") from None
     except RecursionError:

@@ -149,7 +149,7 @@ class RobotSpec(Params):
                 f"--robot: expected {known} or a TOML file{nearest(str(text), ROBOTS)}, found "
                 f"{shown(str(text))}"
             )
-        return read_file(path, cls, "--robot")
+        return read_file(path, cls)
 
     @property
     def yaw_count(self) -> int:

@@ -19,7 +19,15 @@ if TYPE_CHECKING:
 OnStep = Callable[[int, int], None]
 """Takes how many of how many parts are done."""
 OnRow = Callable[[Any], None]
-"""Takes a finished row, a dataclass."""
+"""Takes a finished row, a dataclass; rows come in no particular order."""
+
+
+def no_step(done: int, total: int) -> None:
+    """Tell nobody."""
+
+
+def no_row(row: Any) -> None:
+    """Keep nothing."""
 
 
 class Outcome(Protocol):
@@ -56,7 +64,8 @@ class Experiment(Generic[Config, Found]):
         name: Name of the command.
         description: What `--help` says; its first sentence is the summary in the list of commands.
         config: Its configuration.
-        run: run(config, workers, on_step, on_row) -> outcome.
+        run: run(config, workers, on_step, on_row) -> outcome, which does not depend on the number
+            of worker processes.
         tables: Tables of a result.
         sentence: One plain sentence: what came out, and how sure it is.
         figures: Figures of an outcome by name.

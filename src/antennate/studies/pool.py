@@ -89,6 +89,29 @@ def run_tasks(
         pool.shutdown(cancel_futures=True)
 
 
+def gather(
+    function: Callable[[Task, Emit], None],
+    tasks: Sequence[Task],
+    workers: int,
+    on_step: Callable[[int, int], None],
+    on_result: Emit = lambda result: None,
+    total: int | None = None,
+) -> list[Any]:
+    """All that `run_tasks` hands on, in the order in which it came.
+
+    After each result, `on_step` hears how many of `total` are done; by default every task has one.
+    """
+    found: list[Any] = []
+
+    def take(result: Any) -> None:
+        found.append(result)
+        on_result(result)
+        on_step(len(found), len(tasks) if total is None else total)
+
+    run_tasks(function, tasks, workers, take)
+    return found
+
+
 def _collect(futures: Sequence[Future[int]], results: Any, on_result: Emit) -> None:
     """Hand on results until all tasks have ended and all that they emitted has arrived."""
     waiting, expected, received = set(futures), 0, 0

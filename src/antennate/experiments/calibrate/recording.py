@@ -14,6 +14,7 @@ import numpy as np
 
 from antennate.antenna.fitting import Samples
 from antennate.errors import CalibrationError
+from antennate.files import decoded, read_limited
 from antennate.params import Params
 from antennate.params.base import number
 from antennate.types import Floats, Ints
@@ -86,15 +87,7 @@ def read(path: Path, params: RecordingParams) -> Recording:
 
 
 def _bytes(path: Path) -> bytes:
-    try:
-        with path.open("rb") as file:
-            data = file.read(_LARGEST_FILE + 1)
-    except OSError as error:
-        raise CalibrationError(
-            f"--recording: expected a readable file, found {path}: {error.strerror}"
-        ) from None
-    if len(data) > _LARGEST_FILE:
-        raise CalibrationError(f"{path}: expected at most {_LARGEST_FILE} bytes, found more")
+    data = read_limited(path, _LARGEST_FILE, CalibrationError)
     if not data.endswith((b"\n", b"\r")):
         last = data.count(b"\n") + 1
         raise CalibrationError(
@@ -105,13 +98,7 @@ def _bytes(path: Path) -> bytes:
 
 
 def _rows(path: Path, data: bytes, params: RecordingParams) -> list[tuple[int, list[float]]]:
-    try:
-        text = data.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise CalibrationError(
-            f"{path}: expected UTF-8 text, found byte {data[error.start]:#04x} at {error.start}"
-        ) from None
-    reader = csv.reader(io.StringIO(text))
+    reader = csv.reader(io.StringIO(decoded(path, data, CalibrationError)))
     header = [name.strip() for name in next(reader, [])]
     places = _places(path, header, params)
     try:

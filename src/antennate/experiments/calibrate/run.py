@@ -25,8 +25,8 @@ from antennate.params import BenchPhysicsParams, BenchVariationParams, Params
 from antennate.params.base import number
 from antennate.robots.antenna import AntennaSpec
 from antennate.sim.bench import Bench, compile_bench
-from antennate.studies.experiment import WithoutTrials
-from antennate.studies.pool import run_tasks
+from antennate.studies.experiment import OnStep, WithoutTrials, no_step
+from antennate.studies.pool import gather
 from antennate.types import Floats
 
 _Speed = Annotated[float, Field(gt=0, le=1)]
@@ -232,7 +232,7 @@ def _run_task(task: tuple[CalibrateConfig, int], emit: Callable[[Any], None]) ->
 def record(
     config: CalibrateConfig,
     workers: int = 1,
-    on_step: Callable[[int, int], None] = lambda done, total: None,
+    on_step: OnStep = no_step,
 ) -> Recording:
     """All pushes of the rig, as one recording.
 
@@ -240,13 +240,7 @@ def record(
         SimulationError: The physics became invalid; from a worker it comes as a WorkerError.
     """
     tasks = [(config, trial) for trial in range(len(config.rig.speeds) * config.rig.pushes)]
-    found: dict[int, Recording] = {}
-
-    def take(item: tuple[int, Recording]) -> None:
-        found[item[0]] = item[1]
-        on_step(len(found), len(tasks))
-
-    run_tasks(_run_task, tasks, workers, take)
+    found = dict(gather(_run_task, tasks, workers, on_step))
     parts = [found[trial] for trial in sorted(found)]
     fields = ("counts", "level", "trial", "speed", "row")
     joined = [np.concatenate([getattr(p.samples, f) for p in parts]) for f in fields]
@@ -279,7 +273,7 @@ def levels(outcome: CalibrateOutcome) -> Floats:
 def run(
     config: CalibrateConfig,
     workers: int = 1,
-    on_step: Callable[[int, int], None] = lambda done, total: None,
+    on_step: OnStep = no_step,
 ) -> CalibrateOutcome:
     """Calibrate from the recording, or from the rig if there is none.
 

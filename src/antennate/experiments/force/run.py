@@ -25,7 +25,8 @@ from antennate.experiments.force.loads import (
 )
 from antennate.experiments.force.post_traverse import Traverse, drag
 from antennate.robots.antenna import AntennaSpec
-from antennate.studies.pool import run_tasks
+from antennate.studies.experiment import OnRow, OnStep, no_row, no_step
+from antennate.studies.pool import gather
 from antennate.studies.regression import by_group, explained
 from antennate.types import Floats, Ints
 
@@ -116,12 +117,6 @@ def _judge_all(points: Points, config: ForceConfig, largest: float) -> dict[str,
         name: {s: score(points, s, config.from_place, bins, largest) for s in SCALARS}
         for name, bins in known.items()
     }
-
-
-@dataclass(frozen=True, slots=True)
-class _Task:
-    config: ForceConfig
-    profile: str
 
 
 def study_profile(config: ForceConfig, profile: str) -> ProfileOutcome:
@@ -216,34 +211,26 @@ def closed_form(chain: Chain, points: Points, config: ForceConfig, largest: floa
     return (1.0 - share) * table[below, each] + share * table[below + 1, each]
 
 
-def _run_task(task: _Task, emit: Callable[[ProfileOutcome], None]) -> None:
-    emit(study_profile(task.config, task.profile))
+def _run_task(task: tuple[ForceConfig, str], emit: Callable[[ProfileOutcome], None]) -> None:
+    emit(study_profile(*task))
 
 
 def run(
     config: ForceConfig,
     workers: int = 1,
-    on_step: Callable[[int, int], None] = lambda done, total: None,
-    on_row: Callable[[TraverseRow], None] = lambda row: None,
+    on_step: OnStep = no_step,
+    on_row: OnRow = no_row,
 ) -> ForceOutcome:
     """Study every profile.
-
-    Args:
-        config: What to run.
-        workers: Processes to use; the outcome does not depend on it.
-        on_step: Called after every profile with how many of how many are done.
-        on_row: Called with every traverse.
 
     Raises:
         WorkerError: A worker process died.
     """
-    found: dict[str, ProfileOutcome] = {}
 
-    def take(outcome: ProfileOutcome) -> None:
-        found[outcome.profile] = outcome
+    def keep(outcome: ProfileOutcome) -> None:
         for row in outcome.rows:
             on_row(row)
-        on_step(len(found), len(config.profiles))
 
-    run_tasks(_run_task, [_Task(config, profile) for profile in config.profiles], workers, take)
-    return ForceOutcome(config, [found[profile] for profile in config.profiles])
+    tasks = [(config, profile) for profile in config.profiles]
+    found = gather(_run_task, tasks, workers, on_step, keep)
+    return ForceOutcome(config, sorted(found, key=lambda o: config.profiles.index(o.profile)))

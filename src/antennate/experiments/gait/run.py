@@ -24,8 +24,8 @@ from antennate.sim.scenes.flat import FlatScene
 from antennate.sim.sim_robot import Disturbance, SimRobot
 from antennate.sim.trial import make_world, place_at_start
 from antennate.sim.world import World
-from antennate.studies.experiment import WithoutTrials
-from antennate.studies.pool import run_tasks
+from antennate.studies.experiment import OnStep, WithoutTrials, no_step
+from antennate.studies.pool import gather
 from antennate.types import AntennaFrame, Floats, JointCommand, Maneuver
 
 SCHEMA = 1
@@ -146,16 +146,11 @@ class _Fixed:
         return self._gait.step(self._maneuver)
 
 
-@dataclass(frozen=True, slots=True)
-class _Task:
-    config: GaitStudyConfig
-    name: str
-    gait: GaitParams
-    maneuver: Maneuver = Maneuver.FORWARD
+_Task = tuple[GaitStudyConfig, str, GaitParams, Maneuver]
 
 
 def _run_task(task: _Task, emit: Callable[[Walk], None]) -> None:
-    emit(walk_flat(task.config, task.name, task.gait, task.maneuver))
+    emit(walk_flat(*task))
 
 
 def walk_flat(config: GaitStudyConfig, name: str, gait: GaitParams, maneuver: Maneuver) -> Walk:
@@ -213,12 +208,14 @@ def _positive_power(world: World) -> float:
 
 def _tasks(config: GaitStudyConfig) -> list[_Task]:
     gait = config.gait
-    tasks = [_Task(config, m.name.lower(), gait, m) for m in MANEUVERS]
-    tasks.append(_Task(config, WAVE_OFF, _changed(gait, amplitude=0.0)))
+    forward = {WAVE_OFF: _changed(gait, amplitude=0.0)}
     for i in range(config.sweep_points):
         lead = 2.0 * math.pi * i / config.sweep_points
-        tasks.append(_Task(config, f"sweep{i}", _changed(gait, body_phase=lead)))
-    return tasks
+        forward[f"sweep{i}"] = _changed(gait, body_phase=lead)
+    return [
+        *((config, m.name.lower(), gait, m) for m in MANEUVERS),
+        *((config, name, changed, Maneuver.FORWARD) for name, changed in forward.items()),
+    ]
 
 
 def _changed(gait: GaitParams, **values: float) -> GaitParams:
@@ -228,26 +225,14 @@ def _changed(gait: GaitParams, **values: float) -> GaitParams:
 def run(
     config: GaitStudyConfig,
     workers: int = 1,
-    on_step: Callable[[int, int], None] = lambda done, total: None,
+    on_step: OnStep = no_step,
 ) -> GaitOutcome:
     """Walk all maneuvers, the one without body wave, and the sweep.
-
-    Args:
-        config: What to run.
-        workers: Processes to use; the outcome does not depend on it.
-        on_step: Called after every walk with how many of how many are done.
 
     Raises:
         SimulationError: The physics became invalid; from a worker it comes as a WorkerError.
     """
-    tasks = _tasks(config)
-    found: dict[str, Walk] = {}
-
-    def take(walk: Walk) -> None:
-        found[walk.name] = walk
-        on_step(len(found), len(tasks))
-
-    run_tasks(_run_task, tasks, workers, take)
+    found = {w.name: w for w in gather(_run_task, _tasks(config), workers, on_step)}
     return GaitOutcome(
         config=config,
         maneuvers={m.name.lower(): found[m.name.lower()] for m in MANEUVERS},

@@ -14,6 +14,8 @@ from typing import Any
 
 import numpy as np
 
+from antennate.antenna.statics import with_profile
+from antennate.experiments.sweep.config import SweepConfig
 from antennate.experiments.sweep.reach import (
     Felt,
     Statics,
@@ -23,14 +25,7 @@ from antennate.experiments.sweep.reach import (
     feel,
 )
 from antennate.experiments.sweep.scan import Wall, record
-from antennate.params import (
-    BenchPhysicsParams,
-    ConditioningParams,
-    EstimateParams,
-    ShapeParams,
-    SweepParams,
-)
-from antennate.robots.antenna import AntennaSpec
+from antennate.params import EstimateParams, SweepParams
 from antennate.studies.statistics import mean95
 from antennate.types import Floats
 
@@ -38,20 +33,6 @@ CONDITIONS = ("same", "varied", "tilted", "moving")
 """Every trial sweeps alike; centre and amplitude differ from trial to trial; the sweep is the same
 and walls are not parallel to the heading; the sweep is the same and the base moves along."""
 SPLITS, SIDES = ("calibration", "test"), ("l", "r")
-
-
-@dataclass(frozen=True, slots=True)
-class Setting:
-    """What all trials share."""
-
-    seed: int
-    params: EstimateParams
-    sweep: SweepParams
-    shape: ShapeParams
-    conditioning: ConditioningParams
-    antenna: AntennaSpec
-    physics: BenchPhysicsParams
-    speed: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,37 +61,37 @@ def plan(params: EstimateParams) -> list[tuple[str, str, int, str]]:
     return list(product(CONDITIONS, SPLITS, range(params.trials), SIDES))
 
 
-def run_trial(setting: Setting, condition: str, split: str, number: int, side: str) -> Trial:
+def run_trial(config: SweepConfig, condition: str, split: str, number: int, side: str) -> Trial:
     """Draw one trial and sweep outwards once; chance does not depend on the condition."""
-    params = setting.params
-    key = [setting.seed, SPLITS.index(split), number, SIDES.index(side)]
+    params, antenna = config.estimate, with_profile(config.antenna, config.profile)
+    key = [config.seed, SPLITS.index(split), number, SIDES.index(side)]
     rng = np.random.default_rng(key)
-    distance = float(rng.uniform(*params.distance)) * setting.antenna.length
+    distance = float(rng.uniform(*params.distance)) * antenna.length
     rub, lean = rng.uniform(-1.0, 1.0, 2)
     zero = float(rng.normal(0.0, params.base_zero))
     gain = float(rng.normal(0.0, params.gain))
     both = np.random.default_rng(key[:3]).uniform(-1.0, 1.0, 2)  # one sweep for both antennae
-    sweep = setting.sweep
+    sweep = config.sweep
     if condition == "varied":
         sweep = SweepParams(
             centre=sweep.centre + params.centre_range * float(both[0]),
             amplitude=sweep.amplitude + params.amplitude_range * float(both[1]),
             frequency=sweep.frequency,
         )
-    friction = setting.antenna.friction * (1.0 + params.friction * float(rub))
+    friction = antenna.friction * (1.0 + params.friction * float(rub))
     trace = record(
-        setting.physics,
-        setting.antenna.model_copy(update={"friction": friction}),
+        config.physics,
+        antenna.model_copy(update={"friction": friction}),
         sweep,
         Wall(distance, params.tilt_range * float(lean) if condition == "tilted" else 0.0),
         0.5,
-        setting.speed if condition == "moving" else 0.0,
-        setting.shape.gap,
+        config.speed if condition == "moving" else 0.0,
+        config.shape.gap,
     )
     if trace.reason:
         return Trial(condition, split, number, side, distance, sweep, None, None, trace.reason)
-    statics = Statics(setting.antenna)
-    common = (setting.shape.flex, statics, setting.antenna.sensor, setting.conditioning, zero)
+    statics = Statics(antenna)
+    common = (config.shape.flex, statics, antenna.sensor, config.conditioning, zero)
     outward = 0.5 / sweep.frequency
     exact = feel(trace, outward, *common)
     noisy = feel(trace, outward, *common, gain, rng)

@@ -16,7 +16,8 @@ from antennate.experiments.sweep.config import SweepConfig
 from antennate.experiments.sweep.estimates import Trial
 from antennate.experiments.sweep.reach import CUES
 from antennate.params import SweepParams
-from antennate.studies.pool import run_tasks
+from antennate.studies.experiment import OnRow, OnStep, no_row, no_step
+from antennate.studies.pool import gather
 from antennate.studies.statistics import mean95
 
 __all__ = ["CUES", "MOTIONS", "SHAPES", "SweepConfig", "SweepOutcome", "SweepRow", "run"]
@@ -198,42 +199,16 @@ def _run_task(task: _Task, emit: Callable[[Any], None]) -> None:
         if isinstance(part, _Cell):
             emit((k, map_cell(config, part)))
         else:
-            emit((k, _estimate(config, *part)))
-
-
-def _estimate(config: SweepConfig, condition: str, split: str, number: int, side: str) -> Trial:
-    antenna = with_profile(config.antenna, config.profile)
-    return estimates.run_trial(
-        estimates.Setting(
-            config.seed,
-            config.estimate,
-            config.sweep,
-            config.shape,
-            config.conditioning,
-            antenna,
-            config.physics,
-            config.speed,
-        ),
-        condition,
-        split,
-        number,
-        side,
-    )
+            emit((k, estimates.run_trial(config, *part)))
 
 
 def run(
     config: SweepConfig,
     workers: int = 1,
-    on_step: Callable[[int, int], None] = lambda done, total: None,
-    on_row: Callable[[SweepRow], None] = lambda row: None,
+    on_step: OnStep = no_step,
+    on_row: OnRow = no_row,
 ) -> SweepOutcome:
     """Sweep in every cell of the map and in every trial of the estimates.
-
-    Args:
-        config: What to run.
-        workers: Processes to use; the outcome does not depend on it.
-        on_step: Called after every sweep with how many of how many are done.
-        on_row: Called with every sweep, in no particular order.
 
     Raises:
         WorkerError: A worker process died.
@@ -241,13 +216,10 @@ def run(
     cells = _cells(config)
     parts: list[tuple[int, Any]] = list(enumerate([*cells, *estimates.plan(config.estimate)]))
     tasks = [(config, parts[i : i + _TASK]) for i in range(0, len(parts), _TASK)]
-    found: dict[int, Any] = {}
 
-    def take(item: tuple[int, Any]) -> None:
-        found[item[0]] = item[1]
+    def keep(item: tuple[int, Any]) -> None:
         on_row(_row(config, item[1]) if isinstance(item[1], Trial) else item[1])
-        on_step(len(found), len(parts))
 
-    run_tasks(_run_task, tasks, workers, take)
+    found = dict(gather(_run_task, tasks, workers, on_step, keep, len(parts)))
     ordered = [found[k] for k in range(len(parts))]
     return SweepOutcome(config, ordered[: len(cells)], ordered[len(cells) :])

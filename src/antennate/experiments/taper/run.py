@@ -12,6 +12,7 @@ import numpy as np
 
 from antennate.antenna import taper
 from antennate.errors import BadInputError, ConfigError
+from antennate.files import decoded, read_limited
 from antennate.params import TaperParams
 from antennate.params.base import number
 from antennate.studies.experiment import WithoutTrials
@@ -117,21 +118,7 @@ def read_diameters(path: Path) -> Floats:
     Raises:
         BadInputError: The file cannot be read, or a row holds no diameter.
     """
-    try:
-        with path.open("rb") as file:
-            data = file.read(_LARGEST_FILE + 1)
-        text = data.decode("utf-8-sig")
-    except OSError as error:
-        raise BadInputError(
-            f"--diameters: expected a readable file, found {path}: {error.strerror}"
-        ) from None
-    except UnicodeDecodeError as error:
-        raise BadInputError(
-            f"{path}: expected UTF-8 text, found byte {error.object[error.start]:#04x} at "
-            f"{error.start}"
-        ) from None
-    if len(data) > _LARGEST_FILE:
-        raise BadInputError(f"{path}: expected at most {_LARGEST_FILE} bytes, found more")
+    text = decoded(path, read_limited(path, _LARGEST_FILE))
     rows = csv.DictReader(io.StringIO(text))
     if COLUMN not in (rows.fieldnames or ()):
         raise BadInputError(

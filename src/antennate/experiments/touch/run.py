@@ -25,7 +25,8 @@ from antennate.experiments.touch.traverse import (
 )
 from antennate.sim import touch_wall
 from antennate.sim.touch_wall import WallKind
-from antennate.studies.pool import run_tasks
+from antennate.studies.experiment import OnStep, no_step
+from antennate.studies.pool import gather
 from antennate.types import Floats
 
 
@@ -130,14 +131,9 @@ def _run_task(task: _Task, emit: Callable[[Traverse], None]) -> None:
 def run(
     config: TouchConfig,
     workers: int = 1,
-    on_step: Callable[[int, int], None] = lambda done, total: None,
+    on_step: OnStep = no_step,
 ) -> TouchOutcome:
     """Run all traverses, then let the control read them.
-
-    Args:
-        config: What to run.
-        workers: Processes to use; the outcome does not depend on it.
-        on_step: Called after every traverse with how many of how many are done.
 
     Raises:
         WorkerError: A worker died.
@@ -150,13 +146,7 @@ def run(
         for trial in range(config.trials)
     ]
     place = {task[1:]: i for i, task in enumerate(tasks)}
-    found: list[Traverse] = []
-
-    def take(one: Traverse) -> None:
-        found.append(one)
-        on_step(len(found), len(tasks))
-
-    run_tasks(_run_task, tasks, workers, take)
+    found = gather(_run_task, tasks, workers, on_step)
     found.sort(key=lambda one: place[one.wall, one.speed, one.profile, one.trial])
     comparisons = touch_result.score(config, found)
     return TouchOutcome(config, found, comparisons, touch_result.result(config, found, comparisons))

@@ -20,11 +20,12 @@ def tables(result: Mapping[str, Any]) -> Sequence[Table]:
     controllers = result["controllers"]
     counts = sorted({row["trials"] for row in controllers.values()})
     many = " to ".join(str(n) for n in dict.fromkeys([counts[0], counts[-1]]))
+    many += " trial" if many == "1" else " trials"
     one_by_one = Table.of(
         "Controllers",
         controllers,
         measures.CONTROLLER,
-        f"{many} trials a controller, seed {result['seed']}. A failure counts as the time limit, "
+        f"{many} a controller, seed {result['seed']}. A failure counts as the time limit, "
         f"{result['time_limit_s']:g} s; invalid trials\nare left out of all rows below theirs. "
         "Intervals of means are bootstrapped.",
     )
@@ -45,7 +46,9 @@ def sentence(result: Mapping[str, Any]) -> str:
     )
     pair = next(iter(reversed(result["paired"].items())), None)
     test = f"; McNemar p of {pair[0]} {pair[1]['mcnemar_p']:.2g}" if pair else ""
-    return f"Tunnels crossed (95 % interval): {found}{test}."
+    invalid = sum(row["invalid"] for row in result["controllers"].values())
+    why = f" Invalid trials: {invalid}; trials.csv gives the reason of each." if invalid else ""
+    return f"Tunnels crossed (95 % interval): {found}{test}.{why}"
 
 
 def _figures(outcome: tunnel.TunnelOutcome) -> Mapping[str, Any]:

@@ -14,6 +14,7 @@ from antennate.experiments.tunnel.config import TunnelConfig
 from antennate.experiments.tunnel.monitor import TrialPath, TrialResult
 from antennate.sim.scenes.registry import TUNNEL
 from antennate.sim.trial import check_start
+from antennate.studies.experiment import OnRow, OnStep, no_row, no_step
 from antennate.studies.pool import run_tasks
 
 SCHEMA = 2
@@ -75,16 +76,10 @@ def _run_task(task: _Task, emit: Callable[[Any], None]) -> None:
 def run(
     config: TunnelConfig,
     workers: int = 1,
-    on_step: Callable[[int, int], None] = lambda done, total: None,
-    on_row: Callable[[TrialResult], None] = lambda row: None,
+    on_step: OnStep = no_step,
+    on_row: OnRow = no_row,
 ) -> TunnelOutcome:
     """Run all trials of all controllers.
-
-    Args:
-        config: What to run.
-        workers: Processes to use; the outcome does not depend on it.
-        on_step: Called after every trial with how many of how many are done.
-        on_row: Called with every trial, in no particular order.
 
     Raises:
         SceneError: A scene cannot be built as described.

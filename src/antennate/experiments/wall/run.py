@@ -26,7 +26,8 @@ from antennate.params.base import number, require_different
 from antennate.robots.antenna import AntennaSpec
 from antennate.robots.sensor import SensorParams
 from antennate.sim.bench import Ball, Bench, compile_bench
-from antennate.studies.pool import run_tasks
+from antennate.studies.experiment import OnRow, OnStep, no_row, no_step
+from antennate.studies.pool import gather
 from antennate.types import Floats
 
 REFERENCE: Profile = "descending"
@@ -207,16 +208,10 @@ def _run_task(
 def run(
     config: WallConfig,
     workers: int = 1,
-    on_step: Callable[[int, int], None] = lambda done, total: None,
-    on_row: Callable[[WallTrial], None] = lambda row: None,
+    on_step: OnStep = no_step,
+    on_row: OnRow = no_row,
 ) -> WallOutcome:
     """Run all trials of all profiles.
-
-    Args:
-        config: What to run.
-        workers: Processes to use; the outcome does not depend on it.
-        on_step: Called after every trial with how many of how many are done.
-        on_row: Called with every trial, in no particular order.
 
     Raises:
         WorkerError: A worker process died.
@@ -224,17 +219,7 @@ def run(
     tasks: list[tuple[WallConfig, Profile, int]] = [
         (config, profile, trial) for trial in range(config.trials) for profile in config.profiles
     ]
-    rows: list[WallTrial] = []
-    examples: dict[str, Traverse] = {}
-
-    def take(item: tuple[WallTrial, Traverse | None]) -> None:
-        row, seen = item
-        rows.append(row)
-        if seen is not None:
-            examples[row.profile] = seen
-        on_row(row)
-        on_step(len(rows), len(tasks))
-
-    run_tasks(_run_task, tasks, workers, take)
-    rows.sort(key=lambda row: (config.profiles.index(row.profile), row.trial))
-    return WallOutcome(config, rows, examples)
+    found = gather(_run_task, tasks, workers, on_step, lambda item: on_row(item[0]))
+    found.sort(key=lambda item: (config.profiles.index(item[0].profile), item[0].trial))
+    examples = {row.profile: seen for row, seen in found if seen is not None}
+    return WallOutcome(config, [row for row, _ in found], examples)
