@@ -13,44 +13,9 @@ from antennate.cli import main
 from antennate.errors import BadInputError
 from antennate.studies.run_directory import RunDirectory
 
-DICE = '''
-"""Throw dice. Each of them has six sides."""
-from dataclasses import dataclass
-import numpy as np
-from antennate.params import Params, number
-from antennate.studies.experiment import Experiment
-from antennate.studies.measures import Measure, Table, mean, summarise
-
-class Config(Params):
-    trials: int = number(4, "1", "assumed: few", "throws", ge=1)
-    seed: int = number(0, "1", "assumed: any", "seed of all chance", ge=0)
-
-@dataclass(frozen=True)
-class Row:
-    seed: int
-    trial: int
-    eyes: int
-
-MEASURES = (Measure("eyes", "eyes, mean", of=mean),)
-
-@dataclass(frozen=True)
-class Throws:
-    config: Config
-    rows: list[Row]
-    def result(self):
-        return {"schema": 1, "command": "dice", **summarise(MEASURES, self.rows)}
-
-def run(config, workers, on_step, on_row):
-    rng = np.random.default_rng(config.seed)
-    rows = [Row(config.seed, i, int(rng.integers(1, 7))) for i in range(config.trials)]
-    for row in rows:
-        on_row(row)
-    return Throws(config, rows)
-
-EXPERIMENT = Experiment("dice", __doc__, Config, run,
-    tables=lambda result: [Table.of("Dice", {"throws": result}, MEASURES)],
-    sentence=lambda result: f"Dice show {result['eyes']:.1f} eyes.")
-'''
+PAGE = Path(__file__).parents[1] / "docs" / "experiments.md"
+DICE = PAGE.read_text(encoding="utf-8").split("```python\n")[1].split("```")[0]
+"""The example of the documentation."""
 
 
 @pytest.fixture
