@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import subprocess
@@ -10,6 +11,8 @@ from pathlib import Path
 
 import pytest
 from terminal import Terminal
+
+from antennate.cli.output import Output
 
 RUN = [sys.executable, "-m", "antennate", "springs", "--out", "run"]
 SHELL = ["bash", "-c"]
@@ -94,3 +97,13 @@ def test_a_terminal_of_twenty_columns(term: str, tmp_path: Path) -> None:
     assert "Traceback" not in terminal.text
     assert "written to runs/gait-1" in terminal.text
     assert ("\x1b" in terminal.text) == (term == "xterm")
+
+
+def test_a_stream_that_was_closed_meanwhile_is_flushed_in_silence() -> None:
+    file = io.StringIO()
+    out = Output(file)
+    out.write("text")
+    file.close()
+    out.flush()
+    out.close()
+    assert out.error is None

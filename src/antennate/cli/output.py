@@ -60,8 +60,8 @@ class Output(io.TextIOBase):
         return len(text)
 
     def flush(self) -> None:
-        """Flush, as far as that is possible."""
-        if self._file is not None and self.error is None:
+        """Flush, as far as that is possible; the last one comes when all is closed already."""
+        if self._file is not None and self.error is None and not self._file.closed:
             try:
                 self._file.flush()
             except OSError as error:
