@@ -19,14 +19,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 
 from antennate.hardware.actuators import Tally
 from antennate.hardware.dynamixel import packets
-from antennate.hardware.dynamixel.answers import (
-    SILENT,
-    Answer,
-    Span,
-    Timing,
-    answer,
-    cut,
-)
+from antennate.hardware.dynamixel.answers import SILENT, Answer, Span, Timing, answer, cut
 from antennate.hardware.dynamixel.doubts import Doubts
 from antennate.hardware.dynamixel.exclusive import exclusive
 from antennate.hardware.dynamixel.packets import HEADER, OVERHEAD, Packet, Status, StatusError
