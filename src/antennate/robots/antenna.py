@@ -41,7 +41,7 @@ class AntennaSpec(Params):
         "stiffness of a spring of three active coils",
         gt=0,
     )
-    film_stiffness_n_mm_per_deg: float = number(
+    sensor_stiffness_n_mm_per_deg: float = number(
         0.048,
         "N·mm/deg",
         "assumed: bending stiffness of a 10 x 0.25 mm PET strip, E 3.5 GPa, per 16.7 mm hinge",
@@ -153,6 +153,6 @@ class AntennaSpec(Params):
 
     def hinge_stiffness(self) -> tuple[float, ...]:
         """Stiffness of the hinges, stiffened by the sensor where it lies [N·m/rad]."""
-        film = self.film_stiffness_n_mm_per_deg * N_MM_PER_DEG
+        sensor = self.sensor_stiffness_n_mm_per_deg * N_MM_PER_DEG
         springs = self.spring_stiffness()
-        return tuple(k + film * (i < self.sensed_hinges) for i, k in enumerate(springs))
+        return tuple(k + sensor * (i < self.sensed_hinges) for i, k in enumerate(springs))
