@@ -10,7 +10,7 @@ from antennate.params.base import Params, number
 class TouchCheckParams(Params):
     """The check by hand that left is left and that bending reads as bending."""
 
-    bend: float = number(
+    level: float = number(
         0.3, "1", "assumed: well above noise and creep, easily done by hand", gt=0, le=1
     )
     """Change of the reading that is a touch, in calibrated spans."""
@@ -25,8 +25,8 @@ class TouchCheckParams(Params):
 
     @model_validator(mode="after")
     def _order(self) -> TouchCheckParams:
-        if self.still >= self.bend:
-            raise ValueError(f"still must be below bend, got {self.still} and {self.bend}")
+        if self.still >= self.level:
+            raise ValueError(f"still must be below level, got {self.still} and {self.level}")
         return self
 
 

@@ -38,7 +38,7 @@ class AntennaSpec(Params):
         0.274, "N·mm/deg", "paper: table of springs; 1/coils gives 0.137 and 0.091", gt=0
     )
     """Stiffness of a spring of three active coils."""
-    film_stiffness_n_mm_per_deg: float = number(
+    sensor_stiffness_n_mm_per_deg: float = number(
         0.048, "N·mm/deg", "assumed: PET strip of 10 x 0.25 mm, E 3.5 GPa, 16.7 mm a hinge", ge=0
     )
     """Stiffness the flex sensor adds to each hinge it covers."""
@@ -120,6 +120,6 @@ class AntennaSpec(Params):
 
     def hinge_stiffness(self) -> tuple[float, ...]:
         """Stiffness of the hinges, stiffened by the sensor where it lies [N·m/rad]."""
-        film = self.film_stiffness_n_mm_per_deg * N_MM_PER_DEG
+        sensor = self.sensor_stiffness_n_mm_per_deg * N_MM_PER_DEG
         springs = self.spring_stiffness()
-        return tuple(k + film * (i < self.sensed_hinges) for i, k in enumerate(springs))
+        return tuple(k + sensor * (i < self.sensed_hinges) for i, k in enumerate(springs))
