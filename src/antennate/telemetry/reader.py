@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 from antennate.errors import LogError
 from antennate.telemetry.framing import SCHEMA, Kind, opened, pieces
@@ -17,15 +17,8 @@ _LISTED = 100
 """Most damaged places that are listed."""
 
 
-@dataclass(frozen=True, slots=True)
-class Damage:
-    """One place that could not be read.
-
-    Attributes:
-        offset: Where it begins in the file [bytes].
-        reason: What is wrong.
-        path: The file.
-    """
+class Damage(NamedTuple):
+    """A place that could not be read: where it begins [bytes], what is wrong, in which file."""
 
     offset: int
     reason: str
