@@ -36,7 +36,6 @@ class LogReader:
         parts: All files.
         header: Its header.
         ticks: Ticks read so far.
-        first: Number of the first tick read, 0 before it.
         last: Number of the last tick read, 0 before the first.
         bad: Damaged places so far.
         damage: The first of them.
@@ -48,7 +47,7 @@ class LogReader:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self.ticks = self.first = self.last = self.bad = 0
+        self.ticks = self.last = self.bad = 0
         self.damage: list[Damage] = []
         self.end: int | None = None
         try:
@@ -94,7 +93,7 @@ class LogReader:
                     self._note(offset, f"tick {tick.number} after {self.last}")
                     continue
                 self.ticks += 1
-                self.first, self.last = self.first or tick.number, tick.number
+                self.last = tick.number
                 yield tick
 
     def __enter__(self) -> LogReader:
