@@ -25,12 +25,9 @@ class ReplayConfig(Params):
     """Which controller decides upon the readings of a log."""
 
     controller: str | None = number(
-        None,
-        "1",
-        "assumed: the one recorded",
-        "open, paper, closed, or MODULE:NAME or FILE.py:NAME of your own, in place of the recorded",
-        examples=["open", "paper", "closed"],
+        None, "1", "assumed: the one recorded", examples=["open", "paper", "closed"]
     )
+    """Open, paper, closed, or MODULE:NAME or FILE.py:NAME of your own, in place of the recorded."""
 
     @field_validator("controller")
     @classmethod
