@@ -7,13 +7,9 @@ from collections.abc import Sequence
 
 from antennate.hardware.dynamixel.tables import XC430_W240
 from antennate.params.twin import BatteryParams
-from antennate.robots.servos import TICKS_A_TURN, ServoParams
 from antennate.twin.registers import Servo
 
-_VOLTAGE_ERROR = 1
-"""Bit of the register Hardware Error Status, from the manuals of both models."""
 _UNITS_A_VOLT = 10
-_TICK = 2.0 * math.pi / TICKS_A_TURN
 
 
 class Battery:
@@ -25,9 +21,6 @@ class Battery:
 
     def __init__(self, params: BatteryParams) -> None:
         self._params = params
-        self._servo = ServoParams()
-        self._before: dict[int, float] = {}
-        self._t = 0.0
         self._begin = math.inf
         self._rate = 0.0
 
@@ -36,30 +29,18 @@ class Battery:
         self._begin, self._rate = t, rate
 
     def feed(self, servos: Sequence[Servo], t: float) -> None:
-        """Let servos see their voltage; one below its limit latches a voltage error."""
+        """Let servos see their voltage at time t [s]."""
         if t >= self._begin:
             self._show(servos, self._volts(servos, t))
-        self._before, self._t = {servo.get("id"): servo.position for servo in servos}, t
 
     def _show(self, servos: Sequence[Servo], volts: float) -> None:
         for servo in servos:
             large = servo.table is XC430_W240
             seen = volts if large else min(volts, self._params.antenna_voltage)
             servo.set("present_input_voltage", round(_UNITS_A_VOLT * seen))
-            if servo.get("present_input_voltage") < servo.get("min_voltage_limit"):
-                servo.fail(_VOLTAGE_ERROR)
 
     def _volts(self, servos: Sequence[Servo], t: float) -> float:
-        load = sum(self._load(servo, t) for servo in servos if servo.table is XC430_W240)
+        load = sum(abs(s.motion.shaft.load) for s in servos if s.table is XC430_W240)
         empty = self._rate * (t - self._begin)
         drop = self._params.resistance * self._params.stall_current * load
         return max(self._params.voltage - empty - drop, 0.0)
-
-    def _load(self, servo: Servo, t: float) -> float:
-        """Share of its stall current: its drive, less what its own turning takes from that."""
-        if not servo.torque or t <= self._t:
-            return 0.0
-        ahead = _TICK * (servo.get("goal_position") - servo.position)
-        turned = _TICK * (servo.position - self._before.get(servo.get("id"), servo.position))
-        drive = max(-1.0, min(self._servo.position_gain * ahead, 1.0))
-        return min(abs(drive - turned / (t - self._t) / self._servo.no_load_speed), 1.0)

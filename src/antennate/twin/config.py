@@ -11,6 +11,7 @@ from antennate.robots.spec import RobotSpec
 from antennate.sim.scenes.registry import make_scene
 from antennate.sim.sim_robot import SimRobot
 from antennate.sim.trial import TrialConfig, draw_trial
+from antennate.twin.driven_servo import factory_new
 from antennate.twin.passage import Passage
 from antennate.twin.robot import TwinRobot
 from antennate.twin.touch import TouchStimulus
@@ -41,6 +42,12 @@ class TwinConfig(TrialConfig):
     """Faults, such as servo:7=silent@3s."""
     touch: Annotated[tuple[str, ...], GATHERED] = number((), "1", "assumed: nobody is there")
     """Antennae touched before it walks, such as left@2s; from the first packet on the bus."""
+    push: Annotated[tuple[str, ...], GATHERED] = number((), "1", "assumed: nobody is there")
+    """Joints without torque that are turned, such as yaw1=20deg@3s, from the first packet on."""
+    factory: bool = number(False, "1", "assumed: they are set up")
+    """Servos as delivered: all id 1 at 57600 bit/s."""
+    plugged: Annotated[tuple[str, ...], GATHERED] = number((), "1", "assumed: all")
+    """Joints whose servos are on the bus at first, or `none`."""
     battery: BatteryParams = BatteryParams()
     robot: RobotSpec = RobotSpec()
     control: TwinControlParams = TwinControlParams()
@@ -69,5 +76,8 @@ def watched(config: TwinConfig, boot_id: int | None = None) -> tuple[TwinRobot, 
         touch=touch,
         watch=passage.watch,
         battery=config.battery,
+        servos=factory_new(config.robot) if config.factory else None,
+        pushes=config.push,
     )
+    robot.plugging.begin(config.plugged)
     return robot, passage
