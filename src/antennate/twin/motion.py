@@ -158,6 +158,10 @@ class MotorMotion(Motion):
         if self.resting:
             self._t = t
             return False
+        self._settle()
+        if self.resting:
+            self._t = t
+            return True
         motor = self.shaft
         supply = 0.1 * self.memory.get("present_input_voltage") / motor.rating.voltage
         while (left := t - self._t) > 1e-9:
