@@ -125,7 +125,7 @@ class Faults:
                 raise BadInputError(f"--fault: expected a servo of {known}, found {demand.servo}")
             if alone and (demand.target in ("esp32", "link") or demand.what == "discharge"):
                 raise BadInputError(
-                    "--fault: expected a fault of a servo or the bus where there is no robot, found "
+                    "--fault: expected one of a servo or the bus where there is no robot, found "
                     f"{demand.target}={demand.what}"
                 )
 

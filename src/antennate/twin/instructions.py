@@ -114,9 +114,11 @@ def _change(t: float, servo: Servo, packet: Packet) -> StatusError:
 def _write(servo: Servo, packet: Packet) -> StatusError:
     """Write now, or register the write for an Action if it could be done now."""
     address, data = int.from_bytes(packet.params[:2], "little"), packet.params[2:]
-    now, shadow = packet.instruction == Instruction.WRITE, is_shadow(servo, packet)
-    error = servo.write(address, data, do=now, ram_only=shadow)
-    if not now and not error:
+    shadow = is_shadow(servo, packet)
+    if packet.instruction == Instruction.WRITE:
+        return servo.write(address, data, ram_only=True) if shadow else servo.write(address, data)
+    error = servo.refuses(address, data, shadow)
+    if not error:
         servo.registered = (address, data)
         servo.set("registered_instruction", 1)
     return error

@@ -216,10 +216,12 @@ class MotorMotion(Motion):
         if abs(self.shaft.speed) > _STILL:
             return
         if self.driven:
+            if self._t < self.plan.end:
+                return
             wanted, speed = self.plan.at(self._t)
             if self.mode in POSITION_MODES:
                 away = wanted - self.position
-                if abs(away) > 0.5 or self._t < self.plan.end or self._loops.i:
+                if abs(away) > 0.5 or self._loops.i:
                     return
                 self.shaft.position += self.sign * away
             elif self.mode == VELOCITY_MODE:

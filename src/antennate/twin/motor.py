@@ -106,7 +106,7 @@ class Motor(Shaft):
         self.speed = end + (before - end) * faded
         self.position += end * dt + (before - end) * self._lag * (1.0 - faded)
         self.duty = duty
-        self.load = duty * supply - self.speed / self._fastest
+        self.load = duty * supply - before / self._fastest
 
     def free(self, dt: float) -> None:
         """Let it run down without drive for a time [s]."""

@@ -157,23 +157,16 @@ class Servo:
         """Bytes of the table."""
         return self.memory.read(address, length)
 
-    def write(
-        self, address: int, data: bytes, do: bool = True, ram_only: bool = False
-    ) -> StatusError:
-        """Write whole registers, all or none of them.
-
-        Args:
-            address: Where they begin.
-            data: Their bytes.
-            do: Write them, and not only say whether they could be.
-            ram_only: Nothing of the EEPROM may be written.
-        """
-        error, changes = self.memory.changes(address, data, locked=ram_only or self.torque)
+    def write(self, address: int, data: bytes, ram_only: bool = False) -> StatusError:
+        """Write whole registers, all or none of them; of the EEPROM none if `ram_only`."""
+        error, changes = self._changes(address, data, ram_only)
         for register, value in changes:
-            error = error or rules.refuses(self.memory, register, value)
-        for register, value in changes if do and not error else ():
             self._store(register, value)
         return error
+
+    def refuses(self, address: int, data: bytes, ram_only: bool = False) -> StatusError:
+        """Why a write could not be done now, NONE if it could."""
+        return self._changes(address, data, ram_only)[0]
 
     def clear_turns(self) -> StatusError:
         """Forget whole turns; not while moving."""
@@ -208,6 +201,14 @@ class Servo:
         return StatusError.NONE
 
     # inside
+
+    def _changes(
+        self, address: int, data: bytes, ram_only: bool
+    ) -> tuple[StatusError, list[tuple[Register, int]]]:
+        error, changes = self.memory.changes(address, data, locked=ram_only or self.torque)
+        for register, value in changes:
+            error = error or rules.refuses(self.memory, register, value)
+        return error, [] if error else changes
 
     def _make_motion(self, position: float) -> Motion:
         return MotorMotion(self.memory, position)

@@ -32,12 +32,14 @@ def refuses(memory: Memory, register: Register, value: int) -> StatusError:
     locked = name in GOALS or (name == "bus_watchdog" and value != 0)
     if locked and memory.get("bus_watchdog") == TRIPPED:
         return StatusError.DATA_RANGE
+    least, most = _limits(memory, name)
+    if not least <= value <= most:
+        return StatusError.DATA_LIMIT
     if not _in_range(memory, register, value):
         return StatusError.DATA_RANGE
     if name == "torque_enable" and value and shut_down(memory):
         return StatusError.RESULT_FAIL
-    least, most = _limits(memory, name)
-    return StatusError.NONE if least <= value <= most else StatusError.DATA_LIMIT
+    return StatusError.NONE
 
 
 def shut_down(memory: Memory) -> bool:
