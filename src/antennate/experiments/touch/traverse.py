@@ -146,7 +146,7 @@ def run_traverse(plan: Plan, keep_joints: bool) -> Course:
         _start_off(bench, plan)
         for tick in range(plan.ticks):
             force = _advance(bench, plan, (tick - 1) / plan.antenna.sensor.rate) if tick else 0.0
-            ticks.append((float(bench.carriage()[0]), bench.flex(), force))
+            ticks.append((float(bench.carriage.position[0]), bench.flex(), force))
             if keep_joints:
                 joints.append(bench.joints())
     except SimulationError as error:
