@@ -40,7 +40,7 @@ class RigParams(Params):
         (0.05, 0.10, 0.15), "m/s", "paper: 5, 10 and 15 cm/s", min_length=1
     )
     """Pushing speeds."""
-    pushes: int = number(10, "1", "assumed: unpublished; enough for an interval", ge=1, le=1000)
+    pushes: int = number(10, "1", "assumed: enough for an interval", ge=1, le=1000)
     """Pushes at each speed."""
     place: float = number(0.08, "m", "assumed: two thirds out; the rod stays on", gt=0.01, le=0.4)
     """Place of the rod."""
@@ -81,7 +81,7 @@ class CalibrateConfig(Params):
     """Mean over readings before fitting."""
     full_scale: bool = number(False, "1", "assumed: the paper's numbers do not tell")
     """Normalise by 0 to 4095 counts and not by the recording's ends."""
-    threshold: float = number(0.5, "1", "assumed: unpublished; middle of the sigmoid", gt=0, lt=1)
+    threshold: float = number(0.5, "1", "assumed: middle of the sigmoid", gt=0, lt=1)
     """Theta of the file."""
     least_r2: float = number(0.5, "1", "assumed: half of the bend explained", ge=0, lt=1)
     """A worse fit is refused."""
