@@ -133,7 +133,7 @@ def _judge(trials: list[Trial], noise: str, spacing: float) -> dict[str, Any]:
         real = np.array([t.distance for t in test])
         left = np.array([t.side == "l" for t in test], bool)
         found["distance"][cue] = errors(guess[left], real[left])
-        found["gap"][cue] = errors(*_gaps(test, guess, spacing))
+        found["gap"][cue] = errors(*gaps(test, guess, spacing))
     for cue in cues(tip=True):
         if len(known) < coefficients(cue):
             continue
@@ -143,7 +143,7 @@ def _judge(trials: list[Trial], noise: str, spacing: float) -> dict[str, Any]:
     return found
 
 
-def _gaps(test: list[Trial], guess: Floats, spacing: float) -> tuple[Floats, Floats]:
+def gaps(test: list[Trial], guess: Floats, spacing: float) -> tuple[Floats, Floats]:
     """Estimated and true widths of the gaps that both antennae felt."""
     values = {(trial.number, trial.side): k for k, trial in enumerate(test)}
     left = np.array([k for (n, side), k in values.items() if side == "l" and (n, "r") in values])
