@@ -59,4 +59,4 @@ class Patient:
 
 def wrong(checkup: Checkup) -> dict[str, Row]:
     """Rows that are not ok, by part and check."""
-    return {f"{row.part}: {row.check}": row for row in checkup.rows if row.verdict != "ok"}
+    return {f"{row.part}: {row.check}": row for row in checkup.rows if row.grade != "ok"}

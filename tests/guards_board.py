@@ -24,7 +24,7 @@ from hardware_rig import BAND
 
 from antennate.control import conditioning, contact, maneuver
 from antennate.hardware.esp32 import board, clock, decoder, frame
-from antennate.hardware.esp32.clock import DeviceClock, Verdict
+from antennate.hardware.esp32.clock import DeviceClock, SampleState
 from antennate.hardware.esp32.wire import Reset
 from antennate.hardware.safety import diagnosis, touch_check
 from antennate.types import Maneuver
@@ -44,8 +44,8 @@ def trusting(self: DeviceClock, sample: Any, now: float) -> None:
     self.greet(SimpleNamespace(**greeting))
 
 
-def ticking(old: Any, self: DeviceClock, sample: Any, now: float) -> Verdict:
-    seen = sum(self.verdicts.values())
+def ticking(old: Any, self: DeviceClock, sample: Any, now: float) -> SampleState:
+    seen = sum(self.states.values())
     return old(self, dataclasses.replace(sample, ticks=sample.ticks + seen), now)
 
 
@@ -53,7 +53,7 @@ def afresh(old: Any, self: Any, t: float, counts: float) -> Any:
     return old(self, t + 1e-6 * sum(self.counted.values()), counts)
 
 
-def within(old: Any, self: DeviceClock, sample: Any, now: float) -> Verdict:
+def within(old: Any, self: DeviceClock, sample: Any, now: float) -> SampleState:
     return old(self, dataclasses.replace(sample, ticks=sample.ticks % (1 << 30)), now)
 
 
@@ -72,8 +72,8 @@ def first(one: Any, other: Any) -> Any:
     return one
 
 
-LIE = (lambda n: n * 10_000 + 3_600_000_000, Verdict.AHEAD)
-STILL = (lambda n: 1_000_000, Verdict.FROZEN)
+LIE = (lambda n: n * 10_000 + 3_600_000_000, SampleState.AHEAD)
+STILL = (lambda n: 1_000_000, SampleState.FROZEN)
 OLD_FIRMWARE = test_board.test_E8_no_sample_of_a_board_with_old_firmware_is_used
 
 STREAM = [
@@ -131,7 +131,7 @@ CLOCK = [
     ),
     Guard(
         "doubled and late samples",
-        put(clock.Sequence, "place", constant(Verdict.USED)),
+        put(clock.Sequence, "place", constant(SampleState.USED)),
         test_clock.test_L7_the_window_tells_late_from_doubled,
     ),
     Guard(

@@ -26,8 +26,8 @@ from antennate.hardware.driving import session
 from antennate.hardware.dynamixel import actuators, bringup, bus, inquiry, monitor, packets, parser
 from antennate.hardware.dynamixel import leg_turns as turns
 from antennate.hardware.dynamixel.answers import Timing, Value
-from antennate.hardware.dynamixel.doubts import Doubts
 from antennate.hardware.dynamixel.leg_turns import LegTurns
+from antennate.hardware.dynamixel.pending import PendingRequests
 from antennate.hardware.dynamixel.tables import XC430_W240
 from antennate.hardware.ports import serial_port
 from antennate.robots.spec import RobotSpec
@@ -64,11 +64,11 @@ class Agreeing(int):
     __hash__ = int.__hash__
 
 
-def any_refusal(old: Any, packet: Any, length: int, doubtful: set[int]) -> Any:
+def any_refusal(old: Any, packet: Any, length: int, late: set[int]) -> Any:
     return old(packet, length, set())
 
 
-def any_length(old: Any, packet: Any, length: int, doubtful: set[int]) -> Any:
+def any_length(old: Any, packet: Any, length: int, late: set[int]) -> Any:
     status = packets.as_status(packet)
     return status and dataclasses.replace(status, data=status.data[-length:] if length else b"")
 
@@ -198,12 +198,12 @@ BUS = [
     ),
     Guard(
         "other lengths while an answer may come late",
-        put(Doubts, "free", lambda self, ids, span: span.length),
+        put(PendingRequests, "free", lambda self, ids, span: span.length),
         test_bus.test_B4_single_reads_after_a_late_answer,
     ),
     Guard(
         "wait before a write that cannot be told apart",
-        put(Doubts, "holds", constant(False)),
+        put(PendingRequests, "holds", constant(False)),
         test_bus.test_B4_a_late_confirmation_does_not_confirm_the_next_write,
     ),
     Guard(

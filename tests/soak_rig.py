@@ -173,9 +173,9 @@ class Soak:
         self._send(now)
         self._clock.t = now
         clock = self._board.clock
-        before = sum(clock.verdicts.values())
+        before = sum(clock.states.values())
         seen = self._body.read()
-        refused = sum(clock.verdicts.values()) - before - self._body.used
+        refused = sum(clock.states.values()) - before - self._body.used
         t, counts = float(seen.t[0]), seen.counts[0].tolist()
         said = [film.step(t, c).counts for film, c in zip(self._films, counts, strict=True)]
         clear = self._out is not None and self._out.clear

@@ -13,7 +13,8 @@ from twin_rig import rig
 from antennate.antenna.calibration import Calibration
 from antennate.cli import main
 from antennate.errors import AntennateError, CalibrationError, ConfigError
-from antennate.hardware.esp32.film import calibrated, require_film
+from antennate.hardware.esp32.wire import require_sensor
+from antennate.hardware.robot import RobotConfig
 from antennate.params import ConditioningParams, ControlParams, RuleParams
 from antennate.twin.config import TwinConfig
 
@@ -155,16 +156,16 @@ def test_S9_the_file_of_another_sensor_is_refused(tmp_path: Path) -> None:
 
 
 def test_S9_the_file_of_another_board_is_refused() -> None:
-    require_film(rig(TwinConfig()).session.board.hello, "0" * 16)  # it has not greeted yet
+    require_sensor(rig(TwinConfig()).session.board.hello, "0" * 16)  # it has not greeted yet
     made = rig(TwinConfig())
     made.clock.sleep(0.1)
     made.session.board.poll(made.clock.now())
     twin = b"twin\0\0\0\0".hex()
-    require_film(made.session.board.hello, twin)
-    require_film(made.session.board.hello, "left-1")
-    require_film(made.session.board.hello, None)
+    require_sensor(made.session.board.hello, twin)
+    require_sensor(made.session.board.hello, "left-1")
+    require_sensor(made.session.board.hello, None)
     with pytest.raises(CalibrationError, match=f"expected the board {'0' * 16} .* {twin}"):
-        require_film(made.session.board.hello, "0" * 16)
+        require_sensor(made.session.board.hello, "0" * 16)
 
 
 def test_S9_a_bad_recording_keeps_the_calibration_that_is_there(
@@ -184,10 +185,11 @@ def test_a_calibration_file_gives_the_controller_its_curve(tmp_path: Path) -> No
     path = tmp_path / "left.json"
     GOOD.save(path)
     control = ControlParams(conditioning=ConditioningParams(averaging_time=0.05))
-    made, found = calibrated(control, path, "left-1")
-    assert found == GOOD
-    assert made.conditioning == GOOD.conditioning(0.05)
-    assert made.rule == control.rule
+    config = RobotConfig(control=control, calibration=str(path), sensor_id="left-1")
+    made = config.calibrated()
+    assert made.sensor_id == GOOD.sensor_id
+    assert made.control.conditioning == GOOD.conditioning(0.05)
+    assert made.control.rule == control.rule
 
 
 @pytest.mark.parametrize(
@@ -203,4 +205,4 @@ def test_a_curve_or_a_theta_beside_the_file_is_refused(
     path = tmp_path / "left.json"
     GOOD.save(path)
     with pytest.raises(ConfigError, match=said):
-        calibrated(control, path)
+        RobotConfig(control=control, calibration=str(path)).calibrated()

@@ -47,19 +47,19 @@ def test_B17_an_adapter_that_is_16_ms_late_is_measured_and_its_cure_named() -> N
     assert set(rows) == {"bus: latency timer", "bus: answer time", "bus: read of all"}
     assert "setserial /dev/bus low_latency" in rows["bus: latency timer"].cure
     assert "/sys/bus/usb-serial/devices/ttyUSB0/latency_timer" in rows["bus: latency timer"].cure
-    assert checkup.verdict == "bad"
+    assert checkup.grade == "bad"
 
 
-@pytest.mark.parametrize(("timer", "verdict"), [("16", "bad"), ("1", "ok")])
+@pytest.mark.parametrize(("timer", "grade"), [("16", "bad"), ("1", "ok")])
 def test_B17_the_latency_timer_is_read_from_the_system(
-    tmp_path: Path, timer: str, verdict: str
+    tmp_path: Path, timer: str, grade: str
 ) -> None:
     (tmp_path / "ttyUSB7").mkdir()
     file = tmp_path / "ttyUSB7" / "latency_timer"
     file.write_text(timer + "\n")
     row = latency_row("/dev/ttyUSB7", False, DoctorParams(), tmp_path)
-    assert row.verdict == verdict
-    assert (f"echo 1 | sudo tee {file}" in row.cure) is (verdict == "bad")
+    assert row.grade == grade
+    assert (f"echo 1 | sudo tee {file}" in row.cure) is (grade == "bad")
 
 
 @pytest.mark.parametrize(
@@ -82,7 +82,7 @@ def test_B15_servos_that_are_not_as_expected_are_named_with_the_cure(
     row = wrong(patient.examine(esp32=False))[f"bus: {check}"]
     assert found in row.found
     assert cure in row.cure
-    assert row.verdict == "bad"
+    assert row.grade == "bad"
     assert memory(patient) == before
 
 
@@ -100,7 +100,7 @@ def test_a_bus_where_nobody_answers_says_power_and_wiring() -> None:
 
 
 @pytest.mark.parametrize(
-    ("fault", "check", "found", "verdict"),
+    ("fault", "check", "found", "grade"),
     [
         ("servo:3=return_delay_time:250", "return delay", "500 us (3)", "warn"),
         ("servo:3=homing_offset:7", "homing offset", "7 (3)", "bad"),
@@ -122,7 +122,7 @@ def test_a_bus_where_nobody_answers_says_power_and_wiring() -> None:
     ],
 )
 def test_what_a_servo_says_of_itself_is_judged(
-    fault: str, check: str, found: str, verdict: str
+    fault: str, check: str, found: str, grade: str
 ) -> None:
     """Limits of both models are their manuals'; 2500 ticks are less than 2048 + 1024.
 
@@ -132,13 +132,13 @@ def test_what_a_servo_says_of_itself_is_judged(
     assert list(rows) == [f"bus: {check}"]
     row = rows[f"bus: {check}"]
     assert found in row.found
-    assert row.verdict == verdict
+    assert row.grade == grade
     assert row.cure
 
 
 def test_lost_answers_are_counted() -> None:
     row = wrong(Patient("bus=loss:0.05").examine(esp32=False))["bus: lost answers"]
-    assert row.verdict == "warn"
+    assert row.grade == "warn"
     assert " of 380 " in row.found
 
 
@@ -153,7 +153,7 @@ def test_L14_swapped_ports_are_known_from_both_sides() -> None:
 
 
 @pytest.mark.parametrize(
-    ("fault", "check", "found", "verdict"),
+    ("fault", "check", "found", "grade"),
     [
         ("esp32=silent", "greeting", "nothing", "bad"),
         ("esp32=open_left", "left antenna", "wire open", "bad"),
@@ -162,12 +162,12 @@ def test_L14_swapped_ports_are_known_from_both_sides() -> None:
         ("esp32=left:1450", "left at rest", "b = 0.9", "bad"),
     ],
 )
-def test_what_the_board_says_is_judged(fault: str, check: str, found: str, verdict: str) -> None:
+def test_what_the_board_says_is_judged(fault: str, check: str, found: str, grade: str) -> None:
     patient = Patient(fault)
     patient.clock.sleep(0.5)
     row = wrong(patient.examine(bus=False))[f"esp32: {check}"]
     assert found in row.found
-    assert row.verdict == verdict
+    assert row.grade == grade
     assert row.cure
 
 

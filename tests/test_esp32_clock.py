@@ -10,7 +10,7 @@ import pytest
 from esp32_streams import BOOT, BOOT_TEXTS, encoded, hello, made
 
 from antennate.hardware.esp32 import frame
-from antennate.hardware.esp32.clock import DeviceClock, Sequence, Verdict
+from antennate.hardware.esp32.clock import DeviceClock, SampleState, Sequence
 from antennate.hardware.esp32.decoder import FrameDecoder
 from antennate.hardware.esp32.wire import Hello, Reset, Sample
 
@@ -39,7 +39,7 @@ def sample(seq: int, ticks: int, tick_bits: int = 30, boot: int = BOOT) -> Sampl
 def steady(clock: DeviceClock, first: int, count: int, late: float = 0.001) -> None:
     """Samples on time: number n is taken at n periods and arrives this much later [s]."""
     for n in range(first, first + count):
-        assert clock.take(sample(n, n * PERIOD), n * 0.01 + late) is Verdict.USED
+        assert clock.take(sample(n, n * PERIOD), n * 0.01 + late) is SampleState.USED
 
 
 @pytest.mark.parametrize("loss", [0.0, 0.4])
@@ -56,7 +56,7 @@ def test_E4_ticks_wrap(bits: int, loss: float) -> None:
         ticks = start + n * PERIOD + int(rng.integers(0, 500))
         first = ticks if first is None else first
         now = (ticks - start) * 1e-6 + rng.uniform(0, 0.004)
-        assert clock.take(sample(n, ticks, bits), now) is Verdict.USED
+        assert clock.take(sample(n, ticks, bits), now) is SampleState.USED
         assert clock.newest is not None
         assert clock.newest.elapsed_us == ticks - first
         assert n < 50 or clock.age(now) < STALE
@@ -78,8 +78,8 @@ def test_E4_a_day_with_99_of_100_samples_lost(bits: int, wraps: int) -> None:
     clock = ready(bits)
     before = -1
     for n in range(0, 8_640_000, 100):
-        verdict = clock.take(sample(n, n * PERIOD, bits), n * 0.01)
-        assert verdict is Verdict.USED
+        state = clock.take(sample(n, n * PERIOD, bits), n * 0.01)
+        assert state is SampleState.USED
         assert clock.newest is not None
         assert clock.newest.elapsed_us == n * PERIOD > before
         before = clock.newest.elapsed_us
@@ -93,7 +93,7 @@ def test_E5_a_wrap_hidden_by_an_outage(minutes: float) -> None:
     clock = ready()
     steady(clock, 0, 100)
     later = 100 + round(minutes * 6000)
-    assert clock.take(sample(later, later * PERIOD), later * 0.01 + 0.001) is Verdict.USED
+    assert clock.take(sample(later, later * PERIOD), later * 0.01 + 0.001) is SampleState.USED
     assert clock.epoch == 2
     assert clock.newest is not None
     assert clock.newest.elapsed_us == 0
@@ -124,25 +124,25 @@ def test_E6_ages_are_right_under_drift_and_jitter(drift: float, seed: int) -> No
     for n in range(12_000):
         taken = n * 0.01
         arrival = max(arrival, taken + rng.uniform(0, 0.02))
-        verdict = clock.take(sample(n, round(n * PERIOD * (1 + drift))), arrival)
-        assert verdict is Verdict.USED
+        state = clock.take(sample(n, round(n * PERIOD * (1 + drift))), arrival)
+        assert state is SampleState.USED
         if n >= 6000:
             worst = max(worst, abs(clock.age(arrival) - (arrival - taken)))
     assert worst < 0.002
 
 
 @pytest.mark.parametrize(
-    ("lie", "verdict"),
+    ("lie", "state"),
     [
-        (lambda n: 100 * PERIOD, Verdict.FROZEN),
-        (lambda n: n * PERIOD - 1_000_000, Verdict.BACK),
-        (lambda n: n * PERIOD - 93_000, Verdict.BACK),
-        (lambda n: n * PERIOD - 400_000_000, Verdict.BACK),
-        (lambda n: n * PERIOD + 3_600_000_000, Verdict.AHEAD),
-        (lambda n: n * PERIOD + 200_000, Verdict.AHEAD),
+        (lambda n: 100 * PERIOD, SampleState.FROZEN),
+        (lambda n: n * PERIOD - 1_000_000, SampleState.BACK),
+        (lambda n: n * PERIOD - 93_000, SampleState.BACK),
+        (lambda n: n * PERIOD - 400_000_000, SampleState.BACK),
+        (lambda n: n * PERIOD + 3_600_000_000, SampleState.AHEAD),
+        (lambda n: n * PERIOD + 200_000, SampleState.AHEAD),
     ],
 )
-def test_E7_lies_of_the_boards_clock(lie, verdict: Verdict) -> None:
+def test_E7_lies_of_the_boards_clock(lie, state: SampleState) -> None:
     """Refused at once; a steady lie becomes a new time base after ten samples, a stop never."""
     clock = ready()
     steady(clock, 0, 101)
@@ -152,13 +152,13 @@ def test_E7_lies_of_the_boards_clock(lie, verdict: Verdict) -> None:
         seen.append(clock.take(sample(n, lie(n)), now))
         if n == 106:
             assert clock.age(now) > STALE
-    assert seen[:9] == [verdict] * 9
-    assert clock.verdicts[verdict] >= 9
-    if verdict is Verdict.FROZEN:
-        assert set(seen) == {verdict}
+    assert seen[:9] == [state] * 9
+    assert clock.states[state] >= 9
+    if state is SampleState.FROZEN:
+        assert set(seen) == {state}
         assert clock.epoch == 1
     else:
-        assert seen[9:] == [Verdict.USED] * 21
+        assert seen[9:] == [SampleState.USED] * 21
         assert clock.epoch == 2
         assert clock.age(130 * 0.01 + 0.001) < STALE
 
@@ -168,9 +168,9 @@ def test_E7_single_lies_do_no_harm() -> None:
     clock = ready()
     for n in range(0, 1000, 50):
         steady(clock, n, 49)
-        assert clock.take(sample(n + 49, n * PERIOD), n * 0.01 + 0.491) is Verdict.BACK
+        assert clock.take(sample(n + 49, n * PERIOD), n * 0.01 + 0.491) is SampleState.BACK
     steady(clock, 1000, 50)
-    assert clock.take(sample(1050, 1050 * PERIOD), 10.54) is Verdict.USED
+    assert clock.take(sample(1050, 1050 * PERIOD), 10.54) is SampleState.USED
     assert clock.newest is not None
     assert clock.newest.elapsed_us == 1050 * PERIOD
     assert clock.epoch == 1
@@ -179,7 +179,7 @@ def test_E7_single_lies_do_no_harm() -> None:
 
 def test_E7_ticks_beyond_the_declared_modulus_are_refused() -> None:
     clock = ready()
-    assert clock.take(dataclasses.replace(made(1), ticks=2**30), 0.0) is Verdict.OVERRANGE
+    assert clock.take(dataclasses.replace(made(1), ticks=2**30), 0.0) is SampleState.OVERRANGE
     assert clock.newest is None
 
 
@@ -245,31 +245,31 @@ def test_L7_lost_doubled_and_swapped_datagrams() -> None:
     for n in order.tolist():
         (found,) = decoder.feed(encoded(sample(n, n * PERIOD)))
         assert isinstance(found, Sample)
-        if clock.take(found, n * 0.01 + 0.03) is Verdict.USED:
+        if clock.take(found, n * 0.01 + 0.03) is SampleState.USED:
             used.append(found.seq)
     assert used == sorted(set(used))
     assert len(used) > 0.9 * kept.size
     spread = kept.max() - kept[0] + 1
     assert clock.sequence.lost / spread == pytest.approx(1 - kept.size / count, abs=0.001)
-    assert clock.verdicts[Verdict.DUPLICATE] == pytest.approx(order.size - kept.size, abs=1)
-    assert clock.verdicts[Verdict.USED] + clock.verdicts[Verdict.LATE] == pytest.approx(
+    assert clock.states[SampleState.DUPLICATE] == pytest.approx(order.size - kept.size, abs=1)
+    assert clock.states[SampleState.USED] + clock.states[SampleState.LATE] == pytest.approx(
         kept.size, abs=1
     )
 
 
 def test_L7_the_window_tells_late_from_doubled() -> None:
     numbers = Sequence()
-    assert numbers.place(100) is Verdict.USED
-    assert numbers.place(100) is Verdict.DUPLICATE
-    assert numbers.place(103) is Verdict.USED
+    assert numbers.place(100) is SampleState.USED
+    assert numbers.place(100) is SampleState.DUPLICATE
+    assert numbers.place(103) is SampleState.USED
     assert numbers.lost == 2
-    assert numbers.place(101) is Verdict.LATE
+    assert numbers.place(101) is SampleState.LATE
     assert numbers.lost == 1
-    assert numbers.place(101) is Verdict.DUPLICATE
-    assert numbers.place(200) is Verdict.USED
-    assert numbers.place(102) is Verdict.LATE
-    assert numbers.place(137) is Verdict.LATE
-    assert numbers.place(200) is Verdict.DUPLICATE
+    assert numbers.place(101) is SampleState.DUPLICATE
+    assert numbers.place(200) is SampleState.USED
+    assert numbers.place(102) is SampleState.LATE
+    assert numbers.place(137) is SampleState.LATE
+    assert numbers.place(200) is SampleState.DUPLICATE
     assert numbers.received == 5
 
 
@@ -293,12 +293,12 @@ def test_E1_reset_in_mid_frame() -> None:
                 assert clock.newest is None
                 assert clock.age(now) == math.inf
             elif isinstance(found, Sample):
-                assert clock.take(found, now) is Verdict.OTHER_BOOT
+                assert clock.take(found, now) is SampleState.OTHER_BOOT
         assert clock.resets == 1
         assert clock.last_reset is Reset.WATCHDOG
         for n, later in enumerate(again[1:], 1):
-            assert clock.take(later, now + n * 0.01) is Verdict.USED
-        assert clock.take(old, now + 0.2) is Verdict.OTHER_BOOT
+            assert clock.take(later, now + n * 0.01) is SampleState.USED
+        assert clock.take(old, now + 0.2) is SampleState.OTHER_BOOT
         assert clock.epoch == 2
         assert clock.newest is not None
         assert clock.newest.sample == again[-1]
@@ -310,13 +310,13 @@ def test_E1_a_greeting_that_comes_late_does_not_bring_the_old_boot_back() -> Non
     assert not clock.greet(greeting())
     assert clock.greet(greeting(boot=5))
     assert not clock.greet(greeting())
-    assert clock.take(made(1), 0.0) is Verdict.OTHER_BOOT
+    assert clock.take(made(1), 0.0) is SampleState.OTHER_BOOT
     assert clock.resets == 1
 
 
 def test_E8_before_a_greeting_no_sample_is_used() -> None:
     clock = DeviceClock()
     for n in range(100):
-        assert clock.take(made(n), n * 0.01) is Verdict.OTHER_BOOT
+        assert clock.take(made(n), n * 0.01) is SampleState.OTHER_BOOT
     assert clock.newest is None
     assert clock.age(1.0) == math.inf

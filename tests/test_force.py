@@ -21,7 +21,7 @@ from antennate.robots.antenna import AntennaSpec
 from antennate.robots.sensor import SensorParams
 from antennate.sim.bench import Bench
 
-BARE = AntennaSpec(film_stiffness_n_mm_per_deg=0.0)
+BARE = AntennaSpec(sensor_stiffness_n_mm_per_deg=0.0)
 SENSOR = SensorParams()
 SMALL = loads.ForceConfig(
     profiles=("stiff", "compliant"), loads=12, place_step=0.25, traverses=4, speeds=(0.15,)

@@ -26,7 +26,7 @@ from antennate.sim.bench import Bench, compile_bench
 from antennate.types import Floats
 
 ANTENNA, SENSOR = AntennaSpec(), SensorParams()
-BARE = AntennaSpec(length=0.1, film_stiffness_n_mm_per_deg=0.0)
+BARE = AntennaSpec(length=0.1, sensor_stiffness_n_mm_per_deg=0.0)
 """The springs alone on 100 mm, as in the table of facts that the expected stiffnesses come from."""
 
 

@@ -129,5 +129,5 @@ def test_json_is_the_result_alone_and_out_keeps_it(
     assert main(["doctor", "--bus", "/dev/null", "--json", "--out", str(out)]) == BAD_INPUT
     result = json.loads(capsys.readouterr().out)
     assert result == json.loads((out / "result.json").read_text())
-    assert (result["schema"], result["command"], result["verdict"]) == (1, "doctor", "bad")
+    assert (result["schema"], result["command"], result["grade"]) == (1, "doctor", "bad")
     assert result["rows"][0]["check"] == "port"

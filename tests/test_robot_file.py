@@ -89,7 +89,7 @@ def test_doctor_judges_the_antennae_by_the_calibration_file(file: Path) -> None:
     rows = {row.check: row for row in checkup.rows}
     low, high = GOOD.counts_low, GOOD.counts_high
     assert rows["left at rest"].expected.startswith(f"{low - 20:.0f} to {high + 20:.0f} counts")
-    assert rows["left at rest"].verdict == "bad"
+    assert rows["left at rest"].grade == "bad"
 
 
 def test_S9_doctor_names_the_board_to_which_the_films_do_not_belong(file: Path) -> None:

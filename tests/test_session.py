@@ -27,6 +27,7 @@ from antennate.hardware.ports.port import PortError
 from antennate.hardware.safety.causes import Cause, State
 from antennate.params import ControlParams
 from antennate.robots.spec import RobotSpec
+from antennate.telemetry.header import Header
 from antennate.telemetry.replay import replay
 from antennate.telemetry.ticks import Tick
 from antennate.twin.bus import Fault, Trouble
@@ -696,7 +697,9 @@ def test_B13_below_the_first_level_it_walks_at_half_the_pace_and_replays_alike()
     assert {Cause.SUPPLY_WARN} <= {active.cause for active in made.session.outputs.causes}
     assert legs[450] - legs[250] == pytest.approx(np.full(12, 2 * math.pi), rel=0.03)
     assert legs[790] - legs[590] == pytest.approx(np.full(12, math.pi), rel=0.03)
-    found = replay(ticks, make_controller("closed", ControlParams()), 0.01)
+    found = replay(
+        ticks, make_controller("closed"), Header(controller="closed", params=ControlParams())
+    )
     assert (len(found.maneuvers), found.different, found.commands) == (len(ticks), 0, 0)
 
 

@@ -12,7 +12,7 @@ from hardware_faults import causes
 from hardware_rig import BENT, FREE, LIMIT, PERIOD, Rig, armed, pose_change
 
 from antennate.control.registry import make_controller
-from antennate.hardware.esp32.clock import DeviceClock, Verdict
+from antennate.hardware.esp32.clock import DeviceClock, SampleState
 from antennate.hardware.esp32.wire import Hello, Reset
 from antennate.hardware.safety.causes import Cause, Outputs, State
 from antennate.params import ControlParams
@@ -108,7 +108,7 @@ def test_L10_a_burst_of_old_frames_is_not_acted_upon(stall: float, behind: int) 
             arrived = [n] if n > end + 1 else list(range(max(stop, end - behind), n + 1))
         samples = []
         for number in arrived:
-            if clock.take(made(number), now) is Verdict.USED and clock.newest is not None:
+            if clock.take(made(number), now) is SampleState.USED and clock.newest is not None:
                 counts = (FREE + np.rint(rng.normal(0, 2.5, 2))).tolist()
                 samples.append((number * PERIOD, *counts))
         outputs = rig.step(samples, age=clock.age(now), arm=n == 100)

@@ -100,5 +100,5 @@ def test_S8_an_objection_keeps_the_robot_from_being_armed() -> None:
 
 
 def test_limits_in_the_wrong_order_are_refused() -> None:
-    with pytest.raises(ValidationError, match="still must be below bend"):
+    with pytest.raises(ValidationError, match="still must be below level"):
         TouchCheckParams(still=0.3)

@@ -400,7 +400,7 @@ def test_our_master_over_a_serial_line(server: PtyServer) -> None:
     serial_port = pytest.importorskip("antennate.hardware.ports.serial_port")
     port = serial_port.SerialPort(server.path, 1_000_000)
     try:
-        bus = Bus(port, Timing(gap=0.1, doubt=0.5))
+        bus = Bus(port, Timing(gap=0.1, latest=0.5))
         for _ in range(20):
             answers = bus.read_all(IDS, MOTION, budget=2.0)
             assert positions(answers) == {i: 100 * i for i in IDS}

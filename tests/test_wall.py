@@ -105,7 +105,7 @@ def test_uniform_chains_take_the_same_shapes_and_forces_scale() -> None:
             **SHORT,
             "wall": {**SHORT["wall"], "gravity": "off", "speed": 0.004},
             "variation": STILL,
-            "antenna": {"film_stiffness_n_mm_per_deg": 0.0},
+            "antenna": {"sensor_stiffness_n_mm_per_deg": 0.0},
         }
     )
     stiff, soft = (passage(config, arm, 0) for arm in ("stiff", "compliant"))

@@ -15,7 +15,7 @@ from antennate.control.loop import run_loop
 from antennate.control.registry import make_controller
 from antennate.experiments.tunnel.monitor import TrialMonitor
 from antennate.experiments.tunnel.run import TunnelConfig
-from antennate.hardware.driving.connect import DOUBT
+from antennate.hardware.driving.connect import LATEST
 from antennate.hardware.driving.hardware_robot import HardwareRobot
 from antennate.hardware.driving.session import Session
 from antennate.hardware.dynamixel import bringup
@@ -155,7 +155,7 @@ def rig(config: TwinConfig, name: str = "closed", touch: TouchCheckParams | None
     robot = build(config)
     params = ControlParams(**dict(config.control))
     clock = LockstepClock(robot)
-    bus = Bus(clock, Timing(config.robot.baud, doubt=DOUBT), clock=clock.now)
+    bus = Bus(clock, Timing(config.robot.baud, latest=LATEST), clock=clock.now)
     session = Session(
         board=Board(BoardPort(robot, clock), SupervisorParams().stale_age),
         actuators=DynamixelActuators(bus, Joints(config.robot), clock.now),
@@ -179,7 +179,7 @@ def before_twin(config: TunnelConfig, name: str, trial: int) -> Stage:
     robot = TwinRobot(watch.body, spec, period, boot_id=trial + 1)
     clock = LockstepClock(robot)
     board = Board(BoardPort(robot, clock), SupervisorParams().stale_age)
-    bus = Bus(clock, Timing(spec.baud, doubt=DOUBT), clock=clock.now)
+    bus = Bus(clock, Timing(spec.baud, latest=LATEST), clock=clock.now)
     while board.newest(clock.now()) is None and clock.now() < _WARM_UP:
         clock.sleep(period)
         board.poll(clock.now())

@@ -163,7 +163,7 @@ def scaling(workers: int) -> dict[str, Any]:
             {
                 "wall": {"gravity": gravity},
                 "variation": still,
-                "antenna": {"film_stiffness_n_mm_per_deg": 0.0},
+                "antenna": {"sensor_stiffness_n_mm_per_deg": 0.0},
             }
         )
         stiff, soft = (passage(config, profile, 0) for profile in ("stiff", "compliant"))

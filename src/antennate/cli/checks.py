@@ -24,19 +24,19 @@ def show_rows(rows: Sequence[Row], file: IO[str] | None = None) -> None:
     for head in ("", "check", "expected", "found"):
         table.add_column(head, overflow="fold", no_wrap=not head)
     for row in rows:
-        verdict = Text(row.verdict, _STYLES[row.verdict])
+        grade = Text(row.grade, _STYLES[row.grade])
         words = (f"{row.part}: {row.check}", row.expected, row.found)
-        table.add_row(verdict, *(Text(one_line(word)) for word in words))
+        table.add_row(grade, *(Text(one_line(word)) for word in words))
     console.print(table)
-    wrong = [row for row in rows if row.verdict != "ok"]
-    for row in sorted(wrong, key=lambda row: row.verdict == "warn"):
+    wrong = [row for row in rows if row.grade != "ok"]
+    for row in sorted(wrong, key=lambda row: row.grade == "warn"):
         line = Text.assemble(
-            (f"{row.verdict:<4} ", _STYLES[row.verdict]),
+            (f"{row.grade:<4} ", _STYLES[row.grade]),
             (f"{row.part}: {row.check}: ", "bold"),
             one_line(row.cure),
         )
         console.print(line, soft_wrap=True)
-    bad = sum(row.verdict == "bad" for row in wrong)
+    bad = sum(row.grade == "bad" for row in wrong)
     console.print(Text(_sentence(len(rows), bad, len(wrong) - bad)), soft_wrap=True)
 
 

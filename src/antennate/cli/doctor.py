@@ -68,7 +68,7 @@ def command(argv: Sequence[str]) -> int:
         sys.stdout.write(to_json(checkup.result(changes)))
     else:
         show_rows(checkup.rows)
-    return BAD_INPUT if checkup.verdict == "bad" else OK
+    return BAD_INPUT if checkup.grade == "bad" else OK
 
 
 def _check(orders: Orders) -> None:

@@ -60,7 +60,7 @@ def command(argv: Sequence[str]) -> int:
     path = Path(options.log)
     with LogReader(path) as log:
         controller = recorded_controller(log.header, config.controller)
-        found = replay(log, controller, log.header.params.period)
+        found = replay(log, controller, log.header)
     result = _result(log, found, config.controller)
     if options.out is not None:
         with RunDirectory.create("replay", options.out, options.overwrite) as folder:

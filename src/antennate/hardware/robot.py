@@ -5,8 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Self
 
-from antennate.hardware.esp32.film import calibrated
+from antennate.antenna.calibration import Calibration
+from antennate.errors import ConfigError
 from antennate.params import (
+    ConditioningParams,
     ControlParams,
     NetworkParams,
     Params,
@@ -19,18 +21,10 @@ from antennate.robots.spec import RobotSpec
 class RobotConfig(Params):
     """One robot: its servos, its flex sensors, its controller's numbers and its network."""
 
-    calibration: str | None = number(
-        None,
-        "1",
-        "assumed: the numbers of control.conditioning",
-        "file of `antennate calibrate`, for both antennae, in place of control.conditioning",
-    )
-    sensor_id: str | None = number(
-        None,
-        "1",
-        "assumed: that of the calibration file",
-        "name of the flex sensor; 16 hexadecimal digits name the board it is soldered to",
-    )
+    calibration: str | None = number(None, "1", "assumed: the numbers of control.conditioning")
+    """File of `antennate calibrate`, for both antennae, in place of control.conditioning."""
+    sensor_id: str | None = number(None, "1", "assumed: that of the calibration file")
+    """Name of the flex sensor; 16 hexadecimal digits name the board it is soldered to."""
     robot: RobotSpec = RobotSpec()
     control: ControlParams = ControlParams()
     limits: SupervisorParams = SupervisorParams()
@@ -40,11 +34,24 @@ class RobotConfig(Params):
         """The same with the curve and the flex sensor of the calibration file in place of its name.
 
         Raises:
-            CalibrationError: The file cannot be used.
-            ConfigError: There is another curve beside it.
+            CalibrationError: The file cannot be used, or is of another flex sensor.
+            ConfigError: There is another curve, or another theta, beside it.
         """
         if self.calibration is None:
             return self
-        control, sensor = calibrated(self.control, Path(self.calibration), self.sensor_id)
-        known = {"control": control, "sensor_id": sensor.sensor_id, "calibration": None}
+        path, own = self.calibration, self.control
+        file = Calibration.load(Path(path), self.sensor_id)
+        averaging = own.conditioning.averaging_time
+        if own.conditioning != ConditioningParams(averaging_time=averaging):
+            raise ConfigError(
+                f"control.conditioning: expected no curve beside calibration file {path}, found "
+                "one; give averaging_time alone"
+            )
+        if own.rule.threshold != file.threshold:
+            raise ConfigError(
+                f"control.rule.threshold: expected theta of {path}, {file.threshold:g}, found "
+                f"{own.rule.threshold:g}; set it alike"
+            )
+        control = own.model_copy(update={"conditioning": file.conditioning(averaging)})
+        known = {"control": control, "sensor_id": file.sensor_id, "calibration": None}
         return self.model_copy(update=known)

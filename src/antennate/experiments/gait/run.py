@@ -37,32 +37,17 @@ class GaitStudyConfig(Params):
 
     unread: ClassVar[tuple[str, ...]] = HARDWARE_ALONE
     cycles: int = number(
-        4,
-        "1",
-        "measured: antennate gait, six cycles give the same speeds to 0.3 %",
-        "gait cycles measured",
-        ge=2,
-        le=100,
+        4, "1", "measured: antennate gait, six cycles give the same speeds to 0.3 %", ge=2, le=100
     )
+    """Gait cycles measured."""
     settling_cycles: int = number(
-        2,
-        "1",
-        "measured: antennate gait, speeds then change by 1 % from cycle to cycle",
-        "gait cycles before measuring",
-        ge=0,
-        le=100,
+        2, "1", "measured: antennate gait, 1 % from cycle to cycle then", ge=0, le=100
     )
-    sweep_points: int = number(
-        24,
-        "1",
-        "assumed: steps of 15 deg",
-        "leads of the body wave tried, evenly over a full turn",
-        ge=2,
-        le=360,
-    )
-    rate: float = number(
-        100.0, "Hz", "paper: about 100 Hz over serial", "control ticks per second", gt=0, le=1000
-    )
+    """Gait cycles before measuring."""
+    sweep_points: int = number(24, "1", "assumed: steps of 15 deg", ge=2, le=360)
+    """Leads of the body wave tried, evenly over a full turn."""
+    rate: float = number(100.0, "Hz", "paper: about 100 Hz over serial", gt=0, le=1000)
+    """Control ticks per second."""
     robot: RobotSpec = RobotSpec()
     gait: GaitParams = GaitParams()
     physics: PhysicsParams = PhysicsParams()

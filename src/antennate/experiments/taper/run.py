@@ -27,12 +27,8 @@ _LARGEST_MM = 100.0
 class TaperConfig(TaperParams):
     """The taper and, if measured, the file of its diameters."""
 
-    diameters: str | None = number(
-        None,
-        "1",
-        "assumed: no measurement",
-        f"CSV file with a column {COLUMN}, base first; replaces segments, ends and law",
-    )
+    diameters: str | None = number(None, "1", "assumed: no measurement")
+    """CSV file with a column diameter_mm, base first; replaces segments, ends and law."""
 
 
 @dataclass(frozen=True)

@@ -50,17 +50,14 @@ class WallConfig(Params):
         "antenna.base_spacing",
         *(f"antenna.sensor.{n}" for n in SensorParams.model_fields if n != "active_length"),
     )
-    trials: int = number(
-        20, "1", "paper: 20 trials a profile", "trials of every profile", ge=1, le=10000
-    )
-    seed: int = number(1, "1", "assumed: any", "seed of all chance", ge=0)
+    trials: int = number(20, "1", "paper: 20 trials a profile", ge=1, le=10000)
+    """Trials of every profile."""
+    seed: int = number(1, "1", "assumed: any", ge=0)
+    """Seed of all chance."""
     profiles: tuple[Profile, ...] = number(
-        tuple(PROFILES),
-        "1",
-        "paper: stiff, descending, compliant; assumed: two controls it lacks",
-        "profiles to run",
-        min_length=1,
+        tuple(PROFILES), "1", "paper: its three; assumed: two controls it lacks", min_length=1
     )
+    """Profiles to run."""
     wall: WallParams = WallParams()
     antenna: AntennaSpec = AntennaSpec()
     variation: BenchVariationParams = BenchVariationParams()

@@ -10,8 +10,7 @@ from antennate.hardware.doctor.board_survey import BoardSurvey
 from antennate.hardware.doctor.check import Check, Finding
 from antennate.hardware.doctor.config import DoctorConfig
 from antennate.hardware.esp32 import frame
-from antennate.hardware.esp32.film import require_film
-from antennate.hardware.esp32.wire import Reset, objections
+from antennate.hardware.esp32.wire import Reset, objections, require_sensor
 from antennate.hardware.safety import diagnosis
 from antennate.hardware.safety.diagnosis import Band, ChannelDiagnosis
 
@@ -40,7 +39,7 @@ def checks(board: BoardSurvey, robot: DoctorConfig) -> list[Check[BoardSurvey]]:
             for side, name in enumerate(("left", "right")):
                 found += _antenna(board, robot, name, board.counts[:, side].tolist())
     try:
-        require_film(board.hello, robot.sensor_id)
+        require_sensor(board.hello, robot.sensor_id)
     except CalibrationError:
         found.append(_SENSORS)
     return found

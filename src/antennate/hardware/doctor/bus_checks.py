@@ -5,7 +5,7 @@ from __future__ import annotations
 from statistics import median
 
 from antennate.hardware.doctor.bus_survey import BusSurvey
-from antennate.hardware.doctor.check import Check, Finding, Verdict, grouped, ids_text
+from antennate.hardware.doctor.check import Check, Finding, Grade, grouped, ids_text
 from antennate.hardware.doctor.config import DoctorConfig
 from antennate.hardware.doctor.register_checks import FIX, OFF_AND_ON, REGISTER_CHECKS, known
 from antennate.hardware.dynamixel.tables import TABLES
@@ -80,8 +80,8 @@ def _ids(bus: BusSurvey, robot: DoctorConfig) -> Finding:
         )
     if extra and not lone:
         cures.append("unplug those that are not expected, or name them under robot")
-    verdict: Verdict = "bad" if missing else "warn" if extra else "ok"
-    return Finding(", ".join(parts) or ids_text(bus.here), verdict, "; ".join(cures))
+    grade: Grade = "bad" if missing else "warn" if extra else "ok"
+    return Finding(", ".join(parts) or ids_text(bus.here), grade, "; ".join(cures))
 
 
 def _answers(bus: BusSurvey, robot: DoctorConfig) -> Finding:

@@ -11,7 +11,7 @@ from typing import Generic, Literal, NamedTuple, TypeVar
 from antennate.hardware.doctor.config import DoctorConfig
 from antennate.hardware.ports.port import Port
 
-Verdict = Literal["ok", "warn", "bad"]
+Grade = Literal["ok", "warn", "bad"]
 Opener = Callable[[int], AbstractContextManager[Port]]
 """Opens a port at a number of bits per second for as long as the context lasts; PortError."""
 Survey = TypeVar("Survey")
@@ -27,7 +27,7 @@ class Row:
         check: Name of the check.
         expected: What would be good.
         found: What was found.
-        verdict: "ok"; "warn", the robot may walk but not well; "bad", it must not.
+        grade: "ok"; "warn", the robot may walk but not well; "bad", it must not.
         cure: What to do, empty if all is well.
     """
 
@@ -35,21 +35,21 @@ class Row:
     check: str
     expected: str
     found: str
-    verdict: Verdict
+    grade: Grade
     cure: str = ""
 
 
 class Finding(NamedTuple):
-    """What a check found; the cure is shown only if the verdict is not "ok"."""
+    """What a check found; the cure is shown only if the grade is not "ok"."""
 
     found: str
-    verdict: Verdict = "ok"
+    grade: Grade = "ok"
     cure: str = ""
 
     def row(self, part: str, check: str, expected: str) -> Row:
         """The result of the check that found this."""
-        cure = "" if self.verdict == "ok" else self.cure
-        return Row(part, check, expected, self.found, self.verdict, cure)
+        cure = "" if self.grade == "ok" else self.cure
+        return Row(part, check, expected, self.found, self.grade, cure)
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,9 +72,9 @@ class Check(Generic[Survey]):
         return self.measure(survey, robot).row(part, self.name, expected)
 
 
-def worst(verdicts: Iterable[Verdict]) -> Verdict:
-    """The worst verdict; "ok" of none."""
-    found = set(verdicts)
+def worst(grades: Iterable[Grade]) -> Grade:
+    """The worst grade; "ok" of none."""
+    found = set(grades)
     return "bad" if "bad" in found else "warn" if "warn" in found else "ok"
 
 

@@ -9,7 +9,7 @@ from typing import Any
 from antennate.hardware.doctor import board_checks, bus_checks
 from antennate.hardware.doctor.board_survey import BoardSurvey, survey_board
 from antennate.hardware.doctor.bus_survey import BusSurvey, survey_bus
-from antennate.hardware.doctor.check import Opener, Row, Verdict, worst
+from antennate.hardware.doctor.check import Grade, Opener, Row, worst
 from antennate.hardware.doctor.config import DoctorConfig
 from antennate.hardware.doctor.ports import latency_row, port_row
 from antennate.hardware.esp32.board import BOARD_BAUD
@@ -31,16 +31,16 @@ class Checkup:
     board: BoardSurvey | None = None
 
     @property
-    def verdict(self) -> Verdict:
+    def grade(self) -> Grade:
         """The worst of all rows."""
-        return worst(row.verdict for row in self.rows)
+        return worst(row.grade for row in self.rows)
 
     def result(self, changes: Sequence[str] = ()) -> dict[str, Any]:
         """The content of result.json, with the changes that were made before."""
         return {
             "schema": 1,
             "command": "doctor",
-            "verdict": self.verdict,
+            "grade": self.grade,
             "rows": [asdict(row) for row in self.rows],
             "bus": None if self.bus is None else self.bus.result(),
             "esp32": None if self.board is None else self.board.result(),
@@ -88,7 +88,7 @@ def _port(
 ) -> list[Row]:
     """Rows of a port, and of what is behind it if it opens."""
     first = port_row(part, path, opener, baud)
-    if first.verdict == "bad":
+    if first.grade == "bad":
         return [first]
     try:
         return [first, *look(opener)]

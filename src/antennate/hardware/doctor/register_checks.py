@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 from antennate.hardware.doctor.bus_survey import BusSurvey
-from antennate.hardware.doctor.check import Check, Finding, Verdict, grouped, ids_text, worst
+from antennate.hardware.doctor.check import Check, Finding, Grade, grouped, ids_text, worst
 from antennate.hardware.doctor.config import DoctorConfig
 from antennate.hardware.dynamixel.tables import (
     RETURN_DELAY_UNIT,
@@ -24,8 +24,8 @@ _ANSWERS_ALL = 2
 _VOLT = 0.1
 _SHUTDOWNS = XC430_W240["shutdown"].default or 0
 
-Judge = Callable[[BusSurvey, DoctorConfig, int, int], Verdict]
-"""The verdict on a register of a servo: given survey, robot, id and value."""
+Judge = Callable[[BusSurvey, DoctorConfig, int, int], Grade]
+"""The grade on a register of a servo: given survey, robot, id and value."""
 
 
 def known(bus: BusSurvey, robot: DoctorConfig) -> dict[int, dict[str, int]]:
@@ -51,17 +51,17 @@ def _register(
 
     def measure(bus: BusSurvey, robot: DoctorConfig) -> Finding:
         values = _values(bus, robot, register)
-        verdicts: dict[int, Verdict] = {
+        grades: dict[int, Grade] = {
             servo: judge(bus, robot, servo, value) for servo, value in values.items()
         }
-        return _of_servos(verdicts, grouped(values, text), cure)
+        return _of_servos(grades, grouped(values, text), cure)
 
     return Check(name, expected, measure)
 
 
-def _of_servos(verdicts: Mapping[int, Verdict], found: str, cure: str) -> Finding:
-    ids = ids_text(servo for servo, verdict in verdicts.items() if verdict != "ok")
-    return Finding(found, worst(verdicts.values()), cure.replace("{ids}", ids))
+def _of_servos(grades: Mapping[int, Grade], found: str, cure: str) -> Finding:
+    ids = ids_text(servo for servo, grade in grades.items() if grade != "ok")
+    return Finding(found, worst(grades.values()), cure.replace("{ids}", ids))
 
 
 def _required(register: str) -> Judge:
@@ -71,16 +71,16 @@ def _required(register: str) -> Judge:
     )
 
 
-def _unless(good: Callable[[int], bool], verdict: Verdict) -> Judge:
-    """A verdict on values that are not good."""
-    return lambda bus, robot, servo, value: "ok" if good(value) else verdict
+def _unless(good: Callable[[int], bool], grade: Grade) -> Judge:
+    """A grade on values that are not good."""
+    return lambda bus, robot, servo, value: "ok" if good(value) else grade
 
 
 def _position_limits(bus: BusSurvey, robot: DoctorConfig) -> Finding:
     rules = settings(robot.robot)
     low, high = (_values(bus, robot, f"{end}_position_limit") for end in ("min", "max"))
     both = {i: (low[i], high[i]) for i in rules["min_position_limit"] if i in low and i in high}
-    verdicts: dict[int, Verdict] = {
+    grades: dict[int, Grade] = {
         servo: "ok" if room else "bad"
         for servo, (least, most) in both.items()
         for room in (
@@ -89,10 +89,10 @@ def _position_limits(bus: BusSurvey, robot: DoctorConfig) -> Finding:
         )
     }
     found = grouped(both, lambda ends: f"{ends[0]} to {ends[1]}")
-    return _of_servos(verdicts, found, f"{FIX}: {{ids}} would refuse goals")
+    return _of_servos(grades, found, f"{FIX}: {{ids}} would refuse goals")
 
 
-def _supply(bus: BusSurvey, robot: DoctorConfig, servo: int, value: int) -> Verdict:
+def _supply(bus: BusSurvey, robot: DoctorConfig, servo: int, value: int) -> Grade:
     registers, limits, volt = bus.registers[servo], robot.limits, _VOLT * value
     low, high = registers.get("min_voltage_limit", 0), registers.get("max_voltage_limit", 0xFFFF)
     body = bus.here[servo].model == XC430_W240.model
@@ -101,7 +101,7 @@ def _supply(bus: BusSurvey, robot: DoctorConfig, servo: int, value: int) -> Verd
     return "warn" if body and volt < limits.supply_warn else "ok"
 
 
-def _heat(bus: BusSurvey, robot: DoctorConfig, servo: int, heat: int) -> Verdict:
+def _heat(bus: BusSurvey, robot: DoctorConfig, servo: int, heat: int) -> Grade:
     default = XC430_W240["temperature_limit"].default or 0
     most = bus.registers[servo].get("temperature_limit", default)
     return "bad" if heat >= most else "warn" if heat >= most - robot.doctor.heat_margin else "ok"

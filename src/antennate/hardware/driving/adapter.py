@@ -36,7 +36,7 @@ def require_quick(
     Raises:
         BringUpError: Answers come too late; with the command that cures it.
     """
-    bus = Bus(port, Timing(baud, gap=_PATIENCE, doubt=_PATIENCE), clock=clock)
+    bus = Bus(port, Timing(baud, gap=_PATIENCE, latest=_PATIENCE), clock=clock)
     times: list[float] = []
     for servo in ids:
         while len(times) < _PINGS:

@@ -20,7 +20,7 @@ from antennate.hardware.dynamixel.bringup import BringUpError
 from antennate.hardware.dynamixel.bus import Bus
 from antennate.hardware.dynamixel.tables import XC430_W240
 from antennate.hardware.esp32.board import BOARD_BAUD, Board
-from antennate.hardware.esp32.film import require_film
+from antennate.hardware.esp32.wire import require_sensor
 from antennate.hardware.host_clock import HostClock
 from antennate.hardware.joints import Joints
 from antennate.hardware.ports.finder import finder
@@ -33,7 +33,7 @@ from antennate.types import Controller
 
 _WHO = DoctorParams()
 _PATIENCE = 0.05
-DOUBT = 0.07
+LATEST = 0.07
 """Latest answer while servos have torque [s]: less than the 100 ms of their watchdogs (assumed)."""
 
 
@@ -82,9 +82,9 @@ def prepare(
     """
     board = Board(esp32, config.limits.stale_age)
     await_board(board, clock, bus, config.swapped)
-    require_film(board.hello, config.sensor_id)
+    require_sensor(board.hello, config.sensor_id)
     require_quick(bus, config.robot.ids[:3], config.robot.baud, clock.now, path)
-    master = Bus(bus, Timing(config.robot.baud, doubt=DOUBT), clock=clock.now)
+    master = Bus(bus, Timing(config.robot.baud, latest=LATEST), clock=clock.now)
     require_servos(master, config.robot)
     board.count_anew(clock.now())
     return Session(

@@ -88,9 +88,9 @@ class Session:
         if self.timing is None:
             self.timing = LoopTiming(now, self.period)
         self.timing.begin(now)
-        before = sum(self.board.clock.verdicts.values())
+        before = sum(self.board.clock.states.values())
         frame = self.robot.read()
-        self._refused = sum(self.board.clock.verdicts.values()) - before - self.robot.used
+        self._refused = sum(self.board.clock.states.values()) - before - self.robot.used
         control = self.control
         self.quality.step(float(frame.t[0]), frame.counts[0].tolist(), control.decision.contact)
         counts = self.quality.counts

@@ -77,14 +77,14 @@ class Timing:
         gap: Longest silence inside an answer or before it, beyond the time on the wire [s]; more
             than the return delay of the servos and the latency of the adapter.
         quiet: Silence after which nothing more is expected [s].
-        doubt: An answer later than this never comes [s]: six times the 16 ms of a slow adapter
+        latest: An answer later than this never comes [s]: six times the 16 ms of a slow adapter
             (assumed).
     """
 
     baud: int = 1_000_000
     gap: float = _GAP
     quiet: float = _GAP
-    doubt: float = 0.1
+    latest: float = 0.1
 
     def wire(self, count: int) -> float:
         """Time of so many bytes on the wire [s]."""

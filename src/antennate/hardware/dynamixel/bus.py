@@ -6,7 +6,7 @@ are asked anew without it.
 
 Nothing in the protocol says to which request an answer belongs, so late answers are told apart by
 what can be told: the id and the length. Each id keeps the lengths of its unanswered requests for
-`doubt` seconds, and meanwhile it is asked for a length that none of them had (some `spare` bytes
+`latest` seconds, and meanwhile it is asked for a length that none of them had (some `spare` bytes
 more), or not at all. After trouble the bus is also drained until it was quiet for a while.
 Time is monotonic and comes from outside; nothing is kept that an exception could leave wrong.
 """
@@ -20,10 +20,10 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from antennate.hardware.actuators import Tally
 from antennate.hardware.dynamixel import packets
 from antennate.hardware.dynamixel.answers import SILENT, Answer, Span, Timing, answer, cut
-from antennate.hardware.dynamixel.doubts import Doubts
 from antennate.hardware.dynamixel.exclusive import exclusive
 from antennate.hardware.dynamixel.packets import HEADER, OVERHEAD, Packet, Status, StatusError
 from antennate.hardware.dynamixel.parser import Parser
+from antennate.hardware.dynamixel.pending import PendingRequests
 from antennate.hardware.ports.port import Port, PortError
 
 CHUNK = 1024
@@ -67,7 +67,7 @@ class Bus:
         self._clock = clock
         self._fast = fast
         self._fast_failures = 0
-        self._doubts = Doubts(self.timing.doubt, clock)
+        self._pending = PendingRequests(self.timing.latest, clock)
         self._missed: dict[int, int] = {}
         self._calm = False
         self._last_byte = self._sent = clock()
@@ -134,7 +134,7 @@ class Bus:
     @exclusive
     def read(self, servo: int, span: Span) -> Answer:
         """Read a span of one servo."""
-        return self._read_one(servo, span, self._clock() + self.timing.doubt)
+        return self._read_one(servo, span, self._clock() + self.timing.latest)
 
     @exclusive
     def write(self, servo: int, address: int, data: bytes) -> Answer:
@@ -170,26 +170,26 @@ class Bus:
 
     @exclusive
     def settle(self) -> None:
-        """Wait until no late answer can come any more and noise is over, at most `doubt` seconds.
+        """Wait until no late answer can come any more and noise is over, at most `latest` seconds.
 
         Raises:
             PortError: The bus is gone.
         """
-        end = self._clock() + self.timing.doubt
-        while (left := self._doubts.longest()) > 0.0:
+        end = self._clock() + self.timing.latest
+        while (left := self._pending.longest()) > 0.0:
             self._listen(left, self._clock() + left)
         self._quiet(end)
 
     # one request and its answers
 
     def _ask(self, servo: int, request: bytes, length: int) -> Answer:
-        if self._doubts.holds(servo):
+        if self._pending.holds(servo):
             self.settle()
-        end = self._clock() + self.timing.doubt
+        end = self._clock() + self.timing.latest
         return self._exchange(request, [servo], length, end).get(servo, SILENT)
 
     def _read_one(self, servo: int, span: Span, end: float) -> Answer:
-        length = self._doubts.free([servo], span)
+        length = self._pending.free([servo], span)
         if length is None:
             return SILENT
         request = packets.read(servo, span.address, length)
@@ -198,17 +198,17 @@ class Bus:
         return found.get(servo, SILENT)
 
     def _read_chain(self, ids: Sequence[int], span: Span, end: float) -> dict[int, Answer]:
-        length = self._doubts.free(ids, span)
+        length = self._pending.free(ids, span)
         if length is None:
             return {}
         request = packets.sync_read(ids, span.address, length)
         return cut(self._exchange(request, ids, length, end), span.length)
 
     def _read_fast(self, ids: Sequence[int], span: Span, end: float) -> dict[int, Answer]:
-        length = self._doubts.free(ids, span)
+        length = self._pending.free(ids, span)
         if length is None:
             return {}
-        self._doubts.open(ids, length)
+        self._pending.open(ids, length)
         if not self._send(packets.fast_sync_read(ids, span.address, length), end):
             return {}
         size = packets.fast_reply_size(len(ids), length)
@@ -246,8 +246,8 @@ class Bus:
         Returns:
             An answer by id, of those that gave a right one.
         """
-        doubtful = {servo for servo in ids if self._doubts.holds(servo)}
-        self._doubts.open(ids, length)
+        late = {servo for servo in ids if self._pending.holds(servo)}
+        self._pending.open(ids, length)
         if not self._send(request, end):
             return {}
         parser, good, stale = Parser(), dict[int, Answer](), 0
@@ -256,7 +256,7 @@ class Bus:
         while len(good) < len(ids) and (part := self._listen(wait, end)):
             wait = self.timing.answer(length)
             for packet in parser.feed(part):
-                status = fitting(packet, length, doubtful)
+                status = fitting(packet, length, late)
                 if status and status.id in ids and status.id not in good:
                     good[status.id] = answer(status)
                     continue
@@ -273,7 +273,7 @@ class Bus:
     def _finish(
         self, ids: Sequence[int], length: int, good: Mapping[int, Answer], clean: bool
     ) -> None:
-        self._doubts.close(good, length)
+        self._pending.close(good, length)
         missed = len(ids) - len(good)
         self.tally.misses += missed
         self._calm = clean and not missed
@@ -329,18 +329,18 @@ class Bus:
         return part
 
 
-def fitting(packet: Packet, length: int, doubtful: set[int]) -> Status | None:
+def fitting(packet: Packet, length: int, late: set[int]) -> Status | None:
     """The status in a packet, if it can be the answer to a request for so many bytes.
 
     Args:
         packet: Any packet.
         length: Bytes of data asked for.
-        doubtful: Ids whose late answers may still come: a refusal of theirs may be to the last one.
+        late: Ids whose late answers may still come: a refusal of theirs may be to the last one.
     """
     status = packets.as_status(packet)
     if status is None:
         return None
     refused = status.error != StatusError.NONE and not status.data
-    if refused and length > 0 and status.id in doubtful:
+    if refused and length > 0 and status.id in late:
         return None
     return status if refused or len(status.data) == length else None

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from antennate.hardware.esp32.clock import DeviceClock, Timed, Verdict
+from antennate.hardware.esp32.clock import DeviceClock, SampleState, Timed
 from antennate.hardware.esp32.decoder import FrameDecoder
 from antennate.hardware.esp32.frame import SAMPLE_FRAME_SIZE, encode_request
 from antennate.hardware.esp32.wire import Hello, Sample, objections
@@ -37,7 +37,7 @@ class Board:
 
     Attributes:
         decoder: With the counters of its bytes.
-        clock: With the verdicts on its samples.
+        clock: With the states on its samples.
         hello: The newest greeting, None before the first; of a board that is refused no sample is
             ever used.
         refusals: Why boards or frames were refused: each reason once, newest last, at most 8.
@@ -110,7 +110,7 @@ class Board:
                 self._greet(frame)
             elif not isinstance(frame, Sample):
                 self._refuse(frame.reason)
-            elif self.clock.take(frame, now) is Verdict.USED and self.clock.newest is not None:
+            elif self.clock.take(frame, now) is SampleState.USED and self.clock.newest is not None:
                 used.append(self.clock.newest)
         return used
 

@@ -36,7 +36,7 @@ _WINDOW = 64
 _WINDOW_MASK = (1 << _WINDOW) - 1
 
 
-class Verdict(Enum):
+class SampleState(Enum):
     """What becomes of a sample; only USED ones may be acted upon."""
 
     USED = auto()
@@ -68,25 +68,25 @@ class Sequence:
         """Numbers between the first and the newest that never came [samples]."""
         return 0 if self.highest is None else self.highest - self._first + 1 - self.received
 
-    def place(self, seq: int) -> Verdict:
+    def place(self, seq: int) -> SampleState:
         """Where a number belongs: USED if it is newer than all before, else LATE or DUPLICATE."""
         if self.highest is None:
             self.highest = self._first = seq
             self.received = 1
-            return Verdict.USED
+            return SampleState.USED
         ahead = (seq - self.highest) % _SEQ
         if 0 < ahead < _SEQ // 2:
             self.highest += ahead
             self.received += 1
             self._seen = (self._seen << ahead) & _WINDOW_MASK if ahead < _WINDOW else 0
             self._seen |= 1
-            return Verdict.USED
+            return SampleState.USED
         behind = -ahead % _SEQ
         if behind < _WINDOW and not self._seen >> behind & 1:
             self._seen |= 1 << behind
             self.received += 1
-            return Verdict.LATE
-        return Verdict.DUPLICATE if behind < _WINDOW else Verdict.LATE
+            return SampleState.LATE
+        return SampleState.DUPLICATE if behind < _WINDOW else SampleState.LATE
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,7 +114,7 @@ class DeviceClock:
     """Judges samples by boot, number and the board's time.
 
     Attributes:
-        verdicts: How many samples got which verdict.
+        states: How many samples got which state.
         resets: Boots after the first.
         last_reset: Why the present boot began, None before the first HELLO.
         epoch: Time bases begun.
@@ -123,7 +123,7 @@ class DeviceClock:
     """
 
     def __init__(self) -> None:
-        self.verdicts = dict.fromkeys(Verdict, 0)
+        self.states = dict.fromkeys(SampleState, 0)
         self.resets = 0
         self.last_reset: Reset | None = None
         self.epoch = 0
@@ -163,11 +163,11 @@ class DeviceClock:
         """Samples of all boots that never came; a late one lowers it again."""
         return self._lost_before + self.sequence.lost
 
-    def take(self, sample: Sample, now: float) -> Verdict:
+    def take(self, sample: Sample, now: float) -> SampleState:
         """Judge a sample that arrived at host's time now [s]; a USED one becomes `newest`."""
-        verdict = self._judge(sample, now)
-        self.verdicts[verdict] += 1
-        return verdict
+        state = self._judge(sample, now)
+        self.states[state] += 1
+        return state
 
     def age(self, now: float) -> float:
         """Time since the newest usable sample was taken [s]; inf if that is not known."""
@@ -176,38 +176,42 @@ class DeviceClock:
             return math.inf
         return max(0.0, now - self._floor - 1e-6 * newest.elapsed_us)
 
-    def _judge(self, sample: Sample, now: float) -> Verdict:
+    def _judge(self, sample: Sample, now: float) -> SampleState:
         if sample.boot_id != self._boot:
-            return Verdict.OTHER_BOOT
+            return SampleState.OTHER_BOOT
         if sample.ticks >= self._modulus:
-            return Verdict.OVERRANGE
+            return SampleState.OVERRANGE
         place = self.sequence.place(sample.seq)
-        if place is not Verdict.USED:
+        if place is not SampleState.USED:
             return place
         newest = self.newest
         if newest is None or now - self._arrived >= HIDDEN_WRAP * 1e-6 * self._modulus:
             self._rebase(sample, now)
-            return Verdict.USED
+            return SampleState.USED
         step = (sample.ticks - newest.sample.ticks) % self._modulus
-        verdict = self._judge_time(newest, step, now)
-        if verdict is Verdict.USED:
+        state = self._judge_time(newest, step, now)
+        if state is SampleState.USED:
             self._follow(sample, newest.elapsed_us + step, step, now)
         elif self._consistent(sample):
             self._rebase(sample, now)
-            return Verdict.USED
-        return verdict
+            return SampleState.USED
+        return state
 
-    def _judge_time(self, newest: Timed, step: int, now: float) -> Verdict:
+    def _judge_time(self, newest: Timed, step: int, now: float) -> SampleState:
         if step == 0:
-            return Verdict.FROZEN
+            return SampleState.FROZEN
         if step >= self._modulus // 2:
-            return Verdict.BACK
+            return SampleState.BACK
         late = now - 1e-6 * (newest.elapsed_us + step) - self._floor
         if self._doubts and late > EARLY + DRIFT * 1e-6 * step:
-            return Verdict.BACK
+            return SampleState.BACK
         impossible = late < -EARLY - DRIFT * 1e-6 * step
         numbers = self._number() - newest.seq
-        return Verdict.AHEAD if impossible and step > self._longest_step(numbers) else Verdict.USED
+        return (
+            SampleState.AHEAD
+            if impossible and step > self._longest_step(numbers)
+            else SampleState.USED
+        )
 
     def _number(self) -> int:
         return self.sequence.highest or 0

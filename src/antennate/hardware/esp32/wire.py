@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import re
 import struct
 from dataclasses import dataclass
 from enum import IntEnum
 
+from antennate.errors import CalibrationError
 from antennate.hardware.esp32 import frame
+
+_SERIAL = re.compile("[0-9a-f]{16}")
+"""A sensor id of this form is the serial number of a board."""
 
 
 class Reset(IntEnum):
@@ -136,3 +141,22 @@ def objections(hello: Hello, config_hash: int | None = None) -> tuple[str, ...]:
             "deploy firmware/config.py again"
         )
     return tuple(found)
+
+
+def require_sensor(hello: Hello | None, sensor_id: str | None) -> None:
+    """Refuse a board to which the calibrated sensor is not soldered, where its id names a board.
+
+    Args:
+        hello: What the board has said of itself.
+        sensor_id: That of the calibration.
+
+    Raises:
+        CalibrationError: Says both serial numbers.
+    """
+    if sensor_id is None or not _SERIAL.fullmatch(sensor_id) or hello is None:
+        return
+    if hello.device_id != sensor_id:
+        raise CalibrationError(
+            f"--calibration: expected the board {sensor_id} of its sensor_id, found board "
+            f"{hello.device_id}; calibrate the flex sensors of this board"
+        )

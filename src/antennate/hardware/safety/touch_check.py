@@ -79,7 +79,7 @@ class TouchCheck:
         still = [abs(bend) < self._params.still for bend in bends]
         if all(still):
             return "rest"
-        bent = [abs(bend) >= self._params.bend for bend in bends]
+        bent = [abs(bend) >= self._params.level for bend in bends]
         if sum(bent) != 1 or sum(still) != 1:
             return ""
         if not bent[self._side]:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Sequence
 from antennate.hardware.dynamixel.answers import Span
 
 
-class Doubts:
+class PendingRequests:
     """For each id the lengths of its unanswered requests, each remembered for a while.
 
     Args:
