@@ -129,7 +129,7 @@ def _judge(trials: list[Trial], noise: str, spacing: float) -> dict[str, Any]:
     for cue in enough:
         guess = calibrate_and_guess(cue, known, truth, asked)
         found["distance"][cue] = errors(guess[left], real[left])
-        found["gap"][cue] = errors(*_gaps(test, guess, spacing))
+        found["gap"][cue] = errors(*gaps(test, guess, spacing))
     truth, real = (np.array([f.reach for f in group]) for group in (known, asked))
     for cue in [cue for cue in TIP_CUES if cue in enough]:
         guess = calibrate_and_guess(cue, known, truth, asked, tip=True)
@@ -137,7 +137,7 @@ def _judge(trials: list[Trial], noise: str, spacing: float) -> dict[str, Any]:
     return found
 
 
-def _gaps(test: list[Trial], guess: Floats, spacing: float) -> tuple[Floats, Floats]:
+def gaps(test: list[Trial], guess: Floats, spacing: float) -> tuple[Floats, Floats]:
     """Estimated and true widths of the gaps that both antennae felt."""
     values = {(trial.number, trial.side): k for k, trial in enumerate(test)}
     left = np.array([k for (n, side), k in values.items() if side == "l" and (n, "r") in values])
