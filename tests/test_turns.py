@@ -179,7 +179,7 @@ def test_a_leg_without_torque_to_forget_its_turns_is_not_reported() -> None:
         off = [servo.get("id") for servo in walk.rig.robot.servos if not servo.torque]
         if session.actuators.state.armed:
             for servo in off or [6]:
-                session.actuators.state._guard(servo)
+                session.actuators.state.guard(servo)
         disarmed.extend(session.actuators.state.disarmed)
 
     walk = Walk(253, duration=2.0, act=look)

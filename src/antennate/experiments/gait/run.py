@@ -7,7 +7,6 @@ its own mirror image half a cycle later, so over whole cycles FORWARD neither ya
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -24,7 +23,7 @@ from antennate.sim.scenes.flat import FlatScene
 from antennate.sim.sim_robot import Disturbance, SimRobot
 from antennate.sim.trial import make_world, place_at_start
 from antennate.sim.world import World
-from antennate.studies.experiment import OnStep, WithoutTrials, no_step
+from antennate.studies.experiment import OnStep, Outcome, no_step
 from antennate.studies.pool import gather
 from antennate.types import AntennaFrame, Floats, JointCommand, Maneuver
 
@@ -60,7 +59,7 @@ class GaitStudyConfig(Params):
 
 
 @dataclass(frozen=True, slots=True)
-class GaitOutcome(WithoutTrials):
+class GaitOutcome(Outcome):
     """All walks: four maneuvers by name, one without body wave, and the sweep over its lead."""
 
     config: GaitStudyConfig
@@ -132,10 +131,6 @@ class _Fixed:
 
 
 _Task = tuple[GaitStudyConfig, str, GaitParams, Maneuver]
-
-
-def _run_task(task: _Task, emit: Callable[[Walk], None]) -> None:
-    emit(walk_flat(*task))
 
 
 def walk_flat(config: GaitStudyConfig, name: str, gait: GaitParams, maneuver: Maneuver) -> Walk:
@@ -217,7 +212,7 @@ def run(
     Raises:
         SimulationError: The physics became invalid; from a worker it comes as a WorkerError.
     """
-    found = {w.name: w for w in gather(_run_task, _tasks(config), workers, on_step)}
+    found = {w.name: w for w in gather(walk_flat, _tasks(config), workers, on_step)}
     return GaitOutcome(
         config=config,
         maneuvers={m.name.lower(): found[m.name.lower()] for m in MANEUVERS},

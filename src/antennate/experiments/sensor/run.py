@@ -13,7 +13,7 @@ from antennate.errors import ConfigError
 from antennate.params import Params
 from antennate.params.base import number
 from antennate.robots.sensor import SensorParams
-from antennate.studies.experiment import WithoutTrials
+from antennate.studies.experiment import Outcome
 from antennate.types import Floats
 
 E24 = (
@@ -45,7 +45,7 @@ class SensorConfig(Params):
 
 
 @dataclass(frozen=True)
-class SensorOutcome(WithoutTrials):
+class SensorOutcome(Outcome):
     """What the sensor says.
 
     Attributes:

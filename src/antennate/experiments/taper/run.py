@@ -15,7 +15,7 @@ from antennate.errors import BadInputError, ConfigError
 from antennate.files import decoded, read_limited
 from antennate.params import TaperParams
 from antennate.params.base import number
-from antennate.studies.experiment import WithoutTrials
+from antennate.studies.experiment import Outcome
 from antennate.types import Floats
 
 COLUMN = "diameter_mm"
@@ -32,7 +32,7 @@ class TaperConfig(TaperParams):
 
 
 @dataclass(frozen=True)
-class TaperOutcome(WithoutTrials):
+class TaperOutcome(Outcome):
     """A taper and two ladders.
 
     Attributes:
