@@ -6,7 +6,7 @@ from collections.abc import Callable
 from urllib.parse import urlsplit
 
 from antennate.errors import BadInputError, ConfigError
-from antennate.hardware.ports.reconnecting import Line
+from antennate.hardware.ports.port import Line
 from antennate.params.network import NetworkParams
 
 

@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable
 
 from antennate.hardware.esp32.verifier import Bucket, Tally, Verifier
-from antennate.hardware.ports.port import PortError
+from antennate.hardware.ports.port import Port, PortError
 from antennate.params.network import NetworkParams
 
 _LONGEST = 256
@@ -19,7 +19,7 @@ _ABSENT = {errno.ECONNREFUSED, errno.EHOSTUNREACH, errno.ENETUNREACH, errno.ENET
 """What sending says while the board or the network is away; it may come back."""
 
 
-class UdpPort:
+class UdpPort(Port):
     """The frames of one board. Other senders are not even heard.
 
     Args:
@@ -28,9 +28,6 @@ class UdpPort:
         key: The board's key; empty for a board without one, which anybody can feign.
         params: Pace and limits.
         clock: Time that never steps [s].
-
-    Attributes:
-        tally: What became of every datagram.
 
     Raises:
         PortError: The host is not known.
@@ -80,14 +77,6 @@ class UdpPort:
                 came, self._held = self._held[:most], self._held[most:]
                 return came
             select.select([self._socket], [], [], min(end - now, 0.05))
-
-    def drain(self) -> int:
-        """Throw away what has come; how many bytes that was."""
-        count = len(self._held)
-        self._held = b""
-        while part := self._look(self._clock()):
-            count += len(part)
-        return count
 
     def close(self) -> None:
         """Let it go; the board falls silent by itself."""

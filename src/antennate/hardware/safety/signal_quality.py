@@ -12,11 +12,7 @@ from collections.abc import Sequence
 from antennate.hardware.safety.diagnosis import Band, ChannelDiagnosis, Finding
 from antennate.hardware.safety.drift import Drift
 from antennate.hardware.safety.touch_check import Ask, TouchCheck
-from antennate.params import (
-    ConditioningParams,
-    DriftParams,
-    TouchCheckParams,
-)
+from antennate.params import ConditioningParams, DriftParams, TouchCheckParams
 from antennate.types import Contact
 
 _SIDES = ("left", "right")
@@ -33,7 +29,6 @@ class SignalQuality:
 
     Attributes:
         channels: Diagnosis of the left and the right antenna.
-        check: The check by touch, None if it is skipped.
         drifts: Of the left and the right antenna.
     """
 
