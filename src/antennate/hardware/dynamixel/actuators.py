@@ -27,15 +27,6 @@ class DynamixelActuators:
     """All servos of one robot on one bus, as `Actuators`; for one thread.
 
     Any packet feeds the watchdogs of the servos: nothing is sent but by the calls below.
-
-    Args:
-        bus: The bus.
-        joints: Which servo moves what.
-        clock: Monotonic time [s].
-
-    Attributes:
-        state: The monitor of the servos.
-        turns: How far legs have turned.
     """
 
     def __init__(self, bus: Bus, joints: Joints, clock: Callable[[], float]) -> None:
@@ -67,11 +58,7 @@ class DynamixelActuators:
         return self.turns.standing
 
     def check(self, command: JointCommand) -> JointCommand:
-        """A copy of a command that can be sent.
-
-        Raises:
-            CommandError: It cannot.
-        """
+        """A copy of a command that can be sent; CommandError if it cannot."""
         command = self.joints.plain(command)
         self.joints.ticks(command)
         return command

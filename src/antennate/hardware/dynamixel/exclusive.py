@@ -2,28 +2,19 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Callable
 from functools import wraps
-from typing import Concatenate, ParamSpec, Protocol, TypeVar
+from typing import Any, Concatenate, ParamSpec, TypeVar
 
-
-class Locked(Protocol):
-    """An object whose callers wait for each other."""
-
-    turn: threading.RLock
-
-
-S = TypeVar("S", bound=Locked)
 P = ParamSpec("P")
 R = TypeVar("R")
 
 
-def exclusive(method: Callable[Concatenate[S, P], R]) -> Callable[Concatenate[S, P], R]:
-    """The same method; a caller from another thread waits until nobody is in one of them."""
+def exclusive(method: Callable[Concatenate[Any, P], R]) -> Callable[Concatenate[Any, P], R]:
+    """The same method; it waits until no other thread is in one of them, by the lock `turn`."""
 
     @wraps(method)
-    def waiting(self: S, /, *args: P.args, **kwargs: P.kwargs) -> R:
+    def waiting(self: Any, /, *args: P.args, **kwargs: P.kwargs) -> R:
         with self.turn:
             return method(self, *args, **kwargs)
 
