@@ -16,10 +16,10 @@ from antennate.cli.progress import terminate_as_interrupt
 from antennate.errors import ConfigError
 from antennate.hardware.doctor.check import Opener
 from antennate.hardware.doctor.checkup import Checkup, examine
-from antennate.hardware.doctor.config import DoctorConfig
 from antennate.hardware.doctor.fix import Change, apply, plan
 from antennate.hardware.doctor.ports import opener_of, same
 from antennate.hardware.host_clock import HostClock
+from antennate.hardware.robot import DoctorConfig
 from antennate.hardware.robot_file import RobotFile
 from antennate.studies.formats import to_json
 from antennate.studies.run_directory import RunDirectory

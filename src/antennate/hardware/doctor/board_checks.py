@@ -10,9 +10,9 @@ from antennate.control.conditioning import bending_level
 from antennate.errors import CalibrationError
 from antennate.hardware.doctor.board_survey import BoardSurvey
 from antennate.hardware.doctor.check import Finding, Row
-from antennate.hardware.doctor.config import DoctorConfig
 from antennate.hardware.esp32 import frame
 from antennate.hardware.esp32.wire import Hello, Reset, objections, require_sensor
+from antennate.hardware.robot import DoctorConfig
 from antennate.hardware.safety import diagnosis
 from antennate.hardware.safety.diagnosis import Band, ChannelDiagnosis
 

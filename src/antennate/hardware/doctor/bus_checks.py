@@ -7,9 +7,9 @@ from statistics import median
 
 from antennate.hardware.doctor.bus_survey import BusSurvey
 from antennate.hardware.doctor.check import Finding, Grade, Row, grouped, ids_text
-from antennate.hardware.doctor.config import DoctorConfig
 from antennate.hardware.doctor.register_checks import FIX, OFF_AND_ON, register_findings
 from antennate.hardware.dynamixel.tables import TABLES
+from antennate.hardware.robot import DoctorConfig
 from antennate.robots.spec import RobotSpec
 
 _STATES = {

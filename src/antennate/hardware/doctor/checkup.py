@@ -10,10 +10,10 @@ from antennate.hardware.doctor import board_checks, bus_checks
 from antennate.hardware.doctor.board_survey import BoardSurvey, survey_board
 from antennate.hardware.doctor.bus_survey import BusSurvey, survey_bus
 from antennate.hardware.doctor.check import Grade, Opener, Row, worst
-from antennate.hardware.doctor.config import DoctorConfig
 from antennate.hardware.doctor.ports import latency_row, port_row
 from antennate.hardware.esp32.board import BOARD_BAUD
 from antennate.hardware.ports.port import PortError
+from antennate.hardware.robot import DoctorConfig
 
 
 @dataclass(slots=True)

@@ -52,14 +52,7 @@ def port_row(part: str, path: str, opener: Opener, baud: int = BOARD_BAUD) -> Ro
 
 
 def latency_row(path: str, slow: bool, params: DoctorParams, timers: Path = _TIMERS) -> Row:
-    """The latency timer of the bus's adapter.
-
-    Args:
-        path: Device file of the port.
-        slow: All answers were measured to come late.
-        params: The highest timer that is good.
-        timers: Where Linux shows them.
-    """
+    """The latency timer of the bus's adapter; `slow` if all answers were measured to come late."""
     most, name = params.latency_timer, Path(os.path.realpath(path)).name
     file = timers / name / "latency_timer"
     value = None

@@ -7,13 +7,13 @@ from typing import NamedTuple
 
 from antennate.hardware.doctor.bus_survey import BusSurvey
 from antennate.hardware.doctor.check import Finding, Grade, grouped, ids_text, worst
-from antennate.hardware.doctor.config import DoctorConfig
 from antennate.hardware.dynamixel.tables import (
     RETURN_DELAY_UNIT,
     WATCHDOG_UNIT,
     XC430_W240,
     hardware_errors,
 )
+from antennate.hardware.robot import DoctorConfig
 from antennate.hardware.settings import settings
 
 FIX = "run doctor with --fix"

@@ -64,6 +64,11 @@ class Sequence:
         self._seen = _WINDOW_MASK
 
     @property
+    def number(self) -> int:
+        """The newest number, 0 before the first."""
+        return self.highest or 0
+
+    @property
     def lost(self) -> int:
         """Numbers between the first and the newest that never came [samples]."""
         return 0 if self.highest is None else self.highest - self._first + 1 - self.received
@@ -94,7 +99,6 @@ class Timed:
     """A sample that may be used.
 
     Attributes:
-        sample: What was read.
         epoch: Rises with every new time base; never mix samples of two epochs.
         seq: Its number, unwrapped.
         elapsed_us: The board's time since the epoch began [us], unwrapped.
@@ -206,15 +210,12 @@ class DeviceClock:
         if self._doubts and late > EARLY + DRIFT * 1e-6 * step:
             return SampleState.BACK
         impossible = late < -EARLY - DRIFT * 1e-6 * step
-        numbers = self._number() - newest.seq
+        numbers = self.sequence.number - newest.seq
         return (
             SampleState.AHEAD
             if impossible and step > self._longest_step(numbers)
             else SampleState.USED
         )
-
-    def _number(self) -> int:
-        return self.sequence.highest or 0
 
     def _longest_step(self, numbers: int) -> float:
         """Most the board's time should move over some samples [us]."""
@@ -222,7 +223,7 @@ class DeviceClock:
 
     def _consistent(self, sample: Sample) -> bool:
         """Whether enough doubted samples in a row agree among themselves on a new time."""
-        number = self._number()
+        number = self.sequence.number
         ticks, before = self._doubt
         step = (sample.ticks - ticks) % self._modulus
         agrees = self._doubts and 0 < step < self._longest_step(number - before)
@@ -246,7 +247,7 @@ class DeviceClock:
             self._settle(now)
         self._doubts = 0
         t = self._floor + 1e-6 * elapsed_us
-        self.newest = Timed(sample, self.epoch, self._number(), elapsed_us, t, now)
+        self.newest = Timed(sample, self.epoch, self.sequence.number, elapsed_us, t, now)
 
     def _settle(self, now: float) -> None:
         """Believe ages once the lowest difference has stopped falling."""

@@ -22,7 +22,7 @@ def finder(
     Args:
         address: Path of a serial line, tcp://HOST:PORT or udp://HOST:PORT.
         baud: Bits per second of a serial line.
-        flag: The flag that named it, for errors.
+        flag: What named it, for errors.
         key: Of the board behind udp://; empty for one without a key.
         network: Pace and limits of udp://.
 

@@ -31,12 +31,7 @@ _FAILURES = (OSError, TypeError, ValueError, termios.error)
 
 
 class SerialPort(Port):
-    """A serial line.
-
-    Args:
-        path: Its device file.
-        baud: Bits per second.
-        flag: The flag that named it, for errors.
+    """A serial line, by its device file and bits per second; `flag` named it, for errors.
 
     Raises:
         PortError: If it cannot be opened, or another program holds it; with the cure.

@@ -18,10 +18,6 @@ _WRITING_TIME = 0.1
 class TcpPort(Port):
     """A connection without delays of its own (TCP_NODELAY).
 
-    Args:
-        host: Where to, a name or an address.
-        port: Its TCP port.
-
     Raises:
         PortError: Nobody listens there.
     """
