@@ -105,9 +105,8 @@ def _answers(bus: BusSurvey) -> Finding:
     states = {state: [i for i, s in bus.here.items() if s.state == state] for state in _STATES}
     parts = [f"{_STATES[state][0]} {ids_text(ids)}" for state, ids in states.items() if ids]
     cures = [_STATES[state][1] for state, ids in states.items() if ids]
-    if not parts:
-        return Finding("all whole")
-    return Finding(", ".join(parts), "bad", "; ".join(cures))
+    grade: Grade = "bad" if parts else "ok"
+    return Finding(", ".join(parts) or "all whole", grade, "; ".join(cures))
 
 
 def _models(bus: BusSurvey, robot: RobotSpec) -> Finding:
@@ -132,14 +131,14 @@ def _firmware(bus: BusSurvey) -> Finding:
 
 def _answer_time(bus: BusSurvey, config: DoctorConfig) -> Finding:
     times = bus.ping_times
-    found = f"{1e3 * median(times.values()):.1f} ms"
-    late = [servo for servo, time in times.items() if time > config.doctor.answer_time]
+    usual = f"{1e3 * median(times.values()):.1f} ms"
+    late = ids_text(servo for servo, time in times.items() if time > config.doctor.answer_time)
     if not late:
-        return Finding(found)
+        return Finding(usual)
     if slow(bus, config):
-        return Finding(found, "bad", "the adapter is slow: see latency timer")
-    found += f", up to {1e3 * max(times.values()):.1f} ms ({ids_text(late)})"
-    return Finding(found, "bad", f"{ids_text(late)}: check its return delay, then its cable")
+        return Finding(usual, "bad", "the adapter is slow: see latency timer")
+    longest = f"{usual}, up to {1e3 * max(times.values()):.1f} ms ({late})"
+    return Finding(longest, "bad", f"{late}: check its return delay, then its cable")
 
 
 def _read_time(bus: BusSurvey, time: float, longest: float) -> Finding:

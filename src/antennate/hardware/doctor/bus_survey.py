@@ -20,7 +20,7 @@ from antennate.hardware.ports.port import Port
 from antennate.params import DoctorParams
 from antennate.robots.spec import RobotSpec
 
-BAUDS = (57_600, 115_200, 1_000_000, 2_000_000, 3_000_000, 4_000_000)
+_BAUDS = (57_600, 115_200, 1_000_000, 2_000_000, 3_000_000, 4_000_000)
 """Bits per second at which servos are usually found."""
 REGISTERS = (
     "return_delay_time",
@@ -168,7 +168,7 @@ def _elsewhere(
     opener: Opener, robot: RobotSpec, now: Callable[[], float]
 ) -> list[tuple[int, Present]]:
     others: list[tuple[int, Present]] = []
-    for baud in BAUDS:
+    for baud in _BAUDS:
         if baud != robot.baud:
             with opener(baud) as port:
                 others += [(baud, one) for one in _present(master(port, baud, now), ()).values()]

@@ -32,11 +32,8 @@ Judge = Callable[[BusSurvey, DoctorConfig, int, int], Grade]
 class _Check(NamedTuple):
     """A check of one register of all servos.
 
-    Attributes:
-        expected: What would be good; {config} and {modes} are filled in.
-        judge: The grade of a value.
-        cure: {ids} are those that are not ok.
-        text: A value in words.
+    In `expected` {config} and {modes} are filled in, in `cure` the {ids} that are not ok; `text`
+    says a value in words.
     """
 
     name: str

@@ -77,7 +77,7 @@ def prepare(
 ) -> Session:
     """A session before two open ports, after both sides have said who they are.
 
-    `path` is what the bus is called, for errors; the controller is the configured one if not given.
+    `path` is what the bus is called, for errors.
     """
     board = Board(esp32, config.limits.stale_age)
     await_board(board, clock, bus, config.swapped)

@@ -32,9 +32,6 @@ def drive(
         config: For how long.
         arm: Whether torque may come on.
         on_tick: Called after every tick with the session and the time [s].
-
-    Returns:
-        How it went, after Ctrl-C so far.
     """
     report, clock = Report(), session.clock
     start = clock.now()

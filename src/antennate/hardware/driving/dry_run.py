@@ -23,7 +23,7 @@ class DryRun:
     Attributes:
         over: When torque was last asked for [s], inf while it may not come on.
         end: When all is over [s], inf if not known yet.
-        asks: Whether torque is asked for; the supervisor hears the change to True alone.
+        asks: Whether torque is asked for; the supervisor takes the change to True alone.
         refusal: Why torque has not come on although it was wanted.
     """
 

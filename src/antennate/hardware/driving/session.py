@@ -51,16 +51,9 @@ class Tally:
 class Session:
     """A robot under a supervisor; `run_loop(session, session.control, ...)`. For one thread.
 
-    Args:
-        board: The antennae.
-        actuators: What moves the joints.
-        clock: The host's time.
-        controller: Its controller.
+    Attributes:
         period: Control period [s].
         quality: What the readings of the antennae are worth.
-        limits: Limits of the supervisor.
-
-    Attributes:
         control: The controller, as the loop asks it.
         orders: Read in every tick.
         outputs: The supervisor's of the last tick, None before the first.

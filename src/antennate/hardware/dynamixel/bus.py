@@ -16,11 +16,12 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import wraps
+from typing import Any, Concatenate, ParamSpec, TypeVar
 
 from antennate.hardware.actuators import Tally
 from antennate.hardware.dynamixel import packets
 from antennate.hardware.dynamixel.answers import SILENT, Answer, Span, Timing, answer, cut
-from antennate.hardware.dynamixel.exclusive import exclusive
 from antennate.hardware.dynamixel.packets import HEADER, OVERHEAD, Packet, Status, StatusError
 from antennate.hardware.dynamixel.parser import Parser
 from antennate.hardware.dynamixel.pending import PendingRequests
@@ -38,19 +39,29 @@ BUSY = 0.010
 """How long goals wait for a quiet bus [s]: one tick (assumed)."""
 
 
+P = ParamSpec("P")
+R = TypeVar("R")
+
+
+def exclusive(method: Callable[Concatenate[Any, P], R]) -> Callable[Concatenate[Any, P], R]:
+    """The same method; it waits until no other thread is in one of them, by the lock `turn`."""
+
+    @wraps(method)
+    def waiting(self: Any, /, *args: P.args, **kwargs: P.kwargs) -> R:
+        with self.turn:
+            return method(self, *args, **kwargs)
+
+    return waiting
+
+
 class Bus:
     """Master of one bus. Threads that share it wait for each other, a whole request long.
 
     Calls raise PortError if the bus is gone.
 
-    Args:
-        port: The wire.
-        timing: Its speed and patience.
-        fast: Read groups with fast sync reads, as long as the servos understand them.
-        clock: Monotonic time [s].
-
     Attributes:
-        fast: Groups are still read with fast sync reads.
+        timing: Speed and patience of the wire.
+        fast: Groups are read with fast sync reads, as long as the servos understand them.
         missed: Requests in a row that a servo left unanswered, by id, of those it was asked.
         turn: Held by the thread whose request is on the bus.
     """
@@ -94,12 +105,7 @@ class Bus:
         """Read the same span of several servos.
 
         A servo at which the chain stops is asked again at its end; one that was silent twice in a
-        row is asked alone, after the others.
-
-        Args:
-            ids: The servos.
-            span: What to read.
-            budget: Time for all of it [s].
+        row is asked alone, after the others. All of it takes at most `budget` [s].
 
         Returns:
             An answer for each id, in the order of `ids`.

@@ -137,13 +137,11 @@ class DeviceClock:
         self._boot: int | None = None
         self._retired: deque[int] = deque(maxlen=RETIRED_BOOTS)
         self._modulus = 0
-        self._period = 0.0
-        self._arrived = 0.0
-        self._floor = 0.0
+        self._period = self._arrived = self._floor = 0.0
         self._settled = False
         self._calm = (0.0, 0.0, 0)
-        self._doubt: tuple[int, int] = (0, 0)
-        self._doubts = 0
+        self._suspect: tuple[int, int] = (0, 0)
+        self._suspects = 0
 
     def greet(self, hello: Hello) -> bool:
         """Take a HELLO; True if a boot begins with it. One of an earlier boot is ignored."""
@@ -159,7 +157,7 @@ class DeviceClock:
         self.newest = None
         self._lost_before += self.sequence.lost
         self.sequence = Sequence()
-        self._doubts = 0
+        self._suspects = 0
         return True
 
     @property
@@ -207,7 +205,7 @@ class DeviceClock:
         if step >= self._modulus // 2:
             return SampleState.BACK
         late = now - 1e-6 * (newest.elapsed_us + step) - self._floor
-        if self._doubts and late > EARLY + DRIFT * 1e-6 * step:
+        if self._suspects and late > EARLY + DRIFT * 1e-6 * step:
             return SampleState.BACK
         impossible = late < -EARLY - DRIFT * 1e-6 * step
         numbers = self.sequence.number - newest.seq
@@ -222,14 +220,14 @@ class DeviceClock:
         return 1.5 * self._period * numbers + 1e5
 
     def _consistent(self, sample: Sample) -> bool:
-        """Whether enough doubted samples in a row agree among themselves on a new time."""
+        """Whether enough suspect samples in a row agree among themselves on a new time."""
         number = self.sequence.number
-        ticks, before = self._doubt
+        ticks, before = self._suspect
         step = (sample.ticks - ticks) % self._modulus
-        agrees = self._doubts and 0 < step < self._longest_step(number - before)
-        self._doubts = self._doubts + 1 if agrees else 1
-        self._doubt = (sample.ticks, number)
-        return self._doubts >= SETTLE_SAMPLES
+        agrees = self._suspects and 0 < step < self._longest_step(number - before)
+        self._suspects = self._suspects + 1 if agrees else 1
+        self._suspect = (sample.ticks, number)
+        return self._suspects >= SETTLE_SAMPLES
 
     def _rebase(self, sample: Sample, now: float) -> None:
         """Begin a new time base with a sample of unknown age."""
@@ -245,7 +243,7 @@ class DeviceClock:
         self._arrived = now
         if not self._settled:
             self._settle(now)
-        self._doubts = 0
+        self._suspects = 0
         t = self._floor + 1e-6 * elapsed_us
         self.newest = Timed(sample, self.epoch, self.sequence.number, elapsed_us, t, now)
 

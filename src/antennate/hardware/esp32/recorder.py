@@ -34,9 +34,8 @@ class Recorder:
     """Rows of one recording.
 
     Args:
-        board: The board.
+        board: The board; `now` is monotonic time [s].
         params: What to record.
-        now: Monotonic time [s].
         ask: Asks for a mark or a push.
         write: Takes each line of the file, without its line break.
         on_reading: Called with every reading, recorded or not.

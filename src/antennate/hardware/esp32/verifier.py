@@ -12,8 +12,7 @@ from dataclasses import dataclass
 from antennate.hardware.esp32 import datagram, frame
 from antennate.params.network import NetworkParams
 
-_COUNTS = datagram.COUNTS_SIZE
-_TAG = datagram.TAG_SIZE
+_COUNTS, _TAG = datagram.COUNTS_SIZE, datagram.TAG_SIZE
 _GREETING_SIZE = frame.HELLO_FRAME_SIZE + _COUNTS + _TAG
 _FRAME_SIZE = frame.SAMPLE_FRAME_SIZE + _TAG
 _NUMBERS = 1 << 32
@@ -125,8 +124,7 @@ class Verifier:
         if body is None or len(body) != frame.HELLO_SIZE + frame.CRC_SIZE:
             return hello, False  # the decoder says why not
         boot = struct.unpack(frame.HELLO_LAYOUT, body[: frame.HELLO_SIZE])[2]
-        first = boot != self._boot
-        if first:
+        if first := boot != self._boot:
             self._boot, self._seq = boot, None
         return hello, first
 

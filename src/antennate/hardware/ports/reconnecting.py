@@ -38,9 +38,6 @@ class Reconnecting(Port):
         find: Finds and opens it.
         clock: Monotonic time [s].
         start: Does work in the background.
-
-    Attributes:
-        losses: How often it was lost.
     """
 
     def __init__(
@@ -58,12 +55,6 @@ class Reconnecting(Port):
         self._thread: threading.Thread | None = None
         self._due = 0.0
         self._why = ""
-        self.losses = 0
-
-    @property
-    def gone(self) -> bool:
-        """It was lost and is not back."""
-        return self._line is None
 
     def write(self, data: bytes) -> None:
         """Send all of it."""
@@ -82,7 +73,6 @@ class Reconnecting(Port):
         try:
             return action(line)
         except PortError as error:
-            self.losses += 1
             self._old, self._line = line, None
             self._due = self._clock() + RETRY
             self._why = str(error)

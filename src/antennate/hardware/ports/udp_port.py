@@ -9,7 +9,7 @@ import socket
 import time
 from collections.abc import Callable
 
-from antennate.hardware.esp32.verifier import Bucket, Tally, Verifier
+from antennate.hardware.esp32.verifier import Bucket, Verifier
 from antennate.hardware.ports.port import Port, PortError
 from antennate.params.network import NetworkParams
 
@@ -45,6 +45,7 @@ class UdpPort(Port):
         self._where = f"udp://{host}:{port}"
         self._clock = clock
         self._verifier = Verifier(key, os.urandom(16), params)
+        self.tally = self._verifier.tally
         self._looks = Bucket(params.look_rate, params.look_burst)
         self._held = b""
         try:
@@ -54,11 +55,6 @@ class UdpPort(Port):
             self._socket.connect(address)  # binds one address, and hears this sender alone
         except OSError as error:
             raise PortError(f"could not open {self._where}: {error}") from error
-
-    @property
-    def tally(self) -> Tally:
-        """What became of every datagram."""
-        return self._verifier.tally
 
     def write(self, data: bytes) -> None:
         """Ask the board anew; it listens to nothing else, so the bytes themselves are not sent."""

@@ -95,7 +95,7 @@ class Inputs:
     Attributes:
         age: Age of the newest valid sample [s]; inf if there is none.
         valid: Valid samples that arrived since the tick before, without those that were too old.
-        refused: Samples that arrived since then and were not valid.
+        refused: Samples since then that were not valid.
         findings: Of the left and the right channel.
         decided_at: Time at which the controller finished its newest decision [s].
         maneuver: That decision.

@@ -20,12 +20,7 @@ _RESTING = {Finding.OK, Finding.OUT_OF_CAL}
 
 
 class SignalQuality:
-    """Judges the readings of both antennae of one robot.
-
-    Args:
-        conditioning: Their calibrated range.
-        drift: How drift is followed.
-        touch: What counts as a touch, None if they are not checked by touch.
+    """Judges the readings of both antennae of one robot; checks them by touch if `touch` is given.
 
     Attributes:
         channels: Diagnosis of the left and the right antenna.
