@@ -48,11 +48,6 @@ def test_beam_theory_is_six_percent_stiffer() -> None:
     )
 
 
-def test_the_way_back_returns() -> None:
-    coil = springs.coil_diameter(E, 0.5e-3, 6, 0.0079)
-    assert springs.spring_stiffness(E, 0.5e-3, coil, 6) == pytest.approx(0.0079, rel=1e-12)
-
-
 def test_a_straight_wire_yields_at_its_surface() -> None:
     """Stress E d theta / (2 L), up to curvature, which vanishes for large coils."""
     config = SpringParams(wire="music_wire")

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from multiprocessing import parent_process
 from pathlib import Path
-from typing import Any
 
 from antennate.errors import AntennateError, SceneError, in_one_line
 from antennate.lookup import Registry
@@ -51,10 +50,7 @@ def make_scene(name: str, tunnel: TunnelParams | None = None) -> Scene:
         if parent_process() is None:  # the process that started this worker has tried it
             require_compiles(Path(name))
         return MjcfScene(name)
-    return _called(name, SCENES.find(name))
-
-
-def _called(name: str, make: Callable[[], Any]) -> Scene:
+    make = SCENES.find(name)
     try:
         return make()
     except AntennateError:
