@@ -18,7 +18,6 @@ from antennate.sim.trial import check_start
 from antennate.studies.experiment import OnRow, OnStep, no_row, no_step
 from antennate.studies.pool import run_tasks
 
-SCHEMA = 2
 _TASK = 12
 """Most trials handed to a process at once."""
 
@@ -40,7 +39,7 @@ class TunnelOutcome:
             for name in config.controllers
         }
         return {
-            "schema": SCHEMA,
+            "schema": 2,
             "command": "tunnel",
             "seed": config.seed,
             "scene": config.scene,
