@@ -135,7 +135,7 @@ def intervals(
         panel: Where to draw.
         x: A place for each row.
         rows: Objects of result.json.
-        keys: Names of the measure and of its interval in a row.
+        keys: Names of the measure and of its interval in a row; empty for no interval.
         look: Colour, marker and label, as for `plot`.
     """
     value, interval = keys
