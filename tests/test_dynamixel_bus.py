@@ -27,8 +27,8 @@ from antennate.hardware.dynamixel.packets import Status, StatusError
 from antennate.hardware.dynamixel.tables import XL330_M288
 from antennate.hardware.ports.port import PortError
 from antennate.twin.bus import Fault, ServoBus, Trouble
+from antennate.twin.lockstep import SimulatedWire
 from antennate.twin.registers import Servo
-from antennate.twin.wire import SimulatedWire
 
 LIMIT = 0.010 + 1e-9
 TRUE = {i: 100 * i for i in IDS}
@@ -247,24 +247,24 @@ class Fragile(SimulatedWire):
         super().__init__(bus)
         self.until = -1
 
-    def _count(self) -> None:
+    def count(self) -> None:
         self.until -= 1
         if self.until == 0:
             raise Boom
 
     def write(self, data: bytes) -> None:
-        self._count()
+        self.count()
         super().write(data)
-        self._count()
+        self.count()
 
     def read(self, most: int, timeout: float) -> bytes:
-        self._count()
+        self.count()
         came = super().read(most, timeout)
-        self._count()
+        self.count()
         return came
 
     def drain(self) -> int:
-        self._count()
+        self.count()
         return super().drain()
 
 

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
-from pydantic import model_validator
+from pydantic import field_validator, model_validator
 
 from antennate.control.gait import targets
 from antennate.errors import AntennateError, SceneError, in_one_line
@@ -33,22 +33,22 @@ MOST_OVERLAP = 0.005
 class TrialConfig(Params):
     """What decides how a trial starts."""
 
-    seed: int = number(0, "1", "assumed: any", "seed of all chance", ge=0)
-    scene: str = number(
-        TUNNEL,
-        "1",
-        "paper: a cluttered tunnel",
-        "tunnel, flat, a MJCF file.xml, MODULE:CLASS or file.py:CLASS",
-        examples=["tunnel", "flat"],
-    )
+    seed: int = number(0, "1", "assumed: any", ge=0)
+    """Seed of all chance."""
+    scene: str = number(TUNNEL, "1", "paper: a cluttered tunnel", examples=["tunnel", "flat"])
+    """Tunnel, flat, a MJCF file.xml, MODULE:CLASS or file.py:CLASS."""
     tunnel: TunnelParams = TunnelParams()
     robot: RobotSpec = RobotSpec()
     variation: VariationParams = VariationParams()
     physics: PhysicsParams = PhysicsParams()
 
+    @field_validator("scene")
+    @classmethod
+    def _known(cls, name: str) -> str:
+        return check_name(name)
+
     @model_validator(mode="after")
     def _scene_and_robot_agree(self) -> TrialConfig:
-        check_name(self.scene)
         if self.scene != TUNNEL:
             if self.tunnel != TunnelParams():
                 raise ValueError(

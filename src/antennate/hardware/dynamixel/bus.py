@@ -299,12 +299,13 @@ class Bus:
         return True
 
     def _quiet(self, end: float) -> bool:
-        while (now := self._clock()) < end:
+        """Whether nothing has come for a while; a process that is late looks once all the same."""
+        while True:
+            now = self._clock()
             left = max(self._last_byte, self._sent) + self.timing.quiet - now
-            if left <= 0.0:
-                return True
+            if left <= 0.0 or now >= end:
+                return left <= 0.0
             self.tally.drained += len(self._listen(left, end))
-        return False
 
     def _listen(self, timeout: float, end: float) -> bytes:
         part = self._port.read(CHUNK, max(min(timeout, end - self._clock()), 0.0))
