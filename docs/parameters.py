@@ -15,7 +15,8 @@ HEAD = """\
 # Parameters
 
 Every physical number of the project: its default, its unit, what it means and where it comes from.
-A source begins with `paper` (arXiv:2603.07795), `datasheet`, `measured`, `fitted` or `assumed`.
+A source begins with `paper` (arXiv:2603.07795), `datasheet`, `measured`, `fitted` or `assumed` (the
+paper does not say).
 This page is generated: change `src/antennate/params/` or `robots/`, then run
 `python docs/parameters.py`.
 """

@@ -116,10 +116,10 @@ def test_shares_of_time_add_up_and_shapes_point_ahead_near_a_wall():
 
 def test_statics_of_no_flex_are_those_of_a_straight_rod():
     base = np.radians([20.0, 47.0, 80.0])
-    found = reach.Statics(ANTENNA).distance(base, np.zeros(3))
+    found = reach.wall_distance(ANTENNA, base, np.zeros(3))
     wanted = ANTENNA.length * np.sin(base) + ANTENNA.radius
     np.testing.assert_allclose(found, wanted, rtol=1e-3)  # base angles come in steps of 2.5 deg
-    assert np.isnan(reach.Statics(ANTENNA).distance(base, np.full(3, 9.0))).all()
+    assert np.isnan(reach.wall_distance(ANTENNA, base, np.full(3, 9.0))).all()
 
 
 @pytest.mark.parametrize("share", [0.5, 0.7, 0.85])
@@ -127,7 +127,7 @@ def test_statics_find_the_wall_that_a_slow_smooth_sweep_touches(share):
     smooth = ANTENNA.model_copy(update={"friction": 0.0})
     wall = sweeping.Wall(share * ANTENNA.length)
     trace = record(wall, SweepParams(frequency=0.1), smooth, 0.5)
-    told = reach.Statics(smooth).distance(trace.base, -trace.flex)
+    told = reach.wall_distance(smooth, trace.base, -trace.flex)
     bent = (-trace.flex > SHAPE.flex) & np.isfinite(told)
     assert bent.sum() > 50
     np.testing.assert_allclose(told[bent], wall.distance, rtol=0.015)

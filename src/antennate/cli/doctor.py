@@ -4,25 +4,31 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Sequence
+from contextlib import nullcontext
 from pathlib import Path
+from typing import IO
 
 from pydantic.dataclasses import dataclass
+from rich.box import SIMPLE_HEAD
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
 
-from antennate.cli.addresses import RobotOptions, key_of, parse_robot, require_lossless
-from antennate.cli.checks import show_rows
+from antennate.cli.addresses import PortOptions, key_of, parse_robot, require_two_ports
 from antennate.cli.exit_codes import BAD_INPUT, OK
 from antennate.cli.options import option
-from antennate.cli.progress import terminate_as_interrupt
+from antennate.cli.progress import stop_signals
+from antennate.cli.results import ResultOptions, folder_for
 from antennate.errors import ConfigError
-from antennate.hardware.doctor.check import Opener
+from antennate.hardware.doctor.check import Opener, Row
 from antennate.hardware.doctor.checkup import Checkup, examine
-from antennate.hardware.doctor.config import DoctorConfig
 from antennate.hardware.doctor.fix import Change, apply, plan
-from antennate.hardware.doctor.ports import opener_of, same
+from antennate.hardware.doctor.ports import opener_of
 from antennate.hardware.host_clock import HostClock
+from antennate.hardware.robot import DoctorConfig
 from antennate.hardware.robot_file import RobotFile
+from antennate.messages import one_line
 from antennate.studies.formats import to_json
-from antennate.studies.run_directory import RunDirectory
 
 DESCRIPTION = """\
 Examine the antenna board and the servo bus of a robot at rest, or of its twin: one line for each
@@ -30,20 +36,18 @@ check, with the cure for what is not good. Torque never comes on. Either port ma
 
 Nothing is written without --fix, which asks before each change of an id, a speed, an
 operating mode or a return delay, and reads it back. The exit code is 2 if anything is bad."""
+_STYLES = {"ok": "green", "warn": "yellow", "bad": "bold red"}
 _ROUNDS = 4
 """Servos that change their id or speed are looked at anew before the rest is put right."""
 
 
 @dataclass(frozen=True)
-class Orders(RobotOptions):
-    """What to examine, and what to do about it."""
+class Orders(ResultOptions, PortOptions):
+    """What to do about it."""
 
-    bus: str = option("", "servo bus: a serial port, or tcp://HOST:PORT", "PORT")
     fix: bool = option(False, "put right what can be, asking before each change")
     yes: bool = option(False, "answer yes to all that --fix asks")
-    json: bool = option(False, "print the result in JSON and nothing else")
     out: Path | None = option(None, "folder for result.json; none if not given", "FOLDER")
-    overwrite: bool = option(False, "replace the results that the folder holds")
 
 
 def command(argv: Sequence[str]) -> int:
@@ -56,27 +60,22 @@ def command(argv: Sequence[str]) -> int:
     _check(orders)
     robot = config.calibrated()
     key = key_of(orders)
-    if orders.out is None:
+    with folder_for("doctor", orders, config, argv) if orders.out else nullcontext() as folder:
         checkup, changes = _examine(robot, orders, key)
-    else:
-        with RunDirectory.create("doctor", orders.out, orders.overwrite) as folder:
-            folder.describe(config, ["antennate", "doctor", *argv])
-            checkup, changes = _examine(robot, orders, key)
-            folder.finish(checkup.result(changes), ())
-            sys.stderr.write(f"written to {folder.path}\n")
-    if orders.json:
-        sys.stdout.write(to_json(checkup.result(changes)))
-    else:
-        show_rows(checkup.rows)
+        result = checkup.result(changes)
+        if folder is not None:
+            folder.finish(result)
+        if orders.json:
+            sys.stdout.write(to_json(result))
+        else:
+            show_rows(checkup.rows)
     return BAD_INPUT if checkup.grade == "bad" else OK
 
 
 def _check(orders: Orders) -> None:
     if not (orders.esp32 or orders.bus):
         raise ConfigError("expected --esp32 PORT, --bus PORT or both, found none")
-    if orders.esp32 and orders.bus and same(orders.esp32, orders.bus):
-        raise ConfigError(f"--esp32 and --bus: expected two ports, found {orders.bus} twice")
-    require_lossless(orders.bus)
+    require_two_ports(orders)
     if orders.fix and not orders.bus:
         raise ConfigError("--fix: expected --bus PORT with it, found none")
     if orders.yes and not orders.fix:
@@ -93,7 +92,7 @@ def _examine(robot: DoctorConfig, orders: Orders, key: bytes | None) -> tuple[Ch
     if orders.esp32:
         esp32 = (orders.esp32, opener_of(orders.esp32, "--esp32", key, robot.network))
     now = HostClock().now
-    with terminate_as_interrupt():
+    with stop_signals():
         checkup = examine(robot, bus, esp32, now)
         if not orders.fix or bus is None:
             return checkup, []
@@ -138,3 +137,37 @@ def _agreed(change: Change, yes: bool) -> bool:
     sys.stderr.write(f"{change}; torque goes off first. Change it? [y/N] ")
     sys.stderr.flush()
     return sys.stdin.readline().strip().lower() in ("y", "yes")
+
+
+def show_rows(rows: Sequence[Row], file: IO[str] | None = None) -> None:
+    """Print one line for each row, then the cures; on stdout unless told otherwise."""
+    console = Console(file=file or sys.stdout, highlight=False)
+    table = Table(box=SIMPLE_HEAD, pad_edge=False)
+    for head in ("", "check", "expected", "found"):
+        table.add_column(head, overflow="fold", no_wrap=not head)
+    for row in rows:
+        grade = Text(row.grade, _STYLES[row.grade])
+        words = (f"{row.part}: {row.check}", row.expected, row.found)
+        table.add_row(grade, *(Text(one_line(word)) for word in words))
+    console.print(table)
+    wrong = [row for row in rows if row.grade != "ok"]
+    for row in sorted(wrong, key=lambda row: row.grade == "warn"):
+        line = Text.assemble(
+            (f"{row.grade:<4} ", _STYLES[row.grade]),
+            (f"{row.part}: {row.check}: ", "bold"),
+            one_line(row.cure),
+        )
+        console.print(line, soft_wrap=True)
+    bad = sum(row.grade == "bad" for row in wrong)
+    console.print(Text(_sentence(len(rows), bad, len(wrong) - bad)), soft_wrap=True)
+
+
+def _sentence(checks: int, bad: int, warnings: int) -> str:
+    """What came out, in one sentence."""
+    if bad:
+        return (
+            f"The robot must not be driven yet: {bad} of {checks} checks are bad, {warnings} warn."
+        )
+    if warnings:
+        return f"The robot may be driven: no check is bad, {warnings} of {checks} warn."
+    return f"The robot may be driven: all {checks} checks are good."

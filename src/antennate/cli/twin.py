@@ -13,10 +13,10 @@ from typing import Literal
 
 from pydantic.dataclasses import dataclass
 
-from antennate.cli.arguments import FromFile, parse_with
+from antennate.cli.arguments import FromFile, parse
 from antennate.cli.exit_codes import OK
 from antennate.cli.options import option
-from antennate.cli.progress import end_at_first
+from antennate.cli.progress import stop_signals
 from antennate.errors import ConfigError
 from antennate.hardware.driving.priority import LEVEL, urgent
 from antennate.hardware.ports.keys import read_key
@@ -70,12 +70,14 @@ class Places(FromFile):
     )
 
 
+@stop_signals(last=True)
 def command(argv: Sequence[str]) -> int:
     """Serve until the duration is over, Ctrl-C or SIGTERM.
 
     Raises:
         AntennateError: Something given cannot be used.
     """
+<<<<<<< HEAD
     with end_at_first():
         return _serve(argv)
 
@@ -87,6 +89,9 @@ def _serve(argv: Sequence[str]) -> int:
 
 
 def _serve_robot(config: TwinConfig, places: Places, orders: Orders | None) -> int:
+=======
+    config, places = parse("twin", DESCRIPTION, TwinConfig, argv, Places)
+>>>>>>> main
     faults = Faults([read(text) for text in config.fault], config.robot.ids)
     real = places.pace == "real"
     robot, passage = watched(config, boot_id=secrets.randbits(32) if real else None)

@@ -15,15 +15,13 @@ class WallParams(Params):
     """Diameter and pitch."""
     speed: float = number(0.008, "m/s", "paper: 8 mm/s", gt=1e-5, le=0.5)
     """Speed of the base."""
-    travel: float = number(
-        0.16, "m", "assumed: unpublished; four times the start that may be left out", gt=0.02, le=2
-    )
+    travel: float = number(0.16, "m", "assumed: four times the start", gt=0.02, le=2)
     """Travel of the base along the wall."""
     base_angle: float = number(
         math.radians(53.0), "rad", "fitted: docs/science/wall_study.py window", gt=0.17, lt=2.9
     )
     """Angle of the antenna from the direction of travel; a right angle faces the wall."""
-    overlap: float = number(0.008, "m", "assumed: unpublished; a few spheres' radii", gt=0, le=0.1)
+    overlap: float = number(0.008, "m", "assumed: a few spheres' radii", gt=0, le=0.1)
     """How far the straight antenna would reach behind the crests."""
     gravity: Literal["down", "up", "off"] = number(
         "down", "1", "assumed: the wall is vertical, the base moves up, weight acts along it"
@@ -35,18 +33,14 @@ class WallParams(Params):
     """Over this travel of the base."""
     slip_time: float = number(0.8, "s", "assumed: one sphere at the paper's speed", gt=0)
     """Contact lost for longer."""
-    start: float = number(
-        0.040, "m", "assumed: until then the antenna bows from its approach", ge=0
-    )
+    start: float = number(0.040, "m", "assumed: the antenna bows from its approach", ge=0)
     """Travel that the second count leaves out."""
 
 
 class BenchVariationParams(Params):
     """What differs from trial to trial on the bench."""
 
-    stiffness: float = number(
-        0.05, "1", "assumed: makers quote 10 % of rate at two standard deviations", ge=0, le=0.3
-    )
+    stiffness: float = number(0.05, "1", "assumed: makers quote 10 % (2 sigma)", ge=0, le=0.3)
     """Standard deviation of a spring's stiffness."""
     friction: float = number(0.02, "1", "assumed: clean and dusty places", ge=0)
     """Standard deviation of the friction."""

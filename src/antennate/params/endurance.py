@@ -8,13 +8,9 @@ from antennate.params.base import Params, number
 class DriftParams(Params):
     """How the resting reading of an antenna is followed."""
 
-    quantile: float = number(
-        0.1, "1", "assumed: touches may take nine tenths of the time; 1.3 sigma off", gt=0, lt=1
-    )
+    quantile: float = number(0.1, "1", "assumed: touches may take nine tenths", gt=0, lt=1)
     """Share of readings without contact that lie nearer to straight than the resting one."""
-    speed: float = number(
-        0.002, "1/s", "assumed: four times the fastest of row S7, 30 % in 10 min", gt=0, le=1
-    )
+    speed: float = number(0.002, "1/s", "assumed: four times row S7, 30 % in 10 min", gt=0, le=1)
     """Fastest that the resting reading is taken to drift, in spans."""
     band: float = number(
         0.15,

@@ -10,17 +10,13 @@ from antennate.params.base import Params, number
 class TouchCheckParams(Params):
     """The check by hand that left is left and that bending reads as bending."""
 
-    level: float = number(
-        0.3, "1", "assumed: well above noise and creep, easily done by hand", gt=0, le=1
-    )
+    level: float = number(0.3, "1", "assumed: above noise and creep, easily done", gt=0, le=1)
     """Change of the reading that is a touch, in calibrated spans."""
     still: float = number(0.15, "1", "assumed: half a touch", gt=0, le=1)
     """Change below which an antenna is at rest, in calibrated spans."""
     readings: int = number(10, "1", "assumed: 100 ms at 100 Hz", ge=1, le=1000)
     """Readings in a row that count."""
-    patience: float = number(
-        60.0, "s", "assumed: a person walks to the robot and bends both antennae", ge=0, le=3600
-    )
+    patience: float = number(60.0, "s", "assumed: somebody walks there, bends both", ge=0, le=3600)
     """Time by which the dry run is extended for the check, and then while torque is refused."""
 
     @model_validator(mode="after")
@@ -42,25 +38,17 @@ class SupervisorParams(Params):
         le=0.06,
     )
     """Age of a sample from which on it is not acted upon."""
-    recovery: int = number(
-        10, "1", "assumed: 100 ms at 100 Hz, the length of the running mean", ge=1, le=1000
-    )
+    recovery: int = number(10, "1", "assumed: 100 ms, as the running mean", ge=1, le=1000)
     """Fresh valid samples in a row that end a loss of data."""
     repeats: int = number(3, "1", "assumed: once is chance, three times is a defect", ge=1, le=100)
     """Holds, failures of the controller or reboots of the board that become a fault."""
     repeat_time: float = number(10.0, "s", "assumed: five gait cycles", gt=0, le=600)
     """Time within which they count."""
-    late_answers: int = number(
-        2, "1", "assumed: single answers are lost by noise on the bus", ge=1, le=100
-    )
+    late_answers: int = number(2, "1", "assumed: noise loses single ones", ge=1, le=100)
     """Answers missed in a row that degrade."""
-    silent_answers: int = number(
-        5, "1", "assumed: at 1 % loss five in a row happen once in 10^10", ge=1, le=100
-    )
+    silent_answers: int = number(5, "1", "assumed: at 1 % loss once in 10^10", ge=1, le=100)
     """Answers missed in a row that mean a silent servo."""
-    supply_warn: float = number(
-        10.8, "V", "assumed: three lithium cells at 3.6 V, near empty", gt=0, le=100
-    )
+    supply_warn: float = number(10.8, "V", "assumed: three lithium cells near empty", gt=0, le=100)
     """Supply below which is warned."""
     slow_rate: float = number(
         0.5,
@@ -73,13 +61,9 @@ class SupervisorParams(Params):
     """How fast the gait goes below supply_warn."""
     supply_hold: float = number(10.2, "V", "assumed: three cells at 3.4 V", gt=0, le=100)
     """Supply below which to stand still."""
-    supply_off: float = number(
-        9.6, "V", "assumed: three cells at 3.2 V, before they are harmed", gt=0, le=100
-    )
+    supply_off: float = number(9.6, "V", "assumed: three cells at 3.2 V", gt=0, le=100)
     """Supply below which to switch off."""
-    supply_rise: float = number(
-        0.3, "V", "assumed: more than the supply recovers when the legs stop", ge=0, le=10
-    )
+    supply_rise: float = number(0.3, "V", "assumed: it recovers by less at rest", ge=0, le=10)
     """Rise above a level that ends its cause."""
     rate: float = number(100.0, "Hz", "paper: about 100 Hz over serial", gt=0, le=1000)
     """Samples per second expected."""

@@ -57,18 +57,14 @@ class SpringParams(Params):
     """Torsion springs of one wire and one coil diameter, and how new ones may be wound."""
 
     wire: Literal["stainless_302", "music_wire", "hard_drawn", "phosphor_bronze"] = number(
-        "stainless_302", "1", "assumed: unpublished; a wire that does not rust"
+        "stainless_302", "1", "assumed: a wire that does not rust"
     )
     """Kind of wire."""
     modulus_pa: float | None = number(None, "Pa", "assumed: that of the kind of wire")
     """Young's modulus if it is known better."""
-    wire_mm: float = number(
-        0.50, "mm", "assumed: stock wire that gives the paper's table at index 7.5", gt=0.01, le=10
-    )
+    wire_mm: float = number(0.50, "mm", "assumed: a stock wire, spring index 7.5", gt=0.01, le=10)
     """Wire diameter."""
-    coil_mm: float = number(
-        3.77, "mm", "assumed: from the wire and 0.274 N·mm/deg at three coils", gt=0.05, le=200
-    )
+    coil_mm: float = number(3.77, "mm", "assumed: follows from the paper's table", gt=0.05, le=200)
     """Mean coil diameter."""
     active_coils: tuple[_Positive, ...] = number(
         (3.0, 6.0, 9.0), "1", "paper: table of springs", min_length=1, max_length=50
@@ -103,9 +99,7 @@ class TaperParams(Params):
     """Diameter at the base."""
     tip_mm: float = number(0.2, "mm", "paper: Scolopendra's antenna", gt=0, le=100)
     """Diameter at the tip."""
-    law: Literal["linear", "geometric"] = number(
-        "linear", "1", "assumed: unpublished; the paper gives both ends"
-    )
+    law: Literal["linear", "geometric"] = number("linear", "1", "assumed: unpublished")
     """How diameters fall from base to tip."""
     ladder: tuple[_Positive, ...] = number(
         (3.0, 6.0, 6.0, 9.0, 9.0, 9.0), "1", "paper: its springs", min_length=2, max_length=50

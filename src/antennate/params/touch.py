@@ -18,9 +18,7 @@ class FlatWallParams(Params):
 class SinusoidalWallParams(Params):
     """A wavy wall about the straight one."""
 
-    amplitude: float = number(
-        0.005, "m", "assumed: about the thickness of the antenna", gt=0, le=0.05
-    )
+    amplitude: float = number(0.005, "m", "assumed: as thick as the antenna", gt=0, le=0.05)
     """Amplitude."""
     wavelength: float = number(0.05, "m", "assumed: half the length of the antenna", ge=0.004, le=1)
     """Length of a wave."""
@@ -40,9 +38,7 @@ class BouldersWallParams(Params):
 class StepWallParams(Params):
     """A wall that steps back in its middle."""
 
-    depth: float = number(
-        0.06, "m", "assumed: half the antenna; even a trailing antenna comes off", gt=0, le=0.4
-    )
+    depth: float = number(0.06, "m", "assumed: half the antenna; it then comes off", gt=0, le=0.4)
     """How far it steps back."""
     entry_deg: float = number(90.0, "deg", _BLUNT, ge=5, le=90)
     """Angle of the faces at both ends to the traverse; 90 is blunt."""
@@ -51,9 +47,7 @@ class StepWallParams(Params):
 class GapWallParams(Params):
     """A wall with a gap in its middle."""
 
-    width: float = number(
-        0.20, "m", "assumed: a trailing antenna needs about 0.16 m to swing forward", gt=0, le=2
-    )
+    width: float = number(0.20, "m", "assumed: a trailing antenna swings in 0.16 m", gt=0, le=2)
     """Width of the gap."""
     entry_deg: float = number(90.0, "deg", _BLUNT, ge=5, le=90)
     """Angle of the faces at both ends to the traverse; 90 is blunt."""

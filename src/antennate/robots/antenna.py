@@ -42,35 +42,25 @@ class AntennaSpec(Params):
         0.048, "N·mm/deg", "assumed: PET strip of 10 x 0.25 mm, E 3.5 GPa, 16.7 mm a hinge", ge=0
     )
     """Stiffness the flex sensor adds to each hinge it covers."""
-    length: float = number(
-        0.12, "m", "assumed: six springs and holders under a sensor of 0.1 m", gt=0.02, le=0.4
-    )
+    length: float = number(0.12, "m", "assumed: springs under a sensor of 0.1 m", gt=0.02, le=0.4)
     """Length from base to tip."""
-    radius: float = number(
-        0.003, "m", "assumed: coils of about 5 mm diameter and wire", gt=0, le=0.02
-    )
+    radius: float = number(0.003, "m", "assumed: coils of 5 mm, and the wire", gt=0, le=0.02)
     """Outer radius."""
-    link_mass: float = number(
-        0.0008, "kg", "assumed: unpublished; steel coil and printed holder", gt=0
-    )
+    link_mass: float = number(0.0008, "kg", "assumed: steel coil and printed holder", gt=0)
     """Mass of one link."""
     base_mass: float = number(0.001, "kg", "assumed: printed horn", gt=0)
     """Mass that turns with the base servo."""
-    damping_time: float = number(
-        0.04, "s", "assumed: damping over stiffness; with less the gait alone swings it", ge=0
-    )
+    damping_time: float = number(0.04, "s", "assumed: with less, the gait swings it", ge=0)
     """Relaxation time of a hinge."""
     armature: float = number(3e-6, "kg·m²", "assumed: keeps the light chain well conditioned", gt=0)
     """Inertia added per hinge."""
     range: float = number(1.4, "rad", "assumed: neighbouring holders meet", gt=0, lt=3.1)
     """Largest angle of one hinge."""
     base_angle: float = number(
-        math.radians(47.0), "rad", "assumed: tips span the body's width", ge=0, lt=math.pi / 2
+        math.radians(47.0), "rad", "assumed: tips lead and span the width", ge=0, lt=math.pi / 2
     )
     """Mounting angle from the heading, outwards."""
-    base_spacing: float = number(
-        0.04, "m", "assumed: two XL330 servos (20 mm wide) side by side", gt=0
-    )
+    base_spacing: float = number(0.04, "m", "assumed: two XL330 (20 mm) side by side", gt=0)
     """Distance of the two bases."""
     friction: float = number(0.3, "1", "assumed: printed plastic on paper", ge=0, le=2)
     """Friction against obstacles."""
@@ -81,9 +71,7 @@ class AntennaSpec(Params):
     """Stiffness of the base servo."""
     base_damping: float = number(0.1, "N·m·s/rad", "assumed: settles within 0.05 s", ge=0)
     """Damping of the base servo."""
-    base_armature: float = number(
-        1e-4, "kg·m²", "assumed: below that of the servo; it is driven stiffly", ge=0
-    )
+    base_armature: float = number(1e-4, "kg·m²", "assumed: below the servo's; driven stiffly", ge=0)
     """Its inertia."""
     sensor: SensorParams = SensorParams()
 

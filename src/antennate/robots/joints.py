@@ -25,21 +25,13 @@ class JointParams(Params):
 
     servo: ServoName = number("xc430_w240", "1", "paper: XC430-W240 in the body")
     """Model of the group's servos."""
-    ids: tuple[_Id, ...] = number(
-        (), "1", "assumed: set by hand; not given, all joints are numbered from 1"
-    )
+    ids: tuple[_Id, ...] = number((), "1", "assumed: set by hand; joints from 1 if not given")
     """Ids on the bus."""
-    directions: tuple[_Direction, ...] = number(
-        (), "1", "assumed: mounted alike; not given, all are 1"
-    )
+    directions: tuple[_Direction, ...] = number((), "1", "assumed: mounted alike; all 1 if empty")
     """Sign between ticks and angle."""
-    zeros: tuple[_Zero, ...] = number(
-        (), "ticks", "assumed: the middle of a turn, 2048, if not given"
-    )
+    zeros: tuple[_Zero, ...] = number((), "ticks", "assumed: 2048, half a turn, if not given")
     """Position at the angle 0."""
-    fastest: float = number(
-        4.5, "rad/s", "assumed: two thirds of an unloaded XC430-W240, 6.8 (datasheet)", gt=0
-    )
+    fastest: float = number(4.5, "rad/s", "assumed: 2/3 of an unloaded XC430-W240", gt=0)
     """Fastest that goals move."""
 
     @property
@@ -67,9 +59,7 @@ class PitchParams(YawParams):
 
     kind: Literal["locked", "actuated"] = number("locked", "1", "paper: pitch is left unused")
     """Whether servos on the bus move them."""
-    stiffness: float = number(
-        30.0, "N·m/rad", "assumed: a servo that holds; the paper leaves pitch unused", gt=0
-    )
+    stiffness: float = number(30.0, "N·m/rad", "assumed: a servo that holds", gt=0)
     """Stiffness of a locked pitch joint."""
 
 
@@ -94,11 +84,7 @@ class BaseParams(YawParams):
 
     servo: ServoName = number("xl330_m288", "1", "paper: XL330 at the antennae")
     """Model of the group's servos."""
-    fastest: float = number(
-        4.5, "rad/s", "assumed: as the others; an unloaded XL330-M288 makes 10.8 (datasheet)", gt=0
-    )
+    fastest: float = number(4.5, "rad/s", "assumed: as the others; XL330-M288 makes 10.8", gt=0)
     """Fastest that goals move."""
-    limit: float = number(
-        _RIGHT_ANGLE, "rad", "assumed: beyond it they cross or fold back", gt=0, le=_RIGHT_ANGLE
-    )
+    limit: float = number(_RIGHT_ANGLE, "rad", "assumed: beyond, they cross", gt=0, le=_RIGHT_ANGLE)
     """Largest angle either way from the mounting angle."""

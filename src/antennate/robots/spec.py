@@ -53,21 +53,13 @@ class RobotSpec(Params):
 
     links: int = number(6, "1", "paper: six links", ge=2, le=50)
     """Number of links."""
-    link_pitch: float = number(
-        0.10, "m", "assumed: a yaw servo and two leg servos, 28.5 x 46.5 x 34 mm", gt=0.03
-    )
+    link_pitch: float = number(0.10, "m", "assumed: three servos, 28.5 x 46.5 x 34 mm", gt=0.03)
     """Joint spacing."""
-    mass: float = number(
-        2.0, "kg", "assumed: 17 servos of 65 g (datasheet), as much in frames and legs", gt=0.3
-    )
+    mass: float = number(2.0, "kg", "assumed: 17 servos of 65 g, as much in frames", gt=0.3)
     """Total mass."""
-    width: float = number(
-        0.20, "m", "paper: a free section of 0.40 m is about twice the robot's width", gt=0.08
-    )
+    width: float = number(0.20, "m", "paper: a section of 0.40 m is twice as wide", gt=0.08)
     """Width over the legs."""
-    leg_radius: float = number(
-        0.030, "m", "assumed: fits under the body, 0.12 m/s within the servo's speed", gt=0
-    )
+    leg_radius: float = number(0.030, "m", "assumed: 0.12 m/s within the servo's speed", gt=0)
     """Outer radius of an O-leg."""
     leg_eccentricity: float = number(0.012, "m", "assumed: as leg_radius", ge=0)
     """Distance of the ring's centre from its axle."""
@@ -75,15 +67,11 @@ class RobotSpec(Params):
     """Thickness of an O-leg."""
     leg_mass: float = number(0.020, "kg", "assumed: printed ring", gt=0)
     """Mass of one O-leg."""
-    leg_friction: float = number(
-        0.6, "1", "assumed: rubber on a laboratory floor, 0.5 to 0.8", gt=0, le=2
-    )
+    leg_friction: float = number(0.6, "1", "assumed: rubber on a floor, 0.5 to 0.8", gt=0, le=2)
     """Friction of a leg on the floor."""
     body_friction: float = number(0.3, "1", "assumed: printed plastic on paper", ge=0, le=2)
     """Friction of the body against obstacles."""
-    body_radius: float = number(
-        0.020, "m", "assumed: half the height of the servo and its frame", gt=0
-    )
+    body_radius: float = number(0.020, "m", "assumed: half the height of the servo", gt=0)
     """Radius of spine and cross-beams."""
     baud: Literal[57600, 115200, 1000000, 2000000, 3000000, 4000000] = number(
         1_000_000, "bit/s", "assumed: write and read of 19 servos then take 4.3 of 10 ms"

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from antennate.hardware.dynamixel.tables import XC430_W240
 from antennate.params.twin import BatteryParams
+from antennate.twin.motor import RATINGS
 from antennate.twin.registers import Servo
 
 _UNITS_A_VOLT = 10
@@ -15,8 +15,7 @@ _UNITS_A_VOLT = 10
 class Battery:
     """Feeds all servos; its voltage is constant until `discharge` is called.
 
-    Args:
-        params: Its numbers.
+    Models made for no more than the voltage at the antennae are behind the regulator.
     """
 
     def __init__(self, params: BatteryParams) -> None:
@@ -30,17 +29,19 @@ class Battery:
 
     def feed(self, servos: Sequence[Servo], t: float) -> None:
         """Let servos see their voltage at time t [s]."""
-        if t >= self._begin:
-            self._show(servos, self._volts(servos, t))
-
-    def _show(self, servos: Sequence[Servo], volts: float) -> None:
+        if t < self._begin:
+            return
+        volts = self._volts(servos, t)
         for servo in servos:
-            large = servo.table is XC430_W240
-            seen = volts if large else min(volts, self._params.antenna_voltage)
+            seen = volts if self._direct(servo) else min(volts, self._params.antenna_voltage)
             servo.set("present_input_voltage", round(_UNITS_A_VOLT * seen))
 
     def _volts(self, servos: Sequence[Servo], t: float) -> float:
-        load = sum(abs(s.motion.shaft.load) for s in servos if s.table is XC430_W240)
+        load = sum(abs(servo.motion.shaft.load) for servo in servos if self._direct(servo))
         empty = self._rate * (t - self._begin)
         drop = self._params.resistance * self._params.stall_current * load
         return max(self._params.voltage - empty - drop, 0.0)
+
+    def _direct(self, servo: Servo) -> bool:
+        """Whether it hangs on the supply itself."""
+        return RATINGS[servo.table.model].voltage > self._params.antenna_voltage

@@ -7,8 +7,7 @@ is the rod's way from the first touch over its whole way: what an experimenter k
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
@@ -21,11 +20,12 @@ from antennate.antenna.fitting import Samples
 from antennate.antenna.sensor import SensorChain, reading_noise
 from antennate.control.conditioning import bending_level
 from antennate.experiments.calibrate.recording import Recording, RecordingParams, read, write
+from antennate.experiments.reading import mean_since
 from antennate.params import BenchPhysicsParams, BenchVariationParams, Params
 from antennate.params.base import number
 from antennate.robots.antenna import AntennaSpec
-from antennate.sim.bench import Bench, compile_bench
-from antennate.studies.experiment import OnStep, WithoutTrials, no_step
+from antennate.sim.bench import Bench, Slider, compile_bench
+from antennate.studies.experiment import OnStep, Outcome, no_step
 from antennate.studies.pool import gather
 from antennate.types import Floats
 
@@ -40,7 +40,7 @@ class RigParams(Params):
         (0.05, 0.10, 0.15), "m/s", "paper: 5, 10 and 15 cm/s", min_length=1
     )
     """Pushing speeds."""
-    pushes: int = number(10, "1", "assumed: unpublished; enough for an interval", ge=1, le=1000)
+    pushes: int = number(10, "1", "assumed: enough for an interval", ge=1, le=1000)
     """Pushes at each speed."""
     place: float = number(0.08, "m", "assumed: two thirds out; the rod stays on", gt=0.01, le=0.4)
     """Place of the rod."""
@@ -81,7 +81,7 @@ class CalibrateConfig(Params):
     """Mean over readings before fitting."""
     full_scale: bool = number(False, "1", "assumed: the paper's numbers do not tell")
     """Normalise by 0 to 4095 counts and not by the recording's ends."""
-    threshold: float = number(0.5, "1", "assumed: unpublished; middle of the sigmoid", gt=0, lt=1)
+    threshold: float = number(0.5, "1", "assumed: middle of the sigmoid", gt=0, lt=1)
     """Theta of the file."""
     least_r2: float = number(0.5, "1", "assumed: half of the bend explained", ge=0, lt=1)
     """A worse fit is refused."""
@@ -125,7 +125,7 @@ class CalibrateConfig(Params):
 
 
 @dataclass(frozen=True)
-class CalibrateOutcome(WithoutTrials):
+class CalibrateOutcome(Outcome):
     """A calibration and its data.
 
     Attributes:
@@ -150,6 +150,10 @@ class CalibrateOutcome(WithoutTrials):
             "poor": self.calibration.r2 < self.config.good_r2,
             "calibration": self.calibration.model_dump(mode="json"),
         }
+
+    def levels(self) -> Floats:
+        """Bending levels that the calibration gives its own data, shape (n,)."""
+        return bending_level(self.calibration.conditioning(), self.recording.samples.counts)
 
     def conditioning_toml(self) -> str:
         """The curve as keys of a configuration file."""
@@ -177,16 +181,17 @@ def push(config: CalibrateConfig, trial: int) -> Recording:
     ticks = int(np.ceil((gap + rig.depth) / speed * rate)) + 1
     noise = reading_noise(config.antenna.sensor, rng, (ticks,))
     sensor = SensorChain(config.antenna.sensor, (), period)
+    rod = Slider(bench.model, bench.data, "probe")
     bench.place(0.0, 0.0, 0.0)
-    bench.place_probe(rig.place, -touch - gap)
+    rod.place(rig.place, -touch - gap)
     rows = []
     for i in range(ticks):
-        at = float(bench.probe()[1]) + touch
+        at = float(rod.position[1]) + touch
         counts = float(sensor.step(np.array(bench.flex()), float(noise[i])))
         rows.append((i * period, counts, at / rig.depth))
         for k in range(1, round(period / _COMMAND_PERIOD) + 1):
             y = -touch - gap + speed * (i * period + k * _COMMAND_PERIOD)
-            bench.command_probe(rig.place, y, 0.0, speed)
+            rod.command(rig.place, y, 0.0, speed)
             bench.step(round(_COMMAND_PERIOD / config.physics.timestep))
     t, counts, bend = np.array(rows).T
     inside = (bend >= 0) & (bend <= 1)
@@ -208,10 +213,6 @@ def _bench(config: CalibrateConfig, factors: Floats) -> Bench:
     return Bench(model, config.antenna)
 
 
-def _run_task(task: tuple[CalibrateConfig, int], emit: Callable[[Any], None]) -> None:
-    emit((task[1], push(*task)))
-
-
 def record(
     config: CalibrateConfig,
     workers: int = 1,
@@ -223,13 +224,12 @@ def record(
         SimulationError: The physics became invalid; from a worker it comes as a WorkerError.
     """
     tasks = [(config, trial) for trial in range(len(config.rig.speeds) * config.rig.pushes)]
-    found = dict(gather(_run_task, tasks, workers, on_step))
-    parts = [found[trial] for trial in sorted(found)]
+    parts = gather(push, tasks, workers, on_step)
     fields = ("counts", "level", "trial", "speed", "row")
     joined = [np.concatenate([getattr(p.samples, f) for p in parts]) for f in fields]
     joined[-1] = np.arange(2, len(joined[0]) + 2)
     whole = Recording(np.concatenate([p.t for p in parts]), Samples(*joined), "")
-    return Recording(whole.t, whole.samples, hashlib.sha256(write(whole).encode()).hexdigest())
+    return replace(whole, sha256=hashlib.sha256(write(whole).encode()).hexdigest())
 
 
 def averaged(recording: Recording, averaging_time: float) -> Recording:
@@ -240,17 +240,9 @@ def averaged(recording: Recording, averaging_time: float) -> Recording:
     counts = s.counts.copy()
     for trial in np.unique(s.trial):
         rows = np.flatnonzero(s.trial == trial)
-        t, total = recording.t[rows], np.concatenate([[0.0], np.cumsum(s.counts[rows])])
-        first = np.searchsorted(t, t - averaging_time + 1e-9)
-        ends = np.arange(1, len(rows) + 1)
-        counts[rows] = (total[ends] - total[first]) / (ends - first)
-    samples = Samples(counts, s.level, s.trial, s.speed, s.row)
-    return Recording(recording.t, samples, recording.sha256)
-
-
-def levels(outcome: CalibrateOutcome) -> Floats:
-    """Bending levels that the calibration gives its own data, shape (n,)."""
-    return bending_level(outcome.calibration.conditioning(), outcome.recording.samples.counts)
+        first = np.searchsorted(recording.t[rows], recording.t[rows] - averaging_time + 1e-9)
+        counts[rows] = mean_since(first, s.counts[rows])
+    return replace(recording, samples=replace(s, counts=counts))
 
 
 def run(

@@ -11,6 +11,7 @@ from pydantic import model_validator
 
 from antennate.antenna import sensor as flex_sensor
 from antennate.antenna.statics import PROFILES, Chain, Profile, equilibrium, with_profile
+from antennate.control.conditioning import bending_level
 from antennate.experiments import reading
 from antennate.experiments.force.post_traverse import Traverse
 from antennate.params import BenchPhysicsParams, ConditioningParams, Params, number
@@ -132,7 +133,7 @@ def static_loads(config: ForceConfig, profile: str, friction: float) -> tuple[Po
         {
             "flex": flex[good],
             "reading": repeated[0, good],
-            "level": reading.level(config.conditioning, repeated.mean(axis=0))[good],
+            "level": bending_level(config.conditioning, repeated.mean(axis=0))[good],
         },
         size[good],
         place[good],
@@ -148,10 +149,10 @@ def traverse_points(config: ForceConfig, traverses: list[Traverse]) -> Points:
     counts, levels = [np.zeros(0)], [np.zeros(0)]
     for k, one in enumerate(traverses):
         rng = np.random.default_rng([config.seed, 2, k])
-        noise = reading.noise(config.antenna.sensor, rng, len(one.flex))
+        noise = flex_sensor.reading_noise(config.antenna.sensor, rng, (len(one.flex),))
         counts.append(reading.recorded(config.antenna.sensor, one.flex, noise))
         mean = reading.averaged(config.conditioning, counts[-1], config.antenna.sensor.rate)
-        levels.append(reading.level(config.conditioning, mean))
+        levels.append(bending_level(config.conditioning, mean))
     trial = np.repeat(np.arange(len(traverses)), [len(one.flex) for one in traverses])
     return Points(
         {

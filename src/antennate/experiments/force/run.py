@@ -9,8 +9,7 @@ farther takes part.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -24,13 +23,13 @@ from antennate.experiments.force.loads import (
     traverse_points,
 )
 from antennate.experiments.force.post_traverse import Traverse, drag
+from antennate.experiments.reading import between
 from antennate.robots.antenna import AntennaSpec
 from antennate.studies.experiment import OnRow, OnStep, no_row, no_step
 from antennate.studies.pool import gather
 from antennate.studies.regression import by_group, explained
 from antennate.types import Floats, Ints
 
-SCHEMA = 1
 SCALARS = ("flex", "reading", "level")
 """Flex without noise, one reading of the converter, and b of the readings of T_avg."""
 
@@ -78,7 +77,7 @@ class ForceOutcome:
     def result(self) -> dict[str, Any]:
         """The content of result.json."""
         return {
-            "schema": SCHEMA,
+            "schema": 1,
             "command": "force",
             "seed": self.config.seed,
             "hinge_limit_deg": self.config.hinge_limit_deg,
@@ -106,7 +105,7 @@ def score(
 
 def _row(points: Points, which: Ints, guess: Floats, largest: float) -> dict[str, Any]:
     guess = guess[np.isfinite(guess)]
-    row = explained(points.force[which], guess, points.trial[which]).row()
+    row = asdict(explained(points.force[which], guess, points.trial[which]))
     return row | {"rmse_percent": 100.0 * row["rmse"] / largest}
 
 
@@ -168,12 +167,7 @@ def _traverse_all(
         speed = config.speeds[k % len(config.speeds)]
         one = drag(
             config.physics,
-            antenna,
-            overlap,
-            speed,
-            config.post_radius,
-            limit,
-            config.antenna.sensor.rate,
+            *(antenna, overlap, speed, config.post_radius, limit, antenna.sensor.rate),
         )
         found.append(one)
         rows.append(
@@ -205,14 +199,7 @@ def closed_form(chain: Chain, points: Points, config: ForceConfig, largest: floa
     for at in grid:
         rest = equilibrium(chain, np.full(len(sizes), at * chain.length), force, follower=True)
         tables.append(np.interp(flex, rest.angles[:, :covered].sum(axis=1), sizes))
-    below = np.clip(np.searchsorted(grid, place, "right") - 1, 0, len(grid) - 2)
-    share = (place - grid[below]) / (grid[below + 1] - grid[below])
-    table, each = np.array(tables), np.arange(len(place))
-    return (1.0 - share) * table[below, each] + share * table[below + 1, each]
-
-
-def _run_task(task: tuple[ForceConfig, str], emit: Callable[[ProfileOutcome], None]) -> None:
-    emit(study_profile(*task))
+    return between(grid, np.array(tables), place)
 
 
 def run(
@@ -232,5 +219,4 @@ def run(
             on_row(row)
 
     tasks = [(config, profile) for profile in config.profiles]
-    found = gather(_run_task, tasks, workers, on_step, keep)
-    return ForceOutcome(config, sorted(found, key=lambda o: config.profiles.index(o.profile)))
+    return ForceOutcome(config, gather(study_profile, tasks, workers, on_step, keep))

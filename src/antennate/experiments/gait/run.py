@@ -7,7 +7,6 @@ its own mirror image half a cycle later, so over whole cycles FORWARD neither ya
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -20,15 +19,14 @@ from antennate.experiments.gait.pace import Pace, Walk, measure, rolling_speed
 from antennate.params import GaitParams, Params, PhysicsParams, VariationParams, number
 from antennate.params.base import require_whole_steps
 from antennate.robots.spec import HARDWARE_ALONE, RobotSpec
-from antennate.sim.scenes.flat import FlatScene
+from antennate.sim.scenes.scene import FlatScene
 from antennate.sim.sim_robot import Disturbance, SimRobot
 from antennate.sim.trial import make_world, place_at_start
 from antennate.sim.world import World
-from antennate.studies.experiment import OnStep, WithoutTrials, no_step
+from antennate.studies.experiment import OnStep, Outcome, no_step
 from antennate.studies.pool import gather
 from antennate.types import AntennaFrame, Floats, JointCommand, Maneuver
 
-SCHEMA = 1
 MANEUVERS = (Maneuver.FORWARD, Maneuver.TURN_L, Maneuver.TURN_R, Maneuver.REVERSE)
 WAVE_OFF = "wave_off"
 
@@ -60,7 +58,7 @@ class GaitStudyConfig(Params):
 
 
 @dataclass(frozen=True, slots=True)
-class GaitOutcome(WithoutTrials):
+class GaitOutcome(Outcome):
     """All walks: four maneuvers by name, one without body wave, and the sweep over its lead."""
 
     config: GaitStudyConfig
@@ -82,7 +80,7 @@ class GaitOutcome(WithoutTrials):
         speeds = [pace.speed for pace in swept]
         best = max(speeds)
         return {
-            "schema": SCHEMA,
+            "schema": 1,
             "command": "gait",
             "body_length_m": config.robot.length,
             "frequency_hz": config.gait.frequency,
@@ -132,10 +130,6 @@ class _Fixed:
 
 
 _Task = tuple[GaitStudyConfig, str, GaitParams, Maneuver]
-
-
-def _run_task(task: _Task, emit: Callable[[Walk], None]) -> None:
-    emit(walk_flat(*task))
 
 
 def walk_flat(config: GaitStudyConfig, name: str, gait: GaitParams, maneuver: Maneuver) -> Walk:
@@ -217,7 +211,7 @@ def run(
     Raises:
         SimulationError: The physics became invalid; from a worker it comes as a WorkerError.
     """
-    found = {w.name: w for w in gather(_run_task, _tasks(config), workers, on_step)}
+    found = {w.name: w for w in gather(walk_flat, _tasks(config), workers, on_step)}
     return GaitOutcome(
         config=config,
         maneuvers={m.name.lower(): found[m.name.lower()] for m in MANEUVERS},

@@ -9,7 +9,6 @@ from pydantic import Field, model_validator
 
 from antennate.antenna.statics import Profile
 from antennate.errors import SceneError
-from antennate.experiments.touch.traverse import MOVES, reach, site
 from antennate.params import (
     BenchPhysicsParams,
     ConditioningParams,
@@ -21,13 +20,33 @@ from antennate.params import (
 from antennate.params.base import require_different, require_whole_steps
 from antennate.robots.antenna import AntennaSpec
 from antennate.sim import touch_wall
-from antennate.sim.touch_wall import WALLS, WallKind
+from antennate.sim.touch_wall import WALLS, Site, WallKind
 
+MOVES = 5
+"""Updates of the carriage's target in one tick."""
 _Speed = Annotated[float, Field(ge=0.002, le=1.0)]
 _CLOSEST = 0.01
 """No wall comes nearer to the line of traverse [m]."""
 _MOST_TICKS = 10**7
 """Most ticks of a study: more would not fit into memory."""
+_CLEARANCE = 0.005
+"""Free way between the straight antenna and what it must not touch yet [m]."""
+
+
+def reach(antenna: AntennaSpec) -> float:
+    """Distance of the straight antenna's tip from the line of traverse [m]."""
+    return antenna.length * math.sin(antenna.base_angle)
+
+
+def site(antenna: AntennaSpec, overlap: float, length: float, phase: float) -> Site:
+    """Where a wall stands for an overlap [m]."""
+    return Site(
+        near=reach(antenna) - overlap,
+        clear=reach(antenna) + antenna.radius + _CLEARANCE,
+        top=antenna.length + antenna.radius + _CLEARANCE,
+        length=length,
+        phase=phase,
+    )
 
 
 class TouchConfig(Params):
@@ -82,12 +101,15 @@ class TouchConfig(Params):
     physics: BenchPhysicsParams = BenchPhysicsParams()
 
     @property
+    def lead(self) -> float:
+        """Way of the straight tip ahead of the base [m]."""
+        return self.antenna.length * math.cos(self.antenna.base_angle)
+
+    @property
     def travel(self) -> float:
         """Way of every traverse [m]."""
-        lead = self.antenna.length * math.cos(self.antenna.base_angle)
-        return (
-            lead + self.place_spread + self.wall_length + self.antenna.length + 2 * self.free_length
-        )
+        wall_and_lead = self.lead + self.place_spread + self.wall_length
+        return wall_and_lead + self.antenna.length + 2 * self.free_length
 
     @model_validator(mode="after")
     def _agree(self) -> TouchConfig:
