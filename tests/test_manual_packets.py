@@ -138,7 +138,8 @@ def twin() -> ServoBus:
         servo.set("firmware_version", 38)
         servo.set("present_input_voltage", 119 if name == 1 else 111)
         servo.set("present_temperature", {2: 36, 4: 31}.get(name, 25))
-        servo.advance(1e-6)  # it rests from now on
+        servo.advance(1e-6)  # it rests from now on, and has told so
+        servo.read(120, 28)
         if name == 7:
             servo.memory.show("present_pwm", 421)
         made.append(servo)

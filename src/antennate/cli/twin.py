@@ -77,21 +77,12 @@ def command(argv: Sequence[str]) -> int:
     Raises:
         AntennateError: Something given cannot be used.
     """
-<<<<<<< HEAD
-    with end_at_first():
-        return _serve(argv)
-
-
-def _serve(argv: Sequence[str]) -> int:
-    config, places = parse_with("twin", DESCRIPTION, TwinConfig, argv, Places)
+    config, places = parse("twin", DESCRIPTION, TwinConfig, argv, Places)
     orders = Orders(places.orders, _say) if places.orders else None
     return (_serve_servos if places.servos else _serve_robot)(config, places, orders)
 
 
 def _serve_robot(config: TwinConfig, places: Places, orders: Orders | None) -> int:
-=======
-    config, places = parse("twin", DESCRIPTION, TwinConfig, argv, Places)
->>>>>>> main
     faults = Faults([read(text) for text in config.fault], config.robot.ids)
     real = places.pace == "real"
     robot, passage = watched(config, boot_id=secrets.randbits(32) if real else None)

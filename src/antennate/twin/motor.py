@@ -15,8 +15,10 @@ from dataclasses import dataclass
 from antennate.robots.servos import TICKS_A_TURN, ServoParams, XL330Params
 from antennate.twin.memory import Memory
 
-STEP = 0.001
-"""Period of the loops [s]."""
+LOOP = 0.001
+"""Period of the loops [s], for which their gains are meant."""
+STEP = 0.002
+"""Longest step of a motor [s]."""
 FULL = 885
 """PWM of the full drive."""
 _TICK = 2.0 * math.pi / TICKS_A_TURN
@@ -149,13 +151,13 @@ class Loops:
 
     def position(self, away: float, behind: float, dt: float, limit: float) -> float:
         """Drive for a distance [ticks] and a difference of speeds [ticks/s], within a limit."""
-        wanted = self.p / 128 * away + self.d / 16 * behind * STEP + self.total
-        return self._limited(wanted, self.i / 65_536 * away * dt / STEP, limit)
+        wanted = self.p / 128 * away + self.d / 16 * behind * LOOP + self.total
+        return self._limited(wanted, self.i / 65_536 * away * dt / LOOP, limit)
 
     def velocity(self, behind: float, dt: float, limit: float) -> float:
         """Drive for a difference of speeds [0.229 rev/min], within a limit."""
         wanted = self.vp / 128 * behind + self.total
-        return self._limited(wanted, self.vi / 65_536 * behind * dt / STEP, limit)
+        return self._limited(wanted, self.vi / 65_536 * behind * dt / LOOP, limit)
 
     def _limited(self, wanted: float, more: float, limit: float) -> float:
         """Within a limit; the sum grows only where that has an effect."""

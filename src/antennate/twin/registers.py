@@ -35,6 +35,11 @@ _VOLTAGE_ERROR, _HEAT_ERROR = 1, 4
 """Bits of Hardware Error Status."""
 _TORQUE_AT_START, _RAM_AT_START = 1, 2
 """Bits of Startup Configuration."""
+_TOLD = frozenset(
+    {"moving", "moving_status", "present_pwm", "present_load", "present_current"}
+    | {"present_velocity", "present_position", "velocity_trajectory", "position_trajectory"}
+)
+"""Registers that tell what the shaft does."""
 
 
 class Servo:
@@ -65,6 +70,7 @@ class Servo:
         self.registered: tuple[int, bytes] | None = None
         self.trouble: Trouble | None = None
         self._backup: bytes | None = None
+        self._untold = True
         self._t = self._fed = self._boot = t
         self.set("id", servo)
         self.set("firmware_version", _FIRMWARE)
@@ -74,6 +80,8 @@ class Servo:
 
     def get(self, name: str) -> int:
         """The value of a register."""
+        if self._untold and name in _TOLD:
+            self._tell()
         return self.memory.get(name)
 
     def set(self, name: str, value: int) -> None:
@@ -115,10 +123,10 @@ class Servo:
         if bits & self.get("shutdown"):
             self.set("torque_enable", 0)
 
-    def restart(self, t: float) -> None:
-        """Power lost and back: registers below 64 stay, the others are as after a reset."""
+    def restart(self, t: float, time: float = BOOT_TIME) -> None:
+        """Power lost and back after a time [s]: registers below 64 stay, others are reset."""
         self.advance(t)
-        self._start(t + BOOT_TIME)
+        self._start(t + time)
 
     def plug(self, t: float) -> None:
         """Put it on the bus, which gives it power."""
@@ -155,6 +163,8 @@ class Servo:
 
     def read(self, address: int, length: int) -> tuple[StatusError, bytes]:
         """Bytes of the table."""
+        if self._untold:
+            self._tell()
         return self.memory.read(address, length)
 
     def write(self, address: int, data: bytes, ram_only: bool = False) -> StatusError:
@@ -301,19 +311,17 @@ class Servo:
 
     def _move(self, t: float) -> None:
         self._refresh()
-        moved = self.motion.move(t)
+        self._untold |= self.motion.move(t)
         self._t = max(self._t, t)
-        if moved:
-            self._show()
-        else:
-            self._show_tick()
-
-    def _show(self) -> None:
-        """Tell what happens in the registers that can only be read."""
-        self._refresh()
-        self.motion.show(self._t)
-        self._show_tick()
-
-    def _show_tick(self) -> None:
         since = max(self._t - self._boot, 0.0)
         self.memory.show("realtime_tick", int(1e3 * since) % 32_768)
+
+    def _show(self) -> None:
+        """Something has happened that registers tell, once anybody reads them."""
+        self._refresh()
+        self._untold = True
+
+    def _tell(self) -> None:
+        self._refresh()
+        self._untold = False
+        self.motion.show(self._t)

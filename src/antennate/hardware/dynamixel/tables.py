@@ -13,6 +13,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
+EEPROM_END = 64
+"""Registers below this address survive power-off and are locked while torque is on."""
+
 
 @dataclass(frozen=True, slots=True)
 class Register:
@@ -43,7 +46,7 @@ class Register:
     @property
     def eeprom(self) -> bool:
         """It survives power-off and is locked while torque is on."""
-        return self.address < 64
+        return self.address < EEPROM_END
 
     @property
     def writable(self) -> bool:
@@ -176,7 +179,6 @@ _COMMON: list[_Row] = [
 ]
 
 
-<<<<<<< HEAD
 def _indirect(first: int, address: int, data: int, count: int, last: int) -> list[_Row]:
     """Indirect addresses and indirect data of `count` bytes, numbered from `first`."""
     rows: list[_Row] = []
@@ -197,12 +199,6 @@ def _table(
     changes: dict[str, dict[str, object]],
     more: list[_Row],
 ) -> Table:
-=======
-_CURRENT: dict[str, object] = {"name": "present_current", "unit": "1 mA", "low": None, "high": None}
-
-
-def _registers(changes: dict[str, dict[str, object]], more: list[_Row]) -> dict[str, Register]:
->>>>>>> main
     rows = [Register(*row, signed=row[0] in _SIGNED) for row in _COMMON + more]
     rows = [replace(row, **changes.get(row.name, {})) for row in rows]
     registers = {row.name: row for row in sorted(rows, key=lambda row: row.address)}
@@ -212,14 +208,12 @@ def _registers(changes: dict[str, dict[str, object]], more: list[_Row]) -> dict[
         for name, row in registers.items()
         if name.startswith("indirect_data")
     }
-    page = name.lower().removesuffix("-t")
-    source = f"https://emanual.robotis.com/docs/en/dxl/x/{page}/"
-    return Table(model, name, source, firmware, frozenset(modes), registers, data)
+    return Table(model, name, firmware, frozenset(modes), registers, data)
 
 
-<<<<<<< HEAD
 _FOUR_MODES = {VELOCITY_MODE, POSITION_MODE, EXTENDED_MODE, PWM_MODE}
 _INDIRECT_56 = _indirect(1, 168, 224, 28, 661) + _indirect(29, 578, 634, 28, 661)
+_CURRENT: dict[str, object] = {"name": "present_current", "unit": "1 mA", "low": None, "high": None}
 
 XC430_W240 = _table(1080, "XC430-W240-T", 45, _FOUR_MODES, {}, _INDIRECT_56)
 
@@ -258,7 +252,7 @@ XL330_M288 = _table(
         "velocity_p_gain": {"default": 180},
         "position_p_gain": {"default": 400},
         "goal_velocity": {"low": -2_047, "high": 2_047},
-        "present_load": {"name": "present_current", "unit": "1 mA", "low": None, "high": None},
+        "present_load": _CURRENT,
     },
     [
         ("current_limit", 38, 2, "RW", "1 mA", 1_750, 0, 1_750),
@@ -266,42 +260,6 @@ XL330_M288 = _table(
         ("goal_current", 102, 2, "RW", "1 mA", None, -1_750, 1_750),
         *_indirect(1, 168, 208, 20, 227),
     ],
-=======
-XC430_W240 = Table(
-    model=1080,
-    name="XC430-W240-T",
-    fast_read_firmware=45,
-    registers=_registers({"model_number": {"default": 1080}}, []),
-)
-
-XL330_M288 = Table(
-    model=1200,
-    name="XL330-M288-T",
-    fast_read_firmware=46,
-    registers=_registers(
-        {
-            "model_number": {"default": 1200},
-            "baud_rate": {"high": 6},
-            "drive_mode": {"high": 5},
-            "protocol_type": {"low": 2, "high": 22},
-            "temperature_limit": {"default": 70},
-            "max_voltage_limit": {"default": 70, "low": 31, "high": 70},
-            "min_voltage_limit": {"default": 35, "low": 31, "high": 70},
-            "velocity_limit": {"default": 445, "high": 2_047},
-            "shutdown": {"default": 53},
-            "velocity_i_gain": {"default": 1_600},
-            "velocity_p_gain": {"default": 180},
-            "position_p_gain": {"default": 400},
-            "goal_velocity": {"low": -2_047, "high": 2_047},
-            "present_load": _CURRENT,
-        },
-        [
-            ("current_limit", 38, 2, "RW", "1 mA", 1_750, 0, 1_750),
-            ("pwm_slope", 62, 1, "RW", "1.977 mV/ms", 140, 1, 255),
-            ("goal_current", 102, 2, "RW", "1 mA", None, -1_750, 1_750),
-        ],
-    ),
->>>>>>> main
 )
 
 TABLES = {table.model: table for table in (XC430_W240, XL330_M288, XL430_W250)}
