@@ -27,7 +27,6 @@ from antennate.studies.experiment import OnStep, Outcome, no_step
 from antennate.studies.pool import gather
 from antennate.types import AntennaFrame, Floats, JointCommand, Maneuver
 
-SCHEMA = 1
 MANEUVERS = (Maneuver.FORWARD, Maneuver.TURN_L, Maneuver.TURN_R, Maneuver.REVERSE)
 WAVE_OFF = "wave_off"
 
@@ -81,7 +80,7 @@ class GaitOutcome(Outcome):
         speeds = [pace.speed for pace in swept]
         best = max(speeds)
         return {
-            "schema": SCHEMA,
+            "schema": 1,
             "command": "gait",
             "body_length_m": config.robot.length,
             "frequency_hz": config.gait.frequency,
