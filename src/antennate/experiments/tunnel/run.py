@@ -42,6 +42,7 @@ class TunnelOutcome:
             "command": "tunnel",
             "seed": config.seed,
             "time_limit_s": config.time_limit,
+            "scene": config.scene,
             "length_m": config.tunnel.length if config.scene == TUNNEL else None,
             "interrupted": self.interrupted,
             "controllers": {n: measures.summary(rows) for n, rows in by_name.items()},
