@@ -13,7 +13,7 @@ from antennate.cli import viewer
 from antennate.cli.addresses import PortOptions, key_of, parse_robot, require_two_ports
 from antennate.cli.exit_codes import BAD_INPUT, OK
 from antennate.cli.options import option
-from antennate.cli.progress import terminate_as_interrupt
+from antennate.cli.progress import stop_signals
 from antennate.cli.results import ResultOptions, folder_for, tell
 from antennate.errors import ConfigError, LogError
 from antennate.hardware.driving.config import DriveConfig
@@ -64,7 +64,7 @@ def command(argv: Sequence[str]) -> int:
     with folder_for("drive", orders, config, argv) as folder:
         folder.without_trials()
         wires = connect(config, orders.esp32, orders.bus, key)
-        with wires as session, terminate_as_interrupt():
+        with wires as session, stop_signals():
             result = _carry_out(config, session, orders, folder.path / LOG)
         folder.finish(result, ())
         table = Table.of("Drive", {result["controller"]: result}, MEASURES, _note(result))

@@ -37,14 +37,14 @@ def tables(result: Mapping[str, Any]) -> Sequence[Table]:
 
 def sentence(result: Mapping[str, Any]) -> str:
     """Which controllers came through, and how sure it is."""
-    scene = result["scene"]
-    crossed = "Tunnels crossed" if scene == TUNNEL else f"Exits reached in the scene {scene}"
+    found = successes(result["controllers"])
     pair = next(iter(reversed(result["paired"].items())), None)
     test = f"; McNemar p of {pair[0]} {pair[1]['mcnemar_p']:.2g}" if pair else ""
     invalid = sum(row["invalid"] for row in result["controllers"].values())
     why = f" Invalid trials: {invalid}; trials.csv gives the reason of each." if invalid else ""
-    found = successes(result["controllers"])
-    return f"{crossed} (95 % interval): {found}{test}.{why}"
+    scene = result["scene"]
+    what = "Tunnels crossed" if scene == TUNNEL else f"Trials that succeeded in {scene}"
+    return f"{what} (95 % interval): {found}{test}.{why}"
 
 
 EXPERIMENT = Experiment.of_folder(

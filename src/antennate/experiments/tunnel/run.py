@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from antennate.control.registry import CONTROLLERS, ControllerFactory, make_controller
+from antennate.errors import ConfigError
 from antennate.experiments.tunnel import measures
 from antennate.experiments.tunnel.batch import run_trials
 from antennate.experiments.tunnel.config import TunnelConfig
@@ -41,8 +42,8 @@ class TunnelOutcome:
             "schema": 2,
             "command": "tunnel",
             "seed": config.seed,
-            "time_limit_s": config.time_limit,
             "scene": config.scene,
+            "time_limit_s": config.time_limit,
             "length_m": config.tunnel.length if config.scene == TUNNEL else None,
             "interrupted": self.interrupted,
             "controllers": {n: measures.summary(rows) for n, rows in by_name.items()},
@@ -59,7 +60,10 @@ def check(config: TunnelConfig) -> None:
     """
     check_start(config)
     for name in config.controllers:
-        make_controller(name, config.control, config.robot)
+        try:
+            make_controller(name, config.control, config.robot)
+        except ConfigError as error:
+            raise ConfigError(f"--controllers: {error}") from error
 
 
 _Task = tuple[TunnelConfig, str, ControllerFactory | None, list[int]]
