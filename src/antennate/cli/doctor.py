@@ -22,10 +22,10 @@ from antennate.cli.results import ResultOptions, folder_for
 from antennate.errors import ConfigError
 from antennate.hardware.doctor.check import Opener, Row
 from antennate.hardware.doctor.checkup import Checkup, examine
-from antennate.hardware.doctor.config import DoctorConfig
 from antennate.hardware.doctor.fix import Change, apply, plan
 from antennate.hardware.doctor.ports import opener_of
 from antennate.hardware.host_clock import HostClock
+from antennate.hardware.robot import DoctorConfig
 from antennate.hardware.robot_file import RobotFile
 from antennate.messages import one_line
 from antennate.studies.formats import to_json

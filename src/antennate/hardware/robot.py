@@ -10,6 +10,7 @@ from antennate.errors import ConfigError
 from antennate.params import (
     ConditioningParams,
     ControlParams,
+    DoctorParams,
     NetworkParams,
     Params,
     SupervisorParams,
@@ -55,3 +56,9 @@ class RobotConfig(Params):
         control = own.model_copy(update={"conditioning": file.conditioning(averaging)})
         known = {"control": control, "sensor_id": file.sensor_id, "calibration": None}
         return self.model_copy(update=known)
+
+
+class DoctorConfig(RobotConfig):
+    """What `antennate doctor` has to know: the robot, and what is good."""
+
+    doctor: DoctorParams = DoctorParams()

@@ -32,9 +32,6 @@ def drive(
         config: For how long.
         arm: Whether torque may come on.
         on_tick: Called after every tick with the session and the time [s].
-
-    Returns:
-        How it went. After Ctrl-C the report is that of the way so far.
     """
     report, clock = Report(), session.clock
     start = clock.now()
@@ -46,14 +43,10 @@ def drive(
     def failed(t: float) -> bool:
         """After a fault and a time to look at it: torque can be taken off now, or never."""
         nonlocal failed_at
-        out = session.outputs
-        if (
-            out is not None
-            and t > dry.over + config.limits.longest_arming
-            and out.state >= State.FAULT
-        ):
+        state = State.OK if session.outputs is None else session.outputs.state
+        if t > dry.over + config.limits.longest_arming and state >= State.FAULT:
             failed_at = min(failed_at, t)
-        if out is not None and out.state is State.OFF and t > failed_at:
+        if state is State.OFF and t > failed_at:
             return True
         wait = max(config.fault_time, config.bus_return if session.mute else 0.0)
         return t >= failed_at + wait

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 from antennate.hardware.driving.session import Session
-from antennate.hardware.driving.timing import TimingReport
+from antennate.hardware.driving.timing import LoopTiming
 from antennate.hardware.safety.causes import Cause, Outputs, State
 
 
@@ -23,15 +23,15 @@ class Report:
         on: Servos that did not confirm that their torque is off; None if it never was on.
     """
 
-    timing: TimingReport | None = None
-    before: TimingReport | None = None
+    timing: LoopTiming | None = None
+    before: LoopTiming | None = None
     worst: State = State.OK
     why: str = ""
     refusal: str = ""
     on: list[int] | None = None
     _torque: bool = False
-    _waits: str = field(default="", repr=False)
-    _causes: set[Cause] | None = field(default=None, repr=False)
+    _waits: str = ""
+    _causes: set[Cause] | None = None
 
     @property
     def safe(self) -> bool:
@@ -107,7 +107,7 @@ def _ordered(out: Outputs) -> bool:
     return off == {Cause.STOPPED}
 
 
-def _pace(timing: TimingReport | None) -> dict[str, Any] | None:
+def _pace(timing: LoopTiming | None) -> dict[str, Any] | None:
     if timing is None:
         return None
     return {
@@ -123,7 +123,7 @@ def _pace(timing: TimingReport | None) -> dict[str, Any] | None:
     }
 
 
-def _since(end: TimingReport | None, begin: TimingReport | None) -> dict[str, Any] | None:
+def _since(end: LoopTiming | None, begin: LoopTiming | None) -> dict[str, Any] | None:
     """Ticks from the first command that was sent; the time that arming takes is before it."""
     if end is None or begin is None:
         return None

@@ -43,7 +43,7 @@ class StopOnce:
             signal.signal(number, handler)
 
     def receive(self, number: int, frame: FrameType | None) -> None:
-        """Handle a signal."""
+        """Take note of a signal."""
         self.heard = True
         if not self.deaf:
             raise KeyboardInterrupt

@@ -77,7 +77,7 @@ class Packet:
 
     Attributes:
         id: Servo it is for or from; 254 is all.
-        instruction: An `Instruction`, or a number not known here.
+        instruction: An `Instruction`, or another number.
         params: Parameters without stuffing; of a status, the error byte and the data.
     """
 
@@ -88,14 +88,7 @@ class Packet:
 
 @dataclass(frozen=True, slots=True)
 class Status:
-    """What one servo answered.
-
-    Attributes:
-        id: The servo.
-        error: What went wrong with the request.
-        alert: The servo has a hardware error.
-        data: What was read.
-    """
+    """What one servo answered; `alert` if it has a hardware error."""
 
     id: int
     error: StatusError
