@@ -146,11 +146,9 @@ class AntennaReader:
 
         Call it once every period: hysteresis, creep and noise go on with each call.
         """
-        noise = (
-            0.0
-            if self._rng is None
-            else reading_noise(self._sensor, self._rng, (1, len(self._angle)))
-        )
+        noise: Floats | float = 0.0
+        if self._rng is not None:
+            noise = reading_noise(self._sensor, self._rng, (1, len(self._angle)))
         counts = self._chain.step(self.flex(data)[None, :], noise)
         return AntennaFrame(t=np.array([data.time]), counts=counts)
 

@@ -224,15 +224,6 @@ class World:
         self._qpos.take(self._flex, out=angles, mode="clip")
 
     @property
-    def sensed_hinges(self) -> int:
-        """Number of hinges under one flex sensor."""
-        return self._flex.shape[1]
-
-    def flex(self) -> Floats:
-        """Summed hinge angles under each sensor [rad], shape (2,); positive towards the tail."""
-        return self._qpos[self._flex].sum(axis=1)
-
-    @property
     def heading(self) -> float:
         """Yaw of the head link [rad], within (-pi, pi]."""
         w, x, y, z = self.data.qpos[self._root + 3 : self._root + 7]

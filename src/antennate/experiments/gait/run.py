@@ -19,7 +19,7 @@ from antennate.experiments.gait.pace import Pace, Walk, measure, rolling_speed
 from antennate.params import GaitParams, Params, PhysicsParams, VariationParams, number
 from antennate.params.base import require_whole_steps
 from antennate.robots.spec import HARDWARE_ALONE, RobotSpec
-from antennate.sim.scenes.flat import FlatScene
+from antennate.sim.scenes.scene import FlatScene
 from antennate.sim.sim_robot import Disturbance, SimRobot
 from antennate.sim.trial import make_world, place_at_start
 from antennate.sim.world import World

@@ -9,10 +9,9 @@ from pathlib import Path
 from antennate.errors import AntennateError, ConfigError, SceneError, in_one_line
 from antennate.lookup import Registry
 from antennate.params import TunnelParams
-from antennate.sim.scenes.flat import FlatScene
 from antennate.sim.scenes.mjcf import MjcfScene
 from antennate.sim.scenes.mjcf_file import require_compiles
-from antennate.sim.scenes.scene import Scene
+from antennate.sim.scenes.scene import FlatScene, Scene
 from antennate.sim.scenes.tunnel import TunnelScene
 
 TUNNEL = "tunnel"
