@@ -204,3 +204,14 @@ def test_intervals_reach_from_end_to_end_and_leave_out_what_does_not_exist():
     assert points.get_xydata().tolist() == [[0.0, 2.0], [2.0, 5.0]]
     ends = [segment[:, 1].tolist() for segment in whiskers.get_segments()]
     assert ends == [[1.0, 4.0], [5.0, 5.0]]
+
+
+def test_the_legend_names_only_what_the_scene_has():
+    def named(course):
+        paths = {("open", 0): course}
+        figure = tunnel.trajectories(paths, ("open",), [Row("open", 0, "left", LIMIT)], range(1))
+        return {text.get_text() for text in figure.legends[0].get_texts()}
+
+    bare = path(2.0)
+    bare.fixed, bare.before, bare.after = [], [], []
+    assert named(path(2.0)) - named(bare) == {"wall", "obstacle at first", "obstacle at the end"}

@@ -151,7 +151,7 @@ def _endpoints(places: Places) -> tuple[Endpoint | None, Endpoint | None]:
 
 
 def _place(flag: str, text: str) -> tuple[str, int]:
-    """Host and port; this computer alone is the default, others are named on purpose."""
+    """Host and port; without a host nobody beyond this computer can connect."""
     host, _, port = text.rpartition(":")
     if not re.fullmatch(r"[0-9]{1,5}", port) or int(port) > _LAST_PORT:
         raise ConfigError(

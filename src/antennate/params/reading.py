@@ -67,8 +67,6 @@ def read_file(path: Path, model: type[Config]) -> Config:
         return model.model_validate_json(json.dumps(table, default=str), strict=True)
     except ValidationError as error:
         raise ConfigError(f"{path}: {describe(error, model)}") from None
-    except RecursionError:
-        raise ConfigError(f"{path}: expected plain tables, found them nested too deeply") from None
 
 
 def _table_of(path: Path) -> dict[str, Any]:

@@ -127,8 +127,10 @@ class ServoBus:
 
     def _sync_write(self, t: float, present: list[Servo], params: bytes) -> None:
         address, length = two_words(params)
+        known = {servos[0].get("id"): servos for servos in self._by_id(present)}
         for at in range(4, len(params) - length, length + 1):
-            self._write(present, params[at], address, params[at + 1 : at + 1 + length])
+            for servo in known.get(params[at], ()):
+                servo.write(address, params[at + 1 : at + 1 + length])
         named = set(params[4 :: length + 1])
         if address == _GOAL.address and named >= {servo.get("id") for servo in self.servos}:
             self.on_goals()
@@ -138,13 +140,10 @@ class ServoBus:
             address, length = two_words(params[1:])
             if len(params) < 5 + length:
                 return
-            self._write(present, params[0], address, params[5 : 5 + length])
+            for servo in present:
+                if servo.get("id") == params[0]:
+                    servo.write(address, params[5 : 5 + length])
             params = params[5 + length :]
-
-    def _write(self, present: list[Servo], name: int, address: int, data: bytes) -> None:
-        for servo in present:
-            if servo.get("id") == name:
-                servo.write(address, data)
 
     def _sync_read(self, t: float, present: list[Servo], params: bytes) -> None:
         self._chain(t, present, [(name, *two_words(params)) for name in params[4:]])
@@ -230,8 +229,10 @@ class ServoBus:
         return trouble
 
     def _by_id(self, servos: list[Servo]) -> list[list[Servo]]:
-        names = sorted({servo.get("id") for servo in servos})
-        return [[servo for servo in servos if servo.get("id") == name] for name in names]
+        found: dict[int, list[Servo]] = {}
+        for servo in servos:
+            found.setdefault(servo.get("id"), []).append(servo)
+        return [found[name] for name in sorted(found)]
 
 
 def _bulk(params: bytes) -> list[tuple[int, int, int]]:

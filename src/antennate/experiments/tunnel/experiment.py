@@ -9,7 +9,7 @@ from antennate.experiments.tunnel import measures
 from antennate.experiments.tunnel import run as tunnel
 from antennate.sim.scenes.registry import TUNNEL
 from antennate.studies.experiment import Experiment
-from antennate.studies.measures import Table, shown
+from antennate.studies.measures import Table, successes
 
 
 def tables(result: Mapping[str, Any]) -> Sequence[Table]:
@@ -37,10 +37,7 @@ def tables(result: Mapping[str, Any]) -> Sequence[Table]:
 
 def sentence(result: Mapping[str, Any]) -> str:
     """Which controllers came through, and how sure it is."""
-    found = ", ".join(
-        f"{name} {row['successes']} of {row['trials'] - row['invalid']} ({shown(row['wilson95'])})"
-        for name, row in result["controllers"].items()
-    )
+    found = successes(result["controllers"])
     pair = next(iter(reversed(result["paired"].items())), None)
     test = f"; McNemar p of {pair[0]} {pair[1]['mcnemar_p']:.2g}" if pair else ""
     invalid = sum(row["invalid"] for row in result["controllers"].values())

@@ -58,7 +58,7 @@ def drive(
         report.refusal = dry.refusal
         report.watch(session)
         on_tick(session, clock.now())
-        return not stop.heard and t < dry.end and not failed(t)
+        return not stop.received and t < dry.end and not failed(t)
 
     with StopOnce() as stop:
         try:
@@ -67,7 +67,7 @@ def drive(
             except KeyboardInterrupt:
                 pass
             finally:
-                stop.deaf = True
+                stop.closed = True
         finally:
             report.on = _off(session, config.stand)
             report.close(session)

@@ -1,7 +1,7 @@
 """Ctrl-C, SIGTERM and the loss of the terminal, while servos have torque.
 
 An exception alone would not do: a controller with a bare `except`, a destructor or a callback may
-swallow it. So what was heard is also kept, for the loop to look at.
+swallow it. So what was received is also kept, for the loop to look at.
 """
 
 from __future__ import annotations
@@ -18,19 +18,19 @@ STOPS = tuple(
 
 
 class StopOnce:
-    """Inside the block each of them raises KeyboardInterrupt, until it is made deaf.
+    """Inside the block each of them raises KeyboardInterrupt, until it is closed.
 
-    Make it so before the torque goes off: whoever presses Ctrl-C twice must not keep it on. Outside
-    the main thread Python delivers no signals: the block then changes and hears nothing, and
-    whoever starts such a thread has to end it otherwise, as by `orders.stop`.
+    Close it before the torque goes off: whoever presses Ctrl-C twice must not keep it on. Outside
+    the main thread Python delivers no signals: whoever starts such a thread has to end it
+    otherwise, as by `orders.stop`.
 
     Attributes:
-        heard: One came, whoever may have swallowed the exception.
-        deaf: None raises any more; for the block's owner to set.
+        received: One came, whoever may have swallowed the exception.
+        closed: None raises any more; for the block's owner to set.
     """
 
     def __init__(self) -> None:
-        self.heard = self.deaf = False
+        self.received = self.closed = False
         self._before: dict[int, Any] = {}
 
     def __enter__(self) -> StopOnce:
@@ -44,6 +44,6 @@ class StopOnce:
 
     def receive(self, number: int, frame: FrameType | None) -> None:
         """Take note of a signal."""
-        self.heard = True
-        if not self.deaf:
+        self.received = True
+        if not self.closed:
             raise KeyboardInterrupt

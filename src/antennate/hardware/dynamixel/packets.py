@@ -238,12 +238,12 @@ def split_fast_reply(received: bytes, ids: Sequence[int], length: int) -> list[S
     crc = crc16(received[start:first])
     for begin in range(first, len(received) - length - 3, length + 4):
         end = begin + 2 + length
-        told, crc = received[end : end + 2], crc16(received[begin:end], crc)
+        sent, crc = received[end : end + 2], crc16(received[begin:end], crc)
         servo = received[begin + 1]
-        if told == crc.to_bytes(2, "little") and servo in left:
+        if sent == crc.to_bytes(2, "little") and servo in left:
             answers.append(_status(servo, received[begin], received[begin + 2 : end]))
             left = left[left.index(servo) + 1 :]
-        crc = crc16(told, int.from_bytes(told, "little"))
+        crc = crc16(sent, int.from_bytes(sent, "little"))
     return answers
 
 
