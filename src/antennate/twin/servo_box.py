@@ -83,10 +83,13 @@ def read_list(text: str) -> tuple[ServoEntry, ...]:
                 "--servos: expected ID:MODEL[@BAUD][xCOUNT], such as 1:xl330-m288, or a file that "
                 f"ends in .toml, found {part!r}"
             )
-        entry: dict[str, Any] = {"id": int(match["id"]), "model": match["model"]}
+        model, count = match["model"], match["count"]
+        if count and not match["baud"] and model not in MODELS:
+            model, count = f"{model}x{count}", None  # the x is part of its name
+        entry: dict[str, Any] = {"id": int(match["id"]), "model": model}
         if match["baud"]:
             entry["baud"] = int(match["baud"])
-        entries += [entry] * int(match["count"] or 1)
+        entries += [entry] * int(count or 1)
     return from_values(ServoList, {"servo": entries}).servo
 
 
