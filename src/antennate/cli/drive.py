@@ -13,7 +13,6 @@ from antennate.cli import viewer
 from antennate.cli.addresses import RobotOptions, key_of, parse_robot, require_lossless
 from antennate.cli.exit_codes import BAD_INPUT, OK
 from antennate.cli.options import option
-from antennate.cli.progress import terminate_as_interrupt
 from antennate.cli.tables import Cell, number, show
 from antennate.errors import ConfigError, LogError
 from antennate.hardware.doctor.ports import same
@@ -22,6 +21,7 @@ from antennate.hardware.driving.connect import connect
 from antennate.hardware.driving.drive import drive
 from antennate.hardware.driving.priority import Priority, urgent
 from antennate.hardware.driving.session import Session
+from antennate.hardware.driving.signals import StopOnce
 from antennate.hardware.robot_file import RobotFile
 from antennate.hardware.safety.causes import State
 from antennate.studies.formats import to_json
@@ -35,7 +35,7 @@ from antennate.telemetry.ticks import Tick
 DESCRIPTION = """\
 Let a controller walk the real robot, or its twin. First a dry run: everything is read and nothing
 written. Then, with --arm only, torque comes on with every servo where it stands, and the robot
-walks. Ctrl-C or SIGTERM ends it: command held, torque off, verified.
+walks. Ctrl-C, Ctrl-\\ or SIGTERM ends it: command held, torque off, verified.
 
 A lost board or servo makes the robot hold; the watchdogs of the servos stop it if this program
 dies. The exit code is 2 if it ended in a FAULT or without supply, if torque was refused or is not
@@ -68,12 +68,12 @@ def command(argv: Sequence[str]) -> int:
     config = config.calibrated()
     require_lossless(orders.bus)
     key = key_of(orders)
-    with RunDirectory.create("drive", orders.out, orders.overwrite) as folder:
+    made = RunDirectory.create("drive", orders.out, orders.overwrite)
+    with StopOnce(last=True) as stop, made as folder:
         folder.describe(config, ["antennate", "drive", *argv])
         folder.without_trials()
-        wires = connect(config, orders.esp32, orders.bus, key)
-        with wires as session, terminate_as_interrupt():
-            result = _carry_out(config, session, orders, folder.path / LOG)
+        with connect(config, orders.esp32, orders.bus, key) as session:
+            result = _carry_out(config, session, orders, folder.path / LOG, stop)
         folder.finish(result, ())
         if orders.json:
             sys.stdout.write(to_json(result))
@@ -86,7 +86,9 @@ def command(argv: Sequence[str]) -> int:
     return BAD_INPUT if fault or stays_on or result["refusal"] or idle else OK
 
 
-def _carry_out(config: DriveConfig, session: Session, orders: Orders, log: Path) -> dict[str, Any]:
+def _carry_out(
+    config: DriveConfig, session: Session, orders: Orders, log: Path, stop: StopOnce
+) -> dict[str, Any]:
     """Drive, with the log and the status line in a process of their own."""
     header = Header(controller=config.controller, params=config.control, robot=config.robot)
     required = [viewer.REQUIRED] if config.record_required else []
@@ -109,7 +111,7 @@ def _carry_out(config: DriveConfig, session: Session, orders: Orders, log: Path)
         session.unrecorded = config.record_required and not feed.keeps
 
     with feed, urgent() as priority:
-        report = drive(session, config, orders.arm, keep)
+        report = drive(session, config, orders.arm, keep, stop)
     head = {"schema": 1, "command": "drive", "controller": config.controller, "armed": orders.arm}
     tail = {
         "priority": priority.value,

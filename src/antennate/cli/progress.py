@@ -11,6 +11,8 @@ import time
 from collections.abc import Callable, Iterator
 from typing import Any
 
+from antennate.hardware.driving.signals import STOPS
+
 _LINES = 10
 """Plain lines over a whole run."""
 
@@ -66,16 +68,13 @@ def terminate_as_interrupt() -> Iterator[None]:
         signal.signal(signal.SIGTERM, before)
 
 
-_ENDS = (signal.SIGINT, signal.SIGTERM)
-
-
 @contextlib.contextmanager
 def end_at_first() -> Iterator[None]:
-    """Let the first SIGINT or SIGTERM end the block and this process; none is heard after it."""
+    """Let the first signal of `STOPS` end the block and this process; none is heard after it."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    before = {n: signal.getsignal(n) for n in _ENDS if signal.getsignal(n) is not signal.SIG_IGN}
+    before = {n: signal.getsignal(n) for n in STOPS if signal.getsignal(n) is not signal.SIG_IGN}
     heard = False
 
     def hear(number: int, frame: Any) -> None:

@@ -22,6 +22,7 @@ def drive(
     config: DriveConfig,
     arm: bool,
     on_tick: Callable[[Session, float], None] = lambda session, t: None,
+    stop: StopOnce | None = None,
 ) -> Report:
     """A dry run, then, if `arm`, a walk; torque is off at the end whatever happens.
 
@@ -32,6 +33,8 @@ def drive(
         config: For how long.
         arm: Whether torque may come on.
         on_tick: Called after every tick with the session and the time [s].
+        stop: What hears signals; by default they are heard inside this call alone. It is deaf
+            afterwards.
 
     Returns:
         How it went. After Ctrl-C the report is that of the way so far.
@@ -65,17 +68,19 @@ def drive(
         report.refusal = dry.refusal
         report.watch(session)
         on_tick(session, clock.now())
-        return not stop.heard and t < dry.end and not failed(t)
+        return not heard.heard and t < dry.end and not failed(t)
 
-    with StopOnce() as stop:
+    with contextlib.nullcontext(stop) if stop else StopOnce() as heard:
+        heard.insists = True
         try:
             try:
                 run_loop(session, session.control, session.period, go_on)
-            except KeyboardInterrupt:
-                pass
             finally:
-                stop.deaf = True
+                heard.deaf = True
+        except KeyboardInterrupt:  # also one that came before `deaf` was set
+            pass
         finally:
+            heard.deaf = True
             report.on = _off(session, config.stand)
             report.close(session)
     return report

@@ -1,4 +1,4 @@
-"""Ctrl-C, SIGTERM and the loss of the terminal, while servos have torque.
+"""Ctrl-C, Ctrl-\\, SIGTERM and the loss of the terminal, while servos have torque.
 
 An exception alone would not do: a controller with a bare `except`, a destructor or a callback may
 swallow it. So what was heard is also kept, for the loop to look at.
@@ -12,25 +12,34 @@ from types import FrameType
 from typing import Any
 
 STOPS = tuple(
-    getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
+    getattr(signal, name)
+    for name in ("SIGINT", "SIGQUIT", "SIGTERM", "SIGHUP")
+    if hasattr(signal, name)
 )
 """What asks a program to end; a terminal that goes away, as of a lost connection, sends SIGHUP."""
 
 
 class StopOnce:
-    """Inside the block each of them raises KeyboardInterrupt, until it is made deaf.
+    """Inside the block a signal that asks to end raises KeyboardInterrupt, until it is made deaf.
 
     Make it so before the torque goes off: whoever presses Ctrl-C twice must not keep it on. Outside
     the main thread Python delivers no signals: the block then changes and hears nothing, and
     whoever starts such a thread has to end it otherwise, as by `orders.stop`.
 
+    Args:
+        last: The program ends after the block: if a signal was heard, none is heard any more, so
+            that the report is written and shown however often it is sent.
+
     Attributes:
         heard: One came, whoever may have swallowed the exception.
+        insists: Each of them raises, not the first alone; for code that may swallow one.
         deaf: None raises any more; for the block's owner to set.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, last: bool = False) -> None:
         self.heard = self.deaf = False
+        self.insists = not last
+        self._last = last
         self._before: dict[int, Any] = {}
 
     def __enter__(self) -> StopOnce:
@@ -40,10 +49,10 @@ class StopOnce:
 
     def __exit__(self, *_: object) -> None:
         for number, handler in self._before.items():
-            signal.signal(number, handler)
+            signal.signal(number, signal.SIG_IGN if self._last and self.heard else handler)
 
     def receive(self, number: int, frame: FrameType | None) -> None:
         """Handle a signal."""
-        self.heard = True
-        if not self.deaf:
+        first, self.heard = not self.heard, True
+        if not self.deaf and (first or self.insists):
             raise KeyboardInterrupt
