@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
+import shlex
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,13 +14,16 @@ from pydantic.dataclasses import dataclass
 from antennate.cli import viewer
 from antennate.cli.addresses import RobotOptions, key_of, parse_robot, require_lossless
 from antennate.cli.exit_codes import BAD_INPUT, OK
+from antennate.cli.keyboard import pressed_keys
 from antennate.cli.options import option
 from antennate.cli.tables import Cell, number, show
 from antennate.errors import ConfigError, LogError
 from antennate.hardware.doctor.ports import same
+from antennate.hardware.driving.arrival import Arrival
 from antennate.hardware.driving.config import DriveConfig
 from antennate.hardware.driving.connect import connect
 from antennate.hardware.driving.drive import drive
+from antennate.hardware.driving.operator import Operator
 from antennate.hardware.driving.priority import Priority, urgent
 from antennate.hardware.driving.session import Session
 from antennate.hardware.driving.signals import StopOnce
@@ -49,6 +54,9 @@ class Orders(RobotOptions):
     bus: str = option("", "servo bus: a serial port, or tcp://HOST:PORT", "PORT")
     arm: bool = option(False, "torque on after the dry run")
     out: Path | None = option(None, "folder for log and result, else runs/drive-N", "FOLDER")
+    until: Path | None = option(
+        None, "end once this file exists, as of a light gate, or of `twin --passed FILE`", "FILE"
+    )
     overwrite: bool = option(False, "replace the results that the folder holds")
     json: bool = option(False, "print the content of result.json and nothing else")
 
@@ -68,17 +76,21 @@ def command(argv: Sequence[str]) -> int:
     config = config.calibrated()
     require_lossless(orders.bus)
     key = key_of(orders)
-    made = RunDirectory.create("drive", orders.out, orders.overwrite)
-    with StopOnce(last=True) as stop, made as folder:
+    with (
+        _operator(config, orders) as operator,
+        RunDirectory.create("drive", orders.out, orders.overwrite) as folder,
+    ):
         folder.describe(config, ["antennate", "drive", *argv])
         folder.without_trials()
         with connect(config, orders.esp32, orders.bus, key) as session:
-            result = _carry_out(config, session, orders, folder.path / LOG, stop)
+            result = _carry_out(config, session, orders, folder.path / LOG, operator)
         folder.finish(result, ())
         if orders.json:
             sys.stdout.write(to_json(result))
         else:
             _show(result)
+            log = shlex.quote(str(folder.path / LOG))
+            sys.stdout.write(f"What was read and decided: antennate replay {log}\n")
         sys.stderr.write(f"written to {folder.path}\n")
     fault = result["worst_state"] in (State.FAULT.name, State.OFF.name)
     stays_on = result["torque_off"] is False
@@ -87,7 +99,7 @@ def command(argv: Sequence[str]) -> int:
 
 
 def _carry_out(
-    config: DriveConfig, session: Session, orders: Orders, log: Path, stop: StopOnce
+    config: DriveConfig, session: Session, orders: Orders, log: Path, operator: Operator
 ) -> dict[str, Any]:
     """Drive, with the log and the status line in a process of their own."""
     header = Header(controller=config.controller, params=config.control, robot=config.robot)
@@ -111,7 +123,7 @@ def _carry_out(
         session.unrecorded = config.record_required and not feed.keeps
 
     with feed, urgent() as priority:
-        report = drive(session, config, orders.arm, keep, stop)
+        report = drive(session, config, orders.arm, keep, operator)
     head = {"schema": 1, "command": "drive", "controller": config.controller, "armed": orders.arm}
     tail = {
         "priority": priority.value,
@@ -120,6 +132,25 @@ def _carry_out(
         "logs": [each.name for each in parts(log) if each.exists()],
     }
     return head | report.result(session) | tail
+
+
+@contextlib.contextmanager
+def _operator(config: DriveConfig, orders: Orders) -> Iterator[Operator]:
+    """Who may stop the drive: signals, a key that is let go, a file that comes.
+
+    Raises:
+        ConfigError: No key can be held, or the file is there already.
+    """
+    with contextlib.ExitStack() as stack:
+        stop = stack.enter_context(StopOnce(last=True))
+        pressed = arrived = None
+        if config.hold_to_run:
+            pressed = stack.enter_context(pressed_keys("--hold-to-run"))
+        if orders.until is not None:
+            if orders.until.exists():
+                raise ConfigError(f"--until: expected no such file yet, found {orders.until}")
+            arrived = stack.enter_context(Arrival(orders.until))
+        yield Operator(stop, pressed, arrived or (lambda: False))
 
 
 def _idle(result: Mapping[str, Any]) -> bool:
@@ -153,7 +184,9 @@ def _sentence(result: Mapping[str, Any]) -> str:
     if _idle(result):
         return f"The robot never walked, no command was sent; {worst}; {torque}."
     sent = f"{result['poses_sent']} commands of `{result['controller']}` were sent"
-    return f"The robot walked: {sent}, {worst}; {torque}."
+    shares = ", ".join(f"{name} {100 * s:.0f} %" for name, s in result["shares"].items() if s)
+    walked = f"The robot walked for {result['walked_s']:.1f} s ({shares}): {sent}"
+    return f"{walked}, {worst}; ended by {result['ended']}; {torque}."
 
 
 def _torque(result: Mapping[str, Any]) -> str:

@@ -7,6 +7,7 @@ from pydantic import field_validator
 from antennate.control.registry import CONTROLLERS
 from antennate.hardware.robot import RobotConfig
 from antennate.params import DriftParams, TouchCheckParams, number
+from antennate.params.dead_man import DeadManParams
 
 
 class DriveConfig(RobotConfig):
@@ -38,6 +39,13 @@ class DriveConfig(RobotConfig):
         "whether it is armed only after both antennae were bent by hand in the dry run",
     )
     touch: TouchCheckParams = TouchCheckParams()
+    hold_to_run: bool = number(
+        False,
+        "1",
+        "assumed: a script has no keys",
+        "whether it walks only while a key of the terminal is held",
+    )
+    dead_man: DeadManParams = DeadManParams()
     drift: DriftParams = DriftParams()
     fault_time: float = number(
         10.0,

@@ -8,7 +8,9 @@ from collections.abc import Callable
 
 from antennate.control.loop import run_loop
 from antennate.hardware.driving.config import DriveConfig
+from antennate.hardware.driving.dead_man import DeadMan
 from antennate.hardware.driving.dry_run import DryRun
+from antennate.hardware.driving.operator import Operator
 from antennate.hardware.driving.report import Report
 from antennate.hardware.driving.session import Session
 from antennate.hardware.driving.signals import StopOnce
@@ -16,13 +18,16 @@ from antennate.hardware.ports.port import PortError
 from antennate.hardware.safety.causes import State
 from antennate.types import AntennaFrame, JointCommand
 
+_NOBODY = Operator()
+_SIGNAL = "a signal"
+
 
 def drive(
     session: Session,
     config: DriveConfig,
     arm: bool,
     on_tick: Callable[[Session, float], None] = lambda session, t: None,
-    stop: StopOnce | None = None,
+    operator: Operator = _NOBODY,
 ) -> Report:
     """A dry run, then, if `arm`, a walk; torque is off at the end whatever happens.
 
@@ -33,8 +38,7 @@ def drive(
         config: For how long.
         arm: Whether torque may come on.
         on_tick: Called after every tick with the session and the time [s].
-        stop: What hears signals; by default they are heard inside this call alone. It is deaf
-            afterwards.
+        operator: Who may stop it. Its signals are not heard any more afterwards.
 
     Returns:
         How it went. After Ctrl-C the report is that of the way so far.
@@ -45,6 +49,8 @@ def drive(
         session.quality, config.dry_run, config.touch.patience, arm, config.duration or math.inf
     )
     failed_at = math.inf
+    key = None if operator.pressed is None else DeadMan(config.dead_man, operator.pressed)
+    session.orders.released = key is not None
 
     def failed(t: float) -> bool:
         """After a fault and a time to look at it: torque can be taken off now, or never."""
@@ -65,22 +71,33 @@ def drive(
         t = clock.now() - start
         dry.step(t, session.outputs)
         session.orders.arm = dry.asks
+        if key is not None:
+            key.step(t, session.actuators.enabled)
+            session.orders.released = key.released
         report.refusal = dry.refusal
         report.watch(session)
         on_tick(session, clock.now())
-        return not heard.heard and t < dry.end and not failed(t)
+        reasons = (
+            (stop.heard, _SIGNAL),
+            (key is not None and key.over, "a key that was let go"),
+            (operator.arrived(), "arrival"),
+            (t >= dry.end, "a refusal of torque" if dry.refusal else "the end of its time"),
+            (failed(t), "a fault"),
+        )
+        report.ended = next((text for true, text in reasons if true), "")
+        return not report.ended
 
-    with contextlib.nullcontext(stop) if stop else StopOnce() as heard:
-        heard.insists = True
+    with contextlib.nullcontext(operator.stop) if operator.stop else StopOnce() as stop:
+        stop.insists = True
         try:
             try:
                 run_loop(session, session.control, session.period, go_on)
             finally:
-                heard.deaf = True
+                stop.deaf = True
         except KeyboardInterrupt:  # also one that came before `deaf` was set
-            pass
+            report.ended = _SIGNAL
         finally:
-            heard.deaf = True
+            stop.deaf = True
             report.on = _off(session, config.stand)
             report.close(session)
     return report

@@ -12,10 +12,12 @@ class Orders:
     Attributes:
         arm: Torque on; only the change to True counts.
         stop: Torque off.
+        released: The key that lets it walk is not held.
     """
 
     arm: bool = False
     stop: bool = False
+    released: bool = False
 
 
 @dataclass(slots=True)

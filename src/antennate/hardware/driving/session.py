@@ -193,4 +193,5 @@ class Session:
             unrecorded=self.unrecorded,
             arm=self.orders.arm,
             stop=self.orders.stop,
+            released=self.orders.released,
         )

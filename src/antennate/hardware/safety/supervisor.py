@@ -237,7 +237,8 @@ class Supervisor:
     def _settle(self, now: float) -> State:
         """The state that the most severe cause asks for; counts holds on the way."""
         state = max((c.severity for c in self._active), default=State.OK)
-        if self.state <= State.DEGRADED and state is State.HOLD and self._holds.add(now):
+        begins = self.state <= State.DEGRADED and state is State.HOLD
+        if begins and Cause.RELEASED not in self._active and self._holds.add(now):
             cause = Cause.REPEATED_HOLDS
             self._latched.add(cause)
             self._active[cause] = Active(cause, now, "", present=False)
@@ -267,6 +268,8 @@ def _wishes(inputs: Inputs, found: dict[Cause, str]) -> None:
         found[Cause.NO_RECORD] = ""
     if inputs.stop:
         found[Cause.STOPPED] = ""
+    if inputs.released:
+        found[Cause.RELEASED] = ""
 
 
 def _words(errors: Mapping[int, str]) -> str:
