@@ -15,6 +15,7 @@ import numpy as np
 
 from antennate.dataframe import from_columns
 from antennate.errors import BadInputError
+from antennate.files import open_regular
 from antennate.hardware.esp32.decoder import Counters, FrameDecoder
 from antennate.hardware.esp32.frame import FLAG_LEFT_RAIL, FLAG_RIGHT_RAIL
 from antennate.hardware.esp32.wire import Hello, Refused, Sample
@@ -119,7 +120,7 @@ def _chunks(source: str | Path | bytes) -> list[bytes]:
     if isinstance(source, bytes | bytearray):
         return [bytes(source)]
     try:
-        with Path(source).open("rb") as file:
+        with open_regular(Path(source)) as file:
             return list(iter(lambda: file.read(_CHUNK), b""))
     except OSError as error:
         raise BadInputError(

@@ -14,6 +14,7 @@ from xml.etree import ElementTree
 import mujoco
 
 from antennate.errors import SceneError, in_one_line
+from antennate.files import open_regular
 
 LARGEST_MODEL = 5_000_000
 """Most bytes of a model."""
@@ -52,7 +53,7 @@ def read_spec(path: Path) -> mujoco.MjSpec:
 
 def _read(path: Path, largest: int) -> bytes:
     try:
-        with path.open("rb") as file:
+        with open_regular(path) as file:
             data = file.read(largest + 1)
     except OSError as error:
         raise SceneError(f"cannot read {path.name}: {error.strerror}") from error
