@@ -8,13 +8,15 @@ from pathlib import Path
 from types import ModuleType
 
 from antennate import experiments, params
+from antennate.params.base import meaning
 
 PAGE = Path(__file__).with_suffix(".md")
 HEAD = """\
 # Parameters
 
 Every physical number of the project: its default, its unit, what it means and where it comes from.
-A source begins with `paper` (arXiv:2603.07795), `datasheet`, `measured`, `fitted` or `assumed`.
+A source begins with `paper` (arXiv:2603.07795), `datasheet`, `measured`, `fitted` or `assumed` (the
+paper does not say).
 This page is generated: change `src/antennate/params/` or `robots/`, then run
 `python docs/parameters.py`.
 """
@@ -71,12 +73,18 @@ def table(group: type[params.Params]) -> str:
         default = field.get_default(call_default_factory=True)
         if isinstance(default, params.Params):  # its numbers have a table of their own
             kind = type(default).__name__
-            rows.append(f"| `{name}` | [{kind}](#{kind.lower()}) | | {field.description or ''} | |")
+            rows.append(f"| `{name}` | [{kind}](#{kind.lower()}) | | {meaning(field)} | |")
             continue
         extra = field.json_schema_extra
         assert isinstance(extra, dict), f"{group.__name__}.{name} has no unit and no source"
         value = f"{default:.6g}" if isinstance(default, float) else default
-        cells = [f"`{name}`", f"`{value}`", *(extra[k] for k in ("unit", "meaning", "source"))]
+        cells = [
+            f"`{name}`",
+            f"`{value}`",
+            extra["unit"],
+            meaning(field, unit=False),
+            extra["source"],
+        ]
         rows.append("| " + " | ".join(str(cell).replace("|", "\\|") for cell in cells) + " |")
     return "\n".join(rows) + "\n"
 

@@ -24,8 +24,7 @@ import numpy as np
 from antennate.antenna import fitting
 from antennate.antenna.calibration import Calibration
 from antennate.antenna.fitting import Samples
-from antennate.cli.arguments import Options
-from antennate.cli.experiment import carry_out
+from antennate.cli.experiment import Options, carry_out
 from antennate.errors import CalibrationError
 from antennate.experiments.calibrate.experiment import EXPERIMENT
 from antennate.experiments.calibrate.recording import Recording

@@ -34,8 +34,9 @@ from antennate.hardware.safety.supervisor import Supervisor
 controller_fails = test_session.test_B8_servos_stop_within_120_ms_when_only_the_controller_fails
 
 
-def always_watch(old: Any, self: Any, out: Outputs, command: Any) -> None:
-    old(self, out, command)
+def always_watch(old: Any, self: Any, command: Any) -> None:
+    old(self, command)
+    out = self.outputs
     if out.torque and not out.feed_watchdog:
         self.actuators.look()
 
@@ -59,12 +60,12 @@ def finite_goals(old: Any, self: Any, angles: Any) -> Any:
 
 
 def always_sound(old: Any, self: Any, frame_: Any) -> Any:
-    self._sound = True
+    self.sound = True
     return old(self, frame_)
 
 
 def careless(old: Any, self: Any, frame_: Any) -> Any:
-    self.result = StepResult(decided_at=self._now())
+    self.result = StepResult(decided_at=self.now())
     return self.controller.step(frame_)
 
 
@@ -76,7 +77,7 @@ def an_exception_alone(old: Any, self: Any, number: int, frame: Any) -> None:
 
 
 def forget_the_loss(self: Any, time: float) -> None:
-    self._lost = False
+    self.lost = False
 
 
 SESSION = [
@@ -105,7 +106,7 @@ SESSION = [
     ),
     Guard(
         "no packet without a decision",
-        around(session.Session, "_act", always_watch),
+        around(session.Session, "write", always_watch),
         partial(controller_fails, 11.1),
     ),
     Guard(

@@ -81,11 +81,11 @@ class Driven:
     def __init__(self, kind: type[Plugin]) -> None:
         made, own = robot()
         self.session: Any = made.session
-        self.session.control.controller = Plugin(made._sound, own)
+        self.session.control.controller = Plugin(made.controller_step, own)
         self.step()
         assert self.session.outputs.state < State.HOLD
         self.session.control.tracebacks = Tracebacks()
-        self.session.control.controller = kind(made._sound, own)
+        self.session.control.controller = kind(made.controller_step, own)
 
     def step(self) -> Active | None:
         """One tick: the most severe cause, None if there is none."""

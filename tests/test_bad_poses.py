@@ -36,7 +36,7 @@ class Robot:
         made = rig(TwinConfig())
         self.session, self._servos = made.session, made.robot.servos
         self.session.supervisor = Supervisor(limits)
-        self._sound = self.session.control.controller.step
+        self.controller_step = self.session.control.controller.step
         for _ in range(150):
             self.step()
         self.session.orders.arm = True
@@ -48,7 +48,7 @@ class Robot:
         session = self.session
 
         def said(frame: Any) -> Any:
-            self.sound = self._sound(frame)
+            self.sound = self.controller_step(frame)
             return self.sound if command is SOUND else command
 
         session.control.controller.step = said

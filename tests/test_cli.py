@@ -16,7 +16,7 @@ import pytest
 
 import antennate
 from antennate.cli import commands, main
-from antennate.cli.arguments import FromFile, parse_with
+from antennate.cli.arguments import FromFile, parse
 from antennate.errors import ConfigError
 from antennate.experiments.gait.run import GaitStudyConfig
 from antennate.experiments.tunnel.run import TunnelConfig
@@ -199,7 +199,7 @@ def test_bad_files(capsys, tmp_path, text, parts):
 def test_a_list_may_be_given_at_once_or_piece_by_piece():
     words = ["--fault", "esp32=reset", "bus=loss:0.1@2s", "--touch=left@1s", "--trial", "3"]
     words += ["--fault=servo:7=silent", "--touch", "right@2s"]
-    config, _ = parse_with("twin", "", TwinConfig, words, FromFile)
+    config, _ = parse("twin", "", TwinConfig, words, FromFile)
     assert config.fault == ("esp32=reset", "bus=loss:0.1@2s", "servo:7=silent")
     assert config.touch == ("left@1s", "right@2s")
     assert config.trial == 3
@@ -215,9 +215,9 @@ def test_each_of_two_faults_is_looked_at(capsys, bad):
 
 def test_negative_numbers_and_none_are_values():
     words = ["--tunnel.turns-deg", "90", "-60", "-1e1", "--tunnel.segments=1", "1", "1", "1"]
-    config, _ = parse_with("tunnel", "", TunnelConfig, words, FromFile)
+    config, _ = parse("tunnel", "", TunnelConfig, words, FromFile)
     assert config.tunnel.turns_deg == (90.0, -60.0, -10.0)
-    config, _ = parse_with("twin", "", TwinConfig, ["--duration", "none"], FromFile)
+    config, _ = parse("twin", "", TwinConfig, ["--duration", "none"], FromFile)
     assert config.duration is None
 
 

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from worlds import TICKS, WORLDS, World, recorded, replayed, session, simulated, twin
+from worlds import TICKS, WORLDS, World, plain_tick, recorded, replayed, session, simulated, twin
 
 from antennate.control.loop import run_loop
 from antennate.control.registry import BUILT_IN
@@ -176,7 +176,7 @@ def test_G7_a_session_with_a_silent_board_is_replayed_to_the_bit(tmp_path: Path)
     again = replayed(path)
     assert [one.decision() for one in again.run()] == [one.decision() for one in live.seen]
     with LogReader(path) as log:
-        found = replay(log, recorded_controller(log.header), log.header.params.period)
+        found = replay(log, recorded_controller(log.header), log.header)
         assert (log.ticks, log.missing, log.bad, log.end) == (350, 0, 0, 350)
     assert (found.different, found.commands, found.failures) == (0, 0, 0)
     assert {"OFF", "OK", "HOLD"} < set(found.states)
@@ -241,13 +241,13 @@ def test_G7_logs_of_wandering_readings_are_replayed_to_the_bit(
         with LogWriter(path, header, least_free=0.0) as out:
 
             def go_on(frame: AntennaFrame, command: JointCommand) -> bool:
-                tick = Tick.plain(control, frame, command, out.written + 1, body.now())  # noqa: B023
+                tick = plain_tick(control, frame, command, out.written + 1, body.now())  # noqa: B023
                 out.write(tick)
                 return out.written < ticks
 
             run_loop(body, control, header.params.period, go_on)
         with LogReader(path) as log:
-            found = replay(log, recorded_controller(log.header), log.header.params.period)
+            found = replay(log, recorded_controller(log.header), log.header)
             assert (log.ticks, log.missing, log.bad) == (ticks, 0, 0)
         assert (found.different, found.commands) == (0, 0)
         met += found.recorded
@@ -258,7 +258,7 @@ def test_G7_another_controller_differs_and_the_first_difference_is_named(tmp_pat
     world = simulated(tmp_path, "paper", 0)
     path = recorded(world, tmp_path / "log", 200)
     with LogReader(path) as log:
-        found = replay(log, recorded_controller(log.header, "open"), log.header.params.period)
+        found = replay(log, recorded_controller(log.header, "open"), log.header)
     decided = [one.maneuver for one in world.seen]
     turned = next(i for i, maneuver in enumerate(decided) if maneuver != Maneuver.FORWARD)
     assert found.first is not None
@@ -277,7 +277,7 @@ def test_a_tick_of_a_controller_of_anybody_is_kept_too() -> None:
 
     seen = simulated(Path(), "open", 0).run(1)[0]
     seen.command.yaw.resize((1, 4), refcheck=False)
-    tick = Tick.plain(Odd(), seen.frame, seen.command, 1, 0.5)
+    tick = plain_tick(Odd(), seen.frame, seen.command, 1, 0.5)
     assert (tick.maneuver, tick.contact) == (3, (0, 1))
     assert all(map(math.isnan, (*tick.level, tick.phase)))
     parts = (seen.command.yaw, seen.command.leg, seen.command.antenna)

@@ -247,24 +247,24 @@ class Fragile(SimulatedWire):
         super().__init__(bus)
         self.until = -1
 
-    def _count(self) -> None:
+    def count(self) -> None:
         self.until -= 1
         if self.until == 0:
             raise Boom
 
     def write(self, data: bytes) -> None:
-        self._count()
+        self.count()
         super().write(data)
-        self._count()
+        self.count()
 
     def read(self, most: int, timeout: float) -> bytes:
-        self._count()
+        self.count()
         came = super().read(most, timeout)
-        self._count()
+        self.count()
         return came
 
     def drain(self) -> int:
-        self._count()
+        self.count()
         return super().drain()
 
 

@@ -58,7 +58,7 @@ class Stand:
 
     def until(self, stage: int) -> None:
         """Ticks until the first leg is at this stage."""
-        while self.turns._stage != stage:
+        while self.turns.stage != stage:
             assert self.n < 100
             self.tick()
 
@@ -163,7 +163,7 @@ class Paused:
 
     def __call__(self, walk: Walk, session: Session) -> None:
         out = session.outputs
-        if self.leg is None and session.actuators.turns._stage == HOLDING:
+        if self.leg is None and session.actuators.turns.stage == HOLDING:
             assert session.actuators.turns.loose is not None
             self.leg = walk.rig.robot.servos[
                 session.actuators.joints.ids.index(session.actuators.turns.loose)

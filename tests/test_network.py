@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import select
 import socket
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
@@ -47,27 +48,36 @@ def place(path: str) -> tuple[str, int]:
     return host, int(port)
 
 
-@contextmanager
-def flooded_board(params: NetworkParams) -> Iterator[tuple[UdpPort, Clock, UdpEndpoint]]:
-    """A port that a board has been granted, and the board's end."""
+@dataclass(frozen=True)
+class Flooder:
+    """Who sends from the address of a board, and to whom."""
+
+    own: socket.socket
+    victim: tuple[str, int]
+
+    def send(self, data: bytes) -> None:
+        self.own.sendto(data, self.victim)
+
+
+@contextlib.contextmanager
+def flooded_board(params: NetworkParams) -> Iterator[tuple[UdpPort, Clock, UdpEndpoint, Flooder]]:
+    """A port that a board has been granted, the board's end, and a flooder with its address."""
     end, clock = UdpEndpoint("127.0.0.1", 0, KEY), Clock()
     port = UdpPort(*place(end.path), KEY, params, clock)
-    end.write(hello(5))
-    for _ in range(3):
-        port.write(b"")
-        end.read()
-        port.read(4096, 0.0)
-    try:
-        yield port, clock, end
-    finally:
-        port.close()
-        end.close()
+    own = socket.socket(fileno=os.dup(end.fileno()))
+    with contextlib.closing(port), contextlib.closing(end), own:
+        end.write(hello(5))
+        for _ in range(3):
+            port.write(b"")
+            _, victim = own.recvfrom(1, socket.MSG_PEEK)
+            end.read()
+            port.read(4096, 0.0)
+        yield port, clock, end, Flooder(own, victim)
 
 
 def test_X17_a_flood_is_looked_at_in_part_and_real_frames_get_through() -> None:
     """50 000 forged datagrams a second, from the board's own address, for 2 s of invented time."""
-    with flooded_board(NetworkParams()) as (port, clock, end):
-        victim, flooder = port._socket.getsockname(), end._socket
+    with flooded_board(NetworkParams()) as (port, clock, end, flooder):
         forged = os.urandom(44)
         seq, came, most = 0, bytearray(), 0
         for _ in range(200):
@@ -77,7 +87,7 @@ def test_X17_a_flood_is_looked_at_in_part_and_real_frames_get_through() -> None:
                 if n == 100:
                     end.write(encoded(made(seq, boot=5)))
                     seq += 1
-                flooder.sendto(forged, victim)
+                flooder.send(forged)
             before = port.tally.received
             while part := port.read(4096, 0.0):
                 came += part
@@ -90,11 +100,11 @@ def test_X17_a_flood_is_looked_at_in_part_and_real_frames_get_through() -> None:
 
 def test_X17_no_poll_looks_at_more_than_its_share() -> None:
     """200 datagrams wait at each of 100 polls; a fifth of them may be looked at."""
-    with flooded_board(NetworkParams(look_burst=40, look_rate=4000.0)) as (port, clock, end):
+    with flooded_board(NetworkParams(look_burst=40, look_rate=4000.0)) as (port, clock, _, flooder):
         for _ in range(100):
             clock.t += 0.01
             for _ in range(200):
-                end._socket.sendto(bytes(44), port._socket.getsockname())
+                flooder.send(bytes(44))
             before = port.tally.received
             while port.read(4096, 0.0):
                 pass
@@ -102,11 +112,11 @@ def test_X17_no_poll_looks_at_more_than_its_share() -> None:
 
 
 def test_X14_other_senders_are_not_even_heard() -> None:
-    with flooded_board(NetworkParams()) as (port, _, end):
+    with flooded_board(NetworkParams()) as (port, _, end, flooder):
         received = port.tally.received
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
             for _ in range(100):
-                stranger.sendto(os.urandom(44), port._socket.getsockname())
+                stranger.sendto(os.urandom(44), flooder.victim)
         end.write(encoded(made(0, boot=5)))
         assert port.read(4096, 0.0) == encoded(made(0, boot=5))
         assert port.tally.received == received + 1

@@ -60,10 +60,13 @@ def spoiled(default: object, bad: float) -> object:
 
 
 @pytest.mark.parametrize(("cls", "name"), fields())
-def test_every_field_has_a_unit_and_a_source_of_a_known_kind(cls: type[Params], name: str) -> None:
+def test_every_field_has_a_meaning_a_unit_and_a_source_of_a_known_kind(
+    cls: type[Params], name: str
+) -> None:
     extra = cls.model_fields[name].json_schema_extra
     assert isinstance(extra, dict)
     assert str(extra["unit"]).strip()
+    assert (cls.model_fields[name].description or "").endswith(".")
     kind, _, why = str(extra["source"]).partition(":")
     assert kind in SOURCES
     assert why.strip()

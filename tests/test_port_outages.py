@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 import pytest
-from twin_rig import Rig, rig
+from twin_rig import rig
 
 from antennate.control.loop import run_loop
 from antennate.errors import BadInputError
 from antennate.hardware.driving.config import DriveConfig
-from antennate.hardware.driving.connect import prepare, require_servos
+from antennate.hardware.driving.connect import LATEST, prepare, require_servos
 from antennate.hardware.driving.drive import drive
 from antennate.hardware.driving.session import Session
+from antennate.hardware.dynamixel.answers import Timing
 from antennate.hardware.dynamixel.bringup import BringUpError
+from antennate.hardware.dynamixel.bus import Bus
 from antennate.hardware.esp32.frame import SAMPLE_FRAME_SIZE
 from antennate.hardware.ports.port import Port, PortError
 from antennate.hardware.safety.causes import State
@@ -56,10 +57,8 @@ class Story:
     """A session that is armed; states and goals of every tick."""
 
     def __init__(self, act: Callable[[Story, float], None]) -> None:
-        self.rig = rig(TwinConfig())
-        session: Any = self.rig.session
-        self.board = session.board._port = Cable(session.board._port)
-        self.bus = session.actuators.bus._port = Cable(session.actuators.bus._port)
+        self.rig = rig(TwinConfig(), cable=Cable)
+        self.board, self.bus = self.rig.board_port, self.rig.bus_port
         self.waiting: list[bytes] = []
         self._act = act
         self.t: list[float] = []
@@ -166,9 +165,8 @@ def test_B6_another_robot_on_the_bus_does_not_get_armed() -> None:
 def test_B6_a_drive_waits_for_a_lost_bus_to_take_the_torque_off(
     patience: float, safe: bool
 ) -> None:
-    made: Rig = rig(TwinConfig())
-    inside: Any = made.session.actuators.bus
-    cable = inside._port = Cable(inside._port)
+    made = rig(TwinConfig(), cable=Cable)
+    cable = made.bus_port
     back: list[float] = []
 
     def act(session: Session, t: float) -> None:
@@ -242,9 +240,9 @@ def test_L14_a_port_without_a_board_is_refused_within_2_s(what: str) -> None:
 
 def test_L14_a_board_on_the_port_of_the_bus_is_refused_by_name() -> None:
     made = rig(TwinConfig())
-    session: Any = made.session
-    session.actuators.bus._port = Cable(BoardPort(made.robot, made.clock))
+    board = BoardPort(made.robot, made.clock)
+    bus = Bus(board, Timing(RobotSpec().baud, latest=LATEST), clock=made.clock.now)
     begin = made.clock.now()
     with pytest.raises(BringUpError, match=r"--bus: .* swapped"):
-        require_servos(session.actuators.bus, RobotSpec())
+        require_servos(bus, RobotSpec())
     assert made.clock.now() - begin <= 10.0

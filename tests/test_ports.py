@@ -229,7 +229,8 @@ def test_a_port_that_is_no_usb_adapter_has_no_identity(monkeypatch: pytest.Monke
 def test_L12_a_lost_port_is_looked_for_every_fifth_of_a_second_and_fails_at_once_meanwhile() -> (
     None
 ):
-    now, tries, there = [0.0], list[float](), [Pieces(b"old")]
+    now, tries, first = [0.0], list[float](), Pieces(b"old")
+    there = [first]
 
     def look() -> Pieces:
         tries.append(now[0])
@@ -238,9 +239,7 @@ def test_L12_a_lost_port_is_looked_for_every_fifth_of_a_second_and_fails_at_once
         return there.pop()
 
     port = Reconnecting(look, clock=lambda: now[0], start=lambda work: work())
-    first = port._line
     assert port.read(9, 0.0) == b"old"
-    assert isinstance(first, Pieces)
     first.out = True
     said: list[str] = []
     for tick in range(100):
@@ -259,15 +258,16 @@ def test_L12_a_lost_port_is_looked_for_every_fifth_of_a_second_and_fails_at_once
 
 
 def test_L12_a_port_that_opens_slowly_does_not_hold_up_the_loop() -> None:
-    slow = [0.0, 1.0]
+    first = Pieces()
+    there = [first]
 
     def look() -> Pieces:
-        time.sleep(slow.pop(0))
+        if there:
+            return there.pop()
+        time.sleep(1.0)
         return Pieces(b"here")
 
     port = Reconnecting(look)
-    first = port._line
-    assert isinstance(first, Pieces)
     first.out = True
     longest, end = 0.0, time.monotonic() + 10.0
     while time.monotonic() < end:
@@ -307,8 +307,7 @@ def test_L12_B6_whatever_a_look_raises_the_next_one_is_made(error: Exception) ->
     assert port.read(4, 0.0) == b"back"
 
 
-def test_L12_B6_what_a_look_finds_after_closing_is_closed(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(reconnecting, "_FAREWELL", 0.01)
+def test_L12_B6_what_a_look_finds_after_closing_is_closed() -> None:
     first, late, go = Pieces(), Pieces(), threading.Event()
     there = [first]
 
@@ -318,7 +317,13 @@ def test_L12_B6_what_a_look_finds_after_closing_is_closed(monkeypatch: pytest.Mo
         assert go.wait(20.0)
         return late
 
-    port = Reconnecting(look, clock=iter([0.0, 1.0]).__next__)
+    threads: list[threading.Thread] = []
+
+    def start(work: Callable[[], None]) -> None:
+        """A thread for which the port does not wait."""
+        threads.append(reconnecting.in_background(work))
+
+    port = Reconnecting(look, clock=iter([0.0, 1.0]).__next__, start=start)
     first.out = True
     for _ in range(2):
         with pytest.raises(PortError):
@@ -326,8 +331,7 @@ def test_L12_B6_what_a_look_finds_after_closing_is_closed(monkeypatch: pytest.Mo
     port.close()
     assert not late.out
     go.set()
-    assert port._thread is not None
-    port._thread.join(20.0)
+    threads[0].join(20.0)
     assert late.out
 
 

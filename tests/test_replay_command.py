@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from log_ticks import HEADER
 from worlds import recorded, session, simulated
 
 from antennate import figures as style
@@ -190,11 +191,11 @@ def test_a_controller_that_raises_is_counted_and_does_not_end_the_replay(log: Pa
                 raise ValueError("a bug")
 
         ticks = list(reader)
-    found = replay(ticks, Broken(), 0.01)  # type: ignore[arg-type]
+    found = replay(ticks, Broken(), HEADER)  # type: ignore[arg-type]
     assert (found.failures, found.commands, len(found.maneuvers)) == (TICKS, TICKS, TICKS)
     nowhere = (math.nan,) * len(RobotSpec().joint_names)
     failed = [dataclasses.replace(tick, angles=nowhere) for tick in ticks]
-    assert replay(failed, Broken(), 0.01).commands == 0  # type: ignore[arg-type]
+    assert replay(failed, Broken(), HEADER).commands == 0  # type: ignore[arg-type]
 
 
 def test_the_figure_shows_every_stretch_and_repeats_its_bytes() -> None:
@@ -233,5 +234,5 @@ def test_G7_a_tick_without_a_decision_keeps_the_last_pose_that_was_not_refused(l
         dataclasses.replace(second, angles=angles[1], maneuver=0, refused=1),
         dataclasses.replace(third, angles=angles[0], maneuver=0, refused=1, asked=False),
     ]
-    found = replay(ticks, Turning(), 0.01)
+    found = replay(ticks, Turning(), HEADER)
     assert (found.commands, found.different) == (0, 0)

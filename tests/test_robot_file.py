@@ -104,11 +104,11 @@ def test_S9_doctor_names_the_board_to_which_the_films_do_not_belong(file: Path) 
 
 def test_what_a_run_keeps_is_a_robot_file_that_needs_no_calibration_file(file: Path) -> None:
     robot = read_file(file, RobotFile)
-    for config in (robot.for_drive().calibrated(), robot.for_doctor().calibrated()):
-        kept = Path("kept.toml")
+    for take in (RobotFile.for_drive, RobotFile.for_doctor):
+        kept, config = Path("kept.toml"), take(robot).calibrated()
         kept.write_text(to_toml(config))
         again = read_file(kept, RobotFile)
-        assert again._part(type(config)).calibrated() == config
+        assert take(again).calibrated() == config
         assert again.control.conditioning.counts_low == GOOD.counts_low
 
 

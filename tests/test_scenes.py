@@ -15,6 +15,7 @@ from antennate.params import GaitParams, PhysicsParams
 from antennate.robots.spec import RobotSpec
 from antennate.sim.scenes.flat import FlatScene
 from antennate.sim.scenes.mjcf import MjcfScene
+from antennate.sim.scenes.mjcf_file import require_compiles
 from antennate.sim.scenes.registry import make_scene
 from antennate.sim.scenes.scene import Route
 from antennate.sim.scenes.tunnel import TunnelScene
@@ -285,7 +286,7 @@ BAD = {
     "memory": (SITES, '<size memory="200G"/>', "no <size>"),
     "absolute": (SITES, '<asset><mesh file="/etc/passwd"/></asset>', "folder of the model"),
     "above": (SITES, '<asset><mesh file="../x.obj"/></asset>', "folder of the model"),
-    "missing": (SITES, '<asset><mesh file="x.obj"/></asset>', "cannot read x.obj"),
+    "missing": (SITES, '<asset><mesh file="x.obj"/></asset>', "x.obj: expected a readable file"),
     "nan": (SITES + '<geom size="nan"/>', "", "finite"),
     "infinite": (SITES + '<body><geom size="1" mass="1e999"/></body>', "", "finite"),
     "bomb": (SITES + GRID.format(WALL) + "</replicate></replicate>", "", "at most 20000 elements"),
@@ -312,7 +313,7 @@ def test_entities_and_large_files_are_refused(tmp_path):
     path.write_bytes(b" " * 5_000_001)
     with pytest.raises(SceneError, match="at most 5000000 bytes"):
         MjcfScene(path)
-    with pytest.raises(SceneError, match=r"cannot read none\.xml"):
+    with pytest.raises(SceneError, match=r"none\.xml: expected a readable file"):
         MjcfScene(tmp_path / "none.xml")
 
 
@@ -321,6 +322,34 @@ def test_a_bad_scene_is_told_before_anything_is_written(tmp_path, capsys):
     assert main(["tunnel", "--scene", str(path), "--out", str(tmp_path / "run")]) == 2
     assert "room for the robot" in capsys.readouterr().err
     assert not (tmp_path / "run").exists()
+
+
+@pytest.mark.parametrize(
+    ("code", "limit", "told"),
+    [
+        ("import time; time.sleep(60)", 0.2, "compiles within 0.2 s"),
+        ("import os; os.abort()", 60, "crashes MuJoCo .signal 6."),
+        ("raise MemoryError", 60, "crashes MuJoCo .exit code 1."),
+    ],
+)
+def test_X4_a_model_on_which_the_engine_fails_harms_another_process(tmp_path, code, limit, told):
+    with pytest.raises(SceneError, match=told) as found:
+        require_compiles(mjcf(tmp_path, SITES), limit, ("-c", code))
+    assert "\n" not in str(found.value)
+
+
+def test_X2_a_named_file_is_compiled_by_another_process_first(tmp_path, monkeypatch):
+    tried = []
+    monkeypatch.setattr("antennate.sim.scenes.registry.require_compiles", tried.append)
+    path = mjcf(tmp_path, SITES)
+    assert make_scene(str(path)).random is False
+    make_scene("flat")
+    assert tried == [path]
+
+
+def test_a_good_model_and_a_bad_one_leave_the_word_to_the_reader(tmp_path):
+    require_compiles(mjcf(tmp_path, SITES + WALL))
+    require_compiles(mjcf(tmp_path, "<gem/>"))
 
 
 def test_names_of_scenes_are_checked():

@@ -42,8 +42,8 @@ def driven(
 
 def swapped(made: Rig) -> None:
     """Let the board send each channel as the other."""
-    body = made.session.robot
-    read = body._board.newest
+    board = made.session.board
+    read = board.newest
 
     def exchange(now: float):
         timed = read(now)
@@ -54,7 +54,7 @@ def swapped(made: Rig) -> None:
             timed = replace(timed, sample=replace(s, left=s.right, right=s.left))
         return timed
 
-    body._board.newest = exchange  # type: ignore[method-assign]
+    board.newest = exchange  # type: ignore[method-assign]
 
 
 class Inverted(TouchStimulus):

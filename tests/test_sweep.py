@@ -116,10 +116,10 @@ def test_shares_of_time_add_up_and_shapes_point_ahead_near_a_wall():
 
 def test_statics_of_no_flex_are_those_of_a_straight_rod():
     base = np.radians([20.0, 47.0, 80.0])
-    found = reach.Statics(ANTENNA).distance(base, np.zeros(3))
+    found = reach.wall_distance(ANTENNA, base, np.zeros(3))
     wanted = ANTENNA.length * np.sin(base) + ANTENNA.radius
     np.testing.assert_allclose(found, wanted, rtol=1e-3)  # base angles come in steps of 2.5 deg
-    assert np.isnan(reach.Statics(ANTENNA).distance(base, np.full(3, 9.0))).all()
+    assert np.isnan(reach.wall_distance(ANTENNA, base, np.full(3, 9.0))).all()
 
 
 @pytest.mark.parametrize("share", [0.5, 0.7, 0.85])
@@ -127,7 +127,7 @@ def test_statics_find_the_wall_that_a_slow_smooth_sweep_touches(share):
     smooth = ANTENNA.model_copy(update={"friction": 0.0})
     wall = sweeping.Wall(share * ANTENNA.length)
     trace = record(wall, SweepParams(frequency=0.1), smooth, 0.5)
-    told = reach.Statics(smooth).distance(trace.base, -trace.flex)
+    told = reach.wall_distance(smooth, trace.base, -trace.flex)
     bent = (-trace.flex > SHAPE.flex) & np.isfinite(told)
     assert bent.sum() > 50
     np.testing.assert_allclose(told[bent], wall.distance, rtol=0.015)
@@ -164,7 +164,7 @@ def test_a_gap_is_both_distances_and_the_space_between_the_bases():
         return estimates.Trial("same", "test", number, side, distance, sweep_params, None, None)
 
     test = [trial(0, "l", 0.05), trial(0, "r", 0.07), trial(1, "l", 0.06), trial(2, "r", 0.06)]
-    guess, truth = estimates._gaps(test, np.array([0.06, 0.07, 0.0, 0.0]), 0.04)
+    guess, truth = estimates.gaps(test, np.array([0.06, 0.07, 0.0, 0.0]), 0.04)
     np.testing.assert_allclose(truth, [0.16])  # of the others one antenna felt nothing
     np.testing.assert_allclose(guess, [0.17])
 
@@ -179,15 +179,15 @@ def setting(frequency=2.0, sensor=SENSOR):
 
 
 def test_flex_and_base_angle_tell_a_distance_and_flex_alone_needs_a_known_sweep():
-    found = {}
-    for condition in ("same", "varied"):
-        trials = [
-            estimates.run_trial(setting(0.5, FORGETFUL), condition, split, number, side)
-            for split in estimates.SPLITS
-            for number in range(10)
-            for side in estimates.SIDES
-        ]
-        found[condition] = estimates._judge(trials, "noisy", 0.04)["distance"]
+    trials = [
+        estimates.run_trial(setting(0.5, FORGETFUL), condition, split, number, side)
+        for condition in ("same", "varied")
+        for split in estimates.SPLITS
+        for number in range(10)
+        for side in estimates.SIDES
+    ]
+    summary = estimates.summarise(trials, 0.04)
+    found = {name: summary[name]["noisy"]["distance"] for name in ("same", "varied")}
     blind = found["same"]["blind"]["mape_percent"]
     for cues in found.values():
         assert cues["flex_and_base"]["mape_percent"] < 0.3 * blind

@@ -99,7 +99,7 @@ def test_a_damaged_file_is_one_line(tmp_path: Path, ending: str) -> None:
         (
             "a.csv",
             b'# {"format": "antennate time series 1", "meta": {}}\nt\n0\n',
-            "no whole counts",
+            "no counts",
         ),
         ("a.csv", b"\xff\xfe\x00", "decode"),
         ("a.npz", b"PK\x03\x04", "zip"),

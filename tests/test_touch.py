@@ -17,11 +17,10 @@ from antennate.experiments import reading
 from antennate.experiments.touch import figure as figures
 from antennate.experiments.touch import run as touch
 from antennate.experiments.touch import sensing
-from antennate.experiments.touch import traverse as wall_traverse
-from antennate.experiments.touch.episodes import match, merged, runs
+from antennate.experiments.touch.config import TouchConfig, site
 from antennate.experiments.touch.measures import Pool, roc
-from antennate.experiments.touch.run import TouchConfig
-from antennate.experiments.touch.sensing import Comparison, ContactCriteria
+from antennate.experiments.touch.sensing import Comparison, match, merged, runs
+from antennate.experiments.touch.traverse import plan
 from antennate.params import BenchPhysicsParams, ConditioningParams, RuleParams, TouchWallsParams
 from antennate.robots.antenna import AntennaSpec
 from antennate.robots.sensor import SensorParams
@@ -152,20 +151,20 @@ def test_the_mind_answers_a_step_of_flex_when_the_mean_has_crossed():
     conditioning, sensor = ConditioningParams(), SensorParams(hysteresis=0.0, creep=(0.0, 0.0))
     flex = np.where(np.arange(100) >= 50, math.pi / 2, 0.0)[:, None]
     counts = reading.recorded(sensor, flex, np.zeros((100, 1)))
-    sensed = sensing.sense(conditioning, RuleParams(), counts, 0.01)
+    _, alarm = sensing.sense(conditioning, RuleParams(), counts, 0.01)
     midpoint = 1399.0 + 0.305 * 473.0
     samples = math.ceil(10 * (1872.0 - midpoint) / (1872.0 - 1399.0))
-    assert runs(sensed.alarm[:, 0]).tolist() == [[50 + samples - 1, 100]]
+    assert runs(alarm[:, 0]).tolist() == [[50 + samples - 1, 100]]
 
 
 def test_truth_merges_short_gaps_of_strong_presses():
-    rule = ContactCriteria(force=0.1, merge=3, grace=0)
+    config = TouchConfig(contact_force=0.1, merge_time=0.03)
     force = np.array([0.0, 0.2, 0.05, 0.1, 0.2, 0.0])
-    np.testing.assert_array_equal(sensing.true_state(rule, force), states(".####."))
+    np.testing.assert_array_equal(sensing.true_contact(config, force), states(".####."))
 
 
 def sited(overlap=0.02, length=0.4):
-    return wall_traverse.site(AntennaSpec(), overlap, length, 0.25)
+    return site(AntennaSpec(), overlap, length, 0.25)
 
 
 @pytest.mark.parametrize("kind", touch_wall.WALLS)
@@ -213,17 +212,17 @@ def test_profiles_are_those_of_mechanics():
 
 def test_arms_meet_the_same_draws_and_springs_follow_them():
     config = TouchConfig()
-    plans = [touch.plan(config, "gap", s, p, 3) for s in (0.05, 0.15) for p in config.profiles]
+    plans = [plan(config, "gap", s, p, 3) for s in (0.05, 0.15) for p in config.profiles]
     assert len({(p.site, p.wall_start) for p in plans}) == 1
-    assert touch.plan(config, "gap", 0.05, "stiff", 4).site != plans[0].site
+    assert plan(config, "gap", 0.05, "stiff", 4).site != plans[0].site
     other = config.model_copy(update={"seed": 1})
-    assert touch.plan(other, "gap", 0.05, "stiff", 3).site != plans[0].site
-    factors = touch.draw(config, 3).springs
+    assert plan(other, "gap", 0.05, "stiff", 3).site != plans[0].site
+    factors = plans[0].springs
     nominal = mechanics.with_profile(config.antenna, "descending")
     ratio = np.array(plans[1].antenna.spring_stiffness()) / nominal.spring_stiffness()
     np.testing.assert_allclose(ratio, factors)
     assert (abs(factors - 1) <= 0.1).all()
-    overlaps = [touch.draw(config, t).overlap for t in range(200)]
+    overlaps = [plan(config, "gap", 0.05, "stiff", t).overlap for t in range(200)]
     assert 0.005 <= min(overlaps) < 0.007
     assert 0.033 < max(overlaps) <= 0.035
 
@@ -264,18 +263,18 @@ def test_pressing_steps_like_stepping():
 
 def test_free_before_and_after_and_pressed_between(outcome):
     for one in outcome.traverses:
-        force, x = one.course.force, one.course.x
-        assert one.course.reason == ""
+        force, x = one.force, one.x
+        assert one.reason == ""
         assert x[0] == pytest.approx(0.0, abs=1e-3)
         assert x[-1] >= SMALL.travel - 1e-3
         assert (np.diff(x) > 0).all()
         lead = 0.12 * math.cos(math.radians(47.0))
         pressed = x[force > SMALL.contact_force]
         # no press before the tip can be there, none after the wall has passed the longest arm
-        start = min(line[:, 0].min() for line in one.outline)
+        start = min(line[:, 0].min() for line in one.plan.outline())
         assert start - lead - 0.01 < pressed.min()
         assert pressed.max() < start + SMALL.wall_length + 0.12 + 0.01
-    assert [len(one.course.joints) > 0 for one in outcome.traverses] == [True, False] * 4
+    assert [len(one.joints) > 0 for one in outcome.traverses] == [True, False] * 4
 
 
 def test_the_study_counts_what_it_ran(outcome):
@@ -344,7 +343,7 @@ def test_a_traverse_that_breaks_is_a_row_with_its_reason(monkeypatch):
 def test_figures_have_units_and_repeat(outcome):
     def drawn():
         result = outcome.result()
-        return [figures.trace(outcome.example()), figures.measures(result), figures.curves(result)]
+        return [figures.trace(*outcome.example()), figures.measures(result), figures.curves(result)]
 
     first, second = drawn(), drawn()
     assert style.render(first[0]) == style.render(second[0])

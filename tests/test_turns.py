@@ -15,6 +15,7 @@ from antennate.hardware.driving.drive import drive
 from antennate.hardware.driving.session import Session
 from antennate.hardware.safety.causes import State
 from antennate.params import ControlParams
+from antennate.telemetry.header import Header
 from antennate.telemetry.replay import replay
 from antennate.telemetry.ticks import Tick
 from antennate.twin.bus import Fault, Trouble
@@ -101,7 +102,9 @@ def test_one_leg_at_a_time_is_without_torque_and_all_have_it_afterwards(far: Wal
 
 
 def test_G7_its_log_replays_alike_for_the_controller_was_not_asked_meanwhile(far: Walk) -> None:
-    found = replay(far.ticks, make_controller("closed", ControlParams()), 0.01)
+    found = replay(
+        far.ticks, make_controller("closed"), Header(controller="closed", params=ControlParams())
+    )
     assert (len(found.maneuvers), found.different, found.commands) == (len(far.ticks), 0, 0)
 
 
@@ -176,7 +179,7 @@ def test_a_leg_without_torque_to_forget_its_turns_is_not_reported() -> None:
         off = [servo.get("id") for servo in walk.rig.robot.servos if not servo.torque]
         if session.actuators.state.armed:
             for servo in off or [6]:
-                session.actuators.state._guard(servo)
+                session.actuators.state.guard(servo)
         disarmed.extend(session.actuators.state.disarmed)
 
     walk = Walk(253, duration=2.0, act=look)

@@ -14,6 +14,8 @@ from antennate.hardware.driving.drive import drive
 from antennate.hardware.driving.session import Session
 from antennate.hardware.dynamixel.packets import Instruction
 from antennate.hardware.dynamixel.parser import Parser
+from antennate.hardware.esp32.decoder import FrameDecoder
+from antennate.hardware.esp32.wire import Sample
 from antennate.hardware.safety.causes import State
 from antennate.params import BatteryParams
 from antennate.robots.spec import RobotSpec
@@ -64,6 +66,20 @@ def test_a_share_is_not_above_one_or_below_zero(text: str) -> None:
         read(text)
 
 
+class Overheard(Noise):
+    """Noise that notes the readings in the board's frames before it spoils them."""
+
+    def __init__(self, readings: dict[int, tuple[int, int]]) -> None:
+        super().__init__(seed=0)
+        self.readings, self.decoder = readings, FrameDecoder()
+
+    def __call__(self, data: bytes) -> bytes:
+        for found in self.decoder.feed(data):
+            if isinstance(found, Sample):
+                self.readings[found.seq] = (found.left, found.right)
+        return super().__call__(data)
+
+
 class Truth:
     """What was really sent: goals by the session, readings by the board."""
 
@@ -72,19 +88,15 @@ class Truth:
         self.readings: dict[int, tuple[int, int]] = {}
         self.positions: dict[int, set[int]] = defaultdict(set)
         self._parser, self._robot = Parser(), made.robot
-        send, encode = made.clock.write, made.robot._encoder.encode_sample_into
+        send = made.clock.write
 
         def write(data: bytes) -> None:
             for packet in self._parser.feed(data):
                 self._note(packet.instruction, packet.params)
             send(data)
 
-        def encode_sample_into(buffer: bytearray, seq: int, *rest: int) -> int:
-            self.readings[seq] = (rest[1], rest[2])
-            return encode(buffer, seq, *rest)
-
         made.clock.write = write  # type: ignore[method-assign]
-        made.robot._encoder.encode_sample_into = encode_sample_into  # type: ignore[method-assign]
+        made.robot.noise = Overheard(self.readings)
 
     def _note(self, instruction: int, params: bytes) -> None:
         for servo in self._robot.servos:

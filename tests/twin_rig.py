@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -24,6 +25,7 @@ from antennate.hardware.dynamixel.answers import Timing
 from antennate.hardware.dynamixel.bus import Bus
 from antennate.hardware.esp32.board import Board
 from antennate.hardware.joints import Joints
+from antennate.hardware.ports.port import Port
 from antennate.hardware.safety.signal_quality import SignalQuality
 from antennate.params import ControlParams, SupervisorParams, TouchCheckParams
 from antennate.sim.scenes.registry import make_scene
@@ -148,23 +150,38 @@ class Rig:
     robot: TwinRobot
     clock: LockstepClock
     session: Session
+    board_port: Any
+    bus_port: Any
 
 
-def rig(config: TwinConfig, name: str = "closed", touch: TouchCheckParams | None = None) -> Rig:
-    """A session before a twin robot, not yet armed; checked by touch if `touch` says how."""
+def rig(
+    config: TwinConfig,
+    name: str = "closed",
+    touch: TouchCheckParams | None = None,
+    cable: Callable[[Port], Port] = lambda port: port,
+) -> Rig:
+    """A session before a twin robot, not yet armed.
+
+    Args:
+        config: The twin.
+        name: Name of its controller.
+        touch: How it is checked by touch, None if it is not.
+        cable: Wraps each port.
+    """
     robot = build(config)
     params = ControlParams(**dict(config.control))
     clock = LockstepClock(robot)
-    bus = Bus(clock, Timing(config.robot.baud, latest=LATEST), clock=clock.now)
+    board_port, bus_port = cable(BoardPort(robot, clock)), cable(clock)
+    bus = Bus(bus_port, Timing(config.robot.baud, latest=LATEST), clock=clock.now)
     session = Session(
-        board=Board(BoardPort(robot, clock), SupervisorParams().stale_age),
+        board=Board(board_port, SupervisorParams().stale_age),
         actuators=DynamixelActuators(bus, Joints(config.robot), clock.now),
         clock=clock,
         controller=make_controller(name, params, config.robot),
         period=params.period,
         quality=SignalQuality(params.conditioning, touch=touch),
     )
-    return Rig(robot, clock, session)
+    return Rig(robot, clock, session, board_port, bus_port)
 
 
 def before_twin(config: TunnelConfig, name: str, trial: int) -> Stage:

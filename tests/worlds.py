@@ -13,14 +13,15 @@ from twin_rig import Stage, before_twin, rig, simulation
 from antennate.control.loop import run_loop
 from antennate.experiments.tunnel.run import TunnelConfig
 from antennate.hardware.driving.connect import await_board
+from antennate.hardware.driving.decision import decision_of
 from antennate.robots.spec import RobotSpec
 from antennate.telemetry.header import Header
 from antennate.telemetry.reader import LogReader
 from antennate.telemetry.replay import ReplayRobot, recorded_controller
-from antennate.telemetry.ticks import Tick
+from antennate.telemetry.ticks import Tick, angles_of, decided
 from antennate.telemetry.writer import LogWriter
 from antennate.twin.config import TwinConfig
-from antennate.types import AntennaFrame, Clock, JointCommand, Robot
+from antennate.types import AntennaFrame, Clock, Controller, JointCommand, Robot
 
 CONFIG = TunnelConfig(seed=0)
 LAYOUT = RobotSpec()
@@ -68,12 +69,21 @@ class World:
             self.seen.append(Seen(frame, command, maneuver, (left, right), now))
             if log is not None:
                 own = self.tick_of
-                plain = Tick.plain(self.controller, frame, command, number, now)
+                plain = plain_tick(self.controller, frame, command, number, now)
                 log.write(plain if own is None else own(frame, command, number))
             return self.go_on(frame, command) and number < ticks
 
         run_loop(self.body, self.control, self.header.params.period, go_on)
         return self.seen
+
+
+def plain_tick(
+    controller: Controller, frame: AntennaFrame, command: JointCommand, number: int, now: float
+) -> Tick:
+    """The tick of a controller without supervisor."""
+    seen = decided(controller, decision_of(controller), frame)
+    angles = angles_of(command)
+    return Tick(**seen, angles=angles, number=number, now=now, reading=seen["counts"])
 
 
 class Blinded:

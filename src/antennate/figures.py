@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import functools
 import io
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, ParamSpec, TypeVar
 
 import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import PlaceHolderLayoutEngine
 from matplotlib.transforms import Bbox
@@ -16,6 +18,8 @@ from antennate.types import Maneuver
 
 P = ParamSpec("P")
 R = TypeVar("R")
+
+Keys = tuple[str, str]
 
 INK, MUTED, FAINT = "#222222", "#6E6E6E", "#D5D5D5"
 """Text and robots; secondary lines; things in the background."""
@@ -113,6 +117,35 @@ def short_name(controller: str) -> str:
 def canvas(width: float, height: float) -> Figure:
     """An empty figure of this size [inches] whose parts keep clear of one another."""
     return Figure(figsize=(width, height), layout="constrained")
+
+
+def categories(panel: Axes, labels: Sequence[str]) -> None:
+    """Let x = 0, 1, 2, ... be categories of these names."""
+    panel.set_xticks(range(len(labels)), labels)
+    panel.set_xlim(-0.6, len(labels) - 0.4)
+    panel.grid(visible=False, axis="x")
+
+
+def intervals(
+    panel: Axes, x: Sequence[float], rows: Sequence[Mapping[str, Any]], keys: Keys, **look: Any
+) -> None:
+    """Draw a measure of each row at x with its interval; what does not exist is left out.
+
+    Args:
+        panel: Where to draw.
+        x: A place for each row.
+        rows: Objects of result.json.
+        keys: Names of the measure and of its interval in a row.
+        look: Colour, marker and label, as for `plot`.
+    """
+    value, interval = keys
+    known = [(a, row[value], row[interval]) for a, row in zip(x, rows, strict=True)]
+    known = [(a, b, ends or (b, b)) for a, b, ends in known if b is not None and b == b]
+    middle = np.array([b for _, b, _ in known])
+    low, high = np.array([ends for *_, ends in known]).reshape(-1, 2).T
+    whiskers = np.maximum(0.0, [middle - low, high - middle])
+    look = {"markersize": 5, "linestyle": "", "capsize": 2.5, "elinewidth": 1.2, **look}
+    panel.errorbar([a for a, *_ in known], middle, yerr=whiskers, **look)
 
 
 @styled

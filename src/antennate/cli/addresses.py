@@ -9,9 +9,10 @@ from typing import TypeVar
 
 from pydantic.dataclasses import dataclass
 
-from antennate.cli.arguments import FromFile, parse_with
+from antennate.cli.arguments import FromFile, parse
 from antennate.cli.options import option
 from antennate.errors import ConfigError
+from antennate.hardware.doctor.ports import same
 from antennate.hardware.ports.finder import is_udp
 from antennate.hardware.ports.keys import read_key
 from antennate.hardware.robot_file import RobotFile
@@ -29,6 +30,13 @@ class RobotOptions(FromFile):
         None, "file with the key of a board behind udp://, mode 0600; else ANTENNATE_KEY", "FILE"
     )
     insecure_udp: bool = option(False, "a board without a key; anybody on the network can feign it")
+
+
+@dataclass(frozen=True)
+class PortOptions(RobotOptions):
+    """The same with the bus of the servos."""
+
+    bus: str = option("", "servo bus: a serial port, or tcp://HOST:PORT", "PORT")
 
 
 Chosen = TypeVar("Chosen", bound=RobotOptions)
@@ -55,7 +63,7 @@ def parse_robot(
         HelpRequest: Help was asked for.
     """
     model = type(take(RobotFile()))
-    return parse_with(
+    return parse(
         command, description, model, argv, options, lambda path: take(read_file(path, RobotFile))
     )
 
@@ -79,11 +87,14 @@ def key_of(options: RobotOptions) -> bytes | None:
     return b""
 
 
-def require_lossless(bus: str) -> None:
-    """Refuse a servo bus on the network.
+def require_two_ports(options: PortOptions) -> None:
+    """Refuse one port for both, and a servo bus on a network that loses packets.
 
     Raises:
-        ConfigError: It is behind udp://.
+        ConfigError: They are the same, or the bus is behind udp://.
     """
+    bus = options.bus
+    if bus and options.esp32 and same(options.esp32, bus):
+        raise ConfigError(f"--esp32 and --bus: expected two ports, found {bus} twice")
     if is_udp(bus):
         raise ConfigError("--bus: expected a serial port or tcp://, found udp://; it loses packets")

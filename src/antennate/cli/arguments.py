@@ -54,40 +54,10 @@ class FromFile:
     config: Path | None = option(None, "TOML file of parameters; flags override it", "FILE")
 
 
-@dataclass(frozen=True)
-class Options(FromFile):
-    """How to run; nothing here changes a result."""
-
-    out: Path | None = option(None, "folder for the results, else runs/COMMAND-N", "FOLDER")
-    overwrite: bool = option(False, "replace the results that the folder holds")
-    workers: int | None = option(None, "processes to use, else one for each core", "INT", ge=1)
-    json: bool = option(False, "print the content of result.json and nothing else")
-    no_figures: bool = option(False, "draw no figures")
-
-    @property
-    def worker_count(self) -> int:
-        """Processes to use."""
-        from antennate.studies.pool import core_count
-
-        return core_count() if self.workers is None else self.workers
-
-
 Chosen = TypeVar("Chosen", bound=FromFile)
 
 
 def parse(
-    command: str, description: str, model: type[Config], argv: Sequence[str]
-) -> tuple[Config, Options]:
-    """Read the words of a command that runs a study.
-
-    Raises:
-        ConfigError: A flag, the file or a value cannot be used.
-        HelpRequest: Help was asked for.
-    """
-    return parse_with(command, description, model, argv, Options)
-
-
-def parse_with(
     command: str,
     description: str,
     model: type[Config],
@@ -95,7 +65,7 @@ def parse_with(
     options: type[Chosen],
     read: Callable[[Path], Config] | None = None,
 ) -> tuple[Config, Chosen]:
-    """The same with options of another kind.
+    """Read the words of a command.
 
     Args:
         command: Name of the command.
@@ -104,6 +74,10 @@ def parse_with(
         argv: Its words.
         options: Its other options.
         read: Reads a file that holds more than this configuration.
+
+    Raises:
+        ConfigError: A flag, the file or a value cannot be used.
+        HelpRequest: Help was asked for.
     """
     every, others = list(options_of(model())), list(options_of(options()))
     unread = {option.flag for option in every if ".".join(option.path) in model.unread}

@@ -4,25 +4,26 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Sequence
+from contextlib import nullcontext
 from pathlib import Path
 
 from pydantic.dataclasses import dataclass
 
-from antennate.cli.addresses import RobotOptions, key_of, parse_robot, require_lossless
+from antennate.cli.addresses import PortOptions, key_of, parse_robot, require_two_ports
 from antennate.cli.checks import show_rows
 from antennate.cli.exit_codes import BAD_INPUT, OK
 from antennate.cli.options import option
 from antennate.cli.progress import terminate_as_interrupt
+from antennate.cli.results import ResultOptions, folder_for
 from antennate.errors import ConfigError
 from antennate.hardware.doctor.check import Opener
 from antennate.hardware.doctor.checkup import Checkup, examine
 from antennate.hardware.doctor.config import DoctorConfig
 from antennate.hardware.doctor.fix import Change, apply, plan
-from antennate.hardware.doctor.ports import opener_of, same
+from antennate.hardware.doctor.ports import opener_of
 from antennate.hardware.host_clock import HostClock
 from antennate.hardware.robot_file import RobotFile
 from antennate.studies.formats import to_json
-from antennate.studies.run_directory import RunDirectory
 
 DESCRIPTION = """\
 Examine the antenna board and the servo bus of a robot at rest, or of its twin: one line for each
@@ -35,15 +36,12 @@ _ROUNDS = 4
 
 
 @dataclass(frozen=True)
-class Orders(RobotOptions):
-    """What to examine, and what to do about it."""
+class Orders(ResultOptions, PortOptions):
+    """What to do about it."""
 
-    bus: str = option("", "servo bus: a serial port, or tcp://HOST:PORT", "PORT")
     fix: bool = option(False, "put right what can be, asking before each change")
     yes: bool = option(False, "answer yes to all that --fix asks")
-    json: bool = option(False, "print the result in JSON and nothing else")
     out: Path | None = option(None, "folder for result.json; none if not given", "FOLDER")
-    overwrite: bool = option(False, "replace the results that the folder holds")
 
 
 def command(argv: Sequence[str]) -> int:
@@ -56,27 +54,22 @@ def command(argv: Sequence[str]) -> int:
     _check(orders)
     robot = config.calibrated()
     key = key_of(orders)
-    if orders.out is None:
+    with folder_for("doctor", orders, config, argv) if orders.out else nullcontext() as folder:
         checkup, changes = _examine(robot, orders, key)
-    else:
-        with RunDirectory.create("doctor", orders.out, orders.overwrite) as folder:
-            folder.describe(config, ["antennate", "doctor", *argv])
-            checkup, changes = _examine(robot, orders, key)
-            folder.finish(checkup.result(changes), ())
-            sys.stderr.write(f"written to {folder.path}\n")
-    if orders.json:
-        sys.stdout.write(to_json(checkup.result(changes)))
-    else:
-        show_rows(checkup.rows)
+        result = checkup.result(changes)
+        if folder is not None:
+            folder.finish(result)
+        if orders.json:
+            sys.stdout.write(to_json(result))
+        else:
+            show_rows(checkup.rows)
     return BAD_INPUT if checkup.grade == "bad" else OK
 
 
 def _check(orders: Orders) -> None:
     if not (orders.esp32 or orders.bus):
         raise ConfigError("expected --esp32 PORT, --bus PORT or both, found none")
-    if orders.esp32 and orders.bus and same(orders.esp32, orders.bus):
-        raise ConfigError(f"--esp32 and --bus: expected two ports, found {orders.bus} twice")
-    require_lossless(orders.bus)
+    require_two_ports(orders)
     if orders.fix and not orders.bus:
         raise ConfigError("--fix: expected --bus PORT with it, found none")
     if orders.yes and not orders.fix:

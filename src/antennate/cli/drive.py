@@ -12,13 +12,12 @@ from typing import Any
 from pydantic.dataclasses import dataclass
 
 from antennate.cli import viewer
-from antennate.cli.addresses import RobotOptions, key_of, parse_robot, require_lossless
+from antennate.cli.addresses import PortOptions, key_of, parse_robot, require_two_ports
 from antennate.cli.exit_codes import BAD_INPUT, OK
 from antennate.cli.keyboard import pressed_keys
 from antennate.cli.options import option
-from antennate.cli.tables import Cell, number, show
+from antennate.cli.results import ResultOptions, folder_for, tell
 from antennate.errors import ConfigError, LogError
-from antennate.hardware.doctor.ports import same
 from antennate.hardware.driving.arrival import Arrival
 from antennate.hardware.driving.config import DriveConfig
 from antennate.hardware.driving.connect import connect
@@ -29,8 +28,8 @@ from antennate.hardware.driving.session import Session
 from antennate.hardware.driving.signals import StopOnce
 from antennate.hardware.robot_file import RobotFile
 from antennate.hardware.safety.causes import State
-from antennate.studies.formats import to_json
-from antennate.studies.run_directory import LOG, RunDirectory
+from antennate.studies.measures import Measure, Table
+from antennate.studies.run_directory import LOG
 from antennate.telemetry.feed import Feed
 from antennate.telemetry.header import Header
 from antennate.telemetry.parts import part, parts
@@ -48,17 +47,13 @@ off, and if it was armed and never walked."""
 
 
 @dataclass(frozen=True)
-class Orders(RobotOptions):
-    """What to talk to, whether to move, and where the results go."""
+class Orders(ResultOptions, PortOptions):
+    """Whether to move."""
 
-    bus: str = option("", "servo bus: a serial port, or tcp://HOST:PORT", "PORT")
     arm: bool = option(False, "torque on after the dry run")
-    out: Path | None = option(None, "folder for log and result, else runs/drive-N", "FOLDER")
     until: Path | None = option(
         None, "end once this file exists, as of a light gate, or of `twin --passed FILE`", "FILE"
     )
-    overwrite: bool = option(False, "replace the results that the folder holds")
-    json: bool = option(False, "print the content of result.json and nothing else")
 
 
 def command(argv: Sequence[str]) -> int:
@@ -71,27 +66,21 @@ def command(argv: Sequence[str]) -> int:
     for name in ("esp32", "bus"):
         if not getattr(orders, name):
             raise ConfigError(f"--{name}: expected a serial port, found none")
-    if same(orders.esp32, orders.bus):
-        raise ConfigError(f"--esp32 and --bus: expected two ports, found {orders.bus} twice")
+    require_two_ports(orders)
     config = config.calibrated()
-    require_lossless(orders.bus)
     key = key_of(orders)
     with (
         _operator(config, orders) as operator,
-        RunDirectory.create("drive", orders.out, orders.overwrite) as folder,
+        folder_for("drive", orders, config, argv) as folder,
     ):
-        folder.describe(config, ["antennate", "drive", *argv])
         folder.without_trials()
         with connect(config, orders.esp32, orders.bus, key) as session:
             result = _carry_out(config, session, orders, folder.path / LOG, operator)
         folder.finish(result, ())
-        if orders.json:
-            sys.stdout.write(to_json(result))
-        else:
-            _show(result)
-            log = shlex.quote(str(folder.path / LOG))
-            sys.stdout.write(f"What was read and decided: antennate replay {log}\n")
-        sys.stderr.write(f"written to {folder.path}\n")
+        table = Table.of("Drive", {result["controller"]: result}, MEASURES, _note(result))
+        log = shlex.quote(str(folder.path / LOG))
+        again = f"\nWhat was read and decided: antennate replay {log}"
+        tell(result, orders, [table], _sentence(result) + again)
     fault = result["worst_state"] in (State.FAULT.name, State.OFF.name)
     stays_on = result["torque_off"] is False
     idle = _idle(result)
@@ -158,18 +147,13 @@ def _idle(result: Mapping[str, Any]) -> bool:
     return result["armed"] and not result["poses_sent"]
 
 
-def _show(result: Mapping[str, Any]) -> None:
-    show("Drive", {result["controller"]: result}, _ROWS, _note(result))
-    sys.stdout.write(_sentence(result) + "\n")
-
-
 def _note(result: Mapping[str, Any]) -> str:
-    note = ""
+    lines: list[str] = []
     if result["priority"] == Priority.ORDINARY.value:
-        note += "Real-time priority was not allowed; a busy machine will make it miss ticks.\n"
+        lines.append("Real-time priority was not allowed; a busy machine will make it miss ticks.")
     if not result["log_complete"]:
-        note += f"The log is not complete; its files: {', '.join(result['logs']) or 'none'}.\n"
-    return note
+        lines.append(f"The log is not complete; its files: {', '.join(result['logs']) or 'none'}.")
+    return "\n".join(lines)
 
 
 def _sentence(result: Mapping[str, Any]) -> str:
@@ -198,34 +182,20 @@ def _torque(result: Mapping[str, Any]) -> str:
     return f"torque is NOT confirmed off: servos {names}; switch their supply off"
 
 
-def _pace(key: str, form: str, scale: float = 1.0) -> Cell:
-    def cell(result: Mapping[str, Any]) -> str:
-        pace = result["pace"]
-        return number(None if pace is None else scale * pace[key], form)
-
-    return cell
-
-
-def _walking(result: Mapping[str, Any]) -> str:
-    walking = result["walking"]
-    return number(None if walking is None else 100.0 * walking["missed_share"], ".2f")
-
-
-_ROWS: list[tuple[str, Cell]] = [
-    ("ticks", _pace("ticks", ".0f")),
-    ("missed ticks", _pace("missed_cycles", ".0f")),
-    ("missed [%]", _pace("missed_share", ".2f", 100.0)),
-    ("missed while walking [%]", _walking),
-    ("worst lateness [ms]", _pace("worst_lateness_s", ".1f", 1e3)),
-    ("worst tick [ms]", _pace("worst_tick_s", ".1f", 1e3)),
-    *(
-        (name.replace("_", " "), lambda result, name=name: number(result[name], "d"))
-        for name in (
-            *("frames", "crc_errors", "lost_samples", "resets"),
-            *("missed_answers", "stale_answers"),
-        )
-    ),
-    ("commands sent", lambda result: number(result["poses_sent"], "d")),
-    ("commands refused", lambda result: number(result["poses_refused"], "d")),
-    ("priority", lambda result: result["priority"]),
-]
+MEASURES = (
+    Measure("pace.ticks", "ticks", form="d"),
+    Measure("pace.missed_cycles", "missed ticks", form="d"),
+    Measure("pace.missed_share", "missed", "%", scale=100.0),
+    Measure("walking.missed_share", "missed while walking", "%", scale=100.0),
+    Measure("pace.worst_lateness_s", "worst lateness", "ms", form=".1f", scale=1e3),
+    Measure("pace.worst_tick_s", "worst tick", "ms", form=".1f", scale=1e3),
+    Measure("frames", "frames", form="d"),
+    Measure("crc_errors", "crc errors", form="d"),
+    Measure("lost_samples", "lost samples", form="d"),
+    Measure("resets", "resets", form="d"),
+    Measure("missed_answers", "missed answers", form="d"),
+    Measure("stale_answers", "stale answers", form="d"),
+    Measure("poses_sent", "commands sent", form="d"),
+    Measure("poses_refused", "commands refused", form="d"),
+    Measure("priority", "priority"),
+)

@@ -6,15 +6,26 @@ import sys
 from collections.abc import Sequence
 from typing import Any
 
-from antennate.cli.arguments import Options, parse
+from pydantic.dataclasses import dataclass
+
+from antennate.cli.arguments import parse
 from antennate.cli.exit_codes import INTERRUPTED, OK
+from antennate.cli.options import option
 from antennate.cli.progress import progress, terminate_as_interrupt
-from antennate.cli.tables import print_table
+from antennate.cli.results import ResultOptions, folder_for, tell
 from antennate.errors import OutputError
 from antennate.params import Params
 from antennate.studies.experiment import Experiment, Outcome
-from antennate.studies.formats import to_json
+from antennate.studies.pool import core_count
 from antennate.studies.run_directory import RunDirectory
+
+
+@dataclass(frozen=True)
+class Options(ResultOptions):
+    """How to run; nothing here changes a result."""
+
+    workers: int | None = option(None, "processes to use, else one for each core", "INT", ge=1)
+    no_figures: bool = option(False, "draw no figures")
 
 
 def command(experiment: Experiment[Any, Any], argv: Sequence[str]) -> int:
@@ -23,7 +34,9 @@ def command(experiment: Experiment[Any, Any], argv: Sequence[str]) -> int:
     Raises:
         AntennateError: As below, or something given cannot be used.
     """
-    config, options = parse(experiment.name, experiment.description, experiment.config, argv)
+    config, options = parse(
+        experiment.name, experiment.description, experiment.config, argv, Options
+    )
     experiment.check(config)
     return carry_out(experiment, argv, config, options)
 
@@ -37,20 +50,15 @@ def carry_out(
         AntennateError: The physics became invalid, a worker died, or a file could not be written;
             what was measured is kept and shown first.
     """
-    with RunDirectory.create(experiment.name, options.out, options.overwrite) as run:
-        run.describe(config, ["antennate", experiment.name, *argv])
-        outcome = _measure(experiment, config, options, run)
+    with folder_for(experiment.name, options, config, argv) as run:
+        with progress(experiment.parts) as step, terminate_as_interrupt():
+            outcome = experiment.run(config, options.workers or core_count(), step, run.append)
         result = outcome.result()
         interrupted = bool(result.get("interrupted"))
         if interrupted and not outcome.rows:
             raise KeyboardInterrupt
         failure = _keep(experiment, outcome, options, run)
-        if options.json:
-            sys.stdout.write(to_json(result))
-        else:
-            for table in experiment.tables(result):
-                print_table(table)
-            sys.stdout.write(f"{experiment.sentence(result)}\n")
+        tell(result, options, experiment.tables(result), experiment.sentence(result))
         if failure is not None:
             raise failure
         if interrupted:
@@ -58,15 +66,7 @@ def carry_out(
                 f"antennate {experiment.name}: interrupted: kept {len(outcome.rows)} trials, all "
                 "that had ended\n"
             )
-        sys.stderr.write(f"written to {run.path}\n")
     return INTERRUPTED if interrupted else OK
-
-
-def _measure(
-    experiment: Experiment[Any, Any], config: Params, options: Options, run: RunDirectory
-) -> Outcome:
-    with progress(experiment.parts) as step, terminate_as_interrupt():
-        return experiment.run(config, options.worker_count, step, run.append)
 
 
 def _keep(

@@ -9,6 +9,7 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 from antennate.cli.options import Option, fields_of, first_line, flag_of
+from antennate.params.base import meaning
 from antennate.params.reading import group_of
 
 _WIDEST, _NARROWEST = 100, 40
@@ -139,5 +140,5 @@ def _meaning(model: Any, group: tuple[str, ...]) -> str:
     for part in group:
         field = fields_of(model)[part]
         model = group_of(field.annotation)
-        text = field.description or first_line(model)
+        text = meaning(field) or first_line(model)
     return text

@@ -18,7 +18,7 @@ from pydantic.fields import FieldInfo
 
 from antennate.errors import ConfigError
 from antennate.messages import nearest, shortened, shown
-from antennate.params.base import GATHERED
+from antennate.params.base import GATHERED, meaning
 from antennate.params.reading import group_of
 
 _METAVARS = {int: "INT", float: "FLOAT", str: "TEXT", Path: "FILE"}
@@ -160,7 +160,7 @@ def _option(path: tuple[str, ...], field: FieldInfo, default: Any) -> Option | N
         gathered=GATHERED in field.metadata,
         choices=choices,
         examples=tuple(map(str, field.examples or ())),
-        meaning=field.description or "",
+        meaning=meaning(field),
         limits=_limits(field),
         default=_words(default),
         kinds=kinds,
@@ -176,7 +176,7 @@ def _named(path: tuple[str, ...], field: FieldInfo, group: type[BaseModel]) -> O
         gathered=False,
         choices=(),
         examples=tuple(map(str, field.examples or ())),
-        meaning=field.description or first_line(group),
+        meaning=meaning(field) or first_line(group),
         limits="",
         default="",
         kinds=frozenset({str}),

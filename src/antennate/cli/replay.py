@@ -11,13 +11,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from pydantic.dataclasses import dataclass
 
-from antennate.cli.arguments import FromFile, parse_with
+from antennate.cli.arguments import parse
 from antennate.cli.exit_codes import BAD_INPUT, OK
 from antennate.cli.options import option
-from antennate.cli.tables import Cell, number, show
+from antennate.cli.results import ResultOptions, folder_for, tell
 from antennate.errors import ConfigError
 from antennate.messages import one_line
-from antennate.studies.formats import to_csv, to_json
+from antennate.studies.formats import to_csv
+from antennate.studies.measures import Measure, Table
 from antennate.studies.run_directory import RunDirectory
 from antennate.telemetry.reader import Damage, LogReader
 from antennate.telemetry.replay import ReplayConfig, Replayed, recorded_controller, replay
@@ -34,18 +35,22 @@ named; the exit code is 2 then."""
 TICKS = "ticks.csv"
 _MOST_DRAWN = 5000
 """Most ticks that a figure shows."""
+COUNTS = (
+    Measure("different", "maneuvers that differ", form="d"),
+    Measure("different_poses", "commands that differ", form="d"),
+    Measure("failures", "exceptions", form="d"),
+    Measure("missing", "ticks missing", form="d"),
+)
 
 
 @dataclass(frozen=True)
-class Options(FromFile):
+class Options(ResultOptions):
     """Which log, and what to leave behind."""
 
     log: str = option("", "log of a drive", "LOG", positional=True)
     out: Path | None = option(
         None, "folder for result.json, ticks.csv and a figure; none if not given", "FOLDER"
     )
-    overwrite: bool = option(False, "replace the results that the folder holds")
-    json: bool = option(False, "print the result as JSON and nothing else")
 
 
 def command(argv: Sequence[str]) -> int:
@@ -54,24 +59,19 @@ def command(argv: Sequence[str]) -> int:
     Raises:
         AntennateError: The log, the controller or the folder cannot be used.
     """
-    config, options = parse_with("replay", DESCRIPTION, ReplayConfig, argv, Options)
+    config, options = parse("replay", DESCRIPTION, ReplayConfig, argv, Options)
     if not options.log:
         raise ConfigError("expected the log of a drive, found none")
     path = Path(options.log)
     with LogReader(path) as log:
         controller = recorded_controller(log.header, config.controller)
-        found = replay(log, controller, log.header.params.period)
+        found = replay(log, controller, log.header)
     result = _result(log, found, config.controller)
     if options.out is not None:
-        with RunDirectory.create("replay", options.out, options.overwrite) as folder:
-            folder.describe(config, ["antennate", "replay", *argv])
+        with folder_for("replay", options, config, argv) as folder:
             _keep(folder, path, found)
-            folder.finish(result, ())
-            sys.stderr.write(f"written to {folder.path}\n")
-    if options.json:
-        sys.stdout.write(to_json(result))
-    else:
-        _show(result)
+            folder.finish(result)
+    tell(result, options, [_table(result)], _sentence(result))
     if not log.bad and not log.missing:
         return OK
     place = f"; first at {_place(log.damage[0])}" if log.bad else ""
@@ -119,33 +119,23 @@ def _result(log: LogReader, found: Replayed, controller: str | None) -> dict[str
     }
 
 
-def _show(result: Mapping[str, Any]) -> None:
+def _table(result: Mapping[str, Any]) -> Table:
     then = {"shares": result["recorded_shares"], "states": result["states"]}
     now = {**result, "states": {}}
-    names = [
-        m.name for m in Maneuver if result["recorded_shares"][m.name] + result["shares"][m.name]
-    ]
-    show(
-        "Replay",
-        {"recorded": then, one_line(result["controller"]): now},
-        [
-            *((f"{name} [%]", _percent("shares", name)) for name in names),
-            *(
-                (one_line(f"state {name} [%]"), _percent("states", name))
-                for name in result["states"]
-            ),
-            ("maneuvers that differ", _count("different")),
-            ("commands that differ", _count("different_poses")),
-            ("exceptions", _count("failures")),
-            ("ticks missing", _count("missing")),
-        ],
+    done = [m.name for m in Maneuver if then["shares"][m.name] + now["shares"][m.name]]
+    measures = [Measure(f"shares.{name}", name, "%", form=".1f", scale=100.0) for name in done]
+    for name in result["states"]:
+        label = one_line(f"state {name}")
+        measures.append(Measure(f"states.{name}", label, "%", form=".1f", scale=100.0))
+    note = (
         f"{result['ticks']} ticks, {result['duration_s']:.2f} s, in "
         f"{one_line(', '.join(result['parts']))}.\n"
         f"Recorded by {one_line(result['recorded_controller'])}, antennate "
         f"{one_line(result['version'])}; "
-        f"{'the log is complete' if result['closed'] else 'not ended: its program was killed'}.\n",
+        f"{'the log is complete' if result['closed'] else 'not ended: its program was killed'}."
     )
-    sys.stdout.write(_sentence(result) + "\n")
+    columns = {"recorded": then, one_line(result["controller"]): now}
+    return Table.of("Replay", columns, (*measures, *COUNTS), note)
 
 
 def _sentence(result: Mapping[str, Any]) -> str:
@@ -160,25 +150,12 @@ def _sentence(result: Mapping[str, Any]) -> str:
     )
 
 
-def _percent(of: str, name: str) -> Cell:
-    def cell(column: Mapping[str, Any]) -> str:
-        share = column[of].get(name)
-        return number(None if share is None else 100 * share, ".1f")
-
-    return cell
-
-
-def _count(key: str) -> Cell:
-    return lambda column: number(column.get(key), "d")
-
-
 def _name(maneuver: int) -> str:
     return Maneuver(maneuver).name if maneuver in set(Maneuver) else str(maneuver)
 
 
 def _keep(folder: RunDirectory, path: Path, found: Replayed) -> None:
     """Write the table and the figure, in a second pass over the log."""
-    from antennate import figures as style
     from antennate.telemetry.figure import replay as draw
 
     with LogReader(path) as log:
@@ -187,8 +164,7 @@ def _keep(folder: RunDirectory, path: Path, found: Replayed) -> None:
     if found.maneuvers:
         with LogReader(path) as log:
             figure = draw(_course(log, found.maneuvers))
-        for suffix, data in style.render(figure).items():
-            folder.write(f"figures/replay.{suffix}", data)
+        folder.write_figures({"replay": figure})
 
 
 def _rows(

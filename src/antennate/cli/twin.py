@@ -13,7 +13,7 @@ from typing import Literal
 
 from pydantic.dataclasses import dataclass
 
-from antennate.cli.arguments import FromFile, parse_with
+from antennate.cli.arguments import FromFile, parse
 from antennate.cli.exit_codes import OK
 from antennate.cli.options import option
 from antennate.cli.progress import end_at_first
@@ -70,7 +70,7 @@ def command(argv: Sequence[str]) -> int:
 
 
 def _serve(argv: Sequence[str]) -> int:
-    config, places = parse_with("twin", DESCRIPTION, TwinConfig, argv, Places)
+    config, places = parse("twin", DESCRIPTION, TwinConfig, argv, Places)
     faults = Faults([read(text) for text in config.fault], config.robot.ids)
     real = places.pace == "real"
     robot, passage = watched(config, boot_id=secrets.randbits(32) if real else None)

@@ -5,15 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from antennate.antenna import sensor as flex_sensor
-from antennate.control.conditioning import bending_level
 from antennate.params import ConditioningParams
 from antennate.robots.sensor import SensorParams
-from antennate.types import Floats
-
-
-def noise(sensor: SensorParams, rng: np.random.Generator, count: int) -> Floats:
-    """Noise of one record [counts], shape (count,)."""
-    return flex_sensor.reading_noise(sensor, rng, (count,))
+from antennate.types import Floats, Ints
 
 
 def recorded(sensor: SensorParams, flex: Floats, noise: Floats) -> Floats:
@@ -29,21 +23,20 @@ def recorded(sensor: SensorParams, flex: Floats, noise: Floats) -> Floats:
     return np.array(found).reshape(flex.shape)
 
 
+def mean_since(first: Ints, values: Floats) -> Floats:
+    """Mean of values (n,) from the index `first` (n,) of each to itself, shape (n,)."""
+    total = np.concatenate([[0.0], np.cumsum(values)])
+    end = np.arange(1, len(values) + 1)
+    return (total[end] - total[first]) / (end - first)
+
+
 def averaged(conditioning: ConditioningParams, values: Floats, rate: float) -> Floats:
     """Running mean over the last T_avg of one record, shape (n,), at `rate` [Hz].
 
     While the window fills it is the mean of what there is.
     """
     length = max(1, round(conditioning.averaging_time * rate))
-    total = np.concatenate([[0.0], np.cumsum(values)])
-    end = np.arange(1, len(values) + 1)
-    start = np.maximum(end - length, 0)
-    return (total[end] - total[start]) / (end - start)
-
-
-def level(conditioning: ConditioningParams, counts: Floats) -> Floats:
-    """Bending level b in [0, 1] of averaged readings [counts], same shape."""
-    return bending_level(conditioning, counts)
+    return mean_since(np.maximum(np.arange(1, len(values) + 1) - length, 0), values)
 
 
 def flex_of(sensor: SensorParams, counts: Floats) -> Floats:
@@ -55,3 +48,17 @@ def flex_of(sensor: SensorParams, counts: Floats) -> Floats:
     voltage = np.interp(counts, readings, volts)
     resistance = sensor.divider_resistance * (sensor.supply / voltage - 1.0)
     return np.maximum((resistance / sensor.flat_resistance - 1.0) / sensor.bend_gain, 0.0)
+
+
+def between(grid: Floats, table: Floats, at: Floats) -> Floats:
+    """Values between the rows of a table, straight from row to row.
+
+    Args:
+        grid: What each row stands for, rising, shape (r,).
+        table: Shape (r, n).
+        at: Where to look in each column, within the grid, shape (n,).
+    """
+    below = np.clip(np.searchsorted(grid, at, "right") - 1, 0, len(grid) - 2)
+    share = (at - grid[below]) / (grid[below + 1] - grid[below])
+    column = np.arange(len(at))
+    return (1.0 - share) * table[below, column] + share * table[below + 1, column]

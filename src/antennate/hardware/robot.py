@@ -21,18 +21,10 @@ from antennate.robots.spec import RobotSpec
 class RobotConfig(Params):
     """One robot: its servos, its flex sensors, its controller's numbers and its network."""
 
-    calibration: str | None = number(
-        None,
-        "1",
-        "assumed: the numbers of control.conditioning",
-        "file of `antennate calibrate`, for both antennae, in place of control.conditioning",
-    )
-    sensor_id: str | None = number(
-        None,
-        "1",
-        "assumed: that of the calibration file",
-        "name of the flex sensor; 16 hexadecimal digits name the board it is soldered to",
-    )
+    calibration: str | None = number(None, "1", "assumed: the numbers of control.conditioning")
+    """File of `antennate calibrate`, for both antennae, in place of control.conditioning."""
+    sensor_id: str | None = number(None, "1", "assumed: that of the calibration file")
+    """Name of the flex sensor; 16 hexadecimal digits name the board it is soldered to."""
     robot: RobotSpec = RobotSpec()
     control: ControlParams = ControlParams()
     limits: SupervisorParams = SupervisorParams()

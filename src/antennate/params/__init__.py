@@ -2,8 +2,8 @@
 
 Each class groups the numbers of one part as a frozen model: unknown keys, non-finite numbers and
 values out of bounds are refused. A source begins with one of `paper` (arXiv:2603.07795),
-`datasheet`, `measured`, `fitted` (by which command) or `assumed` (why). Derived numbers are
-properties, computed here and never typed.
+`datasheet`, `measured`, `fitted` (by which command) or `assumed` (why; the paper does not
+say). Derived numbers are properties, computed here and never typed.
 """
 
 from antennate.params.base import Params, number

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Any, ClassVar, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic.fields import FieldInfo
 
 GATHERED = "gathered"
 """Marks a list whose flag, given again, adds to it; of other flags the last one counts."""
@@ -23,7 +24,9 @@ class Params(BaseModel):
             read. They are no flags, and a value other than the default is an error.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True
+    )
     unread: ClassVar[tuple[str, ...]] = ()
 
     @model_validator(mode="after")
@@ -72,11 +75,22 @@ def require_whole_steps(name: str, rate: float, timestep: float, share: int = 1)
         )
 
 
-def number(default: Any, unit: str, source: str, meaning: str, **bounds: Any) -> Any:
-    """Declare one parameter with its unit, source and meaning; `bounds` as for pydantic's Field."""
-    return Field(
-        default,
-        description=f"{meaning} [{unit}]" if unit != "1" else meaning,
-        json_schema_extra={"unit": unit, "source": source, "meaning": meaning},
-        **bounds,
-    )
+def number(default: Any, unit: str, source: str, **bounds: Any) -> Any:
+    """Declare one parameter with its unit and source; the docstring below it is its meaning.
+
+    Args:
+        default: Its default.
+        unit: Its unit, "1" if it has none.
+        source: Where the default comes from.
+        bounds: As for pydantic's Field.
+    """
+    return Field(default, json_schema_extra={"unit": unit, "source": source}, **bounds)
+
+
+def meaning(field: FieldInfo, unit: bool = True) -> str:
+    """What a parameter is, as a phrase without a full stop, with its unit in brackets if wanted."""
+    extra = field.json_schema_extra if isinstance(field.json_schema_extra, dict) else {}
+    words = " ".join((field.description or "").split()).removesuffix(".")
+    first = words.partition(" ")[0]
+    phrase = first.lower() + words[len(first) :] if first.istitle() else words
+    return f"{phrase} [{extra['unit']}]" if unit and extra.get("unit", "1") != "1" else phrase

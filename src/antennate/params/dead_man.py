@@ -8,20 +8,7 @@ from antennate.params.base import Params, number
 class DeadManParams(Params):
     """A key that is held lets the robot walk; a terminal tells it by the characters it repeats."""
 
-    release: float = number(
-        0.3,
-        "s",
-        "assumed: a held key repeats every 33 to 92 ms (X server 30 Hz, Linux console 10.9 Hz), "
-        "later behind a slow connection",
-        "longest time between two characters of a key that is held",
-        gt=0,
-        le=2,
-    )
-    off: float = number(
-        5.0,
-        "s",
-        "assumed: time to change the hand",
-        "time after its release until the torque goes off",
-        ge=0,
-        le=600,
-    )
+    release: float = number(0.3, "s", "assumed: held keys repeat every 33 to 92 ms", gt=0, le=2)
+    """Longest time between two characters of a key that is held."""
+    off: float = number(5.0, "s", "assumed: time to change the hand", ge=0, le=600)
+    """Time after its release until the torque goes off."""

@@ -14,38 +14,22 @@ _Mark = Annotated[float, Field(ge=-1000, le=1000)]
 class RecordParams(Params):
     """What is recorded: marks held by hand, pushes of a stage, or whatever comes."""
 
-    side: Literal["left", "right"] = number(
-        "left", "1", "assumed: the first", "antenna to record; without marks and speed both are"
-    )
-    marks: tuple[_Mark, ...] = number(
-        (),
-        "unit",
-        "assumed: none",
-        "bends or positions to hold the antenna at, each confirmed by Enter; 0 is straight",
-    )
-    unit: Literal["1", "rad", "deg", "m", "mm"] = number(
-        "mm", "1", "assumed: a ruler", "unit of the marks"
-    )
-    hold: float = number(
-        1.0, "s", "assumed: 100 readings", "time recorded at each mark", gt=0, le=600
-    )
-    speed: float | None = number(
-        None, "m/s", "assumed: no stage", "constant speed of a stage that pushes", gt=0, le=1
-    )
-    length: float = number(
-        0.05, "m", "assumed: as the simulated rig", "way of the stage in one push", gt=0, le=1
-    )
-    passes: int = number(
-        2,
-        "1",
-        "assumed: up and down once, so that hysteresis shows",
-        "times the marks are gone through, every other time backwards, or pushes",
-        ge=1,
-        le=1000,
-    )
-    duration: float | None = number(
-        None, "s", "assumed: until Ctrl-C", "time to record without marks and speed", gt=0
-    )
+    side: Literal["left", "right"] = number("left", "1", "assumed: the first")
+    """Antenna to record; without marks and speed both are."""
+    marks: tuple[_Mark, ...] = number((), "unit", "assumed: none")
+    """Bends or positions to hold the antenna at, each confirmed by Enter; 0 is straight."""
+    unit: Literal["1", "rad", "deg", "m", "mm"] = number("mm", "1", "assumed: a ruler")
+    """Unit of the marks."""
+    hold: float = number(1.0, "s", "assumed: 100 readings", gt=0, le=600)
+    """Time recorded at each mark."""
+    speed: float | None = number(None, "m/s", "assumed: no stage", gt=0, le=1)
+    """Constant speed of a stage that pushes."""
+    length: float = number(0.05, "m", "assumed: as the simulated rig", gt=0, le=1)
+    """Way of the stage in one push."""
+    passes: int = number(2, "1", "assumed: up and down, so that hysteresis shows", ge=1, le=1000)
+    """Times the marks are gone through, every other time backwards, or pushes."""
+    duration: float | None = number(None, "s", "assumed: until Ctrl-C", gt=0)
+    """Time to record without marks and speed."""
 
     @model_validator(mode="after")
     def _one_kind(self) -> RecordParams:

@@ -10,33 +10,14 @@ from antennate.params.base import Params, number
 class TouchCheckParams(Params):
     """The check by hand that left is left and that bending reads as bending."""
 
-    level: float = number(
-        0.3,
-        "1",
-        "assumed: well above noise and creep, easily done by hand",
-        "change of the reading that is a touch, in calibrated spans",
-        gt=0,
-        le=1,
-    )
-    still: float = number(
-        0.15,
-        "1",
-        "assumed: half a touch",
-        "change below which an antenna is at rest, in calibrated spans",
-        gt=0,
-        le=1,
-    )
-    readings: int = number(
-        10, "1", "assumed: 100 ms at 100 Hz", "readings in a row that count", ge=1, le=1000
-    )
-    patience: float = number(
-        60.0,
-        "s",
-        "assumed: a person walks to the robot and bends both antennae",
-        "time by which the dry run is extended for the check, and then while torque is refused",
-        ge=0,
-        le=3600,
-    )
+    level: float = number(0.3, "1", "assumed: above noise and creep, easily done", gt=0, le=1)
+    """Change of the reading that is a touch, in calibrated spans."""
+    still: float = number(0.15, "1", "assumed: half a touch", gt=0, le=1)
+    """Change below which an antenna is at rest, in calibrated spans."""
+    readings: int = number(10, "1", "assumed: 100 ms at 100 Hz", ge=1, le=1000)
+    """Readings in a row that count."""
+    patience: float = number(60.0, "s", "assumed: somebody walks there, bends both", ge=0, le=3600)
+    """Time by which the dry run is extended for the check, and then while torque is refused."""
 
     @model_validator(mode="after")
     def _order(self) -> TouchCheckParams:
@@ -53,116 +34,51 @@ class SupervisorParams(Params):
         "s",
         "measured: with a tick of 10 ms HOLD is decided 60 ms after the last valid sample, which "
         "leaves 40 ms of 100 ms for the bus",
-        "age of a sample from which on it is not acted upon",
         gt=0,
         le=0.06,
     )
-    recovery: int = number(
-        10,
-        "1",
-        "assumed: 100 ms at 100 Hz, the length of the running mean",
-        "fresh valid samples in a row that end a loss of data",
-        ge=1,
-        le=1000,
-    )
-    repeats: int = number(
-        3,
-        "1",
-        "assumed: once is chance, three times is a defect",
-        "holds, failures of the controller or reboots of the board that become a fault",
-        ge=1,
-        le=100,
-    )
-    repeat_time: float = number(
-        10.0, "s", "assumed: five gait cycles", "time within which they count", gt=0, le=600
-    )
-    late_answers: int = number(
-        2,
-        "1",
-        "assumed: single answers are lost by noise on the bus",
-        "answers missed in a row that degrade",
-        ge=1,
-        le=100,
-    )
-    silent_answers: int = number(
-        5,
-        "1",
-        "assumed: at 1 % loss five in a row happen once in 10^10",
-        "answers missed in a row that mean a silent servo",
-        ge=1,
-        le=100,
-    )
-    supply_warn: float = number(
-        10.8,
-        "V",
-        "assumed: three lithium cells at 3.6 V, near empty",
-        "supply below which is warned",
-        gt=0,
-        le=100,
-    )
+    """Age of a sample from which on it is not acted upon."""
+    recovery: int = number(10, "1", "assumed: 100 ms, as the running mean", ge=1, le=1000)
+    """Fresh valid samples in a row that end a loss of data."""
+    repeats: int = number(3, "1", "assumed: once is chance, three times is a defect", ge=1, le=100)
+    """Holds, failures of the controller or reboots of the board that become a fault."""
+    repeat_time: float = number(10.0, "s", "assumed: five gait cycles", gt=0, le=600)
+    """Time within which they count."""
+    late_answers: int = number(2, "1", "assumed: noise loses single ones", ge=1, le=100)
+    """Answers missed in a row that degrade."""
+    silent_answers: int = number(5, "1", "assumed: at 1 % loss once in 10^10", ge=1, le=100)
+    """Answers missed in a row that mean a silent servo."""
+    supply_warn: float = number(10.8, "V", "assumed: three lithium cells near empty", gt=0, le=100)
+    """Supply below which is warned."""
     slow_rate: float = number(
         0.5,
         "1",
-        "assumed: half the strides a second, about half the current; never less, or more than one "
-        "tick in a row would pass without a decision",
-        "how fast the gait goes below supply_warn",
+        "assumed: about half the current; never less, or more than one tick in a row would pass "
+        "without a decision",
         ge=0.5,
         le=1,
     )
-    supply_hold: float = number(
-        10.2,
-        "V",
-        "assumed: three cells at 3.4 V",
-        "supply below which to stand still",
-        gt=0,
-        le=100,
-    )
-    supply_off: float = number(
-        9.6,
-        "V",
-        "assumed: three cells at 3.2 V, before they are harmed",
-        "supply below which to switch off",
-        gt=0,
-        le=100,
-    )
-    supply_rise: float = number(
-        0.3,
-        "V",
-        "assumed: more than the supply recovers when the legs stop",
-        "rise above a level that ends its cause",
-        ge=0,
-        le=10,
-    )
-    rate: float = number(
-        100.0, "Hz", "paper: about 100 Hz over serial", "samples per second expected", gt=0, le=1000
-    )
-    rate_error: float = number(
-        0.2,
-        "1",
-        "assumed: far beyond any crystal",
-        "relative error of the rate allowed",
-        gt=0,
-        lt=1,
-    )
-    rate_time: float = number(
-        1.0, "s", "assumed: a hundred samples", "window of the rate, and patience", gt=0, le=60
-    )
+    """How fast the gait goes below supply_warn."""
+    supply_hold: float = number(10.2, "V", "assumed: three cells at 3.4 V", gt=0, le=100)
+    """Supply below which to stand still."""
+    supply_off: float = number(9.6, "V", "assumed: three cells at 3.2 V", gt=0, le=100)
+    """Supply below which to switch off."""
+    supply_rise: float = number(0.3, "V", "assumed: it recovers by less at rest", ge=0, le=10)
+    """Rise above a level that ends its cause."""
+    rate: float = number(100.0, "Hz", "paper: about 100 Hz over serial", gt=0, le=1000)
+    """Samples per second expected."""
+    rate_error: float = number(0.2, "1", "assumed: far beyond any crystal", gt=0, lt=1)
+    """Relative error of the rate allowed."""
+    rate_time: float = number(1.0, "s", "assumed: a hundred samples", gt=0, le=60)
+    """Window of the rate, and patience."""
     longest_arming: float = number(
-        1.0,
-        "s",
-        "measured: 0.14 s against the twin; each step is written and read back",
-        "longest time from an arm event to the next tick",
-        gt=0,
-        le=10,
+        1.0, "s", "measured: 0.14 s on the twin; each step is written and read back", gt=0, le=10
     )
+    """Longest time from an arm event to the next tick."""
     longest_pause: float = number(
-        0.12,
-        "s",
-        "assumed: by then the watchdogs of the servos have stopped them",
-        "time between ticks from which on a restart needs a person",
-        gt=0,
-        le=10,
+        0.12, "s", "assumed: by then the watchdogs of the servos have stopped them", gt=0, le=10
     )
+    """Time between ticks from which on a restart needs a person."""
 
     @model_validator(mode="after")
     def _levels(self) -> SupervisorParams:

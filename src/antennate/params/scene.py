@@ -12,34 +12,16 @@ from antennate.params.base import Params, number
 class CylinderParams(Params):
     """The loose paper cylinders."""
 
-    radius: float = number(0.07, "m", "paper: cylinders of 7 cm radius", "radius", gt=0.005, le=0.5)
-    height: float = number(
-        0.20, "m", "assumed: unpublished; well above the robot's 6 cm", "height", gt=0.05, le=2
-    )
-    mass: float = number(
-        0.10,
-        "kg",
-        "assumed: unpublished; a tube of 1.1 kg/m² board",
-        "mass of one cylinder",
-        gt=0,
-        le=10,
-    )
-    friction: float = number(
-        0.4,
-        "1",
-        "assumed: unpublished; paper on a laboratory floor",
-        "Coulomb friction on the floor",
-        ge=0,
-        le=2,
-    )
-    contact_friction: float = number(
-        0.3,
-        "1",
-        "assumed: unpublished; paper on paper and on walls",
-        "friction against walls and one another",
-        ge=0,
-        le=2,
-    )
+    radius: float = number(0.07, "m", "paper: cylinders of 7 cm radius", gt=0.005, le=0.5)
+    """Radius."""
+    height: float = number(0.20, "m", "assumed: well above the robot", gt=0.05, le=2)
+    """Height."""
+    mass: float = number(0.10, "kg", "assumed: a tube of 1.1 kg/m² board", gt=0, le=10)
+    """Mass of one cylinder."""
+    friction: float = number(0.4, "1", "assumed: paper on a floor", ge=0, le=2)
+    """Friction on the floor (Coulomb)."""
+    contact_friction: float = number(0.3, "1", "assumed: paper on paper", ge=0, le=2)
+    """Friction against walls and one another."""
 
     @property
     def spin_friction(self) -> float:
@@ -51,52 +33,21 @@ class TunnelParams(Params):
     """A corridor with turns, lined and strewn with loose cylinders."""
 
     segments: tuple[float, ...] = number(
-        (1.0, 1.0),
-        "m",
-        "assumed: unpublished; room for the body before the turn and after it",
-        "lengths of the straight pieces of the centre line",
-        min_length=1,
-        max_length=20,
+        (1.0, 1.0), "m", "assumed: room for the body", min_length=1, max_length=20
     )
-    turns_deg: tuple[float, ...] = number(
-        (90.0,),
-        "deg",
-        "fitted: antennate tunnel, open loop alone",
-        "turn between one piece and the next",
-        max_length=19,
-    )
-    mirror: Literal["random", "never", "always"] = number(
-        "random", "1", "assumed: no side is favoured", "whether a trial's tunnel is mirrored"
-    )
-    free_width: float = number(
-        0.40,
-        "m",
-        "paper: the widest section, about twice the robot's width",
-        "widest free width between the linings",
-        gt=0,
-    )
-    corner_radius: float = number(
-        0.0,
-        "m",
-        "assumed: unpublished; a sharp corner is the harder case",
-        "rounding of the outer wall at a turn",
-        ge=0,
-    )
-    lining_gap: float = number(
-        0.02,
-        "m",
-        "assumed: cylinders set side by side by hand",
-        "mean gap between neighbours of a lining",
-        ge=0,
-    )
-    strewn: int = number(
-        4,
-        "1",
-        "assumed: unpublished; some cylinders stand in the way",
-        "cylinders standing in the corridor",
-        ge=0,
-        le=400,
-    )
+    """Lengths of the straight pieces of the centre line."""
+    turns_deg: tuple[float, ...] = number((90.0,), "deg", "fitted: antennate tunnel", max_length=19)
+    """Turn between one piece and the next."""
+    mirror: Literal["random", "never", "always"] = number("random", "1", "assumed: sides are equal")
+    """Whether a trial's tunnel is mirrored."""
+    free_width: float = number(0.40, "m", "paper: the widest, twice the robot's width", gt=0)
+    """Widest free width between the linings."""
+    corner_radius: float = number(0.0, "m", "assumed: sharp is harder", ge=0)
+    """Rounding of the outer wall at a turn."""
+    lining_gap: float = number(0.02, "m", "assumed: cylinders set side by side by hand", ge=0)
+    """Mean gap between neighbours of a lining."""
+    strewn: int = number(4, "1", "assumed: some stand in the way", ge=0, le=400)
+    """Cylinders standing in the corridor."""
     cylinder: CylinderParams = CylinderParams()
 
     @property
@@ -127,95 +78,41 @@ class TunnelParams(Params):
 class VariationParams(Params):
     """What differs from trial to trial besides the tunnel itself."""
 
-    start_lateral: float = number(
-        0.03, "m", "assumed: placed by hand", "half range of the start's side offset", ge=0
-    )
-    start_heading: float = number(
-        0.15, "rad", "assumed: placed by hand", "half range of the start's heading", ge=0, le=1.5
-    )
-    joint_bias: float = number(
-        0.02,
-        "rad",
-        "assumed: a horn mounted by hand, about 1 deg",
-        "standard deviation of a yaw joint's zero",
-        ge=0,
-        le=0.3,
-    )
-    slip_log_sd: float = number(
-        0.3,
-        "1",
-        "assumed: dust and worn tread",
-        "standard deviation of the logarithm of a leg's friction factor",
-        ge=0,
-        le=3,
-    )
-    slip_time: float = number(
-        2.5, "s", "assumed: a few steps", "time after which a leg's friction is drawn anew", gt=0
-    )
+    start_lateral: float = number(0.03, "m", "assumed: placed by hand", ge=0)
+    """Half range of the start's side offset."""
+    start_heading: float = number(0.15, "rad", "assumed: placed by hand", ge=0, le=1.5)
+    """Half range of the start's heading."""
+    joint_bias: float = number(0.02, "rad", "assumed: mounted by hand, about 1 deg", ge=0, le=0.3)
+    """Standard deviation of a yaw joint's zero."""
+    slip_log_sd: float = number(0.3, "1", "assumed: dust and worn tread", ge=0, le=3)
+    """Standard deviation of the logarithm of a leg's friction factor."""
+    slip_time: float = number(2.5, "s", "assumed: a few steps", gt=0)
+    """Time after which a leg's friction is drawn anew."""
 
 
 class PhysicsParams(Params):
-    """Numerics of the simulation."""
+    """Numerics of the simulation, measured by benchmarks/numerics.py."""
 
-    timestep: float = number(
-        0.002,
-        "s",
-        "measured: benchmarks/numerics.py, agrees with 0.25 ms",
-        "physics step",
-        gt=1e-5,
-        le=0.004,
-    )
-    contact_time: float = number(
-        0.004,
-        "s",
-        "measured: benchmarks/numerics.py; longer lets the legs sink into the floor",
-        "time constant of contacts",
-        gt=1e-5,
-        le=0.05,
-    )
-    impratio: float = number(
-        1.0,
-        "1",
-        "measured: benchmarks/numerics.py, 10 and 100 change the speed by under 0.2 %",
-        "stiffness of friction over that of the normal",
-        gt=0,
-        le=1000,
-    )
+    timestep: float = number(0.002, "s", "measured: benchmarks/numerics.py", gt=1e-5, le=0.004)
+    """Physics step."""
+    contact_time: float = number(0.004, "s", "measured: with more, legs sink in", gt=1e-5, le=0.05)
+    """Time constant of contacts."""
+    impratio: float = number(1.0, "1", "measured: 100 changes speeds by 0.2 %", gt=0, le=1000)
+    """Stiffness of friction over that of the normal."""
     sleep_tolerance: float = number(
-        1e-3,
-        "m/s",
-        "measured: benchmarks/numerics.py, outcomes as without sleep",
-        "speed under which resting parts are skipped",
-        gt=0,
-        le=0.1,
+        1e-3, "m/s", "measured: benchmarks/numerics.py, outcomes as without sleep", gt=0, le=0.1
     )
+    """Speed under which resting parts are skipped."""
 
 
 class BenchPhysicsParams(PhysicsParams):
     """Numerics of the bench: a light chain that sticks and slips on small spheres."""
 
-    timestep: float = number(
-        5e-4,
-        "s",
-        "measured: antennate wall at half of it gives the same table; see docs/science/antenna.md",
-        "physics step",
-        gt=1e-5,
-        le=0.002,
-    )
+    timestep: float = number(5e-4, "s", "measured: half gives the same wall", gt=1e-5, le=0.002)
+    """Physics step."""
     contact_time: float = number(
-        1e-3,
-        "s",
-        "assumed: twice the timestep, the stiffest the engine allows; longer lets small spheres "
-        "sink in",
-        "time constant of contacts",
-        gt=1e-5,
-        le=0.05,
+        1e-3, "s", "assumed: twice the timestep, the stiffest the engine takes", gt=1e-5, le=0.05
     )
-    impratio: float = number(
-        10.0,
-        "1",
-        "assumed: with 1 the friction creeps and hides a jam",
-        "stiffness of friction over that of the normal",
-        gt=0,
-        le=1000,
-    )
+    """Time constant of contacts."""
+    impratio: float = number(10.0, "1", "assumed: with 1 friction creeps", gt=0, le=1000)
+    """Stiffness of friction over that of the normal."""

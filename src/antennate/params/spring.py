@@ -57,95 +57,55 @@ class SpringParams(Params):
     """Torsion springs of one wire and one coil diameter, and how new ones may be wound."""
 
     wire: Literal["stainless_302", "music_wire", "hard_drawn", "phosphor_bronze"] = number(
-        "stainless_302", "1", "assumed: unpublished; a wire that does not rust", "kind of wire"
+        "stainless_302", "1", "assumed: a wire that does not rust"
     )
-    modulus_pa: float | None = number(
-        None, "Pa", "assumed: that of the kind of wire", "Young's modulus if it is known better"
-    )
-    wire_mm: float = number(
-        0.50,
-        "mm",
-        "assumed: unpublished; stock wire that gives the paper's table at a spring index of 7.5",
-        "wire diameter",
-        gt=0.01,
-        le=10,
-    )
-    coil_mm: float = number(
-        3.77,
-        "mm",
-        "assumed: unpublished; follows from the wire and 0.274 N·mm/deg at three coils",
-        "mean coil diameter",
-        gt=0.05,
-        le=200,
-    )
+    """Kind of wire."""
+    modulus_pa: float | None = number(None, "Pa", "assumed: that of the kind of wire")
+    """Young's modulus if it is known better."""
+    wire_mm: float = number(0.50, "mm", "assumed: a stock wire, spring index 7.5", gt=0.01, le=10)
+    """Wire diameter."""
+    coil_mm: float = number(3.77, "mm", "assumed: follows from the paper's table", gt=0.05, le=200)
+    """Mean coil diameter."""
     active_coils: tuple[_Positive, ...] = number(
-        (3.0, 6.0, 9.0),
-        "1",
-        "paper: table of springs",
-        "active coils of each spring",
-        min_length=1,
-        max_length=50,
+        (3.0, 6.0, 9.0), "1", "paper: table of springs", min_length=1, max_length=50
     )
+    """Active coils of each spring."""
     wanted_n_mm_per_deg: tuple[_Positive, ...] = number(
-        (0.274, 0.137, 0.091),
-        "N·mm/deg",
-        "paper: table of springs",
-        "stiffnesses that a new set is wound for",
-        min_length=1,
-        max_length=50,
+        (0.274, 0.137, 0.091), "N·mm/deg", "paper: table of springs", min_length=1, max_length=50
     )
+    """Stiffnesses that a new set is wound for."""
     index_limits: tuple[_Positive, _Positive] = number(
-        (4.0, 12.0),
-        "1",
-        "datasheet: makers' usual range of coil over wire diameter",
-        "smallest and largest spring index",
+        (4.0, 12.0), "1", "datasheet: makers' usual range of coil over wire diameter"
     )
+    """Smallest and largest spring index."""
     coil_limits: tuple[_Positive, _Positive] = number(
-        (2.0, 12.0),
-        "1",
-        "assumed: fewer give no clean rate, more grow longer than a link",
-        "fewest and most active coils",
+        (2.0, 12.0), "1", "assumed: fewer give no clean rate, more grow longer than a link"
     )
-    coil_step: float = number(
-        0.25, "1", "datasheet: legs are bent at quarter turns", "step of active coils", gt=0, le=1
-    )
-    mandrel_step_mm: float = number(
-        0.1, "mm", "assumed: drill rod", "step of inner coil diameters", gt=0.001, le=5
-    )
-    angle_deg: float = number(
-        30.0, "deg", "paper: no spring bends farther", "angle a spring must bear", gt=0, le=720
-    )
+    """Fewest and most active coils."""
+    coil_step: float = number(0.25, "1", "datasheet: legs are bent at quarter turns", gt=0, le=1)
+    """Step of active coils."""
+    mandrel_step_mm: float = number(0.1, "mm", "assumed: drill rod", gt=0.001, le=5)
+    """Step of inner coil diameters."""
+    angle_deg: float = number(30.0, "deg", "paper: no spring bends farther", gt=0, le=720)
+    """Angle a spring must bear."""
 
 
 class TaperParams(Params):
     """A tapering antenna as a row of segments, and the ladder of springs that follows it."""
 
-    segments: int = number(
-        14, "1", "paper: segments of the model of the animal", "number of segments", ge=2, le=1000
-    )
-    base_mm: float = number(
-        1.5, "mm", "paper: Scolopendra's antenna", "diameter at the base", gt=0, le=100
-    )
-    tip_mm: float = number(
-        0.2, "mm", "paper: Scolopendra's antenna", "diameter at the tip", gt=0, le=100
-    )
-    law: Literal["linear", "geometric"] = number(
-        "linear",
-        "1",
-        "assumed: unpublished; the paper gives both ends",
-        "how diameters fall from base to tip",
-    )
+    segments: int = number(14, "1", "paper: segments of the model of the animal", ge=2, le=1000)
+    """Number of segments."""
+    base_mm: float = number(1.5, "mm", "paper: Scolopendra's antenna", gt=0, le=100)
+    """Diameter at the base."""
+    tip_mm: float = number(0.2, "mm", "paper: Scolopendra's antenna", gt=0, le=100)
+    """Diameter at the tip."""
+    law: Literal["linear", "geometric"] = number("linear", "1", "assumed: unpublished")
+    """How diameters fall from base to tip."""
     ladder: tuple[_Positive, ...] = number(
-        (3.0, 6.0, 6.0, 9.0, 9.0, 9.0),
-        "1",
-        "paper: the robot's springs",
-        "active coils of the ladder, base to tip",
-        min_length=2,
-        max_length=50,
+        (3.0, 6.0, 6.0, 9.0, 9.0, 9.0), "1", "paper: its springs", min_length=2, max_length=50
     )
+    """Active coils of the ladder, base to tip."""
     coil_limits: tuple[_Coils, _Coils] = number(
-        (3, 30),
-        "1",
-        "assumed: fewest of the paper's springs, and what fits a link when wound of thin wire",
-        "fewest and most coils of a suggested ladder",
+        (3, 30), "1", "assumed: fewest of the paper's springs, most that a link holds"
     )
+    """Fewest and most coils of a suggested ladder."""

@@ -30,94 +30,49 @@ class AntennaSpec(Params):
         (3.0, 6.0, 6.0, 9.0, 9.0, 9.0),
         "1",
         "paper: one spring of 3, two of 6 and three of 9 active coils, stiff base to soft tip",
-        "active coils of each spring, base to tip; as many entries as the antenna has hinges",
         min_length=1,
         max_length=MOST_HINGES,
     )
+    """Active coils of each spring, base to tip; as many entries as the antenna has hinges."""
     three_coil_stiffness_n_mm_per_deg: float = number(
-        0.274,
-        "N·mm/deg",
-        "paper: table of springs; stiffness goes with 1/coils, so 0.137 and 0.091 follow",
-        "stiffness of a spring of three active coils",
-        gt=0,
+        0.274, "N·mm/deg", "paper: table of springs; 1/coils gives 0.137 and 0.091", gt=0
     )
+    """Stiffness of a spring of three active coils."""
     sensor_stiffness_n_mm_per_deg: float = number(
-        0.048,
-        "N·mm/deg",
-        "assumed: bending stiffness of a 10 x 0.25 mm PET strip, E 3.5 GPa, per 16.7 mm hinge",
-        "stiffness the flex sensor adds to each hinge it covers",
-        ge=0,
+        0.048, "N·mm/deg", "assumed: PET strip of 10 x 0.25 mm, E 3.5 GPa, 16.7 mm a hinge", ge=0
     )
-    length: float = number(
-        0.12,
-        "m",
-        "assumed: unpublished; six springs and holders under a sensor of about 0.1 m",
-        "length from base to tip",
-        gt=0.02,
-        le=0.4,
-    )
-    radius: float = number(
-        0.003, "m", "assumed: coils of about 5 mm diameter and wire", "outer radius", gt=0, le=0.02
-    )
-    link_mass: float = number(
-        0.0008,
-        "kg",
-        "assumed: unpublished; steel coil and printed holder",
-        "mass of one link",
-        gt=0,
-    )
-    base_mass: float = number(
-        0.001, "kg", "assumed: printed horn", "mass that turns with the base servo", gt=0
-    )
-    damping_time: float = number(
-        0.04,
-        "s",
-        "assumed: damping over stiffness of a hinge; with less, the gait alone swings the antenna",
-        "relaxation time of a hinge",
-        ge=0,
-    )
-    armature: float = number(
-        3e-6,
-        "kg·m²",
-        "assumed: keeps the light chain well conditioned",
-        "inertia added per hinge",
-        gt=0,
-    )
-    range: float = number(
-        1.4, "rad", "assumed: neighbouring holders meet", "largest angle of one hinge", gt=0, lt=3.1
-    )
+    """Stiffness the flex sensor adds to each hinge it covers."""
+    length: float = number(0.12, "m", "assumed: springs under a sensor of 0.1 m", gt=0.02, le=0.4)
+    """Length from base to tip."""
+    radius: float = number(0.003, "m", "assumed: coils of 5 mm, and the wire", gt=0, le=0.02)
+    """Outer radius."""
+    link_mass: float = number(0.0008, "kg", "assumed: steel coil and printed holder", gt=0)
+    """Mass of one link."""
+    base_mass: float = number(0.001, "kg", "assumed: printed horn", gt=0)
+    """Mass that turns with the base servo."""
+    damping_time: float = number(0.04, "s", "assumed: with less, the gait swings it", ge=0)
+    """Relaxation time of a hinge."""
+    armature: float = number(3e-6, "kg·m²", "assumed: keeps the light chain well conditioned", gt=0)
+    """Inertia added per hinge."""
+    range: float = number(1.4, "rad", "assumed: neighbouring holders meet", gt=0, lt=3.1)
+    """Largest angle of one hinge."""
     base_angle: float = number(
-        math.radians(47.0),
-        "rad",
-        "assumed: unpublished; tips then lead the head and span the body width",
-        "mounting angle from the heading, outwards",
-        ge=0,
-        lt=math.pi / 2,
+        math.radians(47.0), "rad", "assumed: tips lead and span the width", ge=0, lt=math.pi / 2
     )
-    base_spacing: float = number(
-        0.04,
-        "m",
-        "assumed: two XL330 servos (20 mm wide) side by side",
-        "distance of the two bases",
-        gt=0,
-    )
-    friction: float = number(
-        0.3, "1", "assumed: printed plastic on paper", "friction against obstacles", ge=0, le=2
-    )
+    """Mounting angle from the heading, outwards."""
+    base_spacing: float = number(0.04, "m", "assumed: two XL330 (20 mm) side by side", gt=0)
+    """Distance of the two bases."""
+    friction: float = number(0.3, "1", "assumed: printed plastic on paper", ge=0, le=2)
+    """Friction against obstacles."""
 
     base_stiffness: float = number(
-        2.0,
-        "N·m/rad",
-        "assumed: a hundred times the stiffest spring, so that the base holds",
-        "stiffness of the base servo",
-        gt=0,
+        2.0, "N·m/rad", "assumed: a hundred times the stiffest spring, so that the base holds", gt=0
     )
-    base_damping: float = number(
-        0.1, "N·m·s/rad", "assumed: settles within 0.05 s", "damping of the base servo", ge=0
-    )
-    base_armature: float = number(
-        1e-4, "kg·m²", "assumed: below that of the servo; it is driven stiffly", "its inertia", ge=0
-    )
+    """Stiffness of the base servo."""
+    base_damping: float = number(0.1, "N·m·s/rad", "assumed: settles within 0.05 s", ge=0)
+    """Damping of the base servo."""
+    base_armature: float = number(1e-4, "kg·m²", "assumed: below the servo's; driven stiffly", ge=0)
+    """Its inertia."""
     sensor: SensorParams = SensorParams()
 
     @property

@@ -23,34 +23,16 @@ _Zero = Annotated[int, Field(ge=-MOST_TICKS, le=MOST_TICKS)]
 class JointParams(Params):
     """One group of joints, in the order of the robot's joints."""
 
-    servo: ServoName = number(
-        "xc430_w240", "1", "paper: XC430-W240 in the body", "model of the group's servos"
-    )
-    ids: tuple[_Id, ...] = number(
-        (),
-        "1",
-        "assumed: set by hand; not given, all joints are numbered from 1",
-        "ids on the bus",
-    )
-    directions: tuple[_Direction, ...] = number(
-        (),
-        "1",
-        "assumed: mounted alike; not given, all are 1",
-        "sign between ticks and angle",
-    )
-    zeros: tuple[_Zero, ...] = number(
-        (),
-        "ticks",
-        "assumed: the middle of a turn, 2048, if not given",
-        "position at the angle 0",
-    )
-    fastest: float = number(
-        4.5,
-        "rad/s",
-        "assumed: two thirds of an unloaded XC430-W240 at 11.1 V, 6.8 rad/s (datasheet)",
-        "fastest that goals move",
-        gt=0,
-    )
+    servo: ServoName = number("xc430_w240", "1", "paper: XC430-W240 in the body")
+    """Model of the group's servos."""
+    ids: tuple[_Id, ...] = number((), "1", "assumed: set by hand; joints from 1 if not given")
+    """Ids on the bus."""
+    directions: tuple[_Direction, ...] = number((), "1", "assumed: mounted alike; all 1 if empty")
+    """Sign between ticks and angle."""
+    zeros: tuple[_Zero, ...] = number((), "ticks", "assumed: 2048, half a turn, if not given")
+    """Position at the angle 0."""
+    fastest: float = number(4.5, "rad/s", "assumed: 2/3 of an unloaded XC430-W240", gt=0)
+    """Fastest that goals move."""
 
     @property
     def largest(self) -> float:
@@ -62,13 +44,9 @@ class YawParams(JointParams):
     """The yaw joints between links, head first."""
 
     limit: float = number(
-        _RIGHT_ANGLE,
-        "rad",
-        "assumed: links at a right angle nearly meet; the gaits stay within 0.96",
-        "largest angle either way",
-        gt=0,
-        le=_RIGHT_ANGLE,
+        _RIGHT_ANGLE, "rad", "assumed: links nearly meet; gaits need 0.96", gt=0, le=_RIGHT_ANGLE
     )
+    """Largest angle either way."""
 
     @property
     def largest(self) -> float:
@@ -79,35 +57,21 @@ class YawParams(JointParams):
 class PitchParams(YawParams):
     """The pitch joints between links, head first: held by a stiffness, or moved by servos."""
 
-    kind: Literal["locked", "actuated"] = number(
-        "locked", "1", "paper: pitch is left unused", "whether servos on the bus move them"
-    )
-    stiffness: float = number(
-        30.0,
-        "N·m/rad",
-        "assumed: a servo that holds; the paper leaves pitch unused",
-        "stiffness of a locked pitch joint",
-        gt=0,
-    )
+    kind: Literal["locked", "actuated"] = number("locked", "1", "paper: pitch is left unused")
+    """Whether servos on the bus move them."""
+    stiffness: float = number(30.0, "N·m/rad", "assumed: a servo that holds", gt=0)
+    """Stiffness of a locked pitch joint."""
 
 
 class LegParams(JointParams):
     """The legs of all links, head first, left before right."""
 
-    kind: Literal["rolling", "lifting"] = number(
-        "rolling",
-        "1",
-        "paper: O-legs",
-        "rolling legs turn about the pitch axis without end, lifting legs about the roll axis",
-    )
+    kind: Literal["rolling", "lifting"] = number("rolling", "1", "paper: O-legs")
+    """Rolling legs turn about the pitch axis without end, lifting legs about the roll axis."""
     limit: float = number(
-        _RIGHT_ANGLE,
-        "rad",
-        "assumed: a leg that points straight up or down",
-        "largest angle of a lifting leg either way",
-        gt=0,
-        le=_RIGHT_ANGLE,
+        _RIGHT_ANGLE, "rad", "assumed: the leg points straight up or down", gt=0, le=_RIGHT_ANGLE
     )
+    """Largest angle of a lifting leg either way."""
 
     @property
     def largest(self) -> float:
@@ -118,21 +82,9 @@ class LegParams(JointParams):
 class BaseParams(YawParams):
     """The bases of both antennae, left before right."""
 
-    servo: ServoName = number(
-        "xl330_m288", "1", "paper: XL330 at the antennae", "model of the group's servos"
-    )
-    fastest: float = number(
-        4.5,
-        "rad/s",
-        "assumed: as the other joints; an unloaded XL330-M288 makes 10.8 rad/s at 5 V (datasheet)",
-        "fastest that goals move",
-        gt=0,
-    )
-    limit: float = number(
-        _RIGHT_ANGLE,
-        "rad",
-        "assumed: further outwards an antenna lies along the body, inwards it crosses the other",
-        "largest angle either way from the mounting angle",
-        gt=0,
-        le=_RIGHT_ANGLE,
-    )
+    servo: ServoName = number("xl330_m288", "1", "paper: XL330 at the antennae")
+    """Model of the group's servos."""
+    fastest: float = number(4.5, "rad/s", "assumed: as the others; XL330-M288 makes 10.8", gt=0)
+    """Fastest that goals move."""
+    limit: float = number(_RIGHT_ANGLE, "rad", "assumed: beyond, they cross", gt=0, le=_RIGHT_ANGLE)
+    """Largest angle either way from the mounting angle."""

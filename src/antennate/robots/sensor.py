@@ -34,114 +34,55 @@ CONVERTER_AT_1_2_V = (
 class SensorParams(Params):
     """Flex sensor, voltage divider and the ESP32's converter."""
 
-    active_length: float = number(
-        0.0953, "m", "datasheet: Spectra Symbol FS-L-0095-103, active length", "sensed length", gt=0
-    )
+    active_length: float = number(0.0953, "m", "datasheet: Spectra Symbol FS-L-0095-103", gt=0)
+    """Sensed length."""
     kind: Literal["flex", "fsr"] = number(
-        "flex",
-        "1",
-        "assumed: the paper's ZD10-100 is sold as a pressure strip and used as a flex sensor",
-        "flex sensor whose resistance rises with bending (flex) or falls with it (fsr)",
+        "flex", "1", "assumed: the paper's ZD10-100, a pressure strip, is used as flex sensor"
     )
-    flat_resistance: float = number(
-        10e3,
-        "Ohm",
-        "datasheet: Spectra Symbol FS-L-0095-103, flat 10 kOhm",
-        "resistance unbent",
-        gt=0,
-    )
+    """Flex sensor whose resistance rises with bending (flex) or falls with it (fsr)."""
+    flat_resistance: float = number(10e3, "Ohm", "datasheet: Spectra Symbol FS-L-0095-103", gt=0)
+    """Resistance unbent."""
     bend_gain: float = number(
         1.2 / math.pi,
         "1/rad",
-        "datasheet: at least doubled at 180 deg (FS-L-0095-103); 2.2 assumed",
-        "relative rise of resistance per radian of flex",
+        "datasheet: at least 2 at 180 deg (FS-L-0095-103); 2.2 assumed",
         gt=0,
     )
-    unloaded_resistance: float = number(
-        10e6,
-        "Ohm",
-        "datasheet: ZD10-100, above 10 MOhm",
-        "resistance of an unbent fsr sensor",
-        gt=0,
-    )
-    pressed_resistance: float = number(
-        5e3,
-        "Ohm",
-        "assumed: unpublished for bending; strips of this size reach a few kOhm at full load",
-        "resistance of an fsr sensor at a right angle",
-        gt=0,
-    )
-    hysteresis: float = number(
-        0.10,
-        "1",
-        "datasheet: ZD10-100, +10 %",
-        "widest gap between loading and unloading, in bends of a right angle",
-        ge=0,
-        le=0.25,
-    )
-    creep: tuple[float, float] = number(
-        (0.025, 0.025),
-        "1",
-        "assumed: 5 % in all, as viscoelastic flex sensors show",
-        "shares of the response that come late",
-    )
-    creep_time: tuple[float, float] = number(
-        (0.3, 10.0), "s", "assumed: a fast and a slow part", "how late they come"
-    )
+    """Relative rise of resistance per radian of flex."""
+    unloaded_resistance: float = number(10e6, "Ohm", "datasheet: ZD10-100, above 10 MOhm", gt=0)
+    """Resistance of an unbent fsr sensor."""
+    pressed_resistance: float = number(5e3, "Ohm", "assumed: a few kOhm at full load", gt=0)
+    """Resistance of an fsr sensor at a right angle."""
+    hysteresis: float = number(0.10, "1", "datasheet: ZD10-100, +10 %", ge=0, le=0.25)
+    """Widest gap between loading and unloading, in bends of a right angle."""
+    creep: tuple[float, float] = number((0.025, 0.025), "1", "assumed: 5 %, as flex sensors show")
+    """Shares of the response that come late."""
+    creep_time: tuple[float, float] = number((0.3, 10.0), "s", "assumed: a fast and a slow part")
+    """How late they come."""
     directions: Literal["both", "one"] = number(
-        "both",
-        "1",
-        "assumed: the paper's ZD10-100 is sold as a pressure strip, which answers bending either "
-        "way",
-        "whether the flex sensor sees bending towards the tail only (one) or either way",
+        "both", "1", "assumed: a pressure strip, as the paper's ZD10-100, answers both ways"
     )
-    divider_resistance: float = number(
-        10e3,
-        "Ohm",
-        "assumed: the value makers pair with this flex sensor",
-        "fixed resistor to ground",
-        gt=0,
-    )
-    supply: float = number(3.3, "V", "datasheet: ESP32 supply", "voltage over the divider", gt=0)
-    reference: float = number(
-        1.1,
-        "V",
-        "datasheet: ESP32, nominal; chips lie between 1.0 and 1.2 V",
-        "reference voltage of the converter",
-        ge=1.0,
-        le=1.2,
-    )
-    oversampling: int = number(
-        16,
-        "1",
-        "assumed: 100 readings a second of two flex sensors leave time for 16 samples each",
-        "samples averaged to one reading",
-        ge=1,
-        le=1024,
-    )
-    sample_noise_counts: float = number(
-        8.0,
-        "counts",
-        "assumed: reports of 25 counts peak to peak",
-        "standard deviation of one sample on its own",
-        ge=0,
-    )
+    """Whether the flex sensor sees bending towards the tail only (one) or either way."""
+    divider_resistance: float = number(10e3, "Ohm", "assumed: what makers pair with it", gt=0)
+    """Fixed resistor to ground."""
+    supply: float = number(3.3, "V", "datasheet: ESP32 supply", gt=0)
+    """Voltage over the divider."""
+    reference: float = number(1.1, "V", "datasheet: ESP32, nominal; 1.0 to 1.2 V", ge=1.0, le=1.2)
+    """Reference voltage of the converter."""
+    oversampling: int = number(16, "1", "assumed: time is left for so many", ge=1, le=1024)
+    """Samples averaged to one reading."""
+    sample_noise_counts: float = number(8.0, "counts", "assumed: 25 reported, peak to peak", ge=0)
+    """Standard deviation of one sample on its own."""
     common_noise_counts: float = number(
-        1.5,
-        "counts",
-        "assumed: averaging 16 samples leaves 2 to 3 counts, so a part of the noise is common",
-        "standard deviation that all samples of a reading share",
-        ge=0,
+        1.5, "counts", "assumed: 16 samples leave 2 to 3 counts, so a part is common", ge=0
     )
-    outlier_share: float = number(
-        0.01, "1", "assumed: reported spikes", "share of samples that are spikes", ge=0, le=1
-    )
-    outlier_counts: float = number(
-        40.0, "counts", "assumed: reported spikes", "height of a spike, up or down", ge=0
-    )
-    rate: float = number(
-        100.0, "Hz", "paper: about 100 Hz over serial", "readings per second", gt=0, le=1000
-    )
+    """Standard deviation that all samples of a reading share."""
+    outlier_share: float = number(0.01, "1", "assumed: reported spikes", ge=0, le=1)
+    """Share of samples that are spikes."""
+    outlier_counts: float = number(40.0, "counts", "assumed: reported spikes", ge=0)
+    """Height of a spike, up or down."""
+    rate: float = number(100.0, "Hz", "paper: about 100 Hz over serial", gt=0, le=1000)
+    """Readings per second."""
 
     @property
     def noise_counts(self) -> float:

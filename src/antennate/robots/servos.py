@@ -36,31 +36,21 @@ class ServoParams(Params):
     model_number: ClassVar[int] = 1080
     voltage: ClassVar[float] = 11.1
 
-    stall_torque: float = number(
-        1.7, "N·m", "datasheet: XC430-W240, 11.1 V", "torque at standstill", gt=0
-    )
+    stall_torque: float = number(1.7, "N·m", "datasheet: XC430-W240, 11.1 V", gt=0)
+    """Torque at standstill."""
     no_load_speed: float = number(
-        65.0 * _RPM,
-        "rad/s",
-        "datasheet: XC430-W240, 65 rpm at 11.1 V",
-        "speed unloaded",
-        gt=0,
+        65.0 * _RPM, "rad/s", "datasheet: XC430-W240, 65 rpm at 11.1 V", gt=0
     )
+    """Speed unloaded."""
     position_gain: float = number(
         700 / 128 * TICKS_A_TURN / (2 * math.pi) / _PWM_LIMIT,
         "1/rad",
-        "datasheet: Position P Gain 700, scaled by 1/128 to PWM counts a tick of 1/4096 turn, PWM "
-        "limit 885",
-        "share of the full drive per radian of position error",
+        "datasheet: Position P Gain 700, over 128 PWM counts a tick, PWM limit 885",
         gt=0,
     )
-    armature: float = number(
-        0.003,
-        "kg·m²",
-        "assumed: rotor of about 5e-8 kg·m² behind a 245:1 gear",
-        "inertia at the output",
-        ge=0,
-    )
+    """Share of the full drive per radian of position error."""
+    armature: float = number(0.003, "kg·m²", "assumed: rotor of 5e-8 behind a 245:1 gear", ge=0)
+    """Inertia at the output."""
 
     @property
     def stiffness(self) -> float:
@@ -79,22 +69,21 @@ class XL330Params(ServoParams):
     model_number: ClassVar[int] = 1200
     voltage: ClassVar[float] = 5.0
 
-    stall_torque: float = number(
-        0.52, "N·m", "datasheet: XL330-M288, 5 V", "torque at standstill", gt=0
-    )
+    stall_torque: float = number(0.52, "N·m", "datasheet: XL330-M288, 5 V", gt=0)
+    """Torque at standstill."""
     no_load_speed: float = number(
-        103.0 * _RPM, "rad/s", "datasheet: XL330-M288, 103 rpm at 5 V", "speed unloaded", gt=0
+        103.0 * _RPM, "rad/s", "datasheet: XL330-M288, 103 rpm at 5 V", gt=0
     )
+    """Speed unloaded."""
     position_gain: float = number(
         400 / 256 * TICKS_A_TURN / (2 * math.pi) / _PWM_LIMIT,
         "1/rad",
-        "datasheet: Position P Gain 400, PWM limit 885; a recording of one shows a scale of 1/256",
-        "share of the full drive per radian of position error",
+        "datasheet: Position P Gain 400, PWM limit 885; a recording shows a scale of 1/256",
         gt=0,
     )
-    armature: float = number(
-        0.0014, "kg·m²", "measured: on a recording of one", "inertia at the output", ge=0
-    )
+    """Share of the full drive per radian of position error."""
+    armature: float = number(0.0014, "kg·m²", "measured: on a recording of one", ge=0)
+    """Inertia at the output."""
 
 
 class ServosParams(Params):

@@ -51,77 +51,36 @@ ANTENNA_PREFIXES = tuple(f"antenna_{side}_" for side in SIDES)
 class RobotSpec(Params):
     """A walking robot: links with a pair of legs each, yaw joints between them, two antennae."""
 
-    links: int = number(6, "1", "paper: six links", "number of links", ge=2, le=50)
-    link_pitch: float = number(
-        0.10,
-        "m",
-        "assumed: one yaw servo and two leg servos (28.5 x 46.5 x 34 mm) a link",
-        "joint spacing",
-        gt=0.03,
-    )
-    mass: float = number(
-        2.0,
-        "kg",
-        "assumed: 17 servos of 65 g (datasheet) and as much again in frames and legs",
-        "total mass",
-        gt=0.3,
-    )
-    width: float = number(
-        0.20,
-        "m",
-        "paper: a free section of 0.40 m is called about twice the robot's width",
-        "width over the legs",
-        gt=0.08,
-    )
-    leg_radius: float = number(
-        0.030,
-        "m",
-        "assumed: a ring under the 34 mm body that gives 0.12 m/s within the servo's speed",
-        "outer radius of an O-leg",
-        gt=0,
-    )
-    leg_eccentricity: float = number(
-        0.012, "m", "assumed: as leg_radius", "distance of the ring's centre from its axle", ge=0
-    )
-    leg_width: float = number(
-        0.016, "m", "assumed: printed ring with a rubber tread", "thickness of an O-leg", gt=0
-    )
-    leg_mass: float = number(0.020, "kg", "assumed: printed ring", "mass of one O-leg", gt=0)
-    leg_friction: float = number(
-        0.6,
-        "1",
-        "assumed: rubber on a laboratory floor, 0.5 to 0.8",
-        "friction of a leg on the floor",
-        gt=0,
-        le=2,
-    )
-    body_friction: float = number(
-        0.3,
-        "1",
-        "assumed: printed plastic on paper",
-        "friction of the body against obstacles",
-        ge=0,
-        le=2,
-    )
-    body_radius: float = number(
-        0.020,
-        "m",
-        "assumed: half the height of the servo and its frame",
-        "radius of spine and cross-beams",
-        gt=0,
-    )
+    links: int = number(6, "1", "paper: six links", ge=2, le=50)
+    """Number of links."""
+    link_pitch: float = number(0.10, "m", "assumed: three servos, 28.5 x 46.5 x 34 mm", gt=0.03)
+    """Joint spacing."""
+    mass: float = number(2.0, "kg", "assumed: 17 servos of 65 g, as much in frames", gt=0.3)
+    """Total mass."""
+    width: float = number(0.20, "m", "paper: a section of 0.40 m is twice as wide", gt=0.08)
+    """Width over the legs."""
+    leg_radius: float = number(0.030, "m", "assumed: 0.12 m/s within the servo's speed", gt=0)
+    """Outer radius of an O-leg."""
+    leg_eccentricity: float = number(0.012, "m", "assumed: as leg_radius", ge=0)
+    """Distance of the ring's centre from its axle."""
+    leg_width: float = number(0.016, "m", "assumed: printed ring with a rubber tread", gt=0)
+    """Thickness of an O-leg."""
+    leg_mass: float = number(0.020, "kg", "assumed: printed ring", gt=0)
+    """Mass of one O-leg."""
+    leg_friction: float = number(0.6, "1", "assumed: rubber on a floor, 0.5 to 0.8", gt=0, le=2)
+    """Friction of a leg on the floor."""
+    body_friction: float = number(0.3, "1", "assumed: printed plastic on paper", ge=0, le=2)
+    """Friction of the body against obstacles."""
+    body_radius: float = number(0.020, "m", "assumed: half the height of the servo", gt=0)
+    """Radius of spine and cross-beams."""
     baud: Literal[57600, 115200, 1000000, 2000000, 3000000, 4000000] = number(
-        1_000_000,
-        "bit/s",
-        "assumed: write and read of 19 servos then take 4.3 of 10 ms",
-        "bus speed",
+        1_000_000, "bit/s", "assumed: write and read of 19 servos then take 4.3 of 10 ms"
     )
+    """Bus speed."""
     release: tuple[GroupName, ...] = number(
-        ("antennae", "yaw", "legs"),
-        "1",
-        "assumed: what carries the robot goes last; actuated pitch joints follow if not named",
-        "order in which the groups lose their torque",
+        ("antennae", "yaw", "legs"), "1", "assumed: what carries the robot goes last"
     )
+    """Order in which the groups lose their torque."""
     yaw: YawParams = YawParams()
     pitch: PitchParams = PitchParams()
     legs: LegParams = LegParams()

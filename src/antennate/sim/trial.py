@@ -33,14 +33,10 @@ MOST_OVERLAP = 0.005
 class TrialConfig(Params):
     """What decides how a trial starts."""
 
-    seed: int = number(0, "1", "assumed: any", "seed of all chance", ge=0)
-    scene: str = number(
-        TUNNEL,
-        "1",
-        "paper: a cluttered tunnel",
-        "tunnel, flat, a MJCF file.xml, MODULE:CLASS or file.py:CLASS",
-        examples=["tunnel", "flat"],
-    )
+    seed: int = number(0, "1", "assumed: any", ge=0)
+    """Seed of all chance."""
+    scene: str = number(TUNNEL, "1", "paper: a cluttered tunnel", examples=["tunnel", "flat"])
+    """Tunnel, flat, a MJCF file.xml, MODULE:CLASS or file.py:CLASS."""
     tunnel: TunnelParams = TunnelParams()
     robot: RobotSpec = RobotSpec()
     variation: VariationParams = VariationParams()

@@ -6,6 +6,7 @@ its result in a run directory, prints its tables and its closing sentence, and d
 
 from __future__ import annotations
 
+import importlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
@@ -35,21 +36,12 @@ class Outcome(Protocol):
 
     @property
     def rows(self) -> Sequence[Any]:
-        """Finished trials, dataclasses, in a fixed order; empty where there are none."""
-        ...
+        """Finished trials, dataclasses, in a fixed order; by default there are none."""
+        return ()
 
     def result(self) -> dict[str, Any]:
         """The content of result.json; `interrupted` is true if trials are missing."""
         ...
-
-
-class WithoutTrials:
-    """The rows of an outcome that has none."""
-
-    @property
-    def rows(self) -> Sequence[Any]:
-        """No rows."""
-        return ()
 
 
 Config = TypeVar("Config", bound=Params)
@@ -84,3 +76,28 @@ class Experiment(Generic[Config, Found]):
     files: Callable[[Found], Mapping[str, str]] = lambda outcome: {}
     check: Callable[[Config], None] = lambda config: None
     parts: str = "trials"
+
+    @classmethod
+    def of_folder(
+        cls,
+        module: str,
+        config: type[Config],
+        run: Callable[[Config, int, OnStep, OnRow], Found],
+        tables: Callable[[Mapping[str, Any]], Sequence[Table]],
+        sentence: Callable[[Mapping[str, Any]], str],
+        **more: Any,
+    ) -> Experiment[Config, Found]:
+        """An experiment with a folder of its own: a package that has its name and describes it.
+
+        `module` is the `__name__` of a module in the folder. Figures are those that
+        `figures(outcome)` of the module `figure` beside it returns; it is imported when they are
+        drawn, as that takes long.
+        """
+        folder = module.rpartition(".")[0]
+        return cls(
+            folder.rpartition(".")[2],
+            importlib.import_module(folder).__doc__ or "",
+            *(config, run, tables, sentence),
+            figures=lambda outcome: importlib.import_module(f"{folder}.figure").figures(outcome),
+            **more,
+        )

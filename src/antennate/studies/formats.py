@@ -11,6 +11,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 from antennate.params import Params
+from antennate.params.base import meaning
 
 _CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f]+")
 _FORMULA = ("=", "+", "-", "@")
@@ -87,9 +88,9 @@ def _lines(group: Params, path: tuple[str, ...]) -> Iterator[str]:
         if isinstance(value, Params):
             groups.append((name, value))
         elif value is None:
-            yield f"# {name} is not set: {field.description}"
+            yield f"# {name} is not set: {meaning(field)}"
         else:
-            yield f"{name} = {_toml(value)}  # {field.description}"
+            yield f"{name} = {_toml(value)}  # {meaning(field)}"
     for name, value in groups:
         yield from _lines(value, (*path, name))
 

@@ -23,6 +23,7 @@ from typing import Any, TypeVar
 from antennate.errors import WorkerError
 
 Task = TypeVar("Task")
+Result = TypeVar("Result")
 Emit = Callable[[Any], None]
 """Takes one result."""
 
@@ -90,26 +91,41 @@ def run_tasks(
 
 
 def gather(
-    function: Callable[[Task, Emit], None],
-    tasks: Sequence[Task],
+    function: Callable[..., Result],
+    tasks: Sequence[tuple[Any, ...]],
     workers: int,
     on_step: Callable[[int, int], None],
-    on_result: Emit = lambda result: None,
-    total: int | None = None,
-) -> list[Any]:
-    """All that `run_tasks` hands on, in the order in which it came.
+    on_result: Callable[[Result], None] = lambda result: None,
+    chunk: int = 1,
+) -> list[Result]:
+    """What function(*task) returns for every task, in the order of the tasks.
 
-    After each result, `on_step` hears how many of `total` are done; by default every task has one.
+    Args:
+        function: A module-level function.
+        tasks: Its arguments, picklable.
+        workers: As above.
+        on_step: Called after each with how many of how many tasks are done.
+        on_result: Called with each result as it comes, in no particular order.
+        chunk: Tasks handed to a process at once.
     """
-    found: list[Any] = []
+    found: dict[int, Result] = {}
 
-    def take(result: Any) -> None:
-        found.append(result)
+    def take(item: tuple[int, Result]) -> None:
+        place, result = item
+        found[place] = result
         on_result(result)
-        on_step(len(found), len(tasks) if total is None else total)
+        on_step(len(found), len(tasks))
 
-    run_tasks(function, tasks, workers, take)
-    return found
+    numbered = list(enumerate(tasks))
+    chunks = [(function, numbered[i : i + chunk]) for i in range(0, len(tasks), chunk)]
+    run_tasks(_call, chunks, workers, take)
+    return [found[place] for place in range(len(tasks))]
+
+
+def _call(task: tuple[Callable[..., Any], list[tuple[int, Any]]], emit: Emit) -> None:
+    function, numbered = task
+    for place, arguments in numbered:
+        emit((place, function(*arguments)))
 
 
 def _collect(futures: Sequence[Future[int]], results: Any, on_result: Emit) -> None:

@@ -16,9 +16,8 @@ import struct
 import subprocess
 import threading
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from select import PIPE_BUF
-from typing import BinaryIO
+from typing import BinaryIO, NamedTuple
 
 from antennate.errors import LogError
 
@@ -32,14 +31,8 @@ RESTARTS = 3
 _LONGEST = 1 << 17
 
 
-@dataclass(frozen=True, slots=True)
-class Message:
-    """One message.
-
-    Attributes:
-        content: Of the record.
-        dropped: Ticks dropped so far.
-    """
+class Message(NamedTuple):
+    """One message: the content of a record, and the ticks dropped so far."""
 
     content: bytes
     dropped: int

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import json
-from typing import Any
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from antennate import __version__
 from antennate.errors import LogError
 from antennate.params import ControlParams
+from antennate.params.reading import describe
 from antennate.robots.spec import RobotSpec
 from antennate.telemetry.framing import SCHEMA, Kind
 from antennate.telemetry.ticks import fields, layout
@@ -42,15 +42,11 @@ class Header(BaseModel):
 
     def pack(self) -> bytes:
         """The content of its record."""
-        return _START + json.dumps(self.model_dump() | self._of_ticks()).encode()
-
-    def _of_ticks(self) -> dict[str, Any]:
-        """For other readers: layout of a tick in the words of `struct`, and what it holds.
-
-        Its text is as long as the last number says.
-        """
+        # For other readers: the layout of a tick for `struct`, and the names of its numbers. The
+        # last is the length of the text behind them.
         names = ("schema", "kind", "joints", *fields(self.robot), "text")
-        return {"record": layout(len(self.robot.ids)), "fields": names}
+        record = {"record": layout(len(self.robot.ids)), "fields": names}
+        return _START + json.dumps(self.model_dump() | record).encode()
 
     @classmethod
     def unpack(cls, content: bytes) -> Header:
@@ -71,12 +67,7 @@ class Header(BaseModel):
             for name in ("record", "fields"):  # the robot says the same
                 table.pop(name, None)
             return cls.model_validate(table)
-        except (AttributeError, TypeError, ValueError, RecursionError) as error:
-            raise LogError(f"expected a header of a log, found {_fault(error)}") from None
-
-
-def _fault(error: Exception) -> str:
-    if isinstance(error, ValidationError):
-        first = error.errors(include_url=False)[0]
-        return f"{'.'.join(map(str, first['loc']))}: {first['msg']}"
-    return "no JSON"
+        except ValidationError as error:
+            raise LogError(f"expected a header of a log: {describe(error, cls)}") from None
+        except (AttributeError, TypeError, ValueError, RecursionError):
+            raise LogError("expected a header of a log, found no JSON") from None

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 from antennate.errors import LogError
 from antennate.files import open_regular
@@ -18,15 +18,8 @@ _LISTED = 100
 """Most damaged places that are listed."""
 
 
-@dataclass(frozen=True, slots=True)
-class Damage:
-    """One place that could not be read.
-
-    Attributes:
-        offset: Where it begins in the file [bytes].
-        reason: What is wrong.
-        path: The file.
-    """
+class Damage(NamedTuple):
+    """A place that could not be read: where it begins [bytes], what is wrong, in which file."""
 
     offset: int
     reason: str
@@ -44,7 +37,6 @@ class LogReader:
         parts: All files.
         header: Its header.
         ticks: Ticks read so far.
-        first: Number of the first tick read, 0 before it.
         last: Number of the last tick read, 0 before the first.
         bad: Damaged places so far.
         damage: The first of them.
@@ -56,7 +48,7 @@ class LogReader:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self.ticks = self.first = self.last = self.bad = 0
+        self.ticks = self.last = self.bad = 0
         self.damage: list[Damage] = []
         self.end: int | None = None
         try:
@@ -102,7 +94,7 @@ class LogReader:
                     self._note(offset, f"tick {tick.number} after {self.last}")
                     continue
                 self.ticks += 1
-                self.first, self.last = self.first or tick.number, tick.number
+                self.last = tick.number
                 yield tick
 
     def __enter__(self) -> LogReader:

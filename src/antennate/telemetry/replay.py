@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 from pydantic import field_validator
@@ -24,12 +25,9 @@ class ReplayConfig(Params):
     """Which controller decides upon the readings of a log."""
 
     controller: str | None = number(
-        None,
-        "1",
-        "assumed: the one recorded",
-        "open, paper, closed, or MODULE:NAME or FILE.py:NAME of your own, in place of the recorded",
-        examples=["open", "paper", "closed"],
+        None, "1", "assumed: the one recorded", examples=["open", "paper", "closed"]
     )
+    """Open, paper, closed, or MODULE:NAME or FILE.py:NAME of your own, in place of the recorded."""
 
     @field_validator("controller")
     @classmethod
@@ -99,15 +97,15 @@ class _Guarded:
     Its exceptions give a command of NaN, as in a session.
     """
 
-    def __init__(self, controller: Controller, robot: ReplayRobot) -> None:
-        self._controller, self._robot = controller, robot
+    def __init__(self, controller: Controller, log: ReplayRobot, robot: RobotSpec) -> None:
+        self._controller, self._log, self._robot = controller, log, robot
         self._kept: JointCommand | None = None
         self._refused = self.failures = 0
         self.decision = Decision()
 
     def step(self, frame: AntennaFrame) -> JointCommand:
         """The command of this tick."""
-        tick = self._robot.tick
+        tick = self._log.tick
         if tick is not None and self._kept is not None and not tick.asked:
             return self._kept
         refused, self._refused = self._refused, 0 if tick is None else tick.refused
@@ -121,19 +119,11 @@ class _Guarded:
             raise
         except BaseException:  # noqa: BLE001 a plugged-in controller may raise anything
             self.failures += 1
-            return no_command(RobotSpec())
+            return no_command(self._robot)
 
 
-@dataclass(frozen=True, slots=True)
-class Difference:
-    """A tick that was decided otherwise.
-
-    Attributes:
-        number: The tick's number.
-        now: The loop's time then [s].
-        recorded: The maneuver then.
-        replayed: The maneuver now.
-    """
+class Difference(NamedTuple):
+    """A tick that was decided otherwise: its number, its time [s], the maneuver then and now."""
 
     number: int
     now: float
@@ -183,24 +173,24 @@ class Replayed:
             self.first = self.first or Difference(tick.number, tick.now, tick.maneuver, maneuver)
 
 
-def replay(ticks: Iterable[Tick], controller: Controller, period: float) -> Replayed:
+def replay(ticks: Iterable[Tick], controller: Controller, header: Header) -> Replayed:
     """Let a controller that has just begun decide upon all ticks of a log.
 
     Args:
         ticks: The log, in order.
         controller: The controller.
-        period: Its period [s].
+        header: The header of the log: its period and its robot.
     """
-    robot, found = ReplayRobot(ticks), Replayed()
-    control = _Guarded(controller, robot)
+    log, found = ReplayRobot(ticks), Replayed()
+    control = _Guarded(controller, log, header.robot)
 
     def go_on(frame: AntennaFrame, command: JointCommand) -> bool:
-        if robot.tick is not None:
-            found.note(robot.tick, control.decision.maneuver, command)
-        return robot.more
+        if log.tick is not None:
+            found.note(log.tick, control.decision.maneuver, command)
+        return log.more
 
-    if robot.tick is not None:
-        run_loop(robot, control, period, go_on)
+    if log.tick is not None:
+        run_loop(log, control, header.params.period, go_on)
     found.failures = control.failures
     return found
 

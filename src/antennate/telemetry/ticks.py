@@ -9,26 +9,29 @@ from __future__ import annotations
 import math
 import struct
 from dataclasses import dataclass
+from itertools import islice
 from typing import Any
 
 import numpy as np
 
 from antennate.errors import LogError
-from antennate.hardware.driving.decision import Decision, decision_of
+from antennate.hardware.driving.decision import Decision
 from antennate.hardware.driving.session import Session
+from antennate.messages import one_line
 from antennate.robots.spec import RobotSpec
 from antennate.telemetry.framing import SCHEMA, Kind
 from antennate.types import AntennaFrame, Controller, JointCommand
 
 _HEAD = struct.Struct("<BBH")
 """Schema, kind and number of joints."""
-_BEFORE = (
-    *("number", "asked", "t", "now"),
-    *("counts_l", "counts_r", "reading_l", "reading_r", "level_l", "level_r"),
-    *("contact_l", "contact_r", "maneuver", "phase"),
+_CODES = {"number": "Q", "asked": "?", "t": "d", "now": "d"}
+_CODES |= {"counts": "dd", "reading": "dd", "level": "dd"}
+_CODES |= {"contact": "qq", "maneuver": "q", "phase": "d", "angles": "", "age": "d"}
+_CODES |= dict.fromkeys(
+    ("missed", "frames", "crc", "lost", "misses", "stale", "sent", "refused"), "Q"
 )
-_HEALTH = ("age", "missed", "frames", "crc", "lost", "misses", "stale", "sent", "refused")
-"""What stands before and after the angles of the joints."""
+"""The numbers of a tick in the order of its record, with their codes for `struct`: two for a pair,
+left and right; `angles` has a `d` for each joint."""
 _LONGEST_CAUSE = 160
 _NEITHER = (math.nan, math.nan)
 
@@ -96,7 +99,7 @@ class Tick:
         left, right = session.quality.counts
         bytes_ = session.board.decoder.counters
         return cls(
-            **_decided(session.control.controller, session.control.decision, session.frame),
+            **decided(session.control.controller, session.control.decision, session.frame),
             angles=angles_of(session.control.command, len(session.control.robot.ids)),
             number=session.tally.ticks,
             now=t,
@@ -116,38 +119,11 @@ class Tick:
             refused=session.control.refused,
         )
 
-    @classmethod
-    def plain(
-        cls,
-        controller: Controller,
-        frame: AntennaFrame,
-        command: JointCommand,
-        number: int,
-        now: float,
-    ) -> Tick:
-        """A tick of a controller without supervisor, as in simulation.
-
-        Raises:
-            ControllerError: The controller does not say what it has decided.
-        """
-        decided = _decided(controller, decision_of(controller), frame)
-        return cls(
-            **decided,
-            angles=angles_of(command),
-            number=number,
-            now=now,
-            reading=decided["counts"],
-        )
-
     @property
     def values(self) -> tuple[float, ...]:
         """All numbers, in the order of `fields`."""
-        return (
-            *(self.number, int(self.asked), self.t, self.now),
-            *(*self.counts, *self.reading, *self.level, *self.contact, self.maneuver, self.phase),
-            *(*self.angles, self.age, self.missed, self.frames, self.crc, self.lost),
-            *(self.misses, self.stale, self.sent, self.refused),
-        )
+        held = (getattr(self, name) for name in _CODES)
+        return tuple(n for each in held for n in (each if isinstance(each, tuple) else (each,)))
 
     def frame(self) -> AntennaFrame:
         """What the controller got."""
@@ -180,32 +156,35 @@ class Tick:
         fixed = struct.Struct(layout(joints))
         if len(content) < fixed.size:
             raise LogError(f"expected a tick of {joints} joints, found {len(content)} bytes")
-        _, _, _, number, asked, t, now, *rest, length = fixed.unpack_from(content)
+        *numbers, length = fixed.unpack_from(content)
         if len(content) != fixed.size + length:
             raise LogError(f"expected a text of {length} bytes, found another length")
         try:
             state, note, *causes = content[fixed.size :].decode().split("\n")
         except ValueError:
             raise LogError("expected lines in UTF-8 as text of a tick, found others") from None
-        counts, reading, level, contact = (tuple(rest[i : i + 2]) for i in (0, 2, 4, 6))
-        maneuver, phase, *rest = rest[8:]
-        angles, rest = tuple(rest[:joints]), rest[joints:]
-        health = dict(zip(_HEALTH, rest, strict=True))
-        return cls(
-            *(number, t, now, counts, reading, level, contact, maneuver, phase, angles),
-            *(state, tuple(causes), asked, note),
-            **health,
-        )
+        rest = iter(numbers[3:])
+        found: dict[str, Any] = {}
+        for name, code in _codes(joints).items():
+            values = tuple(islice(rest, len(code)))
+            found[name] = values if name == "angles" or len(code) > 1 else values[0]
+        return cls(**found, state=state, note=note, causes=tuple(causes))
+
+
+def _codes(joints: int) -> dict[str, str]:
+    return _CODES | {"angles": "d" * joints}
 
 
 def layout(joints: int) -> str:
     """For `struct`: a tick of a robot with so many joints; the length of its text comes last."""
-    return f"<BBHQ?8d3q{joints + 2}d8QI"
+    return "<BBH" + "".join(_codes(joints).values()) + "I"
 
 
 def fields(robot: RobotSpec) -> tuple[str, ...]:
     """Names of all numbers of a tick, without schema, kind, number of joints and text."""
-    return (*_BEFORE, *robot.joint_names, *_HEALTH)
+    pairs = {name: (f"{name}_l", f"{name}_r") for name, code in _CODES.items() if len(code) > 1}
+    parts = pairs | {"angles": robot.joint_names}
+    return tuple(field for name in _CODES for field in parts.get(name, (name,)))
 
 
 def angles_of(command: JointCommand, joints: int | None = None) -> tuple[float, ...]:
@@ -220,7 +199,7 @@ def angles_of(command: JointCommand, joints: int | None = None) -> tuple[float, 
     return angles if joints in (None, len(angles)) else (math.nan,) * joints
 
 
-def _decided(controller: Controller, decision: Decision, frame: AntennaFrame) -> dict[str, Any]:
+def decided(controller: Controller, decision: Decision, frame: AntennaFrame) -> dict[str, Any]:
     """The fields that every world has; NaN for a level or a phase that the controller lacks."""
     phase, level = _flat(controller, "phase"), _flat(controller, "level")
     return {
@@ -245,4 +224,4 @@ def _flat(owner: Any, name: str) -> tuple[float, ...]:
 
 def _clean(cause: str) -> str:
     """A cause in one line of bounded length; it may quote an exception of anybody."""
-    return " ".join(cause.split())[:_LONGEST_CAUSE]
+    return one_line(cause)[:_LONGEST_CAUSE]

@@ -9,7 +9,6 @@ from __future__ import annotations
 import csv
 import io
 import json
-import re
 import zipfile
 import zlib
 from collections.abc import Callable, Mapping
@@ -26,28 +25,25 @@ from antennate.types import AntennaFrame, Floats, Ints, JointCommand
 
 FORMAT = "antennate time series 1"
 _LARGEST_FILE = 1 << 30
-_DIMENSIONS: dict[str, int] = {
-    "t": 1,
-    "counts": 2,
-    "level": 2,
-    "contact": 2,
-    "maneuver": 1,
-    "yaw": 2,
-    "leg": 3,
-    "antenna": 2,
-    "pitch": 2,
-    "head": 2,
+_ARRAYS: dict[str, tuple[int, type]] = {
+    "t": (1, np.float64),
+    "counts": (2, np.float64),
+    "level": (2, np.float64),
+    "contact": (2, np.int64),
+    "maneuver": (1, np.int64),
+    "yaw": (2, np.float64),
+    "leg": (3, np.float64),
+    "antenna": (2, np.float64),
+    "pitch": (2, np.float64),
+    "head": (2, np.float64),
 }
-"""Number of axes of each array; the first is time."""
-_WHOLE = ("contact", "maneuver")
-"""Arrays of integers; all others hold floats."""
+"""Number of axes, the first of which is time, and type of each array."""
 _MAY_BE_EMPTY = ("yaw", "pitch")
 _UNUSABLE = (
     *(ValueError, KeyError, TypeError, EOFError, MemoryError, OverflowError, RuntimeError),
     *(csv.Error, zlib.error, zipfile.BadZipFile),
 )
 """What damaged files make the standard library and NumPy raise."""
-_COLUMN = re.compile(r"([a-z]+)((?:_\d+)*)")
 _MOST_COLUMNS = 1000
 
 
@@ -82,7 +78,7 @@ class TimeSeries:
     meta: Mapping[str, str | int | float | None] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        for name, axes in _DIMENSIONS.items():
+        for name, (axes, _) in _ARRAYS.items():
             shape = np.shape(getattr(self, name))
             if len(shape) != axes or shape[0] != len(self.t):
                 raise BadInputError(
@@ -97,7 +93,7 @@ class TimeSeries:
     def columns(self) -> dict[str, Floats | Ints]:
         """Every number of a tick as a column of shape (n,): `t`, `counts_0`, …, `leg_5_1`, …."""
         found: dict[str, Floats | Ints] = {}
-        for name in _DIMENSIONS:
+        for name in _ARRAYS:
             values = getattr(self, name)
             for index in np.ndindex(values.shape[1:]):
                 found["_".join([name, *map(str, index)])] = values[(slice(None), *index)]
@@ -133,7 +129,7 @@ class TimeSeries:
         read = _from_npz if _ending(path) == ".npz" else _from_csv
         data = read_limited(path, _LARGEST_FILE)
         try:
-            return cls(**read(data))
+            return read(data)
         except _UNUSABLE as error:
             why = " ".join(str(error).split())
             raise BadInputError(f"{path}: expected an {FORMAT}, found {why}") from None
@@ -143,7 +139,7 @@ class TimeSeries:
 
     def _npz(self) -> bytes:
         file = io.BytesIO()
-        arrays = {name: getattr(self, name) for name in _DIMENSIONS}
+        arrays = {name: getattr(self, name) for name in _ARRAYS}
         np.savez_compressed(file, allow_pickle=False, header=np.array(self._head()), **arrays)
         return file.getvalue()
 
@@ -168,7 +164,7 @@ class TimeSeriesRecorder:
 
     def __init__(self, controller: Any, head: Callable[[], Floats], row: int = 0) -> None:
         self._controller, self._head, self._row = controller, head, row
-        self._ticks: dict[str, list[Any]] = {name: [] for name in _DIMENSIONS}
+        self._ticks: dict[str, list[Any]] = {name: [] for name in _ARRAYS}
 
     def take(self, frame: AntennaFrame, command: JointCommand) -> None:
         """Keep one tick."""
@@ -192,8 +188,7 @@ class TimeSeriesRecorder:
         if not self._ticks["t"]:
             raise BadInputError("time series: expected at least one tick, found none")
         arrays: dict[str, Any] = {
-            name: np.array(values, dtype=np.int64 if name in _WHOLE else np.float64)
-            for name, values in self._ticks.items()
+            name: np.array(values, dtype=_ARRAYS[name][1]) for name, values in self._ticks.items()
         }
         return TimeSeries(**arrays, meta=dict(meta))
 
@@ -214,58 +209,45 @@ def _meta(text: str) -> dict[str, Any]:
     return meta
 
 
-def _from_npz(data: bytes) -> dict[str, Any]:
-    """The fields of a series from the bytes of an npz file."""
+def _from_npz(data: bytes) -> TimeSeries:
     with zipfile.ZipFile(io.BytesIO(data)) as archive:
         size = sum(member.file_size for member in archive.infolist())
         if size > _LARGEST_FILE:
             raise ValueError(f"{size} bytes unpacked, more than {_LARGEST_FILE}")
     with np.load(io.BytesIO(data), allow_pickle=False) as file:
-        arrays = {name: file[name] for name in _DIMENSIONS}
+        arrays = {name: file[name] for name in _ARRAYS}
         meta = _meta(str(file["header"]))
     for name, values in arrays.items():
-        wanted = np.int64 if name in _WHOLE else np.float64
-        if values.dtype != wanted:
-            raise ValueError(f"{name} of type {values.dtype} in place of {np.dtype(wanted)}")
-    return arrays | {"meta": meta}
+        if values.dtype != (wanted := np.dtype(_ARRAYS[name][1])):
+            raise ValueError(f"{name} of type {values.dtype} in place of {wanted}")
+    return TimeSeries(**arrays, meta=meta)
 
 
-def _from_csv(data: bytes) -> dict[str, Any]:
-    """The fields of a series from the bytes of a csv file."""
+def _from_csv(data: bytes) -> TimeSeries:
     first, _, rest = data.decode("utf-8").partition("\n")
     meta = _meta(first.removeprefix("#"))
-    rows = csv.reader(io.StringIO(rest))
-    header = next(rows, [])
+    lines = csv.reader(io.StringIO(rest))
+    header = next(lines, [])
     if len(header) > _MOST_COLUMNS:
         raise ValueError(f"{len(header)} columns")
-    cells = list(rows)
-    for number, row in enumerate(cells, start=3):
+    rows = list(lines)
+    for number, row in enumerate(rows, start=3):
         if len(row) != len(header):
             raise ValueError(f"{len(row)} cells in line {number}, not {len(header)}")
-    values = list(zip(*cells, strict=True)) or [()] * len(header)
-    columns = dict(zip(header, values, strict=True))
-    return _gathered(columns, len(cells)) | {"meta": meta}
-
-
-def _gathered(columns: Mapping[str, tuple[str, ...]], ticks: int) -> dict[str, Any]:
-    """Columns `name_i_j` as arrays `name` of shape (ticks, i, j)."""
-    parts: dict[str, dict[tuple[int, ...], tuple[str, ...]]] = {name: {} for name in _DIMENSIONS}
-    for column, values in columns.items():
-        match = _COLUMN.fullmatch(column)
-        if match is None or match[1] not in parts:
+    cells = np.array(rows, dtype=str).reshape(len(rows), len(header))
+    held: dict[str, list[int]] = {name: [] for name in _ARRAYS}
+    for place, column in enumerate(header):
+        if (name := column.split("_")[0]) not in held:
             raise ValueError(f"an unknown column {column!r}")
-        parts[match[1]][tuple(map(int, match[2].split("_")[1:]))] = values
+        held[name].append(place)
     arrays: dict[str, Any] = {}
-    for name, held in parts.items():
-        axes = _DIMENSIONS[name] - 1
-        if any(len(index) != axes for index in held) or (not held and name not in _MAY_BE_EMPTY):
-            raise ValueError(f"no whole {name}")
-        shape = tuple(1 + max(i) for i in zip(*held, strict=True)) if held else (0,)
-        if int(np.prod(shape)) != len(held):
-            raise ValueError(f"gaps in the columns of {name}")
-        convert: Callable[[str], Any] = int if name in _WHOLE else float
-        array = np.empty((ticks, *shape), dtype=np.int64 if name in _WHOLE else np.float64)
-        for index, values in held.items():
-            array[(slice(None), *index)] = [convert(value) for value in values]
-        arrays[name] = array
-    return arrays
+    for name, places in held.items():
+        if not places and name not in _MAY_BE_EMPTY:
+            raise ValueError(f"no {name}")
+        last = header[places[-1]].split("_")[1:] if places else [-1]
+        shape = (len(rows), *(1 + int(index) for index in last))
+        arrays[name] = cells[:, places].astype(_ARRAYS[name][1]).reshape(shape)
+    series = TimeSeries(**arrays, meta=meta)
+    if list(series.columns()) != header:
+        raise ValueError("columns in another order")
+    return series

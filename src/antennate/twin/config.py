@@ -19,9 +19,8 @@ from antennate.twin.touch import TouchStimulus
 class TwinControlParams(Params):
     """What the twin needs of the control: it has no controller of its own."""
 
-    rate: float = number(
-        100.0, "Hz", "paper: about 100 Hz over serial", "samples per second", gt=0, le=1000
-    )
+    rate: float = number(100.0, "Hz", "paper: about 100 Hz over serial", gt=0, le=1000)
+    """Samples per second."""
     gait: GaitParams = GaitParams()
     conditioning: ConditioningParams = ConditioningParams()
 
@@ -34,19 +33,14 @@ class TwinControlParams(Params):
 class TwinConfig(TrialConfig):
     """The robot that `antennate twin` serves, and the trial at whose start it stands."""
 
-    trial: int = number(0, "1", "assumed: the first", "trial of the seed", ge=0)
-    duration: float | None = number(
-        None, "s", "assumed: until it is stopped", "time to serve", gt=0
-    )
-    fault: Annotated[tuple[str, ...], GATHERED] = number(
-        (), "1", "assumed: nothing is broken", "faults, such as servo:7=silent@3s"
-    )
-    touch: Annotated[tuple[str, ...], GATHERED] = number(
-        (),
-        "1",
-        "assumed: nobody is there",
-        "antennae touched before it walks, such as left@2s; from the first packet on the bus",
-    )
+    trial: int = number(0, "1", "assumed: the first", ge=0)
+    """Trial of the seed."""
+    duration: float | None = number(None, "s", "assumed: until it is stopped", gt=0)
+    """Time to serve."""
+    fault: Annotated[tuple[str, ...], GATHERED] = number((), "1", "assumed: nothing is broken")
+    """Faults, such as servo:7=silent@3s."""
+    touch: Annotated[tuple[str, ...], GATHERED] = number((), "1", "assumed: nobody is there")
+    """Antennae touched before it walks, such as left@2s; from the first packet on the bus."""
     battery: BatteryParams = BatteryParams()
     robot: RobotSpec = RobotSpec()
     control: TwinControlParams = TwinControlParams()

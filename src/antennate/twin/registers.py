@@ -105,10 +105,10 @@ class Servo:
         if bits & self.get("shutdown"):
             self.set("torque_enable", 0)
 
-    def restart(self, t: float) -> None:
-        """Power lost and back: registers below 64 stay, the others are as after a reset."""
+    def restart(self, t: float, time: float = BOOT_TIME) -> None:
+        """Power lost and back after a time [s]: registers below 64 stay, others are reset."""
         self.advance(t)
-        self._start(t + BOOT_TIME)
+        self._start(t + time)
 
     # what the wire sees
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from antennate.experiments import calibrate as package
 from antennate.experiments.calibrate import recording
 from antennate.experiments.calibrate import run as calibrate
 from antennate.studies.experiment import Experiment
@@ -89,22 +88,12 @@ def _files(outcome: calibrate.CalibrateOutcome) -> Mapping[str, str]:
     }
 
 
-def _figures(outcome: calibrate.CalibrateOutcome) -> Mapping[str, Any]:
-    from antennate.experiments.calibrate.figure import calibrate as draw
-
-    s = outcome.recording.samples
-    level = calibrate.levels(outcome)
-    return {"calibrate": draw(outcome.result(), s.counts, s.level, s.speed, level)}
-
-
-EXPERIMENT = Experiment(
-    name="calibrate",
-    description=package.__doc__ or "",
-    config=calibrate.CalibrateConfig,
-    run=lambda config, workers, on_step, on_row: calibrate.run(config, workers, on_step),
-    tables=tables,
-    sentence=sentence,
-    figures=_figures,
+EXPERIMENT = Experiment.of_folder(
+    __name__,
+    calibrate.CalibrateConfig,
+    lambda config, workers, on_step, _: calibrate.run(config, workers, on_step),
+    tables,
+    sentence,
     files=_files,
     parts="pushes",
 )

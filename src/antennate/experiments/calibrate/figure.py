@@ -10,9 +10,16 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from antennate import figures as style
+from antennate.experiments.calibrate.run import CalibrateOutcome
 from antennate.types import Floats
 
 _BINS = 12
+
+
+def figures(outcome: CalibrateOutcome) -> dict[str, Figure]:
+    """The figure of a run."""
+    s = outcome.recording.samples
+    return {"calibrate": calibrate(outcome.result(), s.counts, s.level, s.speed, outcome.levels())}
 
 
 @style.styled

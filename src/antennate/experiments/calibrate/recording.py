@@ -32,23 +32,26 @@ COLUMNS = ("trial", "speed_m_s", "time", "counts", "bend")
 class RecordingParams(Params):
     """Columns and units of a recording."""
 
-    time_column: str = number("time", "1", "assumed: plain", "column of time")
-    time_unit: Literal["s", "ms", "us"] = number("s", "1", "assumed: SI", "its unit")
-    counts_column: str = number("counts", "1", "assumed: plain", "column of readings [counts]")
-    bend_column: str = number("bend", "1", "assumed: plain", "column of bend or position")
+    time_column: str = number("time", "1", "assumed: plain")
+    """Column of time."""
+    time_unit: Literal["s", "ms", "us"] = number("s", "1", "assumed: SI")
+    """Its unit."""
+    counts_column: str = number("counts", "1", "assumed: plain")
+    """Column of readings [counts]."""
+    bend_column: str = number("bend", "1", "assumed: plain")
+    """Column of bend or position."""
     bend_unit: Literal["1", "rad", "deg", "m", "mm"] = number(
-        "1", "1", "assumed: 0 straight, 1 full", "its unit"
+        "1", "1", "assumed: 0 straight, 1 full"
     )
-    bend_zero: float | None = number(
-        None, "unit of bend", "assumed: its smallest value", "value when straight"
-    )
-    bend_full: float | None = number(
-        None, "unit of bend", "assumed: its largest value", "value when fully bent"
-    )
-    trial_column: str = number("trial", "1", "assumed: plain", "column that numbers pushes, if any")
-    speed_column: str = number(
-        "speed_m_s", "1", "assumed: plain", "column of pushing speed [m/s], if any"
-    )
+    """Its unit."""
+    bend_zero: float | None = number(None, "unit of bend", "assumed: its smallest value")
+    """Value when straight."""
+    bend_full: float | None = number(None, "unit of bend", "assumed: its largest value")
+    """Value when fully bent."""
+    trial_column: str = number("trial", "1", "assumed: plain")
+    """Column that numbers pushes, if any."""
+    speed_column: str = number("speed_m_s", "1", "assumed: plain")
+    """Column of pushing speed [m/s], if any."""
 
 
 @dataclass(frozen=True)

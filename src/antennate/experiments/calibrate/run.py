@@ -7,8 +7,7 @@ is the rod's way from the first touch over its whole way: what an experimenter k
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
@@ -21,11 +20,12 @@ from antennate.antenna.fitting import Samples
 from antennate.antenna.sensor import SensorChain, reading_noise
 from antennate.control.conditioning import bending_level
 from antennate.experiments.calibrate.recording import Recording, RecordingParams, read, write
+from antennate.experiments.reading import mean_since
 from antennate.params import BenchPhysicsParams, BenchVariationParams, Params
 from antennate.params.base import number
 from antennate.robots.antenna import AntennaSpec
 from antennate.sim.bench import Bench, compile_bench
-from antennate.studies.experiment import OnStep, WithoutTrials, no_step
+from antennate.studies.experiment import OnStep, Outcome, no_step
 from antennate.studies.pool import gather
 from antennate.types import Floats
 
@@ -37,26 +37,19 @@ class RigParams(Params):
     """The simulated rig."""
 
     speeds: tuple[_Speed, ...] = number(
-        (0.05, 0.10, 0.15), "m/s", "paper: 5, 10 and 15 cm/s", "pushing speeds", min_length=1
+        (0.05, 0.10, 0.15), "m/s", "paper: 5, 10 and 15 cm/s", min_length=1
     )
-    pushes: int = number(
-        10,
-        "1",
-        "assumed: unpublished; enough for an interval",
-        "pushes at each speed",
-        ge=1,
-        le=1000,
-    )
-    place: float = number(
-        0.08, "m", "assumed: two thirds out; the rod stays on", "place of the rod", gt=0.01, le=0.4
-    )
-    depth: float = number(
-        0.05, "m", "assumed: bends the antenna to about a right angle", "full indentation", gt=0.002
-    )
-    rod_radius: float = number(0.006, "m", "assumed: a dowel", "radius of the rod", gt=1e-3, le=0.1)
-    start_spread: float = number(
-        0.0005, "m", "assumed: set by hand", "half range of the rod's first distance", ge=0
-    )
+    """Pushing speeds."""
+    pushes: int = number(10, "1", "assumed: enough for an interval", ge=1, le=1000)
+    """Pushes at each speed."""
+    place: float = number(0.08, "m", "assumed: two thirds out; the rod stays on", gt=0.01, le=0.4)
+    """Place of the rod."""
+    depth: float = number(0.05, "m", "assumed: bends the antenna to about a right angle", gt=0.002)
+    """Full indentation."""
+    rod_radius: float = number(0.006, "m", "assumed: a dowel", gt=1e-3, le=0.1)
+    """Radius of the rod."""
+    start_spread: float = number(0.0005, "m", "assumed: set by hand", ge=0)
+    """Half range of the rod's first distance."""
 
 
 _OF_THE_RIG = ("rig", "antenna", "variation", "physics")
@@ -72,42 +65,32 @@ class CalibrateConfig(Params):
         "variation.friction",
         "variation.overlap",
     )
-    recording: str | None = number(
-        None, "1", "assumed: no recording", "CSV file to calibrate from; the rig if not given"
-    )
+    recording: str | None = number(None, "1", "assumed: no recording")
+    """CSV file to calibrate from; the rig if not given."""
     columns: RecordingParams = RecordingParams()
     sensor_id: str | None = number(
         None,
         "1",
         "assumed: `simulated` for the rig, `unnamed` for a recording",
-        "name of the flex sensor",
         pattern=r"^[A-Za-z0-9._-]{1,64}$",
     )
+    """Name of the flex sensor."""
     averaging_time: float = number(
-        0.0,
-        "s",
-        "assumed: a mean over time adds lag that grows with speed, and is no part of the sensor",
-        "mean over readings before fitting",
-        ge=0,
-        le=5,
+        0.0, "s", "assumed: adds lag that grows with speed, and is no sensor's part", ge=0, le=5
     )
-    full_scale: bool = number(
-        False,
-        "1",
-        "assumed: the paper's numbers do not tell",
-        "normalise by 0 to 4095 counts and not by the recording's ends",
-    )
-    threshold: float = number(
-        0.5, "1", "assumed: unpublished; middle of the sigmoid", "theta of the file", gt=0, lt=1
-    )
-    least_r2: float = number(
-        0.5, "1", "assumed: half of the bend explained", "a worse fit is refused", ge=0, lt=1
-    )
-    good_r2: float = number(
-        0.9, "1", "assumed: our rig reaches 0.98", "a worse fit is warned of", ge=0, lt=1
-    )
-    draws: int = number(500, "1", "assumed: usual", "bootstrap draws", ge=20, le=100000)
-    seed: int = number(1, "1", "assumed: any", "seed of all chance", ge=0)
+    """Mean over readings before fitting."""
+    full_scale: bool = number(False, "1", "assumed: the paper's numbers do not tell")
+    """Normalise by 0 to 4095 counts and not by the recording's ends."""
+    threshold: float = number(0.5, "1", "assumed: middle of the sigmoid", gt=0, lt=1)
+    """Theta of the file."""
+    least_r2: float = number(0.5, "1", "assumed: half of the bend explained", ge=0, lt=1)
+    """A worse fit is refused."""
+    good_r2: float = number(0.9, "1", "assumed: our rig reaches 0.98", ge=0, lt=1)
+    """A worse fit is warned of."""
+    draws: int = number(500, "1", "assumed: usual", ge=20, le=100000)
+    """Bootstrap draws."""
+    seed: int = number(1, "1", "assumed: any", ge=0)
+    """Seed of all chance."""
     rig: RigParams = RigParams()
     antenna: AntennaSpec = AntennaSpec()
     variation: BenchVariationParams = BenchVariationParams()
@@ -142,7 +125,7 @@ class CalibrateConfig(Params):
 
 
 @dataclass(frozen=True)
-class CalibrateOutcome(WithoutTrials):
+class CalibrateOutcome(Outcome):
     """A calibration and its data.
 
     Attributes:
@@ -167,6 +150,10 @@ class CalibrateOutcome(WithoutTrials):
             "poor": self.calibration.r2 < self.config.good_r2,
             "calibration": self.calibration.model_dump(mode="json"),
         }
+
+    def levels(self) -> Floats:
+        """Bending levels that the calibration gives its own data, shape (n,)."""
+        return bending_level(self.calibration.conditioning(), self.recording.samples.counts)
 
     def conditioning_toml(self) -> str:
         """The curve as keys of a configuration file."""
@@ -225,10 +212,6 @@ def _bench(config: CalibrateConfig, factors: Floats) -> Bench:
     return Bench(model, config.antenna)
 
 
-def _run_task(task: tuple[CalibrateConfig, int], emit: Callable[[Any], None]) -> None:
-    emit((task[1], push(*task)))
-
-
 def record(
     config: CalibrateConfig,
     workers: int = 1,
@@ -240,13 +223,12 @@ def record(
         SimulationError: The physics became invalid; from a worker it comes as a WorkerError.
     """
     tasks = [(config, trial) for trial in range(len(config.rig.speeds) * config.rig.pushes)]
-    found = dict(gather(_run_task, tasks, workers, on_step))
-    parts = [found[trial] for trial in sorted(found)]
+    parts = gather(push, tasks, workers, on_step)
     fields = ("counts", "level", "trial", "speed", "row")
     joined = [np.concatenate([getattr(p.samples, f) for p in parts]) for f in fields]
     joined[-1] = np.arange(2, len(joined[0]) + 2)
     whole = Recording(np.concatenate([p.t for p in parts]), Samples(*joined), "")
-    return Recording(whole.t, whole.samples, hashlib.sha256(write(whole).encode()).hexdigest())
+    return replace(whole, sha256=hashlib.sha256(write(whole).encode()).hexdigest())
 
 
 def averaged(recording: Recording, averaging_time: float) -> Recording:
@@ -257,17 +239,9 @@ def averaged(recording: Recording, averaging_time: float) -> Recording:
     counts = s.counts.copy()
     for trial in np.unique(s.trial):
         rows = np.flatnonzero(s.trial == trial)
-        t, total = recording.t[rows], np.concatenate([[0.0], np.cumsum(s.counts[rows])])
-        first = np.searchsorted(t, t - averaging_time + 1e-9)
-        ends = np.arange(1, len(rows) + 1)
-        counts[rows] = (total[ends] - total[first]) / (ends - first)
-    samples = Samples(counts, s.level, s.trial, s.speed, s.row)
-    return Recording(recording.t, samples, recording.sha256)
-
-
-def levels(outcome: CalibrateOutcome) -> Floats:
-    """Bending levels that the calibration gives its own data, shape (n,)."""
-    return bending_level(outcome.calibration.conditioning(), outcome.recording.samples.counts)
+        first = np.searchsorted(recording.t[rows], recording.t[rows] - averaging_time + 1e-9)
+        counts[rows] = mean_since(first, s.counts[rows])
+    return replace(recording, samples=replace(s, counts=counts))
 
 
 def run(

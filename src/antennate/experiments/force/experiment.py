@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from antennate.experiments import force as package
 from antennate.experiments.force import run as force
 from antennate.experiments.force.loads import ForceConfig
 from antennate.studies.experiment import Experiment
@@ -55,19 +54,6 @@ def sentence(result: Mapping[str, Any]) -> str:
     )
 
 
-def _figures(outcome: force.ForceOutcome) -> Mapping[str, Any]:
-    from antennate.experiments.force.figure import study
-
-    return {"force": study(outcome.result(), outcome.profiles)}
-
-
-EXPERIMENT = Experiment(
-    name="force",
-    description=package.__doc__ or "",
-    config=ForceConfig,
-    run=force.run,
-    tables=tables,
-    sentence=sentence,
-    figures=_figures,
-    parts="profiles",
+EXPERIMENT = Experiment.of_folder(
+    __name__, ForceConfig, force.run, tables, sentence, parts="profiles"
 )

@@ -13,9 +13,14 @@ from matplotlib.figure import Figure
 
 from antennate import figures as style
 from antennate.experiments.force.loads import Points
-from antennate.experiments.force.run import ProfileOutcome
+from antennate.experiments.force.run import ForceOutcome, ProfileOutcome
 
 _SHOWN = "descending"
+
+
+def figures(outcome: ForceOutcome) -> dict[str, Figure]:
+    """The figure of a run."""
+    return {"force": study(outcome.result(), outcome.profiles)}
 
 
 @style.styled

@@ -11,6 +11,7 @@ from pydantic import model_validator
 
 from antennate.antenna import sensor as flex_sensor
 from antennate.antenna.statics import PROFILES, Chain, Profile, equilibrium, with_profile
+from antennate.control.conditioning import bending_level
 from antennate.experiments import reading
 from antennate.experiments.force.post_traverse import Traverse
 from antennate.params import BenchPhysicsParams, ConditioningParams, Params, number
@@ -23,63 +24,38 @@ class ForceConfig(Params):
     """Everything that decides the outcome of `antennate force`."""
 
     unread: ClassVar[tuple[str, ...]] = ("antenna.base_angle", "antenna.base_spacing")
-    seed: int = number(0, "1", "assumed: any", "seed of all chance", ge=0)
+    seed: int = number(0, "1", "assumed: any", ge=0)
+    """Seed of all chance."""
     profiles: tuple[Profile, ...] = number(
-        tuple(PROFILES),
-        "1",
-        "assumed: the paper's three and both controls",
-        "profiles",
-        min_length=1,
+        tuple(PROFILES), "1", "assumed: the paper's three and both controls", min_length=1
     )
+    """Profiles."""
     nearest: float = number(
-        0.25,
-        "1",
-        "assumed: nearer contacts hardly bend the flex sensor",
-        "nearest place",
-        gt=0,
-        lt=1,
+        0.25, "1", "assumed: nearer contacts hardly bend the flex sensor", gt=0, lt=1
     )
+    """Nearest place."""
     from_place: float = number(
-        0.5,
-        "1",
-        "assumed: as in the study to confirm, between half and full length",
-        "nearest place of the question, over the length",
-        gt=0,
-        lt=1,
+        0.5, "1", "assumed: as in the study to confirm, between half and full length", gt=0, lt=1
     )
-    place_step: float = number(
-        0.05, "1", "assumed: under a third of a link", "distance of places", gt=0, le=0.5
-    )
+    """Nearest place of the question, over the length."""
+    place_step: float = number(0.05, "1", "assumed: under a third of a link", gt=0, le=0.5)
+    """Distance of places."""
     loads: int = number(
-        60,
-        "1",
-        "assumed: the same number again monitors the curves",
-        "loads at every place to fit curves to",
-        ge=2,
-        le=10000,
+        60, "1", "assumed: the same number again monitors the curves", ge=2, le=10000
     )
+    """Loads at every place to fit curves to."""
     hinge_limit_deg: float = number(
-        30.0,
-        "deg",
-        "paper: deflection of a spring below 30 deg",
-        "largest hinge angle",
-        gt=0,
-        le=80,
+        30.0, "deg", "paper: deflection of a spring below 30 deg", gt=0, le=80
     )
-    traverses: int = number(
-        24,
-        "1",
-        "assumed: half of them judge the curves",
-        "traverses of every profile",
-        ge=4,
-        le=10000,
-    )
+    """Largest hinge angle."""
+    traverses: int = number(24, "1", "assumed: half of them judge the curves", ge=4, le=10000)
+    """Traverses of every profile."""
     speeds: tuple[float, ...] = number(
-        (0.05, 0.10, 0.15), "m/s", "paper: calibration at 5, 10 and 15 cm/s", "speeds", min_length=1
+        (0.05, 0.10, 0.15), "m/s", "paper: calibration at 5, 10 and 15 cm/s", min_length=1
     )
-    post_radius: float = number(
-        0.003175, "m", "paper: spheres of 6.35 mm diameter", "radius of the post", gt=0, le=0.1
-    )
+    """Speeds."""
+    post_radius: float = number(0.003175, "m", "paper: spheres of 6.35 mm diameter", gt=0, le=0.1)
+    """Radius of the post."""
     antenna: AntennaSpec = AntennaSpec()
     conditioning: ConditioningParams = ConditioningParams()
     physics: BenchPhysicsParams = BenchPhysicsParams()
@@ -157,7 +133,7 @@ def static_loads(config: ForceConfig, profile: str, friction: float) -> tuple[Po
         {
             "flex": flex[good],
             "reading": repeated[0, good],
-            "level": reading.level(config.conditioning, repeated.mean(axis=0))[good],
+            "level": bending_level(config.conditioning, repeated.mean(axis=0))[good],
         },
         size[good],
         place[good],
@@ -173,10 +149,10 @@ def traverse_points(config: ForceConfig, traverses: list[Traverse]) -> Points:
     counts, levels = [np.zeros(0)], [np.zeros(0)]
     for k, one in enumerate(traverses):
         rng = np.random.default_rng([config.seed, 2, k])
-        noise = reading.noise(config.antenna.sensor, rng, len(one.flex))
+        noise = flex_sensor.reading_noise(config.antenna.sensor, rng, (len(one.flex),))
         counts.append(reading.recorded(config.antenna.sensor, one.flex, noise))
         mean = reading.averaged(config.conditioning, counts[-1], config.antenna.sensor.rate)
-        levels.append(reading.level(config.conditioning, mean))
+        levels.append(bending_level(config.conditioning, mean))
     trial = np.repeat(np.arange(len(traverses)), [len(one.flex) for one in traverses])
     return Points(
         {

@@ -9,7 +9,6 @@ farther takes part.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -24,6 +23,7 @@ from antennate.experiments.force.loads import (
     traverse_points,
 )
 from antennate.experiments.force.post_traverse import Traverse, drag
+from antennate.experiments.reading import between
 from antennate.robots.antenna import AntennaSpec
 from antennate.studies.experiment import OnRow, OnStep, no_row, no_step
 from antennate.studies.pool import gather
@@ -205,14 +205,7 @@ def closed_form(chain: Chain, points: Points, config: ForceConfig, largest: floa
     for at in grid:
         rest = equilibrium(chain, np.full(len(sizes), at * chain.length), force, follower=True)
         tables.append(np.interp(flex, rest.angles[:, :covered].sum(axis=1), sizes))
-    below = np.clip(np.searchsorted(grid, place, "right") - 1, 0, len(grid) - 2)
-    share = (place - grid[below]) / (grid[below + 1] - grid[below])
-    table, each = np.array(tables), np.arange(len(place))
-    return (1.0 - share) * table[below, each] + share * table[below + 1, each]
-
-
-def _run_task(task: tuple[ForceConfig, str], emit: Callable[[ProfileOutcome], None]) -> None:
-    emit(study_profile(*task))
+    return between(grid, np.array(tables), place)
 
 
 def run(
@@ -232,5 +225,4 @@ def run(
             on_row(row)
 
     tasks = [(config, profile) for profile in config.profiles]
-    found = gather(_run_task, tasks, workers, on_step, keep)
-    return ForceOutcome(config, sorted(found, key=lambda o: config.profiles.index(o.profile)))
+    return ForceOutcome(config, gather(study_profile, tasks, workers, on_step, keep))

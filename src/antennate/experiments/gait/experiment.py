@@ -6,7 +6,6 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from antennate.experiments import gait as package
 from antennate.experiments.gait import run as gait
 from antennate.studies.experiment import Experiment
 from antennate.studies.measures import Measure, Table
@@ -47,19 +46,11 @@ def sentence(result: Mapping[str, Any]) -> str:
     )
 
 
-def _figures(outcome: gait.GaitOutcome) -> Mapping[str, Any]:
-    from antennate.experiments.gait.figure import study
-
-    return {"gait": study(outcome.result(), outcome.maneuvers)}
-
-
-EXPERIMENT = Experiment(
-    name="gait",
-    description=package.__doc__ or "",
-    config=gait.GaitStudyConfig,
-    run=lambda config, workers, on_step, on_row: gait.run(config, workers, on_step),
-    tables=tables,
-    sentence=sentence,
-    figures=_figures,
+EXPERIMENT = Experiment.of_folder(
+    __name__,
+    gait.GaitStudyConfig,
+    lambda config, workers, on_step, _: gait.run(config, workers, on_step),
+    tables,
+    sentence,
     parts="walks",
 )

@@ -12,7 +12,13 @@ from matplotlib.ticker import MultipleLocator
 
 from antennate import figures as style
 from antennate.experiments.gait.pace import Walk
+from antennate.experiments.gait.run import GaitOutcome
 from antennate.types import Maneuver
+
+
+def figures(outcome: GaitOutcome) -> dict[str, Figure]:
+    """The figure of a run."""
+    return {"gait": study(outcome.result(), outcome.maneuvers)}
 
 
 @style.styled

@@ -7,7 +7,6 @@ its own mirror image half a cycle later, so over whole cycles FORWARD neither ya
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -24,7 +23,7 @@ from antennate.sim.scenes.flat import FlatScene
 from antennate.sim.sim_robot import Disturbance, SimRobot
 from antennate.sim.trial import make_world, place_at_start
 from antennate.sim.world import World
-from antennate.studies.experiment import OnStep, WithoutTrials, no_step
+from antennate.studies.experiment import OnStep, Outcome, no_step
 from antennate.studies.pool import gather
 from antennate.types import AntennaFrame, Floats, JointCommand, Maneuver
 
@@ -38,32 +37,17 @@ class GaitStudyConfig(Params):
 
     unread: ClassVar[tuple[str, ...]] = HARDWARE_ALONE
     cycles: int = number(
-        4,
-        "1",
-        "measured: antennate gait, six cycles give the same speeds to 0.3 %",
-        "gait cycles measured",
-        ge=2,
-        le=100,
+        4, "1", "measured: antennate gait, six cycles give the same speeds to 0.3 %", ge=2, le=100
     )
+    """Gait cycles measured."""
     settling_cycles: int = number(
-        2,
-        "1",
-        "measured: antennate gait, speeds then change by 1 % from cycle to cycle",
-        "gait cycles before measuring",
-        ge=0,
-        le=100,
+        2, "1", "measured: antennate gait, 1 % from cycle to cycle then", ge=0, le=100
     )
-    sweep_points: int = number(
-        24,
-        "1",
-        "assumed: steps of 15 deg",
-        "leads of the body wave tried, evenly over a full turn",
-        ge=2,
-        le=360,
-    )
-    rate: float = number(
-        100.0, "Hz", "paper: about 100 Hz over serial", "control ticks per second", gt=0, le=1000
-    )
+    """Gait cycles before measuring."""
+    sweep_points: int = number(24, "1", "assumed: steps of 15 deg", ge=2, le=360)
+    """Leads of the body wave tried, evenly over a full turn."""
+    rate: float = number(100.0, "Hz", "paper: about 100 Hz over serial", gt=0, le=1000)
+    """Control ticks per second."""
     robot: RobotSpec = RobotSpec()
     gait: GaitParams = GaitParams()
     physics: PhysicsParams = PhysicsParams()
@@ -75,7 +59,7 @@ class GaitStudyConfig(Params):
 
 
 @dataclass(frozen=True, slots=True)
-class GaitOutcome(WithoutTrials):
+class GaitOutcome(Outcome):
     """All walks: four maneuvers by name, one without body wave, and the sweep over its lead."""
 
     config: GaitStudyConfig
@@ -147,10 +131,6 @@ class _Fixed:
 
 
 _Task = tuple[GaitStudyConfig, str, GaitParams, Maneuver]
-
-
-def _run_task(task: _Task, emit: Callable[[Walk], None]) -> None:
-    emit(walk_flat(*task))
 
 
 def walk_flat(config: GaitStudyConfig, name: str, gait: GaitParams, maneuver: Maneuver) -> Walk:
@@ -232,7 +212,7 @@ def run(
     Raises:
         SimulationError: The physics became invalid; from a worker it comes as a WorkerError.
     """
-    found = {w.name: w for w in gather(_run_task, _tasks(config), workers, on_step)}
+    found = {w.name: w for w in gather(walk_flat, _tasks(config), workers, on_step)}
     return GaitOutcome(
         config=config,
         maneuvers={m.name.lower(): found[m.name.lower()] for m in MANEUVERS},

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from antennate.experiments import sensor as package
 from antennate.experiments.sensor import run as sensor
 from antennate.studies.experiment import Experiment
 from antennate.studies.measures import Measure, Table
@@ -47,19 +46,6 @@ def sentence(result: Mapping[str, Any]) -> str:
     )
 
 
-def _figures(outcome: sensor.SensorOutcome) -> Mapping[str, Any]:
-    from antennate.experiments.sensor.figure import sensor as draw
-
-    found = draw(outcome.result(), outcome.loop, outcome.hold, outcome.resistors, outcome.spread)
-    return {"sensor": found}
-
-
-EXPERIMENT = Experiment(
-    name="sensor",
-    description=package.__doc__ or "",
-    config=sensor.SensorConfig,
-    run=lambda config, workers, on_step, on_row: sensor.run(config),
-    tables=tables,
-    sentence=sentence,
-    figures=_figures,
+EXPERIMENT = Experiment.of_folder(
+    __name__, sensor.SensorConfig, lambda config, *_: sensor.run(config), tables, sentence
 )

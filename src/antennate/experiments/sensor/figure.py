@@ -10,7 +10,14 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from antennate import figures as style
+from antennate.experiments.sensor.run import SensorOutcome
 from antennate.types import Floats
+
+
+def figures(outcome: SensorOutcome) -> dict[str, Figure]:
+    """The figure of a run."""
+    found = (outcome.loop, outcome.hold, outcome.resistors, outcome.spread)
+    return {"sensor": sensor(outcome.result(), *found)}
 
 
 @style.styled

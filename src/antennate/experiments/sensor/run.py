@@ -13,7 +13,7 @@ from antennate.errors import ConfigError
 from antennate.params import Params
 from antennate.params.base import number
 from antennate.robots.sensor import SensorParams
-from antennate.studies.experiment import WithoutTrials
+from antennate.studies.experiment import Outcome
 from antennate.types import Floats
 
 E24 = (
@@ -28,23 +28,24 @@ class SensorConfig(Params):
 
     unread: ClassVar[tuple[str, ...]] = ("sensor.active_length",)
     largest_flex: float = number(
-        math.pi / 2, "rad", "assumed: antenna bent to a right angle", "largest bend", gt=0.01, le=6
+        math.pi / 2, "rad", "assumed: antenna bent to a right angle", gt=0.01, le=6
     )
-    points: int = number(
-        19, "1", "assumed: every five degrees of a right angle", "bends of the table", ge=3, le=1000
-    )
+    """Largest bend."""
+    points: int = number(19, "1", "assumed: every five degrees of a right angle", ge=3, le=1000)
+    """Bends of the table."""
     loop_time: float = number(
-        4.0, "s", "assumed: slow against the flex sensor's rise", "time of a loop", gt=0.1, le=1000
+        4.0, "s", "assumed: slow against the flex sensor's rise", gt=0.1, le=1000
     )
-    hold_time: float = number(
-        30.0, "s", "assumed: three slow time constants", "time of the held bend", gt=0.1, le=10000
-    )
-    seed: int = number(0, "1", "assumed: any", "seed of the noise", ge=0)
+    """Time of a loop."""
+    hold_time: float = number(30.0, "s", "assumed: three slow time constants", gt=0.1, le=10000)
+    """Time of the held bend."""
+    seed: int = number(0, "1", "assumed: any", ge=0)
+    """Seed of the noise."""
     sensor: SensorParams = SensorParams()
 
 
 @dataclass(frozen=True)
-class SensorOutcome(WithoutTrials):
+class SensorOutcome(Outcome):
     """What the sensor says.
 
     Attributes:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from antennate.experiments import springs as package
 from antennate.experiments.springs import run as springs
 from antennate.params import SpringParams
 from antennate.studies.experiment import Experiment
@@ -80,18 +79,6 @@ def sentence(result: Mapping[str, Any]) -> str:
     )
 
 
-def _figures(outcome: springs.SpringsOutcome) -> Mapping[str, Any]:
-    from antennate.experiments.springs.figure import springs as draw
-
-    return {"springs": draw(outcome.result())}
-
-
-EXPERIMENT = Experiment(
-    name="springs",
-    description=package.__doc__ or "",
-    config=SpringParams,
-    run=lambda config, workers, on_step, on_row: springs.run(config),
-    tables=tables,
-    sentence=sentence,
-    figures=_figures,
+EXPERIMENT = Experiment.of_folder(
+    __name__, SpringParams, lambda config, *_: springs.run(config), tables, sentence
 )

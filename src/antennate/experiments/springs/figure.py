@@ -10,9 +10,15 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from antennate import figures as style
+from antennate.experiments.springs.run import SpringsOutcome
 
 _SHOWN = 5
 """Sets of springs drawn."""
+
+
+def figures(outcome: SpringsOutcome) -> dict[str, Figure]:
+    """The figure of a run."""
+    return {"springs": springs(outcome.result())}
 
 
 @style.styled

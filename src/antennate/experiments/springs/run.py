@@ -11,7 +11,7 @@ from antennate.antenna.springs import Winding
 from antennate.errors import ConfigError
 from antennate.params import SpringParams
 from antennate.robots.antenna import N_MM_PER_DEG
-from antennate.studies.experiment import WithoutTrials
+from antennate.studies.experiment import Outcome
 
 PAPER_TABLE = {3.0: 0.274, 6.0: 0.137, 9.0: 0.091}
 """Stiffness by active coils as printed in the paper [N·mm/deg]."""
@@ -20,7 +20,7 @@ PAPER_DIGITS = 3
 
 
 @dataclass(frozen=True)
-class SpringsOutcome(WithoutTrials):
+class SpringsOutcome(Outcome):
     """The springs as they are, and sets that could be wound.
 
     Attributes:

@@ -28,49 +28,38 @@ class SweepConfig(Params):
         "antenna.base_angle",
         *(f"conditioning.{n}" for n in ConditioningParams.model_fields if n != "averaging_time"),
     )
-    seed: int = number(0, "1", "assumed: any", "seed of all chance", ge=0)
+    seed: int = number(0, "1", "assumed: any", ge=0)
+    """Seed of all chance."""
     profiles: tuple[Profile, ...] = number(
-        tuple(PROFILES),
-        "1",
-        "assumed: the paper's three and both controls",
-        "profiles of the map",
-        min_length=1,
+        tuple(PROFILES), "1", "assumed: the paper's three and both controls", min_length=1
     )
-    profile: Profile = number(
-        "descending", "1", "paper: the robot's profile", "profile of the estimates"
-    )
+    """Profiles of the map."""
+    profile: Profile = number("descending", "1", "paper: the robot's profile")
+    """Profile of the estimates."""
     distances: tuple[float, ...] = number(
-        (0.35, 0.5, 0.65, 0.8, 0.95),
-        "1",
-        "assumed: from a third of the antenna to nearly out of reach",
-        "distances of the wall, over the length of the antenna",
-        min_length=1,
+        (0.35, 0.5, 0.65, 0.8, 0.95), "1", "assumed: up to nearly out of reach", min_length=1
     )
+    """Distances of the wall, over the length of the antenna."""
     centres: tuple[Annotated[float, Field(ge=0, le=2.0)], ...] = number(
         tuple(math.radians(a) for a in (47.0, 70.0, 90.0)),
         "rad",
         "assumed: the mounting angle, and on to sideways",
-        "centres of the sweep",
         min_length=1,
     )
+    """Centres of the sweep."""
     amplitudes: tuple[Annotated[float, Field(gt=0, le=1.5)], ...] = number(
         tuple(math.radians(a) for a in (15.0, 30.0, 45.0)),
         "rad",
         "assumed: half and one and a half times the default",
-        "amplitudes of the sweep",
         min_length=1,
     )
-    sweeps: int = number(
-        2, "1", "assumed: they repeat; one before them is left out", "sweeps measured", ge=1, le=100
-    )
+    """Amplitudes of the sweep."""
+    sweeps: int = number(2, "1", "assumed: they repeat; one before them is left out", ge=1, le=100)
+    """Sweeps measured."""
     speed: float = number(
-        0.05,
-        "m/s",
-        "assumed: slowly; under half of the paper's 0.12 m/s",
-        "speed of the base along the wall where it moves",
-        gt=0,
-        le=1,
+        0.05, "m/s", "assumed: slowly; under half of the paper's 0.12 m/s", gt=0, le=1
     )
+    """Speed of the base along the wall where it moves."""
     sweep: SweepParams = SweepParams()
     shape: ShapeParams = ShapeParams()
     estimate: EstimateParams = EstimateParams()

@@ -17,15 +17,15 @@ import numpy as np
 from antennate.antenna.statics import with_profile
 from antennate.experiments.sweep.config import SweepConfig
 from antennate.experiments.sweep.reach import (
+    CUES,
+    TIP_CUES,
     Felt,
-    Statics,
     calibrate_and_guess,
     coefficients,
-    cues,
     feel,
 )
 from antennate.experiments.sweep.scan import Wall, record
-from antennate.params import EstimateParams, SweepParams
+from antennate.params import SweepParams
 from antennate.studies.statistics import mean95
 from antennate.types import Floats
 
@@ -56,9 +56,10 @@ class Trial:
     reason: str = ""
 
 
-def plan(params: EstimateParams) -> list[tuple[str, str, int, str]]:
-    """Condition, split, number and side of every trial."""
-    return list(product(CONDITIONS, SPLITS, range(params.trials), SIDES))
+def plan(config: SweepConfig) -> list[tuple[SweepConfig, str, str, int, str]]:
+    """Arguments of `run_trial` for every trial."""
+    trials = range(config.estimate.trials)
+    return list(product([config], CONDITIONS, SPLITS, trials, SIDES))
 
 
 def run_trial(config: SweepConfig, condition: str, split: str, number: int, side: str) -> Trial:
@@ -90,11 +91,8 @@ def run_trial(config: SweepConfig, condition: str, split: str, number: int, side
     )
     if trace.reason:
         return Trial(condition, split, number, side, distance, sweep, None, None, trace.reason)
-    statics = Statics(antenna)
-    common = (config.shape.flex, statics, antenna.sensor, config.conditioning, zero)
-    outward = 0.5 / sweep.frequency
-    exact = feel(trace, outward, *common)
-    noisy = feel(trace, outward, *common, gain, rng)
+    exact = feel(config, antenna, trace, zero)
+    noisy = feel(config, antenna, trace, zero, gain, rng)
     return Trial(condition, split, number, side, distance, sweep, exact, noisy)
 
 
@@ -125,25 +123,21 @@ def _judge(trials: list[Trial], noise: str, spacing: float) -> dict[str, Any]:
     }
     known, asked = ([f for _, f in felt[split]] for split in SPLITS)
     test = [t for t, _ in felt["test"]]
-    for cue in cues(tip=False):
-        if len(known) < coefficients(cue):
-            continue
-        truth = np.array([t.distance for t, _ in felt["calibration"]])
+    truth, real = (np.array([t.distance for t, _ in felt[split]]) for split in SPLITS)
+    left = np.array([t.side == "l" for t in test], bool)
+    enough = [cue for cue in CUES if len(known) >= coefficients(cue)]
+    for cue in enough:
         guess = calibrate_and_guess(cue, known, truth, asked)
-        real = np.array([t.distance for t in test])
-        left = np.array([t.side == "l" for t in test], bool)
         found["distance"][cue] = errors(guess[left], real[left])
-        found["gap"][cue] = errors(*_gaps(test, guess, spacing))
-    for cue in cues(tip=True):
-        if len(known) < coefficients(cue):
-            continue
-        truth = np.array([f.reach for f in known])
+        found["gap"][cue] = errors(*gaps(test, guess, spacing))
+    truth, real = (np.array([f.reach for f in group]) for group in (known, asked))
+    for cue in [cue for cue in TIP_CUES if cue in enough]:
         guess = calibrate_and_guess(cue, known, truth, asked, tip=True)
-        found["base_to_tip"][cue] = errors(guess, np.array([f.reach for f in asked]))
+        found["base_to_tip"][cue] = errors(guess, real)
     return found
 
 
-def _gaps(test: list[Trial], guess: Floats, spacing: float) -> tuple[Floats, Floats]:
+def gaps(test: list[Trial], guess: Floats, spacing: float) -> tuple[Floats, Floats]:
     """Estimated and true widths of the gaps that both antennae felt."""
     values = {(trial.number, trial.side): k for k, trial in enumerate(test)}
     left = np.array([k for (n, side), k in values.items() if side == "l" and (n, "r") in values])

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from antennate.experiments import sweep as package
 from antennate.experiments.sweep import run as sweep
+from antennate.experiments.sweep.config import SweepConfig
+from antennate.experiments.sweep.reach import CUES
 from antennate.studies.experiment import Experiment
 from antennate.studies.measures import Table, shown
 
@@ -39,7 +40,7 @@ def _errors(condition: str, by_noise: Mapping[str, Any]) -> Table:
         QUANTITIES,
         [
             (cue.replace("_", " "), [_error(noisy[quantity], cue) for quantity in QUANTITIES])
-            for cue in sweep.CUES
+            for cue in CUES
         ],
         f"{noisy['sweeps']} sweeps to judge, {noisy['missed']} felt nothing, "
         f"{noisy['invalid']} invalid.",
@@ -69,19 +70,6 @@ def sentence(result: Mapping[str, Any]) -> str:
     )
 
 
-def _figures(outcome: sweep.SweepOutcome) -> Mapping[str, Any]:
-    from antennate.experiments.sweep.figure import study
-
-    return {"sweep": study(outcome.result())}
-
-
-EXPERIMENT = Experiment(
-    name="sweep",
-    description=package.__doc__ or "",
-    config=sweep.SweepConfig,
-    run=sweep.run,
-    tables=tables,
-    sentence=sentence,
-    figures=_figures,
-    parts="sweeps",
+EXPERIMENT = Experiment.of_folder(
+    __name__, SweepConfig, sweep.run, tables, sentence, parts="sweeps"
 )

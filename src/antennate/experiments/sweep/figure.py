@@ -11,6 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from antennate import figures as style
+from antennate.experiments.sweep.run import SweepOutcome
 
 SHAPE_COLOURS = {
     "forward": "#0072B2",
@@ -33,6 +34,11 @@ _CUE_NAMES = {
     "closed_form": "flex and base angle, closed form",
     "blind": "nothing (mean of the calibration)",
 }
+
+
+def figures(outcome: SweepOutcome) -> dict[str, Figure]:
+    """The figure of a run."""
+    return {"sweep": study(outcome.result())}
 
 
 @style.styled

@@ -16,12 +16,12 @@ from itertools import combinations_with_replacement
 
 import numpy as np
 
+from antennate.antenna.sensor import reading_noise
 from antennate.antenna.statics import Chain, equilibrium, shape
-from antennate.experiments import reading
+from antennate.experiments.reading import averaged, between, flex_of, recorded
+from antennate.experiments.sweep.config import SweepConfig
 from antennate.experiments.sweep.scan import Trace
-from antennate.params import ConditioningParams
 from antennate.robots.antenna import AntennaSpec
-from antennate.robots.sensor import SensorParams
 from antennate.types import Floats
 
 CUES = ("flex_and_base", "flex", "first_contact", "blind", "closed_form")
@@ -33,6 +33,8 @@ _FEATURES: dict[str, tuple[str, ...]] = {
     "first_contact": ("first",),
     "blind": (),
 }
+TIP_CUES = ("flex_and_base", "flex", "blind")
+"""Those that also estimate the distance from base to tip."""
 _TIP_FEATURES: dict[str, tuple[str, ...]] = {
     "flex_and_base": ("peak", "peak_base"),
     "flex": ("peak",),
@@ -61,25 +63,23 @@ class Felt:
     reach: float
 
 
-class Statics:
-    """Distance to a wall that the tip touches without friction, from base angle and flex."""
+def wall_distance(antenna: AntennaSpec, base: Floats, flex: Floats) -> Floats:
+    """Distance to a wall that the tip touches without friction [m].
 
-    def __init__(self, antenna: AntennaSpec) -> None:
-        self._table = _tip_curves(
-            antenna.hinge_stiffness(), antenna.link_length, antenna.radius, antenna.sensed_hinges
-        )
+    Args:
+        antenna: The antenna.
+        base: Base angles [rad], shape (n,).
+        flex: Sizes of the flex [rad], shape (n,).
 
-    def distance(self, base: Floats, flex: Floats) -> Floats:
-        """Distance of the wall [m] for base angles and sizes of flex [rad], shape (n,)."""
-        bases, curves = self._table
-        each = np.array(
-            [np.interp(flex, *curve, left=np.nan, right=np.nan) for curve in curves]
-        ).reshape(len(bases), len(flex))
-        below = np.clip(np.searchsorted(bases, base, "right") - 1, 0, len(bases) - 2)
-        share = (base - bases[below]) / (bases[below + 1] - bases[below])
-        column = np.arange(len(flex))
-        found = (1.0 - share) * each[below, column] + share * each[below + 1, column]
-        return np.where((share >= 0.0) & (share <= 1.0), found, np.nan)
+    Returns:
+        Distances, shape (n,); NaN where the statics cannot tell.
+    """
+    bases, curves = _tip_curves(
+        antenna.hinge_stiffness(), antenna.link_length, antenna.radius, antenna.sensed_hinges
+    )
+    table = [np.interp(flex, *curve, left=np.nan, right=np.nan) for curve in curves]
+    found = between(bases, np.array(table).reshape(len(bases), len(flex)), base)
+    return np.where((base >= bases[0]) & (base <= bases[-1]), found, np.nan)
 
 
 @cache
@@ -105,42 +105,39 @@ def _tip_curves(
 
 
 def feel(
+    config: SweepConfig,
+    antenna: AntennaSpec,
     trace: Trace,
-    outward: float,
-    threshold: float,
-    statics: Statics,
-    sensor: SensorParams,
-    conditioning: ConditioningParams,
-    base_zero: float = 0.0,
+    base_zero: float,
     gain_error: float = 0.0,
     rng: np.random.Generator | None = None,
 ) -> Felt | None:
     """What the outward part of a sweep told, None if nothing was felt.
 
+    The sign of the flex is known, as on the way out the wall alone bends the antenna.
+
     Args:
+        config: Threshold of a touch, and T_avg, over which flex and base angle are averaged alike.
+        antenna: The antenna as the statics know it.
         trace: The sweep.
-        outward: Time at which the base turns back [s].
-        threshold: Flex at which a touch begins [rad].
-        statics: Of the antenna.
-        sensor: The flex sensor; the sign is known, as on the way out the wall alone bends it.
-        conditioning: T_avg; flex and base angle are averaged alike.
         base_zero: Error of the base's zero [rad].
         gain_error: Relative error of the flex sensor's gain in this trial.
         rng: Noise of the readings; without one, the exact flex and no averaging.
     """
-    until = trace.t <= outward
+    until = trace.t <= 0.5 / config.sweep.frequency
     flex, base = np.maximum(-trace.flex, 0.0), trace.base + base_zero
     if rng is not None:
-        noise = reading.noise(sensor, rng, len(trace.flex))
-        counts = reading.recorded(sensor, (1.0 + gain_error) * trace.flex, noise)
-        flex = reading.flex_of(sensor, reading.averaged(conditioning, counts, sensor.rate))
-        base = reading.averaged(conditioning, base, sensor.rate)
+        sensor, conditioning = antenna.sensor, config.conditioning
+        noise = reading_noise(sensor, rng, (len(trace.flex),))
+        counts = recorded(sensor, (1.0 + gain_error) * trace.flex, noise)
+        flex = flex_of(sensor, averaged(conditioning, counts, sensor.rate))
+        base = averaged(conditioning, base, sensor.rate)
     flex, base = flex[until], base[until]
-    touched = np.flatnonzero(flex >= threshold)
+    touched = np.flatnonzero(flex >= config.shape.flex)
     if len(touched) == 0:
         return None
     first, peak = int(touched[0]), int(flex.argmax())
-    far = statics.distance(base[touched], flex[touched])
+    far = wall_distance(antenna, base[touched], flex[touched])
     return Felt(
         float(np.sin(base[first])),
         float(flex[peak]),
@@ -170,11 +167,6 @@ def calibrate_and_guess(
     return asked @ np.linalg.lstsq(known, truth, rcond=None)[0]
 
 
-def cues(tip: bool) -> tuple[str, ...]:
-    """The cues that estimate the distance from base to tip, or that to a wall."""
-    return tuple(_TIP_FEATURES) if tip else CUES
-
-
 def coefficients(cue: str) -> int:
     """Number of coefficients of a cue."""
     count = len(_FEATURES.get(cue, ()))
@@ -183,7 +175,5 @@ def coefficients(cue: str) -> int:
 
 def _matrix(felt: list[Felt], names: tuple[str, ...]) -> Floats:
     """One, the features and their products of two, shape (n, k)."""
-    columns = [np.array([getattr(one, name) for one in felt]) for name in names]
-    columns = [np.ones(len(felt)), *columns]
-    pairs = combinations_with_replacement(range(len(columns)), 2)
-    return np.stack([columns[i] * columns[j] for i, j in pairs], axis=1)
+    columns = [np.ones(len(felt)), *(np.array([getattr(f, n) for f in felt]) for n in names)]
+    return np.stack([a * b for a, b in combinations_with_replacement(columns, 2)], axis=1)

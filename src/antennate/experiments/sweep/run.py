@@ -9,18 +9,15 @@ from typing import Any, Literal
 
 import numpy as np
 
-from antennate.antenna.statics import with_profile
+from antennate.antenna.statics import Profile, with_profile
 from antennate.experiments.sweep import estimates
 from antennate.experiments.sweep import scan as sweeping
 from antennate.experiments.sweep.config import SweepConfig
 from antennate.experiments.sweep.estimates import Trial
-from antennate.experiments.sweep.reach import CUES
 from antennate.params import SweepParams
 from antennate.studies.experiment import OnRow, OnStep, no_row, no_step
 from antennate.studies.pool import gather
 from antennate.studies.statistics import mean95
-
-__all__ = ["CUES", "MOTIONS", "SHAPES", "SweepConfig", "SweepOutcome", "SweepRow", "run"]
 
 SCHEMA = 1
 MOTIONS = ("fixed", "moving")
@@ -46,13 +43,13 @@ class SweepRow:
     distance_m: float
     centre_rad: float
     amplitude_rad: float
-    forward: float | None
-    backward: float | None
-    straight: float | None
-    transition: float | None
-    free: float | None
-    peak_flex_rad: float | None
-    reason: str
+    forward: float | None = None
+    backward: float | None = None
+    straight: float | None = None
+    transition: float | None = None
+    free: float | None = None
+    peak_flex_rad: float | None = None
+    reason: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,81 +122,54 @@ def _row(config: SweepConfig, trial: Trial) -> SweepRow:
         distance_m=trial.distance,
         centre_rad=trial.sweep.centre,
         amplitude_rad=trial.sweep.amplitude,
-        forward=None,
-        backward=None,
-        straight=None,
-        transition=None,
-        free=None,
         peak_flex_rad=None if felt is None else felt.peak,
         reason=trial.reason,
     )
 
 
-@dataclass(frozen=True, slots=True)
-class _Cell:
-    profile: str
-    motion: str
-    number: int
-    distance: float
-    centre: float
-    amplitude: float
-
-
-def _cells(config: SweepConfig) -> list[_Cell]:
-    grid = list(product(config.distances, config.centres, config.amplitudes))
-    return [
-        _Cell(profile, motion, number, *cell)
-        for profile in config.profiles
-        for motion in MOTIONS
-        for number, cell in enumerate(grid)
-    ]
-
-
-def map_cell(config: SweepConfig, cell: _Cell) -> SweepRow:
+def map_cell(
+    config: SweepConfig,
+    profile: Profile,
+    motion: str,
+    number: int,
+    distance: float,
+    centre: float,
+    amplitude: float,
+) -> SweepRow:
     """Sweep in one cell of the map and share out the time between the shapes."""
-    sweep = SweepParams(
-        centre=cell.centre, amplitude=cell.amplitude, frequency=config.sweep.frequency
-    )
-    wall = sweeping.Wall(cell.distance * config.antenna.length)
+    sweep = SweepParams(centre=centre, amplitude=amplitude, frequency=config.sweep.frequency)
+    wall = sweeping.Wall(distance * config.antenna.length)
     trace = sweeping.record(
         config.physics,
-        with_profile(config.antenna, cell.profile),
+        with_profile(config.antenna, profile),
         sweep,
         wall,
         config.sweeps + 1,
-        config.speed if cell.motion == "moving" else 0.0,
+        config.speed if motion == "moving" else 0.0,
         config.shape.gap,
     )
-    found: dict[str, Any] = dict.fromkeys((*SHAPES, "free", "peak_flex_rad"))
+    found: dict[str, Any] = {}
     if not trace.reason:
         found = sweeping.shares(config.shape, trace, 1.0 / sweep.frequency)
         found["peak_flex_rad"] = float(abs(trace.flex).max())
     return SweepRow(
         seed=config.seed,
         kind="map",
-        profile=cell.profile,
-        condition=cell.motion,
-        trial=cell.number,
+        profile=profile,
+        condition=motion,
+        trial=number,
         side="l",
         status="invalid" if trace.reason else "valid",
         distance_m=wall.distance,
-        centre_rad=cell.centre,
-        amplitude_rad=cell.amplitude,
+        centre_rad=centre,
+        amplitude_rad=amplitude,
         reason=trace.reason,
         **found,
     )
 
 
-_Task = tuple[SweepConfig, list[tuple[int, Any]]]
-
-
-def _run_task(task: _Task, emit: Callable[[Any], None]) -> None:
-    config, parts = task
-    for k, part in parts:
-        if isinstance(part, _Cell):
-            emit((k, map_cell(config, part)))
-        else:
-            emit((k, estimates.run_trial(config, *part)))
+def _sweep(function: Callable[..., SweepRow | Trial], *arguments: Any) -> SweepRow | Trial:
+    return function(*arguments)
 
 
 def run(
@@ -213,13 +183,16 @@ def run(
     Raises:
         WorkerError: A worker process died.
     """
-    cells = _cells(config)
-    parts: list[tuple[int, Any]] = list(enumerate([*cells, *estimates.plan(config.estimate)]))
-    tasks = [(config, parts[i : i + _TASK]) for i in range(0, len(parts), _TASK)]
+    grid = list(product(config.distances, config.centres, config.amplitudes))
+    cells = [
+        (map_cell, config, profile, motion, number, *cell)
+        for profile, motion in product(config.profiles, MOTIONS)
+        for number, cell in enumerate(grid)
+    ]
+    trials = [(estimates.run_trial, *trial) for trial in estimates.plan(config)]
 
-    def keep(item: tuple[int, Any]) -> None:
-        on_row(_row(config, item[1]) if isinstance(item[1], Trial) else item[1])
+    def keep(found: SweepRow | Trial) -> None:
+        on_row(_row(config, found) if isinstance(found, Trial) else found)
 
-    found = dict(gather(_run_task, tasks, workers, on_step, keep, len(parts)))
-    ordered = [found[k] for k in range(len(parts))]
-    return SweepOutcome(config, ordered[: len(cells)], ordered[len(cells) :])
+    found: list[Any] = gather(_sweep, [*cells, *trials], workers, on_step, keep, _TASK)
+    return SweepOutcome(config, found[: len(cells)], found[len(cells) :])

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from antennate.experiments import taper as package
 from antennate.experiments.taper import run as taper
 from antennate.studies.experiment import Experiment
 from antennate.studies.measures import Table, shown
@@ -52,18 +51,6 @@ def _coils(row: Mapping[str, Any]) -> str:
     return "-".join(f"{n:g}" for n in row["active_coils"])
 
 
-def _figures(outcome: taper.TaperOutcome) -> Mapping[str, Any]:
-    from antennate.experiments.taper.figure import taper as draw
-
-    return {"taper": draw(outcome.result())}
-
-
-EXPERIMENT = Experiment(
-    name="taper",
-    description=package.__doc__ or "",
-    config=taper.TaperConfig,
-    run=lambda config, workers, on_step, on_row: taper.run(config),
-    tables=tables,
-    sentence=sentence,
-    figures=_figures,
+EXPERIMENT = Experiment.of_folder(
+    __name__, taper.TaperConfig, lambda config, *_: taper.run(config), tables, sentence
 )

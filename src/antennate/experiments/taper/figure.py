@@ -10,6 +10,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from antennate import figures as style
+from antennate.experiments.taper.run import TaperOutcome
+
+
+def figures(outcome: TaperOutcome) -> dict[str, Figure]:
+    """The figure of a run."""
+    return {"taper": taper(outcome.result())}
 
 
 @style.styled

@@ -15,7 +15,7 @@ from antennate.errors import BadInputError, ConfigError
 from antennate.files import decoded, read_limited
 from antennate.params import TaperParams
 from antennate.params.base import number
-from antennate.studies.experiment import WithoutTrials
+from antennate.studies.experiment import Outcome
 from antennate.types import Floats
 
 COLUMN = "diameter_mm"
@@ -27,16 +27,12 @@ _LARGEST_MM = 100.0
 class TaperConfig(TaperParams):
     """The taper and, if measured, the file of its diameters."""
 
-    diameters: str | None = number(
-        None,
-        "1",
-        "assumed: no measurement",
-        f"CSV file with a column {COLUMN}, base first; replaces segments, ends and law",
-    )
+    diameters: str | None = number(None, "1", "assumed: no measurement")
+    """CSV file with a column diameter_mm, base first; replaces segments, ends and law."""
 
 
 @dataclass(frozen=True)
-class TaperOutcome(WithoutTrials):
+class TaperOutcome(Outcome):
     """A taper and two ladders.
 
     Attributes:

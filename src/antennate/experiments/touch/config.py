@@ -9,7 +9,6 @@ from pydantic import Field, model_validator
 
 from antennate.antenna.statics import Profile
 from antennate.errors import SceneError
-from antennate.experiments.touch.traverse import MOVES, reach, site
 from antennate.params import (
     BenchPhysicsParams,
     ConditioningParams,
@@ -21,13 +20,33 @@ from antennate.params import (
 from antennate.params.base import require_different, require_whole_steps
 from antennate.robots.antenna import AntennaSpec
 from antennate.sim import touch_wall
-from antennate.sim.touch_wall import WALLS, WallKind
+from antennate.sim.touch_wall import WALLS, Site, WallKind
 
+MOVES = 5
+"""Updates of the carriage's target in one tick."""
 _Speed = Annotated[float, Field(ge=0.002, le=1.0)]
 _CLOSEST = 0.01
 """No wall comes nearer to the line of traverse [m]."""
 _MOST_TICKS = 10**7
 """Most ticks of a study: more would not fit into memory."""
+_CLEARANCE = 0.005
+"""Free way between the straight antenna and what it must not touch yet [m]."""
+
+
+def reach(antenna: AntennaSpec) -> float:
+    """Distance of the straight antenna's tip from the line of traverse [m]."""
+    return antenna.length * math.sin(antenna.base_angle)
+
+
+def site(antenna: AntennaSpec, overlap: float, length: float, phase: float) -> Site:
+    """Where a wall stands for an overlap [m]."""
+    return Site(
+        near=reach(antenna) - overlap,
+        clear=reach(antenna) + antenna.radius + _CLEARANCE,
+        top=antenna.length + antenna.radius + _CLEARANCE,
+        length=length,
+        phase=phase,
+    )
 
 
 class TouchConfig(Params):
@@ -39,70 +58,42 @@ class TouchConfig(Params):
         "rule.similar",
         "rule.strong",
     )
-    trials: int = number(
-        5,
-        "1",
-        "assumed: a minute on two cores",
-        "trials of every wall, speed and profile",
-        ge=1,
-        le=10000,
-    )
-    seed: int = number(0, "1", "assumed: any", "seed of all chance", ge=0)
-    walls: tuple[WallKind, ...] = number(WALLS, "1", "assumed: all", "walls", min_length=1)
+    trials: int = number(5, "1", "assumed: a minute on two cores", ge=1, le=10000)
+    """Trials of every wall, speed and profile."""
+    seed: int = number(0, "1", "assumed: any", ge=0)
+    """Seed of all chance."""
+    walls: tuple[WallKind, ...] = number(WALLS, "1", "assumed: all", min_length=1)
+    """Walls."""
     speeds: tuple[_Speed, ...] = number(
-        (0.05, 0.10, 0.15),
-        "m/s",
-        "paper: speeds of the calibration; its boulder wall ran at 0.008",
-        "speeds of the carriage",
-        min_length=1,
+        (0.05, 0.10, 0.15), "m/s", "paper: calibration; its boulders ran at 0.008", min_length=1
     )
+    """Speeds of the carriage."""
     profiles: tuple[Profile, ...] = number(
-        ("stiff", "descending", "compliant"),
-        "1",
-        "paper: its three profiles",
-        "springs of the antenna: `descending` are antenna.active_coils as they are",
-        min_length=1,
+        ("stiff", "descending", "compliant"), "1", "paper: its three profiles", min_length=1
     )
-    overlap: float = number(
-        0.02, "m", "assumed: a sixth of the antenna", "mean of how far the tip would reach in", gt=0
-    )
-    overlap_spread: float = number(
-        0.015, "m", "assumed: from a brush to a firm press", "half range of the overlap", ge=0
-    )
-    spring_tolerance: float = number(
-        0.1, "1", "assumed: usual for wound springs", "half range of a spring's factor", ge=0, lt=1
-    )
-    wall_length: float = number(
-        0.4, "m", "assumed: three antennae and more", "length of every wall", ge=0.05, le=2
-    )
-    free_length: float = number(
-        0.08, "m", "assumed: free for half a second or more", "free way at both ends", ge=0.01, le=1
-    )
-    place_spread: float = number(
-        0.02, "m", "assumed: more than a tick at any speed", "range of the wall's place", ge=0, le=1
-    )
+    """Springs of the antenna: `descending` are antenna.active_coils as they are."""
+    overlap: float = number(0.02, "m", "assumed: a sixth of the antenna", gt=0)
+    """Mean of how far the tip would reach in."""
+    overlap_spread: float = number(0.015, "m", "assumed: from a brush to a firm press", ge=0)
+    """Half range of the overlap."""
+    spring_tolerance: float = number(0.1, "1", "assumed: usual for wound springs", ge=0, lt=1)
+    """Half range of a spring's factor."""
+    wall_length: float = number(0.4, "m", "assumed: three antennae and more", ge=0.05, le=2)
+    """Length of every wall."""
+    free_length: float = number(0.08, "m", "assumed: free for half a second or more", ge=0.01, le=1)
+    """Free way at both ends."""
+    place_spread: float = number(0.02, "m", "assumed: more than a tick at any speed", ge=0, le=1)
+    """Range of the wall's place."""
     contact_force: float = number(
-        1e-4,
-        "N",
-        "assumed: a hundredth of the weight of a link",
-        "mean force in a tick above which an obstacle presses",
-        ge=0,
-        le=10,
+        1e-4, "N", "assumed: a hundredth of the weight of a link", ge=0, le=10
     )
-    merge_time: float = number(
-        0.05,
-        "s",
-        "assumed: half of T_avg; 7.5 mm at 0.15 m/s",
-        "gaps between presses shorter than this are contact",
-        ge=0,
-        le=10,
-    )
+    """Mean force in a tick above which an obstacle presses."""
+    merge_time: float = number(0.05, "s", "assumed: half of T_avg; 7.5 mm at 0.15 m/s", ge=0, le=10)
+    """Gaps between presses shorter than this are contact."""
     averaging_times: tuple[Annotated[float, Field(gt=0, le=5)], ...] = number(
-        (0.02, 0.05, 0.1, 0.15, 0.2, 0.3),
-        "s",
-        "assumed: a fifth of the default to three times it",
-        "further T_avg to try on the same readings",
+        (0.02, 0.05, 0.1, 0.15, 0.2, 0.3), "s", "assumed: a fifth of the default to three times it"
     )
+    """Further T_avg to try on the same readings."""
     antenna: AntennaSpec = AntennaSpec()
     conditioning: ConditioningParams = ConditioningParams()
     rule: RuleParams = RuleParams()
@@ -110,12 +101,15 @@ class TouchConfig(Params):
     physics: BenchPhysicsParams = BenchPhysicsParams()
 
     @property
+    def lead(self) -> float:
+        """Way of the straight tip ahead of the base [m]."""
+        return self.antenna.length * math.cos(self.antenna.base_angle)
+
+    @property
     def travel(self) -> float:
         """Way of every traverse [m]."""
-        lead = self.antenna.length * math.cos(self.antenna.base_angle)
-        return (
-            lead + self.place_spread + self.wall_length + self.antenna.length + 2 * self.free_length
-        )
+        wall_and_lead = self.lead + self.place_spread + self.wall_length
+        return wall_and_lead + self.antenna.length + 2 * self.free_length
 
     @model_validator(mode="after")
     def _agree(self) -> TouchConfig:

@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from antennate.experiments import touch as package
 from antennate.experiments.touch import run as touch
-from antennate.experiments.touch.run import TouchConfig, TouchOutcome
+from antennate.experiments.touch.config import TouchConfig
 from antennate.studies.experiment import Experiment
 from antennate.studies.measures import Measure, Table, shown
 
@@ -102,21 +101,11 @@ def sentence(result: Mapping[str, Any]) -> str:
     )
 
 
-def _figures(outcome: TouchOutcome) -> Mapping[str, Any]:
-    from antennate.experiments.touch import figure as figures
-
-    result, example = outcome.result(), outcome.example()
-    drawn = {"touch": figures.measures(result), "touch_roc": figures.curves(result)}
-    return drawn if example is None else {**drawn, "touch_trace": figures.trace(example)}
-
-
-EXPERIMENT = Experiment(
-    name="touch",
-    description=package.__doc__ or "",
-    config=TouchConfig,
-    run=lambda config, workers, on_step, on_row: touch.run(config, workers, on_step),
-    tables=tables,
-    sentence=sentence,
-    figures=_figures,
+EXPERIMENT = Experiment.of_folder(
+    __name__,
+    TouchConfig,
+    lambda config, workers, on_step, _: touch.run(config, workers, on_step),
+    tables,
+    sentence,
     parts="traverses",
 )

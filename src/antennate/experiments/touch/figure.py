@@ -12,12 +12,22 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MultipleLocator
 
 from antennate import figures as style
-from antennate.experiments.touch.run import Trace
+from antennate.experiments.touch.experiment import F1, ONSET, RELEASE
+from antennate.experiments.touch.run import TouchOutcome
+from antennate.experiments.touch.sensing import Comparison
 from antennate.experiments.touch.traverse import Traverse
+from antennate.params import RuleParams
 
 _TRUE, _SENSED = "#0072B2", "#D55E00"
 _SHAPES = 14
 """Shapes of the antenna drawn along a wall."""
+
+
+def figures(outcome: TouchOutcome) -> dict[str, Figure]:
+    """All figures of a run; without an example, the first two alone."""
+    result, example = outcome.result(), outcome.example()
+    drawn = {"touch": measures(result), "touch_roc": curves(result)}
+    return drawn if example is None else {**drawn, "touch_trace": trace(*example)}
 
 
 @style.styled
@@ -28,118 +38,52 @@ def measures(result: Mapping[str, Any]) -> Figure:
         result: The content of result.json.
     """
     figure = style.canvas(10.0, 6.6)
-    (by_speed, by_wall), (onset, release) = figure.subplots(2, 2)
-    _draw_by_speed(by_speed, result)
-    _draw_by_wall(by_wall, result)
-    for panel, key in ((onset, "onset"), (release, "release")):
-        _draw_latency(panel, result, key)
+    (by_speed, by_wall), latencies = figure.subplots(2, 2)
+    speeds, walls = result["by_speed"], result["by_wall"]
+    for panel, rows, part in ((by_speed, speeds, "speed_m_s"), (by_wall, walls, "wall")):
+        _draw(panel, rows, part, rows, (F1.name, "f1_95"))
+        low, high = (end(row["traverses"] for row in rows) for end in (min, max))
+        over = "walls" if part == "speed_m_s" else "speeds"
+        count = f"{low}" if low == high else f"{low} to {high}"
+        panel.set_title(f"All {over}, n = {count} traverses a point, 95 %")
+        panel.set(ylim=(-0.03, 1.02), ylabel=f"{F1.label} of contact, 0 to 1")
+    for panel, measure in zip(latencies, (ONSET, RELEASE), strict=True):
+        key = measure.name.partition(".")[0]
+        found = [row[key] for row in speeds]
+        _draw(panel, speeds, "speed_m_s", found, ("median_ms", "median_95_ms"))
+        _draw(panel, speeds, "speed_m_s", found, ("p90_ms", "p90_ms"), marker="_")
+        low, high = (end(row["n"] for row in found) for end in (min, max))
+        panel.set_title(f"Median, 95 %, and 90th percentile (bar), n = {low} to {high} contacts")
+        panel.set_ylabel(measure.title)
+        bottom, top = panel.get_ylim()
+        panel.set_ylim(min(0.0, bottom), max(1.05 * top, 10.0))
     handles, labels = by_speed.get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper center", ncols=len(labels))
     return figure
 
 
-def _profiles(result: Mapping[str, Any]) -> list[tuple[str, float]]:
-    """Profiles, and how far each is moved aside, as a share of the room."""
-    names = list(result["profiles"])
-    return [(name, (i - (len(names) - 1) / 2) / max(len(names), 3)) for i, name in enumerate(names)]
-
-
-def _points(
+def _draw(
     panel: Axes,
-    name: str,
-    x: Sequence[float],
-    y: Sequence[float | None],
-    interval: Sequence[Sequence[float] | None],
+    cells: Sequence[Mapping[str, Any]],
+    part: str,
+    found: Sequence[Mapping[str, Any]],
+    keys: style.Keys,
+    marker: str = "",
 ) -> None:
-    """Points with their intervals; what does not exist is left out."""
-    colour, marker, _ = style.PROFILE_LOOKS[name]
-    known = [(a, b, i) for a, b, i in zip(x, y, interval, strict=True) if b is not None]
-    if not known:
-        panel.plot([], [], color=colour, marker=marker, linestyle="", label=name)
-        return
-    where = [a for a, _, _ in known]
-    value = np.array([b for _, b, _ in known])
-    ends = np.array([i if i is not None else (b, b) for _, b, i in known]).T
-    panel.errorbar(
-        where,
-        value,
-        yerr=np.maximum(0.0, np.array([value - ends[0], ends[1] - value])),
-        color=colour,
-        marker=marker,
-        markersize=5,
-        linestyle="",
-        capsize=2.5,
-        elinewidth=1.2,
-        label=name,
-    )
-
-
-def _speeds(result: Mapping[str, Any]) -> list[float]:
-    return sorted({row["speed_m_s"] for row in result["by_speed"]})
-
-
-def _by_speed(result: Mapping[str, Any], name: str) -> list[Mapping[str, Any]]:
-    rows = [row for row in result["by_speed"] if row["profile"] == name]
-    return sorted(rows, key=lambda row: row["speed_m_s"])
-
-
-def _speed_axis(panel: Axes, speeds: Sequence[float]) -> None:
-    panel.set_xticks(range(len(speeds)), [f"{speed:g}" for speed in speeds])
-    panel.set_xlim(-0.6, len(speeds) - 0.4)
-    panel.set_xlabel("speed of the traverse [m/s]")
-    panel.grid(visible=False, axis="x")
-
-
-def _draw_by_speed(panel: Axes, result: Mapping[str, Any]) -> None:
-    for name, aside in _profiles(result):
-        rows = _by_speed(result, name)
-        x = [i + 0.6 * aside for i in range(len(rows))]
-        _points(panel, name, x, [r["f1"] for r in rows], [r["f1_95"] for r in rows])
-    traverses = sorted({row["traverses"] for row in result["by_speed"]})
-    count = f"{traverses[0]}" if len(traverses) == 1 else f"{traverses[0]} to {traverses[-1]}"
-    panel.set(ylim=(0, 1.02), ylabel="F1 of contact, 0 to 1")
-    panel.set_title(f"All walls, n = {count} traverses a point, 95 %")
-    _speed_axis(panel, _speeds(result))
-
-
-def _draw_by_wall(panel: Axes, result: Mapping[str, Any]) -> None:
-    walls = list(dict.fromkeys(row["wall"] for row in result["by_wall"]))
-    for name, aside in _profiles(result):
-        rows = [row for row in result["by_wall"] if row["profile"] == name]
-        x = [walls.index(r["wall"]) + 0.6 * aside for r in rows]
-        _points(panel, name, x, [r["f1"] for r in rows], [r["f1_95"] for r in rows])
-    panel.set_xticks(range(len(walls)), walls)
-    panel.set_xlim(-0.6, len(walls) - 0.4)
-    panel.grid(visible=False, axis="x")
-    panel.set(ylim=(-0.03, 1.02), xlabel="wall", ylabel="F1 of contact, 0 to 1")
-    counts = sorted({row["traverses"] for row in result["by_wall"]})
-    many = f"{counts[0]}" if len(counts) == 1 else f"{counts[0]} to {counts[-1]}"
-    panel.set_title(f"All speeds, n = {many} traverses a point, 95 %")
-
-
-def _draw_latency(panel: Axes, result: Mapping[str, Any], key: str) -> None:
-    counts = []
-    for name, aside in _profiles(result):
-        rows = [row[key] for row in _by_speed(result, name)]
-        x = [i + 0.6 * aside for i in range(len(rows))]
-        counts += [row["n"] for row in rows]
-        _points(panel, name, x, [r["median_ms"] for r in rows], [r["median_95_ms"] for r in rows])
-        known = [(a, r["p90_ms"]) for a, r in zip(x, rows, strict=True) if r["n"]]
-        if known:
-            panel.plot(
-                *zip(*known, strict=True),
-                color=style.PROFILE_LOOKS[name][0],
-                marker="_",
-                markersize=11,
-                markeredgewidth=1.8,
-                linestyle="",
-            )
-    low, high = min(counts, default=0), max(counts, default=0)
-    panel.set_title(f"Median, 95 %, and 90th percentile (bar), n = {low} to {high} contacts")
-    panel.set_ylabel(f"{key} latency [ms]")
-    bottom, top = panel.get_ylim()
-    panel.set_ylim(min(0.0, bottom), max(1.05 * top, 10.0))
-    _speed_axis(panel, _speeds(result))
+    """A measure of what was found in each cell, over speeds or walls, the profiles side by side."""
+    values = list(dict.fromkeys(cell[part] for cell in cells))
+    values = sorted(values) if part == "speed_m_s" else values
+    profiles = list(dict.fromkeys(cell["profile"] for cell in cells))
+    for i, name in enumerate(profiles):
+        colour, own, _ = style.PROFILE_LOOKS[name]
+        aside = 0.6 * (i - (len(profiles) - 1) / 2) / max(len(profiles), 3)
+        mine = [k for k, cell in enumerate(cells) if cell["profile"] == name]
+        x = [values.index(cells[k][part]) + aside for k in mine]
+        look = {"marker": marker, "markersize": 11, "markeredgewidth": 1.8} if marker else {}
+        look = {"marker": own, "label": name, **look}
+        style.intervals(panel, x, [found[k] for k in mine], keys, color=colour, **look)
+    style.categories(panel, [f"{v:g}" if isinstance(v, float) else v for v in values])
+    panel.set_xlabel("speed of the traverse [m/s]" if part == "speed_m_s" else "wall")
 
 
 @style.styled
@@ -205,28 +149,28 @@ def _draw_curve(
 
 
 @style.styled
-def trace(example: Trace) -> Figure:
+def trace(one: Traverse, found: Comparison) -> Figure:
     """One traverse: the wall with shapes of the antenna, flex, b, and contact against truth."""
     figure = style.canvas(10.0, 7.2)
     plan, flex, level, state = figure.subplots(4, 1, height_ratios=(2.0, 1.2, 1.2, 0.7))
-    one, t = example.traverse, example.t
+    config = one.plan.config
+    t = np.arange(len(one.flex)) / config.antenna.sensor.rate
     _draw_plan(plan, one)
-    plan.set_title(
-        f"Wall {one.wall}, {one.profile} antenna, {one.speed:g} m/s, trial 0; "
-        f"the base moves to the right along y = 0"
-    )
-    flex.plot(t, one.course.flex, color=style.INK, linewidth=1.3)
+    flex.plot(t, one.flex, color=style.INK, linewidth=1.3)
     flex.set_ylabel("flex [rad]")
-    _draw_level(level, example)
-    _draw_states(state, example)
+    level.plot(t, 1.0 / (1.0 + np.exp(-found.level)), color=style.INK, linewidth=1.3)
+    _draw_bounds(level, config.rule)
+    for row, (states, colour) in enumerate(((found.alarm, _SENSED), (found.truth, _TRUE))):
+        state.fill_between(t, row + 0.1, row + 0.9, where=states.tolist(), color=colour, step="mid")
+    state.set(xlim=(t[0], t[-1]), ylim=(0, 2), xlabel="time [s]")
+    state.set_yticks([0.5, 1.5], ["sensed", "true"])
+    state.grid(visible=False, axis="y")
     for panel in (flex, level):
         panel.set_xlim(t[0], t[-1])
         panel.tick_params(labelbottom=False)
         panel.fill_between(
-            t,
-            0,
-            1,
-            where=example.comparison.truth.tolist(),
+            *(t, 0, 1),
+            where=found.truth.tolist(),
             color=_TRUE,
             alpha=0.08,
             transform=panel.get_xaxis_transform(),
@@ -236,18 +180,14 @@ def trace(example: Trace) -> Figure:
     return figure
 
 
-def _draw_level(panel: Axes, example: Trace) -> None:
-    panel.plot(example.t, example.b, color=style.INK, linewidth=1.3)
-    bounds = (
-        (example.threshold, 2, "bottom", "contact from here"),
-        (example.threshold - example.hysteresis, -2, "top", "free below"),
-    )
-    for bound, lift, side, name in bounds:
+def _draw_bounds(panel: Axes, rule: RuleParams) -> None:
+    for bound, lift, side, name in (
+        (rule.threshold, 2, "bottom", "contact from here"),
+        (rule.threshold - rule.hysteresis, -2, "top", "free below"),
+    ):
         panel.axhline(bound, color=_SENSED, linewidth=0.9, linestyle=(0, (4, 2)))
         panel.annotate(
-            name,
-            (0.0, bound),
-            (4, lift),
+            *(name, (0.0, bound), (4, lift)),
             textcoords="offset points",
             va=side,
             fontsize=7,
@@ -256,30 +196,22 @@ def _draw_level(panel: Axes, example: Trace) -> None:
     panel.set(ylim=(-0.05, 1.05), ylabel="b, 0 to 1")
 
 
-def _draw_states(panel: Axes, example: Trace) -> None:
-    t, comparison = example.t, example.comparison
-    for row, (states, colour) in enumerate(
-        ((comparison.alarm, _SENSED), (comparison.truth, _TRUE))
-    ):
-        panel.fill_between(t, row + 0.1, row + 0.9, where=states.tolist(), color=colour, step="mid")
-    panel.set(xlim=(t[0], t[-1]), ylim=(0, 2), xlabel="time [s]")
-    panel.set_yticks([0.5, 1.5], ["sensed", "true"])
-    panel.grid(visible=False, axis="y")
-
-
 def _draw_plan(panel: Axes, one: Traverse) -> None:
-    for line in one.outline:
-        if one.wall == "boulders":
+    plan = one.plan
+    for line in plan.outline():
+        if plan.wall == "boulders":
             panel.plot(*line.T, color=style.MUTED, marker="o", markersize=3, linestyle="")
         else:
             panel.plot(*line.T, color=style.MUTED, linewidth=2.2)
-    joints = one.course.joints
-    if len(joints):
-        shown = joints[np.linspace(0, len(joints) - 1, _SHAPES).astype(int)]
-        colour = style.PROFILE_LOOKS[one.profile][0]
-        panel.add_collection(LineCollection(list(shown), colors=colour, linewidths=1.3))
-        panel.plot(*shown[:, 0].T, color=style.INK, marker="o", markersize=3, linestyle="")
+    shown = one.joints[np.linspace(0, len(one.joints) - 1, _SHAPES).astype(int)]
+    colour = style.PROFILE_LOOKS[plan.profile][0]
+    panel.add_collection(LineCollection(list(shown), colors=colour, linewidths=1.3))
+    panel.plot(*shown[:, 0].T, color=style.INK, marker="o", markersize=3, linestyle="")
     panel.set_aspect("equal", adjustable="datalim")
+    panel.set_title(
+        f"Wall {plan.wall}, {plan.profile} antenna, {plan.speed:g} m/s, trial 0; "
+        f"the base moves to the right along y = 0"
+    )
     panel.set(xlabel="x [m]", ylabel="y [m]")
     panel.yaxis.set_major_locator(MultipleLocator(0.05))
     panel.margins(0.02)

@@ -1,4 +1,4 @@
-"""What the control makes of traverses, and how that compares with the truth.
+"""What the control makes of traverses, and how its alarms answer true contacts.
 
 The control is the robot's: `conditioning` and `contact`, stepped tick by tick for a batch of
 traverses of the same length.
@@ -6,58 +6,89 @@ traverses of the same length.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from antennate.antenna.sensor import reading_noise
 from antennate.control.conditioning import RunningMean, bending_level
 from antennate.control.contact import ContactState
-from antennate.experiments.touch.episodes import Matches, match, merged
+from antennate.experiments import reading
+from antennate.experiments.touch.config import TouchConfig
+from antennate.experiments.touch.traverse import Traverse
 from antennate.params import ConditioningParams, RuleParams
-from antennate.types import Bools, Contact, Floats
+from antennate.types import Bools, Contact, Floats, Ints
+
+
+def runs(state: Bools) -> Ints:
+    """Begin and end (exclusive) of every run of True, shape (n, 2) [ticks]."""
+    edges = np.flatnonzero(np.diff(state.astype(np.int8), prepend=0, append=0))
+    return edges.reshape(-1, 2)
+
+
+def merged(state: Bools, shortest: int) -> Bools:
+    """The state with every gap between two runs filled that is shorter than `shortest` ticks."""
+    filled = state.copy()
+    found = runs(state)
+    for end, begin in zip(found[:-1, 1], found[1:, 0], strict=True):
+        if begin - end < shortest:
+            filled[end:begin] = True
+    return filled
 
 
 @dataclass(frozen=True, slots=True)
-class Sensed:
-    """What the control says at every tick.
+class Matches:
+    """How alarms answer contacts.
 
     Attributes:
-        b: Bending level, shape (n, B).
-        alarm: Whether it says CONTACT, shape (n, B).
+        contacts: Begin and end of every contact, shape (n, 2) [ticks].
+        found: Whether a contact matches an alarm, shape (n,).
+        carried: Contacts that are found by an alarm that had begun before them.
+        alarms: Number of alarms; `false` of them match no contact.
+        onset: Begin of the first matching alarm after the begin of the contact [ticks].
+        release: End of the last matching alarm after the end of the contact [ticks].
     """
 
-    b: Floats
-    alarm: Bools
+    contacts: Ints
+    found: Bools
+    carried: int
+    alarms: int
+    false: int
+    onset: Ints
+    release: Ints
 
 
-def sense(
-    conditioning: ConditioningParams, rule: RuleParams, counts: Floats, period: float
-) -> Sensed:
-    """Let the control read counts of shape (n, B), one row every `period` seconds."""
-    batch = counts.shape[1]
-    mean = RunningMean(conditioning, batch, period)
-    contact = ContactState(rule, batch)
-    levels, states = [], []
-    for row in counts:
-        b = bending_level(conditioning, mean.step(np.stack([row, row], axis=1)))
-        levels.append(b[:, 0])
-        states.append(contact.step(b)[:, 0])
-    return Sensed(np.array(levels), np.array(states) == Contact.CONTACT)
+def match(truth: Bools, alarm: Bools, grace: int) -> Matches:
+    """Match contacts and alarms that overlap, a contact taken `grace` ticks longer at its end.
 
-
-@dataclass(frozen=True, slots=True)
-class ContactCriteria:
-    """How the truth is told from forces, and how late an alarm may come.
-
-    Attributes:
-        force: An obstacle that presses with more than this is felt [N].
-        merge: Gaps between presses shorter than this are contact [ticks].
-        grace: How much later than the end of a contact an alarm still answers it [ticks].
+    Args:
+        truth: True state, shape (n,).
+        alarm: Sensed state, shape (n,).
+        grace: How much later an alarm may still answer [ticks].
     """
-
-    force: float
-    merge: int
-    grace: int
+    contacts, alarms = runs(truth), runs(alarm)
+    over = (alarms[None, :, 0] < contacts[:, None, 1] + grace) & (
+        alarms[None, :, 1] > contacts[:, None, 0]
+    )
+    found, answering = np.asarray(over.any(axis=1)), np.asarray(over.any(axis=0))
+    onset, release, carried = [], [], 0
+    for i in np.flatnonzero(found):
+        begin, end = contacts[i]
+        answers = alarms[over[i]]
+        if answers[0, 0] < begin:
+            carried += 1
+        else:
+            onset.append(answers[0, 0] - begin)
+        last = answers[-1, 1]
+        onwards = i + 1 < len(contacts) and last > contacts[i + 1, 0]
+        if not onwards and end < len(truth) and last < len(truth):
+            release.append(last - end)
+    return Matches(
+        *(contacts, found, carried, len(alarms), int((~answering).sum())),
+        onset=np.array(onset, dtype=np.int64),
+        release=np.array(release, dtype=np.int64),
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,17 +123,71 @@ class Comparison:
         return np.array([abs(self.flex[begin:end]).max() for begin, end in lost])
 
 
-def true_state(criteria: ContactCriteria, force: Floats) -> Bools:
+def sense(
+    conditioning: ConditioningParams, rule: RuleParams, counts: Floats, period: float
+) -> tuple[Floats, Bools]:
+    """Let the control read counts of shape (n, B), one row every `period` seconds.
+
+    Returns:
+        The bending level b and whether it says CONTACT, at every tick, each of shape (n, B).
+    """
+    batch = counts.shape[1]
+    mean = RunningMean(conditioning, batch, period)
+    contact = ContactState(rule, batch)
+    levels, states = [], []
+    for row in counts:
+        b = bending_level(conditioning, mean.step(np.stack([row, row], axis=1)))
+        levels.append(b[:, 0])
+        states.append(contact.step(b)[:, 0])
+    return np.array(levels), np.array(states) == Contact.CONTACT
+
+
+def true_contact(config: TouchConfig, force: Floats) -> Bools:
     """Whether an obstacle presses, for forces over time [N], shape (n,)."""
-    return merged(force > criteria.force, criteria.merge)
+    return merged(
+        force > config.contact_force, round(config.merge_time * config.antenna.sensor.rate)
+    )
 
 
-def compare(truth: Bools, alarm: Bools, criteria: ContactCriteria) -> Matches:
-    """Contacts against alarms, both of shape (n,)."""
-    return match(truth, alarm, criteria.grace)
+def compare(config: TouchConfig, traverses: Sequence[Traverse]) -> list[Comparison | None]:
+    """Let the control read all traverses, those of one speed side by side; None if invalid."""
+    found: list[Comparison | None] = [None] * len(traverses)
+    for speed in config.speeds:
+        places = [i for i, t in enumerate(traverses) if t.plan.speed == speed and not t.reason]
+        if places:
+            batch = _compare_batch(config, [traverses[i] for i in places])
+            for place, comparison in zip(places, batch, strict=True):
+                found[place] = comparison
+    return found
 
 
-def logit(b: Floats) -> Floats:
-    """log(b / (1 - b)), b kept off 0 and 1; same shape."""
-    safe = np.clip(b, 1e-15, 1.0 - 1e-15)
-    return np.log(safe / (1.0 - safe))
+def _compare_batch(config: TouchConfig, batch: Sequence[Traverse]) -> list[Comparison]:
+    sensor, ticks = config.antenna.sensor, len(batch[0].x)
+    noises = {
+        trial: reading_noise(sensor, np.random.default_rng([config.seed, trial, 1]), (ticks,))
+        for trial in {t.plan.trial for t in batch}
+    }
+    counts = reading.recorded(
+        sensor,
+        np.stack([t.flex for t in batch], axis=1),
+        np.stack([noises[t.plan.trial] for t in batch], axis=1),
+    )
+    level, alarm = sense(config.conditioning, config.rule, counts, 1.0 / sensor.rate)
+    safe = np.clip(level, 1e-15, 1.0 - 1e-15)
+    logit = np.log(safe / (1.0 - safe))
+    grace = round(config.conditioning.averaging_time * sensor.rate)
+    found = []
+    for i, one in enumerate(batch):
+        truth, plan = true_contact(config, one.force), one.plan
+        found.append(
+            Comparison(
+                *(plan.wall, plan.speed, plan.profile, plan.trial),
+                metres=float(one.x[-1] - one.x[0]),
+                truth=truth,
+                alarm=alarm[:, i],
+                level=logit[:, i],
+                flex=one.flex,
+                matches=match(truth, alarm[:, i], grace),
+            )
+        )
+    return found

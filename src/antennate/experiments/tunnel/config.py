@@ -18,29 +18,21 @@ class TunnelConfig(TrialConfig):
 
     unread: ClassVar[tuple[str, ...]] = HARDWARE_ALONE
     trials: int = number(
-        30,
-        "1",
-        "assumed: the paper's ten leave an interval of half the range",
-        "trials of every controller",
-        ge=1,
-        le=100000,
+        30, "1", "assumed: the paper's ten leave an interval of half the range", ge=1, le=100000
     )
+    """Trials of every controller."""
     controllers: tuple[str, ...] = number(
         tuple(BUILT_IN),
         "1",
         "assumed: all of ours",
-        "controllers to run: open, paper, closed, or MODULE:NAME or FILE.py:NAME of your own",
         min_length=1,
         examples=["open", "paper", "closed"],
     )
+    """Controllers to run: open, paper, closed, or MODULE:NAME or FILE.py:NAME of your own."""
     time_limit: float = number(
-        100.0,
-        "s",
-        "paper: open loop made 0.04 m/s over its successes; half of that on 2 m takes this long",
-        "time after which a trial has failed",
-        gt=0,
-        le=3600,
+        100.0, "s", "paper: open loop made 0.04 m/s; half of that on 2 m", gt=0, le=3600
     )
+    """Time after which a trial has failed."""
     control: ControlParams = ControlParams()
 
     @field_validator("controllers")

@@ -5,14 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from antennate.experiments import tunnel as package
 from antennate.experiments.tunnel import measures
 from antennate.experiments.tunnel import run as tunnel
 from antennate.studies.experiment import Experiment
 from antennate.studies.measures import Table, shown
-
-SHOWN_TRIALS = 5
-"""Trials drawn in the figure of trajectories."""
 
 
 def tables(result: Mapping[str, Any]) -> Sequence[Table]:
@@ -51,24 +47,6 @@ def sentence(result: Mapping[str, Any]) -> str:
     return f"Tunnels crossed (95 % interval): {found}{test}.{why}"
 
 
-def _figures(outcome: tunnel.TunnelOutcome) -> Mapping[str, Any]:
-    from antennate.experiments.tunnel.figure import summary, trajectories
-
-    config = outcome.config
-    trials = range(min(SHOWN_TRIALS, config.trials))
-    return {
-        "trajectories": trajectories(outcome.paths, config.controllers, outcome.rows, trials),
-        "summary": summary(outcome.result()["controllers"], outcome.rows, config.time_limit),
-    }
-
-
-EXPERIMENT = Experiment(
-    name="tunnel",
-    description=package.__doc__ or "",
-    config=tunnel.TunnelConfig,
-    run=tunnel.run,
-    tables=tables,
-    sentence=sentence,
-    figures=_figures,
-    check=tunnel.check,
+EXPERIMENT = Experiment.of_folder(
+    __name__, tunnel.TunnelConfig, tunnel.run, tables, sentence, check=tunnel.check
 )

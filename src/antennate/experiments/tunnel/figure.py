@@ -16,8 +16,11 @@ from matplotlib.ticker import MaxNLocator, PercentFormatter
 
 from antennate import figures as style
 from antennate.experiments.tunnel.monitor import TrialPath, TrialResult
+from antennate.experiments.tunnel.run import TunnelOutcome
 from antennate.types import Floats, Maneuver
 
+SHOWN_TRIALS = 5
+"""Trials drawn in the figure of trajectories."""
 MARGIN = 0.3
 """Shown around the walls; what is farther out is cut off [m]."""
 
@@ -27,6 +30,15 @@ _OUTCOMES = {
     "left": "left",
     "invalid": "invalid",
 }
+
+
+def figures(outcome: TunnelOutcome) -> dict[str, Figure]:
+    """Both figures of a run."""
+    config, trials = outcome.config, range(min(SHOWN_TRIALS, outcome.config.trials))
+    return {
+        "trajectories": trajectories(outcome.paths, config.controllers, outcome.rows, trials),
+        "summary": summary(outcome.result()["controllers"], outcome.rows, config.time_limit),
+    }
 
 
 @style.styled

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from antennate.experiments import wall as package
 from antennate.experiments.wall import measures
 from antennate.experiments.wall import run as wall
 from antennate.studies.experiment import Experiment
@@ -40,22 +39,4 @@ def sentence(result: Mapping[str, Any]) -> str:
     return f"Walls passed (95 % interval): {found}."
 
 
-def _figures(outcome: wall.WallOutcome) -> Mapping[str, Any]:
-    from antennate.experiments.wall.figure import outcomes, passages
-
-    figures = {"wall": outcomes(outcome.result())}
-    if outcome.examples:
-        ordered = {p: outcome.examples[p] for p in outcome.config.profiles if p in outcome.examples}
-        figures["passages"] = passages(ordered)
-    return figures
-
-
-EXPERIMENT = Experiment(
-    name="wall",
-    description=package.__doc__ or "",
-    config=wall.WallConfig,
-    run=wall.run,
-    tables=tables,
-    sentence=sentence,
-    figures=_figures,
-)
+EXPERIMENT = Experiment.of_folder(__name__, wall.WallConfig, wall.run, tables, sentence)

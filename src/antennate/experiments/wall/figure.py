@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 
 from antennate import figures as style
 from antennate.experiments.wall.outcome import Traverse
+from antennate.experiments.wall.run import WallOutcome
 
 OUTCOME_COLOURS = {
     "successes": "#009E73",
@@ -18,6 +19,13 @@ OUTCOME_COLOURS = {
     "slips": "#56B4E9",
     "invalid": "#000000",
 }
+
+
+def figures(outcome: WallOutcome) -> dict[str, Figure]:
+    """Both figures of a run; without an example, the first alone."""
+    drawn = {"wall": outcomes(outcome.result())}
+    examples = outcome.examples
+    return {**drawn, "passages": passages(examples)} if examples else drawn
 
 
 @style.styled

@@ -10,7 +10,6 @@ is counted once more without the `start`. A trial that does both counts as a jam
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -51,17 +50,14 @@ class WallConfig(Params):
         "antenna.base_spacing",
         *(f"antenna.sensor.{n}" for n in SensorParams.model_fields if n != "active_length"),
     )
-    trials: int = number(
-        20, "1", "paper: 20 trials a profile", "trials of every profile", ge=1, le=10000
-    )
-    seed: int = number(1, "1", "assumed: any", "seed of all chance", ge=0)
+    trials: int = number(20, "1", "paper: 20 trials a profile", ge=1, le=10000)
+    """Trials of every profile."""
+    seed: int = number(1, "1", "assumed: any", ge=0)
+    """Seed of all chance."""
     profiles: tuple[Profile, ...] = number(
-        tuple(PROFILES),
-        "1",
-        "paper: stiff, descending, compliant; assumed: two controls it lacks",
-        "profiles to run",
-        min_length=1,
+        tuple(PROFILES), "1", "paper: its three; assumed: two controls it lacks", min_length=1
     )
+    """Profiles to run."""
     wall: WallParams = WallParams()
     antenna: AntennaSpec = AntennaSpec()
     variation: BenchVariationParams = BenchVariationParams()
@@ -191,18 +187,18 @@ def _ramp(length: float, speed: float) -> list[float]:
     return (length * np.arange(1, count + 1) / count).tolist()
 
 
-def _run_task(
-    task: tuple[WallConfig, Profile, int], emit: Callable[[tuple[WallTrial, Traverse | None]], None]
-) -> None:
-    config, profile, trial = task
+def run_trial(
+    config: WallConfig, profile: Profile, trial: int
+) -> tuple[WallTrial, Traverse | None]:
+    """One trial, and of the first of a profile its passage."""
     try:
         seen = passage(config, profile, trial)
     except SimulationError as error:
         none = [math.nan] * 7
         row = WallTrial(config.seed, trial, profile, "invalid", "invalid", *none, reason=str(error))
-        emit((row, None))
-        return
-    emit((classify(config.wall, config.seed, trial, profile, seen), seen if trial == 0 else None))
+        return row, None
+    row = classify(config.wall, config.seed, trial, profile, seen)
+    return row, seen if trial == 0 else None
 
 
 def run(
@@ -216,10 +212,10 @@ def run(
     Raises:
         WorkerError: A worker process died.
     """
-    tasks: list[tuple[WallConfig, Profile, int]] = [
+    tasks = [
         (config, profile, trial) for trial in range(config.trials) for profile in config.profiles
     ]
-    found = gather(_run_task, tasks, workers, on_step, lambda item: on_row(item[0]))
-    found.sort(key=lambda item: (config.profiles.index(item[0].profile), item[0].trial))
+    found = gather(run_trial, tasks, workers, on_step, lambda item: on_row(item[0]))
+    found.sort(key=lambda item: config.profiles.index(item[0].profile))
     examples = {row.profile: seen for row, seen in found if seen is not None}
     return WallOutcome(config, [row for row, _ in found], examples)

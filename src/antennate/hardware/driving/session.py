@@ -50,6 +50,7 @@ class Session:
         tally: What was done.
         timing: Whether the loop keeps its pace, None before the first tick.
         frame: What the controller got in the last tick.
+        lost: Whether the actuators were lost; no goal is sent until an arm event.
         touched: Whether anything was written to the actuators.
         unrecorded: Whether a record that is required is not kept; the robot holds meanwhile.
     """
@@ -75,7 +76,7 @@ class Session:
         self.outputs: Outputs | None = None
         self.frame = AntennaFrame(t=np.zeros(1), counts=np.full((1, 2), math.nan))
         self._refused = 0
-        self._lost = self.touched = self.unrecorded = False
+        self.lost = self.touched = self.unrecorded = False
 
     @property
     def mute(self) -> bool:
@@ -128,8 +129,8 @@ class Session:
             if out.arming:
                 self.touched = True
                 actuators.enable(command)
-                self._lost = False
-            elif out.feed_watchdog and actuators.enabled and not self._lost:
+                self.lost = False
+            elif out.feed_watchdog and actuators.enabled and not self.lost:
                 self._move(out, command)
             if not out.torque and actuators.enabled:
                 actuators.disable()
@@ -137,11 +138,11 @@ class Session:
                 actuators.disable(again=True)
         except (PortError, CommandError, ActuatorError) as error:
             actuators.state.bus_error = str(error)
-            self._lost |= not isinstance(error, CommandError)
+            self.lost |= not isinstance(error, CommandError)
             return
         if out.feed_watchdog or not out.torque:  # any packet would feed the watchdogs
             actuators.look()
-        self._lost |= actuators.state.silent(self._limits.silent_answers)
+        self.lost |= actuators.state.silent(self._limits.silent_answers)
 
     def _move(self, out: Outputs, command: JointCommand) -> None:
         """Goals nearer to the command, or where they are; a fault lets nothing else begin."""
@@ -163,7 +164,7 @@ class Session:
             PortError: The bus is gone.
         """
         end = self.clock.now() + time
-        while self.actuators.enabled and not self._lost and self.clock.now() < end:
+        while self.actuators.enabled and not self.lost and self.clock.now() < end:
             self.actuators.command(None)
             self.clock.sleep_until(self.clock.now() + self.period)
 

@@ -31,6 +31,7 @@ class SupervisedController:
         command: What it said last.
         decision: What it decided, whenever it was asked last without failing.
         result: What became of it in the last tick.
+        sound: Whether the last command asked for could be sent.
         refused: Commands that could not be sent.
         tracebacks: Of its failures.
     """
@@ -49,9 +50,9 @@ class SupervisedController:
         self.result = StepResult()
         self.refused = 0
         self.tracebacks = Tracebacks()
-        self._check, self._now = check, now
+        self.now, self._check = now, check
         self._sound_command: JointCommand | None = None
-        self._sound = False
+        self.sound = False
         self._owed = self._seen = self._stood = 0.0
 
     def time(self, t: Floats) -> Floats:
@@ -68,12 +69,12 @@ class SupervisedController:
         return self.command
 
     def _step(self, frame: AntennaFrame) -> JointCommand:
-        due = self._due() or not self._sound
+        due = self._due() or not self.sound
         result = self.result = StepResult()
         if self._sound_command is not None and (self.standing or not due):
-            result.asked, result.decided_at = False, self._now()
+            result.asked, result.decided_at = False, self.now()
             return self._sound_command
-        self._sound = False
+        self.sound = False
         try:
             own = AntennaFrame(t=frame.t.copy(), counts=frame.counts.copy())
             command = self.controller.step(own)  # which it may change
@@ -82,16 +83,16 @@ class SupervisedController:
             raise
         except BaseException as error:  # noqa: BLE001 a plugged-in controller may raise anything
             result.failure = in_one_line(error)
-            self.tracebacks.keep(self._now(), error)
+            self.tracebacks.keep(self.now(), error)
             return no_command(self.robot)
-        result.decided_at = self._now()
+        result.decided_at = self.now()
         try:
             command = self._sound_command = self._check(command)
         except CommandError as error:
             result.bad_command = str(error)
             self.refused += 1
         else:
-            self._sound = self.decision.maneuver in set(Maneuver)
+            self.sound = self.decision.maneuver in set(Maneuver)
         return command
 
     def _due(self) -> bool:

@@ -56,6 +56,7 @@ class LegTurns:
 
     Attributes:
         forgotten: Legs that have forgotten their turns so far.
+        stage: What the next leg has to do: 0 lose its torque, 1 forget its turns, 2 get it back.
     """
 
     def __init__(self, bus: Bus, joints: Joints) -> None:
@@ -66,7 +67,7 @@ class LegTurns:
     def reset(self) -> None:
         """Give up what was begun; torque is off, or comes on anew."""
         self._left: deque[int] = deque()
-        self._stage = self._tried = self._waited = self._still = 0
+        self.stage = self._tried = self._waited = self._still = 0
         self._before: Mapping[int, int] = {}
         self._place = math.nan
 
@@ -78,7 +79,7 @@ class LegTurns:
     @property
     def loose(self) -> int | None:
         """Id of the leg whose torque may be off for it, None if there is none."""
-        begun = self.standing and (self._stage or self._tried)
+        begun = self.standing and (self.stage or self._tried)
         return self._joints.ids[self._left[0]] if begun else None
 
     def begin(self, goals: Floats) -> None:
@@ -106,22 +107,22 @@ class LegTurns:
             BringUpError: A leg did not do its part; it has no torque then.
             PortError: The bus is gone.
         """
-        waits = self._stage == 0 and not may_begin
+        waits = self.stage == 0 and not may_begin
         if not self.standing or waits or not self._calm(positions):
             return
         at = self._left[0]
         stages = (self._release, self._forget, self._hold)
-        if stages[self._stage](at, goals):
+        if stages[self.stage](at, goals):
             self._tried = 0
-            self._stage += 1
+            self.stage += 1
         else:
             self._tried += 1
-        if self._stage == len(stages):
+        if self.stage == len(stages):
             self._left.popleft()
-            self._stage = 0
+            self.stage = 0
             self.forgotten += 1
         if self._tried >= _TRIES:
-            servo, stage = self._joints.ids[at], self._stage
+            servo, stage = self._joints.ids[at], self.stage
             self.reset()
             what = ("lose its torque", "forget its turns", "get its torque back")[stage]
             raise BringUpError(f"expected leg servo {servo} to {what}, found that it does not")

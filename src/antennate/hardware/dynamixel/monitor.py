@@ -95,12 +95,12 @@ class ServoMonitor(ActuatorState):
         servo = self._ids[at]
         if self.missed[servo]:
             return
-        self._guard(servo)
+        self.guard(servo)
         if at == 0 and (volts := self._one(servo, Span(_VOLTAGE.address, 2))) is not None:
             self.supply = _VOLT * _VOLTAGE.decode(volts)
             self._measured = self._clock()
 
-    def _guard(self, servo: int) -> None:
+    def guard(self, servo: int) -> None:
         """Whether a servo still has the watchdog and the torque that it was given."""
         said = self._one(servo, Span(_WATCHDOG.address, _WATCHDOG.size))
         if said is None:

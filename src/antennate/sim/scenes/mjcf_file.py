@@ -2,19 +2,25 @@
 
 The engine's own reader opens any file that a model names and accepts models without end and numbers
 that are not numbers. So the file is read and bounded here first, and the engine gets a text and the
-contents of the files it names, all of them from the folder of the model or below.
+contents of the files it names, all of them from the folder of the model or below. What still gets
+through may crash the engine or keep it busy for ever, so a process of its own compiles it first.
 """
 
 from __future__ import annotations
 
 import math
+import os
+import resource
+import subprocess
+import sys
+from collections.abc import Sequence
 from pathlib import Path
 from xml.etree import ElementTree
 
 import mujoco
 
 from antennate.errors import SceneError, in_one_line
-from antennate.files import open_regular
+from antennate.files import read_limited
 
 LARGEST_MODEL = 5_000_000
 """Most bytes of a model."""
@@ -22,6 +28,12 @@ LARGEST_ASSET = 20_000_000
 """Most bytes of a mesh, texture or height field."""
 MOST_ELEMENTS = 20_000
 """Most elements of a model, those of `replicate` and the like counted as often as they come."""
+_LONGEST_COMPILE = 10.0
+"""Most time for the first compilation, the start of its process included [s]."""
+_MOST_MEMORY = 2 << 30
+"""Most memory of that process [bytes]."""
+_NO_MODEL = 3
+"""Its exit code if the file is refused with a reason, which is found again and said later."""
 _REFUSED = ("include", "extension", "plugin", "attach", "model", "size")
 _COUNTED = ("replicate", "composite", "flexcomp")
 _DIRECTORIES = ("assetdir", "meshdir", "texturedir")
@@ -30,14 +42,48 @@ _LARGEST_SIDE = 4096
 _TEXTS = ("name", "class", "childclass", "file", "content_type")
 
 
+def require_compiles(
+    path: Path,
+    limit: float = _LONGEST_COMPILE,
+    child: Sequence[str] = ("-m", "antennate.sim.scenes.mjcf_file"),
+) -> None:
+    """Let a process of its own compile a model; this one survives whatever happens.
+
+    Args:
+        path: The file.
+        limit: Time that it may take [s].
+        child: What Python runs there, with the path as its argument.
+
+    Raises:
+        SceneError: The engine crashes, or takes longer.
+    """
+    try:
+        code = subprocess.run(  # noqa: S603 our own module
+            [sys.executable, "-P", *child, str(path)],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            env=os.environ | {"OPENBLAS_NUM_THREADS": "1"},  # each thread reserves memory
+            timeout=limit,
+            check=False,
+        ).returncode
+    except subprocess.TimeoutExpired:
+        raise SceneError(
+            f"{path}: expected a model that MuJoCo compiles within {limit:g} s, found none"
+        ) from None
+    if code not in (0, _NO_MODEL):
+        how = f"signal {-code}" if code < 0 else f"exit code {code}"
+        raise SceneError(f"{path}: expected an MJCF model, found one that crashes MuJoCo ({how})")
+
+
 def read_spec(path: Path) -> mujoco.MjSpec:
     """Read a model as a spec.
 
     Raises:
         SceneError: It cannot be read, is too large, or holds what a scene must not hold.
     """
+    data = read_limited(path, LARGEST_MODEL, SceneError)
     try:
-        data = _read(path, LARGEST_MODEL)
         if b"<!DOCTYPE" in data or b"<!ENTITY" in data:
             raise SceneError("expected no DOCTYPE and no ENTITY")
         root = ElementTree.fromstring(data)  # noqa: S314 without DOCTYPE there are no entities
@@ -49,17 +95,6 @@ def read_spec(path: Path) -> mujoco.MjSpec:
         raise SceneError(f"{path}: {error}") from error
     except (ElementTree.ParseError, ValueError, mujoco.FatalError) as error:
         raise SceneError(f"{path}: expected an MJCF model, found {in_one_line(error)}") from error
-
-
-def _read(path: Path, largest: int) -> bytes:
-    try:
-        with open_regular(path) as file:
-            data = file.read(largest + 1)
-    except OSError as error:
-        raise SceneError(f"cannot read {path.name}: {error.strerror}") from error
-    if len(data) > largest:
-        raise SceneError(f"expected at most {largest} bytes in {path.name}, found more")
-    return data
 
 
 def _check(root: ElementTree.Element) -> None:
@@ -111,10 +146,10 @@ def _take_assets(root: ElementTree.Element, folder: Path) -> dict[str, bytes]:
         own = directories["texturedir" if element.tag == "texture" else "meshdir"]
         for key in [key for key in element.attrib if key.startswith("file")]:
             named = element.get(key, "")
-            data = _read(_below(folder, Path(own or directories["assetdir"], named)), LARGEST_ASSET)
+            path = _below(folder, Path(own or directories["assetdir"], named))
             element.attrib.setdefault("name", Path(named).stem)
             element.set(key, f"{len(assets)}{Path(named).suffix}")
-            assets[element.get(key, "")] = data
+            assets[element.get(key, "")] = read_limited(path, LARGEST_ASSET, SceneError)
     return assets
 
 
@@ -126,3 +161,18 @@ def _below(folder: Path, named: Path) -> Path:
             f"expected files in the folder of the model or below, found {str(named)!r}"
         )
     return path
+
+
+def _compile(path: Path) -> None:
+    """What that process does."""
+    resource.setrlimit(resource.RLIMIT_AS, (_MOST_MEMORY, _MOST_MEMORY))
+    mujoco.set_mju_user_warning(lambda message: None)
+    try:
+        model = read_spec(path).compile()
+    except (SceneError, ValueError):
+        sys.exit(_NO_MODEL)
+    mujoco.mj_forward(model, mujoco.MjData(model))
+
+
+if __name__ == "__main__":
+    _compile(Path(sys.argv[1]))

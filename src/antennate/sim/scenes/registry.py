@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from multiprocessing import parent_process
+from pathlib import Path
 from typing import Any
 
 from antennate.errors import AntennateError, SceneError, in_one_line
@@ -10,6 +12,7 @@ from antennate.lookup import Registry
 from antennate.params import TunnelParams
 from antennate.sim.scenes.flat import FlatScene
 from antennate.sim.scenes.mjcf import MjcfScene
+from antennate.sim.scenes.mjcf_file import require_compiles
 from antennate.sim.scenes.scene import Scene
 from antennate.sim.scenes.tunnel import TunnelScene
 
@@ -45,6 +48,8 @@ def make_scene(name: str, tunnel: TunnelParams | None = None) -> Scene:
     if name == TUNNEL:
         return TunnelScene(tunnel)
     if _is_file(name):
+        if parent_process() is None:  # the process that started this worker has tried it
+            require_compiles(Path(name))
         return MjcfScene(name)
     return _called(name, SCENES.find(name))
 

@@ -1,0 +1,75 @@
+"""Where the results of a command go: a folder, and standard output."""
+
+from __future__ import annotations
+
+import contextlib
+import sys
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from pydantic.dataclasses import dataclass
+
+from antennate.cli.arguments import FromFile
+from antennate.cli.options import option
+from antennate.params import Params
+from antennate.studies.formats import to_json
+from antennate.studies.measures import Table
+from antennate.studies.run_directory import RunDirectory
+
+
+@dataclass(frozen=True)
+class ResultOptions(FromFile):
+    """Where the results go."""
+
+    out: Path | None = option(None, "folder for the results, else runs/COMMAND-N", "FOLDER")
+    overwrite: bool = option(False, "replace the results that the folder holds")
+    json: bool = option(False, "print the content of result.json and nothing else")
+
+
+@contextlib.contextmanager
+def folder_for(
+    command: str, options: ResultOptions, config: Params, argv: Sequence[str]
+) -> Iterator[RunDirectory]:
+    """The described folder of a run; where it is is said when it is complete.
+
+    Raises:
+        OutputError: It cannot be written, or it holds another run.
+    """
+    with RunDirectory.create(command, options.out, options.overwrite) as folder:
+        folder.describe(config, ["antennate", command, *argv])
+        yield folder
+        sys.stderr.write(f"written to {folder.path}\n")
+
+
+def tell(
+    result: Mapping[str, Any], options: ResultOptions, tables: Iterable[Table], sentence: str
+) -> None:
+    """Print the result: as JSON, or as tables and one closing sentence."""
+    if options.json:
+        sys.stdout.write(to_json(result))
+        return
+    for table in tables:
+        print_table(table)
+    sys.stdout.write(f"{sentence}\n")
+
+
+def print_table(table: Table) -> None:
+    """Print a table and its note; underscores of a name are shown as spaces, of a path not."""
+    from rich.box import SIMPLE_HEAD  # slow to import
+    from rich.console import Console
+    from rich.table import Table as Drawn
+    from rich.text import Text
+
+    drawn = Drawn(title=table.title, title_justify="left", box=SIMPLE_HEAD, pad_edge=False)
+    drawn.add_column("", overflow="fold")
+    for name in table.columns:
+        heading = name if ":" in name else name.replace("_", " ")
+        drawn.add_column(Text(heading), justify="right", overflow="fold")
+    for name, cells in table.rows:
+        drawn.add_row(Text(name), *(Text(cell) for cell in cells))
+    console = Console(file=sys.stdout, highlight=False)
+    console.print(drawn)
+    if table.note:
+        console.print(Text(table.note), soft_wrap=True)
+        console.print()

@@ -1,0 +1,103 @@
+"""Tests know the package by its public names alone, so that a rename inside it breaks none."""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+TESTS = Path(__file__).parent
+PRIVATE = re.compile(r"_[A-Za-z]\w*")
+
+
+def of_the_package() -> set[str]:
+    """Private names that occur in the package, or are modules of it."""
+    paths = list((TESTS.parent / "src").rglob("*.py"))
+    words = (re.findall(r"\b_\w+", path.read_text(encoding="utf-8")) for path in paths)
+    names = {word for found in words for word in found} | {path.stem for path in paths}
+    return {name for name in names if PRIVATE.fullmatch(name)}
+
+
+def known_names(tree: ast.Module) -> tuple[set[str], set[str]]:
+    """Names of other packages' modules, and of what comes from the package."""
+    modules, ours = set[str](), set[str]()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import | ast.ImportFrom):
+            names = {alias.asname or alias.name for alias in node.names}
+            from_us = "antennate" in ast.unparse(node)
+            (ours if from_us else modules).update(names)
+    return modules, ours
+
+
+def own_attributes(tree: ast.Module, package: set[str], ours: set[str]) -> Iterator[ast.AST]:
+    """Those of `self` in classes; a class made from one of the package's may share no name."""
+    for kind in ast.walk(tree):
+        if isinstance(kind, ast.ClassDef):
+            shared = package if ours & {ast.unparse(base) for base in kind.bases} else ()
+            for node in ast.walk(kind):
+                of_self = isinstance(node, ast.Attribute) and ast.unparse(node.value) == "self"
+                if of_self and node.attr not in shared:
+                    yield node
+
+
+def words_of(node: ast.AST, package: set[str]) -> list[str]:
+    """Names in an import, and in a text that may name an attribute to be set."""
+    if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("antennate"):
+        return [*str(node.module).split("."), *(alias.name for alias in node.names)]
+    if isinstance(node, ast.Constant) and isinstance(node.value, str):
+        words = [node.value, *re.findall(r"\w\.(_[A-Za-z]\w*)", node.value)]
+        return [word for word in words if word in package]
+    return []
+
+
+def used(tree: ast.Module, package: set[str]) -> Iterator[ast.AST]:
+    """Where private names are used that are not the test's own."""
+    modules, ours = known_names(tree)
+    own = set(own_attributes(tree, package, ours))
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Attribute) and PRIVATE.fullmatch(node.attr):
+            if node not in own and ast.unparse(node.value) not in modules:
+                yield node
+        elif any(PRIVATE.fullmatch(word) for word in words_of(node, package)):
+            yield node
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "session._hidden",
+        "from antennate.control.loop import _x",
+        "from antennate._x import loop",
+        "setattr(session, '_hidden', True)",
+        "put('antennate.hardware.session.Session._hidden')",
+        "def forget(self):\n    self._hidden = False",
+        "from antennate.x import A\nclass B(A):\n    def forget(self):\n        self._hidden = 1",
+    ],
+)
+def test_a_private_name_is_found(text: str) -> None:
+    assert list(used(ast.parse(text), {"_hidden"}))
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "import os\nos._exit(0)",
+        "class Mine:\n    def forget(self):\n        self._hidden = False",
+        "feed.__enter__()",
+        "site = 'left_hinge' + '_hinge5'",
+    ],
+)
+def test_a_name_of_its_own_is_none(text: str) -> None:
+    assert not list(used(ast.parse(text), {"_hidden"}))
+
+
+def test_tests_use_no_private_name_of_the_package() -> None:
+    package = of_the_package()
+    assert [
+        f"{path.name}:{node.lineno}: {ast.unparse(node)}"
+        for path in TESTS.glob("*.py")
+        for node in used(ast.parse(path.read_text(encoding="utf-8")), package)
+    ] == []
