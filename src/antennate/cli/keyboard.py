@@ -18,9 +18,9 @@ _MOST = 1024
 
 @contextlib.contextmanager
 def pressed_keys(flag: str) -> Iterator[Callable[[], bool]]:
-    """Yield a function that says, without waiting, whether a key came since its last call.
+    r"""Yield a function that says, without waiting, whether a key came since its last call.
 
-    Ctrl-C, Ctrl-\\ and Ctrl-Z do what they always do. The terminal is as before afterwards.
+    Ctrl-C, Ctrl-\ and Ctrl-Z do what they always do. The terminal is as before afterwards.
 
     Args:
         flag: What needs the keys, for the error.
@@ -30,7 +30,9 @@ def pressed_keys(flag: str) -> Iterator[Callable[[], bool]]:
     """
     stdin = sys.stdin
     if stdin is None or not stdin.isatty():
-        raise ConfigError(f"{flag}: expected a terminal as standard input, whose keys can be held, found none")
+        raise ConfigError(
+            f"{flag}: expected a terminal as standard input, whose keys can be held, found none"
+        )
     handle = stdin.fileno()
     if os.tcgetpgrp(handle) != os.getpgrp():
         raise ConfigError(f"{flag}: expected to run in the foreground of its terminal, without &")

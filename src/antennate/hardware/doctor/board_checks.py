@@ -133,7 +133,7 @@ def _antenna(
     )
     found = [_measured(f"{name} noise", f"at most {robot.doctor.noise:g} counts", quiet)]
     try:
-        band = Band.of(curve)
+        band = Band.of(curve, robot.reach)
         channel = ChannelDiagnosis(band)
     except CalibrationError as error:
         wrong = Finding(str(error), "bad", "calibrate again, with another divider resistor")

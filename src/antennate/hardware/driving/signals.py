@@ -1,4 +1,4 @@
-"""Ctrl-C, Ctrl-\\, SIGTERM and the loss of the terminal, while servos have torque.
+r"""Ctrl-C, Ctrl-\, SIGTERM and the loss of the terminal, while servos have torque.
 
 An exception alone would not do: a controller with a bare `except`, a destructor or a callback may
 swallow it. So what was heard is also kept, for the loop to look at.

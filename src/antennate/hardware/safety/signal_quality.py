@@ -30,6 +30,7 @@ class SignalQuality:
         conditioning: Their calibrated range.
         drift: How drift is followed.
         touch: What counts as a touch, None if they are not checked by touch.
+        reach: How far beyond the calibrated range readings are believed [spans]; 0.8 by default.
 
     Attributes:
         channels: Diagnosis of the left and the right antenna.
@@ -42,8 +43,9 @@ class SignalQuality:
         conditioning: ConditioningParams,
         drift: DriftParams | None = None,
         touch: TouchCheckParams | None = None,
+        reach: float | None = None,
     ) -> None:
-        band = Band.of(conditioning)
+        band = Band.of(conditioning, reach)
         self.channels = [ChannelDiagnosis(band) for _ in _SIDES]
         self.check = None if touch is None else TouchCheck(touch, (band, band))
         self.drifts = [Drift(drift or DriftParams(), band) for _ in _SIDES]
