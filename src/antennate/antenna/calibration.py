@@ -92,7 +92,7 @@ class Calibration(_Strict):
     speeds: tuple[SpeedFit, ...]
     cross_validated_rmse: dict[Literal["sigmoid", "line", "isotonic"], float]
     better_than_sigmoid: tuple[Literal["line", "isotonic"], ...]
-    reach: float = Field(REACH, ge=0, le=20)
+    reach: float = Field(default=REACH, ge=0, le=200)
 
     def conditioning(self, averaging_time: float = 0.1) -> ConditioningParams:
         """The curve as parameters of a controller; `averaging_time` [s] is T_avg of the paper."""

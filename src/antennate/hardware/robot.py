@@ -25,7 +25,9 @@ class RobotConfig(Params):
     """File of `antennate calibrate`, for both antennae, in place of control.conditioning."""
     sensor_id: str | None = number(None, "1", "assumed: that of the calibration file")
     """Name of the flex sensor; 16 hexadecimal digits name the board it is soldered to."""
-    reach: float | None = number(None, "1", "assumed: of the calibration file, or 0.8", ge=0, le=20)
+    reach: float | None = number(
+        None, "1", "assumed: of the calibration file, or 0.8", ge=0, le=200
+    )
     """How far beyond the bent end of its range a reading is believed, in calibrated spans."""
     robot: RobotSpec = RobotSpec()
     control: ControlParams = ControlParams()

@@ -15,10 +15,9 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from antennate.antenna import fitting
-from antennate.antenna.calibration import REACH, Calibration
+from antennate.antenna.calibration import Calibration
 from antennate.antenna.fitting import Samples
 from antennate.antenna.sensor import SensorChain, reading_noise
-from antennate.antenna.sensor import counts as sensed_counts
 from antennate.control.conditioning import bending_level
 from antennate.experiments.calibrate.recording import Recording, RecordingParams, read, write
 from antennate.experiments.reading import mean_since
@@ -84,8 +83,6 @@ class CalibrateConfig(Params):
     """Normalise by 0 to 4095 counts and not by the recording's ends."""
     threshold: float = number(0.5, "1", "assumed: middle of the sigmoid", gt=0, lt=1)
     """Theta of the file."""
-    reach: float | None = number(None, "1", "assumed: 0.8; the rig's at its stops", gt=0, le=20)
-    """How far beyond the bent end readings are those of the sensor, in calibrated spans."""
     least_r2: float = number(0.5, "1", "assumed: half of the bend explained", ge=0, lt=1)
     """A worse fit is refused."""
     good_r2: float = number(0.9, "1", "assumed: our rig reaches 0.98", ge=0, lt=1)
@@ -273,14 +270,4 @@ def run(
         config.draws,
         config.seed,
     )
-    reach = config.reach or (_reach(config, found) if config.recording is None else REACH)
-    return CalibrateOutcome(config, used, raw, found.model_copy(update={"reach": reach}))
-
-
-def _reach(config: CalibrateConfig, found: Calibration) -> float:
-    """How far the rig's antenna bends beyond its calibration: all its hinges at their stops."""
-    antenna = config.antenna
-    most = float(sensed_counts(antenna.sensor, np.array(antenna.sensed_hinges * antenna.range)))
-    bent = found.counts_high if found.polarity > 0 else found.counts_low
-    span = found.counts_high - found.counts_low
-    return round(max(REACH, abs(most - bent) / span), 2)
+    return CalibrateOutcome(config, used, raw, found)
