@@ -26,7 +26,6 @@ OTHERS = (
     "antennate.hardware.robot_file",
     "antennate.hardware.robot",
     "antennate.hardware.driving.config",
-    "antennate.hardware.doctor.config",
     "antennate.hardware.esp32.recorder",
     "antennate.telemetry.replay",
 )

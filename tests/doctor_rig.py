@@ -7,9 +7,9 @@ from collections.abc import Iterator
 
 from antennate.hardware.doctor.check import Row
 from antennate.hardware.doctor.checkup import Checkup, examine
-from antennate.hardware.doctor.config import DoctorConfig
 from antennate.hardware.doctor.fix import apply, plan
 from antennate.hardware.ports.port import Port
+from antennate.hardware.robot import DoctorConfig
 from antennate.twin.config import TwinConfig, build
 from antennate.twin.faults import Faults, read
 from antennate.twin.lockstep import BoardPort, LockstepClock

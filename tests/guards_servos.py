@@ -31,7 +31,7 @@ from antennate.hardware.dynamixel.pending import PendingRequests
 from antennate.hardware.dynamixel.tables import XC430_W240
 from antennate.hardware.ports import serial_port
 from antennate.robots.spec import RobotSpec
-from antennate.twin.wire import SimulatedWire
+from antennate.twin.lockstep import SimulatedWire
 
 controller_fails = test_session.test_B8_servos_stop_within_120_ms_when_only_the_controller_fails
 
@@ -257,7 +257,7 @@ BUS = [
     ),
     Guard(
         "line that goes away",
-        put(serial_port, "PortError", OSError),
+        put(serial_port, "port_errors", constant(contextlib.nullcontext())),
         test_twin_bus.test_L12_a_line_that_goes_away_is_a_port_error,
         by=(OSError,),
     ),

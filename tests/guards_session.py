@@ -73,7 +73,7 @@ def an_exception_alone(old: Any, self: Any, number: int, frame: Any) -> None:
     try:
         old(self, number, frame)
     finally:
-        self.heard = False
+        self.received = False
 
 
 def forget_the_loss(self: Any, time: float) -> None:
@@ -126,7 +126,7 @@ SESSION = [
     ),
     Guard(
         "signals while the torque goes off",
-        before(StopOnce, "receive", lambda self, *_: setattr(self, "deaf", False)),
+        before(StopOnce, "receive", lambda self, *_: setattr(self, "closed", False)),
         partial(test_signals.test_B19_no_signal_is_heard_once_the_walk_is_over_of_itself, "stand"),
         by=(KeyboardInterrupt,),
     ),

@@ -6,8 +6,8 @@ from antennate.hardware.dynamixel.answers import MOTION, Answer, Span, Value
 from antennate.hardware.dynamixel.bus import Bus
 from antennate.hardware.dynamixel.tables import XC430_W240, XL330_M288
 from antennate.twin.bus import ServoBus
+from antennate.twin.lockstep import SimulatedWire
 from antennate.twin.registers import Servo
-from antennate.twin.wire import SimulatedWire
 
 IDS = list(range(1, 20))
 MODELS = {i: (XC430_W240 if i <= 17 else XL330_M288).model for i in IDS}

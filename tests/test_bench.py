@@ -49,7 +49,7 @@ def test_the_carriage_follows_its_target() -> None:
     for i in range(1000):
         held.command(0.0, speed * (i + 1) * period, 0.0, speed, 0.0)
         held.step(2)
-    assert held.carriage() == pytest.approx([0.0, 0.05], abs=2e-4)
+    assert held.carriage.position == pytest.approx([0.0, 0.05], abs=2e-4)
 
 
 def test_weight_bends_by_the_sum_of_its_levers() -> None:
@@ -94,7 +94,7 @@ def test_joints_are_where_the_chain_says() -> None:
     rest(held)
     angles = held.hinges()[None, :].copy()
     angles[0, 0] += held.base_angle()
-    expected = shape(Chain.of(ANTENNA), angles)[0] + held.carriage()
+    expected = shape(Chain.of(ANTENNA), angles)[0] + held.carriage.position
     assert held.joints() == pytest.approx(expected, abs=1e-6)
     assert held.flex() == pytest.approx(held.hinges()[: ANTENNA.sensed_hinges].sum())
 

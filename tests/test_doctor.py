@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from doctor_rig import ROBOT, Patient, wrong
 
-from antennate.hardware.doctor.board_checks import checks
+from antennate.hardware.doctor import board_checks
 from antennate.hardware.doctor.board_survey import BoardSurvey
 from antennate.hardware.doctor.check import grouped, ids_text
 from antennate.hardware.doctor.checkup import examine
@@ -175,7 +175,7 @@ def test_a_board_that_speaks_another_language_is_quoted() -> None:
     text = BoardSurvey(text="MicroPython v1.24 on ESP32\r\n>>> ", received=40)
     other = BoardSurvey(refusals=["the board speaks protocol version 9"], received=40)
     for survey, said in ((text, "'MicroPython v1.24 on ESP32 >>>'"), (other, "version 9")):
-        rows = [check.row("esp32", survey, ROBOT) for check in checks(survey, ROBOT)]
+        rows = list(board_checks.rows(survey, ROBOT))
         assert len(rows) == 1
         assert said in rows[0].found
         assert "firmware/" in rows[0].cure

@@ -1,15 +1,16 @@
-"""`antennate drive` and `antennate twin` as they are shipped: two processes, and what is left."""
+"""`antennate drive` as it is shipped, with somebody's own controller, before a twin elsewhere."""
 
 from __future__ import annotations
 
 import json
+import re
 import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -17,67 +18,100 @@ import pytest
 
 from antennate.telemetry.reader import count
 
-ANTENNATE = [sys.executable, "-c", "import sys; from antennate.cli import main; sys.exit(main())"]
-FAULTS = (("reset", 5.0), ("reset", 10.5), ("open_left", 12.5))
-"""What happens to the board, and when [s]: in the dry run, while walking, and at its end."""
-DRY_RUN, WALK = 5.0, 6.0
-"""How long they last [s]."""
-START = 1.5
-"""Time in which a twin is ready on an idle machine [s]; faults come later where it takes longer."""
+HERE = Path(__file__).parent
+EXAMPLE = f"{HERE.parent / 'examples' / 'own_controller.py'}:OwnController"
+ANTENNATE = [sys.executable, "-m", "antennate"]
+MOST = 120
+"""Longest walk [s]: an end, should nothing of what is waited for be said."""
+RESTART = 1.0
+"""Time in which a board is back after a reset [s]: half of it in silence."""
+OPEN = " HOLD (OPEN: a channel floats: its wire is open"
+SHORT = " HOLD (SHORT_LO: a channel is shorted to ground"
 
 
-@dataclass(frozen=True)
+@dataclass
 class Drive:
-    """What a drive left behind."""
+    """A drive and what it has said."""
 
-    code: int
-    lines: list[str]
     folder: Path
+    code: int | None = None
+    lines: list[str] = field(default_factory=list)
 
     @property
     def result(self) -> dict[str, Any]:
         return json.loads((self.folder / "result.json").read_text())
 
-    def status(self, cause: str) -> list[str]:
-        """Lines of its status that name a cause."""
-        return [line for line in self.lines if f" {cause}: " in line and " maneuver=" in line]
+    @property
+    def sent(self) -> int:
+        """Commands sent, as it said last."""
+        found = re.search(r" sent=(\d+) ", self.lines[-1]) if self.lines else None
+        return int(found[1]) if found else 0
+
+    def read(self, process: subprocess.Popen[str], enough: Callable[[], bool]) -> None:
+        """Read what it says until that is enough, or until it ends."""
+        assert process.stderr is not None
+        for line in process.stderr:
+            self.lines.append(line.rstrip("\n"))
+            if enough():
+                return
 
 
 @contextmanager
-def twin(faults: Iterable[tuple[str, float]] = ()) -> Iterator[list[str]]:
-    """A twin; the arguments that lead to it."""
-    asked = [word for what, t in faults for word in ("--fault", f"esp32={what}@{t:.2f}s")]
-    with subprocess.Popen(
-        [*ANTENNATE, "twin", *asked], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
-    ) as process:
+def twin() -> Iterator[tuple[list[str], Callable[[str], None]]]:
+    """A twin: the arguments that lead to it, and what breaks it at once."""
+    words = [sys.executable, str(HERE / "twin_process.py")]
+    pipes: Any = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
+    with subprocess.Popen(words, **pipes) as process:
+        assert process.stdin is not None
         assert process.stdout is not None
+        stdin = process.stdin
+
+        def fault(text: str) -> None:
+            stdin.write(text + "\n")
+            stdin.flush()
+
         places = json.loads(process.stdout.readline())
         try:
-            yield ["--esp32", places["esp32"], "--bus", places["bus"]]
+            yield ["--esp32", places["esp32"], "--bus", places["bus"]], fault
         finally:
-            process.send_signal(signal.SIGTERM)
+            process.kill()
 
 
 @pytest.fixture(scope="module")
 def driven(tmp_path_factory: pytest.TempPathFactory) -> Drive:
-    """A drive with all the faults."""
-    began = time.monotonic()
-    with twin():
-        later = 3.0 * max(0.0, time.monotonic() - began - START)
-    folder = tmp_path_factory.mktemp("drive") / "run"
-    words = ["drive", "--arm", "--no-touch-check", "--out", str(folder)]
-    words += ["--dry-run", f"{DRY_RUN + later}", "--duration", f"{WALK + later}"]
-    first, *others = FAULTS
-    faults = [(first[0], first[1] + later), *((what, t + 2 * later) for what, t in others)]
-    with twin(faults) as places:
-        run = subprocess.run(
-            [*ANTENNATE, *words, *places], capture_output=True, text=True, check=False
-        )
-    return Drive(run.returncode, run.stderr.splitlines(), folder)
+    """A drive whose board resets twice, and of whose antennae one wire breaks, then shorts."""
+    drive = Drive(tmp_path_factory.mktemp("drive") / "run")
+    words = ["drive", "--arm", "--no-touch-check", "--controller", EXAMPLE]
+    words += ["--dry-run", "3", "--duration", f"{MOST}", "--limits.repeats", "100"]
+    with (
+        twin() as (places, fault),
+        subprocess.Popen(
+            [*ANTENNATE, *words, *places, "--out", str(drive.folder)],
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
+            text=True,
+        ) as process,
+    ):
+        drive.read(process, lambda: " maneuver=" in drive.lines[-1])
+        fault("esp32=reset")
+        time.sleep(RESTART)
+        drive.read(process, lambda: drive.sent > 0)
+        fault("esp32=reset")
+        time.sleep(RESTART)
+        walked = drive.sent
+        drive.read(process, lambda: drive.sent >= walked + 150)
+        fault("esp32=open_left")
+        drive.read(process, lambda: OPEN in drive.lines[-1])
+        fault("esp32=short_left")
+        drive.read(process, lambda: SHORT in drive.lines[-1])
+        process.send_signal(signal.SIGINT)
+        drive.read(process, lambda: False)
+    drive.code = process.returncode
+    return drive
 
 
 def test_E1_a_reset_or_a_broken_wire_ends_no_drive(driven: Drive) -> None:
-    """It goes to its end, torque off, with its result and every tick in its log."""
+    """It goes on until it is stopped, torque off, with its result and every tick in its log."""
     result = driven.result
     assert driven.code == 0, driven.lines[-5:]
     assert driven.lines[-1] == f"written to {driven.folder}"
@@ -88,5 +122,13 @@ def test_E1_a_reset_or_a_broken_wire_ends_no_drive(driven: Drive) -> None:
     assert result["lost_samples"] < 100
     assert (result["unlogged"], result["log_complete"]) == (0, True)
     assert count(driven.folder / result["logs"][0]) == result["pace"]["ticks"]
-    assert " HOLD (OPEN: a channel floats: its wire is open" in driven.lines[-2]
-    assert result["poses_sent"] > 150  # it walked on after the reset
+
+
+@pytest.mark.parametrize("cause", [OPEN, SHORT], ids=["open", "short"])
+def test_S1_S2_what_is_wrong_with_a_wire_is_said_through_bytes(driven: Drive, cause: str) -> None:
+    assert any(cause in line for line in driven.lines)
+
+
+def test_a_controller_of_ones_own_drives_another_process(driven: Drive) -> None:
+    assert driven.result["controller"] == EXAMPLE
+    assert driven.result["poses_sent"] > 150  # it walked on after the reset

@@ -27,8 +27,8 @@ from antennate.hardware.dynamixel.packets import Status, StatusError
 from antennate.hardware.dynamixel.tables import XL330_M288
 from antennate.hardware.ports.port import PortError
 from antennate.twin.bus import Fault, ServoBus, Trouble
+from antennate.twin.lockstep import SimulatedWire
 from antennate.twin.registers import Servo
-from antennate.twin.wire import SimulatedWire
 
 LIMIT = 0.010 + 1e-9
 TRUE = {i: 100 * i for i in IDS}

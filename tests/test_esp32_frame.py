@@ -123,7 +123,7 @@ def test_E8_what_cannot_be_used_says_why(body: bytes, says: str) -> None:
 def test_E8_a_body_without_version_and_kind_is_noise(body: bytes) -> None:
     decoder = FrameDecoder()
     assert decoder.feed(framed(body)) == []
-    assert decoder.counters.noise_bytes == len(body) + 5
+    assert decoder.counters.judged == len(body) + 5
 
 
 def test_E8_an_unknown_reset_reason_stays_unknown() -> None:

@@ -194,3 +194,24 @@ def test_the_chosen_lead_is_marked_within_one_turn():
     marked = study().axes[0].lines[2]
     assert list(marked.get_xdata()) == pytest.approx([np.degrees(-2.5) + 360.0])
     assert list(marked.get_ydata()) == [0.2]
+
+
+def test_intervals_reach_from_end_to_end_and_leave_out_what_does_not_exist():
+    panel = style.canvas(3.0, 3.0).subplots()
+    rows = [{"f": 2.0, "f_95": (1.0, 4.0)}, {"f": None, "f_95": None}, {"f": 5.0, "f_95": None}]
+    style.intervals(panel, [0, 1, 2], rows, ("f", "f_95"), label="f")
+    points, _, (whiskers,) = panel.containers[0]
+    assert points.get_xydata().tolist() == [[0.0, 2.0], [2.0, 5.0]]
+    ends = [segment[:, 1].tolist() for segment in whiskers.get_segments()]
+    assert ends == [[1.0, 4.0], [5.0, 5.0]]
+
+
+def test_the_legend_names_only_what_the_scene_has():
+    def named(course):
+        paths = {("open", 0): course}
+        figure = tunnel.trajectories(paths, ("open",), [Row("open", 0, "left", LIMIT)], range(1))
+        return {text.get_text() for text in figure.legends[0].get_texts()}
+
+    bare = path(2.0)
+    bare.fixed, bare.before, bare.after = [], [], []
+    assert named(path(2.0)) - named(bare) == {"wall", "obstacle at first", "obstacle at the end"}

@@ -77,7 +77,8 @@ def sent(board: Board) -> tuple[list[Hello], list[Sample]]:
     decoder = FrameDecoder()
     frames = decoder.feed(bytes(board.sent))
     counters = decoder.counters
-    assert counters.good_bytes + counters.delimiters == counters.received == len(board.sent)
+    assert counters.accounted == counters.received == len(board.sent)
+    assert counters.good == len(frames)
     greetings = [found for found in frames if isinstance(found, Hello)]
     samples = [found for found in frames if isinstance(found, Sample)]
     assert len(greetings) + len(samples) == len(frames)

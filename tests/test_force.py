@@ -7,10 +7,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from beams import uniform_beam
 from pydantic import ValidationError
 
 from antennate.antenna import sensor
-from antennate.antenna.statics import Chain, equilibrium, shape, uniform_beam, with_profile
+from antennate.antenna.statics import Chain, equilibrium, shape, with_profile
 from antennate.cli import main
 from antennate.errors import SimulationError
 from antennate.experiments import reading

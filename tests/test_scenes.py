@@ -13,11 +13,10 @@ from antennate.cli import main
 from antennate.errors import AntennateError, ConfigError, SceneError
 from antennate.params import GaitParams, PhysicsParams
 from antennate.robots.spec import RobotSpec
-from antennate.sim.scenes.flat import FlatScene
 from antennate.sim.scenes.mjcf import MjcfScene
 from antennate.sim.scenes.mjcf_file import require_compiles
 from antennate.sim.scenes.registry import make_scene
-from antennate.sim.scenes.scene import Route
+from antennate.sim.scenes.scene import FlatScene, Route
 from antennate.sim.scenes.tunnel import TunnelScene
 from antennate.sim.trial import TrialConfig, check_start, make_world, place_at_start
 from antennate.testing import check_scene

@@ -20,8 +20,8 @@ from antennate.hardware.dynamixel.packets import LONGEST, Packet
 from antennate.hardware.dynamixel.parser import Parser
 from antennate.hardware.safety.causes import Cause, State
 from antennate.twin.bus import ServoBus
+from antennate.twin.lockstep import SimulatedWire
 from antennate.twin.registers import Servo
-from antennate.twin.wire import SimulatedWire
 
 GOAL = 116
 

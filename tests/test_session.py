@@ -25,7 +25,7 @@ from antennate.hardware.dynamixel.packets import Instruction, StatusError
 from antennate.hardware.dynamixel.parser import Parser
 from antennate.hardware.ports.port import PortError
 from antennate.hardware.safety.causes import Cause, State
-from antennate.params import ControlParams
+from antennate.params import ControlParams, TouchCheckParams
 from antennate.robots.spec import RobotSpec
 from antennate.telemetry.header import Header
 from antennate.telemetry.replay import replay
@@ -660,7 +660,8 @@ def test_B10_arming_that_fails_half_way_leaves_no_servo_with_torque(what: str) -
         log(session, t)
         note(session, t)
 
-    drive(made.session, DriveConfig(dry_run=1.0, duration=2.0), arm=True, on_tick=both)
+    config = DriveConfig(dry_run=1.0, duration=2.0, touch=TouchCheckParams(patience=1.0))
+    drive(made.session, config, arm=True, on_tick=both)
     assert max(had_torque) == 0
     assert log.state[-1] >= State.FAULT
     said = "torque_enable" if what == "servo" else "1.571 rad for servo 3"

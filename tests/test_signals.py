@@ -22,12 +22,12 @@ CONFIG = DriveConfig(dry_run=0.5, duration=4.0)
 def test_B19_each_signal_that_ends_a_program_is_heard_until_nobody_shall_hear(number: int) -> None:
     before = [signal.getsignal(other) for other in STOPS]
     with StopOnce() as stop:
-        assert not stop.heard
+        assert not stop.received
         for other in (number, *STOPS):
             with pytest.raises(KeyboardInterrupt):
                 signal.raise_signal(other)
-        assert stop.heard
-        stop.deaf = True
+        assert stop.received
+        stop.closed = True
         for other in STOPS:
             signal.raise_signal(other)
     assert [signal.getsignal(other) for other in STOPS] == before

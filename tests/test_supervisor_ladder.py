@@ -15,7 +15,7 @@ from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
 
 from antennate.hardware.safety.causes import (
     DATA,
-    OF_MIND,
+    OF_CONTROLLER,
     Active,
     Cause,
     Inputs,
@@ -31,7 +31,7 @@ def first_told(active: Active) -> tuple[int, int, bool, float]:
     """Lost data explain what the controller makes of them; those that are over explain least."""
     cause = active.cause
     over = cause in DATA and not active.present
-    return -cause.severity, 0 if cause in DATA else 1 + (cause in OF_MIND), over, active.since
+    return -cause.severity, 0 if cause in DATA else 1 + (cause in OF_CONTROLLER), over, active.since
 
 
 def pairs() -> list[tuple[Cause, ...]]:

@@ -9,7 +9,7 @@ import pytest
 
 from antennate.antenna import taper
 from antennate.errors import BadInputError, ConfigError
-from antennate.experiments.taper.run import TaperConfig, run
+from antennate.experiments.taper.experiment import TaperConfig, run
 from antennate.params import TaperParams
 
 LINEAR = (

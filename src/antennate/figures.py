@@ -135,11 +135,11 @@ def intervals(
         panel: Where to draw.
         x: A place for each row.
         rows: Objects of result.json.
-        keys: Names of the measure and of its interval in a row.
+        keys: Names of the measure and of its interval in a row; empty for no interval.
         look: Colour, marker and label, as for `plot`.
     """
     value, interval = keys
-    known = [(a, row[value], row[interval]) for a, row in zip(x, rows, strict=True)]
+    known = [(a, row.get(value), row.get(interval)) for a, row in zip(x, rows, strict=True)]
     known = [(a, b, ends or (b, b)) for a, b, ends in known if b is not None and b == b]
     middle = np.array([b for _, b, _ in known])
     low, high = np.array([ends for *_, ends in known]).reshape(-1, 2).T

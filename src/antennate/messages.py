@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
-from difflib import get_close_matches
+from difflib import SequenceMatcher, get_close_matches
 from typing import Any
 
 _CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f]+")
@@ -12,6 +12,8 @@ _LONGEST = 80
 """Most characters of a found value that are shown."""
 _SIMILAR = 0.7
 """Least similarity of a word to the choice that is hinted at, from 0 to 1."""
+_SIMILAR_END = 0.6
+"""The same of what follows the last dot of both."""
 
 
 def one_line(text: str) -> str:
@@ -42,5 +44,13 @@ def nearest(word: str, known: Iterable[str]) -> str:
     choices = {choice.lstrip("-"): choice for choice in known}
     wanted = word.lstrip("-").lower()
     ends = [name for name in choices if name.endswith(f".{wanted}")]
-    close = ends[:2] or get_close_matches(wanted, choices, n=1, cutoff=_SIMILAR)
+    close = ends[:2] or [
+        name
+        for name in get_close_matches(wanted, choices, n=1, cutoff=_SIMILAR)
+        if SequenceMatcher(None, _last(wanted), _last(name)).ratio() >= _SIMILAR_END
+    ]
     return f" (did you mean {' or '.join(choices[name] for name in close)}?)" if close else ""
+
+
+def _last(path: str) -> str:
+    return path.rpartition(".")[2]

@@ -37,6 +37,11 @@ class Maneuver(IntEnum):
     REVERSE = 3
     HOLD = 4
 
+    @classmethod
+    def label(cls, value: int) -> str:
+        """Its name; a number that is none of ours, as a controller may say, stays one."""
+        return cls(value).name if value in set(cls) else str(value)
+
 
 @dataclass(frozen=True, slots=True)
 class AntennaFrame:

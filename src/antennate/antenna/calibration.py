@@ -10,6 +10,7 @@ from typing import Literal
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from antennate.antenna.sensor import FULL_SCALE
 from antennate.control.conditioning import bending_level
 from antennate.errors import CalibrationError
 from antennate.files import read_limited, write_whole
@@ -28,7 +29,6 @@ NARROWEST_RISE = 10.0
 """Fewest counts over which the level may rise from 0.1 to 0.9: four times a reading's noise."""
 _RISE = 2.0 * math.log(9.0)
 """That rise of a sigmoid in units of 1 / slope."""
-_FULL_SCALE = 4095
 _LARGEST_FILE = 1_000_000
 
 
@@ -176,7 +176,7 @@ def _impossible(found: Calibration) -> str:
         if not low <= high:
             return f"{field}: expected the lower end first, found {low:g} and {high:g}"
     low, high = found.valid_counts
-    if not (0 <= low < high <= _FULL_SCALE):
+    if not (0 <= low < high <= FULL_SCALE):
         return f"valid_counts: expected readings of 12 bits, found {low:g} to {high:g}"
     if (width := _RISE * span / found.slope) < NARROWEST_RISE:
         return (

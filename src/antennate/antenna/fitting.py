@@ -18,13 +18,15 @@ import numpy as np
 from antennate import __version__
 from antennate.antenna.calibration import FEWEST, NARROWEST_SPAN, REACH, Calibration, SpeedFit
 from antennate.antenna.sensor import FULL_SCALE
+from antennate.control.conditioning import sigmoid
 from antennate.errors import CalibrationError
-from antennate.types import Bools, Floats, Ints
+from antennate.types import Floats, Ints
 
 MODELS = ("sigmoid", "line", "isotonic")
 REVERSAL = 0.15
 """Share of the span by which mean readings may fall back while the level rises."""
 _BINS = 10
+_FOLDS = 10
 _RAILS = (0.0, 4090.0)
 """Readings at or beyond these say nothing about the level [counts]."""
 _RAIL_SHARE = 0.2
@@ -48,16 +50,6 @@ class Samples:
     trial: Ints
     speed: Floats
     row: Ints
-
-    def __getitem__(self, chosen: Bools | Ints) -> Samples:
-        """Some rows."""
-        return Samples(
-            self.counts[chosen],
-            self.level[chosen],
-            self.trial[chosen],
-            self.speed[chosen],
-            self.row[chosen],
-        )
 
 
 def check(samples: Samples) -> None:
@@ -119,7 +111,7 @@ def polarity(samples: Samples) -> Literal[-1, 1]:
 
 def curve(z: Floats, slope: float, midpoint: float) -> Floats:
     """Level, 0 to 1, of signed normalised readings z = s x, same shape; midpoint is s x0."""
-    return 1.0 / (1.0 + np.exp(-np.clip(slope * (z - midpoint), -700.0, 700.0)))
+    return sigmoid(slope * (z - midpoint))
 
 
 def fit_sigmoid(x: Floats, level: Floats, sign: int) -> tuple[float, float]:
@@ -174,7 +166,7 @@ def fit(
     """
     check(samples)
     sign = polarity(samples)
-    low, high = (0.0, 4095.0) if full_scale else _ends(samples)
+    low, high = (0.0, float(FULL_SCALE)) if full_scale else _ends(samples)
     x = (samples.counts - low) / (high - low)
     slope, midpoint = fit_sigmoid(x, samples.level, sign)
     predicted = curve(sign * x, slope, sign * midpoint)
@@ -294,7 +286,7 @@ def _groups(samples: Samples) -> list[Ints]:
     trials = np.unique(samples.trial)
     if len(trials) >= 3:
         return [np.flatnonzero(samples.trial == trial) for trial in trials]
-    return [b for b in np.array_split(np.arange(len(samples.counts)), 10) if len(b)]
+    return [b for b in np.array_split(np.arange(len(samples.counts)), _FOLDS) if len(b)]
 
 
 def _bootstrap(
@@ -313,7 +305,7 @@ def _bootstrap(
 def cross_validate(samples: Samples, x: Floats, sign: int) -> dict[str, Floats]:
     """Root mean squared error of each model on groups it has not seen, shape (folds,)."""
     groups = _groups(samples)
-    folds = [np.concatenate(part) for part in _deal(groups, 10)]
+    folds = [np.concatenate(groups[i::_FOLDS]) for i in range(min(_FOLDS, len(groups)))]
     errors: dict[str, list[float]] = {model: [] for model in MODELS}
     for held in folds:
         rest = np.setdiff1d(np.arange(len(x)), held)
@@ -321,11 +313,6 @@ def cross_validate(samples: Samples, x: Floats, sign: int) -> dict[str, Floats]:
             predicted = _predict(model, x[rest], samples.level[rest], x[held], sign)
             errors[model].append(_rmse(predicted, samples.level[held]))
     return {model: np.array(e) for model, e in errors.items()}
-
-
-def _deal(groups: list[Ints], parts: int) -> list[list[Ints]]:
-    """The groups in at most so many parts."""
-    return [groups[i::parts] for i in range(min(parts, len(groups)))]
 
 
 def _predict(model: str, x: Floats, level: Floats, at: Floats, sign: int) -> Floats:

@@ -72,14 +72,13 @@ def transfer_curve(params: SensorParams) -> tuple[Floats, Floats]:
 
 def counts(params: SensorParams, flex: Floats, noise: Floats | float = 0.0) -> Floats:
     """Static reading [counts] at flex [rad]; noise [counts] comes before rounding and clipping."""
-    volts, readings = transfer_curve(params)
-    return _read(
-        divider(params, resistance(params, sensed_flex(params, flex))), noise, volts, readings
-    )
+    return _read(params, sensed_flex(params, flex), noise, transfer_curve(params))
 
 
-def _read(voltage: Floats, noise: Floats | float, volts: Floats, readings: Floats) -> Floats:
-    exact = np.interp(voltage, volts, readings)
+def _read(
+    params: SensorParams, sensed: Floats, noise: Floats | float, curve: tuple[Floats, Floats]
+) -> Floats:
+    exact = np.interp(divider(params, resistance(params, sensed)), *curve)
     return np.minimum(np.maximum(np.rint(exact + noise), 0.0), FULL_SCALE)
 
 
@@ -111,7 +110,7 @@ class SensorChain:
         self._pace: Floats = -np.expm1(-period / np.array(params.creep_time)).reshape(-1, *tail)
         self._play: Floats = np.zeros((len(_PLAY_SHARES), *shape))
         self._crept: Floats = np.zeros((len(params.creep), *shape))
-        self._volts, self._readings = transfer_curve(params)
+        self._curve = transfer_curve(params)
 
     def reset(self, rows: int | Ints | Bools) -> None:
         """Let the sensors of some rows forget, as if they had been straight for long."""
@@ -129,12 +128,7 @@ class SensorChain:
             Readings [counts], same shape.
         """
         sensed = self.with_memory(sensed_flex(self._params, flex))
-        return _read(
-            divider(self._params, resistance(self._params, sensed)),
-            noise,
-            self._volts,
-            self._readings,
-        )
+        return _read(self._params, sensed, noise, self._curve)
 
     def with_memory(self, sensed: Floats) -> Floats:
         """Sensed flex [rad], at least 0, with hysteresis and creep after one more sample."""

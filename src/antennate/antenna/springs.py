@@ -1,4 +1,4 @@
-"""The law of torsion springs: from wire and coils to stiffness, and back.
+"""The law of torsion springs: from wire and coils to stiffness, and which springs can be wound.
 
     rate per turn = E d^4 / (10.8 D N)
 
@@ -30,33 +30,18 @@ def spring_stiffness(modulus: float, wire: float, coil: float, coils: float) -> 
     return modulus * wire**4 / (RATE_FACTOR * coil * coils) / (2.0 * math.pi)
 
 
-def coil_diameter(modulus: float, wire: float, coils: float, wanted: float) -> float:
-    """Mean coil diameter [m] that gives a wanted stiffness [N·m/rad]."""
-    return modulus * wire**4 / (RATE_FACTOR * coils * wanted) / (2.0 * math.pi)
-
-
 def modulus_of(params: SpringParams) -> float:
     """Young's modulus of the wire in use [Pa]."""
     return WIRES[params.wire].modulus if params.modulus_pa is None else params.modulus_pa
 
 
-def yield_stress(params: SpringParams, wire: float) -> float:
-    """Stress at which a wire of this diameter [m] yields in bending [Pa]."""
-    kind = WIRES[params.wire]
-    return kind.yield_share * kind.strength / (1e3 * wire) ** kind.exponent
-
-
-def inner_stress(torque: float, wire: float, coil: float) -> float:
-    """Bending stress at the inside of the coil [Pa] under a torque [N·m]; diameters in m."""
-    index = coil / wire
-    factor = (4 * index**2 - index - 1) / (4 * index * (index - 1))
-    return factor * 32.0 * torque / (math.pi * wire**3)
-
-
 def yield_angle(params: SpringParams, wire: float, coil: float, coils: float) -> float:
     """Angle [rad] at which a spring of these diameters [m] begins to yield."""
-    per_radian = inner_stress(spring_stiffness(modulus_of(params), wire, coil, coils), wire, coil)
-    return yield_stress(params, wire) / per_radian
+    kind, index = WIRES[params.wire], coil / wire
+    limit = kind.yield_share * kind.strength / (1e3 * wire) ** kind.exponent
+    factor = (4 * index**2 - index - 1) / (4 * index * (index - 1))
+    torque = spring_stiffness(modulus_of(params), wire, coil, coils)
+    return limit / (factor * 32.0 * torque / (math.pi * wire**3))
 
 
 @dataclass(frozen=True, slots=True)

@@ -173,28 +173,9 @@ def shape(chain: Chain, angles: Floats) -> Floats:
     return np.concatenate([origin, np.cumsum(steps, axis=1)], axis=1)
 
 
-def torque(chain: Chain, angles: Floats) -> Floats:
-    """Torque of each spring [N·m], same shape as angles [rad]."""
-    return chain.stiffness * angles
-
-
 def tip_compliance(chain: Chain) -> float:
     """Sideways give of the tip under a small load there [m/N]: sum of (L - s_i)^2 / k_i."""
     return float(((chain.length - chain.starts) ** 2 / chain.stiffness).sum())
-
-
-def uniform_beam(length: float, bending_stiffness: float, count: int) -> Chain:
-    """A straight beam cut into `count` links, each of which bends in its middle.
-
-    Args:
-        length: Length of the beam [m].
-        bending_stiffness: E I [N·m²].
-        count: Number of pieces; the first half piece is rigid.
-    """
-    piece = length / count
-    lengths = np.full(count, piece)
-    lengths[-1] = piece / 2
-    return Chain(lengths, np.full(count, bending_stiffness / piece))
 
 
 def with_profile(antenna: AntennaSpec, profile: str) -> AntennaSpec:
@@ -203,19 +184,15 @@ def with_profile(antenna: AntennaSpec, profile: str) -> AntennaSpec:
     Raises:
         ValueError: There is no such profile.
     """
-    own = antenna.active_coils
-    if profile == "stiff":
-        coils = (min(own),) * len(own)
-    elif profile == "descending":
-        coils = own
-    elif profile == "compliant":
-        coils = (max(own),) * len(own)
-    elif profile == "matched_uniform":
-        coils = (_matched_coils(antenna),) * len(own)
-    elif profile == "ascending":
-        coils = own[::-1]
-    else:
+    if profile not in PROFILES:
         raise ValueError(f"expected a profile of {', '.join(PROFILES)}, found {profile}")
+    coils = antenna.active_coils
+    if profile == "matched_uniform":
+        coils = (_matched_coils(antenna),) * len(coils)
+    elif profile == "ascending":
+        coils = coils[::-1]
+    elif profile != "descending":
+        coils = (min(coils) if profile == "stiff" else max(coils),) * len(coils)
     return antenna.model_copy(update={"active_coils": coils})
 
 

@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 from pydantic import TypeAdapter, ValidationError
 from pydantic.dataclasses import dataclass
 
-from antennate.cli.help import long_page, short_page
+from antennate.cli.help import Command, long_page, short_page
 from antennate.cli.options import (
     Option,
     fields_of,
@@ -34,11 +34,7 @@ class HelpRequest(Exception):
 
 
 class OptionsRequest(Exception):
-    """The words ask which options there are.
-
-    Attributes:
-        options: All of them.
-    """
+    """The words ask which `options` there are."""
 
     WORD = "--complete"
 
@@ -84,13 +80,14 @@ def parse(
     parameters = [option for option in every if option.flag not in unread]
     if list(argv) == [OptionsRequest.WORD]:
         raise OptionsRequest([*others, *parameters])
+    page = Command(command, description, model, parameters, others)
     for word in argv:
         if word in ("-h", "--help"):
-            raise HelpRequest(short_page(command, description, model, parameters, others))
+            raise HelpRequest(short_page(page))
         if (name := word.partition("=")[0].replace("_", "-")) in unread:
             raise ConfigError(f"{name}: expected a parameter that {command} reads, found this one")
         if word == "--help-all":
-            raise HelpRequest(long_page(command, description, model, parameters, others))
+            raise HelpRequest(long_page(page))
     values = read_words(argv, [*others, *parameters])
     names = fields_of(options)
     chosen = _filled(options, {}, {p: v for p, v in values.items() if p[0] in names})

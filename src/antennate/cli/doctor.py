@@ -8,21 +8,25 @@ from contextlib import nullcontext
 from pathlib import Path
 
 from pydantic.dataclasses import dataclass
+from rich.box import SIMPLE_HEAD
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
 
 from antennate.cli.addresses import PortOptions, key_of, parse_robot, require_two_ports
-from antennate.cli.checks import show_rows
 from antennate.cli.exit_codes import BAD_INPUT, OK
 from antennate.cli.options import option
-from antennate.cli.progress import terminate_as_interrupt
+from antennate.cli.progress import stop_signals
 from antennate.cli.results import ResultOptions, folder_for
 from antennate.errors import ConfigError
-from antennate.hardware.doctor.check import Opener
+from antennate.hardware.doctor.check import Opener, Row
 from antennate.hardware.doctor.checkup import Checkup, examine
-from antennate.hardware.doctor.config import DoctorConfig
 from antennate.hardware.doctor.fix import Change, apply, plan
 from antennate.hardware.doctor.ports import opener_of
 from antennate.hardware.host_clock import HostClock
+from antennate.hardware.robot import DoctorConfig
 from antennate.hardware.robot_file import RobotFile
+from antennate.messages import one_line
 from antennate.studies.formats import to_json
 
 DESCRIPTION = """\
@@ -31,6 +35,7 @@ check, with the cure for what is not good. Torque never comes on. Either port ma
 
 Nothing is written without --fix, which asks before each change of an id, a speed, an
 operating mode or a return delay, and reads it back. The exit code is 2 if anything is bad."""
+_STYLES = {"ok": "green", "warn": "yellow", "bad": "bold red"}
 _ROUNDS = 4
 """Servos that change their id or speed are looked at anew before the rest is put right."""
 
@@ -86,11 +91,11 @@ def _examine(robot: DoctorConfig, orders: Orders, key: bytes | None) -> tuple[Ch
     if orders.esp32:
         esp32 = (orders.esp32, opener_of(orders.esp32, "--esp32", key, robot.network))
     now = HostClock().now
-    with terminate_as_interrupt():
+    with stop_signals():
         checkup = examine(robot, bus, esp32, now)
         if not orders.fix or bus is None:
             return checkup, []
-        show_rows(checkup.rows, sys.stderr)
+        sys.stderr.write("examined; now what can be put right\n")
         changes = _fix(robot, bus, orders.yes, now, checkup)
         if changes:
             checkup = examine(robot, bus, esp32, now)
@@ -131,3 +136,37 @@ def _agreed(change: Change, yes: bool) -> bool:
     sys.stderr.write(f"{change}; torque goes off first. Change it? [y/N] ")
     sys.stderr.flush()
     return sys.stdin.readline().strip().lower() in ("y", "yes")
+
+
+def show_rows(rows: Sequence[Row]) -> None:
+    """Print one line for each row, then the cures."""
+    console = Console(file=sys.stdout, highlight=False)
+    table = Table(box=SIMPLE_HEAD, pad_edge=False)
+    for head in ("", "check", "expected", "found"):
+        table.add_column(head, overflow="fold", no_wrap=not head)
+    for row in rows:
+        grade = Text(row.grade, _STYLES[row.grade])
+        words = (f"{row.part}: {row.check}", row.expected, row.found)
+        table.add_row(grade, *(Text(one_line(word)) for word in words))
+    console.print(table)
+    wrong = [row for row in rows if row.grade != "ok"]
+    for row in sorted(wrong, key=lambda row: row.grade == "warn"):
+        line = Text.assemble(
+            (f"{row.grade:<4} ", _STYLES[row.grade]),
+            (f"{row.part}: {row.check}: ", "bold"),
+            one_line(row.cure),
+        )
+        console.print(line, soft_wrap=True)
+    bad = sum(row.grade == "bad" for row in wrong)
+    console.print(Text(_sentence(len(rows), bad, len(wrong) - bad)), soft_wrap=True)
+
+
+def _sentence(checks: int, bad: int, warnings: int) -> str:
+    """What came out, in one sentence."""
+    if bad:
+        return (
+            f"The robot must not be driven yet: {bad} of {checks} checks are bad, {warnings} warn."
+        )
+    if warnings:
+        return f"The robot may be driven: no check is bad, {warnings} of {checks} warn."
+    return f"The robot may be driven: all {checks} checks are good."

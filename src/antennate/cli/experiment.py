@@ -11,7 +11,7 @@ from pydantic.dataclasses import dataclass
 from antennate.cli.arguments import parse
 from antennate.cli.exit_codes import INTERRUPTED, OK
 from antennate.cli.options import option
-from antennate.cli.progress import progress, terminate_as_interrupt
+from antennate.cli.progress import progress, stop_signals
 from antennate.cli.results import ResultOptions, folder_for, tell
 from antennate.errors import OutputError
 from antennate.params import Params
@@ -51,7 +51,7 @@ def carry_out(
             what was measured is kept and shown first.
     """
     with folder_for(experiment.name, options, config, argv) as run:
-        with progress(experiment.parts) as step, terminate_as_interrupt():
+        with progress(experiment.parts) as step, stop_signals():
             outcome = experiment.run(config, options.workers or core_count(), step, run.append)
         result = outcome.result()
         interrupted = bool(result.get("interrupted"))

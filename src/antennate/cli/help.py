@@ -6,7 +6,7 @@ import shutil
 import textwrap
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 from antennate.cli.options import Option, fields_of, first_line, flag_of
 from antennate.params.base import meaning
@@ -21,26 +21,30 @@ SHORT_LINES = 46
 """Most lines of the short page: two screens of 24, less a prompt on each."""
 
 
-def short_page(
-    command: str,
-    description: str,
-    model: type,
-    parameters: Sequence[Option],
-    others: Sequence[Option],
-) -> str:
-    """What people use first: options outside all groups, and the names of the groups.
+class Command(NamedTuple):
+    """What the help of a command is made from.
 
-    Args:
-        command: Name of the command.
-        description: What it does; only what precedes the first empty line is shown.
+    Attributes:
+        name: Its name.
+        description: What it does; the short page shows what precedes the first empty line.
         model: Its configuration.
-        parameters: Options of the configuration; the first ones, if they are too many.
+        parameters: Options of the configuration.
         others: Its other options.
     """
-    top = [option for option in parameters if len(option.path) == 1]
-    groups = _groups(model, parameters)
-    head = [*_head(command, others, description.split("\n\n")[0]), *_section("options:", others)]
-    tail = [*groups, "", f"`antennate {command} --help-all` shows every option."]
+
+    name: str
+    description: str
+    model: type
+    parameters: Sequence[Option]
+    others: Sequence[Option]
+
+
+def short_page(command: Command) -> str:
+    """What people use first: options outside all groups, and the names of the groups."""
+    top = [option for option in command.parameters if len(option.path) == 1]
+    groups = _groups(command.model, command.parameters)
+    head = _head(command, command.description.split("\n\n")[0])
+    tail = [*groups, "", f"`antennate {command.name} --help-all` shows every option."]
     lines = list(_section("parameters:", top))
     if (over := len(head) + len(lines) + len(tail) - SHORT_LINES) > 0:
         kept, shown = lines[: 2 if len(lines) > 1 else 0], 0
@@ -54,20 +58,14 @@ def short_page(
     return "\n".join([*head, *lines, *tail]) + "\n"
 
 
-def long_page(
-    command: str,
-    description: str,
-    model: type,
-    parameters: Sequence[Option],
-    others: Sequence[Option],
-) -> str:
-    """Every option, group by group; arguments as for `short_page`."""
-    lines = [*_head(command, others, description), *_section("options:", others)]
+def long_page(command: Command) -> str:
+    """Every option, group by group."""
+    lines = _head(command, command.description)
     by_group: dict[tuple[str, ...], list[Option]] = {}
-    for option in parameters:
+    for option in command.parameters:
         by_group.setdefault(option.path[:-1], []).append(option)
     for group, options in by_group.items():
-        lines += _section(_title(model, group), options)
+        lines += _section(_title(command.model, group), options)
     return "\n".join(lines) + "\n"
 
 
@@ -82,9 +80,10 @@ def paragraphs(text: str) -> list[str]:
     return "\n\n".join(blocks).split("\n")
 
 
-def _head(command: str, others: Iterable[Option], description: str) -> list[str]:
-    free = "".join(f" {option.metavar}" for option in others if option.positional)
-    return [f"usage: antennate {command}{free} [OPTIONS]", "", *paragraphs(description)]
+def _head(command: Command, description: str) -> list[str]:
+    free = "".join(f" {option.metavar}" for option in command.others if option.positional)
+    usage = f"usage: antennate {command.name}{free} [OPTIONS]"
+    return [usage, "", *paragraphs(description), *_section("options:", command.others)]
 
 
 def _section(title: str, options: Sequence[Option]) -> list[str]:

@@ -47,28 +47,28 @@ class Option:
     Attributes:
         path: Field that it sets, within the model.
         metavar: What stands for a value in the help; empty for a switch.
+        kinds: Types that a word is tried as, beside text.
+        meaning: What the field means, with its unit.
+        examples: Known values among others, for completion.
         many: Whether it takes several values.
         gathered: Whether those of a flag given again add to the first ones.
         choices: All valid values, if they are few.
-        examples: Known values among others, for completion.
-        meaning: What the field means, with its unit.
         limits: Bounds in words, such as `at least 1`.
         default: Its default in words, empty if there is none to tell.
-        kinds: Types that a word is tried as, beside text.
         positional: Whether it is given without a flag.
     """
 
     path: tuple[str, ...]
     metavar: str
-    many: bool
-    gathered: bool
-    choices: tuple[Any, ...]
-    examples: tuple[str, ...]
-    meaning: str
-    limits: str
-    default: str
     kinds: frozenset[type]
-    positional: bool
+    meaning: str
+    examples: tuple[str, ...]
+    many: bool = False
+    gathered: bool = False
+    choices: tuple[Any, ...] = ()
+    limits: str = ""
+    default: str = ""
+    positional: bool = False
 
     @property
     def flag(self) -> str:
@@ -138,7 +138,9 @@ def options_of(default: Any, path: tuple[str, ...] = ()) -> Iterator[Option]:
                 yield option
         else:
             if hasattr(group, "named"):
-                yield _named((*path, name), field, group)
+                words = meaning(field) or first_line(group)
+                known = tuple(map(str, field.examples or ()))
+                yield Option((*path, name), "NAME|FILE", frozenset({str}), words, known)
             yield from options_of(group() if value is None else value, (*path, name))
 
 
@@ -165,22 +167,6 @@ def _option(path: tuple[str, ...], field: FieldInfo, default: Any) -> Option | N
         default=_words(default),
         kinds=kinds,
         positional=bool(extra.get("positional")),
-    )
-
-
-def _named(path: tuple[str, ...], field: FieldInfo, group: type[BaseModel]) -> Option:
-    return Option(
-        path=path,
-        metavar="NAME|FILE",
-        many=False,
-        gathered=False,
-        choices=(),
-        examples=tuple(map(str, field.examples or ())),
-        meaning=meaning(field) or first_line(group),
-        limits="",
-        default="",
-        kinds=frozenset({str}),
-        positional=False,
     )
 
 

@@ -68,7 +68,7 @@ class Output(io.TextIOBase):
                 self._fail(error)
 
     def _fail(self, error: OSError) -> None:
-        """Keep the error; what is still in the buffer goes nowhere."""
+        """Keep the error; what is still in the buffer is written to the null device."""
         self.error = error
         if self._file is not None:
             with contextlib.suppress(OSError):

@@ -52,41 +52,28 @@ def _plain(what: str) -> Callable[[int, int], None]:
 
 
 @contextlib.contextmanager
-def terminate_as_interrupt() -> Iterator[None]:
-    """Let SIGTERM end the block as Ctrl-C does."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
+def stop_signals(last: bool = False) -> Iterator[None]:
+    """Let SIGTERM end the block as Ctrl-C does; a signal that is ignored stays so.
 
-    def interrupt(number: int, frame: Any) -> None:
-        raise KeyboardInterrupt
-
-    before = signal.signal(signal.SIGTERM, interrupt)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, before)
-
-
-@contextlib.contextmanager
-def end_at_first() -> Iterator[None]:
-    """Let the first signal of `STOPS` end the block and this process; none is heard after it."""
+    Args:
+        last: Whether all after the first are ignored, even when the block has ended.
+    """
     if threading.current_thread() is not threading.main_thread():
         yield
         return
     before = {n: signal.getsignal(n) for n in STOPS if signal.getsignal(n) is not signal.SIG_IGN}
-    heard = False
+    stopped = False
 
-    def hear(number: int, frame: Any) -> None:
-        nonlocal heard
-        if not heard:
-            heard = True
+    def stop(number: int, frame: Any) -> None:
+        nonlocal stopped
+        if not (stopped and last):
+            stopped = True
             raise KeyboardInterrupt
 
     for number in before:
-        signal.signal(number, hear)
+        signal.signal(number, stop)
     try:
         yield
     finally:
         for number, handler in before.items():
-            signal.signal(number, signal.SIG_IGN if heard else handler)
+            signal.signal(number, signal.SIG_IGN if stopped and last else handler)

@@ -17,7 +17,7 @@ from pydantic.dataclasses import dataclass
 from antennate.cli.addresses import RobotOptions, key_of, parse_robot
 from antennate.cli.exit_codes import OK
 from antennate.cli.options import option
-from antennate.cli.progress import terminate_as_interrupt
+from antennate.cli.progress import stop_signals
 from antennate.cli.status import StatusLine
 from antennate.errors import BadInputError, ConfigError, OutputError
 from antennate.hardware.doctor.ports import opener_of
@@ -62,8 +62,8 @@ def command(argv: Sequence[str]) -> int:
     with opener(BOARD_BAUD) as port:
         board = Board(port)
         status = Status(board, params, now)
-        with Lines(orders.out) as lines, terminate_as_interrupt():
-            recorder = Recorder(board, params, now, ask(status), lines.write, status)
+        with Lines(orders.out) as lines, stop_signals():
+            recorder = Recorder(board, params, now, status.ask, lines.write, status)
             then = "."
             try:
                 recorder.run()
@@ -116,7 +116,7 @@ class Status:
     """One line on stderr now and then: readings, their noise, rate and losses."""
 
     def __init__(self, board: Board, params: RecordParams, now: Callable[[], float]) -> None:
-        self.said = ""
+        self._waiting = False
         self._board, self._params, self._now = board, params, now
         self._shown: deque[Timed] = deque(maxlen=_SHOWN)
         self._status = StatusLine()
@@ -127,10 +127,17 @@ class Status:
         if self._status.due(self._now()):
             self._status.show(self.line())
 
-    def ask(self, text: str) -> None:
-        """Ask a person for something."""
-        self.said = text
+    def ask(self, text: str) -> Callable[[], bool]:
+        """Ask a person for something; return a function that says whether Enter has come."""
+        if sys.stdin.isatty():  # an Enter that was typed too early confirms nothing
+            termios.tcflush(sys.stdin, termios.TCIFLUSH)
+        self._waiting = True
         self._status.say(text)
+        return self._confirmed
+
+    def _confirmed(self) -> bool:
+        self._waiting = self._waiting and not _entered()
+        return not self._waiting
 
     def close(self) -> None:
         """End the line."""
@@ -140,32 +147,13 @@ class Status:
         """The line."""
         span = self._shown[-1].arrived - self._shown[0].arrived
         rate = (len(self._shown) - 1) / span if span > 0 else 0.0
-        said = ["waiting for Enter" if self.said else "recording"]
+        said = ["waiting for Enter" if self._waiting else "recording"]
         for side in ("left", "right"):
             counts = [float(getattr(one.sample, side)) for one in self._shown]
             said.append(f"{side} {fmean(counts):6.1f} ± {pstdev(counts):4.1f}")
         bytes_ = self._board.decoder.counters
         lost = self._board.clock.sequence.lost
         return f"{'  '.join(said)}  {rate:5.1f} Hz  lost {lost}  crc {bytes_.crc_errors} "
-
-
-def ask(status: Status) -> Callable[[str], Callable[[], bool]]:
-    """Ask on stderr, and hear Enter on stdin without waiting for it."""
-
-    def asked(text: str) -> Callable[[], bool]:
-        if sys.stdin.isatty():  # an Enter that was typed too early confirms nothing
-            termios.tcflush(sys.stdin, termios.TCIFLUSH)
-        status.ask(text)
-
-        def confirmed() -> bool:
-            if not _entered():
-                return False
-            status.said = ""
-            return True
-
-        return confirmed
-
-    return asked
 
 
 def _entered() -> bool:

@@ -108,8 +108,8 @@ def _result(log: LogReader, found: Replayed, controller: str | None) -> dict[str
         else {
             "tick": first.number,
             "time_s": first.now - found.start,
-            "recorded": _name(first.recorded),
-            "replayed": _name(first.replayed),
+            "recorded": Maneuver.label(first.recorded),
+            "replayed": Maneuver.label(first.replayed),
         },
         "different_poses": found.commands,
         "failures": found.failures,
@@ -148,10 +148,6 @@ def _sentence(result: Mapping[str, Any]) -> str:
         f"The controller decided otherwise in {different} of {ticks} ticks, first in tick "
         f"{first['tick']} at {first['time_s']:.2f} s: {first['replayed']} for {first['recorded']}."
     )
-
-
-def _name(maneuver: int) -> str:
-    return Maneuver(maneuver).name if maneuver in set(Maneuver) else str(maneuver)
 
 
 def _keep(folder: RunDirectory, path: Path, found: Replayed) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import re
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
@@ -55,21 +56,33 @@ def tell(
 
 
 def print_table(table: Table) -> None:
-    """Print a table and its note; underscores of a name are shown as spaces, of a path not."""
+    """Print a table and its note; as a list where it is too wide for the terminal.
+
+    Underscores of a name are shown as spaces; a path has a line for each of its parts.
+    """
     from rich.box import SIMPLE_HEAD  # slow to import
     from rich.console import Console
+    from rich.measure import Measurement
     from rich.table import Table as Drawn
     from rich.text import Text
 
     drawn = Drawn(title=table.title, title_justify="left", box=SIMPLE_HEAD, pad_edge=False)
     drawn.add_column("", overflow="fold")
     for name in table.columns:
-        heading = name if ":" in name else name.replace("_", " ")
-        drawn.add_column(Text(heading), justify="right", overflow="fold")
+        parts = re.sub(r"(?<=[/:])", "\n", name) if ":" in name else name.replace("_", " ")
+        drawn.add_column(Text(parts), justify="right", overflow="fold")
     for name, cells in table.rows:
         drawn.add_row(Text(name), *(Text(cell) for cell in cells))
     console = Console(file=sys.stdout, highlight=False)
-    console.print(drawn)
+    unlimited = console.options.update(max_width=sys.maxsize)
+    if Measurement.get(console, unlimited, drawn).minimum <= console.width:
+        console.print(drawn)
+    else:
+        console.print(Text(table.title))
+        for name, cells in table.rows:
+            found = (f"{each} {cell}" for each, cell in zip(table.columns, cells, strict=True))
+            console.print(Text(f"{name}: {', '.join(found)}"))
+        console.print()
     if table.note:
         console.print(Text(table.note), soft_wrap=True)
         console.print()

@@ -65,7 +65,7 @@ class StatusLine:
 
 
 def write(text: str) -> None:
-    """Write on stderr, or nowhere if that is gone."""
+    """Write on stderr; that it is closed or full is no error."""
     if sys.stderr is not None:
         with contextlib.suppress(OSError):  # it is closed or full, as with a lost terminal
             sys.stderr.write(text)

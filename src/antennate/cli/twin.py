@@ -19,7 +19,7 @@ from pydantic.dataclasses import dataclass
 from antennate.cli.arguments import FromFile, parse
 from antennate.cli.exit_codes import OK
 from antennate.cli.options import option
-from antennate.cli.progress import end_at_first
+from antennate.cli.progress import stop_signals
 from antennate.errors import BadInputError, ConfigError
 from antennate.hardware.driving.priority import LEVEL, urgent
 from antennate.hardware.ports.keys import read_key
@@ -70,17 +70,13 @@ class Places(FromFile):
     )
 
 
+@stop_signals(last=True)
 def command(argv: Sequence[str]) -> int:
     """Serve until the duration is over, Ctrl-C or SIGTERM.
 
     Raises:
         AntennateError: Something given cannot be used.
     """
-    with end_at_first():
-        return _serve(argv)
-
-
-def _serve(argv: Sequence[str]) -> int:
     config, places = parse("twin", DESCRIPTION, TwinConfig, argv, Places)
     faults = Faults([read(text) for text in config.fault], config.robot.ids)
     real = places.pace == "real"
@@ -142,7 +138,7 @@ def _endpoints(places: Places) -> tuple[Endpoint | None, Endpoint | None]:
 
 
 def _place(flag: str, text: str) -> tuple[str, int]:
-    """Host and port; this computer alone is the default, others are named on purpose."""
+    """Host and port; without a host nobody beyond this computer can connect."""
     host, _, port = text.rpartition(":")
     if not re.fullmatch(r"[0-9]{1,5}", port) or int(port) > _LAST_PORT:
         raise ConfigError(

@@ -54,17 +54,13 @@ def line(tick: Tick, dropped: int) -> str:
     left, right = ("-" if math.isnan(counts) else f"{counts:.0f}" for counts in tick.reading)
     state = tick.state or "-"
     why = " (" + tick.causes[0].removeprefix(f"{state} ") + ")" if tick.causes else ""
+    maneuver = Maneuver.label(tick.maneuver)
     return (
-        f"{tick.now:7.1f} s {state}{why} maneuver={_name(tick.maneuver)} counts={left},{right} "
+        f"{tick.now:7.1f} s {state}{why} maneuver={maneuver} counts={left},{right} "
         f"age={1e3 * tick.age:.0f}ms {tick.note} missed_ticks={tick.missed} "
         f"missed_answers={tick.misses} stale={tick.stale} frames={tick.frames} crc={tick.crc} "
         f"lost={tick.lost} sent={tick.sent} refused={tick.refused} unlogged={dropped}"
     )
-
-
-def _name(maneuver: int) -> str:
-    """Of a maneuver; somebody's own controller may say anything."""
-    return Maneuver(maneuver).name if maneuver in set(Maneuver) else str(maneuver)
 
 
 def main() -> int:

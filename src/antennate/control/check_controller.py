@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from antennate.control.checked import CheckedController
+from antennate.control.expect import expect
 from antennate.control.registry import ControllerFactory, make_controller
 from antennate.errors import AntennateError
 from antennate.params import ConditioningParams, ControlParams
@@ -30,14 +31,15 @@ class _Trace:
     commands: dict[str, Floats]
     said: dict[str, Floats]
 
-    def differs(self, other: _Trace, mine: Sequence[int], its: Sequence[int]) -> str:
-        """The first answer in which these rows of the two differ, empty if none does."""
+    def expect_same(
+        self, what: str, other: _Trace, mine: Sequence[int], its: Sequence[int]
+    ) -> None:
+        """Expect the same answers in these rows of the two."""
         for name, values in (self.commands | self.said).items():
             here, there = values[:, list(mine)], (other.commands | other.said)[name][:, list(its)]
             equal = (here == there) | (np.isnan(here) & np.isnan(there))
-            if not equal.all():
-                return f"another {name} at tick {int(np.argwhere(~equal)[0][0])}"
-        return ""
+            for tick in np.argwhere(~equal)[:1, 0].tolist():
+                raise AssertionError(f"expected {what}, found another {name} at tick {tick}")
 
 
 def check_controller(
@@ -66,22 +68,16 @@ def check_controller(
     run = _Runs(factory, robot or RobotSpec(), control or ControlParams())
     counts, rows = run.counts, list(range(_ROWS))
     together = run.trace(counts, rows)
-    _expect(
-        "the same answers to the same readings",
-        run.trace(counts, rows).differs(together, rows, rows),
-    )
-    _expect(
-        "the same answers whatever becomes of a command that was returned",
-        run.trace(counts, rows, spoil=True).differs(together, rows, rows),
-    )
+    again, spoiled = run.trace(counts, rows), run.trace(counts, rows, spoil=True)
+    again.expect_same("the same answers to the same readings", together, rows, rows)
+    what = "the same answers whatever becomes of a command that was returned"
+    spoiled.expect_same(what, together, rows, rows)
     turned = rows[::-1]
-    _expect(
-        "the same answers from rows in another order",
-        run.trace(counts[:, turned], turned).differs(together, rows, turned),
-    )
+    other = run.trace(counts[:, turned], turned)
+    other.expect_same("the same answers from rows in another order", together, rows, turned)
     for row in rows:
         alone = run.trace(counts[:, [row]], [row])
-        _expect(f"row {row} alone to answer as in a batch", alone.differs(together, [0], [row]))
+        alone.expect_same(f"row {row} alone to answer as in a batch", together, [0], [row])
     _check_reset(run, together)
     _check_blind(run, together)
 
@@ -134,10 +130,10 @@ class _Runs:
             if spoil:
                 break
             for part, copy in zip(self._parts, copies, strict=True):
-                same = np.array_equal(getattr(command, part), copy)
-                _expect(
+                expect(
+                    np.array_equal(getattr(command, part), copy),
                     "a command that stays as it was returned",
-                    "" if same else f"another {part} in that of tick {tick} later",
+                    f"another {part} in that of tick {tick} later",
                 )
         arrays = {part: np.array([c[i] for c in kept]) for i, part in enumerate(self._parts)}
         found = _Trace(arrays, {name: np.array(values) for name, values in said.items()})
@@ -149,7 +145,7 @@ def _step(checked: CheckedController, t: Floats, reading: Floats) -> JointComman
     frame = AntennaFrame(t=t.copy(), counts=reading.copy())
     command = checked.step(frame)
     same = np.array_equal(frame.t, t) and np.array_equal(frame.counts, reading, equal_nan=True)
-    _expect("a frame that is left as it is", "" if same else "other values in it after a step")
+    expect(same, "a frame that is left as it is", "other values in it after a step")
     for row, fault in checked.faults.items():
         raise AssertionError(f"{fault} in row {row}")
     return command
@@ -158,24 +154,20 @@ def _step(checked: CheckedController, t: Floats, reading: Floats) -> JointComman
 def _check_values(found: _Trace) -> None:
     contact, level = found.said["contact"], found.said["level"]
     known = np.isin(contact, [int(state) for state in Contact])
-    _expect("contacts of 0 to 2", "" if known.all() else f"{contact[~known][0]:g}")
+    expect(bool(known.all()), "contacts of 0 to 2", f"{contact[~known][:1]}")
     wrong = (level < 0.0) | (level > 1.0)
-    _expect("levels of 0 to 1, or NaN", f"{level[wrong][0]:g}" if wrong.any() else "")
+    expect(not wrong.any(), "levels of 0 to 1, or NaN", f"{level[wrong][:1]}")
 
 
 def _check_reset(run: _Runs, together: _Trace) -> None:
     rows = list(range(_ROWS))
     after = run.trace(run.counts, rows, reset=1)
     others = [row for row in rows if row != 1]
-    _expect("the other rows to go on when one is reset", after.differs(together, others, others))
+    after.expect_same("the other rows to go on when one is reset", together, others, others)
     fresh = run.trace(run.counts[:, [1]], [1], first=_RESET_AT)
-    again = _Trace(
-        *(
-            {name: values[_RESET_AT:] for name, values in part.items()}
-            for part in (after.commands, after.said)
-        )
-    )
-    _expect("a row that is reset to answer as a new one", again.differs(fresh, [1], [0]))
+    parts = (after.commands, after.said)
+    again = _Trace(*({name: v[_RESET_AT:] for name, v in part.items()} for part in parts))
+    again.expect_same("a row that is reset to answer as a new one", fresh, [1], [0])
 
 
 def _check_blind(run: _Runs, together: _Trace) -> None:
@@ -187,17 +179,15 @@ def _check_blind(run: _Runs, together: _Trace) -> None:
             counts[blind, 2, side] = bad
             found = run.trace(counts, rows)
             others = [row for row in rows if row != 2]
-            _expect(
-                f"the other rows to go on when one reads {bad}",
-                found.differs(together, others, others),
-            )
+            what = f"the other rows to go on when one reads {bad}"
+            found.expect_same(what, together, others, others)
             held = found.said["maneuver"][blind, 2] == int(Maneuver.HOLD)
             unknown = found.said["contact"][blind, 2, side] == int(Contact.UNKNOWN)
-            _expect(f"HOLD while an antenna reads {bad}", "" if held.all() else "another maneuver")
-            _expect(f"UNKNOWN for a reading of {bad}", "" if unknown.all() else "another contact")
+            expect(held.all(), f"HOLD while an antenna reads {bad}", "another maneuver")
+            expect(unknown.all(), f"UNKNOWN for a reading of {bad}", "another contact")
             for part, values in found.commands.items():
                 still = (values[blind, 2] == values[_BLIND_FROM - 1, 2]).all()
-                _expect("joint targets that stand still in HOLD", "" if still else f"{part} moves")
+                expect(still, "joint targets that stand still in HOLD", f"{part} moves")
 
 
 def _readings(conditioning: ConditioningParams, period: float, frequency: float) -> Floats:
@@ -213,9 +203,3 @@ def _readings(conditioning: ConditioningParams, period: float, frequency: float)
     straight, bent = (high, low) if conditioning.polarity < 0 else (low, high)
     noise = rng.normal(0.0, 2.5, flex.shape)
     return np.rint(straight + (bent - straight) * flex + noise)
-
-
-def _expect(what: str, found: str) -> None:
-    """Fail if something was found."""
-    if found:
-        raise AssertionError(f"expected {what}, found {found}")

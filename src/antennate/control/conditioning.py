@@ -12,6 +12,11 @@ from antennate.params import ConditioningParams
 from antennate.types import Bools, Floats, Ints
 
 
+def sigmoid(z: Floats) -> Floats:
+    """1 / (1 + exp(-z)), same shape; NaN stays NaN."""
+    return 1.0 / (1.0 + np.exp(-np.minimum(np.maximum(z, -700.0), 700.0)))
+
+
 def bending_level(params: ConditioningParams, counts: Floats) -> Floats:
     """Sigmoid calibration, b = 1 / (1 + exp(-s k (x - x0))), s the polarity of the reading x.
 
@@ -23,10 +28,7 @@ def bending_level(params: ConditioningParams, counts: Floats) -> Floats:
         b in [0, 1], same shape.
     """
     x = (counts - params.counts_low) / (params.counts_high - params.counts_low)
-    z = np.minimum(
-        np.maximum(params.polarity * params.slope * (x - params.midpoint), -700.0), 700.0
-    )
-    return 1.0 / (1.0 + np.exp(-z))
+    return sigmoid(params.polarity * params.slope * (x - params.midpoint))
 
 
 def flex_fraction(params: ConditioningParams, counts: Floats) -> Floats:

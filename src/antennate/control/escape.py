@@ -84,8 +84,7 @@ class Escape:
         self._ticks += 1
         before = self._past[at].copy()
         self._past[at] = self.touch
-        left, right = (before == 0.0).T
-        return np.where((left & right)[:, None], self.touch, before)
+        return np.where((before == 0.0).all(axis=1, keepdims=True), self.touch, before)
 
     def _back_off(self, rows: Bools, touch: Floats, t: Floats) -> None:
         params = self._params

@@ -48,5 +48,10 @@ def run_loop(
         ticks += 1
         if not go_on(frame, command):
             return ticks
-        due = max(due + 1, math.ceil((body.clock.now() - start) / period - _ROUNDING))
+        due = next_tick(due, body.clock.now() - start, period)
         body.clock.sleep_until(start + due * period)
+
+
+def next_tick(number: int, elapsed: float, period: float) -> int:
+    """The first tick after one of this number that is not yet due, a time [s] after the start."""
+    return max(number + 1, math.ceil(elapsed / period - _ROUNDING))

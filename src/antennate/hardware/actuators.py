@@ -23,7 +23,6 @@ class Tally:
     Attributes:
         misses: Requests to one of them without a right answer.
         stale: Answers that were right but came too late, and were thrown away.
-        bad_crc: Answers that came broken.
         drained: Bytes thrown away before a request.
     """
 

@@ -23,18 +23,13 @@ class Joints:
     """All joints of one robot that servos move, in the order of its description.
 
     Attributes:
-        robot: The description.
-        ids: Ids of their servos.
-        models: Model numbers by id.
         profiles: Profile velocities by id [0.229 rev/min], above what goals are moved at.
         in_order_of_release: Ids of the groups in the order in which they lose their torque.
         turning: Places in `ids` of the joints that turn without end.
     """
 
     def __init__(self, robot: RobotSpec) -> None:
-        self.robot = robot
-        self.ids = robot.ids
-        self.models = robot.models
+        self.robot, self.ids, self.models = robot, robot.ids, robot.models
         self.profiles = profile_velocities(robot)
         self.in_order_of_release = robot.in_order_of_release
         self._shapes = robot.command_shapes()
@@ -51,7 +46,8 @@ class Joints:
             CommandError: It is not of one robot, not finite, or beyond a limit or what servos
                 count. It is refused as a whole.
         """
-        angles = self._angles(command)
+        parts = (_part(command, name, shape) for name, shape in self._shapes.items())
+        angles = np.concatenate([part.ravel() for part in parts])
         with np.errstate(over="ignore"):  # infinite then, and refused
             ticks = np.rint(self.positions(angles))
         turning = np.isinf(self._limit)
@@ -91,18 +87,9 @@ class Joints:
         return JointCommand(**{name: part.reshape(shape) for (name, shape), part in named})
 
     def plain(self, command: JointCommand) -> JointCommand:
-        """A copy of a command of one robot, which nobody else changes; it may have been anything.
-
-        Raises:
-            CommandError: It is no command of one robot.
-        """
+        """A copy of a command of one robot; CommandError if it is anything else."""
         shapes = self._shapes.items()
         return JointCommand(**{name: _part(command, name, shape) for name, shape in shapes})
-
-    def _angles(self, command: JointCommand) -> Floats:
-        """Its joint angles [rad], shape (n,)."""
-        parts = (_part(command, name, shape) for name, shape in self._shapes.items())
-        return np.concatenate([part.ravel() for part in parts])
 
 
 def _part(command: JointCommand, name: str, shape: tuple[int, ...]) -> Floats:

@@ -10,6 +10,7 @@ from antennate.errors import ConfigError
 from antennate.params import (
     ConditioningParams,
     ControlParams,
+    DoctorParams,
     NetworkParams,
     Params,
     SupervisorParams,
@@ -60,3 +61,9 @@ class RobotConfig(Params):
         known = {"control": control, "sensor_id": file.sensor_id, "calibration": None}
         reach = file.reach if self.reach is None else self.reach
         return self.model_copy(update=known | {"reach": reach})
+
+
+class DoctorConfig(RobotConfig):
+    """What `antennate doctor` has to know: the robot, and what is good."""
+
+    doctor: DoctorParams = DoctorParams()

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from typing import TypeVar
 
-from antennate.hardware.doctor.config import DoctorConfig
 from antennate.hardware.driving.config import DriveConfig
 from antennate.hardware.esp32.recorder import RecordConfig
-from antennate.hardware.robot import RobotConfig
+from antennate.hardware.robot import DoctorConfig, RobotConfig
 from antennate.params import DoctorParams, RecordParams
 
 _Config = TypeVar("_Config", bound=RobotConfig)
@@ -20,7 +19,7 @@ class RobotFile(DriveConfig):
     record: RecordParams = RecordParams()
 
     def for_drive(self) -> DriveConfig:
-        """What `antennate drive` takes: all but the two tables."""
+        """What `drive` takes: all but the two tables."""
         return self._part(DriveConfig)
 
     def for_doctor(self) -> DoctorConfig:

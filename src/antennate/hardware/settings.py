@@ -22,13 +22,7 @@ _ROOM = 1.25
 
 
 class Setting(NamedTuple):
-    """What a register may hold.
-
-    Attributes:
-        low: Smallest value.
-        high: Largest.
-        cure: The value to set if it holds another.
-    """
+    """What a register may hold, and the value to set if it holds another."""
 
     low: int
     high: int
@@ -44,10 +38,7 @@ class Setting(NamedTuple):
         return f"at most {self.high}" if self.cure == self.low else f"at least {self.low}"
 
 
-Settings = Mapping[str, Mapping[int, Setting]]
-
-
-def settings(robot: RobotSpec) -> Settings:
+def settings(robot: RobotSpec) -> Mapping[str, Mapping[int, Setting]]:
     """By register and id, in the order in which they are set."""
     zero = dict.fromkeys(robot.ids, Setting(0, 0, 0))
     low, high = _position_limits(robot)
@@ -63,42 +54,33 @@ def settings(robot: RobotSpec) -> Settings:
 
 def profile_velocities(robot: RobotSpec) -> dict[int, int]:
     """Profile velocity by id [0.229 rev/min]: `fastest` of its group with some room."""
-    models = robot.models
+    limits = {i: TABLES[model]["velocity_limit"].default or 0 for i, model in robot.models.items()}
     return {
-        servo: min(math.ceil(_ROOM * fastest / VELOCITY_UNIT), _default_limit(models[servo]))
+        servo: min(math.ceil(_ROOM * fastest / VELOCITY_UNIT), limits[servo])
         for servo, fastest in zip(robot.ids, robot.fastest, strict=True)
     }
 
 
 def wrong(known: Mapping[str, Mapping[int, int]], robot: RobotSpec) -> list[str]:
-    """What is not as it has to be, in words.
-
-    Args:
-        known: Values by register and id.
-        robot: The robot.
-    """
-    found: dict[str, list[int]] = {}
+    """What is not as it has to be, in words, of values by register and id."""
+    faults: dict[str, list[int]] = {}
     for name, wanted in settings(robot).items():
         for servo, setting in wanted.items():
             value = known[name][servo]
             if not setting.allows(value):
                 what = f"{name.replace('_', ' ')} {value} (expected {setting}) in servos"
-                found.setdefault(what, []).append(servo)
-    return [f"{what} {ids}" for what, ids in found.items()]
-
-
-def _default_limit(model: int) -> int:
-    return TABLES[model]["velocity_limit"].default or 0
+                faults.setdefault(what, []).append(servo)
+    return [f"{what} {ids}" for what, ids in faults.items()]
 
 
 def _velocity_limits(robot: RobotSpec) -> dict[int, Setting]:
     """A servo refuses a profile that is faster than its velocity limit."""
-    found: dict[int, Setting] = {}
-    models = robot.models
-    for servo, least in profile_velocities(robot).items():
-        register = TABLES[models[servo]]["velocity_limit"]
-        found[servo] = Setting(least, register.high or 0, _default_limit(models[servo]))
-    return found
+    velocities = profile_velocities(robot)
+    limits = {servo: TABLES[robot.models[servo]]["velocity_limit"] for servo in velocities}
+    return {
+        servo: Setting(least, limits[servo].high or 0, limits[servo].default or 0)
+        for servo, least in velocities.items()
+    }
 
 
 def _position_limits(robot: RobotSpec) -> tuple[dict[int, Setting], dict[int, Setting]]:

@@ -10,10 +10,8 @@ from pydantic.fields import FieldInfo
 
 GATHERED = "gathered"
 """Marks a list whose flag, given again, adds to it; of other flags the last one counts."""
-
-
-DESCRIPTION = "robot"
-"""A robot is described whole: its file may hold what a command does not read, a flag may not."""
+ROBOT = "robot"
+"""This group is described whole: a file may hold what a command does not read, a flag may not."""
 
 
 class Params(BaseModel):
@@ -37,7 +35,7 @@ class Params(BaseModel):
             for part in groups:
                 group = getattr(group, part)
             default, found = type(group).model_fields[name].default, getattr(group, name)
-            if groups[0] != DESCRIPTION and found != default:
+            if groups[0] != ROBOT and found != default:
                 raise ValueError(
                     f"{path}: expected {default}, as it is not read here, found {found}"
                 )

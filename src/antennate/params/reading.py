@@ -67,8 +67,6 @@ def read_file(path: Path, model: type[Config]) -> Config:
         return model.model_validate_json(json.dumps(table, default=str), strict=True)
     except ValidationError as error:
         raise ConfigError(f"{path}: {describe(error, model)}") from None
-    except RecursionError:
-        raise ConfigError(f"{path}: expected plain tables, found them nested too deeply") from None
 
 
 def _table_of(path: Path) -> dict[str, Any]:
@@ -157,7 +155,7 @@ def describe(
     kind, path, context = first["type"], first["loc"], first.get("ctx", {})
     more = f" (and {len(faults) - 1} more)" if len(faults) > 1 else ""
     if kind == "value_error":
-        place = f"{dotted(path)}: " if path else ""
+        place = f"{where(path)}: " if path else ""
         return f"{place}{context['error']}{more}"
     if kind == "extra_forbidden":
         key, group = str(path[-1]), dotted(path[:-1])

@@ -71,13 +71,9 @@ class SupervisorParams(Params):
     """Relative error of the rate allowed."""
     rate_time: float = number(1.0, "s", "assumed: a hundred samples", gt=0, le=60)
     """Window of the rate, and patience."""
-    longest_arming: float = number(
-        1.0, "s", "measured: 0.14 s on the twin; each step is written and read back", gt=0, le=10
-    )
+    longest_arming: float = number(1.0, "s", "measured: 0.14 s on the twin", gt=0, le=10)
     """Longest time from an arm event to the next tick."""
-    longest_pause: float = number(
-        0.12, "s", "assumed: by then the watchdogs of the servos have stopped them", gt=0, le=10
-    )
+    longest_pause: float = number(0.12, "s", "assumed: servo watchdogs act before it", gt=0, le=10)
     """Time between ticks from which on a restart needs a person."""
 
     @model_validator(mode="after")

@@ -65,8 +65,7 @@ class TunnelParams(Params):
         if len(self.turns_deg) != len(self.segments) - 1:
             raise ValueError(
                 f"turns_deg needs one value between every two segments: expected "
-                f"{len(self.segments) - 1}, "
-                f"got {len(self.turns_deg)}"
+                f"{len(self.segments) - 1}, got {len(self.turns_deg)}"
             )
         if any(abs(turn) > 120 for turn in self.turns_deg):
             raise ValueError(f"turns_deg must lie within -120 and 120, got {self.turns_deg}")
@@ -100,7 +99,7 @@ class PhysicsParams(Params):
     impratio: float = number(1.0, "1", "measured: 100 changes speeds by 0.2 %", gt=0, le=1000)
     """Stiffness of friction over that of the normal."""
     sleep_tolerance: float = number(
-        1e-3, "m/s", "measured: benchmarks/numerics.py, outcomes as without sleep", gt=0, le=0.1
+        1e-3, "m/s", "measured: outcomes as without sleep", gt=0, le=0.1
     )
     """Speed under which resting parts are skipped."""
 
@@ -110,9 +109,7 @@ class BenchPhysicsParams(PhysicsParams):
 
     timestep: float = number(5e-4, "s", "measured: half gives the same wall", gt=1e-5, le=0.002)
     """Physics step."""
-    contact_time: float = number(
-        1e-3, "s", "assumed: twice the timestep, the stiffest the engine takes", gt=1e-5, le=0.05
-    )
+    contact_time: float = number(1e-3, "s", "assumed: the stiffest: two steps", gt=1e-5, le=0.05)
     """Time constant of contacts."""
     impratio: float = number(10.0, "1", "assumed: with 1 friction creeps", gt=0, le=1000)
     """Stiffness of friction over that of the normal."""

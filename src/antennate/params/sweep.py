@@ -41,9 +41,7 @@ class EstimateParams(Params):
     """Trials to calibrate, and as many to judge, in every condition."""
     distance: tuple[_Place, _Place] = number((0.4, 0.9), "1", "assumed: reached by default")
     """Range of wall distances, over the length of the antenna."""
-    centre_range: float = number(
-        math.radians(10.0), "rad", "assumed: the body yaws by so much while it walks", ge=0, le=1
-    )
+    centre_range: float = number(math.radians(10.0), "rad", "assumed: yaw of the gait", ge=0, le=1)
     """Half range of the centre where the sweep is varied."""
     amplitude_range: float = number(math.radians(10.0), "rad", "assumed: a third", ge=0, le=1)
     """Half range of the amplitude where the sweep is varied."""

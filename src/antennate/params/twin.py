@@ -10,9 +10,7 @@ class BatteryParams(Params):
 
     voltage: float = number(11.1, "V", "datasheet: XC430-W240; three lithium cells", gt=0, le=16)
     """Voltage at rest before it discharges."""
-    antenna_voltage: float = number(
-        5.0, "V", "datasheet: XL330-M288, recommended; assumed behind a regulator", gt=0, le=16
-    )
+    antenna_voltage: float = number(5.0, "V", "datasheet: XL330-M288; by a regulator", gt=0, le=16)
     """Voltage at the antenna servos as long as the supply is above it."""
     resistance: float = number(0.1, "ohm", "assumed: 20 mohm a cell, cable and plugs", ge=0, le=10)
     """Source resistance."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Literal
 
 import mujoco
 import numpy as np
@@ -12,9 +11,8 @@ from antennate.antenna.sensor import SensorChain, reading_noise
 from antennate.errors import ConfigError
 from antennate.robots.antenna import AntennaSpec
 from antennate.sim import antenna_part
+from antennate.sim.antenna_part import Side
 from antennate.types import AntennaFrame, Floats, Ints
-
-Side = Literal["left", "right"]
 
 _TOUCH_MARGIN = 1.5
 """Radius of a touch sensor's volume over that of its link: contacts lie inside it."""
@@ -148,11 +146,9 @@ class AntennaReader:
 
         Call it once every period: hysteresis, creep and noise go on with each call.
         """
-        noise = (
-            0.0
-            if self._rng is None
-            else reading_noise(self._sensor, self._rng, (1, len(self._angle)))
-        )
+        noise: Floats | float = 0.0
+        if self._rng is not None:
+            noise = reading_noise(self._sensor, self._rng, (1, len(self._angle)))
         counts = self._chain.step(self.flex(data)[None, :], noise)
         return AntennaFrame(t=np.array([data.time]), counts=counts)
 

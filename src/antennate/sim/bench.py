@@ -7,7 +7,8 @@ or not at all.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,12 +19,10 @@ from antennate.errors import SimulationError
 from antennate.params import PhysicsParams
 from antennate.robots.antenna import BASE, AntennaSpec
 from antennate.sim import antenna_part, layers
-from antennate.sim.world import new_spec
+from antennate.sim.world import new_spec, set_contacts
 from antennate.types import Floats, Ints
 
 PREFIX = "antenna/"
-_SLIDES = ("carriage_x", "carriage_y")
-_PROBE = ("probe_x", "probe_y")
 _CARRIAGE_MASS = 1.0
 """A thousand antenna links [kg]: what the antenna feels does not move it."""
 _STIFFNESS, _DAMPING = 1e4, 200.0
@@ -44,6 +43,11 @@ class Ball:
     y: float
     radius: float
 
+    def geom(self) -> dict[str, Any]:
+        """The same as arguments of `add_geom`."""
+        kind = mujoco.mjtGeom.mjGEOM_SPHERE
+        return {"type": kind, "pos": [self.x, self.y, 0], "size": [self.radius, 0, 0]}
+
 
 @dataclass(frozen=True, slots=True)
 class Bar:
@@ -54,6 +58,12 @@ class Bar:
     x1: float
     y1: float
     radius: float
+
+    def geom(self) -> dict[str, Any]:
+        """The same as arguments of `add_geom`."""
+        ends = [self.x0, self.y0, 0, self.x1, self.y1, 0]
+        kind = mujoco.mjtGeom.mjGEOM_CAPSULE
+        return {"type": kind, "fromto": ends, "size": [self.radius, 0, 0]}
 
 
 def compile_bench(
@@ -76,17 +86,14 @@ def compile_bench(
     spec.option.gravity = [*gravity, 0.0]
     spec.option.tolerance = 1e-10
     for obstacle in obstacles:
-        _add(spec, obstacle)
-    carriage = _slider(spec, "carriage", _SLIDES)
+        spec.worldbody.add_geom(**obstacle.geom(), **_OBSTACLE)
+    carriage = _slider(spec, "carriage")
     if probe_radius is not None:
-        _slider(spec, "probe", _PROBE).add_geom(
-            type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[probe_radius, 0, 0], **_OBSTACLE
-        )
+        probe = _slider(spec, "probe")
+        probe.add_geom(type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[probe_radius, 0, 0], **_OBSTACLE)
     frame = carriage.add_frame()
     spec.attach(antenna_part.build(antenna), frame=frame, prefix=PREFIX)
-    for geom in spec.geoms:
-        geom.solref[0] = physics.contact_time
-        geom.solimp[:3] = [0.95, 0.99, 0.0005]
+    set_contacts(spec, physics)
     return spec.compile()
 
 
@@ -98,14 +105,14 @@ _OBSTACLE: dict[str, Any] = {
 }
 
 
-def _slider(spec: mujoco.MjSpec, name: str, slides: tuple[str, str]) -> mujoco.MjsBody:
+def _slider(spec: mujoco.MjSpec, name: str) -> mujoco.MjsBody:
     """A heavy body on two slides with servos, untouched by gravity."""
     body = spec.worldbody.add_body(name=name)
     body.gravcomp = 1.0
     body.mass = _CARRIAGE_MASS
     body.inertia = [1e-3, 1e-3, 1e-3]
     body.explicitinertial = True
-    for slide, axis in zip(slides, ([1, 0, 0], [0, 1, 0]), strict=True):
+    for slide, axis in ((f"{name}_x", [1, 0, 0]), (f"{name}_y", [0, 1, 0])):
         body.add_joint(name=slide, type=mujoco.mjtJoint.mjJNT_SLIDE, axis=axis)
         hinge = mujoco.mjtTrn.mjTRN_JOINT
         spec.add_actuator(name=slide, trntype=hinge, target=slide).set_to_position(kp=_STIFFNESS)
@@ -114,21 +121,34 @@ def _slider(spec: mujoco.MjSpec, name: str, slides: tuple[str, str]) -> mujoco.M
     return body
 
 
-def _add(spec: mujoco.MjSpec, obstacle: Ball | Bar) -> None:
-    if isinstance(obstacle, Ball):
-        spec.worldbody.add_geom(
-            type=mujoco.mjtGeom.mjGEOM_SPHERE,
-            pos=[obstacle.x, obstacle.y, 0],
-            size=[obstacle.radius, 0, 0],
-            **_OBSTACLE,
-        )
-        return
-    spec.worldbody.add_geom(
-        type=mujoco.mjtGeom.mjGEOM_CAPSULE,
-        fromto=[obstacle.x0, obstacle.y0, 0, obstacle.x1, obstacle.y1, 0],
-        size=[obstacle.radius, 0, 0],
-        **_OBSTACLE,
-    )
+class Slider:
+    """A body of the bench that servos move in the plane."""
+
+    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, name: str) -> None:
+        self._model, self._data = model, data
+        slides = (f"{name}_x", f"{name}_y")
+        self._where = _addresses(model, slides)
+        servos = (*slides, *(f"{slide}_speed" for slide in slides))
+        self._servos: Ints = np.array([model.actuator(servo).id for servo in servos])
+
+    @property
+    def position(self) -> Floats:
+        """Where it is [m], shape (2,)."""
+        return self._data.qpos[self._where]
+
+    def place(self, x: float, y: float) -> None:
+        """Put it at x, y [m], at rest."""
+        self._data.qpos[self._where] = x, y
+        self.command(x, y, 0.0, 0.0)
+        mujoco.mj_forward(self._model, self._data)
+
+    def command(self, x: float, y: float, speed_x: float, speed_y: float) -> None:
+        """Set its target [m] and its speed there [m/s]."""
+        self._data.ctrl[self._servos] = x, y, speed_x, speed_y
+
+
+def _addresses(model: mujoco.MjModel, joints: Sequence[str]) -> Ints:
+    return np.array([model.joint(name).qposadr[0] for name in joints])
 
 
 class Bench:
@@ -136,30 +156,21 @@ class Bench:
 
     Attributes:
         model: The compiled model; `data` its state.
+        carriage: Carries the antenna; a rod is another `Slider`, "probe".
     """
 
     def __init__(self, model: mujoco.MjModel, antenna: AntennaSpec) -> None:
         self.model = model
         self.data = mujoco.MjData(model)
         names = [PREFIX + name for name in antenna.hinge_names]
-        self._slides = self._addresses(_SLIDES)
-        self._base = self._addresses([PREFIX + BASE])
-        self._hinges = self._addresses(names)
+        self.carriage = Slider(model, self.data, "carriage")
+        self._base = _addresses(model, [PREFIX + BASE])
+        self._hinges = _addresses(model, names)
         self._sensed = antenna.sensed_hinges
         self._links: Ints = np.array([model.body(name).id for name in names])
         self._end = 2.0 * float(model.geom(names[-1]).pos[0])
-        self._controls = self._actuators(*_SLIDES, PREFIX + BASE)
-        has_probe = any(model.body(i).name == "probe" for i in range(model.nbody))
-        self._probe = self._addresses(_PROBE) if has_probe else None
-        self._probe_controls = self._actuators(*_PROBE) if has_probe else None
+        self._base_servo: int = model.actuator(PREFIX + BASE).id
         self._steps = 0
-
-    def _actuators(self, x: str, y: str, *others: str) -> Ints:
-        names = (x, y, f"{x}_speed", f"{y}_speed", *others)
-        return np.array([self.model.actuator(name).id for name in names])
-
-    def _addresses(self, joints: Sequence[str]) -> Ints:
-        return np.array([self.model.joint(name).qposadr[0] for name in joints])
 
     @property
     def t(self) -> float:
@@ -168,28 +179,14 @@ class Bench:
 
     def place(self, x: float, y: float, base: float) -> None:
         """Put the carriage at x, y [m] and turn the base [rad], all at rest and straight."""
-        self.data.qpos[self._slides] = x, y
         self.data.qpos[self._base] = base
-        self.command(x, y, 0.0, 0.0, base)
-        mujoco.mj_forward(self.model, self.data)
+        self.data.ctrl[self._base_servo] = base
+        self.carriage.place(x, y)
 
     def command(self, x: float, y: float, speed_x: float, speed_y: float, base: float) -> None:
         """Set the carriage's target [m], its speed there [m/s] and the base angle [rad]."""
-        self.data.ctrl[self._controls] = x, y, speed_x, speed_y, base
-
-    def place_probe(self, x: float, y: float) -> None:
-        """Put the probe at x, y [m], at rest."""
-        self.data.qpos[self._probe] = x, y
-        self.command_probe(x, y, 0.0, 0.0)
-        mujoco.mj_forward(self.model, self.data)
-
-    def command_probe(self, x: float, y: float, speed_x: float, speed_y: float) -> None:
-        """Set the probe's target [m] and its speed there [m/s]."""
-        self.data.ctrl[self._probe_controls] = x, y, speed_x, speed_y
-
-    def probe(self) -> Floats:
-        """Position of the probe [m], shape (2,)."""
-        return self.data.qpos[self._probe]
+        self.carriage.command(x, y, speed_x, speed_y)
+        self.data.ctrl[self._base_servo] = base
 
     def step(self, count: int = 1) -> None:
         """Advance by `count` physics steps.
@@ -198,12 +195,8 @@ class Bench:
             SimulationError: A command is not finite, the engine warned, time stood still, or the
                 state left all bounds.
         """
-        before = self._before_steps(count)
-        try:
+        with self._checked(count):
             mujoco.mj_step(self.model, self.data, count)
-        except mujoco.FatalError as error:
-            raise SimulationError(self._steps, str(error).splitlines()[0]) from error
-        self._after_steps(before)
 
     def press(self, count: int) -> Floats:
         """Advance by `count` physics steps and return the mean over them of `contact_force`.
@@ -214,27 +207,24 @@ class Bench:
         Raises:
             SimulationError: As for `step`.
         """
-        before = self._before_steps(count)
         total = np.zeros(2)
-        try:
+        with self._checked(count):
             for _ in range(count):
                 mujoco.mj_step(self.model, self.data)
                 if self.data.ncon:
                     total += self.contact_force()
-        except mujoco.FatalError as error:
-            raise SimulationError(self._steps, str(error).splitlines()[0]) from error
-        self._after_steps(before)
         return total / count
 
-    def _before_steps(self, count: int) -> float:
-        """Check the commands, count the steps and return the time."""
+    @contextmanager
+    def _checked(self, count: int) -> Iterator[None]:
+        """Physics steps, with a check of the commands before and of the state after them."""
         if not np.isfinite(self.data.ctrl).all():
             raise SimulationError(self._steps, "a command of the bench is not finite")
-        self._steps += count
-        return float(self.data.time)
-
-    def _after_steps(self, before: float) -> None:
-        """Raise if the state is unsound."""
+        before, self._steps = self.data.time, self._steps + count
+        try:
+            yield
+        except mujoco.FatalError as error:
+            raise SimulationError(self._steps, str(error).splitlines()[0]) from error
         bend, speed = self.hinges(), self.data.qvel
         if self.data.warning.number.any() or not self.data.time > before:
             raise SimulationError(self._steps, "engine warning")
@@ -256,10 +246,6 @@ class Bench:
     def base_angle(self) -> float:
         """Angle of the antenna's base [rad]."""
         return float(self.data.qpos[self._base][0])
-
-    def carriage(self) -> Floats:
-        """Position of the carriage [m], shape (2,)."""
-        return self.data.qpos[self._slides]
 
     def joints(self) -> Floats:
         """Positions of the n hinges and the tip [m], shape (n + 1, 2)."""

@@ -8,6 +8,7 @@ import math
 import mujoco
 import numpy as np
 
+from antennate.control.expect import expect
 from antennate.control.gait import targets
 from antennate.params import GaitParams, PhysicsParams
 from antennate.robots.spec import RobotSpec
@@ -32,7 +33,7 @@ def check_robot(robot: RobotSpec) -> None:
     _check_numbers(robot)
     world = World(compile_world(PhysicsParams(), robot), robot)
     mass = float(world.model.body_mass.sum())
-    _expect(
+    expect(
         math.isclose(mass, robot.mass, rel_tol=1e-9),
         f"bodies of {robot.mass} kg in all",
         f"{mass} kg",
@@ -41,7 +42,7 @@ def check_robot(robot: RobotSpec) -> None:
     rest = np.concatenate([getattr(start, name).ravel() for name in robot.command_shapes()])
     world.place(0.0, 0.0, 0.0, start.yaw[0], start.leg[0])
     _hold(world, rest, _SETTLE)
-    _expect(world.head[2] > 0.0, "it to stand", f"its head {world.head[2]} m high")
+    expect(world.head[2] > 0.0, "it to stand", f"its head {world.head[2]} m high")
     for i, name in enumerate(robot.joint_names):
         _check_joint(world, rest, i, name)
 
@@ -50,10 +51,10 @@ def _check_numbers(robot: RobotSpec) -> None:
     count = len(robot.joint_names)
     for what in ("ids", "directions", "zeros", "limits", "fastest"):
         found = len(getattr(robot, what))
-        _expect(found == count, f"{count} {what}, one a joint", f"{found}")
-    _expect(len(set(robot.ids)) == count, "ids that differ", f"{robot.ids}")
+        expect(found == count, f"{count} {what}, one a joint", f"{found}")
+    expect(len(set(robot.ids)) == count, "ids that differ", f"{robot.ids}")
     again = RobotSpec.model_validate_json(json.dumps(robot.model_dump(mode="json")), strict=True)
-    _expect(again == robot, "the same robot back from JSON", "another")
+    expect(again == robot, "the same robot back from JSON", "another")
 
 
 def _check_joint(world: World, rest: Floats, i: int, name: str) -> None:
@@ -63,15 +64,10 @@ def _check_joint(world: World, rest: Floats, i: int, name: str) -> None:
     _hold(world, goals, _TURN)
     turned = float(world.drives()[i]) - before
     _hold(world, rest, _TURN)
-    _expect(turned > _STEP / 4, f"{name} to turn by {_STEP} rad", f"{turned:.4g} rad")
+    expect(turned > _STEP / 4, f"{name} to turn by {_STEP} rad", f"{turned:.4g} rad")
 
 
 def _hold(world: World, goals: Floats, time: float) -> None:
     world.command(goals)
     mujoco.mj_forward(world.model, world.data)
     world.step(round(time / world.model.opt.timestep))
-
-
-def _expect(holds: bool, expected: str, found: str) -> None:
-    if not holds:
-        raise AssertionError(f"expected {expected}, found {found}")

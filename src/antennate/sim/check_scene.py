@@ -7,6 +7,7 @@ import math
 import mujoco
 import numpy as np
 
+from antennate.control.expect import expect
 from antennate.errors import AntennateError
 from antennate.params import GaitParams, PhysicsParams
 from antennate.robots.spec import RobotSpec
@@ -44,13 +45,13 @@ def check_scene(scene: Scene, robot: RobotSpec | None = None) -> None:
     models = [_checked_model(_draw(scene, robot, seed), robot) for seed in _SEEDS]
     for seed, model in zip(_SEEDS, models, strict=True):
         again = _checked_model(_draw(scene, robot, seed), robot)
-        _expect(again == model, f"seed {seed}: the same instance again", "another")
+        expect(again == model, f"seed {seed}: the same instance again", "another")
     differ = len(set(models)) > 1
-    _expect(isinstance(scene.random, bool), "random to be True or False", repr(scene.random))
+    expect(isinstance(scene.random, bool), "random to be True or False", repr(scene.random))
     if scene.random:
-        _expect(differ, "other instances from other seeds, as random is True", "one and the same")
+        expect(differ, "other instances from other seeds, as random is True", "one and the same")
     else:
-        _expect(not differ, "one instance, as random is False", "others from other seeds")
+        expect(not differ, "one instance, as random is False", "others from other seeds")
     for seed in _SEEDS:
         _check_course(_draw(scene, robot, seed))
 
@@ -78,38 +79,33 @@ def _check_course(drawn: SceneInstance) -> None:
     x, y, heading = drawn.start
     start = np.array([x, y])
     ahead = np.array([math.cos(heading), math.sin(heading)])
-    _expect(bool(np.isfinite([x, y, heading]).all()), "a finite start", str(drawn.start))
-    _expect(0.0 < drawn.length < math.inf, "a length above 0 m", f"{drawn.length} m")
+    expect(bool(np.isfinite([x, y, heading]).all()), "a finite start", str(drawn.start))
+    expect(0.0 < drawn.length < math.inf, "a length above 0 m", f"{drawn.length} m")
     first, then = drawn.progress(start.copy()), drawn.progress(start + _STEP * ahead)
-    _expect(abs(first) < 1e-3, "progress 0 m at the start", f"{first} m")
-    _expect(then > first, f"progress to grow over {_STEP} m ahead of the start", f"{then} m")
-    _expect(not drawn.succeeded(start.copy()), "no success at the start", "success")
-    _expect(not drawn.left(start.copy()), "a start inside", "a robot that has left")
+    expect(abs(first) < 1e-3, "progress 0 m at the start", f"{first} m")
+    expect(then > first, f"progress to grow over {_STEP} m ahead of the start", f"{then} m")
+    expect(not drawn.succeeded(start.copy()), "no success at the start", "success")
+    expect(not drawn.left(start.copy()), "a start inside", "a robot that has left")
     _check_exit(drawn)
     for turn in np.arange(8) * math.pi / 4:
         where = start + _FAR * np.array([math.cos(turn), math.sin(turn)])
-        _expect(drawn.left(where), f"the robot to have left at {_shown(where)}", "it inside")
+        expect(drawn.left(where), f"the robot to have left at {_shown(where)}", "it inside")
 
 
 def _check_exit(drawn: SceneInstance) -> None:
     exit_line = np.asarray(drawn.exit, dtype=float)
-    _expect(exit_line.shape == (2, 2), "an exit line of shape (2, 2)", str(exit_line.shape))
+    expect(exit_line.shape == (2, 2), "an exit line of shape (2, 2)", str(exit_line.shape))
     middle, along = exit_line.mean(axis=0), exit_line[1] - exit_line[0]
-    _expect(bool(np.hypot(*along) > 0.0), "an exit line with a length", "none")
+    expect(bool(np.hypot(*along) > 0.0), "an exit line with a length", "none")
     normal = np.array([-along[1], along[0]]) / np.hypot(*along)
     sides = [middle + _NEAR * normal, middle - _NEAR * normal]
     before, past = sorted(sides, key=drawn.progress)
-    _expect(drawn.succeeded(past), f"success past the exit, at {_shown(past)}", "none")
-    _expect(not drawn.succeeded(before), f"no success before it, at {_shown(before)}", "success")
-    _expect(not drawn.left(before), f"{_shown(before)}, before the exit, inside", "outside")
+    expect(drawn.succeeded(past), f"success past the exit, at {_shown(past)}", "none")
+    expect(not drawn.succeeded(before), f"no success before it, at {_shown(before)}", "success")
+    expect(not drawn.left(before), f"{_shown(before)}, before the exit, inside", "outside")
     gap = drawn.progress(middle) - drawn.length
-    _expect(abs(gap) < _NEAR, "progress at the exit to be the length", f"{gap:+.3f} m more")
+    expect(abs(gap) < _NEAR, "progress at the exit to be the length", f"{gap:+.3f} m more")
 
 
 def _shown(where: Floats) -> str:
     return f"({where[0]:.2f}, {where[1]:.2f}) m"
-
-
-def _expect(holds: bool, expected: str, found: str) -> None:
-    if not holds:
-        raise AssertionError(f"expected {expected}, found {found}")

@@ -79,11 +79,10 @@ def _add_link_joints(spec: mujoco.MjSpec, link: mujoco.MjsBody, i: int, params: 
     _add_hinge(link, yaw, _YAW, at, servo)
     _add_servo(spec, yaw, servo)
     servo = params.servos.of(params.pitch.servo)
+    spring = {} if params.pitch_count else {"stiffness": params.pitch.stiffness}
+    _add_hinge(link, pitch, _PITCH, at, servo, **spring)
     if params.pitch_count:
-        _add_hinge(link, pitch, _PITCH, at, servo)
         _add_servo(spec, pitch, servo)
-    else:
-        _add_hinge(link, pitch, _PITCH, at, servo, stiffness=params.pitch.stiffness)
 
 
 def _add_link_shape(link: mujoco.MjsBody, params: RobotSpec) -> None:
@@ -131,12 +130,10 @@ def _add_leg(
 
 def _attach_antennae(spec: mujoco.MjSpec, params: RobotSpec) -> None:
     head = spec.body(params.link_names[0])
-    part = antenna.build(params.antenna)
     for prefix, sign in zip(ANTENNA_PREFIXES, SIDE_SIGN, strict=True):
         side = "left" if sign > 0 else "right"
         turn = antenna.mounting_quaternion(params.antenna.base_angle, side)
         frame = head.add_frame(
             pos=[params.link_pitch / 2, sign * params.antenna.base_spacing / 2, 0.0], quat=turn
         )
-        spec.attach(part, frame=frame, prefix=prefix)
-        part = antenna.build(params.antenna)
+        spec.attach(antenna.build(params.antenna), frame=frame, prefix=prefix)

@@ -29,10 +29,7 @@ class Disturbance:
         period: float,
     ) -> None:
         self._rng = rng
-        self._params = robot.antenna.sensor
-        self._legs = robot.leg_count
-        self._variation = variation
-        self._friction = robot.leg_friction
+        self._robot, self._variation = robot, variation
         self._slip_ticks = max(1, round(variation.slip_time / period))
         self._noise = np.zeros((0, 2))
         self.joint_bias: Floats = rng.normal(0.0, variation.joint_bias, robot.yaw_count)
@@ -41,15 +38,15 @@ class Disturbance:
         """Reading noise of one tick [counts], shape (2,)."""
         at = tick % _NOISE_BLOCK
         if at == 0:
-            self._noise = reading_noise(self._params, self._rng, (_NOISE_BLOCK, 2))
+            self._noise = reading_noise(self._robot.antenna.sensor, self._rng, (_NOISE_BLOCK, 2))
         return self._noise[at]
 
     def leg_friction(self, tick: int) -> Floats | None:
         """New friction of all legs where this tick draws one, else None."""
         if tick % self._slip_ticks:
             return None
-        factor = np.exp(self._rng.normal(0.0, self._variation.slip_log_sd, self._legs))
-        return np.clip(self._friction * factor, 0.02, 2.0)
+        factor = np.exp(self._rng.normal(0.0, self._variation.slip_log_sd, self._robot.leg_count))
+        return np.clip(self._robot.leg_friction * factor, 0.02, 2.0)
 
 
 class _Row:
@@ -60,7 +57,7 @@ class _Row:
     def __init__(self, world: World, chance: Disturbance) -> None:
         self.world = world
         self.chance = chance
-        self.hinges: Floats = np.zeros((2, world.sensed_hinges))
+        self.hinges: Floats = np.zeros((2, world.robot.antenna.sensed_hinges))
         self.tick = 0
         self.commanded = False
         self.failure: SimulationError | None = None

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
-from pydantic import model_validator
+from pydantic import field_validator, model_validator
 
 from antennate.control.gait import targets
 from antennate.errors import AntennateError, SceneError, in_one_line
@@ -42,9 +42,13 @@ class TrialConfig(Params):
     variation: VariationParams = VariationParams()
     physics: PhysicsParams = PhysicsParams()
 
+    @field_validator("scene")
+    @classmethod
+    def _known(cls, name: str) -> str:
+        return check_name(name)
+
     @model_validator(mode="after")
     def _scene_and_robot_agree(self) -> TrialConfig:
-        check_name(self.scene)
         if self.scene != TUNNEL:
             if self.tunnel != TunnelParams():
                 raise ValueError(

@@ -18,7 +18,7 @@ from antennate.robots.spec import ANTENNA_PREFIXES, RobotSpec
 from antennate.sim import layers, robot_part
 from antennate.sim.outline import outline
 from antennate.sim.scenes.scene import SceneInstance, add_floor
-from antennate.types import Floats, Ints
+from antennate.types import Bools, Floats, Ints
 
 mujoco.set_mju_user_warning(lambda message: None)
 """The engine prints its warnings and writes them to a file; we read its counters instead."""
@@ -71,13 +71,18 @@ def compile_world(
     frame = spec.worldbody.add_frame(pos=[0, 0, robot_part.axle_height(robot)])
     spec.attach(robot_part.build(robot), frame=frame, prefix=PREFIX)
     spec.body(PREFIX + robot.link_names[0]).add_freejoint(name=PREFIX + "root")
-    for geom in spec.geoms:
-        geom.solref[0] = physics.contact_time
-        geom.solimp[:3] = [0.95, 0.99, 0.0005]
+    set_contacts(spec, physics)
     try:
         return spec.compile()
     except ValueError as error:
         raise SceneError(f"the scene cannot be compiled: {in_one_line(error)}") from error
+
+
+def set_contacts(spec: mujoco.MjSpec, physics: PhysicsParams) -> None:
+    """Give all contacts one stiffness, that of `contact_time`."""
+    for geom in spec.geoms:
+        geom.solref[0] = physics.contact_time
+        geom.solimp[:3] = [0.95, 0.99, 0.0005]
 
 
 def _meet_robot(spec: mujoco.MjSpec) -> None:
@@ -95,6 +100,7 @@ class World:
     Attributes:
         model: The compiled model; `data` its state.
         robot: The robot in it.
+        head: Position of the head link [m], shape (3,), a view of the state.
         t: Time since the world was made [s].
     """
 
@@ -121,7 +127,7 @@ class World:
         self._steps = 0
         data = self.data
         self._qpos, self._qvel, self._ctrl = data.qpos, data.qvel, data.ctrl
-        self._head: Floats = data.qpos[self._root : self._root + 3]
+        self.head: Floats = data.qpos[self._root : self._root + 3]
         self._bent: Floats = np.zeros(len(self._bounded))
         self._warnings = data.warning.number
         self._no_warning = self._warnings.tobytes()
@@ -192,7 +198,7 @@ class World:
         self._check(before)
 
     def _check(self, before: float) -> None:
-        x, y, height = self._head.tolist()
+        x, y, height = self.head.tolist()
         bent, speed = self._bent, self._qvel
         self._qpos.take(self._bounded, out=bent, mode="clip")
         sound = (
@@ -210,41 +216,24 @@ class World:
     def _explain(self, before: float) -> None:
         """Look closely at a state that may be unsound."""
         data = self.data
-        speed = float(abs(data.qvel).max())
-        height = float(self.head[2])
-        if data.warning.number.any():
-            found = [n for n, count in zip(_WARNINGS, data.warning.number, strict=True) if count]
-            raise SimulationError(self._steps, f"engine warning {', '.join(found)}")
-        far = float(abs(self.head[:2]).max())
-        if not far < _DISTANCE_LIMIT:
-            raise SimulationError(self._steps, f"the head is {far:.3g} m away")
-        bend = float(abs(data.qpos[self._bounded]).max())
-        if not bend < _ANGLE_LIMIT:
-            raise SimulationError(self._steps, f"a joint is at {bend:.3g} rad")
-        if not data.time > before:
-            raise SimulationError(self._steps, f"time stood still at {data.time:.6g} s")
-        if not speed < _SPEED_LIMIT:
-            raise SimulationError(self._steps, f"a coordinate moves at {speed:.3g} m/s or rad/s")
-        if not 0.0 < height < _HEIGHT_LIMIT:
-            raise SimulationError(self._steps, f"the head is at a height of {height:.3g} m")
+        warned = [n for n, count in zip(_WARNINGS, data.warning.number, strict=True) if count]
+        far, height = float(abs(self.head[:2]).max()), float(self.head[2])
+        bend, speed = (float(abs(v).max()) for v in (data.qpos[self._bounded], data.qvel))
+        checks = (
+            (not warned, f"engine warning {', '.join(warned)}"),
+            (far < _DISTANCE_LIMIT, f"the head is {far:.3g} m away"),
+            (bend < _ANGLE_LIMIT, f"a joint is at {bend:.3g} rad"),
+            (data.time > before, f"time stood still at {data.time:.6g} s"),
+            (speed < _SPEED_LIMIT, f"a coordinate moves at {speed:.3g} m/s or rad/s"),
+            (0.0 < height < _HEIGHT_LIMIT, f"the head is at a height of {height:.3g} m"),
+        )
+        for sound, found in checks:
+            if not sound:
+                raise SimulationError(self._steps, found)
 
     def read_hinges(self, angles: Floats) -> None:
         """Write the angles of all hinges under the flex sensors to `angles` [rad], shape (2, n)."""
         self._qpos.take(self._flex, out=angles, mode="clip")
-
-    @property
-    def sensed_hinges(self) -> int:
-        """Number of hinges under one flex sensor."""
-        return self._flex.shape[1]
-
-    def flex(self) -> Floats:
-        """Summed hinge angles under each sensor [rad], shape (2,); positive towards the tail."""
-        return self._qpos[self._flex].sum(axis=1)
-
-    @property
-    def head(self) -> Floats:
-        """Position of the head link [m], shape (3,), a view of the state."""
-        return self._head
 
     @property
     def heading(self) -> float:
@@ -268,18 +257,18 @@ class World:
 
     def obstacle_overlap(self) -> float:
         """How deep the robot is in obstacles at most [m]; 0 if it touches none."""
-        contact = self.data.contact
-        kind = self._obstacle[contact.geom]
-        meets = (kind[:, 0] != kind[:, 1]) & self._robot[contact.geom].any(axis=1)
-        return max(0.0, -float(contact.dist[meets].min(initial=0.0)))
+        return max(0.0, -float(self.data.contact.dist[self._on_obstacles()].min(initial=0.0)))
 
     def obstacle_force(self) -> float:
         """Sum of the normal forces between robot and obstacles [N] in the last physics step."""
-        contact = self.data.contact
-        kind = self._obstacle[contact.geom]
-        pushing = (kind[:, 0] != kind[:, 1]) & (self._robot[contact.geom].any(axis=1))
-        address = contact.efc_address[pushing]
+        address = self.data.contact.efc_address[self._on_obstacles()]
         return float(self.data.efc_force[address[address >= 0]].sum())
+
+    def _on_obstacles(self) -> Bools:
+        """Contacts between the robot and an obstacle, shape (contacts,)."""
+        geoms = self.data.contact.geom
+        kind = self._obstacle[geoms]
+        return (kind[:, 0] != kind[:, 1]) & self._robot[geoms].any(axis=1)
 
     def set_leg_friction(self, friction: Floats) -> None:
         """Give every leg its own sliding friction, shape (2 L,)."""

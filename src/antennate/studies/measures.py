@@ -100,6 +100,14 @@ def count(column: str, value: Any) -> Of:
     return lambda name, rows: sum(getattr(row, column) == value for row in rows)
 
 
+def successes(summaries: Mapping[str, Mapping[str, Any]]) -> str:
+    """Successes of each condition by name, of its valid trials, with their interval."""
+    return ", ".join(
+        f"{name} {row['successes']} of {row['trials'] - row['invalid']} ({shown(row['wilson95'])})"
+        for name, row in summaries.items()
+    )
+
+
 @dataclass(frozen=True, slots=True)
 class Table:
     """A table to be shown: measures are rows, so that it fits a narrow terminal.

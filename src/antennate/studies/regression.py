@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -55,10 +54,6 @@ class Explained:
     r2: float
     r2_95: tuple[float, float]
     rmse: float
-
-    def row(self) -> dict[str, Any]:
-        """As an object of result.json."""
-        return asdict(self)
 
 
 def explained(truth: Floats, prediction: Floats, groups: Ints, seed: int = 0) -> Explained:

@@ -29,7 +29,7 @@ from typing import IO, Any
 
 from antennate import __version__
 from antennate.errors import BadInputError, OutputError
-from antennate.files import write_whole
+from antennate.files import decoded, read_limited, write_whole
 from antennate.params import Params
 from antennate.params.reading import Config, read_file
 from antennate.studies.formats import from_csv, strict, to_csv, to_json, to_toml
@@ -40,6 +40,8 @@ CONFIG, VERSIONS, COMMAND = "config.toml", "versions.json", "command.txt"
 FIGURES = "figures"
 """Folder of the figures; what it holds as svg and png belongs to the run."""
 CALIBRATION, LOG = "calibration.json", "drive.log"
+_LARGEST = 10**9
+"""No file of a run is longer [bytes]."""
 _LOGS = tuple(part(Path(LOG), number).name for number in range(1, MOST_PARTS + 1))
 _FILES = (CALIBRATION, "conditioning.toml", "recording.csv", "ticks.csv", *_LOGS)
 _NAMES = (RESULT, PARTIAL, TABLE, CONFIG, VERSIONS, COMMAND, *_FILES)
@@ -134,12 +136,9 @@ class RunDirectory:
 
     def _decoded(self, name: str, decode: Any) -> Any:
         path = self.path / name
+        text = decoded(path, read_limited(path, _LARGEST))
         try:
-            return decode(path.read_text("utf-8"))
-        except OSError as error:
-            raise BadInputError(
-                f"expected a readable file, found {path}: {error.strerror}"
-            ) from None
+            return decode(text)
         except ValueError as error:
             raise BadInputError(
                 f"{path}: expected a whole file of this kind, found: {str(error).splitlines()[0]}"

@@ -101,9 +101,8 @@ class LogWriter:
         )
 
     def _require_room(self, least: float) -> None:
-        folder = self.path.parent
         try:
-            free = shutil.disk_usage(folder).free
+            free = shutil.disk_usage(self.path.parent).free
         except OSError as error:
             raise LogError(
                 f"expected a folder to write {self.path}, found: {error.strerror}"

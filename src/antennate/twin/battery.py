@@ -5,27 +5,25 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from antennate.hardware.dynamixel.tables import XC430_W240
 from antennate.params.twin import BatteryParams
-from antennate.robots.servos import TICKS_A_TURN, ServoParams
+from antennate.robots.servos import TICKS_A_TURN, ServoParams, ServosParams
 from antennate.twin.registers import Servo
 
 _VOLTAGE_ERROR = 1
 """Bit of the register Hardware Error Status, from the manuals of both models."""
 _UNITS_A_VOLT = 10
 _TICK = 2.0 * math.pi / TICKS_A_TURN
+_MODELS: dict[int, ServoParams] = {m.model_number: m for m in dict(ServosParams()).values()}
 
 
 class Battery:
     """Feeds all servos; its voltage is constant until `discharge` is called.
 
-    Args:
-        params: Its numbers.
+    Models made for no more than the voltage at the antennae are behind the regulator.
     """
 
     def __init__(self, params: BatteryParams) -> None:
         self._params = params
-        self._servo = ServoParams()
         self._before: dict[int, float] = {}
         self._t = 0.0
         self._begin = math.inf
@@ -43,17 +41,20 @@ class Battery:
 
     def _show(self, servos: Sequence[Servo], volts: float) -> None:
         for servo in servos:
-            large = servo.table is XC430_W240
-            seen = volts if large else min(volts, self._params.antenna_voltage)
+            seen = volts if self._direct(servo) else min(volts, self._params.antenna_voltage)
             servo.set("present_input_voltage", round(_UNITS_A_VOLT * seen))
             if servo.get("present_input_voltage") < servo.get("min_voltage_limit"):
                 servo.fail(_VOLTAGE_ERROR)
 
     def _volts(self, servos: Sequence[Servo], t: float) -> float:
-        load = sum(self._load(servo, t) for servo in servos if servo.table is XC430_W240)
+        load = sum(self._load(servo, t) for servo in servos if self._direct(servo))
         empty = self._rate * (t - self._begin)
         drop = self._params.resistance * self._params.stall_current * load
         return max(self._params.voltage - empty - drop, 0.0)
+
+    def _direct(self, servo: Servo) -> bool:
+        """Whether it hangs on the supply itself."""
+        return _MODELS[servo.table.model].voltage > self._params.antenna_voltage
 
     def _load(self, servo: Servo, t: float) -> float:
         """Share of its stall current: its drive, less what its own turning takes from that."""
@@ -61,5 +62,6 @@ class Battery:
             return 0.0
         ahead = _TICK * (servo.get("goal_position") - servo.position)
         turned = _TICK * (servo.position - self._before.get(servo.get("id"), servo.position))
-        drive = max(-1.0, min(self._servo.position_gain * ahead, 1.0))
-        return min(abs(drive - turned / (t - self._t) / self._servo.no_load_speed), 1.0)
+        model = _MODELS[servo.table.model]
+        drive = max(-1.0, min(model.position_gain * ahead, 1.0))
+        return min(abs(drive - turned / (t - self._t) / model.no_load_speed), 1.0)

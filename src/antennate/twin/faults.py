@@ -23,19 +23,10 @@ _SERVO = {fault.name.lower(): fault for fault in Fault}
 _HARDWARE = {"voltage": 1, "overheat": 4, "encoder": 8, "shock": 16, "overload": 32}
 """Bits of the register Hardware Error Status, from the manuals of both models."""
 _SIDES = ("left", "right")
+_BOARD = ("silent", "reset", *(f"{kind}_{side}" for kind in ("open", "short") for side in _SIDES))
 _KNOWN = {
     "servo": (*_SERVO, *_HARDWARE, "reboot"),
-    "esp32": (
-        "silent",
-        "reset",
-        "open_left",
-        "open_right",
-        "short_left",
-        "short_right",
-        "left",
-        "right",
-        "ber",
-    ),
+    "esp32": (*_BOARD, *_SIDES, "ber"),
     "bus": ("loss", "silent", "latency", "discharge", "ber"),
     "link": ("loss", "ber"),
 }

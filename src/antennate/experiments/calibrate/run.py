@@ -24,7 +24,7 @@ from antennate.experiments.reading import mean_since
 from antennate.params import BenchPhysicsParams, BenchVariationParams, Params
 from antennate.params.base import number
 from antennate.robots.antenna import AntennaSpec
-from antennate.sim.bench import Bench, compile_bench
+from antennate.sim.bench import Bench, Slider, compile_bench
 from antennate.studies.experiment import OnStep, Outcome, no_step
 from antennate.studies.pool import gather
 from antennate.types import Floats
@@ -181,16 +181,17 @@ def push(config: CalibrateConfig, trial: int) -> Recording:
     ticks = int(np.ceil((gap + rig.depth) / speed * rate)) + 1
     noise = reading_noise(config.antenna.sensor, rng, (ticks,))
     sensor = SensorChain(config.antenna.sensor, (), period)
+    rod = Slider(bench.model, bench.data, "probe")
     bench.place(0.0, 0.0, 0.0)
-    bench.place_probe(rig.place, -touch - gap)
+    rod.place(rig.place, -touch - gap)
     rows = []
     for i in range(ticks):
-        at = float(bench.probe()[1]) + touch
+        at = float(rod.position[1]) + touch
         counts = float(sensor.step(np.array(bench.flex()), float(noise[i])))
         rows.append((i * period, counts, at / rig.depth))
         for k in range(1, round(period / _COMMAND_PERIOD) + 1):
             y = -touch - gap + speed * (i * period + k * _COMMAND_PERIOD)
-            bench.command_probe(rig.place, y, 0.0, speed)
+            rod.command(rig.place, y, 0.0, speed)
             bench.step(round(_COMMAND_PERIOD / config.physics.timestep))
     t, counts, bend = np.array(rows).T
     inside = (bend >= 0) & (bend <= 1)

@@ -10,7 +10,7 @@ from antennate.experiments.force.loads import ForceConfig
 from antennate.studies.experiment import Experiment
 from antennate.studies.measures import Measure, Table, shown
 
-_PARTS = {
+PARTS = {
     "at rest": "statics.frictionless",
     "with friction": "statics.friction",
     "dragged": "traverses",
@@ -18,7 +18,7 @@ _PARTS = {
 """Where a result holds each part."""
 EXPLAINED = tuple(
     measure
-    for name, path in _PARTS.items()
+    for name, path in PARTS.items()
     for place in ("known", "unknown")
     for measure in (
         Measure(f"{path}.{place}.flex.r2", f"{name}, place {place}"),

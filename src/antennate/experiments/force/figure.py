@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -12,10 +13,10 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
 from antennate import figures as style
+from antennate.experiments.force.experiment import PARTS
 from antennate.experiments.force.loads import Points
 from antennate.experiments.force.run import ForceOutcome, ProfileOutcome
-
-_SHOWN = "descending"
+from antennate.studies.measures import Measure
 
 
 def figures(outcome: ForceOutcome) -> dict[str, Figure]:
@@ -33,12 +34,12 @@ def study(result: Mapping[str, Any], profiles: Sequence[ProfileOutcome]) -> Figu
     """
     figure = style.canvas(10.0, 7.4)
     (rest, move), (ranges, shares) = figure.subplots(2, 2, height_ratios=(1.1, 1))
-    shown = next((p for p in profiles if p.profile == _SHOWN), profiles[0])
+    shown = next((p for p in profiles if p.profile == "descending"), profiles[0])
     scale = ScalarMappable(Normalize(result["from_place"], 1.0), "viridis")
-    _scatter(rest, shown.statics, scale, result, "At rest, normal to the link")
     moved = result["profiles"][shown.profile]["traverses"]["trials"]
+    title = f"{shown.profile}: at rest, normal to the link"
+    _scatter(rest, shown.statics, scale, result, title)
     _scatter(move, shown.traverses, scale, result, f"Dragged past a post, {moved} traverses")
-    rest.set_title(f"{shown.profile}: {rest.get_title(loc='left').lower()}")
     figure.colorbar(scale, ax=[rest, move], label="place of contact / length", shrink=0.9)
     _draw_ranges(ranges, result)
     _draw_shares(shares, result)
@@ -84,40 +85,25 @@ def _draw_ranges(panel: Axes, result: Mapping[str, Any]) -> None:
     panel.legend(loc="lower right")
 
 
-_BARS = {
-    "known": ("at rest, place known", ("statics", "frictionless")),
-    "unknown": ("at rest, place unknown", ("statics", "frictionless")),
-    "dragged, known": ("dragged, place known", ("traverses",)),
-    "dragged, unknown": ("dragged, place unknown", ("traverses",)),
-}
-_BAR_MARKS = (("o", style.INK), ("s", style.INK), ("o", "#D55E00"), ("s", "#D55E00"))
-
-
 def _draw_shares(panel: Axes, result: Mapping[str, Any]) -> None:
-    names = list(result["profiles"])
-    for k, ((key, (label, path)), (marker, colour)) in enumerate(
-        zip(_BARS.items(), _BAR_MARKS, strict=True)
-    ):
-        for i, name in enumerate(names):
-            row = result["profiles"][name]
-            for step in (*path, key.rpartition(" ")[2], "flex"):
-                row = row[step]
-            low, high = row["r2_95"]
-            panel.errorbar(
-                i + 0.18 * (k - 1.5),
-                row["r2"],
-                [[max(row["r2"] - low, 0.0)], [max(high - row["r2"], 0.0)]],
-                marker=marker,
-                color=colour,
-                markersize=5,
-                linewidth=1.2,
-                label=label if i == 0 else None,
-                markerfacecolor=colour if "known" in label.split() else "white",
-            )
-    panel.set_xticks(range(len(names)), [name.replace("_", "\n") for name in names])
+    profiles = result["profiles"]
+    parts = (("at rest", style.INK), ("dragged", "#D55E00"))
+    places = (("known", "o"), ("unknown", "s"))
+    for k, ((part, colour), (place, marker)) in enumerate(product(parts, places)):
+        known = Measure(f"{PARTS[part]}.{place}.flex", f"{part}, place {place}")
+        style.intervals(
+            panel,
+            [i + 0.18 * (k - 1.5) for i in range(len(profiles))],
+            [known.value(row) for row in profiles.values()],
+            ("r2", "r2_95"),
+            marker=marker,
+            color=colour,
+            label=known.label,
+            markerfacecolor=colour if place == "known" else "white",
+        )
+    style.categories(panel, [name.replace("_", "\n") for name in profiles])
     panel.set(ylabel="R² of force", title="Share of force that flex explains (95 %)")
     bottom, top = panel.get_ylim()
     panel.set_ylim(min(bottom, 0.0), top + 0.35)
     panel.set_yticks([0.2 * step for step in range(6)])
-    panel.grid(visible=False, axis="x")
     panel.legend(loc="upper left", ncols=2, fontsize=8)

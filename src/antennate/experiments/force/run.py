@@ -9,7 +9,7 @@ farther takes part.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -30,7 +30,6 @@ from antennate.studies.pool import gather
 from antennate.studies.regression import by_group, explained
 from antennate.types import Floats, Ints
 
-SCHEMA = 1
 SCALARS = ("flex", "reading", "level")
 """Flex without noise, one reading of the converter, and b of the readings of T_avg."""
 
@@ -78,7 +77,7 @@ class ForceOutcome:
     def result(self) -> dict[str, Any]:
         """The content of result.json."""
         return {
-            "schema": SCHEMA,
+            "schema": 1,
             "command": "force",
             "seed": self.config.seed,
             "hinge_limit_deg": self.config.hinge_limit_deg,
@@ -106,7 +105,7 @@ def score(
 
 def _row(points: Points, which: Ints, guess: Floats, largest: float) -> dict[str, Any]:
     guess = guess[np.isfinite(guess)]
-    row = explained(points.force[which], guess, points.trial[which]).row()
+    row = asdict(explained(points.force[which], guess, points.trial[which]))
     return row | {"rmse_percent": 100.0 * row["rmse"] / largest}
 
 
@@ -168,12 +167,7 @@ def _traverse_all(
         speed = config.speeds[k % len(config.speeds)]
         one = drag(
             config.physics,
-            antenna,
-            overlap,
-            speed,
-            config.post_radius,
-            limit,
-            config.antenna.sensor.rate,
+            *(antenna, overlap, speed, config.post_radius, limit, antenna.sensor.rate),
         )
         found.append(one)
         rows.append(

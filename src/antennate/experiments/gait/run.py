@@ -19,7 +19,7 @@ from antennate.experiments.gait.pace import Pace, Walk, measure, rolling_speed
 from antennate.params import GaitParams, Params, PhysicsParams, VariationParams, number
 from antennate.params.base import require_whole_steps
 from antennate.robots.spec import HARDWARE_ALONE, RobotSpec
-from antennate.sim.scenes.flat import FlatScene
+from antennate.sim.scenes.scene import FlatScene
 from antennate.sim.sim_robot import Disturbance, SimRobot
 from antennate.sim.trial import make_world, place_at_start
 from antennate.sim.world import World
@@ -27,7 +27,6 @@ from antennate.studies.experiment import OnStep, Outcome, no_step
 from antennate.studies.pool import gather
 from antennate.types import AntennaFrame, Floats, JointCommand, Maneuver
 
-SCHEMA = 1
 MANEUVERS = (Maneuver.FORWARD, Maneuver.TURN_L, Maneuver.TURN_R, Maneuver.REVERSE)
 WAVE_OFF = "wave_off"
 
@@ -81,7 +80,7 @@ class GaitOutcome(Outcome):
         speeds = [pace.speed for pace in swept]
         best = max(speeds)
         return {
-            "schema": SCHEMA,
+            "schema": 1,
             "command": "gait",
             "body_length_m": config.robot.length,
             "frequency_hz": config.gait.frequency,

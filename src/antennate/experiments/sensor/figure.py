@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from antennate import figures as style
-from antennate.experiments.sensor.run import SensorOutcome
+from antennate.experiments.sensor.experiment import SensorOutcome
 from antennate.types import Floats
 
 

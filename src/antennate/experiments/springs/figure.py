@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from antennate import figures as style
-from antennate.experiments.springs.run import SpringsOutcome
+from antennate.experiments.springs.experiment import SpringsOutcome
 
 _SHOWN = 5
 """Sets of springs drawn."""

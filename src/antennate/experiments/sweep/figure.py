@@ -122,28 +122,19 @@ def _draw_map(panel: Axes, cells: Sequence[Mapping[str, Any]]) -> None:
 
 
 def _draw_errors(panel: Axes, estimates: Mapping[str, Any], quantity: str) -> None:
+    found = [by_noise["noisy"][quantity] for by_noise in estimates.values()]
     for k, (cue, (marker, colour)) in enumerate(_CUE_MARKS.items()):
-        for i, by_noise in enumerate(estimates.values()):
-            if cue not in by_noise["noisy"][quantity]:
-                continue
-            row = by_noise["noisy"][quantity][cue]
-            low, high = row["mape_95"]
-            mean = row["mape_percent"]
-            panel.errorbar(
-                i + 0.13 * (k - 2),
-                mean,
-                [[max(mean - low, 0.0)], [max(high - mean, 0.0)]],
-                marker=marker,
-                color=colour,
-                markersize=5,
-                linewidth=1.2,
-                label=_CUE_NAMES[cue] if i == 0 else None,
-            )
-    counts = [by_noise["noisy"][quantity] for by_noise in estimates.values()]
-    numbers = [max((row["n"] for row in count.values()), default=0) for count in counts]
-    panel.set_xticks(
-        range(len(estimates)), [f"{c}\nn = {n}" for c, n in zip(estimates, numbers, strict=True)]
-    )
+        style.intervals(
+            panel,
+            [i + 0.13 * (k - 2) for i in range(len(found))],
+            [cues.get(cue, {}) for cues in found],
+            ("mape_percent", "mape_95"),
+            marker=marker,
+            color=colour,
+            label=_CUE_NAMES[cue],
+        )
+    numbers = [max((row["n"] for row in cues.values()), default=0) for cues in found]
+    labels = [f"{name}\nn = {n}" for name, n in zip(estimates, numbers, strict=True)]
+    style.categories(panel, labels)
     panel.set_yscale("log")
     panel.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
-    panel.grid(visible=False, axis="x")

@@ -19,7 +19,6 @@ from antennate.studies.experiment import OnRow, OnStep, no_row, no_step
 from antennate.studies.pool import gather
 from antennate.studies.statistics import mean95
 
-SCHEMA = 1
 MOTIONS = ("fixed", "moving")
 SHAPES = tuple(shape.name.lower() for shape in sweeping.Shape)
 _TASK = 12
@@ -75,7 +74,7 @@ class SweepOutcome:
         """The content of result.json."""
         config = self.config
         return {
-            "schema": SCHEMA,
+            "schema": 1,
             "command": "sweep",
             "seed": config.seed,
             "length_m": config.antenna.length,

@@ -1,13 +1,145 @@
-"""The experiment `taper`."""
+"""The animal's taper and the robot's ladder side by side."""
 
 from __future__ import annotations
 
+import csv
+import io
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
-from antennate.experiments.taper import run as taper
-from antennate.studies.experiment import Experiment
+import numpy as np
+
+from antennate.antenna import taper
+from antennate.errors import BadInputError, ConfigError
+from antennate.files import decoded, read_limited
+from antennate.params import TaperParams
+from antennate.params.base import number
+from antennate.studies.experiment import Experiment, Outcome
 from antennate.studies.measures import Table, shown
+from antennate.types import Floats
+
+COLUMN = "diameter_mm"
+"""Column of a file of measured diameters, base first."""
+_LARGEST_FILE = 1_000_000
+_LARGEST_MM = 100.0
+
+
+class TaperConfig(TaperParams):
+    """The taper and, if measured, the file of its diameters."""
+
+    diameters: str | None = number(None, "1", "assumed: no measurement")
+    """CSV file with a column diameter_mm, base first; replaces segments, ends and law."""
+
+
+@dataclass(frozen=True)
+class TaperOutcome(Outcome):
+    """A taper and two ladders.
+
+    Attributes:
+        config: What was asked.
+        diameter: Diameters base to tip [m], shape (n,).
+        proxy: Stiffness of each segment over that of the base, shape (n,).
+        stretches: The same for one stretch for each spring of the ladder, shape (m,).
+        ladder: Stiffness of the ladder's springs over its first, shape (m,).
+        suggested: Coils of the ladder that follows the taper best within limits, shape (m,).
+    """
+
+    config: TaperConfig
+    diameter: Floats
+    proxy: Floats
+    stretches: Floats
+    ladder: Floats
+    suggested: Floats
+
+    def result(self) -> dict[str, Any]:
+        """The content of result.json."""
+        suggested = taper.ladder_proxy(self.suggested)
+        return {
+            "schema": 1,
+            "command": "taper",
+            "segments": [
+                {"diameter_mm": 1e3 * d, "second_moment_mm4": 1e12 * i, "proxy": k}
+                for d, i, k in zip(
+                    self.diameter.tolist(),
+                    taper.second_moment(self.diameter).tolist(),
+                    self.proxy.tolist(),
+                    strict=True,
+                )
+            ],
+            "base_over_tip": float(1.0 / self.proxy[-1]),
+            "stretches": (self.stretches / self.stretches[0]).tolist(),
+            "stretch_ratio": float(self.stretches[0] / self.stretches[-1]),
+            "ladder": _ladder(np.array(self.config.ladder), self.ladder, self.stretches),
+            "suggested": _ladder(self.suggested, suggested, self.stretches),
+        }
+
+
+def _ladder(coils: Floats, proxy: Floats, stretches: Floats) -> dict[str, Any]:
+    return {
+        "active_coils": coils.tolist(),
+        "proxy": proxy.tolist(),
+        "base_over_tip": float(proxy[0] / proxy[-1]),
+        "distance_decades": taper.distance_decades(proxy, stretches / stretches[0]),
+    }
+
+
+def run(config: TaperConfig) -> TaperOutcome:
+    """Work out the taper, its distance from the ladder, and a ladder that follows it better.
+
+    Raises:
+        BadInputError: The file of diameters cannot be used, or limits are the wrong way round.
+    """
+    fewest, most = config.coil_limits
+    if fewest >= most:
+        raise ConfigError(f"coil_limits: expected the smaller first, found {fewest} and {most}")
+    if config.diameters is None:
+        diameter = taper.diameters(config)
+    else:
+        diameter = read_diameters(Path(config.diameters))
+    proxy = taper.proxy(diameter)
+    stretches = taper.binned(proxy, len(config.ladder))
+    return TaperOutcome(
+        config=config,
+        diameter=diameter,
+        proxy=proxy,
+        stretches=stretches,
+        ladder=taper.ladder_proxy(np.array(config.ladder)),
+        suggested=taper.follow(stretches / stretches[0], fewest, most),
+    )
+
+
+def read_diameters(path: Path) -> Floats:
+    """Diameters [m] from a CSV file with a column `diameter_mm`, base first.
+
+    Raises:
+        BadInputError: The file cannot be read, or a row holds no diameter.
+    """
+    text = decoded(path, read_limited(path, _LARGEST_FILE))
+    rows = csv.DictReader(io.StringIO(text))
+    if COLUMN not in (rows.fieldnames or ()):
+        raise BadInputError(
+            f"{path}: row 1: expected a header with {COLUMN}, found {rows.fieldnames or 'nothing'}"
+        )
+    found = [_diameter(path, rows.line_num, row[COLUMN]) for row in rows]
+    if len(found) < 2:
+        raise BadInputError(f"{path}: expected at least 2 rows of diameters, found {len(found)}")
+    return 1e-3 * np.array(found)
+
+
+def _diameter(path: Path, line: int, cell: str | None) -> float:
+    try:
+        value = float(cell or "")
+    except ValueError:
+        value = float("nan")
+    if not 0 < value <= _LARGEST_MM:
+        raise BadInputError(
+            f"{path}: row {line}: expected a diameter above 0 and up to {_LARGEST_MM:g} mm, found "
+            f"{cell!r}"
+        )
+    return value
+
 
 SHOWN_SEGMENTS = 20
 COLUMNS = {"d [mm]": "diameter_mm", "I [mm⁴]": "second_moment_mm4", "proxy": "proxy"}
@@ -52,5 +184,5 @@ def _coils(row: Mapping[str, Any]) -> str:
 
 
 EXPERIMENT = Experiment.of_folder(
-    __name__, taper.TaperConfig, lambda config, *_: taper.run(config), tables, sentence
+    __name__, TaperConfig, lambda config, *_: run(config), tables, sentence
 )

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from antennate import figures as style
-from antennate.experiments.taper.run import TaperOutcome
+from antennate.experiments.taper.experiment import TaperOutcome
 
 
 def figures(outcome: TaperOutcome) -> dict[str, Figure]:

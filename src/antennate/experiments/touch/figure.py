@@ -19,6 +19,7 @@ from antennate.experiments.touch.traverse import Traverse
 from antennate.params import RuleParams
 
 _TRUE, _SENSED = "#0072B2", "#D55E00"
+_BAR = {"marker": "_", "markersize": 11, "markeredgewidth": 1.8, "capsize": 0}
 _SHAPES = 14
 """Shapes of the antenna drawn along a wall."""
 
@@ -51,7 +52,7 @@ def measures(result: Mapping[str, Any]) -> Figure:
         key = measure.name.partition(".")[0]
         found = [row[key] for row in speeds]
         _draw(panel, speeds, "speed_m_s", found, ("median_ms", "median_95_ms"))
-        _draw(panel, speeds, "speed_m_s", found, ("p90_ms", "p90_ms"), marker="_")
+        _draw(panel, speeds, "speed_m_s", found, ("p90_ms", ""), **_BAR)
         low, high = (end(row["n"] for row in found) for end in (min, max))
         panel.set_title(f"Median, 95 %, and 90th percentile (bar), n = {low} to {high} contacts")
         panel.set_ylabel(measure.title)
@@ -68,7 +69,7 @@ def _draw(
     part: str,
     found: Sequence[Mapping[str, Any]],
     keys: style.Keys,
-    marker: str = "",
+    **look: Any,
 ) -> None:
     """A measure of what was found in each cell, over speeds or walls, the profiles side by side."""
     values = list(dict.fromkeys(cell[part] for cell in cells))
@@ -79,9 +80,8 @@ def _draw(
         aside = 0.6 * (i - (len(profiles) - 1) / 2) / max(len(profiles), 3)
         mine = [k for k, cell in enumerate(cells) if cell["profile"] == name]
         x = [values.index(cells[k][part]) + aside for k in mine]
-        look = {"marker": marker, "markersize": 11, "markeredgewidth": 1.8} if marker else {}
-        look = {"marker": own, "label": name, **look}
-        style.intervals(panel, x, [found[k] for k in mine], keys, color=colour, **look)
+        own_look = look or {"marker": own, "label": name}
+        style.intervals(panel, x, [found[k] for k in mine], keys, color=colour, **own_look)
     style.categories(panel, [f"{v:g}" if isinstance(v, float) else v for v in values])
     panel.set_xlabel("speed of the traverse [m/s]" if part == "speed_m_s" else "wall")
 

@@ -124,10 +124,9 @@ class Pool:
     def _latency(self, group: Sequence[Comparison], ticks: Sequence[Ints]) -> dict[str, Any]:
         """Median with its interval and 90th percentile [ms], and the median way meanwhile [mm]."""
         values = np.concatenate([np.zeros(0, dtype=np.int64), *ticks])
-        empty = {"n": 0, "median_ms": None, "median_95_ms": None, "p90_ms": None}
-        empty["median_mm"] = None
         if not len(values):
-            return empty
+            keys = ("median_ms", "median_95_ms", "p90_ms", "median_mm")
+            return {"n": 0, **dict.fromkeys(keys)}
         trials = np.concatenate(
             [np.full(len(t), v.trial) for v, t in zip(group, ticks, strict=True)]
         )
@@ -156,7 +155,8 @@ class Pool:
             place = np.searchsorted(edges, score)
             for state, counts in ((comparison.truth, touching), (~comparison.truth, free)):
                 counts[comparison.trial] += np.bincount(place[state], minlength=counts.shape[1])
-        order = touching @ _below(free).T  # ordered pairs of a trial's touching and another's free
+        below = np.cumsum(free, axis=1) - free / 2
+        order = touching @ below.T  # ordered pairs of a trial's touching and another's free
         pairs = np.outer(touching.sum(axis=1), free.sum(axis=1))
         weights = self._weights
         with np.errstate(invalid="ignore", divide="ignore"):
@@ -175,11 +175,6 @@ def _edges(scores: Sequence[Floats]) -> Floats:
     if not scores:
         return np.zeros(1)
     return np.unique(np.quantile(np.concatenate(scores), np.linspace(0, 1, _BINS + 1)[1:-1]))
-
-
-def _below(free: Floats) -> Floats:
-    """Free ticks that score below each bin, those in it counted half; histograms (m, bins)."""
-    return np.cumsum(free, axis=1) - free / 2
 
 
 def _auc(touching: Floats, free: Floats) -> float:

@@ -104,7 +104,7 @@ def run_traverse(
         _start_off(bench, one)
         for tick in range(one.ticks):
             force = _advance(bench, one, (tick - 1) / one.antenna.sensor.rate) if tick else 0.0
-            ticks.append((float(bench.carriage()[0]), bench.flex(), force))
+            ticks.append((float(bench.carriage.position[0]), bench.flex(), force))
             if trial == 0:
                 joints.append(bench.joints())
     except SimulationError as error:

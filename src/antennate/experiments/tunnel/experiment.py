@@ -7,8 +7,9 @@ from typing import Any
 
 from antennate.experiments.tunnel import measures
 from antennate.experiments.tunnel import run as tunnel
+from antennate.sim.scenes.registry import TUNNEL
 from antennate.studies.experiment import Experiment
-from antennate.studies.measures import Table, shown
+from antennate.studies.measures import Table, successes
 
 
 def tables(result: Mapping[str, Any]) -> Sequence[Table]:
@@ -36,15 +37,14 @@ def tables(result: Mapping[str, Any]) -> Sequence[Table]:
 
 def sentence(result: Mapping[str, Any]) -> str:
     """Which controllers came through, and how sure it is."""
-    found = ", ".join(
-        f"{name} {row['successes']} of {row['trials'] - row['invalid']} ({shown(row['wilson95'])})"
-        for name, row in result["controllers"].items()
-    )
+    found = successes(result["controllers"])
     pair = next(iter(reversed(result["paired"].items())), None)
     test = f"; McNemar p of {pair[0]} {pair[1]['mcnemar_p']:.2g}" if pair else ""
     invalid = sum(row["invalid"] for row in result["controllers"].values())
     why = f" Invalid trials: {invalid}; trials.csv gives the reason of each." if invalid else ""
-    return f"Tunnels crossed (95 % interval): {found}{test}.{why}"
+    scene = result["scene"]
+    what = "Tunnels crossed" if scene == TUNNEL else f"Trials that succeeded in {scene}"
+    return f"{what} (95 % interval): {found}{test}.{why}"
 
 
 EXPERIMENT = Experiment.of_folder(

@@ -89,7 +89,8 @@ def trajectories(
             fontsize=11,
             fontweight="bold",
         )
-    figure.legend(handles=_handles(), loc="outside lower center", ncols=min(5, 2 + len(trials)))
+    handles = _handles(list(paths.values()))
+    figure.legend(handles=handles, loc="outside lower center", ncols=min(5, 2 + len(trials)))
     return figure
 
 
@@ -138,22 +139,24 @@ def _stretches(path: TrialPath) -> Iterator[tuple[Maneuver, Floats]]:
             yield Maneuver(int(path.maneuver[last])), path.head[first : last + 1]
 
 
-def _handles() -> list[Any]:
+def _handles(paths: Sequence[TrialPath]) -> list[Any]:
+    """What is drawn: of the scene only what it has."""
     lines = [
         Line2D([], [], color=colour, label=f"head, {style.MANEUVER_NAMES[maneuver]}")
         for maneuver, colour in style.MANEUVER_COLOURS.items()
     ]
-    robot = Line2D(
-        [], [], color=style.INK, linewidth=2.4, marker="o", markersize=5, label="robot at the end"
-    )
-    return [
-        *lines,
-        robot,
-        Patch(facecolor=style.MUTED, label="wall"),
-        Line2D([], [], color=style.MUTED, linewidth=1.0, linestyle=(0, (2, 2)), label="exit"),
+    robot = {"linewidth": 2.4, "marker": "o", "markersize": 5, "label": "robot at the end"}
+    lines.append(Line2D([], [], color=style.INK, **robot))
+    dashed = {"linewidth": 1.0, "linestyle": (0, (2, 2))}
+    lines.append(Line2D([], [], color=style.MUTED, **dashed, label="exit"))
+    walls = [Patch(facecolor=style.MUTED, label="wall")]
+    obstacles = [
         Patch(facecolor="white", edgecolor=style.MUTED, linewidth=0.6, label="obstacle at first"),
         Patch(facecolor=style.FAINT, label="obstacle at the end"),
     ]
+    has_walls = any(len(path.fixed) for path in paths)
+    has_obstacles = any(len(path.before) for path in paths)
+    return [*lines, *(walls if has_walls else []), *(obstacles if has_obstacles else [])]
 
 
 @style.styled

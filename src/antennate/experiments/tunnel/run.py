@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from antennate.control.registry import CONTROLLERS, ControllerFactory, make_controller
+from antennate.errors import ConfigError
 from antennate.experiments.tunnel import measures
 from antennate.experiments.tunnel.batch import run_trials
 from antennate.experiments.tunnel.config import TunnelConfig
@@ -17,7 +18,6 @@ from antennate.sim.trial import check_start
 from antennate.studies.experiment import OnRow, OnStep, no_row, no_step
 from antennate.studies.pool import run_tasks
 
-SCHEMA = 2
 _TASK = 12
 """Most trials handed to a process at once."""
 
@@ -39,9 +39,10 @@ class TunnelOutcome:
             for name in config.controllers
         }
         return {
-            "schema": SCHEMA,
+            "schema": 2,
             "command": "tunnel",
             "seed": config.seed,
+            "scene": config.scene,
             "time_limit_s": config.time_limit,
             "length_m": config.tunnel.length if config.scene == TUNNEL else None,
             "interrupted": self.interrupted,
@@ -59,7 +60,10 @@ def check(config: TunnelConfig) -> None:
     """
     check_start(config)
     for name in config.controllers:
-        make_controller(name, config.control, config.robot)
+        try:
+            make_controller(name, config.control, config.robot)
+        except ConfigError as error:
+            raise ConfigError(f"--controllers: {error}") from error
 
 
 _Task = tuple[TunnelConfig, str, ControllerFactory | None, list[int]]

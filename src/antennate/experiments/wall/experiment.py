@@ -8,7 +8,7 @@ from typing import Any
 from antennate.experiments.wall import measures
 from antennate.experiments.wall import run as wall
 from antennate.studies.experiment import Experiment
-from antennate.studies.measures import Table, shown
+from antennate.studies.measures import Table, successes
 
 
 def tables(result: Mapping[str, Any]) -> Sequence[Table]:
@@ -32,11 +32,7 @@ def tables(result: Mapping[str, Any]) -> Sequence[Table]:
 
 def sentence(result: Mapping[str, Any]) -> str:
     """Which profiles passed, and how sure it is."""
-    found = ", ".join(
-        f"{name} {row['successes']} of {row['trials'] - row['invalid']} ({shown(row['wilson95'])})"
-        for name, row in result["profiles"].items()
-    )
-    return f"Walls passed (95 % interval): {found}."
+    return f"Walls passed (95 % interval): {successes(result['profiles'])}."
 
 
 EXPERIMENT = Experiment.of_folder(__name__, wall.WallConfig, wall.run, tables, sentence)

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from antennate.control.conditioning import bending_level
 from antennate.errors import CalibrationError
 from antennate.hardware.doctor.board_survey import BoardSurvey
-from antennate.hardware.doctor.check import Check, Finding
-from antennate.hardware.doctor.config import DoctorConfig
+from antennate.hardware.doctor.check import Finding, Row
 from antennate.hardware.esp32 import frame
-from antennate.hardware.esp32.wire import Reset, objections, require_sensor
+from antennate.hardware.esp32.wire import Hello, Reset, objections, require_sensor
+from antennate.hardware.robot import DoctorConfig
 from antennate.hardware.safety import diagnosis
 from antennate.hardware.safety.diagnosis import Band, ChannelDiagnosis
 
@@ -29,23 +31,40 @@ _CURES = {
 _DEGRADED = (diagnosis.Finding.OUT_OF_CAL, diagnosis.Finding.SPIKY, diagnosis.Finding.SATURATED)
 
 
-def checks(board: BoardSurvey, robot: DoctorConfig) -> list[Check[BoardSurvey]]:
-    """The checks for which there is something to look at, in the order in which they are shown."""
-    found = [_GREETING]
-    if board.hello is not None:
-        found += _BOARD
-        if board.readings:
-            found += _WIRE
-            for side, name in enumerate(("left", "right")):
-                found += _antenna(board, robot, name, board.counts[:, side].tolist())
+def rows(board: BoardSurvey, config: DoctorConfig) -> Iterator[Row]:
+    """The rows for which there is something to look at, in the order in which they are shown."""
+    for finding, check, expected in _findings(board, config):
+        yield finding.row("esp32", check, expected)
+
+
+def _findings(board: BoardSurvey, config: DoctorConfig) -> Iterator[tuple[Finding, str, str]]:
+    """Each with the name of its check and what would be good."""
+    hello = board.hello
+    yield _greeting(board), "greeting", f"within {config.doctor.greeting:g} s"
+    if hello is None:
+        return
+    least = f"{_version(frame.FIRMWARE)} or newer, protocol {frame.PROTOCOL}"
+    yield _firmware(hello), "firmware", least
+    yield _boot(board, hello), "boot", "once, not by its watchdog"
+    rate, error = config.limits.rate, config.limits.rate_error
+    low, high = rate * (1 - error), rate * (1 + error)
+    yield _rate(board, low, high), "rate", f"{low:g} to {high:g} Hz"
+    if board.readings:
+        yield _lost(board), "lost samples", "none"
+        cure = "use a shorter cable, away from motors; check the ground of the board"
+        broken = Finding(str(board.broken), "warn" if board.broken else "ok", cure)
+        yield broken, "broken frames", "none"
+        for side, name in enumerate(("left", "right")):
+            yield from _antenna(board, config, name, board.counts[:, side].tolist())
     try:
-        require_sensor(board.hello, robot.sensor_id)
+        require_sensor(hello, config.sensor_id)
     except CalibrationError:
-        found.append(_SENSORS)
-    return found
+        cure = "calibrate the antennae of this board, or name their file in calibration"
+        other = Finding(f"board {hello.device_id}", "bad", cure)
+        yield other, "sensors", f"on board {config.sensor_id}"
 
 
-def _greeting(board: BoardSurvey, robot: DoctorConfig) -> Finding:
+def _greeting(board: BoardSurvey) -> Finding:
     if board.hello is not None:
         return Finding(f"board {board.hello.device_id}")
     if board.servos:
@@ -63,42 +82,32 @@ def _greeting(board: BoardSurvey, robot: DoctorConfig) -> Finding:
     return Finding("nothing", "bad", cure)
 
 
-def _firmware(board: BoardSurvey, robot: DoctorConfig) -> Finding:
-    if board.hello is None:
-        return Finding("none")
-    found = f"{_version(board.hello.firmware)}, protocol {frame.PROTOCOL}"
-    return Finding(found, "bad" if objections(board.hello) else "ok", _COPY)
+def _firmware(hello: Hello) -> Finding:
+    version = f"{_version(hello.firmware)}, protocol {frame.PROTOCOL}"
+    return Finding(version, "bad" if objections(hello) else "ok", _COPY)
 
 
 def _version(numbers: tuple[int, ...]) -> str:
     return ".".join(map(str, numbers))
 
 
-def _boot(board: BoardSurvey, robot: DoctorConfig) -> Finding:
-    reset = Reset.POWER_ON if board.hello is None else board.hello.reset
-    reason = reset.name.lower().replace("_", " ")
+def _boot(board: BoardSurvey, hello: Hello) -> Finding:
+    reason = hello.reset.name.lower().replace("_", " ")
     return Finding(
         f"{reason}, {board.boots} more boots" if board.boots else reason,
-        "bad" if board.boots else "warn" if reset is Reset.WATCHDOG else "ok",
+        "bad" if board.boots else "warn" if hello.reset is Reset.WATCHDOG else "ok",
         "check its supply and USB cable; if only the watchdog did it, copy firmware/ again",
     )
 
 
-def _rates(robot: DoctorConfig) -> tuple[float, float]:
-    """Lowest and highest rate that is good [Hz]."""
-    rate, error = robot.limits.rate, robot.limits.rate_error
-    return rate * (1 - error), rate * (1 + error)
-
-
-def _rate(board: BoardSurvey, robot: DoctorConfig) -> Finding:
+def _rate(board: BoardSurvey, low: float, high: float) -> Finding:
     if board.rate is None:
         return Finding("no samples", "bad", "reset the board")
-    low, high = _rates(robot)
     cure = "set RATE in firmware/config.py, or limits.rate"
     return Finding(f"{board.rate:.1f} Hz", "ok" if low <= board.rate <= high else "warn", cure)
 
 
-def _lost(board: BoardSurvey, robot: DoctorConfig) -> Finding:
+def _lost(board: BoardSurvey) -> Finding:
     dropped = f", {board.dropped} not sent" if board.dropped else ""
     return Finding(
         f"{board.lost} of {board.lost + len(board.readings)}{dropped}",
@@ -107,37 +116,20 @@ def _lost(board: BoardSurvey, robot: DoctorConfig) -> Finding:
     )
 
 
-def _broken(board: BoardSurvey, robot: DoctorConfig) -> Finding:
-    cure = "use a shorter cable, away from motors; check the ground of the board"
-    return Finding(str(board.broken), "warn" if board.broken else "ok", cure)
-
-
-def _sensors(board: BoardSurvey, robot: DoctorConfig) -> Finding:
-    device = "" if board.hello is None else board.hello.device_id
-    cure = "calibrate the antennae of this board, or name their file in calibration"
-    return Finding(f"board {device}", "bad", cure)
-
-
-# one antenna
-
-
 def _antenna(
-    board: BoardSurvey, robot: DoctorConfig, name: str, counts: list[float]
-) -> list[Check[BoardSurvey]]:
-    """Checks of an antenna by its readings [counts]."""
-    curve, noise, middle = robot.control.conditioning, float(np.std(counts)), np.median(counts)
-    quiet = Finding(
-        f"{noise:.1f} counts",
-        "warn" if noise > robot.doctor.noise else "ok",
-        "leave the antenna alone; then check its plug, cable and ground",
-    )
-    found = [_measured(f"{name} noise", f"at most {robot.doctor.noise:g} counts", quiet)]
+    board: BoardSurvey, config: DoctorConfig, name: str, counts: list[float]
+) -> Iterator[tuple[Finding, str, str]]:
+    """Findings on an antenna by its readings [counts]."""
+    noise, middle, quiet = float(np.std(counts)), float(np.median(counts)), config.doctor.noise
+    cure = "leave the antenna alone; then check its plug, cable and ground"
+    noisy = Finding(f"{noise:.1f} counts", "warn" if noise > quiet else "ok", cure)
+    yield noisy, f"{name} noise", f"at most {quiet:g} counts"
     try:
-        band = Band.of(curve, robot.reach)
-        channel = ChannelDiagnosis(band)
+        channel = ChannelDiagnosis(Band.of(config.control.conditioning, config.reach))
     except CalibrationError as error:
         wrong = Finding(str(error), "bad", "calibrate again, with another divider resistor")
-        return [*found, _measured(f"{name} calibration", "leaves the rails free", wrong)]
+        yield wrong, f"{name} calibration", "leaves the rails free"
+        return
     for reading, value in zip(board.readings, counts, strict=True):
         channel.step(1e-6 * reading.elapsed_us, value)
     shown = channel.reading.finding
@@ -146,12 +138,13 @@ def _antenna(
         "ok" if shown is diagnosis.Finding.OK else "warn" if shown in _DEGRADED else "bad",
         _CURES.get(shown, "check plug, cable and divider of this antenna"),
     )
-    found.append(_measured(f"{name} antenna", "ok", signal))
-    return [*found, _at_rest(robot, name, float(middle))] if shown.usable else found
+    yield signal, f"{name} antenna", "ok"
+    if shown.usable:
+        yield _at_rest(config, name, middle)
 
 
-def _at_rest(robot: DoctorConfig, name: str, counts: float) -> Check[BoardSurvey]:
-    curve, threshold = robot.control.conditioning, robot.control.rule.threshold
+def _at_rest(config: DoctorConfig, name: str, counts: float) -> tuple[Finding, str, str]:
+    curve, threshold = config.control.conditioning, config.control.rule.threshold
     low, high = curve.counts_low - diagnosis.MARGIN, curve.counts_high + diagnosis.MARGIN
     level = float(bending_level(curve, np.array(counts)))
     finding = Finding(
@@ -160,21 +153,4 @@ def _at_rest(robot: DoctorConfig, name: str, counts: float) -> Check[BoardSurvey
         "straighten the antenna; if it is straight, `antennate record` and `antennate calibrate`, "
         "and put the new curve into [control.conditioning]",
     )
-    expected = f"{low:.0f} to {high:.0f} counts, b below {threshold:g}"
-    return _measured(f"{name} at rest", expected, finding)
-
-
-def _measured(name: str, expected: str, finding: Finding) -> Check[BoardSurvey]:
-    return Check(name, expected, lambda board, robot: finding)
-
-
-_GREETING: Check[BoardSurvey] = Check(
-    "greeting", lambda board, robot: f"within {robot.doctor.greeting:g} s", _greeting
-)
-_BOARD = (
-    Check("firmware", f"{_version(frame.FIRMWARE)} or newer, protocol {frame.PROTOCOL}", _firmware),
-    Check("boot", "once, not by its watchdog", _boot),
-    Check("rate", lambda board, robot: "{:g} to {:g} Hz".format(*_rates(robot)), _rate),
-)
-_WIRE = (Check("lost samples", "none", _lost), Check("broken frames", "none", _broken))
-_SENSORS = Check("sensors", lambda board, robot: f"on board {robot.sensor_id}", _sensors)
+    return finding, f"{name} at rest", f"{low:.0f} to {high:.0f} counts, b below {threshold:g}"

@@ -27,7 +27,6 @@ class BoardSurvey:
     """What came from the board's port.
 
     Attributes:
-        hello: Its greeting, None if none came.
         refusals: Why frames were refused.
         text: Printable text that came instead of frames.
         received: Bytes received.
@@ -36,7 +35,7 @@ class BoardSurvey:
         dropped: Samples that the board itself could not send meanwhile.
         broken: Pieces with a wrong CRC or code after the greeting.
         boots: Times it started anew meanwhile.
-        servos: Servos answer on the port.
+        servos: Whether servos answer on the port.
     """
 
     hello: Hello | None = None

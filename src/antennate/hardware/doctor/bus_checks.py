@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from statistics import median
 
 from antennate.hardware.doctor.bus_survey import BusSurvey
-from antennate.hardware.doctor.check import Check, Finding, Grade, grouped, ids_text
-from antennate.hardware.doctor.config import DoctorConfig
-from antennate.hardware.doctor.register_checks import FIX, OFF_AND_ON, REGISTER_CHECKS, known
+from antennate.hardware.doctor.check import Finding, Grade, Row, grouped, ids_text
+from antennate.hardware.doctor.register_checks import FIX, OFF_AND_ON, register_findings
 from antennate.hardware.dynamixel.tables import TABLES
+from antennate.hardware.robot import DoctorConfig
+from antennate.robots.spec import RobotSpec
 
 _STATES = {
     "collides": (
@@ -21,26 +23,41 @@ _STATES = {
 }
 
 
-def checks(bus: BusSurvey, robot: DoctorConfig) -> tuple[Check[BusSurvey], ...]:
-    """The checks for which there is something to look at, in the order in which they are shown."""
+def rows(bus: BusSurvey, config: DoctorConfig) -> Iterator[Row]:
+    """The rows for which there is something to look at, in the order in which they are shown."""
+    for finding, check, expected in _findings(bus, config):
+        yield finding.row("bus", check, expected)
+
+
+def _findings(bus: BusSurvey, config: DoctorConfig) -> Iterator[tuple[Finding, str, str]]:
+    """Each with the name of its check and what would be good."""
+    robot, good = config.robot, config.doctor
+    yield _baud(bus), "baud", f"all at {bus.baud}"
     if not (bus.here or bus.elsewhere):
-        return _SPEED
-    if not known(bus, robot):
-        return _SPEED + _SERVOS
-    times = _ANSWER_TIME if bus.ping_times else ()
-    return _SPEED + _SERVOS + REGISTER_CHECKS + times + (() if bus.read_time is None else _READS)
+        return
+    yield _ids(bus, robot), "ids", ids_text(robot.ids)
+    yield _answers(bus), "answers", "one whole answer of each"
+    yield _models(bus, robot), "models", grouped(robot.models, _model)
+    newest = ", ".join(f"{t.name} {t.fast_read_firmware}" for t in TABLES.values())
+    yield _firmware(bus), "firmware", f"from {newest} on"
+    if not bus.registers.keys() & set(robot.ids):
+        return
+    yield from register_findings(bus, config)
+    if bus.ping_times:
+        yield _answer_time(bus, config), "answer time", f"at most {1e3 * good.answer_time:g} ms"
+    if bus.read_time is not None:
+        finding = _read_time(bus, bus.read_time, good.read_time)
+        yield finding, "read of all", f"at most {1e3 * good.read_time:g} ms"
+        yield _lost_answers(bus), "lost answers", "none"
 
 
-def slow(bus: BusSurvey, robot: DoctorConfig) -> bool:
+def slow(bus: BusSurvey, config: DoctorConfig) -> bool:
     """All answers come late, as through an adapter that keeps bytes back."""
     times = bus.ping_times.values()
-    return bool(times) and median(times) > robot.doctor.answer_time
+    return bool(times) and median(times) > config.doctor.answer_time
 
 
-# which servos are there
-
-
-def _baud(bus: BusSurvey, robot: DoctorConfig) -> Finding:
+def _baud(bus: BusSurvey) -> Finding:
     here = [f"{len(bus.here)} at {bus.baud}"] if bus.here else []
     if bus.elsewhere:
         ids: dict[int, set[int]] = {}
@@ -62,9 +79,9 @@ def _baud(bus: BusSurvey, robot: DoctorConfig) -> Finding:
     )
 
 
-def _ids(bus: BusSurvey, robot: DoctorConfig) -> Finding:
-    missing = set(robot.robot.ids) - set(bus.here)
-    extra = set(bus.here) - set(robot.robot.ids)
+def _ids(bus: BusSurvey, robot: RobotSpec) -> Finding:
+    missing = set(robot.ids) - set(bus.here)
+    extra = set(bus.here) - set(robot.ids)
     parts = [f"missing {ids_text(missing)}"] if missing else []
     parts += [f"not expected {ids_text(extra)}"] if extra else []
     cures: list[str] = []
@@ -84,92 +101,59 @@ def _ids(bus: BusSurvey, robot: DoctorConfig) -> Finding:
     return Finding(", ".join(parts) or ids_text(bus.here), grade, "; ".join(cures))
 
 
-def _answers(bus: BusSurvey, robot: DoctorConfig) -> Finding:
+def _answers(bus: BusSurvey) -> Finding:
     states = {state: [i for i, s in bus.here.items() if s.state == state] for state in _STATES}
     parts = [f"{_STATES[state][0]} {ids_text(ids)}" for state, ids in states.items() if ids]
     cures = [_STATES[state][1] for state, ids in states.items() if ids]
-    if not parts:
-        return Finding("all whole")
-    return Finding(", ".join(parts), "bad", "; ".join(cures))
+    grade: Grade = "bad" if parts else "ok"
+    return Finding(", ".join(parts) or "all whole", grade, "; ".join(cures))
 
 
-def _models(bus: BusSurvey, robot: DoctorConfig) -> Finding:
-    wanted = robot.robot.models
-    found = {i: seen.model for i, seen in bus.here.items() if seen.model is not None}
-    wrong = [i for i, model in found.items() if i in wanted and model != wanted[i]]
+def _models(bus: BusSurvey, robot: RobotSpec) -> Finding:
+    models = {i: seen.model for i, seen in bus.here.items() if seen.model is not None}
+    wrong = [i for i, model in models.items() if model != robot.models.get(i, model)]
     cure = f"{ids_text(wrong)}: put a servo of the expected model there, or correct robot.*.ids"
-    return Finding(grouped(found, _model), "bad" if wrong else "ok", cure)
+    return Finding(grouped(models, _model), "bad" if wrong else "ok", cure)
 
 
 def _model(model: int) -> str:
     return TABLES[model].name if model in TABLES else f"model {model}"
 
 
-def _firmware(bus: BusSurvey, robot: DoctorConfig) -> Finding:
+def _firmware(bus: BusSurvey) -> Finding:
     here = bus.here.values()
-    found = {seen.servo: seen.firmware for seen in here if seen.firmware is not None}
+    versions = {s.servo: s.firmware for s in here if s.firmware is not None}
     least = {s.servo: TABLES[s.model].fast_read_firmware for s in here if s.model in TABLES}
-    old = [servo for servo, version in found.items() if version < least.get(servo, 0)]
+    old = [servo for servo, version in versions.items() if version < least.get(servo, 0)]
     cure = f"{ids_text(old)}: update with DYNAMIXEL Wizard; older ones take no fast reads"
-    return Finding(grouped(found), "warn" if old else "ok", cure)
+    return Finding(grouped(versions), "warn" if old else "ok", cure)
 
 
-# pace
-
-
-def _answer_time(bus: BusSurvey, robot: DoctorConfig) -> Finding:
+def _answer_time(bus: BusSurvey, config: DoctorConfig) -> Finding:
     times = bus.ping_times
-    found = f"{1e3 * median(times.values()):.1f} ms"
-    late = [servo for servo, time in times.items() if time > robot.doctor.answer_time]
+    usual = f"{1e3 * median(times.values()):.1f} ms"
+    late = ids_text(servo for servo, time in times.items() if time > config.doctor.answer_time)
     if not late:
-        return Finding(found)
-    if slow(bus, robot):
-        return Finding(found, "bad", "the adapter is slow: see latency timer")
-    found += f", up to {1e3 * max(times.values()):.1f} ms ({ids_text(late)})"
-    return Finding(found, "bad", f"{ids_text(late)}: check its return delay, then its cable")
+        return Finding(usual)
+    if slow(bus, config):
+        return Finding(usual, "bad", "the adapter is slow: see latency timer")
+    longest = f"{usual}, up to {1e3 * max(times.values()):.1f} ms ({late})"
+    return Finding(longest, "bad", f"{late}: check its return delay, then its cable")
 
 
-def _read_time(bus: BusSurvey, robot: DoctorConfig) -> Finding:
-    time = bus.read_time or 0.0
+def _read_time(bus: BusSurvey, time: float, longest: float) -> Finding:
     rate = f", {1.0 / time:.0f} a second" if time else ""
     return Finding(
         f"{1e3 * time:.1f} ms{rate}, {'fast' if bus.fast else 'slow'} reads of {len(bus.whole)}",
-        "bad" if time > robot.doctor.read_time else "ok" if bus.fast else "warn",
+        "bad" if time > longest else "ok" if bus.fast else "warn",
         "cure answer time, answers and lost answers first, then return delay and firmware; then "
         "end other programs, or raise robot.baud",
     )
 
 
-def _lost_answers(bus: BusSurvey, robot: DoctorConfig) -> Finding:
-    share = bus.missed / bus.asked if bus.asked else 0.0
+def _lost_answers(bus: BusSurvey) -> Finding:
     return Finding(
-        f"{bus.missed} of {bus.asked} ({100 * share:.1f} %)",
+        f"{bus.missed} of {bus.asked} ({100 * bus.missed / max(bus.asked, 1):.1f} %)",
         "warn" if bus.missed else "ok",
         "check plugs, cables and the ground between adapter, supply and servos",
     )
-
-
-_SPEED = (Check("baud", lambda bus, robot: f"all at {bus.baud}", _baud),)
-_SERVOS = (
-    Check("ids", lambda bus, robot: ids_text(robot.robot.ids), _ids),
-    Check("answers", "one whole answer of each", _answers),
-    Check("models", lambda bus, robot: grouped(robot.robot.models, _model), _models),
-    Check(
-        "firmware",
-        f"from {', '.join(f'{t.name} {t.fast_read_firmware}' for t in TABLES.values())} on",
-        _firmware,
-    ),
-)
-_ANSWER_TIME = (
-    Check(
-        "answer time",
-        lambda bus, robot: f"at most {1e3 * robot.doctor.answer_time:g} ms",
-        _answer_time,
-    ),
-)
-_READS = (
-    Check(
-        "read of all", lambda bus, robot: f"at most {1e3 * robot.doctor.read_time:g} ms", _read_time
-    ),
-    Check("lost answers", "none", _lost_answers),
-)

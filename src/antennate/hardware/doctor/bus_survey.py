@@ -20,7 +20,7 @@ from antennate.hardware.ports.port import Port
 from antennate.params import DoctorParams
 from antennate.robots.spec import RobotSpec
 
-BAUDS = (57_600, 115_200, 1_000_000, 2_000_000, 3_000_000, 4_000_000)
+_BAUDS = (57_600, 115_200, 1_000_000, 2_000_000, 3_000_000, 4_000_000)
 """Bits per second at which servos are usually found."""
 REGISTERS = (
     "return_delay_time",
@@ -55,10 +55,9 @@ _SAMPLE_TIME = 0.3
 
 @dataclass(slots=True)
 class BusSurvey:
-    """What was found on a bus.
+    """What was found on a bus of which a number of bits per second is expected.
 
     Attributes:
-        baud: Bits per second that are expected.
         here: Servos that answer at that speed, by id.
         elsewhere: Servos that answer at another one, each with its bits per second.
         registers: Values by id and name, of those that could be read.
@@ -95,9 +94,9 @@ class BusSurvey:
             "answers_missed": self.missed,
             "servos": [
                 asdict(servo)
-                | {"baud": self.baud, "registers": self.registers.get(servo.servo, {})}
-                | {"ping_time": self.ping_times.get(servo.servo)}
-                for servo in self.here.values()
+                | {"baud": self.baud, "registers": self.registers.get(i, {})}
+                | {"ping_time": self.ping_times.get(i)}
+                for i, servo in self.here.items()
             ]
             + [
                 asdict(servo) | {"baud": baud, "registers": {}, "ping_time": None}
@@ -109,13 +108,7 @@ class BusSurvey:
 def survey_bus(
     opener: Opener, robot: RobotSpec, params: DoctorParams, now: Callable[[], float]
 ) -> BusSurvey:
-    """Look at a bus; a few seconds, ten if no servo answers.
-
-    Args:
-        opener: Opens its port.
-        robot: The robot expected.
-        params: How often to read.
-        now: Monotonic time [s].
+    """Look at the bus of an expected robot; a few seconds, ten if no servo answers.
 
     Raises:
         PortError: The port is gone or cannot be opened.
@@ -175,7 +168,7 @@ def _elsewhere(
     opener: Opener, robot: RobotSpec, now: Callable[[], float]
 ) -> list[tuple[int, Present]]:
     others: list[tuple[int, Present]] = []
-    for baud in BAUDS:
+    for baud in _BAUDS:
         if baud != robot.baud:
             with opener(baud) as port:
                 others += [(baud, one) for one in _present(master(port, baud, now), ()).values()]

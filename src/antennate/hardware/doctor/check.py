@@ -1,4 +1,4 @@
-"""A check: what is measured, what would be good, and the cure. The rows of the doctor's tables."""
+"""Rows of the doctor's table: what was found, what would be good, and the cure."""
 
 from __future__ import annotations
 
@@ -6,15 +6,13 @@ from collections.abc import Callable, Iterable, Mapping
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from itertools import groupby
-from typing import Generic, Literal, NamedTuple, TypeVar
+from typing import Literal, NamedTuple, TypeVar
 
-from antennate.hardware.doctor.config import DoctorConfig
 from antennate.hardware.ports.port import Port
 
 Grade = Literal["ok", "warn", "bad"]
 Opener = Callable[[int], AbstractContextManager[Port]]
 """Opens a port at a number of bits per second for as long as the context lasts; PortError."""
-Survey = TypeVar("Survey")
 Item = TypeVar("Item")
 
 
@@ -24,9 +22,6 @@ class Row:
 
     Attributes:
         part: "bus" or "esp32".
-        check: Name of the check.
-        expected: What would be good.
-        found: What was found.
         grade: "ok"; "warn", the robot may walk but not well; "bad", it must not.
         cure: What to do, empty if all is well.
     """
@@ -52,30 +47,10 @@ class Finding(NamedTuple):
         return Row(part, check, expected, self.found, self.grade, cure)
 
 
-@dataclass(frozen=True, slots=True)
-class Check(Generic[Survey]):
-    """One check of what a survey has found.
-
-    Attributes:
-        name: Its name.
-        expected: What would be good.
-        measure: The finding in a survey, for a robot.
-    """
-
-    name: str
-    expected: Callable[[Survey, DoctorConfig], str] | str
-    measure: Callable[[Survey, DoctorConfig], Finding]
-
-    def row(self, part: str, survey: Survey, robot: DoctorConfig) -> Row:
-        """The result."""
-        expected = self.expected if isinstance(self.expected, str) else self.expected(survey, robot)
-        return self.measure(survey, robot).row(part, self.name, expected)
-
-
 def worst(grades: Iterable[Grade]) -> Grade:
     """The worst grade; "ok" of none."""
-    found = set(grades)
-    return "bad" if "bad" in found else "warn" if "warn" in found else "ok"
+    seen = set(grades)
+    return "bad" if "bad" in seen else "warn" if "warn" in seen else "ok"
 
 
 def ids_text(ids: Iterable[int]) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
@@ -10,21 +10,15 @@ from antennate.hardware.doctor import board_checks, bus_checks
 from antennate.hardware.doctor.board_survey import BoardSurvey, survey_board
 from antennate.hardware.doctor.bus_survey import BusSurvey, survey_bus
 from antennate.hardware.doctor.check import Grade, Opener, Row, worst
-from antennate.hardware.doctor.config import DoctorConfig
 from antennate.hardware.doctor.ports import latency_row, port_row
 from antennate.hardware.esp32.board import BOARD_BAUD
 from antennate.hardware.ports.port import PortError
+from antennate.hardware.robot import DoctorConfig
 
 
 @dataclass(slots=True)
 class Checkup:
-    """What was found.
-
-    Attributes:
-        rows: One for each check.
-        bus: Survey of the bus, None if there was no bus to look at.
-        board: Survey of the board, None likewise.
-    """
+    """A row for each check, and the surveys of the ports that were looked at."""
 
     rows: list[Row] = field(default_factory=list[Row])
     bus: BusSurvey | None = None
@@ -49,7 +43,7 @@ class Checkup:
 
 
 def examine(
-    robot: DoctorConfig,
+    config: DoctorConfig,
     bus: tuple[str, Opener] | None,
     esp32: tuple[str, Opener] | None,
     now: Callable[[], float],
@@ -57,41 +51,39 @@ def examine(
     """Examine a robot at rest; nothing is written to it and nothing moves.
 
     Args:
-        robot: What is expected, its calibration already in place.
+        config: What is expected, its calibration already in place.
         bus: Path and opener of the bus, None to leave it out.
         esp32: The same of the antenna board.
         now: Monotonic time [s].
     """
     checkup = Checkup()
+
+    def bus_rows(path: str, opener: Opener) -> Iterator[Row]:
+        survey = checkup.bus = survey_bus(opener, config.robot, config.doctor, now)
+        yield latency_row(path, bus_checks.slow(survey, config), config.doctor)
+        yield from bus_checks.rows(survey, config)
+
+    def board_rows(path: str, opener: Opener) -> Iterator[Row]:
+        survey = checkup.board = survey_board(opener, config.robot, config.doctor, now)
+        yield from board_checks.rows(survey, config)
+
     if bus is not None:
-
-        def look_at_bus(opener: Opener) -> list[Row]:
-            survey = checkup.bus = survey_bus(opener, robot.robot, robot.doctor, now)
-            latency = latency_row(bus[0], bus_checks.slow(survey, robot), robot.doctor)
-            checks = bus_checks.checks(survey, robot)
-            return [latency, *(check.row("bus", survey, robot) for check in checks)]
-
-        checkup.rows += _port("bus", *bus, robot.robot.baud, look_at_bus)
+        checkup.rows += _rows("bus", *bus, config.robot.baud, bus_rows)
     if esp32 is not None:
-
-        def look_at_board(opener: Opener) -> list[Row]:
-            survey = checkup.board = survey_board(opener, robot.robot, robot.doctor, now)
-            checks = board_checks.checks(survey, robot)
-            return [check.row("esp32", survey, robot) for check in checks]
-
-        checkup.rows += _port("esp32", *esp32, BOARD_BAUD, look_at_board)
+        checkup.rows += _rows("esp32", *esp32, BOARD_BAUD, board_rows)
     return checkup
 
 
-def _port(
-    part: str, path: str, opener: Opener, baud: int, look: Callable[[Opener], list[Row]]
-) -> list[Row]:
+def _rows(
+    part: str, path: str, opener: Opener, baud: int, behind: Callable[[str, Opener], Iterable[Row]]
+) -> Iterator[Row]:
     """Rows of a port, and of what is behind it if it opens."""
     first = port_row(part, path, opener, baud)
+    yield first
     if first.grade == "bad":
-        return [first]
+        return
     try:
-        return [first, *look(opener)]
+        yield from behind(path, opener)
     except PortError as error:
         cure = "plug it in again, with a cable that holds; then run doctor again"
-        return [first, Row(part, "wire", "stays open", f"{path}: {error}", "bad", cure)]
+        yield Row(part, "wire", "stays open", f"{path}: {error}", "bad", cure)

@@ -31,15 +31,7 @@ _AFTER = {
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """One register of one servo.
-
-    Attributes:
-        servo: Its id.
-        baud: Bits per second at which it answers.
-        register: Name of the register.
-        before: Its value now.
-        after: Its value then.
-    """
+    """One register, by name, of one servo, which answers at so many bits per second."""
 
     servo: int
     baud: int
@@ -119,8 +111,7 @@ _POWER = "switch its supply off and on"
 
 def _require_alone(bus: Bus, change: Change) -> None:
     present = look(bus, change.servo)
-    state = "silent" if present is None else present.state
-    if state != "ok":
+    if (state := "silent" if present is None else present.state) != "ok":
         raise BringUpError(
             f"expected servo {change.servo} alone at {change.baud}, found it {state}; "
             "leave it alone on the bus"
@@ -142,9 +133,8 @@ def _require_moved(opener: Opener, change: Change, now: Callable[[], float]) -> 
 
 
 def _require_value(bus: Bus, servo: int, change: Change) -> None:
-    there = read_some(bus, [servo], XC430_W240[change.register]).get(servo)
-    if there != change.after:
-        found = "no answer" if there is None else str(there)
+    value = read_some(bus, [servo], XC430_W240[change.register]).get(servo, "no answer")
+    if value != change.after:
         raise BringUpError(
-            f"expected {change.register} {change.after} in servo {servo}, found {found}; {_POWER}"
+            f"expected {change.register} {change.after} in servo {servo}, found {value}; {_POWER}"
         )

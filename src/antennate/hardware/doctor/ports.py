@@ -41,46 +41,25 @@ def opener_of(
 
 def port_row(part: str, path: str, opener: Opener, baud: int = BOARD_BAUD) -> Row:
     """Whether a port is there, may be opened, and is nobody else's."""
-    return _port(path, opener, baud).row(part, "port", "opens, in use by nobody else")
-
-
-def _port(path: str, opener: Opener, baud: int) -> Finding:
     try:
         with opener(baud):
-            others = holders(path)
+            others = ", ".join(holders(path))
+        cure = "end that program: two readers take each other's bytes"
+        finding = Finding(f"{path}, in use by {others}", "warn", cure) if others else Finding(path)
     except OpenError as error:
-        return Finding(f"{path}: {error.found}", "bad", error.cure)
-    if not others:
-        return Finding(path)
-    cure = "end that program: two readers take each other's bytes"
-    return Finding(f"{path}, in use by {', '.join(others)}", "warn", cure)
+        finding = Finding(f"{path}: {error.found}", "bad", error.cure)
+    return finding.row(part, "port", "opens, in use by nobody else")
 
 
 def latency_row(path: str, slow: bool, params: DoctorParams, timers: Path = _TIMERS) -> Row:
-    """The latency timer of the bus's adapter.
-
-    Args:
-        path: Device file of the port.
-        slow: All answers were measured to come late.
-        params: The highest timer that is good.
-        timers: Where Linux shows them.
-    """
-    most = params.latency_timer
-    finding = _latency(path, slow, most, timers)
-    return finding.row("bus", "latency timer", f"at most {most} ms")
-
-
-def _latency(path: str, slow: bool, most: int, timers: Path) -> Finding:
-    name = Path(os.path.realpath(path)).name
+    """The latency timer of the bus's adapter; `slow` if all answers were measured to come late."""
+    most, name = params.latency_timer, Path(os.path.realpath(path)).name
     file = timers / name / "latency_timer"
-    try:
+    value = None
+    with contextlib.suppress(OSError, ValueError):
         value = int(file.read_text())
-    except (OSError, ValueError):
-        value = None
-        file = timers / (name if name.startswith("tty") else _USUAL_NAME) / "latency_timer"
-    found = "none is shown" if value is None else f"{value} ms"
-    if slow:
-        found += ", and answers come late"
+    if value is None and not name.startswith("tty"):
+        file = timers / _USUAL_NAME / "latency_timer"
     set_it = (
         f"run `echo {most} | sudo tee {file}`, or `setserial {path} low_latency`; again after "
         "every plug-in"
@@ -91,8 +70,11 @@ def _latency(path: str, slow: bool, most: int, timers: Path) -> Finding:
         cure = set_it
     else:
         cure = "not the timer: plug the adapter into the computer itself, end busy programs"
+    shown = "none is shown" if value is None else f"{value} ms"
+    late = ", and answers come late" if slow else ""
     high = value is not None and value > most
-    return Finding(found, "bad" if high or slow else "ok", cure)
+    finding = Finding(shown + late, "bad" if high or slow else "ok", cure)
+    return finding.row("bus", "latency timer", f"at most {most} ms")
 
 
 def same(one: str, other: str) -> bool:

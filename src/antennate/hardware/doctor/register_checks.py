@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from typing import NamedTuple
 
 from antennate.hardware.doctor.bus_survey import BusSurvey
-from antennate.hardware.doctor.check import Check, Finding, Grade, grouped, ids_text, worst
-from antennate.hardware.doctor.config import DoctorConfig
+from antennate.hardware.doctor.check import Finding, Grade, grouped, ids_text, worst
 from antennate.hardware.dynamixel.tables import (
     RETURN_DELAY_UNIT,
     WATCHDOG_UNIT,
     XC430_W240,
     hardware_errors,
 )
+from antennate.hardware.robot import DoctorConfig
 from antennate.hardware.settings import settings
 
 FIX = "run doctor with --fix"
@@ -25,38 +26,39 @@ _VOLT = 0.1
 _SHUTDOWNS = XC430_W240["shutdown"].default or 0
 
 Judge = Callable[[BusSurvey, DoctorConfig, int, int], Grade]
-"""The grade on a register of a servo: given survey, robot, id and value."""
+"""The grade of a register of a servo: given survey, configuration, id and value."""
 
 
-def known(bus: BusSurvey, robot: DoctorConfig) -> dict[int, dict[str, int]]:
-    """Registers of the expected servos that could be read."""
-    return {i: values for i, values in bus.registers.items() if i in robot.robot.ids}
+class _Check(NamedTuple):
+    """A check of one register of all servos.
+
+    In `expected` {config} and {modes} are filled in, in `cure` the {ids} that are not ok; `text`
+    says a value in words.
+    """
+
+    name: str
+    register: str
+    expected: str
+    judge: Judge
+    cure: str
+    text: Callable[[int], str] = str
 
 
-def _values(bus: BusSurvey, robot: DoctorConfig, register: str) -> dict[int, int]:
-    """One of them, by id."""
-    servos = known(bus, robot).items()
-    return {servo: values[register] for servo, values in servos if register in values}
+def register_findings(bus: BusSurvey, config: DoctorConfig) -> Iterator[tuple[Finding, str, str]]:
+    """Each with the name of its check and what would be good; of the servos that are expected."""
+    modes = grouped(config.robot.modes)
+    yield _position_limits(bus, config)
+    for check in _CHECKS:
+        values = _values(bus, config, check.register)
+        grades: dict[int, Grade] = {i: check.judge(bus, config, i, values[i]) for i in values}
+        finding = _of_servos(grades, grouped(values, check.text), check.cure)
+        yield finding, check.name, check.expected.format(config=config, modes=modes)
 
 
-def _register(
-    name: str,
-    register: str,
-    expected: Callable[[BusSurvey, DoctorConfig], str] | str,
-    judge: Judge,
-    cure: str,
-    text: Callable[[int], str] = str,
-) -> Check[BusSurvey]:
-    """A check of one register of all servos; `{ids}` in the cure are those that are not ok."""
-
-    def measure(bus: BusSurvey, robot: DoctorConfig) -> Finding:
-        values = _values(bus, robot, register)
-        grades: dict[int, Grade] = {
-            servo: judge(bus, robot, servo, value) for servo, value in values.items()
-        }
-        return _of_servos(grades, grouped(values, text), cure)
-
-    return Check(name, expected, measure)
+def _values(bus: BusSurvey, config: DoctorConfig, register: str) -> dict[int, int]:
+    """A register of the servos that could be read, by id."""
+    servos = bus.registers.items()
+    return {i: v[register] for i, v in servos if i in config.robot.ids and register in v}
 
 
 def _of_servos(grades: Mapping[int, Grade], found: str, cure: str) -> Finding:
@@ -66,34 +68,34 @@ def _of_servos(grades: Mapping[int, Grade], found: str, cure: str) -> Finding:
 
 def _required(register: str) -> Judge:
     """What `drive` requires, as `hardware.settings` says."""
-    return lambda bus, robot, servo, value: (
-        "ok" if settings(robot.robot)[register][servo].allows(value) else "bad"
+    return lambda bus, config, servo, value: (
+        "ok" if settings(config.robot)[register][servo].allows(value) else "bad"
     )
 
 
-def _unless(good: Callable[[int], bool], grade: Grade) -> Judge:
-    """A grade on values that are not good."""
-    return lambda bus, robot, servo, value: "ok" if good(value) else grade
+def _only(good: int, grade: Grade) -> Judge:
+    """A grade of all values but one."""
+    return lambda bus, config, servo, value: "ok" if value == good else grade
 
 
-def _position_limits(bus: BusSurvey, robot: DoctorConfig) -> Finding:
-    rules = settings(robot.robot)
-    low, high = (_values(bus, robot, f"{end}_position_limit") for end in ("min", "max"))
-    both = {i: (low[i], high[i]) for i in rules["min_position_limit"] if i in low and i in high}
-    grades: dict[int, Grade] = {
-        servo: "ok" if room else "bad"
-        for servo, (least, most) in both.items()
-        for room in (
-            rules["min_position_limit"][servo].allows(least)
-            and rules["max_position_limit"][servo].allows(most),
-        )
-    }
-    found = grouped(both, lambda ends: f"{ends[0]} to {ends[1]}")
-    return _of_servos(grades, found, f"{FIX}: {{ids}} would refuse goals")
+def _position_limits(bus: BusSurvey, config: DoctorConfig) -> tuple[Finding, str, str]:
+    names = ("min_position_limit", "max_position_limit")
+    rules = [settings(config.robot)[name] for name in names]
+    least, most = (_values(bus, config, name) for name in names)
+    limits = {i: (least[i], most[i]) for i in rules[0] if i in least and i in most}
+    fits = {i: all(r[i].allows(v) for r, v in zip(rules, limits[i], strict=True)) for i in limits}
+    grades: dict[int, Grade] = {i: "ok" if fit else "bad" for i, fit in fits.items()}
+    shown = grouped(limits, lambda ends: f"{ends[0]} to {ends[1]}")
+    finding = _of_servos(grades, shown, f"{FIX}: {{ids}} would refuse goals")
+    return finding, "position limits", "at least robot.*.limit about each zero"
 
 
-def _supply(bus: BusSurvey, robot: DoctorConfig, servo: int, value: int) -> Grade:
-    registers, limits, volt = bus.registers[servo], robot.limits, _VOLT * value
+def _shutdown(bus: BusSurvey, config: DoctorConfig, servo: int, bits: int) -> Grade:
+    return "ok" if bits & _SHUTDOWNS == _SHUTDOWNS else "warn"
+
+
+def _supply(bus: BusSurvey, config: DoctorConfig, servo: int, value: int) -> Grade:
+    registers, limits, volt = bus.registers[servo], config.limits, _VOLT * value
     low, high = registers.get("min_voltage_limit", 0), registers.get("max_voltage_limit", 0xFFFF)
     body = bus.here[servo].model == XC430_W240.model
     if not low <= value <= high or (body and volt < limits.supply_hold):
@@ -101,10 +103,10 @@ def _supply(bus: BusSurvey, robot: DoctorConfig, servo: int, value: int) -> Grad
     return "warn" if body and volt < limits.supply_warn else "ok"
 
 
-def _heat(bus: BusSurvey, robot: DoctorConfig, servo: int, heat: int) -> Grade:
+def _heat(bus: BusSurvey, config: DoctorConfig, servo: int, heat: int) -> Grade:
     default = XC430_W240["temperature_limit"].default or 0
     most = bus.registers[servo].get("temperature_limit", default)
-    return "bad" if heat >= most else "warn" if heat >= most - robot.doctor.heat_margin else "ok"
+    return "bad" if heat >= most else "warn" if heat >= most - config.doctor.heat_margin else "ok"
 
 
 def _watchdog(counts: int) -> str:
@@ -113,37 +115,37 @@ def _watchdog(counts: int) -> str:
     return f"{1e3 * WATCHDOG_UNIT * counts:.0f} ms" if counts else "off"
 
 
-REGISTER_CHECKS: tuple[Check[BusSurvey], ...] = (
-    _register(
+_CHECKS = (
+    _Check(
         "operating mode",
         "operating_mode",
-        lambda bus, robot: grouped(robot.robot.modes),
+        "{modes}",
         _required("operating_mode"),
         FIX,
     ),
-    _register(
+    _Check(
         "return delay",
         "return_delay_time",
         "0 us",
-        _unless(lambda value: value == 0, "warn"),
+        _only(0, "warn"),
         FIX,
         lambda value: f"{1e6 * RETURN_DELAY_UNIT * value:g} us",
     ),
-    _register(
+    _Check(
         "status return level",
         "status_return_level",
         str(_ANSWERS_ALL),
-        _unless(lambda value: value == _ANSWERS_ALL, "warn"),
+        _only(_ANSWERS_ALL, "warn"),
         OFF_AND_ON,
     ),
-    _register(
+    _Check(
         "homing offset",
         "homing_offset",
         "0",
         _required("homing_offset"),
         f"{FIX}, then correct robot.*.zeros of {{ids}}",
     ),
-    _register(
+    _Check(
         "drive mode",
         "drive_mode",
         "normal",
@@ -151,61 +153,58 @@ REGISTER_CHECKS: tuple[Check[BusSurvey], ...] = (
         f"{FIX}; robot.*.directions of {{ids}} tells signs",
         lambda value: " + ".join(word for bit, word in _MODES if value & bit) or "normal",
     ),
-    _register(
+    _Check(
         "velocity limit",
         "velocity_limit",
         "from robot.*.fastest on",
         _required("velocity_limit"),
         f"{FIX}: {{ids}} would refuse their profile velocity",
     ),
-    Check("position limits", "at least robot.*.limit about each zero", _position_limits),
-    _register(
+    _Check(
         "shuts itself down at",
         "shutdown",
         ", ".join(hardware_errors(_SHUTDOWNS)),
-        _unless(lambda bits: bits & _SHUTDOWNS == _SHUTDOWNS, "warn"),
+        _shutdown,
         f"set register 63 of {{ids}} to {_SHUTDOWNS} with DYNAMIXEL Wizard",
         lambda bits: f"{'' if bits & _SHUTDOWNS == _SHUTDOWNS else 'not '}all of these",
     ),
-    _register(
+    _Check(
         "supply",
         "present_input_voltage",
-        lambda bus, robot: (
-            f"body from {robot.limits.supply_warn:g} V on, antennae within their limits"
-        ),
+        "body from {config.limits.supply_warn:g} V on, antennae within their limits",
         _supply,
         "{ids}: charge the battery, or check supply and cable to them",
         lambda value: f"{_VOLT * value:.1f} V",
     ),
-    _register(
+    _Check(
         "temperature",
         "present_temperature",
-        lambda bus, robot: f"{robot.doctor.heat_margin:g} degC below the limit",
+        "{config.doctor.heat_margin:g} degC below the limit",
         _heat,
         "{ids}: let them cool down",
         lambda heat: f"{heat} degC",
     ),
-    _register(
+    _Check(
         "hardware errors",
         "hardware_error_status",
         "none",
-        _unless(lambda bits: not bits, "bad"),
+        _only(0, "bad"),
         "{ids}: remove the cause (load, heat, supply), then switch the supply off and on",
         lambda bits: ", ".join(hardware_errors(bits)) or "none",
     ),
-    _register(
+    _Check(
         "bus watchdog",
         "bus_watchdog",
         "off",
-        _unless(lambda counts: not counts, "warn"),
+        _only(0, "warn"),
         "{ids}: left by a program that died, or in use by one; drive clears it when it arms",
         _watchdog,
     ),
-    _register(
+    _Check(
         "torque",
         "torque_enable",
         "off",
-        _unless(lambda value: not value, "bad"),
+        _only(0, "bad"),
         "{ids}: no other program may drive them; hold the robot and switch the supply off",
         lambda value: "on" if value else "off",
     ),

@@ -24,14 +24,9 @@ _PATIENCE = 0.05
 def require_quick(
     port: Port, ids: Sequence[int], baud: int, clock: Callable[[], float], path: str
 ) -> float | None:
-    """Ping a servo that answers a few times; the median time to its answer [s], None without any.
+    """Ping the first servo that answers; the median time to its answers [s], None without any.
 
-    Args:
-        port: The wire; nobody else uses it meanwhile.
-        ids: Servos to try, in this order.
-        baud: Bits per second.
-        clock: Monotonic time [s].
-        path: What the port is called, for the cure.
+    `path` is what the port is called, for the cure.
 
     Raises:
         BringUpError: Answers come too late; with the command that cures it.
@@ -39,20 +34,18 @@ def require_quick(
     bus = Bus(port, Timing(baud, gap=_PATIENCE, latest=_PATIENCE), clock=clock)
     times: list[float] = []
     for servo in ids:
-        while len(times) < _PINGS:
-            begin = clock()
-            if not isinstance(bus.ping(servo), Value):
-                break
+        begin = clock()
+        while len(times) < _PINGS and isinstance(bus.ping(servo), Value):
             times.append(clock() - begin)
+            begin = clock()
         if times:
             break
     if not times:
         return None
-    found, most = median(times), _SLOW
-    if found > most:
+    if (time := median(times)) > _SLOW:
         cure = latency_row(path, True, DoctorParams()).cure
         raise BringUpError(
-            f"--bus: expected answers within {1e3 * most:g} ms, found {1e3 * found:.1f} ms: the "
+            f"--bus: expected answers within {1e3 * _SLOW:g} ms, found {1e3 * time:.1f} ms: the "
             f"adapter keeps bytes back; {cure}"
         )
-    return found
+    return time

@@ -57,15 +57,14 @@ def connect(
     """
     controller = make_controller(config.controller, config.control, config.robot)
     with contextlib.ExitStack() as stack:
-        lines: list[Port] = []
-        for flag, address, baud in (
-            ("--esp32", esp32, BOARD_BAUD),
-            ("--bus", bus, config.robot.baud),
-        ):
-            line = Reconnecting(finder(address, baud, flag, key, config.network))
-            stack.callback(line.close)
-            lines.append(line)
-        yield prepare(config, lines[0], lines[1], HostClock(), bus, controller)
+        ports = ("--esp32", esp32, BOARD_BAUD), ("--bus", bus, config.robot.baud)
+        board, servos = (
+            stack.enter_context(
+                contextlib.closing(Reconnecting(finder(address, baud, flag, key, config.network)))
+            )
+            for flag, address, baud in ports
+        )
+        yield prepare(config, board, servos, HostClock(), bus, controller)
 
 
 def prepare(
@@ -78,7 +77,7 @@ def prepare(
 ) -> Session:
     """A session before two open ports, after both sides have said who they are.
 
-    `path` is what the bus is called, for errors; the controller is the configured one if not given.
+    `path` is what the bus is called, for errors.
     """
     board = Board(esp32, config.limits.stale_age)
     await_board(board, clock, bus, config.swapped)
@@ -126,14 +125,11 @@ def await_board(
         if clock.now() > begin + patience:
             came = board.decoder.counters
             why = (
-                board.refusals[-1]
-                if board.refusals
-                else (
-                    f"{came.received} bytes and {came.good} frames; is it the right port, with the "
-                    "firmware on the board? Perhaps --esp32 and --bus are swapped; over UDP a "
-                    "board does not answer to a wrong key"
-                )
+                f"{came.received} bytes and {came.good} frames; is it the right port, with the "
+                "firmware on the board? Perhaps --esp32 and --bus are swapped; over UDP a board "
+                "does not answer to a wrong key"
             )
+            why = board.refusals[-1] if board.refusals else why
             raise BadInputError(
                 f"--esp32: expected an antenna board within {patience:g} s, found {why}"
             )

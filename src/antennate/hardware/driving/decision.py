@@ -17,12 +17,7 @@ _MOST = (1 << 31) - 1
 
 @dataclass(frozen=True, slots=True)
 class Decision:
-    """What a controller has decided; the defaults are those of one that was not asked yet.
-
-    Attributes:
-        maneuver: A `Maneuver`.
-        contact: A `Contact` a side.
-    """
+    """A `Maneuver` and a `Contact` a side; the defaults are those of one that was not asked yet."""
 
     maneuver: int = int(Maneuver.HOLD)
     contact: tuple[int, int] = (int(Contact.UNKNOWN), int(Contact.UNKNOWN))
@@ -60,9 +55,9 @@ def decision_of(controller: Controller) -> Decision:
 
 def _integers(controller: Controller, name: str, shape: tuple[int, ...]) -> list[int]:
     value: object = getattr(controller, name, None)
-    found = np.asarray(value)
-    fits = found.shape == shape and found.dtype.kind in "iu"
-    numbers = [int(number) for number in found.ravel()] if fits else []
+    array = np.asarray(value)
+    fits = array.shape == shape and array.dtype.kind in "iu"
+    numbers = [int(number) for number in array.ravel()] if fits else []
     if not numbers or max(map(abs, numbers)) > _MOST:
         raise ControllerError(
             f"expected {name} of shape {shape}, small whole numbers, found {value!r}; see "

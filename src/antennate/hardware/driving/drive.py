@@ -39,9 +39,6 @@ def drive(
         arm: Whether torque may come on.
         on_tick: Called after every tick with the session and the time [s].
         operator: Who may stop it. Its signals are not heard any more afterwards.
-
-    Returns:
-        How it went. After Ctrl-C the report is that of the way so far.
     """
     report, clock = Report(), session.clock
     start = clock.now()
@@ -55,14 +52,10 @@ def drive(
     def failed(t: float) -> bool:
         """After a fault and a time to look at it: torque can be taken off now, or never."""
         nonlocal failed_at
-        out = session.outputs
-        if (
-            out is not None
-            and t > dry.over + config.limits.longest_arming
-            and out.state >= State.FAULT
-        ):
+        state = State.OK if session.outputs is None else session.outputs.state
+        if t > dry.over + config.limits.longest_arming and state >= State.FAULT:
             failed_at = min(failed_at, t)
-        if out is not None and out.state is State.OFF and t > failed_at:
+        if state is State.OFF and t > failed_at:
             return True
         wait = max(config.fault_time, config.bus_return if session.mute else 0.0)
         return t >= failed_at + wait
@@ -78,7 +71,7 @@ def drive(
         report.watch(session)
         on_tick(session, clock.now())
         reasons = (
-            (stop.heard, _SIGNAL),
+            (stop.received, _SIGNAL),
             (key is not None and key.over, "a key that was let go"),
             (operator.arrived(), "arrival"),
             (t >= dry.end, "a refusal of torque" if dry.refusal else "the end of its time"),
@@ -93,11 +86,11 @@ def drive(
             try:
                 run_loop(session, session.control, session.period, go_on)
             finally:
-                stop.deaf = True
-        except KeyboardInterrupt:  # also one that came before `deaf` was set
+                stop.closed = True
+        except KeyboardInterrupt:  # also one that came before `closed` was set
             report.ended = _SIGNAL
         finally:
-            stop.deaf = True
+            stop.closed = True
             report.on = _off(session, config.stand)
             report.close(session)
     return report

@@ -14,7 +14,7 @@ class DryRun:
     """Lasts its time, and longer until the antennae are checked and the supervisor allows torque.
 
     Args:
-        quality: The check of the antennae.
+        quality: With the check of the antennae.
         length: Its time [s].
         patience: By how much it is extended at most [s], by the check and by the supervisor each.
         arm: Whether torque is wanted afterwards.
@@ -23,7 +23,7 @@ class DryRun:
     Attributes:
         over: When torque was last asked for [s], inf while it may not come on.
         end: When all is over [s], inf if not known yet.
-        asks: Whether torque is asked for; the supervisor hears the change to True alone.
+        asks: Whether torque is asked for; the supervisor takes the change to True alone.
         refusal: Why torque has not come on although it was wanted.
     """
 
@@ -39,16 +39,11 @@ class DryRun:
         self.refusal = ""
 
     def step(self, t: float, out: Outputs | None) -> None:
-        """Look at the antennae, and at what became of the question, once a tick.
-
-        Args:
-            t: Time since the beginning [s].
-            out: The supervisor's of this tick.
-        """
+        """Look at antennae and supervisor, at a time since the beginning [s], once a tick."""
         if not self._waits:
             return
         if self.asks:
-            self._hear(t, out)
+            self._follow(t, out)
         elif self._first < math.inf:
             self._ask(t)
         elif self._quality.refused or (
@@ -62,7 +57,7 @@ class DryRun:
     def _ask(self, t: float) -> None:
         self.asks, self.over, self.end = True, t, t + self._duration
 
-    def _hear(self, t: float, out: Outputs | None) -> None:
+    def _follow(self, t: float, out: Outputs | None) -> None:
         """Torque comes on in this tick, or is asked for again in the next but one."""
         if out is None or out.arming:
             self._waits, self.refusal = False, ""

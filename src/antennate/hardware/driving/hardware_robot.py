@@ -16,32 +16,22 @@ class HardwareRobot:
     Frames are stamped with the board's own time since the first reading, so that neither its way to
     the host nor the host's load shows in them. Their time never goes back.
 
-    Args:
-        board: Its antennae.
-        actuators: What moves its joints.
-        clock: The host's time, which never steps.
-
     Attributes:
+        clock: The host's time, which never steps.
         used: Usable samples that the last reading found.
     """
 
     def __init__(self, board: Board, actuators: Actuators, clock: Clock) -> None:
-        self._board = board
-        self._actuators = actuators
-        self._clock = clock
+        self.clock = clock
         self.used = 0
+        self._board, self._actuators = board, actuators
         self._stamp: Timed | None = None
         self._stamp_now: float | None = None
         self._stamp_t = self._t = 0.0
 
-    @property
-    def clock(self) -> Clock:
-        """The host's clock."""
-        return self._clock
-
     def read(self) -> AntennaFrame:
         """The newest reading of both antennae."""
-        now = self._clock.now()
+        now = self.clock.now()
         self.used = self._board.poll(now)
         timed = self._board.newest(now)
         self._t = max(self._t, self._time(timed, now))
@@ -62,10 +52,5 @@ class HardwareRobot:
         return self._stamp_t + 1e-6 * (timed.elapsed_us - last.elapsed_us)
 
     def write(self, command: JointCommand) -> None:
-        """Send a command to the actuators, which have torque.
-
-        Raises:
-            CommandError: The command must not be sent; nothing is.
-            PortError: The bus is gone.
-        """
+        """Send a command to the actuators, which have torque; see `Actuators.command`."""
         self._actuators.command(command)

@@ -31,35 +31,18 @@ def urgent(level: int = LEVEL) -> Iterator[Priority]:
     """Run the block, which must sleep most of the time, before all ordinary processes if allowed.
 
     Processes and threads started inside are ordinary again. What was made before is also kept from
-    the collector of garbage, which would walk through all of it in one tick or another.
-
-    Args:
-        level: Real-time level, 1 to 99.
-
-    Yields:
-        What was got.
+    the collector of garbage, which would walk through all of it in one tick or another. Yields what
+    was got; the real-time level is 1 to 99.
     """
-    with _restored():
-        gc.collect()
-        gc.freeze()
-        try:
-            yield claim(level)
-        finally:
-            gc.unfreeze()
-
-
-@contextlib.contextmanager
-def _restored() -> Iterator[None]:
-    """Give this thread back the scheduling that it has now."""
-    if not _LINUX:
-        yield
-        return
-    policy, param = os.sched_getscheduler(0), os.sched_getparam(0)
+    before = (os.sched_getscheduler(0), os.sched_getparam(0)) if _LINUX else None
+    gc.collect()
+    gc.freeze()
     try:
-        yield
+        yield claim(level)
     finally:
-        if os.sched_getscheduler(0) != policy:
-            _give_back(policy, param)
+        gc.unfreeze()
+        if before is not None and os.sched_getscheduler(0) != before[0]:
+            _give_back(*before)
 
 
 def _give_back(policy: int, param: os.sched_param) -> None:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from antennate.hardware.driving.session import Session
-from antennate.hardware.driving.timing import TimingReport
+from antennate.hardware.driving.timing import LoopTiming
 from antennate.hardware.driving.walk import Walk
 from antennate.hardware.safety.causes import Cause, Outputs, State
 
@@ -26,8 +26,8 @@ class Report:
         walk: How long the robot walked.
     """
 
-    timing: TimingReport | None = None
-    before: TimingReport | None = None
+    timing: LoopTiming | None = None
+    before: LoopTiming | None = None
     worst: State = State.OK
     why: str = ""
     refusal: str = ""
@@ -35,8 +35,8 @@ class Report:
     ended: str = ""
     walk: Walk = field(default_factory=Walk)
     _torque: bool = False
-    _waits: str = field(default="", repr=False)
-    _causes: set[Cause] | None = field(default=None, repr=False)
+    _waits: str = ""
+    _causes: set[Cause] | None = None
 
     @property
     def safe(self) -> bool:
@@ -116,7 +116,7 @@ def _ordered(out: Outputs) -> bool:
     return off == {Cause.STOPPED}
 
 
-def _pace(timing: TimingReport | None) -> dict[str, Any] | None:
+def _pace(timing: LoopTiming | None) -> dict[str, Any] | None:
     if timing is None:
         return None
     return {
@@ -132,7 +132,7 @@ def _pace(timing: TimingReport | None) -> dict[str, Any] | None:
     }
 
 
-def _since(end: TimingReport | None, begin: TimingReport | None) -> dict[str, Any] | None:
+def _since(end: LoopTiming | None, begin: LoopTiming | None) -> dict[str, Any] | None:
     """Ticks from the first command that was sent; the time that arming takes is before it."""
     if end is None or begin is None:
         return None

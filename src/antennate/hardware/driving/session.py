@@ -13,12 +13,12 @@ goals are set to where the joints stand, as with the first.
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
 from antennate.hardware.actuators import ActuatorError, Actuators
 from antennate.hardware.driving.hardware_robot import HardwareRobot
-from antennate.hardware.driving.orders import Orders, Tally
 from antennate.hardware.driving.supervised_controller import SupervisedController
 from antennate.hardware.driving.timing import LoopTiming
 from antennate.hardware.esp32.board import Board
@@ -31,23 +31,36 @@ from antennate.params import SupervisorParams
 from antennate.types import AntennaFrame, Clock, Controller, JointCommand
 
 
+@dataclass(slots=True)
+class Orders:
+    """What the operator wants.
+
+    Torque on, of which only the change to True counts; off; no walk, as no key is held.
+    """
+
+    arm: bool = False
+    stop: bool = False
+    released: bool = False
+
+
+@dataclass(slots=True)
+class Tally:
+    """Ticks run, commands sent to the actuators, and goals that moved slower than asked."""
+
+    ticks: int = 0
+    sent: int = 0
+    limited: int = 0
+
+
 class Session:
     """A robot under a supervisor; `run_loop(session, session.control, ...)`. For one thread.
 
-    Args:
-        board: The antennae.
-        actuators: What moves the joints.
-        clock: The host's time.
-        controller: Its controller.
+    Attributes:
         period: Control period [s].
         quality: What the readings of the antennae are worth.
-        limits: Limits of the supervisor.
-
-    Attributes:
         control: The controller, as the loop asks it.
-        orders: The operator's, read in every tick.
+        orders: Read in every tick.
         outputs: The supervisor's of the last tick, None before the first.
-        tally: What was done.
         timing: Whether the loop keeps its pace, None before the first tick.
         frame: What the controller got in the last tick.
         lost: Whether the actuators were lost; no goal is sent until an arm event.
@@ -94,9 +107,8 @@ class Session:
         self._refused = sum(self.board.clock.states.values()) - before - self.robot.used
         control = self.control
         self.quality.step(float(frame.t[0]), frame.counts[0].tolist(), control.decision.contact)
-        counts = self.quality.counts
-        if self.outputs is None or not self.outputs.clear:
-            counts = [math.nan, math.nan]
+        clear = self.outputs is not None and self.outputs.clear
+        counts = self.quality.counts if clear else [math.nan, math.nan]
         self._mark("read")
         control.standing, control.rate = self.actuators.resting, self._rate()
         self.frame = AntennaFrame(t=control.time(frame.t), counts=np.array([counts]))

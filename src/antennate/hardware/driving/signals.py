@@ -1,7 +1,7 @@
 r"""Ctrl-C, Ctrl-\, SIGTERM and the loss of the terminal, while servos have torque.
 
 An exception alone would not do: a controller with a bare `except`, a destructor or a callback may
-swallow it. So what was heard is also kept, for the loop to look at.
+swallow it. So what was received is also kept, for the loop to look at.
 """
 
 from __future__ import annotations
@@ -20,24 +20,24 @@ STOPS = tuple(
 
 
 class StopOnce:
-    """Inside the block a signal that asks to end raises KeyboardInterrupt, until it is made deaf.
+    """Inside the block a signal that asks to end raises KeyboardInterrupt, until it is closed.
 
-    Make it so before the torque goes off: whoever presses Ctrl-C twice must not keep it on. Outside
-    the main thread Python delivers no signals: the block then changes and hears nothing, and
-    whoever starts such a thread has to end it otherwise, as by `orders.stop`.
+    Close it before the torque goes off: whoever presses Ctrl-C twice must not keep it on. Outside
+    the main thread Python delivers no signals: whoever starts such a thread has to end it
+    otherwise, as by `orders.stop`.
 
     Args:
-        last: The program ends after the block: if a signal was heard, none is heard any more, so
+        last: The program ends after the block: if a signal came, none is heard any more, so
             that the report is written and shown however often it is sent.
 
     Attributes:
-        heard: One came, whoever may have swallowed the exception.
+        received: One came, whoever may have swallowed the exception.
         insists: Each of them raises, not the first alone; for code that may swallow one.
-        deaf: None raises any more; for the block's owner to set.
+        closed: None raises any more; for the block's owner to set.
     """
 
     def __init__(self, last: bool = False) -> None:
-        self.heard = self.deaf = False
+        self.received = self.closed = False
         self.insists = not last
         self._last = last
         self._before: dict[int, Any] = {}
@@ -49,10 +49,10 @@ class StopOnce:
 
     def __exit__(self, *_: object) -> None:
         for number, handler in self._before.items():
-            signal.signal(number, signal.SIG_IGN if self._last and self.heard else handler)
+            signal.signal(number, signal.SIG_IGN if self._last and self.received else handler)
 
     def receive(self, number: int, frame: FrameType | None) -> None:
-        """Handle a signal."""
-        first, self.heard = not self.heard, True
-        if not self.deaf and (first or self.insists):
+        """Take note of a signal."""
+        first, self.received = not self.received, True
+        if not self.closed and (first or self.insists):
             raise KeyboardInterrupt

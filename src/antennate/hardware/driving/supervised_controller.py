@@ -21,7 +21,7 @@ class SupervisedController:
 
     Args:
         controller: Of one robot; anybody's.
-        robot: The robot.
+        robot: That robot.
         check: A copy of a command that can be sent, or CommandError.
         now: The host's time [s].
 

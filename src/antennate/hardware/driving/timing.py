@@ -1,15 +1,10 @@
-"""Whether the loop keeps its pace: due times, overruns, and which stage cost them.
-
-The n-th tick is due at start + n * period. Ticks that come due while another still runs are left
-out and counted; they are never made up for in a burst. Nothing here reads a clock or sleeps.
-"""
+"""Whether the loop keeps its pace: overruns, ticks left out, and which stage cost them."""
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
-from antennate.errors import ConfigError
+from antennate.control.loop import next_tick
 
 
 @dataclass(slots=True)
@@ -25,11 +20,16 @@ class StageTiming:
     overruns: int = 0
 
 
-@dataclass(frozen=True, slots=True)
-class TimingReport:
-    """How well the pace was kept.
+@dataclass(slots=True)
+class LoopTiming:
+    """Accounts for the time of a loop.
+
+    A tick is `begin`, then `mark` after each stage, then `finish`.
 
     Attributes:
+        start: Time of the first tick [s].
+        period: Control period [s].
+        number: Number n of the tick now due or running; it is due at start + n * period.
         ticks: Ticks finished.
         overruns: Ticks that lasted beyond the time the next one was due.
         missed_cycles: Due times left out.
@@ -38,64 +38,29 @@ class TimingReport:
         stages: Worst time [s] and overruns of each stage, by name.
     """
 
-    ticks: int
-    overruns: int
-    missed_cycles: int
-    worst_lateness: float
-    worst_tick: float
-    stages: dict[str, StageTiming]
+    start: float
+    period: float
+    number: int = 0
+    ticks: int = 0
+    overruns: int = 0
+    missed_cycles: int = 0
+    worst_lateness: float = 0.0
+    worst_tick: float = 0.0
+    stages: dict[str, StageTiming] = field(default_factory=dict[str, StageTiming])
+    _began: float = 0.0
+    _marked: float = 0.0
+    _spent: dict[str, float] = field(default_factory=dict[str, float])
 
     @property
     def missed_share(self) -> float:
         """Share of all due times that were left out."""
         return self.missed_cycles / max(1, self.ticks + self.missed_cycles)
 
-
-class LoopTiming:
-    """Accounts for the time of a loop.
-
-    A tick is `begin`, then `mark` after each stage, then `finish`, which says when the next is due.
-
-    Args:
-        start: Time of the first tick [s].
-        period: Control period [s].
-
-    Attributes:
-        number: Number n of the tick now due or running.
-
-    Raises:
-        ConfigError: The period is not a positive number, or the start not a finite one.
-    """
-
-    def __init__(self, start: float, period: float) -> None:
-        if not (math.isfinite(start) and math.isfinite(period) and period > 0):
-            raise ConfigError(
-                f"expected a finite start and a period above 0 s, got {start} and {period}"
-            )
-        self._start = start
-        self._period = period
-        self.number = 0
-        self._began = self._marked = start
-        self._spent: dict[str, float] = {}
-        self._stages: dict[str, StageTiming] = {}
-        self._ticks = 0
-        self._overruns = 0
-        self._missed = 0
-        self._late = 0.0
-        self._worst = 0.0
-
-    @property
-    def due(self) -> float:
-        """Time at which the tick `number` is due [s]."""
-        return self._due(self.number)
-
-    def begin(self, now: float) -> float:
-        """A tick begins; its lateness [s]."""
+    def begin(self, now: float) -> None:
+        """A tick begins."""
         self._began = self._marked = now
         self._spent = {}
-        late = max(0.0, now - self.due)
-        self._late = max(self._late, late)
-        return late
+        self.worst_lateness = max(self.worst_lateness, now - self._due())
 
     def mark(self, stage: str, now: float) -> None:
         """A stage of the running tick ends."""
@@ -103,42 +68,24 @@ class LoopTiming:
         self._marked = now
 
     def finish(self, now: float) -> float:
-        """The tick ends; the time at which the next one is due [s], never before now."""
-        self._ticks += 1
-        self._worst = max(self._worst, now - self._began)
-        following = self._first_due(now)
+        """The tick ends; the time at which the next one is due [s]."""
+        self.ticks += 1
+        self.worst_tick = max(self.worst_tick, now - self._began)
+        following = next_tick(self.number, now - self.start, self.period)
         missed = following - self.number - 1
-        self._missed += missed
-        self._overruns += missed > 0
-        self._blame(overrun=missed > 0)
         self.number = following
-        return self.due
+        self.missed_cycles += missed
+        self.overruns += missed > 0
+        for name, spent in self._spent.items():
+            stage = self.stages.setdefault(name, StageTiming())
+            stage.worst = max(stage.worst, spent)
+        if missed and self._spent:
+            self.stages[max(self._spent, key=self._spent.__getitem__)].overruns += 1
+        return self._due()
 
-    def report(self) -> TimingReport:
-        """What happened so far."""
-        return TimingReport(
-            ticks=self._ticks,
-            overruns=self._overruns,
-            missed_cycles=self._missed,
-            worst_lateness=self._late,
-            worst_tick=self._worst,
-            stages={n: StageTiming(s.worst, s.overruns) for n, s in self._stages.items()},
-        )
+    def report(self) -> LoopTiming:
+        """A copy of what happened so far."""
+        return replace(self, stages={name: replace(s) for name, s in self.stages.items()})
 
-    def _due(self, number: int) -> float:
-        return self._start + number * self._period
-
-    def _first_due(self, now: float) -> int:
-        """Number of the first tick after the present one that is not due before now."""
-        number = max(self.number + 1, math.floor((now - self._start) / self._period) - 1)
-        while self._due(number) < now:
-            number += 1
-        return number
-
-    def _blame(self, overrun: bool) -> None:
-        for stage, spent in self._spent.items():
-            known = self._stages.setdefault(stage, StageTiming())
-            known.worst = max(known.worst, spent)
-        if overrun and self._spent:
-            slowest = max(self._spent, key=self._spent.__getitem__)
-            self._stages[slowest].overruns += 1
+    def _due(self) -> float:
+        return self.start + self.number * self.period

@@ -8,7 +8,6 @@ from collections.abc import Callable
 import numpy as np
 
 from antennate.errors import AntennateError
-from antennate.hardware.actuators import Tally
 from antennate.hardware.dynamixel import bringup
 from antennate.hardware.dynamixel.answers import MOTION_BUDGET
 from antennate.hardware.dynamixel.bus import Bus
@@ -16,7 +15,6 @@ from antennate.hardware.dynamixel.leg_turns import LegTurns
 from antennate.hardware.dynamixel.monitor import ServoMonitor
 from antennate.hardware.dynamixel.tables import XC430_W240
 from antennate.hardware.joints import Joints
-from antennate.robots.spec import RobotSpec
 from antennate.types import Floats, JointCommand
 
 _GOAL = XC430_W240["goal_position"]
@@ -27,19 +25,11 @@ class DynamixelActuators:
     """All servos of one robot on one bus, as `Actuators`; for one thread.
 
     Any packet feeds the watchdogs of the servos: nothing is sent but by the calls below.
-
-    Args:
-        bus: The bus.
-        joints: Which servo moves what.
-        clock: Monotonic time [s].
-
-    Attributes:
-        state: The monitor of the servos.
-        turns: How far legs have turned.
     """
 
     def __init__(self, bus: Bus, joints: Joints, clock: Callable[[], float]) -> None:
         self.bus, self.joints = bus, joints
+        self.tally, self.robot = bus.tally, joints.robot
         self.state = ServoMonitor(bus, joints.ids, clock)
         self.turns = LegTurns(bus, joints)
         self.left_on: list[int] = []
@@ -47,19 +37,9 @@ class DynamixelActuators:
         self._goals: Floats | None = None
 
     @property
-    def tally(self) -> Tally:
-        """What the bus has seen."""
-        return self.bus.tally
-
-    @property
     def enabled(self) -> bool:
         """Whether torque was given and not taken."""
         return self._goals is not None
-
-    @property
-    def robot(self) -> RobotSpec:
-        """The robot whose joints they move."""
-        return self.joints.robot
 
     @property
     def resting(self) -> bool:
@@ -67,11 +47,7 @@ class DynamixelActuators:
         return self.turns.standing
 
     def check(self, command: JointCommand) -> JointCommand:
-        """A copy of a command that can be sent.
-
-        Raises:
-            CommandError: It cannot.
-        """
+        """A copy of a command that can be sent; CommandError if it cannot."""
         command = self.joints.plain(command)
         self.joints.ticks(command)
         return command

@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from antennate.hardware.dynamixel.packets import OVERHEAD, Status, StatusError
 
 
 @dataclass(frozen=True, slots=True)
 class Value:
-    """A servo answered.
-
-    Attributes:
-        data: The bytes asked for.
-        alert: The servo reports a hardware error all the same.
-    """
+    """A servo answered with the bytes asked for; `alert` if it reports a hardware error too."""
 
     data: bytes
     alert: bool
@@ -22,12 +17,7 @@ class Value:
 
 @dataclass(frozen=True, slots=True)
 class Refused:
-    """A servo answered that it cannot.
-
-    Attributes:
-        error: Why.
-        alert: The servo reports a hardware error.
-    """
+    """A servo answered why it cannot; `alert` if it reports a hardware error too."""
 
     error: StatusError
     alert: bool
@@ -44,12 +34,9 @@ SILENT = Silent()
 
 @dataclass(frozen=True, slots=True)
 class Span:
-    """Bytes of the control table to read.
+    """Bytes of the control table to read, from an address on.
 
-    Attributes:
-        address: First byte.
-        length: Bytes wanted.
-        spare: Bytes after those that may be read too, to tell new answers from late ones.
+    `spare` more bytes may be read too, to tell new answers from late ones.
     """
 
     address: int
@@ -105,6 +92,6 @@ def answer(status: Status) -> Answer:
 def cut(answers: dict[int, Answer], length: int) -> dict[int, Answer]:
     """The answers with no more data than was wanted."""
     return {
-        servo: Value(said.data[:length], said.alert) if isinstance(said, Value) else said
-        for servo, said in answers.items()
+        servo: replace(reply, data=reply.data[:length]) if isinstance(reply, Value) else reply
+        for servo, reply in answers.items()
     }

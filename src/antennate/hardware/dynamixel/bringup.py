@@ -13,12 +13,7 @@ from antennate.hardware.dynamixel import inquiry
 from antennate.hardware.dynamixel.answers import Span, Value
 from antennate.hardware.dynamixel.bus import Bus
 from antennate.hardware.dynamixel.inquiry import Present, State
-from antennate.hardware.dynamixel.tables import (
-    EXTENDED_MODE,
-    TABLES,
-    XC430_W240,
-    Register,
-)
+from antennate.hardware.dynamixel.tables import EXTENDED_MODE, TABLES, XC430_W240, Register
 from antennate.hardware.ports.port import PortError
 
 WATCHDOG_COUNTS = 5
@@ -38,26 +33,22 @@ class BringUpError(ActuatorError):
 
 
 def require(bus: Bus, expected: Mapping[int, int]) -> None:
-    """Whether there is on the bus what is expected, and nothing else; asks nobody to move.
-
-    Args:
-        bus: The bus.
-        expected: Model numbers by id.
+    """Whether the servos of these model numbers by id are on the bus, and nothing else.
 
     Raises:
         BringUpError: Otherwise; the text says each id that is not, and why.
     """
-    verdicts = {i: _verdict(inquiry.look(bus, i), model) for i, model in expected.items()}
-    strangers = {status.id for status in bus.scan()} - verdicts.keys()
-    verdicts |= dict.fromkeys(sorted(strangers), "not expected")
+    faults = {i: _fault(inquiry.look(bus, i), model) for i, model in expected.items()}
+    strangers = {status.id for status in bus.scan()} - faults.keys()
+    faults |= dict.fromkeys(sorted(strangers), "not expected")
     wrong: dict[str, list[int]] = {}
-    for servo, verdict in verdicts.items():
-        if verdict != "ok":
-            wrong.setdefault(verdict, []).append(servo)
+    for servo, fault in faults.items():
+        if fault:
+            wrong.setdefault(fault, []).append(servo)
     if wrong:
-        fit = len(verdicts) - sum(map(len, wrong.values()))
-        said = "; ".join(f"{_named(ids, len(expected))}: {why}" for why, ids in wrong.items())
-        raise BringUpError(f"expected {len(expected)} servos, found {fit} fit; {said}")
+        fit = len(faults) - sum(map(len, wrong.values()))
+        why = "; ".join(f"{_named(ids, len(expected))}: {fault}" for fault, ids in wrong.items())
+        raise BringUpError(f"expected {len(expected)} servos, found {fit} fit; {why}")
 
 
 def _named(ids: Sequence[int], count: int) -> str:
@@ -137,20 +128,15 @@ def disable(
     """Torque off as well as can be, whatever the bus does: the ids that did not confirm it.
 
     The watchdogs of the others are switched off, so that nobody takes the robot for one whose
-    program died; those that may have torque keep theirs. The last try writes into noise as well.
-
-    Args:
-        bus: The bus.
-        ids: The servos.
-        tries: How often they are told.
-        budget: Time for their answers, each time [s].
+    program died; those that may have torque keep theirs. The last of the tries, each with a budget
+    of time for the answers [s], writes into noise as well.
     """
     left = list(ids)
     for more in reversed(range(tries)):
         with contextlib.suppress(PortError):
             bus.write_all(_TORQUE.address, dict.fromkeys(left, b"\0"), anyway=not more)
-            said = bus.read_all(left, Span(_TORQUE.address, 1, spare=1), budget)
-            left = [i for i in left if not isinstance(a := said[i], Value) or a.data != b"\0"]
+            replies = bus.read_all(left, Span(_TORQUE.address, 1, spare=1), budget)
+            left = [i for i in left if not isinstance(r := replies[i], Value) or r.data != b"\0"]
         if not left:
             break
         if more:
@@ -181,18 +167,18 @@ def _write_checked(bus: Bus, register: Register, values: Mapping[int, int]) -> N
         raise BringUpError(f"could not write {register.name}, servos still have {wrong}")
 
 
-def _verdict(found: Present | None, model: int) -> str:
-    """What is wrong with a servo, or that it is "ok"."""
-    if found is None:
+def _fault(present: Present | None, model: int) -> str:
+    """What is wrong with a servo, empty if nothing is."""
+    if present is None:
         return "silent"
-    if found.model not in (None, model):
+    if present.model not in (None, model):
         name = TABLES[model].name if model in TABLES else str(model)
-        return f"expected model {name}, found number {found.model}"
-    return _STATES[found.state]
+        return f"expected model {name}, found number {present.model}"
+    return _STATES[present.state]
 
 
 _STATES: Mapping[State, str] = {
-    "ok": "ok",
+    "ok": "",
     "broken": "answers are never whole: two servos with this id, or a bad cable?",
     "collides": "answers collide: two servos with this id?",
     "mute": "answers pings alone: switch its supply off and on",

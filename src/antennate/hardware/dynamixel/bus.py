@@ -16,11 +16,12 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import wraps
+from typing import Any, Concatenate, ParamSpec, TypeVar
 
 from antennate.hardware.actuators import Tally
 from antennate.hardware.dynamixel import packets
 from antennate.hardware.dynamixel.answers import SILENT, Answer, Span, Timing, answer, cut
-from antennate.hardware.dynamixel.exclusive import exclusive
 from antennate.hardware.dynamixel.packets import HEADER, OVERHEAD, Packet, Status, StatusError
 from antennate.hardware.dynamixel.parser import Parser
 from antennate.hardware.dynamixel.pending import PendingRequests
@@ -38,18 +39,30 @@ BUSY = 0.010
 """How long goals wait for a quiet bus [s]: one tick (assumed)."""
 
 
+P = ParamSpec("P")
+R = TypeVar("R")
+
+
+def exclusive(method: Callable[Concatenate[Any, P], R]) -> Callable[Concatenate[Any, P], R]:
+    """The same method; it waits until no other thread is in one of them, by the lock `turn`."""
+
+    @wraps(method)
+    def waiting(self: Any, /, *args: P.args, **kwargs: P.kwargs) -> R:
+        with self.turn:
+            return method(self, *args, **kwargs)
+
+    return waiting
+
+
 class Bus:
     """Master of one bus. Threads that share it wait for each other, a whole request long.
 
-    Args:
-        port: The wire.
-        timing: Its speed and patience.
-        fast: Read groups with fast sync reads, as long as the servos understand them.
-        clock: Monotonic time [s].
+    Calls raise PortError if the bus is gone.
 
     Attributes:
-        timing: Its speed and patience.
-        tally: What became of the answers.
+        timing: Speed and patience of the wire.
+        fast: Groups are read with fast sync reads, as long as the servos understand them.
+        missed: Requests in a row that a servo left unanswered, by id, of those it was asked.
         turn: Held by the thread whose request is on the bus.
     """
 
@@ -63,24 +76,13 @@ class Bus:
         self.timing = timing or Timing()
         self.tally = Tally()
         self.turn = threading.RLock()
-        self._port = port
-        self._clock = clock
-        self._fast = fast
+        self.fast = fast
+        self.missed: dict[int, int] = {}
+        self._port, self._clock = port, clock
         self._fast_failures = 0
         self._pending = PendingRequests(self.timing.latest, clock)
-        self._missed: dict[int, int] = {}
         self._calm = False
         self._last_byte = self._sent = clock()
-
-    @property
-    def fast(self) -> bool:
-        """Groups are read with fast sync reads."""
-        return self._fast
-
-    @property
-    def missed(self) -> Mapping[int, int]:
-        """Requests in a row that a servo left unanswered, by id, of those it was asked."""
-        return self._missed
 
     @exclusive
     def write_all(self, address: int, data: Mapping[int, bytes], anyway: bool = False) -> None:
@@ -92,7 +94,7 @@ class Bus:
             anyway: Write into the noise as well, for what may be written again and again.
 
         Raises:
-            PortError: The bus did not become quiet in time, or is gone.
+            PortError: The bus did not become quiet in time.
         """
         if not self._send(packets.sync_write(address, data), self._clock() + BUSY, anyway):
             raise PortError(f"expected a quiet bus, found it busy for {1e3 * BUSY:g} ms")
@@ -103,28 +105,23 @@ class Bus:
         """Read the same span of several servos.
 
         A servo at which the chain stops is asked again at its end; one that was silent twice in a
-        row is asked alone, after the others.
-
-        Args:
-            ids: The servos.
-            span: What to read.
-            budget: Time for all of it [s].
+        row is asked alone, after the others. All of it takes at most `budget` [s].
 
         Returns:
             An answer for each id, in the order of `ids`.
         """
         end = self._clock() + budget
         answers: dict[int, Answer] = dict.fromkeys(ids, SILENT)
-        alone = [servo for servo, n in self._missed.items() if n >= ALONE and servo in ids]
-        left = sorted(set(ids) - set(alone), key=lambda servo: (servo in self._missed, servo))
-        fast, dumb = self._fast, False
+        alone = [servo for servo, n in self.missed.items() if n >= ALONE and servo in ids]
+        left = sorted(set(ids) - set(alone), key=lambda servo: (servo in self.missed, servo))
+        fast, dumb = self.fast, False
         while left and self._time_for(span, len(left), end):
             got = (self._read_fast if fast else self._read_chain)(left, span, end)
             dumb = self._judge_fast(fast, dumb, bool(got))
             answers |= got
             left, fast = [servo for servo in left if servo not in got], False
             self._note(got, left[:1])
-            again = [servo for servo in left[:1] if self._missed[servo] < ALONE]
+            again = [servo for servo in left[:1] if self.missed[servo] < ALONE]
             left = left[1:] + again
         for servo in alone:
             if self._time_for(span, 1, end):
@@ -162,19 +159,15 @@ class Bus:
         self.settle()
         end = self._clock() + window
         self._send(packets.ping(), end)
-        parser, found = Parser(), list[Status]()
+        parser, statuses = Parser(), list[Status]()
         while self._clock() < end:
-            found += filter(None, map(packets.as_status, parser.feed(self._listen(window, end))))
+            statuses += filter(None, map(packets.as_status, parser.feed(self._listen(window, end))))
         self.tally.bad_crc += parser.counters.bad_crc
-        return found
+        return statuses
 
     @exclusive
     def settle(self) -> None:
-        """Wait until no late answer can come any more and noise is over, at most `latest` seconds.
-
-        Raises:
-            PortError: The bus is gone.
-        """
+        """Wait until no late answer can come any more and noise is over, at most `latest` [s]."""
         end = self._clock() + self.timing.latest
         while (left := self._pending.longest()) > 0.0:
             self._listen(left, self._clock() + left)
@@ -193,9 +186,9 @@ class Bus:
         if length is None:
             return SILENT
         request = packets.read(servo, span.address, length)
-        found = cut(self._exchange(request, [servo], length, end), span.length)
-        self._note(found, [] if found else [servo])
-        return found.get(servo, SILENT)
+        answers = cut(self._exchange(request, [servo], length, end), span.length)
+        self._note(answers, [] if answers else [servo])
+        return answers.get(servo, SILENT)
 
     def _read_chain(self, ids: Sequence[int], span: Span, end: float) -> dict[int, Answer]:
         length = self._pending.free(ids, span)
@@ -219,8 +212,8 @@ class Bus:
             if len(received) - max(received.find(HEADER), 0) >= size:
                 break
             wait = self.timing.answer(length)
-        found = packets.split_fast_reply(received, ids, length)
-        good = {status.id: answer(status) for status in found}
+        statuses = packets.split_fast_reply(received, ids, length)
+        good = {status.id: answer(status) for status in statuses}
         self.tally.bad_crc += packets.broken_fast_reply(received, len(ids), length, len(good))
         self._finish(ids, length, good, len(received) == size)
         return cut(good, span.length)
@@ -235,16 +228,8 @@ class Bus:
         answer an earlier request, a refusal, which has no data, could be to either and is not
         taken. All else is counted as stale. A servo that answers twice is not believed at all: one
         of the two answers is a late one of the same length. The wait ends as soon as all have
-        answered, or after a silence that is longer than any within a chain of answers.
-
-        Args:
-            request: The packet, to all of `ids` at once.
-            ids: The servos that are to answer, each with a packet of its own.
-            length: Bytes of data in each answer.
-            end: Time after which nothing more is waited for [s].
-
-        Returns:
-            An answer by id, of those that gave a right one.
+        answered, after a silence that is longer than any within a chain of answers, or at `end`
+        [s]. What comes back are the right answers by id.
         """
         late = {servo for servo in ids if self._pending.holds(servo)}
         self._pending.open(ids, length)
@@ -262,12 +247,11 @@ class Bus:
                     continue
                 stale += 1
                 twice |= {status.id} if status else set()
-        good = {servo: said for servo, said in good.items() if servo not in twice}
+        good = {servo: reply for servo, reply in good.items() if servo not in twice}
         self.tally.stale += stale
         self.tally.bad_crc += parser.counters.bad_crc
-        self._finish(
-            ids, length, good, not (stale or parser.pending or parser.counters.skipped_bytes)
-        )
+        dirty = stale or parser.pending or parser.counters.skipped_bytes
+        self._finish(ids, length, good, not dirty)
         return good
 
     def _finish(
@@ -280,9 +264,9 @@ class Bus:
 
     def _note(self, good: Iterable[int], silent: Iterable[int]) -> None:
         for servo in good:
-            self._missed.pop(servo, None)
+            self.missed.pop(servo, None)
         for servo in silent:
-            self._missed[servo] = self._missed.pop(servo, 0) + 1
+            self.missed[servo] = self.missed.pop(servo, 0) + 1
 
     def _judge_fast(self, fast: bool, dumb: bool, answered: bool) -> bool:
         if fast:
@@ -290,7 +274,7 @@ class Bus:
             return not answered
         if dumb and answered:
             self._fast_failures += 1
-            self._fast = self._fast_failures < FAST_TRIES
+            self.fast = self._fast_failures < FAST_TRIES
             return False
         return dumb
 
@@ -315,12 +299,13 @@ class Bus:
         return True
 
     def _quiet(self, end: float) -> bool:
-        while (now := self._clock()) < end:
+        """Whether nothing has come for a while; a process that is late looks once all the same."""
+        while True:
+            now = self._clock()
             left = max(self._last_byte, self._sent) + self.timing.quiet - now
-            if left <= 0.0:
-                return True
+            if left <= 0.0 or now >= end:
+                return left <= 0.0
             self.tally.drained += len(self._listen(left, end))
-        return False
 
     def _listen(self, timeout: float, end: float) -> bytes:
         part = self._port.read(CHUNK, max(min(timeout, end - self._clock()), 0.0))
@@ -332,10 +317,7 @@ class Bus:
 def fitting(packet: Packet, length: int, late: set[int]) -> Status | None:
     """The status in a packet, if it can be the answer to a request for so many bytes.
 
-    Args:
-        packet: Any packet.
-        length: Bytes of data asked for.
-        late: Ids whose late answers may still come: a refusal of theirs may be to the last one.
+    `late` are ids whose late answers may still come: a refusal of theirs may be to the last one.
     """
     status = packets.as_status(packet)
     if status is None:

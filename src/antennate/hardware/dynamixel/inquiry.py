@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from antennate.hardware.dynamixel.answers import Answer, Span, Value
-from antennate.hardware.dynamixel.bus import PING_DATA, Bus
+from antennate.hardware.dynamixel.bus import Bus
 from antennate.hardware.dynamixel.tables import XC430_W240, Register
 
 PINGS = 3
@@ -23,12 +23,11 @@ State = Literal["ok", "broken", "collides", "mute"]
 
 @dataclass(frozen=True, slots=True)
 class Present:
-    """One id that was heard.
+    """One id that answers.
 
     Attributes:
         servo: The id.
-        model: Model number, None if no ping came back whole.
-        firmware: Firmware version, None likewise.
+        model: Model number, None if no ping came back whole; so `firmware`.
         state: "ok"; "broken", no answer is whole; "collides", pings are whole but other answers are
             not, as of two servos with one id; "mute", it answers pings and no reads.
     """
@@ -50,12 +49,7 @@ def look(bus: Bus, servo: int, pings: int = PINGS) -> Present | None:
         return Present(servo, None, None, "broken") if broken else None
     read, broken = _tried(bus, lambda: bus.read(servo, _TICKS), _READS)
     state: State = "ok" if read is not None else "collides" if broken else "mute"
-    return Present(servo, *model_of(data), state)
-
-
-def model_of(data: bytes) -> tuple[int | None, int | None]:
-    """Model number and firmware version in the answer to a ping, None if it is of another form."""
-    return (int.from_bytes(data[:2], "little"), data[2]) if len(data) == PING_DATA else (None, None)
+    return Present(servo, int.from_bytes(data[:2], "little"), data[2], state)
 
 
 def read_some(
@@ -67,8 +61,8 @@ def read_some(
     for _ in range(tries):
         if not left:
             break
-        said = bus.read_all(left, Span(register.address, register.size), budget)
-        values |= {i: register.decode(a.data) for i, a in said.items() if isinstance(a, Value)}
+        replies = bus.read_all(left, Span(register.address, register.size), budget)
+        values |= {i: register.decode(r.data) for i, r in replies.items() if isinstance(r, Value)}
         left = [servo for servo in left if servo not in values]
         if left:
             bus.settle()
@@ -79,8 +73,8 @@ def _tried(bus: Bus, ask: Callable[[], Answer], tries: int) -> tuple[bytes | Non
     """Data of the first answer, or None; and whether anything came that was not whole."""
     before = bus.tally.bad_crc + bus.tally.stale
     for _ in range(tries):
-        said = ask()
-        if isinstance(said, Value):
-            return said.data, False
+        reply = ask()
+        if isinstance(reply, Value):
+            return reply.data, False
         bus.settle()
     return None, bus.tally.bad_crc + bus.tally.stale > before

@@ -50,10 +50,6 @@ not be told (assumed)."""
 class LegTurns:
     """Watches how far legs have turned, and lets them forget it; for one thread.
 
-    Args:
-        bus: The servos.
-        joints: Which servo is which leg; told of every turn that is forgotten.
-
     Attributes:
         forgotten: Legs that have forgotten their turns so far.
         stage: What the next leg has to do: 0 lose its torque, 1 forget its turns, 2 get it back.
@@ -83,17 +79,12 @@ class LegTurns:
         return self._joints.ids[self._left[0]] if begun else None
 
     def begin(self, goals: Floats) -> None:
-        """Stand still from now on if a leg has turned far enough.
-
-        Args:
-            goals: Of all servos [ticks], shape (n,).
-        """
+        """Stand still from now on if the goal of a leg, of all [ticks], shape (n,), is far."""
         turning = self._joints.turning
         turned = abs(goals[turning]) / TICKS_A_TURN
         if not self.standing and turned.max(initial=0.0) >= MOST_TURNS:
             self.reset()
-            far = turned >= 0.5 * MOST_TURNS
-            self._left.extend(turning[far].tolist())
+            self._left.extend(turning[turned >= 0.5 * MOST_TURNS].tolist())
 
     def step(self, goals: Floats, positions: Mapping[int, int], may_begin: bool = True) -> None:
         """One tick's share; goals of legs that have forgotten are changed in place.
@@ -177,5 +168,5 @@ class LegTurns:
 
     def _read(self, servo: int, register: Register) -> int | None:
         span = Span(register.address, register.size, _SPARE[register.name])
-        said = self._bus.read_all([servo], span, _BUDGET)[servo]
-        return register.decode(said.data) if isinstance(said, Value) else None
+        reply = self._bus.read_all([servo], span, _BUDGET)[servo]
+        return register.decode(reply.data) if isinstance(reply, Value) else None

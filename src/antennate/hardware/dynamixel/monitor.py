@@ -31,11 +31,8 @@ SUPPLY_AGE = 4.0
 class ServoMonitor(ActuatorState):
     """Reads all positions every tick, and one servo's watchdog, torque and the supply in turn.
 
-    Args:
-        bus: The bus.
-        ids: All servos; the first one tells the voltage of the supply.
-        clock: Monotonic time [s].
-        budget: Time for the positions [s]; the rest waits for the next tick if they took all of it.
+    The first servo tells the voltage of the supply. All but the positions waits for the next tick
+    if they took the whole budget of time [s].
 
     Attributes:
         positions: Newest position by id [ticks].
@@ -51,10 +48,7 @@ class ServoMonitor(ActuatorState):
         budget: float = MOTION_BUDGET,
     ) -> None:
         super().__init__(missed=dict.fromkeys(ids, 0))
-        self._bus = bus
-        self._clock = clock
-        self._ids = ids
-        self._budget = budget
+        self._bus, self._ids, self._clock, self._budget = bus, ids, clock, budget
         self._turn = cycle(range(len(ids)))
         self._waited = 0
         self.positions: dict[int, int] = {}
@@ -84,9 +78,9 @@ class ServoMonitor(ActuatorState):
     def _look(self) -> None:
         end = self._clock() + self._budget
         answers = self._bus.read_all(self._ids, POSITION, self._budget)
-        dead = not any(isinstance(said, Value) for said in answers.values())
-        for servo, said in answers.items():
-            self._note(servo, said, dead)
+        dead = not any(isinstance(reply, Value) for reply in answers.values())
+        for servo, reply in answers.items():
+            self._note(servo, reply, dead)
         self._waited += 1
         if self._clock() + _ALONE > end and self._waited < _PATIENCE:
             return
@@ -102,10 +96,10 @@ class ServoMonitor(ActuatorState):
 
     def guard(self, servo: int) -> None:
         """Whether a servo still has the watchdog and the torque that it was given."""
-        said = self._one(servo, Span(_WATCHDOG.address, _WATCHDOG.size))
-        if said is None:
+        data = self._one(servo, Span(_WATCHDOG.address, _WATCHDOG.size))
+        if data is None:
             return
-        watchdog = _WATCHDOG.decode(said)
+        watchdog = _WATCHDOG.decode(data)
         self.watchdogs = _with(self.watchdogs, servo, watchdog < 0)
         if not self.armed or servo == self.loose:
             return
@@ -115,16 +109,15 @@ class ServoMonitor(ActuatorState):
             lost |= torque is not None and not _TORQUE.decode(torque)
             self.disarmed = _with(self.disarmed, servo, lost)
 
-    def _note(self, servo: int, said: Answer, dead: bool) -> None:
-        if not isinstance(
-            said, Value
-        ):  # one that was not asked for want of time has missed nothing
+    def _note(self, servo: int, reply: Answer, dead: bool) -> None:
+        if not isinstance(reply, Value):
+            # one that was not asked for want of time has missed nothing
             asked = self._bus.missed.get(servo, 0)
             self.missed[servo] = self.missed[servo] + 1 if dead else max(self.missed[servo], asked)
             return
         self.missed[servo] = 0
-        self.positions[servo] = _POSITION.decode(said.data)
-        if said.alert:
+        self.positions[servo] = _POSITION.decode(reply.data)
+        if reply.alert:
             bits = self._one(servo, _ERRORS)
             words = hardware_errors(bits[0]) if bits else []
             self.errors[servo] = ", ".join(words) or "alert"
@@ -132,8 +125,8 @@ class ServoMonitor(ActuatorState):
             self.errors.pop(servo, None)
 
     def _one(self, servo: int, span: Span) -> bytes | None:
-        said = self._bus.read_all([servo], span, _ALONE)[servo]
-        return said.data if isinstance(said, Value) else None
+        reply = self._bus.read_all([servo], span, _ALONE)[servo]
+        return reply.data if isinstance(reply, Value) else None
 
 
 def _with(ids: Iterable[int], servo: int, is_in: bool) -> tuple[int, ...]:

@@ -77,7 +77,7 @@ class Packet:
 
     Attributes:
         id: Servo it is for or from; 254 is all.
-        instruction: An `Instruction`, or a number not known here.
+        instruction: An `Instruction`, or another number.
         params: Parameters without stuffing; of a status, the error byte and the data.
     """
 
@@ -88,14 +88,7 @@ class Packet:
 
 @dataclass(frozen=True, slots=True)
 class Status:
-    """What one servo answered.
-
-    Attributes:
-        id: The servo.
-        error: What went wrong with the request.
-        alert: The servo has a hardware error.
-        data: What was read.
-    """
+    """What one servo answered; `alert` if it has a hardware error."""
 
     id: int
     error: StatusError
@@ -245,12 +238,12 @@ def split_fast_reply(received: bytes, ids: Sequence[int], length: int) -> list[S
     crc = crc16(received[start:first])
     for begin in range(first, len(received) - length - 3, length + 4):
         end = begin + 2 + length
-        told, crc = received[end : end + 2], crc16(received[begin:end], crc)
+        sent, crc = received[end : end + 2], crc16(received[begin:end], crc)
         servo = received[begin + 1]
-        if told == crc.to_bytes(2, "little") and servo in left:
+        if sent == crc.to_bytes(2, "little") and servo in left:
             answers.append(_status(servo, received[begin], received[begin + 2 : end]))
             left = left[left.index(servo) + 1 :]
-        crc = crc16(told, int.from_bytes(told, "little"))
+        crc = crc16(sent, int.from_bytes(sent, "little"))
     return answers
 
 

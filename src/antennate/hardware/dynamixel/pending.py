@@ -8,16 +8,10 @@ from antennate.hardware.dynamixel.answers import Span
 
 
 class PendingRequests:
-    """For each id the lengths of its unanswered requests, each remembered for a while.
-
-    Args:
-        patience: After this time an answer never comes [s].
-        clock: Monotonic time [s].
-    """
+    """For each id the lengths of its unanswered requests, each until its answer never comes [s]."""
 
     def __init__(self, patience: float, clock: Callable[[], float]) -> None:
-        self._patience = patience
-        self._clock = clock
+        self._patience, self._clock = patience, clock
         self._until: dict[int, dict[int, float]] = {}
 
     def open(self, ids: Iterable[int], length: int) -> None:

@@ -11,9 +11,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-EEPROM_END = 64
-"""Registers below this address survive power-off and are locked while torque is on."""
-
 
 @dataclass(frozen=True, slots=True)
 class Register:
@@ -44,7 +41,7 @@ class Register:
     @property
     def eeprom(self) -> bool:
         """It survives power-off and is locked while torque is on."""
-        return self.address < EEPROM_END
+        return self.address < 64
 
     @property
     def writable(self) -> bool:
@@ -65,16 +62,13 @@ class Table:
     """The control table of one model.
 
     Attributes:
-        model: Model number.
-        name: Model name.
-        source: Address of the manual.
+        model: Its number.
         fast_read_firmware: First firmware that understands a fast sync read.
         registers: By name, in the order of their addresses.
     """
 
     model: int
     name: str
-    source: str
     fast_read_firmware: int
     registers: dict[str, Register]
 
@@ -100,20 +94,9 @@ BAUD_RATES = (9_600, 57_600, 115_200, 1_000_000, 2_000_000, 3_000_000, 4_000_000
 GOALS = frozenset({"goal_pwm", "goal_current", "goal_velocity", "goal_position"})
 """Registers that a tripped bus watchdog locks."""
 
-_SIGNED = frozenset(
-    {
-        "homing_offset",
-        "bus_watchdog",
-        "present_pwm",
-        "present_load",
-        "present_current",
-        "present_velocity",
-        "present_position",
-        "velocity_trajectory",
-        "position_trajectory",
-    }
-    | GOALS
-)
+_SIGNED = GOALS | {"homing_offset", "bus_watchdog", "present_pwm", "present_load"}
+_SIGNED |= {"present_current", "present_velocity", "present_position"}
+_SIGNED |= {"velocity_trajectory", "position_trajectory"}
 
 _RPM, _PULSE, _VOLT, _DUTY = "0.229 rev/min", "1 pulse", "0.1 V", "0.113 %"
 _GAIN = (0, 16_383)
@@ -175,6 +158,9 @@ _COMMON: list[_Row] = [
 ]
 
 
+_CURRENT: dict[str, object] = {"name": "present_current", "unit": "1 mA", "low": None, "high": None}
+
+
 def _registers(changes: dict[str, dict[str, object]], more: list[_Row]) -> dict[str, Register]:
     rows = [Register(*row, signed=row[0] in _SIGNED) for row in _COMMON + more]
     rows = [replace(row, **changes.get(row.name, {})) for row in rows]
@@ -184,7 +170,6 @@ def _registers(changes: dict[str, dict[str, object]], more: list[_Row]) -> dict[
 XC430_W240 = Table(
     model=1080,
     name="XC430-W240-T",
-    source="https://emanual.robotis.com/docs/en/dxl/x/xc430-w240/",
     fast_read_firmware=45,
     registers=_registers({"model_number": {"default": 1080}}, []),
 )
@@ -192,7 +177,6 @@ XC430_W240 = Table(
 XL330_M288 = Table(
     model=1200,
     name="XL330-M288-T",
-    source="https://emanual.robotis.com/docs/en/dxl/x/xl330-m288/",
     fast_read_firmware=46,
     registers=_registers(
         {
@@ -209,12 +193,7 @@ XL330_M288 = Table(
             "velocity_p_gain": {"default": 180},
             "position_p_gain": {"default": 400},
             "goal_velocity": {"low": -2_047, "high": 2_047},
-            "present_load": {
-                "name": "present_current",
-                "unit": "1 mA",
-                "low": None,
-                "high": None,
-            },
+            "present_load": _CURRENT,
         },
         [
             ("current_limit", 38, 2, "RW", "1 mA", 1_750, 0, 1_750),

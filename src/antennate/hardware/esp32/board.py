@@ -69,7 +69,7 @@ class Board:
 
     def poll(self, now: float) -> int:
         """Take the newest of what has come by now [s]; how many usable samples that were."""
-        return len(self._hear(self._read(), now))
+        return len(self._take(self._read(), now))
 
     def wait(self, timeout: float, clock: Callable[[], float]) -> list[Timed]:
         """Usable samples that have come, or come within `timeout` [s]; `clock` tells the time [s].
@@ -78,7 +78,7 @@ class Board:
             PortError: The port is gone.
         """
         data = self._port.read(CHUNK, timeout)
-        return self._hear(data, clock())
+        return self._take(data, clock())
 
     def _read(self) -> bytes:
         """What has come, of a backlog the end; a board that is back is asked to greet."""
@@ -102,7 +102,7 @@ class Board:
         """The newest usable sample, or None if it is too old or its age is not known."""
         return self.clock.newest if self.clock.age(now) <= self._limit else None
 
-    def _hear(self, data: bytes, now: float) -> list[Timed]:
+    def _take(self, data: bytes, now: float) -> list[Timed]:
         """Usable samples in bytes that have come by now [s]."""
         used: list[Timed] = []
         for frame in self.decoder.feed(data):

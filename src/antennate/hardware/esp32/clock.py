@@ -64,6 +64,11 @@ class Sequence:
         self._seen = _WINDOW_MASK
 
     @property
+    def number(self) -> int:
+        """The newest number, 0 before the first."""
+        return self.highest or 0
+
+    @property
     def lost(self) -> int:
         """Numbers between the first and the newest that never came [samples]."""
         return 0 if self.highest is None else self.highest - self._first + 1 - self.received
@@ -94,7 +99,6 @@ class Timed:
     """A sample that may be used.
 
     Attributes:
-        sample: What was read.
         epoch: Rises with every new time base; never mix samples of two epochs.
         seq: Its number, unwrapped.
         elapsed_us: The board's time since the epoch began [us], unwrapped.
@@ -133,13 +137,11 @@ class DeviceClock:
         self._boot: int | None = None
         self._retired: deque[int] = deque(maxlen=RETIRED_BOOTS)
         self._modulus = 0
-        self._period = 0.0
-        self._arrived = 0.0
-        self._floor = 0.0
+        self._period = self._arrived = self._floor = 0.0
         self._settled = False
         self._calm = (0.0, 0.0, 0)
-        self._doubt: tuple[int, int] = (0, 0)
-        self._doubts = 0
+        self._suspect: tuple[int, int] = (0, 0)
+        self._suspects = 0
 
     def greet(self, hello: Hello) -> bool:
         """Take a HELLO; True if a boot begins with it. One of an earlier boot is ignored."""
@@ -155,7 +157,7 @@ class DeviceClock:
         self.newest = None
         self._lost_before += self.sequence.lost
         self.sequence = Sequence()
-        self._doubts = 0
+        self._suspects = 0
         return True
 
     @property
@@ -203,32 +205,29 @@ class DeviceClock:
         if step >= self._modulus // 2:
             return SampleState.BACK
         late = now - 1e-6 * (newest.elapsed_us + step) - self._floor
-        if self._doubts and late > EARLY + DRIFT * 1e-6 * step:
+        if self._suspects and late > EARLY + DRIFT * 1e-6 * step:
             return SampleState.BACK
         impossible = late < -EARLY - DRIFT * 1e-6 * step
-        numbers = self._number() - newest.seq
+        numbers = self.sequence.number - newest.seq
         return (
             SampleState.AHEAD
             if impossible and step > self._longest_step(numbers)
             else SampleState.USED
         )
 
-    def _number(self) -> int:
-        return self.sequence.highest or 0
-
     def _longest_step(self, numbers: int) -> float:
         """Most the board's time should move over some samples [us]."""
         return 1.5 * self._period * numbers + 1e5
 
     def _consistent(self, sample: Sample) -> bool:
-        """Whether enough doubted samples in a row agree among themselves on a new time."""
-        number = self._number()
-        ticks, before = self._doubt
+        """Whether enough suspect samples in a row agree among themselves on a new time."""
+        number = self.sequence.number
+        ticks, before = self._suspect
         step = (sample.ticks - ticks) % self._modulus
-        agrees = self._doubts and 0 < step < self._longest_step(number - before)
-        self._doubts = self._doubts + 1 if agrees else 1
-        self._doubt = (sample.ticks, number)
-        return self._doubts >= SETTLE_SAMPLES
+        agrees = self._suspects and 0 < step < self._longest_step(number - before)
+        self._suspects = self._suspects + 1 if agrees else 1
+        self._suspect = (sample.ticks, number)
+        return self._suspects >= SETTLE_SAMPLES
 
     def _rebase(self, sample: Sample, now: float) -> None:
         """Begin a new time base with a sample of unknown age."""
@@ -244,9 +243,9 @@ class DeviceClock:
         self._arrived = now
         if not self._settled:
             self._settle(now)
-        self._doubts = 0
+        self._suspects = 0
         t = self._floor + 1e-6 * elapsed_us
-        self.newest = Timed(sample, self.epoch, self._number(), elapsed_us, t, now)
+        self.newest = Timed(sample, self.epoch, self.sequence.number, elapsed_us, t, now)
 
     def _settle(self, now: float) -> None:
         """Believe ages once the lowest difference has stopped falling."""

@@ -77,14 +77,7 @@ def encode_ask(signer: Signer, nonce: bytes, number: int, boot_id: int, count: i
 
 
 class Speaker:
-    """The board's end: answers asks, signs frames for whoever was granted them.
-
-    Args:
-        signer: With the key of this board.
-        boot_id: Random number of this boot.
-        hello: Frame of the greeting.
-        frame_size: Bytes of every frame to be signed.
-    """
+    """The board's end: answers asks with a greeting, signs frames for whoever was granted them."""
 
     def __init__(self, signer: Signer, boot_id: int, hello: bytes, frame_size: int) -> None:
         self.listener = None
@@ -98,13 +91,7 @@ class Speaker:
         self._datagram = bytearray(frame_size + TAG_SIZE)
 
     def answer(self, datagram: bytes, sender: object, now_ms: int) -> bytes | None:
-        """Take what came from a sender; what to answer, or None.
-
-        Args:
-            datagram: What came.
-            sender: Its address, any object.
-            now_ms: Time [ms], modulo 2**30 or more.
-        """
+        """What to answer to a datagram from an address, or None, at a time [ms] modulo 2**30."""
         if len(datagram) != ASK_SIZE:
             return None
         ask = datagram[:-TAG_SIZE]

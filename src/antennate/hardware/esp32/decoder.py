@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 from binascii import crc32
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 from antennate.hardware.esp32 import frame
 from antennate.hardware.esp32.wire import Frame, Refused, parse
@@ -31,46 +31,33 @@ class Counters:
     Attributes:
         received: Bytes fed.
         delimiters: Zero bytes.
+        judged: Bytes of all pieces below.
         good: Frames delivered.
-        good_bytes: Bytes of them.
         refused: Intact frames of an unknown version, kind, length or range.
-        refused_bytes: Bytes of them.
         crc_errors: Pieces of COBS with a wrong CRC.
-        crc_bytes: Bytes of them.
         cobs_errors: Pieces that are not COBS.
-        cobs_bytes: Bytes of them.
         oversize: Pieces longer than any frame.
-        oversize_bytes: Bytes of them.
         noise: Pieces shorter than any frame.
-        noise_bytes: Bytes of them.
         text: Pieces that are printable text only.
-        text_bytes: Bytes of them.
-        text_lost: Printable bytes that found no room; not part of the sum.
+        text_lost: Printable bytes that found no room.
     """
 
     received: int = 0
     delimiters: int = 0
+    judged: int = 0
     good: int = 0
-    good_bytes: int = 0
     refused: int = 0
-    refused_bytes: int = 0
     crc_errors: int = 0
-    crc_bytes: int = 0
     cobs_errors: int = 0
-    cobs_bytes: int = 0
     oversize: int = 0
-    oversize_bytes: int = 0
     noise: int = 0
-    noise_bytes: int = 0
     text: int = 0
-    text_bytes: int = 0
     text_lost: int = 0
 
     @property
     def accounted(self) -> int:
-        """Bytes whose fate is known."""
-        of_pieces = (getattr(self, each.name) for each in fields(self) if "_bytes" in each.name)
-        return self.delimiters + sum(of_pieces)
+        """Bytes of which is known what became of them."""
+        return self.delimiters + self.judged
 
 
 class FrameDecoder:
@@ -104,9 +91,8 @@ class FrameDecoder:
             self._held += data[at:end]
             at = end + 1
             self.counters.delimiters += 1
-            found = self._close()
-            if found is not None:
-                frames.append(found)
+            if (whole := self._close()) is not None:
+                frames.append(whole)
         return frames
 
     def take_text(self) -> str:
@@ -121,52 +107,40 @@ class FrameDecoder:
     def _spill(self) -> None:
         """Give up bytes that cannot be a frame any more, except text."""
         self._keep_text(self._held)
-        self.counters.oversize_bytes += len(self._held)
+        self.counters.judged += len(self._held)
         self._held = bytearray()
         self._spilled = True
 
     def _close(self) -> Frame | None:
         """Judge what lies between two delimiters."""
-        chunk = bytes(self._held)
+        chunk, counters = bytes(self._held), self.counters
         self._held = bytearray()
+        counters.judged += len(chunk)
         if self._spilled:
             self._spilled = False
-            self.counters.oversize += 1
-            self.counters.oversize_bytes += len(chunk)
+            counters.oversize += 1
             self._keep_text(chunk)
-            return None
-        if not chunk:
             return None
         content = frame.unstuff(chunk) if len(chunk) >= SHORTEST else None
         if content is not None and _intact(content):
-            return self._deliver(parse(content[: -frame.CRC_SIZE]), len(chunk))
-        self._reject(chunk, cobs=content is not None)
+            parsed = parse(content[: -frame.CRC_SIZE])
+            counters.refused += isinstance(parsed, Refused)
+            counters.good += not isinstance(parsed, Refused)
+            return parsed
+        if chunk:
+            self._reject(chunk, cobs=content is not None)
         return None
 
-    def _deliver(self, found: Frame, size: int) -> Frame:
-        if isinstance(found, Refused):
-            self.counters.refused += 1
-            self.counters.refused_bytes += size
-        else:
-            self.counters.good += 1
-            self.counters.good_bytes += size
-        return found
-
     def _reject(self, chunk: bytes, cobs: bool) -> None:
-        counters, size = self.counters, len(chunk)
         self._keep_text(chunk)
         if _TEXT.fullmatch(chunk):
-            counters.text += 1
-            counters.text_bytes += size
-        elif size < SHORTEST:
-            counters.noise += 1
-            counters.noise_bytes += size
+            self.counters.text += 1
+        elif len(chunk) < SHORTEST:
+            self.counters.noise += 1
         elif cobs:
-            counters.crc_errors += 1
-            counters.crc_bytes += size
+            self.counters.crc_errors += 1
         else:
-            counters.cobs_errors += 1
-            counters.cobs_bytes += size
+            self.counters.cobs_errors += 1
 
     def _keep_text(self, chunk: bytes | bytearray) -> None:
         for run in _TEXT.findall(chunk):

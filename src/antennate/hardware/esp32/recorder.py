@@ -34,9 +34,8 @@ class Recorder:
     """Rows of one recording.
 
     Args:
-        board: The board.
+        board: The board; `now` is monotonic time [s].
         params: What to record.
-        now: Monotonic time [s].
         ask: Asks for a mark or a push.
         write: Takes each line of the file, without its line break.
         on_reading: Called with every reading, recorded or not.
@@ -128,14 +127,14 @@ class Recorder:
 
     def _readings(self) -> Iterator[tuple[Timed, float]]:
         """All readings from now on, each with its time since the first of all [s]."""
-        heard = self._now()
+        newest = self._now()
         while True:
             for reading in self._board.wait(_PATIENCE, self._now):
-                heard = reading.arrived
+                newest = reading.arrived
                 self._last = (reading, self._time(reading))
                 self._on_reading(reading)
                 yield self._last
-            if self._now() - heard > SILENCE:
+            if self._now() - newest > SILENCE:
                 raise BadInputError(self._silent())
 
     def _time(self, reading: Timed) -> float:
@@ -148,11 +147,8 @@ class Recorder:
 
     def _silent(self) -> str:
         came = self._board.decoder.counters
-        why = (
-            self._board.refusals[-1]
-            if self._board.refusals
-            else f"{came.received} bytes and {came.good} frames in all"
-        )
+        why = f"{came.received} bytes and {came.good} frames in all"
+        why = self._board.refusals[-1] if self._board.refusals else why
         return (
             f"--esp32: expected readings of an antenna board, found none for {SILENCE:g} s "
             f"({why}); run `antennate doctor --esp32 PORT`"

@@ -15,13 +15,14 @@ import numpy as np
 
 from antennate.dataframe import from_columns
 from antennate.errors import BadInputError
-from antennate.files import open_regular
+from antennate.files import read_limited
 from antennate.hardware.esp32.decoder import Counters, FrameDecoder
 from antennate.hardware.esp32.frame import FLAG_LEFT_RAIL, FLAG_RIGHT_RAIL
-from antennate.hardware.esp32.wire import Hello, Refused, Sample
+from antennate.hardware.esp32.wire import Hello, Sample
 from antennate.types import Bools, Floats, Ints
 
-_CHUNK = 1 << 20
+_LARGEST = 1 << 30
+"""Bytes of a recording that is read: four days at 100 Hz."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,14 +91,14 @@ def read_esp32(source: str | Path | bytes) -> Esp32Recording:
         BadInputError: The file cannot be read, or there is no usable sample in it.
     """
     decoder, hellos, samples, refused = FrameDecoder(), {}, {}, ""
-    for chunk in _chunks(source):
-        for frame in decoder.feed(chunk):
-            if isinstance(frame, Hello):
-                hellos.setdefault(frame.boot_id, frame)
-            elif isinstance(frame, Sample):
-                samples.setdefault(frame.boot_id, []).append(frame)
-            elif isinstance(frame, Refused):
-                refused = frame.reason
+    data = source if isinstance(source, bytes) else read_limited(Path(source), _LARGEST)
+    for frame in decoder.feed(data):
+        if isinstance(frame, Hello):
+            hellos.setdefault(frame.boot_id, frame)
+        elif isinstance(frame, Sample):
+            samples.setdefault(frame.boot_id, []).append(frame)
+        else:
+            refused = frame.reason
     known = [boot for boot in samples if boot in hellos]
     if not known:
         raise BadInputError(_empty(source, decoder.counters, len(hellos), len(samples), refused))
@@ -114,20 +115,6 @@ def read_esp32(source: str | Path | bytes) -> Esp32Recording:
         unknown_boot=sum(len(samples[boot]) for boot in samples if boot not in hellos),
         unordered=sum(part[4] for part in parts),
     )
-
-
-def _chunks(source: str | Path | bytes) -> list[bytes]:
-    if isinstance(source, bytes | bytearray):
-        return [bytes(source)]
-    try:
-        with open_regular(Path(source)) as file:
-            return list(iter(lambda: file.read(_CHUNK), b""))
-    except OSError as error:
-        raise BadInputError(
-            f"{source}: expected a readable file of ESP32 frames: {error.strerror or error}"
-        ) from None
-    except ValueError as error:  # a path with a zero byte
-        raise BadInputError(f"expected the path of a file, found {source!r}: {error}") from None
 
 
 def _boot_arrays(samples: list[Sample], hello: Hello) -> tuple[Floats, Ints, Floats, Ints, int]:
@@ -156,7 +143,7 @@ def _boot_arrays(samples: list[Sample], hello: Hello) -> tuple[Floats, Ints, Flo
 def _empty(
     source: str | Path | bytes, counters: Counters, hellos: int, boots: int, refused: str
 ) -> str:
-    where = f"{len(source)} bytes" if isinstance(source, bytes | bytearray) else str(source)
+    where = f"{len(source)} bytes" if isinstance(source, bytes) else str(source)
     if boots and not hellos:
         why = f"{counters.good} samples but no HELLO, which says how the board counts time"
     elif boots:
@@ -164,6 +151,5 @@ def _empty(
     else:
         damaged = counters.crc_errors + counters.cobs_errors
         why = f"{counters.received} bytes with {counters.good} good and {damaged} damaged frames"
-    return f"{where}: expected samples of an antenna board, found {why}" + (
-        f" ({refused})" if refused else ""
-    )
+    why += f" ({refused})" if refused else ""
+    return f"{where}: expected samples of an antenna board, found {why}"

@@ -12,8 +12,7 @@ from dataclasses import dataclass
 from antennate.hardware.esp32 import datagram, frame
 from antennate.params.network import NetworkParams
 
-_COUNTS = datagram.COUNTS_SIZE
-_TAG = datagram.TAG_SIZE
+_COUNTS, _TAG = datagram.COUNTS_SIZE, datagram.TAG_SIZE
 _GREETING_SIZE = frame.HELLO_FRAME_SIZE + _COUNTS + _TAG
 _FRAME_SIZE = frame.SAMPLE_FRAME_SIZE + _TAG
 _NUMBERS = 1 << 32
@@ -22,12 +21,7 @@ _OPEN_ASKS = 16
 
 
 class Bucket:
-    """Allows so many events a second, and some more at once.
-
-    Args:
-        rate: Events allowed [1/s].
-        depth: Most events at once.
-    """
+    """Allows so many events a second [1/s], and at most `depth` at once."""
 
     def __init__(self, rate: float, depth: int) -> None:
         self._rate, self._depth = rate, depth
@@ -35,8 +29,7 @@ class Bucket:
 
     def take(self, now: float) -> bool:
         """Whether one more is allowed at time now [s]; it is counted then."""
-        elapsed = max(now - self._t, 0.0)
-        self._level = min(self._depth, self._level + self._rate * elapsed)
+        self._level = min(self._depth, self._level + self._rate * max(now - self._t, 0.0))
         self._t = max(now, self._t)
         if self._level < 1.0:
             return False
@@ -72,9 +65,6 @@ class Verifier:
         key: The board's.
         nonce: Random bytes of this connection, never used before.
         params: Rates.
-
-    Attributes:
-        tally: What became of every datagram.
     """
 
     def __init__(self, key: bytes, nonce: bytes, params: NetworkParams) -> None:
@@ -106,27 +96,20 @@ class Verifier:
         )
 
     def take(self, data: bytes, now: float) -> tuple[bytes, bool]:
-        """Judge a datagram.
+        """The frame in a datagram, empty if it is not to be used; and whether to ask anew at once.
 
-        Args:
-            data: All of it.
-            now: Time [s].
-
-        Returns:
-            The frame in it, empty if it is not to be used, and whether to ask again at once.
+        `now` is the time at which it came [s].
         """
         self.tally.received += 1
         content, tag = data[:-_TAG], data[-_TAG:]
-        if len(data) == _FRAME_SIZE:
-            expected = self._signer.tag(datagram.FRAME, self._nonce, content)
-            if hmac.compare_digest(expected, tag):
-                return self._frame(content, now), False
-        elif len(data) == _GREETING_SIZE:
-            expected = self._signer.tag(datagram.GREETING, self._nonce, content)
-            if hmac.compare_digest(expected, tag):
-                return self._greeting(content)
-        self.tally.forged += 1
-        return b"", False
+        kind = {_FRAME_SIZE: datagram.FRAME, _GREETING_SIZE: datagram.GREETING}.get(len(data))
+        expected = b"" if kind is None else self._signer.tag(kind, self._nonce, content)
+        if not hmac.compare_digest(expected, tag):
+            self.tally.forged += 1
+            return b"", False
+        if kind == datagram.FRAME:
+            return self._frame(content, now), False
+        return self._greeting(content)
 
     def _greeting(self, content: bytes) -> tuple[bytes, bool]:
         """Answers are taken in the order of the asks, so that no earlier boot comes back."""
@@ -141,8 +124,7 @@ class Verifier:
         if body is None or len(body) != frame.HELLO_SIZE + frame.CRC_SIZE:
             return hello, False  # the decoder says why not
         boot = struct.unpack(frame.HELLO_LAYOUT, body[: frame.HELLO_SIZE])[2]
-        first = boot != self._boot
-        if first:
+        if first := boot != self._boot:
             self._boot, self._seq = boot, None
         return hello, first
 

@@ -32,7 +32,6 @@ class Hello:
     Attributes:
         boot_id: Random number of this boot.
         firmware: Version: major, minor, patch.
-        reset: Why the board started.
         config_hash: `frame.config_hash` of its settings.
         device_id: The chip's serial number in hexadecimal.
         tick_bits: Ticks count modulo 2**tick_bits.
@@ -56,8 +55,7 @@ class Sample:
         boot_id: Boot it belongs to.
         seq: Number since boot, modulo 2**32.
         ticks: The board's time [us], modulo what HELLO declared.
-        left: Left reading [counts].
-        right: Right reading [counts].
+        left: Left reading [counts]; so `right`.
         flags: Sum of `frame.FLAG_` values.
         drops: Samples the board could not send since boot, modulo 2**16.
     """
@@ -127,28 +125,22 @@ def _sample(body: bytes | bytearray) -> Sample | Refused:
 def objections(hello: Hello, config_hash: int | None = None) -> tuple[str, ...]:
     """Reasons not to arm with this board, each with what was expected and found; none is good.
 
-    Args:
-        hello: The board's greeting.
-        config_hash: The settings wanted, or None to take any.
+    Its settings have to be those of `config_hash`, if that is given.
     """
-    found = []
+    reasons: list[str] = []
     if hello.firmware < frame.FIRMWARE:
         has, needs = (".".join(map(str, v)) for v in (hello.firmware, frame.FIRMWARE))
-        found.append(f"the board runs firmware {has}, this host needs {needs} or newer")
+        reasons.append(f"the board runs firmware {has}, this host needs {needs} or newer")
     if config_hash is not None and hello.config_hash != config_hash:
-        found.append(
+        reasons.append(
             f"the board's settings have hash {hello.config_hash:08x}, expected {config_hash:08x}: "
             "deploy firmware/config.py again"
         )
-    return tuple(found)
+    return tuple(reasons)
 
 
 def require_sensor(hello: Hello | None, sensor_id: str | None) -> None:
     """Refuse a board to which the calibrated sensor is not soldered, where its id names a board.
-
-    Args:
-        hello: What the board has said of itself.
-        sensor_id: That of the calibration.
 
     Raises:
         CalibrationError: Says both serial numbers.

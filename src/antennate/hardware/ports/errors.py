@@ -16,28 +16,19 @@ _NAMES = Path("/dev/serial/by-id")
 
 
 class OpenError(PortError):
-    """A port did not open.
-
-    Attributes:
-        found: What was found.
-        cure: What to do.
-    """
+    """A port did not open: what was found, and what to do."""
 
     def __init__(self, flag: str, path: str, found: str, cure: str) -> None:
         where = f"{flag}: " if flag else ""
         super().__init__(f"{where}expected a serial port that opens, found {path}: {found}; {cure}")
-        self.found = found
-        self.cure = cure
+        self.found, self.cure = found, cure
 
 
 def explain(flag: str, path: str, baud: int, error: Exception) -> OpenError:
-    """The error to raise when a port did not open.
+    """The error to raise when a port did not open at so many bits per second.
 
-    Args:
-        flag: The flag that named it, "--esp32" or "--bus"; empty if none did.
-        path: Its device file.
-        baud: Bits per second asked for.
-        error: What the system or pyserial said.
+    `flag` is the one that named it, "--esp32" or "--bus", or empty; `error` is what the system or
+    pyserial said.
     """
     return OpenError(flag, path, *_why(path, baud, error))
 

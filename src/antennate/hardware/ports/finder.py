@@ -6,7 +6,7 @@ from collections.abc import Callable
 from urllib.parse import urlsplit
 
 from antennate.errors import BadInputError, ConfigError
-from antennate.hardware.ports.reconnecting import Line
+from antennate.hardware.ports.port import Line
 from antennate.params.network import NetworkParams
 
 
@@ -22,7 +22,7 @@ def finder(
     Args:
         address: Path of a serial line, tcp://HOST:PORT or udp://HOST:PORT.
         baud: Bits per second of a serial line.
-        flag: The flag that named it, for errors.
+        flag: What named it, for errors.
         key: Of the board behind udp://; empty for one without a key.
         network: Pace and limits of udp://.
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+from collections.abc import Iterator
 from typing import Protocol
 
 from antennate.errors import AntennateError
@@ -24,4 +26,24 @@ class Port(Protocol):
 
     def drain(self) -> int:
         """Throw away what has come; how many bytes that was."""
+        count = 0
+        while part := self.read(4096, 0.0):
+            count += len(part)
+        return count
+
+
+class Line(Port, Protocol):
+    """A port that can be closed."""
+
+    def close(self) -> None:
+        """Let it go."""
         ...
+
+
+@contextlib.contextmanager
+def port_errors(what: str, *kinds: type[Exception]) -> Iterator[None]:
+    """Raise a PortError, which says what could not be done, for exceptions of these kinds."""
+    try:
+        yield
+    except kinds as error:
+        raise PortError(f"could not {what}: {error}") from error

@@ -7,9 +7,9 @@ import threading
 import time
 from collections.abc import Callable
 from queue import Empty, SimpleQueue
-from typing import Protocol
+from typing import TypeVar
 
-from antennate.hardware.ports.port import Port, PortError
+from antennate.hardware.ports.port import Line, Port, PortError
 
 RETRY = 0.2
 """Time between two looks for a port that is gone [s]; short beside the handling of a plug
@@ -18,12 +18,7 @@ _FAREWELL = 1.0
 """Longest that closing waits for a look that is under way [s]; one takes a tenth (assumed)."""
 
 
-class Line(Port, Protocol):
-    """A port that can be closed."""
-
-    def close(self) -> None:
-        """Let it go."""
-        ...
+_Result = TypeVar("_Result")
 
 
 def in_background(work: Callable[[], None]) -> threading.Thread:
@@ -33,22 +28,16 @@ def in_background(work: Callable[[], None]) -> threading.Thread:
     return thread
 
 
-class Reconnecting:
+class Reconnecting(Port):
     """A port that is opened again after it was lost; for one thread.
 
-    While it is gone each call raises PortError at once. Opening and closing may take long, so they
-    happen in the background.
+    While it is gone each call raises PortError at once, and so does the constructor if it cannot be
+    opened the first time. Opening and closing may take long, so they happen in the background.
 
     Args:
         find: Finds and opens it.
         clock: Monotonic time [s].
         start: Does work in the background.
-
-    Attributes:
-        losses: How often it was lost.
-
-    Raises:
-        PortError: If it cannot be opened the first time.
     """
 
     def __init__(
@@ -66,36 +55,28 @@ class Reconnecting:
         self._thread: threading.Thread | None = None
         self._due = 0.0
         self._why = ""
-        self.losses = 0
-
-    @property
-    def gone(self) -> bool:
-        """It was lost and is not back."""
-        return self._line is None
 
     def write(self, data: bytes) -> None:
         """Send all of it."""
-        line = self._there()
-        try:
-            line.write(data)
-        except PortError as error:
-            raise self._lose(error) from None
+        self._use(lambda line: line.write(data))
 
     def read(self, most: int, timeout: float) -> bytes:
         """What has come, empty if nothing comes within `timeout` [s]."""
-        line = self._there()
-        try:
-            return line.read(most, timeout)
-        except PortError as error:
-            raise self._lose(error) from None
+        return self._use(lambda line: line.read(most, timeout))
 
     def drain(self) -> int:
         """Throw away what has come; how many bytes that was."""
+        return self._use(lambda line: line.drain())
+
+    def _use(self, action: Callable[[Line], _Result]) -> _Result:
         line = self._there()
         try:
-            return line.drain()
+            return action(line)
         except PortError as error:
-            raise self._lose(error) from None
+            self._old, self._line = line, None
+            self._due = self._clock() + RETRY
+            self._why = str(error)
+            raise
 
     def close(self) -> None:
         """Let it go for good; a look that lasts longer lets go of what it finds by itself."""
@@ -149,13 +130,6 @@ class Reconnecting:
                 self._why = str(found)
             else:
                 self._line = found
-
-    def _lose(self, error: PortError) -> PortError:
-        self.losses += 1
-        self._old, self._line = self._line, None
-        self._due = self._clock() + RETRY
-        self._why = str(error)
-        return error
 
 
 def _close(line: Line | None) -> None:

@@ -14,13 +14,9 @@ from antennate.hardware.ports.serial_port import SerialPort
 
 @dataclass(frozen=True, slots=True)
 class Identity:
-    """What a USB adapter says of itself.
+    """What a USB adapter says of itself: vendor, product, serial number if it has one of its own.
 
-    Attributes:
-        vid: Vendor.
-        pid: Product.
-        serial_number: Of the adapter; empty if it has none of its own.
-        location: Socket it hangs on, with the interface of an adapter that has several.
+    The location is the socket it hangs on, with the interface of an adapter that has several.
     """
 
     vid: int
@@ -34,12 +30,7 @@ class SerialFinder:
 
     The adapter behind it is remembered at the first opening: by its serial number, and by its
     socket where it has none or two share one. What is no USB adapter, such as a pseudo-terminal, is
-    opened by its path, and a link is followed anew each time.
-
-    Args:
-        path: Its device file, or a link to it.
-        baud: Bits per second.
-        flag: The flag that named it, for errors.
+    opened by its path, and a link is followed anew each time. `flag` named it, for errors.
     """
 
     def __init__(self, path: str, baud: int, flag: str = "") -> None:

@@ -19,22 +19,19 @@ reset the board; wanting both on changes nothing more. Both on it is, said befor
 from __future__ import annotations
 
 import termios
-from collections.abc import Generator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager
 
 import serial
 
 from antennate.hardware.ports.errors import explain
-from antennate.hardware.ports.port import PortError
+from antennate.hardware.ports.port import Port, PortError, port_errors
+
+_FAILURES = (OSError, TypeError, ValueError, termios.error)
+"""What pyserial raises; it lets some through as they are."""
 
 
-class SerialPort:
-    """A serial line.
-
-    Args:
-        path: Its device file.
-        baud: Bits per second.
-        flag: The flag that named it, for errors.
+class SerialPort(Port):
+    """A serial line, by its device file and bits per second; `flag` named it, for errors.
 
     Raises:
         PortError: If it cannot be opened, or another program holds it; with the cure.
@@ -48,7 +45,7 @@ class SerialPort:
             line.port = path
             line.open()
             self._line = line
-        except (OSError, TypeError, ValueError, termios.error) as error:
+        except _FAILURES as error:
             raise explain(flag, path, baud, error) from error
 
     def write(self, data: bytes) -> None:
@@ -68,23 +65,10 @@ class SerialPort:
             self._line.timeout = 0
             return first + self._line.read(most - 1)
 
-    def drain(self) -> int:
-        """Throw away what has come; how many bytes that was."""
-        with self._mapped("read from"):
-            self._line.timeout = 0
-            count = 0
-            while part := self._line.read(4096):
-                count += len(part)
-            return count
-
     def close(self) -> None:
         """Let it go."""
         with self._mapped("close"):
             self._line.close()
 
-    @contextmanager
-    def _mapped(self, what: str) -> Generator[None]:
-        try:
-            yield
-        except (OSError, TypeError, ValueError, termios.error) as error:
-            raise PortError(f"could not {what} {self._path}: {error}") from error
+    def _mapped(self, what: str) -> AbstractContextManager[None]:
+        return port_errors(f"{what} {self._path}", *_FAILURES)

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import select
 import socket
-from collections.abc import Generator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager
 
-from antennate.hardware.ports.port import PortError
+from antennate.hardware.ports.port import Port, PortError, port_errors
 
 _OPENING_TIME = 3.0
 """Longest wait for a connection [s]: a lost packet of the handshake is sent again after 1 and 3
@@ -16,12 +15,8 @@ _WRITING_TIME = 0.1
 """Longest wait until all is sent [s], as of a serial line: 1 kB at 115 200 bit/s (assumed)."""
 
 
-class TcpPort:
+class TcpPort(Port):
     """A connection without delays of its own (TCP_NODELAY).
-
-    Args:
-        host: Where to, a name or an address.
-        port: Its TCP port.
 
     Raises:
         PortError: Nobody listens there.
@@ -48,20 +43,9 @@ class TcpPort:
                 return data
         raise PortError(f"{self._where}: the other end has closed, or serves another client")
 
-    def drain(self) -> int:
-        """Throw away what has come; how many bytes that was."""
-        count = 0
-        while part := self.read(4096, 0.0):
-            count += len(part)
-        return count
-
     def close(self) -> None:
         """Let it go."""
         self._line.close()
 
-    @contextmanager
-    def _mapped(self, what: str) -> Generator[None]:
-        try:
-            yield
-        except (OSError, ValueError) as error:
-            raise PortError(f"could not {what} {self._where}: {error}") from error
+    def _mapped(self, what: str) -> AbstractContextManager[None]:
+        return port_errors(f"{what} {self._where}", OSError, ValueError)

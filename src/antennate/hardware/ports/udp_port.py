@@ -9,8 +9,8 @@ import socket
 import time
 from collections.abc import Callable
 
-from antennate.hardware.esp32.verifier import Bucket, Tally, Verifier
-from antennate.hardware.ports.port import PortError
+from antennate.hardware.esp32.verifier import Bucket, Verifier
+from antennate.hardware.ports.port import Port, PortError
 from antennate.params.network import NetworkParams
 
 _LONGEST = 256
@@ -19,7 +19,7 @@ _ABSENT = {errno.ECONNREFUSED, errno.EHOSTUNREACH, errno.ENETUNREACH, errno.ENET
 """What sending says while the board or the network is away; it may come back."""
 
 
-class UdpPort:
+class UdpPort(Port):
     """The frames of one board. Other senders are not even heard.
 
     Args:
@@ -28,9 +28,6 @@ class UdpPort:
         key: The board's key; empty for a board without one, which anybody can feign.
         params: Pace and limits.
         clock: Time that never steps [s].
-
-    Attributes:
-        tally: What became of every datagram.
 
     Raises:
         PortError: The host is not known.
@@ -48,6 +45,7 @@ class UdpPort:
         self._where = f"udp://{host}:{port}"
         self._clock = clock
         self._verifier = Verifier(key, os.urandom(16), params)
+        self.tally = self._verifier.tally
         self._looks = Bucket(params.look_rate, params.look_burst)
         self._held = b""
         try:
@@ -57,11 +55,6 @@ class UdpPort:
             self._socket.connect(address)  # binds one address, and hears this sender alone
         except OSError as error:
             raise PortError(f"could not open {self._where}: {error}") from error
-
-    @property
-    def tally(self) -> Tally:
-        """What became of every datagram."""
-        return self._verifier.tally
 
     def write(self, data: bytes) -> None:
         """Ask the board anew; it listens to nothing else, so the bytes themselves are not sent."""
@@ -80,14 +73,6 @@ class UdpPort:
                 came, self._held = self._held[:most], self._held[most:]
                 return came
             select.select([self._socket], [], [], min(end - now, 0.05))
-
-    def drain(self) -> int:
-        """Throw away what has come; how many bytes that was."""
-        count = len(self._held)
-        self._held = b""
-        while part := self._look(self._clock()):
-            count += len(part)
-        return count
 
     def close(self) -> None:
         """Let it go; the board falls silent by itself."""

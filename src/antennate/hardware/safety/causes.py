@@ -78,40 +78,15 @@ class Cause(Enum):
         return self.value[1]
 
 
-DATA = frozenset(
-    {
-        Cause.STALE,
-        Cause.REBOOT,
-        Cause.LOST,
-        Cause.STUCK,
-        Cause.OPEN,
-        Cause.SHORT_LO,
-        Cause.SHORT_HI,
-    }
-)
+OF_FINDING = {f: Cause[f.name] for f in Finding if f is not Finding.OK}
+DATA = frozenset({Cause.STALE, Cause.REBOOT}) | {c for f, c in OF_FINDING.items() if not f.usable}
 """Losses of data: they end after enough fresh valid samples in a row."""
-OF_MIND = frozenset(
-    {
-        Cause.FAILED,
-        Cause.UNDECIDED,
-        Cause.BAD_ACTION,
-        Cause.BAD_POSE,
-        Cause.UNKNOWN_CONTACT,
-    }
+OF_CONTROLLER = frozenset(
+    {Cause.FAILED, Cause.UNDECIDED, Cause.BAD_ACTION, Cause.BAD_POSE, Cause.UNKNOWN_CONTACT}
 )
 """Causes in the controller: they end as soon as it decides well again."""
 CURED_BY_ARMING = frozenset({Cause.UNKNOWN_CONTACT, Cause.WATCHDOG, Cause.DISARMED})
 """Causes that do not stand against an arm event."""
-OF_FINDING = {
-    Finding.OUT_OF_CAL: Cause.OUT_OF_CAL,
-    Finding.SPIKY: Cause.SPIKY,
-    Finding.SATURATED: Cause.SATURATED,
-    Finding.LOST: Cause.LOST,
-    Finding.STUCK: Cause.STUCK,
-    Finding.OPEN: Cause.OPEN,
-    Finding.SHORT_LO: Cause.SHORT_LO,
-    Finding.SHORT_HI: Cause.SHORT_HI,
-}
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,8 +96,8 @@ class Inputs:
     Attributes:
         age: Age of the newest valid sample [s]; inf if there is none.
         valid: Valid samples that arrived since the tick before, without those that were too old.
-        refused: Samples that arrived since then and were not valid.
-        findings: State of the left and the right channel.
+        refused: Samples since then that were not valid.
+        findings: Of the left and the right channel.
         decided_at: Time at which the controller finished its newest decision [s].
         maneuver: That decision.
         contact: What it rests on, left and right.
@@ -142,7 +117,7 @@ class Inputs:
         unrecorded: Whether a record that is required is not kept.
         stop: Whether the operator wants the torque off.
         released: Whether the key that lets the robot walk is not held.
-        arm: Whether the operator wants it on; only the change to True in FAULT or OFF counts.
+        arm: Whether he wants it on; only the change to True in FAULT or OFF counts.
     """
 
     age: float
@@ -176,7 +151,6 @@ class Active:
     """A cause in force.
 
     Attributes:
-        cause: Which.
         since: When it began [s].
         detail: Side, ids or reason; may be empty.
         present: Whether it is still there; if not, it is latched or waits for fresh samples.
@@ -199,9 +173,7 @@ class Outputs:
     """What the tick may do.
 
     Attributes:
-        state: Where on the ladder the robot is.
         move: Whether the command just decided may be sent; if not, the last one sent stays.
-        torque: Whether torque is on.
         arming: True in the one tick of an accepted arm event: clear the watchdogs, set all goals to
             the present positions, then switch the torque on.
         feed_watchdog: Whether the watchdogs of the servos may be fed: only upon a decision taken in

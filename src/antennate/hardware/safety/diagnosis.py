@@ -84,14 +84,9 @@ _USABLE = {Finding.OK, Finding.OUT_OF_CAL, Finding.SPIKY, Finding.SATURATED}
 
 @dataclass(frozen=True, slots=True)
 class Band:
-    """Calibrated range of a channel.
+    """Calibrated range of a channel [counts]; polarity is 1 if readings rise with flex, else -1.
 
-    Attributes:
-        low: Lowest calibrated reading [counts].
-        high: Highest calibrated reading [counts].
-        polarity: +1 if readings rise with the bend, -1 if they fall.
-        reach: Distance beyond the bent end up to which a reading is believed [spans]; BEYOND, as
-            at the straight end, if None.
+    Readings are believed up to BEYOND outside it, to the bent side up to `reach` if given [spans].
     """
 
     low: float
@@ -107,9 +102,19 @@ class Band:
 
     def believes(self, counts: float) -> bool:
         """Whether a flex sensor can give a reading [counts], as far as is known."""
-        span, reach = self.high - self.low, BEYOND if self.reach is None else self.reach
+        reach = BEYOND if self.reach is None else self.reach
         below, above = (reach, BEYOND) if self.polarity < 0 else (BEYOND, reach)
-        return self.low - below * span <= counts <= self.high + above * span
+        return self.low - below * self.span <= counts <= self.high + above * self.span
+
+    @property
+    def span(self) -> float:
+        """From lowest to highest [counts]."""
+        return self.high - self.low
+
+    def level(self, counts: float) -> float:
+        """Change from the straight end on, in spans; negative is the wrong way."""
+        straight = self.low if self.polarity > 0 else self.high
+        return self.polarity * (counts - straight) / self.span
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,7 +123,6 @@ class Reading:
 
     Attributes:
         counts: Reading to use [counts]; NaN where nothing can be said.
-        finding: State of the channel.
         taken: Reading as it came [counts]; NaN if it is beyond what a flex sensor can give.
     """
 
@@ -131,10 +135,7 @@ _NOTHING = Reading(math.nan, Finding.LOST)
 
 
 class ChannelDiagnosis:
-    """Judges the readings of one antenna.
-
-    Args:
-        band: The channel's calibrated range.
+    """Judges the readings of one antenna by its calibrated range.
 
     Attributes:
         reading: The newest result; LOST before the first.
@@ -154,7 +155,6 @@ class ChannelDiagnosis:
                 f"to {band.high:g}; choose another divider resistor"
             )
         self._band = band
-        self._span = band.high - band.low
         self.counted = dict.fromkeys(Finding, 0)
         self.bad = 0
         self.outside = 0
@@ -172,7 +172,6 @@ class ChannelDiagnosis:
         self._bad_run = LONGEST_HOLD + 1
         self._doubted: list[float] = []
         self._equal = 0
-        self._share_bad = 0
 
     def step(self, t: float, counts: float) -> Reading:
         """Take a reading.
@@ -205,7 +204,7 @@ class ChannelDiagnosis:
         return self._band.believes(counts)
 
     def _near(self, one: float, other: float) -> bool:
-        return abs(one - other) <= JUMP * self._span
+        return abs(one - other) <= JUMP * self._band.span
 
     def _believe(self, counts: float) -> None:
         """Accept a reading as the good one, or count it as bad."""
@@ -224,15 +223,11 @@ class ChannelDiagnosis:
         self._count(good, counts)
 
     def _count(self, good: bool, counts: float) -> None:
-        margin = MARGIN
-        outside = not self._band.low - margin <= counts <= self._band.high + margin
+        outside = not self._band.low - MARGIN <= counts <= self._band.high + MARGIN
         self._outside.append(good and outside)
         self.outside += good and outside
         self.bad += not good
-        if len(self._share) == self._share.maxlen:
-            self._share_bad -= self._share[0]
         self._share.append(not good)
-        self._share_bad += not good
         self._bad.append(not good and not math.isnan(counts))
 
     def _find(self) -> Finding:
@@ -241,9 +236,9 @@ class ChannelDiagnosis:
             return broken
         if self._bad_run > LONGEST_HOLD:
             return Finding.LOST
-        if self._at_bent_rail() >= SATURATED:
+        if self._at_rail(low=self._band.polarity < 0) >= SATURATED:
             return Finding.SATURATED
-        if self._share_bad > SHARE * SHARE_WINDOW:
+        if sum(self._share) > SHARE * SHARE_WINDOW:
             return Finding.SPIKY
         return Finding.OUT_OF_CAL if any(self._outside) else Finding.OK
 
@@ -261,9 +256,7 @@ class ChannelDiagnosis:
 
     def _at_both_rails(self) -> bool:
         """Whether the window has two readings or more at either rail, which no flex sensor can."""
-        low = sum(counts <= LOW_RAIL for counts in self._raw)
-        high = sum(counts >= HIGH_RAIL for counts in self._raw)
-        return min(low, high) >= 2
+        return min(self._at_rail(low=True), self._at_rail(low=False)) >= 2
 
     def _pinned(self, low: bool) -> bool:
         """Whether the whole window is at one rail; that of a bent sensor there has noise."""
@@ -275,7 +268,6 @@ class ChannelDiagnosis:
         bound = FULL_SCALE if bent else HIGH_RAIL
         return all(counts >= bound for counts in self._raw)
 
-    def _at_bent_rail(self) -> int:
-        if self._band.polarity > 0:
-            return sum(counts >= HIGH_RAIL for counts in self._raw)
-        return sum(counts <= LOW_RAIL for counts in self._raw)
+    def _at_rail(self, low: bool) -> int:
+        """Readings of the window there."""
+        return sum(counts <= LOW_RAIL if low else counts >= HIGH_RAIL for counts in self._raw)

@@ -18,21 +18,15 @@ _LONGEST = 0.1
 
 
 class Drift:
-    """Follows one antenna.
-
-    Args:
-        params: How fast, and when it is too much.
-        band: The calibrated range, whose straight end is at rest.
+    """Follows one antenna, which is at rest at the straight end of its calibrated range.
 
     Attributes:
-        share: Drift in spans, positive towards the bend.
+        share: Drift in spans, positive towards the bent end.
         beyond: Whether it is more than the band allows.
     """
 
     def __init__(self, params: DriftParams, band: Band) -> None:
-        self._params = params
-        self._straight = band.low if band.polarity > 0 else band.high
-        self._scale = band.polarity / (band.high - band.low)
+        self._params, self._band = params, band
         self._down = params.speed * (1.0 - params.quantile) / params.quantile
         self._t = math.nan
         self.share = 0.0
@@ -51,7 +45,7 @@ class Drift:
         if not elapsed > 0.0 or not free or not math.isfinite(counts):
             return
         elapsed = min(elapsed, _LONGEST)
-        bend = self._scale * (counts - self._straight)
-        self.share += elapsed * (self._params.speed if bend > self.share else -self._down)
+        rises = self._band.level(counts) > self.share
+        self.share += elapsed * (self._params.speed if rises else -self._down)
         bound = self._params.band - (self._params.rise if self.beyond else 0.0)
         self.beyond = abs(self.share) > bound

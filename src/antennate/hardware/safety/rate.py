@@ -16,7 +16,6 @@ class RateMeter:
 
     Attributes:
         rate: Samples per second over the window [Hz], NaN while it fills.
-        wrong: Whether the rate has been wrong for the whole window.
     """
 
     def __init__(self, expected: float, error: float, window: float) -> None:

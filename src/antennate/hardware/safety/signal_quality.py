@@ -12,11 +12,7 @@ from collections.abc import Sequence
 from antennate.hardware.safety.diagnosis import Band, ChannelDiagnosis, Finding
 from antennate.hardware.safety.drift import Drift
 from antennate.hardware.safety.touch_check import Ask, TouchCheck
-from antennate.params import (
-    ConditioningParams,
-    DriftParams,
-    TouchCheckParams,
-)
+from antennate.params import ConditioningParams, DriftParams, TouchCheckParams
 from antennate.types import Contact
 
 _SIDES = ("left", "right")
@@ -24,17 +20,10 @@ _RESTING = {Finding.OK, Finding.OUT_OF_CAL}
 
 
 class SignalQuality:
-    """Judges the readings of both antennae of one robot.
-
-    Args:
-        conditioning: Their calibrated range.
-        drift: How drift is followed.
-        touch: What counts as a touch, None if they are not checked by touch.
-        reach: How far beyond the calibrated range readings are believed [spans]; 0.8 by default.
+    """Judges the readings of both antennae of one robot; checks them by touch if `touch` is given.
 
     Attributes:
         channels: Diagnosis of the left and the right antenna.
-        check: The check by touch, None if it is skipped.
         drifts: Of the left and the right antenna.
     """
 

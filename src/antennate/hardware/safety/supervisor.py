@@ -13,8 +13,8 @@ from collections.abc import Iterable, Mapping
 from antennate.hardware.safety.causes import (
     CURED_BY_ARMING,
     DATA,
+    OF_CONTROLLER,
     OF_FINDING,
-    OF_MIND,
     Active,
     Cause,
     Inputs,
@@ -50,11 +50,7 @@ class _Repeats:
 class Supervisor:
     """Begins OFF and without data; torque comes on by an arm event only.
 
-    Args:
-        params: Limits.
-
     Attributes:
-        state: Where on the ladder the robot is.
         meter: Measures the rate of samples.
         transitions: Changes of state so far.
     """
@@ -78,28 +74,20 @@ class Supervisor:
         self._reboots = _Repeats(params.repeats, params.repeat_time)
 
     def step(self, now: float, inputs: Inputs) -> Outputs:
-        """Judge one tick.
-
-        Args:
-            now: Time [s], from a clock that never steps.
-            inputs: What is known now.
-        """
+        """Judge one tick at a time [s], from a clock that never steps."""
         decided = self._last < inputs.decided_at <= now
-        present = self._world(now, inputs) | self._mind(now, inputs, decided)
+        present = self._world(now, inputs) | self._controller(now, inputs, decided)
         self._recover(inputs, present)
         self._latch(present)
-        refusal: tuple[Cause, ...] = ()
-        arming = False
-        if inputs.arm and not self._asked and self.state >= State.FAULT:
-            refusal = self._objections(present)
-            arming = not refusal
+        asks = inputs.arm and not self._asked and self.state >= State.FAULT
+        refusal = self._objections(present) if asks else ()
+        arming = asks and not refusal
         self._asked = inputs.arm
         if arming:
             self._rearm(present)
         self._list(now, present)
         state = self._settle(now)
-        self._last = now
-        self._arming = arming
+        self._last, self._arming = now, arming
         return self._outputs(state, decided and not inputs.failure, arming, refusal)
 
     def _outputs(
@@ -114,7 +102,7 @@ class Supervisor:
             torque=torque,
             arming=arming,
             feed_watchdog=torque and decided,
-            clear=torque and not waits - OF_MIND,
+            clear=torque and not waits - OF_CONTROLLER,
             causes=tuple(order),
             refusal=refusal,
         )
@@ -126,8 +114,7 @@ class Supervisor:
         if not 0.0 <= inputs.age <= params.stale_age:
             found[Cause.STALE] = inputs.board_error or f"age {inputs.age:.3g} s"
         for side, finding in zip(("left", "right"), inputs.findings, strict=True):
-            cause = OF_FINDING.get(finding)
-            if cause is not None:
+            if (cause := OF_FINDING.get(finding)) is not None:
                 found[cause] = f"{found[cause]}, {side}" if cause in found else side
         self._boots(now, inputs, found)
         self.meter.step(now, inputs.valid)
@@ -140,11 +127,13 @@ class Supervisor:
             found[Cause.PAUSE] = "time did not advance"
         self._servos(inputs, found)
         self._supply(inputs.supply, found)
-        if inputs.drift:
-            found[Cause.DRIFT] = inputs.drift
         if inputs.objections:
             found[Cause.NOT_READY] = "; ".join(inputs.objections)
-        _wishes(inputs, found)
+        if inputs.drift:
+            found[Cause.DRIFT] = inputs.drift
+        found |= {Cause.NO_RECORD: ""} if inputs.unrecorded else {}
+        found |= {Cause.STOPPED: ""} if inputs.stop else {}
+        found |= {Cause.RELEASED: ""} if inputs.released else {}
         return found
 
     def _boots(self, now: float, inputs: Inputs, found: dict[Cause, str]) -> None:
@@ -164,7 +153,8 @@ class Supervisor:
         _name(found, Cause.WATCHDOG, inputs.watchdogs)
         _name(found, Cause.DISARMED, inputs.disarmed)
         if inputs.servo_errors:
-            found[Cause.SERVO_ERROR] = _words(inputs.servo_errors)
+            errors = sorted(inputs.servo_errors.items())
+            found[Cause.SERVO_ERROR] = "; ".join(f"servo {i}: {text}" for i, text in errors)
         if inputs.bus_error:
             found[Cause.BUS_ERROR] = inputs.bus_error
 
@@ -179,7 +169,7 @@ class Supervisor:
             found[Cause.SUPPLY_UNKNOWN] = ""
         found |= dict.fromkeys(self._low, f"{supply:.1f} V")
 
-    def _mind(self, now: float, inputs: Inputs, decided: bool) -> dict[Cause, str]:
+    def _controller(self, now: float, inputs: Inputs, decided: bool) -> dict[Cause, str]:
         """Causes in the controller, each with its detail."""
         found: dict[Cause, str] = {}
         if inputs.failure:
@@ -252,7 +242,14 @@ def _rank(active: Active) -> tuple[int, bool, bool, bool, float, str]:
     """The order in which causes are listed."""
     cause = active.cause
     over = cause in DATA and not active.present
-    return -cause.severity, cause in OF_MIND, cause not in DATA, over, active.since, cause.name
+    return (
+        -cause.severity,
+        cause in OF_CONTROLLER,
+        cause not in DATA,
+        over,
+        active.since,
+        cause.name,
+    )
 
 
 def _name(found: dict[Cause, str], cause: Cause, ids: Iterable[int]) -> None:
@@ -260,17 +257,3 @@ def _name(found: dict[Cause, str], cause: Cause, ids: Iterable[int]) -> None:
     listed = ", ".join(str(i) for i in sorted(ids))
     if listed:
         found[cause] = f"servo {listed}"
-
-
-def _wishes(inputs: Inputs, found: dict[Cause, str]) -> None:
-    """Causes that the operator asked for."""
-    if inputs.unrecorded:
-        found[Cause.NO_RECORD] = ""
-    if inputs.stop:
-        found[Cause.STOPPED] = ""
-    if inputs.released:
-        found[Cause.RELEASED] = ""
-
-
-def _words(errors: Mapping[int, str]) -> str:
-    return "; ".join(f"servo {i}: {text}" for i, text in sorted(errors.items()))

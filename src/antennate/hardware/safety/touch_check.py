@@ -29,18 +29,10 @@ class TouchCheck:
     Args:
         params: What counts as a touch and as rest.
         bands: Calibrated ranges of the left and the right channel.
-
-    Attributes:
-        ask: What to do next.
     """
 
     def __init__(self, params: TouchCheckParams, bands: tuple[Band, Band]) -> None:
-        self._params = params
-        self._bands = bands
-        self.reset()
-
-    def reset(self) -> None:
-        """Begin anew."""
+        self._params, self._bands = params, bands
         self.ask = Ask.REST
         self._against = ""
         self._side = 0
@@ -58,33 +50,26 @@ class TouchCheck:
         """Take the newest readings as they came [counts]; NaN if unknown. What to do next."""
         if self.ask is Ask.NOTHING:
             return self.ask
-        bends = [self._bend(*pair) for pair in zip(self._bands, (left, right), strict=True)]
-        seen = self._see(bends)
+        seen = self._see([b.level(c) for b, c in zip(self._bands, (left, right), strict=True)])
         count = self._run[1] + 1 if seen == self._run[0] else 1
         self._run = (seen, count)
         if seen and count >= self._params.readings:
             self._follow(seen)
         return self.ask
 
-    @staticmethod
-    def _bend(band: Band, counts: float) -> float:
-        """Bend from the straight end of the band on, in spans; negative is the wrong way."""
-        straight = band.low if band.polarity > 0 else band.high
-        return band.polarity * (counts - straight) / (band.high - band.low)
-
-    def _see(self, bends: list[float]) -> str:
+    def _see(self, levels: list[float]) -> str:
         """What the readings say: rest, right, swapped or reversed; empty if nothing clear."""
-        if not all(map(math.isfinite, bends)):
+        if not all(map(math.isfinite, levels)):
             return ""
-        still = [abs(bend) < self._params.still for bend in bends]
+        still = [abs(level) < self._params.still for level in levels]
         if all(still):
             return "rest"
-        bent = [abs(bend) >= self._params.level for bend in bends]
+        bent = [abs(level) >= self._params.level for level in levels]
         if sum(bent) != 1 or sum(still) != 1:
             return ""
         if not bent[self._side]:
             return "swapped"
-        return "right" if bends[self._side] > 0 else "reversed"
+        return "right" if levels[self._side] > 0 else "reversed"
 
     def _follow(self, seen: str) -> None:
         if self.ask is Ask.REST:

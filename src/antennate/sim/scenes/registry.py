@@ -5,15 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from multiprocessing import parent_process
 from pathlib import Path
-from typing import Any
 
-from antennate.errors import AntennateError, SceneError, in_one_line
+from antennate.errors import AntennateError, ConfigError, SceneError, in_one_line
 from antennate.lookup import Registry
 from antennate.params import TunnelParams
-from antennate.sim.scenes.flat import FlatScene
 from antennate.sim.scenes.mjcf import MjcfScene
 from antennate.sim.scenes.mjcf_file import require_compiles
-from antennate.sim.scenes.scene import Scene
+from antennate.sim.scenes.scene import FlatScene, Scene
 from antennate.sim.scenes.tunnel import TunnelScene
 
 TUNNEL = "tunnel"
@@ -22,14 +20,13 @@ SCENES: Registry[Callable[[], Scene]] = Registry(
 )
 
 
-def check_name(name: str) -> None:
-    """Refuse a name that cannot be one of a scene; no code of the user runs.
+def check_name(name: str) -> str:
+    """Return the name if it may be that of a scene; no code of the user runs.
 
     Raises:
         ConfigError: The name has another form.
     """
-    if not _is_file(name):
-        SCENES.check(name)
+    return name if _is_file(name) else SCENES.check(name)
 
 
 def make_scene(name: str, tunnel: TunnelParams | None = None) -> Scene:
@@ -51,16 +48,16 @@ def make_scene(name: str, tunnel: TunnelParams | None = None) -> Scene:
         if parent_process() is None:  # the process that started this worker has tried it
             require_compiles(Path(name))
         return MjcfScene(name)
-    return _called(name, SCENES.find(name))
-
-
-def _called(name: str, make: Callable[[], Any]) -> Scene:
     try:
-        return make()
+        return SCENES.find(name)()
+    except ConfigError as error:
+        raise ConfigError(f"--scene: {error}") from error
     except AntennateError:
         raise
     except Exception as error:
-        raise SceneError(f"scene {name!r} cannot be made: {in_one_line(error)}") from error
+        raise SceneError(
+            f"--scene: expected to make {name!r}, found {in_one_line(error)}"
+        ) from error
 
 
 def _is_file(name: str) -> bool:

@@ -1,4 +1,4 @@
-"""What a scene is: the protocols, and a base for scenes with a route from start to exit."""
+"""What a scene is: the protocols, a base for scenes with a route, and the simplest of them."""
 
 from __future__ import annotations
 
@@ -120,6 +120,23 @@ class Route:
     def left(self, head: Floats) -> bool:
         """Whether the head is outside the rectangle."""
         return bool((head < self._low).any() or (head > self._high).any())
+
+
+class FlatScene:
+    """A flat floor without anything on it; the exit is straight ahead.
+
+    Args:
+        length: Distance of the exit [m].
+    """
+
+    random = False
+
+    def __init__(self, length: float = 2.0) -> None:
+        self._length = length
+
+    def draw(self, robot: RobotSpec, rng: np.random.Generator) -> Route:
+        """Every instance is the same."""
+        return Route(np.array([[0.0, 0.0], [self._length, 0.0]]))
 
 
 def add_floor(spec: mujoco.MjSpec) -> None:
