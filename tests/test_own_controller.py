@@ -2,25 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from importlib.metadata import EntryPoint
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from antennate.sim.scenes.flat import FlatScene
 
 from antennate import lookup
 from antennate.cli import main
 from antennate.control.controllers import RuleController, closed_loop, open_loop
 from antennate.control.registry import CONTROLLERS, make_controller
-from antennate.errors import ConfigError
+from antennate.errors import ConfigError, WorkerError
 from antennate.experiments.tunnel.run import TunnelConfig, run
 from antennate.hardware.driving.config import DriveConfig
 from antennate.hardware.driving.connect import prepare
 from antennate.hardware.driving.drive import drive
 from antennate.hardware.driving.session import Session
 from antennate.hardware.safety.causes import State
-from antennate.sim.scenes.registry import make_scene
+from antennate.sim.scenes.registry import SCENES, make_scene
 from antennate.sim.trial import draw_trial
 from antennate.testing import check_controller
 from antennate.twin.config import TwinConfig, build
@@ -32,8 +34,10 @@ SHORT = {"trials": 3, "time_limit": 1.5, "seed": 3}
 
 
 @pytest.fixture(autouse=True)
-def _nothing_added(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(CONTROLLERS, "added", {})
+def _nothing_added() -> Iterator[None]:
+    yield
+    CONTROLLERS.added.clear()
+    SCENES.added.clear()
 
 
 def rows_of(name: str, **changes: Any) -> list[Any]:
@@ -95,6 +99,24 @@ def test_a_controller_can_be_added_in_python_but_not_in_place_of_ours() -> None:
     assert CONTROLLERS.find("added") is closed_loop
     with pytest.raises(ConfigError, match="expected a new name"):
         CONTROLLERS.add("paper", open_loop)
+
+
+def test_what_is_added_in_python_is_known_in_worker_processes() -> None:
+    CONTROLLERS.add("mine", closed_loop)
+    SCENES.add("my_floor", FlatScene)
+    changes = {"controllers": ["mine"], "scene": "my_floor", "trials": 2, "time_limit": 0.3}
+    found = run(TunnelConfig.model_validate(changes), workers=2).rows
+    assert [(row.controller, row.outcome) for row in found] == [("mine", "timeout")] * 2
+
+
+def test_what_cannot_be_sent_to_workers_is_refused_in_one_line() -> None:
+    CONTROLLERS.add("mine", lambda *words: closed_loop(*words))
+    changes = {"controllers": ["mine"], "trials": 2, "time_limit": 0.3}
+    with pytest.raises(
+        WorkerError, match=r"sent to 2 workers, found .*at the top of a module"
+    ) as e:
+        run(TunnelConfig.model_validate(changes), workers=2)
+    assert "\n" not in str(e.value)
 
 
 # the example

@@ -69,8 +69,8 @@ def used(tree: ast.Module, package: set[str]) -> Iterator[ast.AST]:
     "text",
     [
         "session._hidden",
-        "from antennate.control.loop import _x",
-        "from antennate._x import loop",
+        "from antennate.control.loop import _hidden",
+        "from antennate._hidden import loop",
         "setattr(session, '_hidden', True)",
         "put('antennate.hardware.session.Session._hidden')",
         "def forget(self):\n    self._hidden = False",

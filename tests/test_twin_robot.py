@@ -156,8 +156,7 @@ def test_no_pose_of_a_gait_is_beyond_the_limits(name: str) -> None:
         joints.ticks(control.step(AntennaFrame(t=np.array([0.01 * tick]), counts=counts)))
 
 
-@pytest.mark.parametrize("robot", [ROBOT, MIRRORED])
-@pytest.mark.parametrize(("name", "trial"), [("closed", 1), ("paper", 0)])
+@pytest.mark.parametrize(("name", "trial", "robot"), [("closed", 1, ROBOT), ("paper", 0, MIRRORED)])
 def test_a_whole_trial_through_bytes_is_decided_like_the_pure_simulation(
     name: str, trial: int, robot: RobotSpec
 ) -> None:

@@ -17,6 +17,10 @@ from antennate.messages import nearest, shown
 T = TypeVar("T")
 
 
+ADDED: dict[str, dict[str, Any]] = {}
+"""Objects given to `Registry.add`, by group and name; worker processes get them too."""
+
+
 class Registry(Generic[T]):
     """Objects of one kind by name.
 
@@ -40,7 +44,7 @@ class Registry(Generic[T]):
     def __init__(self, kind: str, group: str, ours: Mapping[str, T]) -> None:
         self._kind, self._group = kind, group
         self._ours: dict[str, T] = dict(ours)
-        self.added: dict[str, T] = {}
+        self.added: dict[str, T] = ADDED.setdefault(group, {})
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -49,7 +53,7 @@ class Registry(Generic[T]):
         return tuple(dict.fromkeys((*self._ours, *others, *self.added)))
 
     def add(self, name: str, found: T) -> None:
-        """Make an object known under a name, in this process; a later one takes its place.
+        """Make an object known under a name, here and in workers; a later one takes its place.
 
         Raises:
             ConfigError: The name is that of another object, or holds a colon.

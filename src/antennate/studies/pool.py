@@ -20,7 +20,8 @@ from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from typing import Any, TypeVar
 
-from antennate.errors import WorkerError
+from antennate.errors import WorkerError, in_one_line
+from antennate.lookup import ADDED
 
 Task = TypeVar("Task")
 Result = TypeVar("Result")
@@ -62,11 +63,18 @@ def run_tasks(
         for task in tasks:
             function(task, on_result)
         return
+    try:
+        pickle.dumps((tasks, ADDED))
+    except Exception as error:  # pickle raises what an object's own code raises
+        raise WorkerError(
+            f"expected what can be sent to {workers} workers, found {in_one_line(error)}; an "
+            "object of your own has to be defined at the top of a module, or run with one worker"
+        ) from error
     context = multiprocessing.get_context("spawn")
     results = context.Queue()
     others = set(multiprocessing.active_children())
     count = min(workers, len(tasks))
-    pool = ProcessPoolExecutor(count, context, initializer=_begin, initargs=(results,))
+    pool = ProcessPoolExecutor(count, context, initializer=_begin, initargs=(results, ADDED))
     with _deaf():
         futures = [pool.submit(_work, function, task) for task in tasks]
     crew = set(multiprocessing.active_children()) - others
@@ -154,9 +162,11 @@ def _deaf() -> Iterator[None]:
         signal.signal(signal.SIGINT, before)
 
 
-def _begin(results: Any) -> None:
+def _begin(results: Any, added: dict[str, dict[str, Any]]) -> None:
     global _results
     _results = results
+    for group, objects in added.items():
+        ADDED.setdefault(group, {}).update(objects)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 

@@ -176,10 +176,10 @@ class ServoBus:
 
     def _sync_write(self, t: float, present: list[Servo], params: bytes) -> None:
         address, length = _two_words(params)
+        known = {servos[0].get("id"): servos for servos in self._by_id(present)}
         for at in range(4, len(params) - length, length + 1):
-            for servo in present:
-                if servo.get("id") == params[at]:
-                    servo.write(address, params[at + 1 : at + 1 + length])
+            for servo in known.get(params[at], ()):
+                servo.write(address, params[at + 1 : at + 1 + length])
         named = set(params[4 :: length + 1])
         if address == _GOAL.address and named >= {servo.get("id") for servo in self.servos}:
             self.on_goals()
@@ -251,8 +251,10 @@ class ServoBus:
         return trouble
 
     def _by_id(self, servos: list[Servo]) -> list[list[Servo]]:
-        names = sorted({servo.get("id") for servo in servos})
-        return [[servo for servo in servos if servo.get("id") == name] for name in names]
+        found: dict[int, list[Servo]] = {}
+        for servo in servos:
+            found.setdefault(servo.get("id"), []).append(servo)
+        return [found[name] for name in sorted(found)]
 
 
 def _answer(servo: Servo, name: int, error: StatusError, data: bytes) -> Status:

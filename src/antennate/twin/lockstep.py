@@ -80,8 +80,9 @@ class LockstepClock(SimulatedWire):
         while self._robot.due <= t + ROUNDING:
             self._faults.apply(self._robot, self._robot.due)
             self._robot.advance(self._robot.due)
-        self._robot.advance(t)
-        super()._until(t)
+        self._robot.advance(t)  # servos move with the physics, not from one byte to the next
+        self._t = t
+        self._collect()
 
 
 class BoardPort:

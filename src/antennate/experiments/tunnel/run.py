@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from antennate.control.registry import CONTROLLERS, ControllerFactory, make_controller
+from antennate.control.registry import make_controller
 from antennate.errors import ConfigError
 from antennate.experiments.tunnel import measures
 from antennate.experiments.tunnel.batch import run_trials
@@ -66,15 +66,12 @@ def check(config: TunnelConfig) -> None:
             raise ConfigError(f"--controllers: {error}") from error
 
 
-_Task = tuple[TunnelConfig, str, ControllerFactory | None, list[int]]
-"""Configuration, name of the controller, the controller if it was added in Python, trials."""
+_Task = tuple[TunnelConfig, str, list[int]]
+"""Configuration, name of the controller, trials."""
 
 
 def _run_task(task: _Task, emit: Callable[[Any], None]) -> None:
-    config, name, added, trials = task
-    if added is not None:
-        CONTROLLERS.add(name, added)
-    run_trials(config, name, trials, emit)
+    run_trials(*task, emit)
 
 
 def run(
@@ -95,11 +92,7 @@ def run(
         list(range(first, min(first + size, config.trials)))
         for first in range(0, config.trials, size)
     ]
-    tasks: list[_Task] = [
-        (config, name, CONTROLLERS.added.get(name), chunk)
-        for name in config.controllers
-        for chunk in chunks
-    ]
+    tasks = [(config, name, chunk) for name in config.controllers for chunk in chunks]
     found: list[tuple[TrialResult, TrialPath]] = []
 
     def take(item: tuple[TrialResult, TrialPath]) -> None:
