@@ -43,7 +43,7 @@ class ServoBus:
         fast: They understand fast sync reads.
 
     Attributes:
-        trouble: What is wrong with all servos of an id.
+        trouble: Faults of servos, by the id that each had when the bus was made.
         latency: Time by which the adapter delivers answers late [s].
         noise: What the wire does to bytes, both ways.
         master_baud: Bits per second of the master; servos set to another baud understand nothing.
@@ -61,6 +61,7 @@ class ServoBus:
     ) -> None:
         self.servos = list(servos)
         self.trouble: dict[int, Trouble] = {}
+        self._first_ids = {id(servo): servo.get("id") for servo in self.servos}
         self.loss = loss
         self.fast = fast
         self.latency = 0.0
@@ -213,18 +214,19 @@ class ServoBus:
         same = self.master_baud is None or BAUD_RATES[servo.get("baud_rate")] == self.master_baud
         return same and servo.get("protocol_type") != 1 and not self._is(servo, Fault.SILENT)
 
-    def _trouble(self, servo: Servo) -> Trouble | None:
-        """What is wrong with a servo, or with all that have its id."""
-        trouble = servo.trouble or self.trouble.get(servo.get("id"))
-        return None if trouble is None or trouble.count == 0 else trouble
-
     def _is(self, servo: Servo, fault: Fault) -> bool:
-        trouble = self._trouble(servo)
-        return trouble is not None and trouble.fault is fault
+        trouble = self._trouble_of(servo)
+        return trouble is not None and trouble.fault is fault and trouble.count != 0
+
+    def _trouble_of(self, servo: Servo) -> Trouble | None:
+        """A fault stays with its servo when the id of that changes."""
+        return servo.trouble or self.trouble.get(self._first_ids.get(id(servo), servo.get("id")))
 
     def _use(self, servo: Servo) -> Trouble | None:
-        trouble = self._trouble(servo)
-        if trouble is not None and trouble.count is not None:
+        trouble = self._trouble_of(servo)
+        if trouble is None or trouble.count == 0:
+            return None
+        if trouble.count is not None:
             trouble.count -= 1
         return trouble
 

@@ -109,6 +109,12 @@ class DrivenServo(Servo):
         self.motion.add_turns(turns)
         self._show()
 
+    def carry(self, ticks: float) -> None:
+        """Let somebody turn the shaft there without torque; whole turns stay as counted."""
+        before = self.position
+        self.motion.turn_to(ticks)
+        self.turn(round((before - self.position) / TICKS_A_TURN))
+
     def shaft(self, ticks: float, speed: float = 0.0, duty: float = 0.0) -> None:
         """What the physics has done: position [ticks], speed [ticks/s], share of the drive."""
         self._refresh()

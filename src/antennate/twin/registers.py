@@ -236,7 +236,7 @@ class Servo:
         self.set("present_input_voltage", round(10 * RATINGS[self.table.model].voltage))
         self.set("present_temperature", _ROOM_TEMPERATURE)
         self.registered = None
-        self._boot = self._fed = boot
+        self._boot = boot
         self.motion.stopped = False
         self.motion.shaft.rest()
         self._refresh()

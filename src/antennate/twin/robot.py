@@ -27,6 +27,7 @@ from antennate.twin.noise import Noise
 from antennate.twin.orders import Plugging
 from antennate.twin.push import Pushes
 from antennate.twin.touch import TouchStimulus
+from antennate.twin.visit import Visit
 from antennate.types import Floats
 
 GREETING_PERIOD = 1.0
@@ -43,6 +44,9 @@ ROUNDING = 1e-9
 
 class TwinRobot:
     """One robot in row 0 of a simulated body, served as bytes.
+
+    When a client begins, no servo has torque and the robot has walked, it is put back to where it
+    stood first, so that one twin serves many drives.
 
     Args:
         body: Holds one world.
@@ -62,6 +66,7 @@ class TwinRobot:
         t: Time up to which everything has happened [s].
         touch: Bends the antennae of the standing robot, None for no touches.
         board_silent: The board sends nothing.
+        on_return: Called when the robot is carried back to the start, for another drive.
         noise: What the board's wire does to bytes, both ways.
         battery: What feeds the servos.
     """
@@ -96,6 +101,7 @@ class TwinRobot:
         self._held = [math.nan, math.nan]
         self._chance = np.random.default_rng(boot_id) if standing_noise else None
         self.touch = touch
+        self.on_return: Callable[[], None] = lambda: None
         self.t = 0.0
         self.board_silent = False
         self.noise = Noise(seed=0)
@@ -105,6 +111,8 @@ class TwinRobot:
         self._zero: Floats = np.array(robot.zeros, float)
         self._pushes = Pushes(pushes, robot.joint_names, self._ticks_at)
         self.plugging = Plugging(self.servos, self._pushes)
+        self._visit = Visit()
+        self._standing, self._start = True, body.world(0).state()
         self._show(self._shafts())
         self._counts = body.read().counts[0]
         self._sample()
@@ -138,8 +146,12 @@ class TwinRobot:
         self.battery.feed(self.servos, self._ticks * self._period)
         if self._pushes.busy:
             self._push()
-        if not self._walked and not any(servo.torque for servo in self.servos):
+        torque = any(servo.torque for servo in self.servos)
+        if self._visit.step(self.t, self.servos) and not (torque or self._standing):
+            self._carry_back()
+        if self._standing and not torque:
             return None
+        self._standing = False
         end, lead = (self._ticks + 1) * self._period, 0.5 * self._period
         return np.array([servo.goal(end, lead) for servo in self.servos])
 
@@ -212,10 +224,21 @@ class TwinRobot:
         moved = self._pushes.apply(self._ticks * self._period, self._used, self.servos)
         for place, ticks in moved:
             self.servos[place].push(ticks)
-        if moved and not self._walked:
+        if moved and self._standing:
             ticks = np.array([servo.motion.shaft.position for servo in self.servos])
             angles = (ticks - self._zero) * self._sign * POSITION_UNIT
             self._body.world(0).place_drives(angles)
+
+    def _carry_back(self) -> None:
+        """To where the trial began, as a person does between two drives."""
+        self._body.put_back(0, self._start)
+        self._standing = True
+        for servo, ticks in zip(
+            self.servos, self._joints.positions(self._body.world(0).drives()).tolist(), strict=True
+        ):
+            servo.carry(ticks)
+        self._counts = self._body.read().counts[0]
+        self.on_return()
 
     def _shafts(self) -> Floats:
         """Positions [ticks], speeds [ticks/s] and shares of the full drive, shape (3, n)."""
@@ -241,10 +264,11 @@ class TwinRobot:
         if since % round(GREETING_PERIOD / self._period) == 0:
             self._greet()
         noise = np.zeros(2)
-        if self._chance is not None and not self._walked:
+        if self._chance is not None and self._standing:
             noise = np.rint(self._chance.normal(0.0, _STANDING_NOISE, 2))
-        if self.touch is not None and not self._walked:
-            noise = noise + np.rint(self.touch.change(self._ticks * self._period, self._used))
+        if self.touch is not None and self._standing:
+            now = self._ticks * self._period
+            noise = noise + np.rint(self.touch.change(now, self._visit.begun))
         read = np.where(np.isnan(self._held), self._counts, self._held)
         left, right = (
             self._converted(counts, wire)
