@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from servo_process import Served, served
 
+from antennate.cli.twin import command
 from antennate.errors import AntennateError, BadInputError, ConfigError
 from antennate.hardware.dynamixel import packets
 from antennate.hardware.dynamixel.parser import Parser
@@ -235,6 +236,20 @@ def test_a_leg_turns_at_a_speed_in_velocity_mode_and_by_a_drive_in_pwm_mode() ->
 
 
 # the command
+
+
+@pytest.mark.parametrize("flag", ["--factory", "--touch=left@2s", "--pace=lockstep", "--udp=0"])
+def test_what_is_for_a_robot_is_refused_without_one(flag: str) -> None:
+    with pytest.raises(ConfigError, match="are for a robot"):
+        command(["--servos", "1:xl330-m288", flag])
+
+
+@pytest.mark.parametrize(
+    "fault", ["esp32=reset", "link=loss:0.1", "bus=discharge:1", "servo:2=shock"]
+)
+def test_a_fault_of_what_is_not_there_is_refused(fault: str) -> None:
+    with pytest.raises(BadInputError, match="--fault: expected"):
+        command(["--servos", "1:xl330-m288", "--fault", fault])
 
 
 @pytest.fixture
