@@ -268,10 +268,16 @@ def test_the_first_ping_after_the_ready_line_is_answered(twin: Served) -> None:
         line.write(packets.ping(1))
         assert line.read(14) == b""
         assert twin.order("plug 3").startswith("not done: plug: expected all or one of 1, 2")
-    for speed in (19_200, 500_000, 1_000_000):
-        with serial.Serial(twin.path, speed, timeout=0.1) as line:
-            line.write(packets.ping(1))
-            assert line.read(14) == b""
+
+
+def test_only_a_client_at_the_speed_of_a_servo_is_heard() -> None:
+    """Linux has no name for 4.5 and 10.5 Mbit/s, but programs set them."""
+    serial = pytest.importorskip("serial")
+    with served("1:xc430-w240@4500000") as twin:
+        for speed in (19_200, 57_600, 500_000, 4_000_000, 10_500_000, 4_500_000):
+            with serial.Serial(twin.path, speed, timeout=0.2) as line:
+                line.write(packets.ping(1))
+                assert len(line.read(14)) == (14 if speed == 4_500_000 else 0), speed
 
 
 def test_what_is_pushed_has_an_angle_with_its_unit() -> None:
