@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from antennate.sim.scenes.flat import FlatScene
 
 from antennate import lookup
 from antennate.cli import main
@@ -23,6 +22,7 @@ from antennate.hardware.driving.drive import drive
 from antennate.hardware.driving.session import Session
 from antennate.hardware.safety.causes import State
 from antennate.sim.scenes.registry import SCENES, make_scene
+from antennate.sim.scenes.scene import FlatScene
 from antennate.sim.trial import draw_trial
 from antennate.testing import check_controller
 from antennate.twin.config import TwinConfig, build
