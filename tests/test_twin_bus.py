@@ -240,6 +240,16 @@ def test_the_chain_stops_at_a_silent_servo(slow: bool) -> None:
         assert [status.id for status in found] == IDS[:6]
 
 
+def test_a_fault_stays_with_its_servo_when_the_id_changes() -> None:
+    bus = ServoBus(servos())
+    bus.trouble[7] = Trouble(Fault.SILENT)
+    bus.servos[6].set("id", 8)  # as a script that gives ids may do
+    bus.servos[7].set("id", 7)
+    found, _ = ask(bus, packets.ping(7))
+    assert [status.id for status in found] == [7]
+    assert ask(bus, packets.ping(8))[0] == []
+
+
 def test_status_return_levels() -> None:
     bus = ServoBus([Servo(XC430_W240, 1)])
     for level, count in ((2, 3), (1, 2), (0, 1)):

@@ -2,10 +2,26 @@
 
 from __future__ import annotations
 
+import errno
 import os
+import stat
 from pathlib import Path
+from typing import BinaryIO
 
 from antennate.errors import BadInputError, OutputError
+
+
+def open_regular(path: Path) -> BinaryIO:
+    """Open a regular file to read; a pipe, whose writer may never come, is refused at once.
+
+    Raises:
+        OSError: It cannot be opened, or is a pipe, a device or a folder.
+    """
+    handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_NOCTTY | os.O_CLOEXEC)
+    if not stat.S_ISREG(os.fstat(handle).st_mode):
+        os.close(handle)
+        raise OSError(errno.EINVAL, "it is a folder, a pipe or a device", str(path))
+    return os.fdopen(handle, "rb")
 
 
 def read_limited(path: Path, largest: int, error: type[BadInputError] = BadInputError) -> bytes:
@@ -15,7 +31,7 @@ def read_limited(path: Path, largest: int, error: type[BadInputError] = BadInput
         BadInputError: Of the given type: the file cannot be read, or is larger.
     """
     try:
-        with path.open("rb") as file:
+        with open_regular(path) as file:
             data = file.read(largest + 1)
     except (OSError, ValueError) as cause:  # a zero byte in a path is a ValueError
         why = getattr(cause, "strerror", None) or cause

@@ -18,6 +18,9 @@ from antennate.params import ConditioningParams
 from antennate.types import Floats
 
 SCHEMA = 1
+REACH = 0.8
+"""How far sensors of the robot bend beyond a calibration up to a right angle [spans]: 0.70 in
+simulation (measured), and a tenth for drift."""
 FEWEST = 20
 """Fewest readings."""
 NARROWEST_SPAN = 20.0
@@ -63,6 +66,8 @@ class Calibration(_Strict):
         r2: Share of the level's variance that the curve explains; `rmse` its error.
         speeds: The same for each pushing speed.
         cross_validated_rmse: Error on unseen pushes of the sigmoid and of two other models.
+        reach: How far beyond the bent end of this range readings are still those of the sensor
+            [spans].
         better_than_sigmoid: Models that were better by more than one standard error.
     """
 
@@ -87,6 +92,7 @@ class Calibration(_Strict):
     speeds: tuple[SpeedFit, ...]
     cross_validated_rmse: dict[Literal["sigmoid", "line", "isotonic"], float]
     better_than_sigmoid: tuple[Literal["line", "isotonic"], ...]
+    reach: float = Field(default=REACH, ge=0, le=200)
 
     def conditioning(self, averaging_time: float = 0.1) -> ConditioningParams:
         """The curve as parameters of a controller; `averaging_time` [s] is T_avg of the paper."""

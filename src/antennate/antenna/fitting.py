@@ -16,7 +16,7 @@ from typing import Literal
 import numpy as np
 
 from antennate import __version__
-from antennate.antenna.calibration import FEWEST, NARROWEST_SPAN, Calibration, SpeedFit
+from antennate.antenna.calibration import FEWEST, NARROWEST_SPAN, REACH, Calibration, SpeedFit
 from antennate.antenna.sensor import FULL_SCALE
 from antennate.control.conditioning import sigmoid
 from antennate.errors import CalibrationError
@@ -201,7 +201,18 @@ def fit(
         speeds=tuple(_per_speed(samples, predicted)),
         cross_validated_rmse=rmse,  # pyright: ignore[reportArgumentType]
         better_than_sigmoid=_better(errors),
+        reach=_reach(low, high, sign),
     )
+
+
+def _reach(low: float, high: float, sign: int) -> float:
+    """How far readings may lie beyond the bent end [spans]: half of its way to the rail.
+
+    Behind two equal resistors a reading halves when the resistance becomes three times as large; a
+    flex sensor's becomes twice as large or a little more at 180 deg (datasheet FS-L-0095-103).
+    """
+    way = low if sign < 0 else FULL_SCALE - high
+    return max(REACH, round(way / 2 / (high - low), 2))
 
 
 def fit_calibration(

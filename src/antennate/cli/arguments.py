@@ -5,6 +5,7 @@ The file must be valid on its own; flags override it. Values are checked once, b
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
@@ -24,6 +25,7 @@ from antennate.cli.options import (
     read_words,
 )
 from antennate.errors import ConfigError
+from antennate.messages import shown
 from antennate.params.reading import Config, describe, group_of, put_over, read_file
 
 
@@ -93,7 +95,29 @@ def parse(
     if chosen.config is not None:
         config = read_file(chosen.config, model) if read is None else read(chosen.config)
         base = config.model_dump(exclude_unset=True)
+        _refuse_code(chosen.config, base, values)
     return _filled(model, base, {p: v for p, v in values.items() if p[0] not in names}), chosen
+
+
+_CODE = ("controller", "controllers", "scene")
+"""Parameters that may name code to run, as MODULE:NAME or FILE.py:NAME."""
+
+
+def _refuse_code(file: Path, base: Mapping[str, Any], flags: Mapping[tuple[str, ...], Any]) -> None:
+    """Run no code because a file of somebody else says so: a flag has to name it.
+
+    Raises:
+        ConfigError: The file names code, and no flag does.
+    """
+    for name in _CODE:
+        value = base.get(name, ())
+        names = (value,) if isinstance(value, str) else value
+        if (name,) not in flags and any(":" in each for each in names):
+            words = shlex.join([flag_of((name,)), *names])
+            raise ConfigError(
+                f"{file}: {name}: expected no code of its own in a file, found "
+                f"{', '.join(map(shown, names))}; if you trust that code, add {words}"
+            )
 
 
 _Model = TypeVar("_Model")

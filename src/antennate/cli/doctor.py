@@ -6,7 +6,6 @@ import sys
 from collections.abc import Callable, Sequence
 from contextlib import nullcontext
 from pathlib import Path
-from typing import IO
 
 from pydantic.dataclasses import dataclass
 from rich.box import SIMPLE_HEAD
@@ -96,7 +95,7 @@ def _examine(robot: DoctorConfig, orders: Orders, key: bytes | None) -> tuple[Ch
         checkup = examine(robot, bus, esp32, now)
         if not orders.fix or bus is None:
             return checkup, []
-        show_rows(checkup.rows, sys.stderr)
+        sys.stderr.write("examined; now what can be put right\n")
         changes = _fix(robot, bus, orders.yes, now, checkup)
         if changes:
             checkup = examine(robot, bus, esp32, now)
@@ -139,9 +138,9 @@ def _agreed(change: Change, yes: bool) -> bool:
     return sys.stdin.readline().strip().lower() in ("y", "yes")
 
 
-def show_rows(rows: Sequence[Row], file: IO[str] | None = None) -> None:
-    """Print one line for each row, then the cures; on stdout unless told otherwise."""
-    console = Console(file=file or sys.stdout, highlight=False)
+def show_rows(rows: Sequence[Row]) -> None:
+    """Print one line for each row, then the cures."""
+    console = Console(file=sys.stdout, highlight=False)
     table = Table(box=SIMPLE_HEAD, pad_edge=False)
     for head in ("", "check", "expected", "found"):
         table.add_column(head, overflow="fold", no_wrap=not head)

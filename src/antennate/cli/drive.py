@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
+import shlex
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,15 +14,18 @@ from pydantic.dataclasses import dataclass
 from antennate.cli import viewer
 from antennate.cli.addresses import PortOptions, key_of, parse_robot, require_two_ports
 from antennate.cli.exit_codes import BAD_INPUT, OK
+from antennate.cli.keyboard import pressed_keys
 from antennate.cli.options import option
-from antennate.cli.progress import stop_signals
 from antennate.cli.results import ResultOptions, folder_for, tell
 from antennate.errors import ConfigError, LogError
+from antennate.hardware.driving.arrival import Arrival
 from antennate.hardware.driving.config import DriveConfig
 from antennate.hardware.driving.connect import connect
 from antennate.hardware.driving.drive import drive
+from antennate.hardware.driving.operator import Operator
 from antennate.hardware.driving.priority import Priority, urgent
 from antennate.hardware.driving.session import Session
+from antennate.hardware.driving.signals import StopOnce
 from antennate.hardware.robot_file import RobotFile
 from antennate.hardware.safety.causes import State
 from antennate.studies.measures import Measure, Table
@@ -34,7 +39,7 @@ from antennate.telemetry.ticks import Tick
 DESCRIPTION = """\
 Let a controller walk the real robot, or its twin. First a dry run: everything is read and nothing
 written. Then, with --arm only, torque comes on with every servo where it stands, and the robot
-walks. Ctrl-C or SIGTERM ends it: command held, torque off, verified.
+walks. Ctrl-C, Ctrl-\\ or SIGTERM ends it: command held, torque off, verified.
 
 A lost board or servo makes the robot hold; the watchdogs of the servos stop it if this program
 dies. The exit code is 2 if it ended in a FAULT or without supply, if torque was refused or is not
@@ -46,6 +51,9 @@ class Orders(ResultOptions, PortOptions):
     """Whether to move."""
 
     arm: bool = option(False, "torque on after the dry run")
+    until: Path | None = option(
+        None, "end once this file exists, as of a light gate, or of `twin --passed FILE`", "FILE"
+    )
 
 
 def command(argv: Sequence[str]) -> int:
@@ -61,21 +69,27 @@ def command(argv: Sequence[str]) -> int:
     require_two_ports(orders)
     config = config.calibrated()
     key = key_of(orders)
-    with folder_for("drive", orders, config, argv) as folder:
+    with (
+        _operator(config, orders) as operator,
+        folder_for("drive", orders, config, argv) as folder,
+    ):
         folder.without_trials()
-        wires = connect(config, orders.esp32, orders.bus, key)
-        with wires as session, stop_signals():
-            result = _carry_out(config, session, orders, folder.path / LOG)
+        with connect(config, orders.esp32, orders.bus, key) as session:
+            result = _carry_out(config, session, orders, folder.path / LOG, operator)
         folder.finish(result, ())
         table = Table.of("Drive", {result["controller"]: result}, MEASURES, _note(result))
-        tell(result, orders, [table], _sentence(result))
+        log = shlex.quote(str(folder.path / LOG))
+        again = f"\nWhat was read and decided: antennate replay {log}"
+        tell(result, orders, [table], _sentence(result) + again)
     fault = result["worst_state"] in (State.FAULT.name, State.OFF.name)
     stays_on = result["torque_off"] is False
     idle = _idle(result)
     return BAD_INPUT if fault or stays_on or result["refusal"] or idle else OK
 
 
-def _carry_out(config: DriveConfig, session: Session, orders: Orders, log: Path) -> dict[str, Any]:
+def _carry_out(
+    config: DriveConfig, session: Session, orders: Orders, log: Path, operator: Operator
+) -> dict[str, Any]:
     """Drive, with the log and the status line in a process of their own."""
     header = Header(controller=config.controller, params=config.control, robot=config.robot)
     required = [viewer.REQUIRED] if config.record_required else []
@@ -98,7 +112,7 @@ def _carry_out(config: DriveConfig, session: Session, orders: Orders, log: Path)
         session.unrecorded = config.record_required and not feed.keeps
 
     with feed, urgent() as priority:
-        report = drive(session, config, orders.arm, keep)
+        report = drive(session, config, orders.arm, keep, operator)
     head = {"schema": 1, "command": "drive", "controller": config.controller, "armed": orders.arm}
     tail = {
         "priority": priority.value,
@@ -107,6 +121,25 @@ def _carry_out(config: DriveConfig, session: Session, orders: Orders, log: Path)
         "logs": [each.name for each in parts(log) if each.exists()],
     }
     return head | report.result(session) | tail
+
+
+@contextlib.contextmanager
+def _operator(config: DriveConfig, orders: Orders) -> Iterator[Operator]:
+    """Who may stop the drive: signals, a key that is let go, a file that comes.
+
+    Raises:
+        ConfigError: No key can be held, or the file is there already.
+    """
+    with contextlib.ExitStack() as stack:
+        stop = stack.enter_context(StopOnce(last=True))
+        pressed = arrived = None
+        if config.hold_to_run:
+            pressed = stack.enter_context(pressed_keys("--hold-to-run"))
+        if orders.until is not None:
+            if orders.until.exists():
+                raise ConfigError(f"--until: expected no such file yet, found {orders.until}")
+            arrived = stack.enter_context(Arrival(orders.until))
+        yield Operator(stop, pressed, arrived or (lambda: False))
 
 
 def _idle(result: Mapping[str, Any]) -> bool:
@@ -135,7 +168,9 @@ def _sentence(result: Mapping[str, Any]) -> str:
     if _idle(result):
         return f"The robot never walked, no command was sent; {worst}; {torque}."
     sent = f"{result['poses_sent']} commands of `{result['controller']}` were sent"
-    return f"The robot walked: {sent}, {worst}; {torque}."
+    shares = ", ".join(f"{name} {100 * s:.0f} %" for name, s in result["shares"].items() if s)
+    walked = f"The robot walked for {result['walked_s']:.1f} s ({shares}): {sent}"
+    return f"{walked}, {worst}; ended by {result['ended']}; {torque}."
 
 
 def _torque(result: Mapping[str, Any]) -> str:

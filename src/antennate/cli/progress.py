@@ -11,9 +11,10 @@ import time
 from collections.abc import Callable, Iterator
 from typing import Any
 
+from antennate.hardware.driving.signals import STOPS
+
 _LINES = 10
 """Plain lines over a whole run."""
-_ENDS = (signal.SIGINT, signal.SIGTERM)
 
 
 @contextlib.contextmanager
@@ -60,7 +61,7 @@ def stop_signals(last: bool = False) -> Iterator[None]:
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    before = {n: signal.getsignal(n) for n in _ENDS if signal.getsignal(n) is not signal.SIG_IGN}
+    before = {n: signal.getsignal(n) for n in STOPS if signal.getsignal(n) is not signal.SIG_IGN}
     stopped = False
 
     def stop(number: int, frame: Any) -> None:

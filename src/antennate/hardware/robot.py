@@ -26,6 +26,10 @@ class RobotConfig(Params):
     """File of `antennate calibrate`, for both antennae, in place of control.conditioning."""
     sensor_id: str | None = number(None, "1", "assumed: that of the calibration file")
     """Name of the flex sensor; 16 hexadecimal digits name the board it is soldered to."""
+    reach: float | None = number(
+        None, "1", "assumed: of the calibration file, or 0.8", ge=0, le=200
+    )
+    """How far beyond the bent end of its range a reading is believed, in calibrated spans."""
     robot: RobotSpec = RobotSpec()
     control: ControlParams = ControlParams()
     limits: SupervisorParams = SupervisorParams()
@@ -55,7 +59,8 @@ class RobotConfig(Params):
             )
         control = own.model_copy(update={"conditioning": file.conditioning(averaging)})
         known = {"control": control, "sensor_id": file.sensor_id, "calibration": None}
-        return self.model_copy(update=known)
+        reach = file.reach if self.reach is None else self.reach
+        return self.model_copy(update=known | {"reach": reach})
 
 
 class DoctorConfig(RobotConfig):

@@ -149,6 +149,18 @@ class World:
         q[self._leg] = leg.ravel()
         mujoco.mj_forward(self.model, self.data)
 
+    def state(self) -> Floats:
+        """All that the physics goes on from, for `restore`."""
+        kind = mujoco.mjtState.mjSTATE_INTEGRATION
+        found = np.empty(mujoco.mj_stateSize(self.model, kind))
+        mujoco.mj_getState(self.model, self.data, found, kind)
+        return found
+
+    def restore(self, state: Floats) -> None:
+        """Be again as when `state` was called, also in time."""
+        mujoco.mj_setState(self.model, self.data, state, mujoco.mjtState.mjSTATE_INTEGRATION)
+        mujoco.mj_forward(self.model, self.data)
+
     def command(self, drive: Floats) -> None:
         """Set the targets of all joints that servos move, in the robot's order [rad], shape (n,).
 

@@ -81,6 +81,8 @@ class RunDirectory:
         with _writing(place):
             missing = [p for p in (place, *place.parents) if not p.exists()]
             place.mkdir(parents=True, exist_ok=path is not None)
+            if (place / FIGURES).is_symlink():
+                raise OutputError(f"expected {place / FIGURES} within its run, found a link")
             held = _held(place)
             if held and not overwrite:
                 raise OutputError(

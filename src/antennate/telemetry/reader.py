@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from antennate.errors import LogError
+from antennate.files import open_regular
 from antennate.telemetry.framing import SCHEMA, Kind, opened, pieces
 from antennate.telemetry.header import Header
 from antennate.telemetry.parts import parts
@@ -51,7 +52,7 @@ class LogReader:
         self.damage: list[Damage] = []
         self.end: int | None = None
         try:
-            self._file = path.open("rb")
+            self._file = open_regular(path)
         except OSError as error:
             raise LogError(f"expected a log, found {path}: {error.strerror}") from None
         self.parts = parts(path)
@@ -108,7 +109,7 @@ class LogReader:
                 if path != self.path:
                     self._file.close()
                     self._part, self._before, self.end = path, self.ticks, None
-                    self._file = path.open("rb")
+                    self._file = open_regular(path)
                 yield from pieces(self._file)
         except OSError as error:
             raise LogError(f"expected to read {self._part}, found: {error.strerror}") from None

@@ -70,6 +70,7 @@ class ServoBus:
         fast: They understand fast sync reads.
 
     Attributes:
+        trouble: Faults of servos, by the id that each had when the bus was made.
         latency: Time by which the adapter delivers answers late [s].
         noise: What the wire does to bytes, both ways.
         master_baud: Bits per second of the master; servos set to another baud understand nothing.
@@ -87,6 +88,7 @@ class ServoBus:
     ) -> None:
         self.servos = list(servos)
         self.trouble: dict[int, Trouble] = {}
+        self._first_ids = {id(servo): servo.get("id") for servo in self.servos}
         self.loss = loss
         self.fast = fast
         self.latency = 0.0
@@ -233,11 +235,15 @@ class ServoBus:
         return known and not self._is(servo, Fault.SILENT)
 
     def _is(self, servo: Servo, fault: Fault) -> bool:
-        trouble = self.trouble.get(servo.get("id"))
+        trouble = self._trouble_of(servo)
         return trouble is not None and trouble.fault is fault and trouble.count != 0
 
+    def _trouble_of(self, servo: Servo) -> Trouble | None:
+        """A fault stays with its servo when the id of that changes."""
+        return self.trouble.get(self._first_ids.get(id(servo), servo.get("id")))
+
     def _use(self, servo: Servo) -> Trouble | None:
-        trouble = self.trouble.get(servo.get("id"))
+        trouble = self._trouble_of(servo)
         if trouble is None or trouble.count == 0:
             return None
         if trouble.count is not None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from antennate.params import ConditioningParams, GaitParams, Params, number
+from antennate.params import GaitParams, Params, number
 from antennate.params.base import GATHERED
 from antennate.params.twin import BatteryParams
 from antennate.robots.spec import RobotSpec
@@ -22,7 +22,6 @@ class TwinControlParams(Params):
     rate: float = number(100.0, "Hz", "paper: about 100 Hz over serial", gt=0, le=1000)
     """Samples per second."""
     gait: GaitParams = GaitParams()
-    conditioning: ConditioningParams = ConditioningParams()
 
     @property
     def period(self) -> float:
@@ -40,7 +39,7 @@ class TwinConfig(TrialConfig):
     fault: Annotated[tuple[str, ...], GATHERED] = number((), "1", "assumed: nothing is broken")
     """Faults, such as servo:7=silent@3s."""
     touch: Annotated[tuple[str, ...], GATHERED] = number((), "1", "assumed: nobody is there")
-    """Antennae touched before it walks, such as left@2s; from the first packet on the bus."""
+    """Touches of the standing robot: left@2s, left:20mm@2s, or - to type them; from each client."""
     battery: BatteryParams = BatteryParams()
     robot: RobotSpec = RobotSpec()
     control: TwinControlParams = TwinControlParams()
@@ -59,7 +58,8 @@ def watched(config: TwinConfig, boot_id: int | None = None) -> tuple[TwinRobot, 
     body = SimRobot(1, config.robot, period, config.physics.timestep)
     body.load(0, start.world, start.chance)
     boot = config.trial + 1 if boot_id is None else boot_id
-    touch, passage = TouchStimulus(config.touch, control.conditioning), Passage(start.scene)
+    touch = TouchStimulus(config.touch, config.robot.antenna)
+    passage = Passage(start.scene)
     robot = TwinRobot(
         body,
         config.robot,
@@ -70,4 +70,5 @@ def watched(config: TwinConfig, boot_id: int | None = None) -> tuple[TwinRobot, 
         watch=passage.watch,
         battery=config.battery,
     )
+    robot.on_return = passage.reset
     return robot, passage

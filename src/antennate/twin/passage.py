@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 from antennate.sim.scenes.scene import SceneInstance
 from antennate.sim.world import World
@@ -20,10 +21,16 @@ class Passage:
     Attributes:
         progress: How far the head has come [m].
         passed: Time of walking at which the head passed the exit [s], inf before.
+        on_pass: Called when it does.
     """
 
     def __init__(self, scene: SceneInstance) -> None:
         self._scene = scene
+        self.on_pass: Callable[[], None] = lambda: None
+        self.reset()
+
+    def reset(self) -> None:
+        """The robot stands at the start again."""
         self._ticks = 0
         self.progress = 0.0
         self.passed = math.inf
@@ -35,8 +42,9 @@ class Passage:
             return
         head = world.head[:2].copy()
         self.progress = self._scene.progress(head)
-        if self._scene.succeeded(head):
-            self.passed = min(self.passed, world.t)
+        if self.passed == math.inf and self._scene.succeeded(head):
+            self.passed = world.t
+            self.on_pass()
 
     @property
     def summary(self) -> str:

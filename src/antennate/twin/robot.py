@@ -30,6 +30,7 @@ from antennate.twin.bus import ServoBus
 from antennate.twin.noise import Noise
 from antennate.twin.registers import Servo
 from antennate.twin.touch import TouchStimulus
+from antennate.twin.visit import Visit
 from antennate.types import Floats
 
 GREETING_PERIOD = 1.0
@@ -64,6 +65,12 @@ class DrivenServo(Servo):
     def shaft(self, ticks: float) -> None:
         """Where the physics has turned the shaft [ticks]."""
         self.place(self._mirrored(ticks) + self._ahead)
+
+    def carry(self, ticks: float) -> None:
+        """Let somebody turn the shaft there without torque; whole turns stay as counted."""
+        before, self._stood = self.position, None
+        self.shaft(ticks)
+        self.turn(round((before - self.position) / TICKS_A_TURN))
 
     def clear_turns(self) -> StatusError:
         """Forget whole turns; the shaft stays."""
@@ -102,6 +109,9 @@ class DrivenServo(Servo):
 class TwinRobot:
     """One robot in row 0 of a simulated body, served as bytes.
 
+    When a client begins, no servo has torque and the robot has walked, it is put back to where it
+    stood first, so that one twin serves many drives.
+
     Args:
         body: Holds one world.
         robot: Its description: servos, directions, zeros and bus speed.
@@ -117,6 +127,7 @@ class TwinRobot:
         t: Time up to which everything has happened [s].
         touch: Bends the antennae of the standing robot, None for no touches.
         board_silent: The board sends nothing.
+        on_return: Called when the robot is carried back to the start, for another drive.
         noise: What the board's wire does to bytes, both ways.
         battery: What feeds the servos.
     """
@@ -146,12 +157,15 @@ class TwinRobot:
         self._held = [math.nan, math.nan]
         self._chance = np.random.default_rng(boot_id) if standing_noise else None
         self.touch = touch
+        self.on_return: Callable[[], None] = lambda: None
         self.t = 0.0
         self.board_silent = False
         self.noise = Noise(seed=0)
         self.battery = Battery(battery or BatteryParams())
         self.servos = _servos(robot)
         self.bus = ServoBus(self.servos, robot.baud)
+        self._visit = Visit()
+        self._standing, self._start = True, body.world(0).state()
         self._show(self._shafts())
         self._counts = body.read().counts[0]
         self._sample()
@@ -183,8 +197,12 @@ class TwinRobot:
         self.bus.advance(self._ticks * self._period)
         self.t = max(self.t, self._ticks * self._period)
         self.battery.feed(self.servos, self._ticks * self._period)
-        if not self._walked and not any(servo.torque for servo in self.servos):
+        torque = any(servo.torque for servo in self.servos)
+        if self._visit.step(self.t, self.servos) and not (torque or self._standing):
+            self._carry_back()
+        if self._standing and not torque:
             return None
+        self._standing = False
         return np.array([servo.goal() for servo in self.servos])
 
     def move(self, goals: Floats | None) -> Floats | None:
@@ -242,6 +260,15 @@ class TwinRobot:
         """Hold the reading of antenna 0 (left) or 1 at a value [counts]; NaN releases it."""
         self._held[side] = counts
 
+    def _carry_back(self) -> None:
+        """To where the trial began, as a person does between two drives."""
+        self._body.put_back(0, self._start)
+        self._standing = True
+        for servo, ticks in zip(self.servos, self._shafts().tolist(), strict=True):
+            servo.carry(ticks)
+        self._counts = self._body.read().counts[0]
+        self.on_return()
+
     def _shafts(self) -> Floats:
         return self._joints.positions(self._body.world(0).drives())
 
@@ -258,11 +285,11 @@ class TwinRobot:
         if since % round(GREETING_PERIOD / self._period) == 0:
             self._greet()
         noise = np.zeros(2)
-        if self._chance is not None and not self._walked:
+        if self._chance is not None and self._standing:
             noise = np.rint(self._chance.normal(0.0, _STANDING_NOISE, 2))
-        if self.touch is not None and not self._walked:
-            used = any(servo.last_fed > 0.0 for servo in self.servos)
-            noise = noise + np.rint(self.touch.change(self._ticks * self._period, used))
+        if self.touch is not None and self._standing:
+            now = self._ticks * self._period
+            noise = noise + np.rint(self.touch.change(now, self._visit.begun))
         read = np.where(np.isnan(self._held), self._counts, self._held)
         left, right = (
             self._converted(counts, wire)

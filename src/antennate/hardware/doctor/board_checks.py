@@ -125,7 +125,7 @@ def _antenna(
     noisy = Finding(f"{noise:.1f} counts", "warn" if noise > quiet else "ok", cure)
     yield noisy, f"{name} noise", f"at most {quiet:g} counts"
     try:
-        channel = ChannelDiagnosis(Band.of(config.control.conditioning))
+        channel = ChannelDiagnosis(Band.of(config.control.conditioning, config.reach))
     except CalibrationError as error:
         wrong = Finding(str(error), "bad", "calibrate again, with another divider resistor")
         yield wrong, f"{name} calibration", "leaves the rails free"

@@ -7,6 +7,7 @@ from pydantic import field_validator
 from antennate.control.registry import CONTROLLERS
 from antennate.hardware.robot import RobotConfig
 from antennate.params import DriftParams, TouchCheckParams, number
+from antennate.params.dead_man import DeadManParams
 
 
 class DriveConfig(RobotConfig):
@@ -29,6 +30,9 @@ class DriveConfig(RobotConfig):
     )
     """Whether it is armed only after both antennae were bent by hand in the dry run."""
     touch: TouchCheckParams = TouchCheckParams()
+    hold_to_run: bool = number(False, "1", "assumed: a script has no keys")
+    """Whether it walks only while a key of the terminal is held."""
+    dead_man: DeadManParams = DeadManParams()
     drift: DriftParams = DriftParams()
     fault_time: float = number(
         10.0, "s", "assumed: long enough to take hold of the robot", ge=0, le=600

@@ -96,6 +96,7 @@ def prepare(
             config.control.conditioning,
             drift=config.drift,
             touch=config.touch if config.touch_check else None,
+            reach=config.reach,
         ),
         limits=config.limits,
     )

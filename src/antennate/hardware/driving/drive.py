@@ -8,7 +8,9 @@ from collections.abc import Callable
 
 from antennate.control.loop import run_loop
 from antennate.hardware.driving.config import DriveConfig
+from antennate.hardware.driving.dead_man import DeadMan
 from antennate.hardware.driving.dry_run import DryRun
+from antennate.hardware.driving.operator import Operator
 from antennate.hardware.driving.report import Report
 from antennate.hardware.driving.session import Session
 from antennate.hardware.driving.signals import StopOnce
@@ -16,12 +18,16 @@ from antennate.hardware.ports.port import PortError
 from antennate.hardware.safety.causes import State
 from antennate.types import AntennaFrame, JointCommand
 
+_NOBODY = Operator()
+_SIGNAL = "a signal"
+
 
 def drive(
     session: Session,
     config: DriveConfig,
     arm: bool,
     on_tick: Callable[[Session, float], None] = lambda session, t: None,
+    operator: Operator = _NOBODY,
 ) -> Report:
     """A dry run, then, if `arm`, a walk; torque is off at the end whatever happens.
 
@@ -32,6 +38,7 @@ def drive(
         config: For how long.
         arm: Whether torque may come on.
         on_tick: Called after every tick with the session and the time [s].
+        operator: Who may stop it. Its signals are not heard any more afterwards.
     """
     report, clock = Report(), session.clock
     start = clock.now()
@@ -39,6 +46,8 @@ def drive(
         session.quality, config.dry_run, config.touch.patience, arm, config.duration or math.inf
     )
     failed_at = math.inf
+    key = None if operator.pressed is None else DeadMan(config.dead_man, operator.pressed)
+    session.orders.released = key is not None
 
     def failed(t: float) -> bool:
         """After a fault and a time to look at it: torque can be taken off now, or never."""
@@ -55,20 +64,33 @@ def drive(
         t = clock.now() - start
         dry.step(t, session.outputs)
         session.orders.arm = dry.asks
+        if key is not None:
+            key.step(t, session.actuators.enabled)
+            session.orders.released = key.released
         report.refusal = dry.refusal
         report.watch(session)
         on_tick(session, clock.now())
-        return not stop.received and t < dry.end and not failed(t)
+        reasons = (
+            (stop.received, _SIGNAL),
+            (key is not None and key.over, "a key that was let go"),
+            (operator.arrived(), "arrival"),
+            (t >= dry.end, "a refusal of torque" if dry.refusal else "the end of its time"),
+            (failed(t), "a fault"),
+        )
+        report.ended = next((text for true, text in reasons if true), "")
+        return not report.ended
 
-    with StopOnce() as stop:
+    with contextlib.nullcontext(operator.stop) if operator.stop else StopOnce() as stop:
+        stop.insists = True
         try:
             try:
                 run_loop(session, session.control, session.period, go_on)
-            except KeyboardInterrupt:
-                pass
             finally:
                 stop.closed = True
+        except KeyboardInterrupt:  # also one that came before `closed` was set
+            report.ended = _SIGNAL
         finally:
+            stop.closed = True
             report.on = _off(session, config.stand)
             report.close(session)
     return report

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from antennate.hardware.driving.session import Session
 from antennate.hardware.driving.timing import LoopTiming
+from antennate.hardware.driving.walk import Walk
 from antennate.hardware.safety.causes import Cause, Outputs, State
 
 
@@ -21,6 +22,8 @@ class Report:
             left out, unless no command follows it.
         refusal: Why torque did not come on although it was wanted, empty if nothing forbade it.
         on: Servos that did not confirm that their torque is off; None if it never was on.
+        ended: What ended it.
+        walk: How long the robot walked.
     """
 
     timing: LoopTiming | None = None
@@ -29,6 +32,8 @@ class Report:
     why: str = ""
     refusal: str = ""
     on: list[int] | None = None
+    ended: str = ""
+    walk: Walk = field(default_factory=Walk)
     _torque: bool = False
     _waits: str = ""
     _causes: set[Cause] | None = None
@@ -40,6 +45,7 @@ class Report:
 
     def watch(self, session: Session) -> None:
         """Take note of a tick."""
+        self.walk.watch(session)
         out = session.outputs
         if out is None or not (self._torque or out.torque):
             return
@@ -74,10 +80,13 @@ class Report:
             "worst_state": self.worst.name,
             "why": self.why,
             "refusal": self.refusal,
+            "ended": self.ended,
             "torque_off": None if self.on is None else self.safe,
             "servos_on": self.on or [],
             "pace": _pace(self.timing),
             "walking": _since(self.timing, self.before),
+            "walked_s": self.walk.time,
+            "shares": self.walk.shares,
             "frames": board.decoder.counters.good,
             "crc_errors": board.decoder.counters.crc_errors,
             "lost_samples": board.lost,

@@ -36,10 +36,14 @@ from antennate.types import AntennaFrame, Clock, Controller, JointCommand
 
 @dataclass(slots=True)
 class Orders:
-    """What the operator wants: torque on, of which only the change to True counts, or off."""
+    """What the operator wants.
+
+    Torque on, of which only the change to True counts; off; no walk, as no key is held.
+    """
 
     arm: bool = False
     stop: bool = False
+    released: bool = False
 
 
 @dataclass(slots=True)
@@ -214,4 +218,5 @@ class Session:
             unrecorded=self.unrecorded,
             arm=self.orders.arm,
             stop=self.orders.stop,
+            released=self.orders.released,
         )

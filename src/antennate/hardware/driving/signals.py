@@ -1,4 +1,4 @@
-"""Ctrl-C, SIGTERM and the loss of the terminal, while servos have torque.
+r"""Ctrl-C, Ctrl-\, SIGTERM and the loss of the terminal, while servos have torque.
 
 An exception alone would not do: a controller with a bare `except`, a destructor or a callback may
 swallow it. So what was received is also kept, for the loop to look at.
@@ -12,25 +12,34 @@ from types import FrameType
 from typing import Any
 
 STOPS = tuple(
-    getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
+    getattr(signal, name)
+    for name in ("SIGINT", "SIGQUIT", "SIGTERM", "SIGHUP")
+    if hasattr(signal, name)
 )
 """What asks a program to end; a terminal that goes away, as of a lost connection, sends SIGHUP."""
 
 
 class StopOnce:
-    """Inside the block each of them raises KeyboardInterrupt, until it is closed.
+    """Inside the block a signal that asks to end raises KeyboardInterrupt, until it is closed.
 
     Close it before the torque goes off: whoever presses Ctrl-C twice must not keep it on. Outside
     the main thread Python delivers no signals: whoever starts such a thread has to end it
     otherwise, as by `orders.stop`.
 
+    Args:
+        last: The program ends after the block: if a signal came, none is heard any more, so
+            that the report is written and shown however often it is sent.
+
     Attributes:
         received: One came, whoever may have swallowed the exception.
+        insists: Each of them raises, not the first alone; for code that may swallow one.
         closed: None raises any more; for the block's owner to set.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, last: bool = False) -> None:
         self.received = self.closed = False
+        self.insists = not last
+        self._last = last
         self._before: dict[int, Any] = {}
 
     def __enter__(self) -> StopOnce:
@@ -40,10 +49,10 @@ class StopOnce:
 
     def __exit__(self, *_: object) -> None:
         for number, handler in self._before.items():
-            signal.signal(number, handler)
+            signal.signal(number, signal.SIG_IGN if self._last and self.received else handler)
 
     def receive(self, number: int, frame: FrameType | None) -> None:
         """Take note of a signal."""
-        self.received = True
-        if not self.closed:
+        first, self.received = not self.received, True
+        if not self.closed and (first or self.insists):
             raise KeyboardInterrupt

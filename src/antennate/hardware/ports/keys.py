@@ -8,6 +8,7 @@ import stat
 from pathlib import Path
 
 from antennate.errors import BadInputError
+from antennate.files import open_regular
 
 KEY_SIZE = 32
 """As many bytes as SHA-256 gives; more would add nothing."""
@@ -39,13 +40,11 @@ def read_key(path: Path | None, way_out: str = "") -> bytes:
 def _private(path: Path) -> str:
     """Content of a file that nobody else can read; looked at after opening, so it cannot change."""
     try:
-        with path.open("rb") as file:
+        with open_regular(path) as file:
             mode = os.fstat(file.fileno()).st_mode
-            content = file.read(1024) if stat.S_ISREG(mode) else b""
+            content = file.read(1024)
     except OSError as error:
         raise BadInputError(f"--key: expected a file, found {path}: {error.strerror}") from None
-    if not stat.S_ISREG(mode):
-        raise BadInputError(f"--key: expected a plain file, found {path}")
     if mode & 0o077:
         raise BadInputError(
             f"--key: expected a file that only you can read (mode 0600), found {path} with mode "

@@ -51,6 +51,7 @@ class Cause(Enum):
     BAD_POSE = (State.HOLD, "a command of the controller was refused")
     UNKNOWN_CONTACT = (State.HOLD, "contact is not known")
     NO_RECORD = (State.HOLD, "no log is kept, and one is required")
+    RELEASED = (State.HOLD, "hold a key, such as the space bar, to let it walk")
     SUPPLY_HOLD = (State.HOLD, "the supply is too low to walk")
     REPEATED_HOLDS = (State.FAULT, "too many holds in a short time")
     REPEATED_FAILURES = (State.FAULT, "the controller failed too often in a short time")
@@ -115,6 +116,7 @@ class Inputs:
         objections: What speaks against arming, such as a failed touch check or foreign firmware.
         unrecorded: Whether a record that is required is not kept.
         stop: Whether the operator wants the torque off.
+        released: Whether the key that lets the robot walk is not held.
         arm: Whether he wants it on; only the change to True in FAULT or OFF counts.
     """
 
@@ -140,6 +142,7 @@ class Inputs:
     objections: tuple[str, ...] = ()
     unrecorded: bool = False
     stop: bool = False
+    released: bool = False
     arm: bool = False
 
 

@@ -16,6 +16,7 @@ from collections import deque
 from dataclasses import dataclass
 from enum import Enum
 
+from antennate.antenna.calibration import REACH
 from antennate.antenna.sensor import FULL_SCALE
 from antennate.errors import CalibrationError
 from antennate.params import ConditioningParams
@@ -51,9 +52,9 @@ SHARE = 0.2
 (assumed)."""
 MARGIN = 20.0
 """Reading beyond the calibrated range still taken for noise [counts]: eight sigma (assumed)."""
-BEYOND = 0.8
-"""Distance from the calibrated range up to which a reading is believed [spans]: simulated sensors
-bend up to 0.70 beyond (measured), and a tenth for drift."""
+BEYOND = REACH
+"""Distance from the calibrated range up to which a reading is believed [spans]; to the bent side a
+calibration may reach farther."""
 GAP = 0.1
 """Time without a reading after which nothing before it is remembered [s]: twice the age at which
 data are stale (assumed)."""
@@ -83,16 +84,27 @@ _USABLE = {Finding.OK, Finding.OUT_OF_CAL, Finding.SPIKY, Finding.SATURATED}
 
 @dataclass(frozen=True, slots=True)
 class Band:
-    """Calibrated range of a channel [counts]; polarity is 1 if readings rise with flex, else -1."""
+    """Calibrated range of a channel [counts]; polarity is 1 if readings rise with flex, else -1.
+
+    Readings are believed up to BEYOND outside it, to the bent side up to `reach` if given [spans].
+    """
 
     low: float
     high: float
     polarity: int
+    reach: float | None = None
 
     @classmethod
-    def of(cls, conditioning: ConditioningParams) -> Band:
+    def of(cls, conditioning: ConditioningParams, reach: float | None = None) -> Band:
         """The range of a calibration."""
-        return cls(conditioning.counts_low, conditioning.counts_high, conditioning.polarity)
+        low, high = conditioning.counts_low, conditioning.counts_high
+        return cls(low, high, conditioning.polarity, reach)
+
+    def believes(self, counts: float) -> bool:
+        """Whether a flex sensor can give a reading [counts], as far as is known."""
+        reach = BEYOND if self.reach is None else self.reach
+        below, above = (reach, BEYOND) if self.polarity < 0 else (BEYOND, reach)
+        return self.low - below * self.span <= counts <= self.high + above * self.span
 
     @property
     def span(self) -> float:
@@ -189,8 +201,7 @@ class ChannelDiagnosis:
         return self._good
 
     def _plausible(self, counts: float) -> bool:
-        reach = BEYOND * self._band.span
-        return self._band.low - reach <= counts <= self._band.high + reach
+        return self._band.believes(counts)
 
     def _near(self, one: float, other: float) -> bool:
         return abs(one - other) <= JUMP * self._band.span

@@ -32,8 +32,9 @@ class SignalQuality:
         conditioning: ConditioningParams,
         drift: DriftParams | None = None,
         touch: TouchCheckParams | None = None,
+        reach: float | None = None,
     ) -> None:
-        band = Band.of(conditioning)
+        band = Band.of(conditioning, reach)
         self.channels = [ChannelDiagnosis(band) for _ in _SIDES]
         self.check = None if touch is None else TouchCheck(touch, (band, band))
         self.drifts = [Drift(drift or DriftParams(), band) for _ in _SIDES]

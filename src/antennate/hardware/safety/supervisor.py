@@ -133,6 +133,7 @@ class Supervisor:
             found[Cause.DRIFT] = inputs.drift
         found |= {Cause.NO_RECORD: ""} if inputs.unrecorded else {}
         found |= {Cause.STOPPED: ""} if inputs.stop else {}
+        found |= {Cause.RELEASED: ""} if inputs.released else {}
         return found
 
     def _boots(self, now: float, inputs: Inputs, found: dict[Cause, str]) -> None:
@@ -226,7 +227,8 @@ class Supervisor:
     def _settle(self, now: float) -> State:
         """The state that the most severe cause asks for; counts holds on the way."""
         state = max((c.severity for c in self._active), default=State.OK)
-        if self.state <= State.DEGRADED and state is State.HOLD and self._holds.add(now):
+        begins = self.state <= State.DEGRADED and state is State.HOLD
+        if begins and Cause.RELEASED not in self._active and self._holds.add(now):
             cause = Cause.REPEATED_HOLDS
             self._latched.add(cause)
             self._active[cause] = Active(cause, now, "", present=False)

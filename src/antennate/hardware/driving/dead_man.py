@@ -1,0 +1,49 @@
+"""A key that is held lets the robot walk.
+
+A terminal tells no release. A key that is held repeats its character, after a first pause of 0.25 s
+(Linux console) to 0.66 s (X server). So a key is held from its second character in quick succession
+on: a single press never lets a robot walk.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+from antennate.params.dead_man import DeadManParams
+
+
+class DeadMan:
+    """Whether a key is held.
+
+    Args:
+        params: How long it may be let go.
+        pressed: Whether a character has come since the last call.
+
+    Attributes:
+        released: The key is not held: the robot has to stand.
+        over: It has not been held for so long that the torque has to go off.
+    """
+
+    def __init__(self, params: DeadManParams, pressed: Callable[[], bool]) -> None:
+        self._params, self._pressed = params, pressed
+        self._last = -math.inf
+        self._held_at: float | None = None
+        self.released, self.over = True, False
+
+    def step(self, now: float, torque: bool) -> None:
+        """Look at the key, once a tick.
+
+        Args:
+            now: Time [s].
+            torque: Whether the servos have torque; before that nothing is over.
+        """
+        quick = now - self._last <= self._params.release
+        if self._pressed():
+            self.released = self.released and not quick
+            self._last = now
+        elif not quick:
+            self.released = True
+        if self._held_at is None or not torque or not self.released:
+            self._held_at = now
+        self.over = now - self._held_at >= self._params.off

@@ -1,0 +1,126 @@
+"""Hands on the twin's antennae, and one twin for many drives."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import numpy as np
+import pytest
+from test_drive_processes import ANTENNATE
+from twin_rig import rig
+
+from antennate.antenna.sensor import counts
+from antennate.errors import BadInputError
+from antennate.hardware.driving.config import DriveConfig
+from antennate.hardware.driving.drive import drive
+from antennate.hardware.dynamixel import packets
+from antennate.params import TouchCheckParams
+from antennate.robots.antenna import AntennaSpec
+from antennate.twin.config import TwinConfig
+from antennate.twin.touch import TouchStimulus
+
+ANTENNA = AntennaSpec()
+REST = float(counts(ANTENNA.sensor, np.array(0.0)))
+
+
+def reading(flex: float) -> float:
+    """Change of a reading [counts] by a flex [rad]."""
+    return float(counts(ANTENNA.sensor, np.array(flex))) - REST
+
+
+def test_a_tip_pushed_a_little_aside_bends_as_the_springs_say() -> None:
+    """y = F sum(a^2 / k) and flex = F sum(a / k), a the distance of a hinge from the tip."""
+    stiffness = np.array(ANTENNA.hinge_stiffness())
+    arms = ANTENNA.length - ANTENNA.link_length * np.arange(len(stiffness))
+    under = slice(ANTENNA.sensed_hinges)  # the flex sensor
+    flex = 0.010 * (arms / stiffness)[under].sum() / (arms**2 / stiffness).sum()
+    touch = TouchStimulus(["left:10mm@0s"], ANTENNA)
+    assert touch.change(1.0, begun=0.0) == pytest.approx([reading(flex), 0.0], abs=1.0)
+
+
+def test_touches_begin_with_each_client_and_last_a_second() -> None:
+    touch = TouchStimulus(["left@2s", "right:60deg@4s", "right:0deg@6s"], ANTENNA)
+    for begun in (10.0, 50.0):
+        for t, left, right in ((1.9, 0, 0), (2.5, 1.0, 0), (3.1, 0, 0), (5.0, 0, np.pi / 3)):
+            assert touch.change(begun + t, begun).tolist() == [reading(left), reading(right)]
+        assert touch.change(begun + 6.5, begun).tolist() == [0, 0]
+
+
+def test_touches_can_be_typed_and_the_next_client_finds_none_of_them() -> None:
+    touch = TouchStimulus(["-", "left@2s"], ANTENNA)
+    assert touch.typed
+    assert touch.change(1.0, begun=0.0).tolist() == [0, 0]
+    touch.order("left:60deg")
+    touch.order("right")
+    assert touch.change(1.5, begun=0.0).tolist() == [reading(np.pi / 3), reading(1.0)]
+    assert touch.change(2.6, begun=0.0).tolist() == [reading(np.pi / 3), 0]
+    touch.order("left:0mm")
+    assert touch.change(2.7, begun=0.0).tolist() == [0, 0]
+    assert touch.change(22.5, begun=20.0).tolist() == [reading(1.0), 0]
+
+
+@pytest.mark.parametrize(
+    "text", ["", "left:5", "left:5mm", "left:5cm@1s", "up@1s", "left:900mm@1s"]
+)
+def test_other_orders_are_refused(text: str) -> None:
+    with pytest.raises(BadInputError, match="--touch: expected"):
+        TouchStimulus([text], ANTENNA)
+    with pytest.raises(BadInputError, match="--touch: expected"):
+        TouchStimulus(["-"], ANTENNA).order("left@1s")
+
+
+def test_one_twin_serves_many_drives_each_with_its_touches_from_the_same_start() -> None:
+    config = TwinConfig(touch=("left@1s", "right@3s"))
+    made = rig(config, touch=TouchCheckParams())
+    starts = list[list[float]]()
+    for _ in range(2):
+        again = rig(config, touch=TouchCheckParams())
+        made.session.quality, made.session.supervisor = (
+            again.session.quality,
+            again.session.supervisor,
+        )
+        made.session.outputs = None
+        made.clock.sleep(1.0)  # the time in which another program starts
+        made.robot.bus.receive(made.clock.now(), packets.ping(1))
+        made.clock.sleep(0.1)
+        starts.append([servo.get("present_position") % 4096 for servo in made.robot.servos])
+        plan = DriveConfig(dry_run=0.5, duration=2.0, touch=TouchCheckParams(patience=10.0))
+        report = drive(made.session, plan, arm=True)
+        assert report.refusal == ""
+        assert report.walk.time == pytest.approx(2.0, abs=0.3)
+    assert starts[0] == starts[1]
+
+
+@contextmanager
+def typing_twin(*words: str) -> Iterator[tuple[subprocess.Popen[bytes], str]]:
+    """A twin whose standard input takes orders, and the path of its board."""
+    with subprocess.Popen(
+        [*ANTENNATE, "twin", "--touch", "-", *words],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+    ) as process:
+        assert process.stdout is not None
+        try:
+            yield process, json.loads(process.stdout.readline())["esp32"]
+        finally:
+            process.terminate()
+
+
+def test_the_shipped_twin_takes_typed_touches_and_answers_others(tmp_path_factory) -> None:
+    with typing_twin() as (process, board):
+        assert process.stdin is not None
+        assert process.stderr is not None
+        process.stdin.write(b"left:20mm\nnonsense\n")
+        process.stdin.flush()
+        said = process.stderr.readline().decode()
+        path = tmp_path_factory.mktemp("record") / "left.csv"
+        record = ["record", "--esp32", board, "--duration", "0.3", "--out", str(path)]
+        subprocess.run([*ANTENNATE, *record], check=True, capture_output=True)
+        rows = [line.split(",") for line in path.read_text().splitlines()[1:]]
+    assert said.startswith("--touch: expected left or right")
+    left, right = (np.median([float(row[i]) for row in rows]) for i in (1, 2))
+    assert left < right - 50
