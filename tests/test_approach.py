@@ -60,9 +60,9 @@ class Seen:
 
 
 def test_without_an_approach_the_first_motion_runs_at_the_limit() -> None:
-    """What was so before: at the start of trial 0 in 44 of the first 100 packets."""
+    """What was so before: at the start of trial 0 in each of the first 100 packets."""
     seen = Seen(approach=LIMIT, duration=1.5)
-    assert int((seen.speeds[:100] >= LIMIT - ROUNDING).sum()) == 44
+    assert int((seen.speeds[:100] >= LIMIT - ROUNDING).sum()) == 100
 
 
 def test_the_first_motion_is_slow_and_the_gait_begins_where_it_ends() -> None:

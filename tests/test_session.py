@@ -117,12 +117,12 @@ def test_a_dry_run_writes_nothing_to_any_servo() -> None:
 
 
 def test_it_arms_walks_and_ends_without_torque() -> None:
-    log = walked(config=CONFIG.model_copy(update={"duration": 7.0}))
+    log = walked()
     assert State.OK in log.state
     assert log.rig.session.tally.sent > 250
     assert not any(servo.torque for servo in log.rig.robot.servos)
     legs = np.ptp([goals[5:17] for goals in log.goals], axis=0)
-    assert (legs > 4096).all()  # more than a turn: 4 s at half a turn a second, after the approach
+    assert (legs > 4096).all()  # more than a turn in 3 s at half a turn a second
 
 
 def test_B10_torque_comes_on_with_goals_where_servos_stand_and_they_move_slowly() -> None:

@@ -5,11 +5,12 @@ from __future__ import annotations
 from typing import TypeVar
 
 from antennate.hardware.driving.config import DriveConfig
+from antennate.hardware.driving.teleop import TeleopConfig
 from antennate.hardware.esp32.recorder import RecordConfig
 from antennate.hardware.robot import DoctorConfig, RobotConfig
 from antennate.hardware.setup.config import JogConfig, SetupConfig
 from antennate.params import DoctorParams, RecordParams
-from antennate.params.setup import JogParams, PortsParams, SetupParams
+from antennate.params.setup import JogParams, PortsParams, SetupParams, TeleopParams
 
 _Config = TypeVar("_Config", bound=RobotConfig)
 
@@ -22,10 +23,15 @@ class RobotFile(DriveConfig):
     ports: PortsParams = PortsParams()
     setup: SetupParams = SetupParams()
     jog: JogParams = JogParams()
+    teleop: TeleopParams = TeleopParams()
 
     def for_drive(self) -> DriveConfig:
         """What `drive` takes: all but the tables of others."""
         return self._part(DriveConfig)
+
+    def for_teleop(self) -> TeleopConfig:
+        """What `teleop` takes: what `drive` takes, and its own table."""
+        return self._part(TeleopConfig)
 
     def for_doctor(self) -> DoctorConfig:
         """What `antennate doctor` takes: the robot, and its own table."""

@@ -147,7 +147,7 @@ class Session:
             if out.arming:
                 self.touched = True
                 actuators.enable(command)
-                self._fresh, self.approaching = True, False
+                self._fresh, self.approaching = self._slow < self.period, False
                 self.lost = False
             elif out.feed_watchdog and actuators.enabled and not self.lost:
                 self._move(out, command)

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from antennate.control.controllers import RuleController
+from antennate.hardware.driving.config import DriveConfig
 from antennate.params import ControlParams
 from antennate.params.setup import TeleopParams
 from antennate.robots.spec import RobotSpec
@@ -36,6 +37,12 @@ OSCILLATE = "o"
 
 QUIT = ("q", "end")
 """Keys that end the drive; the second one stands for the end of the input."""
+
+
+class TeleopConfig(DriveConfig):
+    """What `drive` takes, and how keys walk the robot; the controller that is named is not used."""
+
+    teleop: TeleopParams = TeleopParams()
 
 
 @dataclass
