@@ -18,8 +18,8 @@ from antennate.hardware.dynamixel.tables import XC430_W240
 from antennate.hardware.safety.causes import State
 from antennate.robots.spec import RobotSpec
 from antennate.twin.config import TwinConfig
+from antennate.twin.driven_servo import DrivenServo
 from antennate.twin.registers import Servo
-from antennate.twin.robot import DrivenServo
 
 COUNTS = math.ceil(1.25 * 4.5 / (0.229 * 2 * math.pi / 60))
 """A quarter more than the 4.5 rad/s of goals, in units of 0.229 rev/min: 235."""

@@ -95,7 +95,6 @@ def walking(silences: int, seed: int) -> list[float]:
     """One drive: the time from each last sample to the HOLD on the bus [s]."""
     made = servos()
     for servo in made:
-        servo.set("present_input_voltage", 111)
         if 6 <= servo.get("id") <= 17:
             servo.set("operating_mode", EXTENDED_MODE)
         else:

@@ -165,6 +165,6 @@ def test_a_sagging_supply_gives_way_under_load() -> None:
     broken(robot, "bus=discharge:0")
     for servo in robot.servos[:2]:
         servo.set("torque_enable", 1)
-        servo.set("goal_position", servo.get("present_position") + 4000)
+        servo.shaft(2048.0, duty=1.0)
     robot.battery.feed(robot.servos, 1.0)
     assert robot.servos[5].get("present_input_voltage") == round(10 * (11.1 - 1.3))

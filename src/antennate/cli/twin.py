@@ -9,7 +9,7 @@ import re
 import secrets
 import sys
 import threading
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import nullcontext
 from pathlib import Path
 from typing import Literal
@@ -26,8 +26,11 @@ from antennate.hardware.ports.keys import read_key
 from antennate.twin.config import TwinConfig, watched
 from antennate.twin.endpoints import Endpoint
 from antennate.twin.faults import Faults, read
+from antennate.twin.orders import Orders
 from antennate.twin.passage import Passage
 from antennate.twin.serve import TwinServer
+from antennate.twin.serve_servos import ServoServer
+from antennate.twin.servo_box import ServoBox, read_list
 from antennate.twin.tcp import TcpEndpoint
 from antennate.twin.touch import TouchStimulus
 from antennate.twin.udp import UdpEndpoint
@@ -44,6 +47,12 @@ ready. Physics begins when the first servo gets torque. --fault and --touch may 
 its tip 20 mm aside. --touch - takes left, left:20mm and so on as lines of standard input, to follow
 the marks of `antennate record`. A robot that has walked is put back to the start when a new client
 begins and no servo has torque.
+
+--push yaw1=20deg@3s turns a joint whose servo has no torque.
+
+--servos 1:xl330-m288,2:xl430-w250@1000000,1:xc430-w240x17 serves DYNAMIXEL servos alone, all else
+as delivered. --orders reads lines while it runs: plug NAME, unplug NAME, only NAME, next,
+push NAME=ANGLE; a NAME is a joint, a number from 1 on, or all.
 
 Faults, each with @Ts for its time:
 servo:ID=silent, bad_crc, truncated, late:SECONDS, doubled, wrong_id, oversized, voltage, overheat,
@@ -62,6 +71,10 @@ class Places(FromFile):
     key: Path | None = option(
         None, "file with the key for --udp, mode 0600; else ANTENNATE_KEY", "FILE"
     )
+    servos: str = option(
+        "", "these servos alone, without a robot; or a TOML file", "ID:MODEL[@BAUD][xCOUNT],..."
+    )
+    orders: str = option("", "take orders from a file, a named pipe or - for stdin", "FILE")
     passed: Path | None = option(
         None, "make this file when the head passes the exit, for `drive --until FILE`", "FILE"
     )
@@ -78,25 +91,69 @@ def command(argv: Sequence[str]) -> int:
         AntennateError: Something given cannot be used.
     """
     config, places = parse("twin", DESCRIPTION, TwinConfig, argv, Places)
+    orders = Orders(places.orders, _say) if places.orders else None
+    return (_serve_servos if places.servos else _serve_robot)(config, places, orders)
+
+
+def _serve_robot(config: TwinConfig, places: Places, orders: Orders | None) -> int:
     faults = Faults([read(text) for text in config.fault], config.robot.ids)
     real = places.pace == "real"
     robot, passage = watched(config, boot_id=secrets.randbits(32) if real else None)
     passage.on_pass = lambda: _tell(passage, places.passed)
     if robot.touch is not None and robot.touch.typed:
+        if places.orders == "-":
+            raise ConfigError("--orders -: expected another file beside --touch -")
         threading.Thread(target=_take_orders, args=(robot.touch,), daemon=True).start()
-    end = float("inf") if config.duration is None else config.duration
-    with TwinServer(robot, faults, *_endpoints(places)) as server:
+    with TwinServer(robot, faults, *_endpoints(places), orders) as server:
         try:
-            sys.stdout.write(json.dumps(server.paths) + "\n")
-            sys.stdout.flush()
             with urgent(LEVEL + 1) if real else nullcontext():
                 serve = server.run if real else server.run_lockstep
-                serve(lambda t: t < end and robot.failure is None)
+                serve(_until(config, server.paths, lambda: robot.failure is None))
         finally:
             invalid = f"physics became invalid: {robot.failure}; " if robot.failure else ""
             late = f"its latest tick was {1e3 * server.late:.1f} ms late"
-            sys.stderr.write(f"The twin has ended: {invalid}{passage.summary}; {late}.\n")
+            _say(f"The twin has ended: {invalid}{passage.summary}; {late}.")
     return OK
+
+
+def _serve_servos(config: TwinConfig, places: Places, orders: Orders | None) -> int:
+    """Servos without a robot."""
+    if places.udp or places.pace != "real":
+        raise ConfigError("--servos: expected neither --udp nor --pace lockstep beside it")
+    entries = read_list(places.servos)
+    demands = [read(text) for text in config.fault]
+    faults = Faults(demands, [entry.id for entry in entries], alone=True)
+    box = ServoBox(entries, config.plugged, config.push)
+    bus = TcpEndpoint(*_place("--tcp", places.tcp)) if places.tcp else None
+    with ServoServer(box, faults, bus, orders) as server, urgent(LEVEL + 1):
+        server.run(_until(config, server.paths, lambda: True))
+    return OK
+
+
+def _until(
+    config: TwinConfig, paths: dict[str, str], sound: Callable[[], bool]
+) -> Callable[[float], bool]:
+    """Whether to go on at a time [s]; the first time it also says that the twin is ready.
+
+    Only then does it answer at once: what takes a while to begin has begun.
+    """
+    end = float("inf") if config.duration is None else config.duration
+    told = False
+
+    def go_on(t: float) -> bool:
+        nonlocal told
+        if not told:
+            told = True
+            sys.stdout.write(json.dumps(paths) + "\n")
+            sys.stdout.flush()
+        return t < end and sound()
+
+    return go_on
+
+
+def _say(text: str) -> None:
+    sys.stderr.write(text + "\n")
+    sys.stderr.flush()
 
 
 def _tell(passage: Passage, file: Path | None) -> None:

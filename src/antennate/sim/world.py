@@ -118,6 +118,7 @@ class World:
         names = [PREFIX + n for n in robot.joint_names]
         self._drive: Ints = np.array([model.actuator(n).id for n in names])
         self._driven = self._addresses(names)
+        self._turning: Ints = np.array([model.joint(n).dofadr[0] for n in names])
         self._root: int = model.joint(PREFIX + "root").qposadr[0]
         self._links: Ints = np.array([model.body(PREFIX + n).id for n in robot.link_names])
         self._leg_geoms: Ints = np.array([model.geom(PREFIX + n).id for n in robot.leg_names])
@@ -182,6 +183,19 @@ class World:
     def drives(self) -> Floats:
         """Angles of all driven joints, in the order of `command` [rad], shape (n,)."""
         return self._qpos[self._driven]
+
+    def place_drives(self, angles: Floats) -> None:
+        """Put all driven joints at angles [rad], shape (n,), without physics."""
+        self._qpos[self._driven] = angles
+        mujoco.mj_forward(self.model, self.data)
+
+    def drive_speeds(self) -> Floats:
+        """Speeds of all driven joints [rad/s], shape (n,)."""
+        return self._qvel[self._turning]
+
+    def drive_torques(self) -> Floats:
+        """Torques of all actuators, without what their joints' damping takes [N·m], shape (n,)."""
+        return self.data.actuator_force[self._drive]
 
     def step(self, count: int) -> None:
         """Advance by `count` physics steps.

@@ -12,51 +12,24 @@ is expected to be quiet meanwhile: its packets never collide with an answer.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from enum import Enum
 from itertools import zip_longest
 
 import numpy as np
 
 from antennate.hardware.dynamixel import packets
-from antennate.hardware.dynamixel.packets import BROADCAST, Instruction, Packet, Status, StatusError
+from antennate.hardware.dynamixel.packets import BROADCAST, Instruction, Packet, Status
 from antennate.hardware.dynamixel.parser import Parser
 from antennate.hardware.dynamixel.tables import BAUD_RATES, RETURN_DELAY_UNIT, XC430_W240
+from antennate.twin import instructions
+from antennate.twin.instructions import two_words
 from antennate.twin.noise import Noise
 from antennate.twin.registers import Servo
+from antennate.twin.trouble import Fault, Trouble, spoil
 
 _GIVE_UP = 0.01
 """Silence after which servos forget half a packet [s]: ten times the longest packet used."""
 
 _GOAL = XC430_W240["goal_position"]
-_CLEAR = b"\x01\x44\x58\x4c\x22"
-
-
-class Fault(Enum):
-    """What may be wrong with the answers of a servo."""
-
-    SILENT = "takes nothing and replies nothing"
-    BAD_CRC = "answers with a wrong CRC"
-    TRUNCATED = "stops in the middle of an answer"
-    LATE = "answers, and all after it, `delay` seconds late"
-    DOUBLED = "answers twice"
-    WRONG_ID = "answers with the id of its neighbour"
-    OVERSIZED = "answers with four bytes too many"
-
-
-@dataclass(slots=True)
-class Trouble:
-    """A fault of one servo.
-
-    Attributes:
-        fault: What.
-        delay: For LATE, by how much [s].
-        count: How many more answers it spoils, None for all; not used for SILENT.
-    """
-
-    fault: Fault
-    delay: float = 0.0
-    count: int | None = None
 
 
 class ServoBus:
@@ -64,7 +37,7 @@ class ServoBus:
 
     Args:
         servos: In any order; two may share an id.
-        baud: Bits per second; a byte is ten bits.
+        baud: Bits per second while the master's are not known; a byte is ten bits.
         loss: Share of answers that get lost between the wire and the master.
         rng: Which of them.
         fast: They understand fast sync reads.
@@ -95,7 +68,7 @@ class ServoBus:
         self.noise = Noise(seed=1)
         self.master_baud: int | None = None
         self.on_goals: Callable[[], None] = lambda: None
-        self._byte_time = 10.0 / baud
+        self._baud = baud
         self._rng = rng or np.random.default_rng(0)
         self._parser = Parser()
         self._t = self._last = 0.0
@@ -140,42 +113,21 @@ class ServoBus:
             Instruction.SYNC_READ: self._sync_read,
             Instruction.FAST_SYNC_READ: self._fast_sync_read,
             Instruction.SYNC_WRITE: self._sync_write,
+            Instruction.BULK_READ: self._bulk_read,
+            Instruction.FAST_BULK_READ: self._fast_bulk_read,
+            Instruction.BULK_WRITE: self._bulk_write,
         }
         if packet.instruction in many:
             if packet.id == BROADCAST and len(packet.params) > 4:
                 many[Instruction(packet.instruction)](t, present, packet.params)
             return
-        reached = [s for s in present if packet.id in (s.get("id"), BROADCAST)]
+        reached = [s for s in present if instructions.is_for(s, packet)]
         for servos in self._by_id(reached):
-            answers = [a for s in servos if (a := self._single(t, s, packet)) is not None]
-            t = self._reply(t, servos[0], [packets.status(answer) for answer in answers])
-
-    def _single(self, t: float, servo: Servo, packet: Packet) -> Status | None:
-        level, name = servo.get("status_return_level"), servo.get("id")
-        asks_all = packet.id == BROADCAST
-        if packet.instruction == Instruction.PING:
-            data = b"".join(
-                servo.table[r].encode(servo.get(r)) for r in ("model_number", "firmware_version")
-            )
-            return _answer(servo, name, StatusError.NONE, data)
-        if packet.instruction == Instruction.READ:
-            error, data = servo.read(*_two_words(packet.params))
-            return _answer(servo, name, error, data) if level >= 1 and not asks_all else None
-        error = self._change(t, servo, packet)
-        return _answer(servo, name, error, b"") if level >= 2 and not asks_all else None
-
-    def _change(self, t: float, servo: Servo, packet: Packet) -> StatusError:
-        if packet.instruction == Instruction.WRITE and len(packet.params) > 2:
-            return servo.write(int.from_bytes(packet.params[:2], "little"), packet.params[2:])
-        if packet.instruction == Instruction.REBOOT:
-            servo.restart(t)
-            return StatusError.NONE
-        if packet.instruction == Instruction.CLEAR and packet.params == _CLEAR:
-            return servo.clear_turns()
-        return StatusError.INSTRUCTION
+            said = [a for s in servos if (a := instructions.answer(t, s, packet)) is not None]
+            t = self._reply(t, servos[0], [packets.status(one) for one in said])
 
     def _sync_write(self, t: float, present: list[Servo], params: bytes) -> None:
-        address, length = _two_words(params)
+        address, length = two_words(params)
         known = {servos[0].get("id"): servos for servos in self._by_id(present)}
         for at in range(4, len(params) - length, length + 1):
             for servo in known.get(params[at], ()):
@@ -184,26 +136,49 @@ class ServoBus:
         if address == _GOAL.address and named >= {servo.get("id") for servo in self.servos}:
             self.on_goals()
 
+    def _bulk_write(self, t: float, present: list[Servo], params: bytes) -> None:
+        while len(params) > 5:
+            address, length = two_words(params[1:])
+            if len(params) < 5 + length:
+                return
+            for servo in present:
+                if servo.get("id") == params[0]:
+                    servo.write(address, params[5 : 5 + length])
+            params = params[5 + length :]
+
     def _sync_read(self, t: float, present: list[Servo], params: bytes) -> None:
-        address, length = _two_words(params)
-        for name in params[4:]:
+        self._chain(t, present, [(name, *two_words(params)) for name in params[4:]])
+
+    def _bulk_read(self, t: float, present: list[Servo], params: bytes) -> None:
+        self._chain(t, present, _bulk(params))
+
+    def _chain(self, t: float, present: list[Servo], asked: list[tuple[int, int, int]]) -> None:
+        """Let servos answer one after the other: id, address and length of each."""
+        for name, address, length in asked:
             servos = [s for s in present if s.get("id") == name and s.get("status_return_level")]
             if not servos:
                 return
-            replies = [packets.status(_answer(s, name, *s.read(address, length))) for s in servos]
-            t = self._reply(t, servos[0], replies)
+            said = [instructions.status(s, *s.read(address, length)) for s in servos]
+            t = self._reply(t, servos[0], [packets.status(one) for one in said])
 
     def _fast_sync_read(self, t: float, present: list[Servo], params: bytes) -> None:
-        address, length = _two_words(params)
-        names = params[4:]
+        self._join(t, present, [(name, *two_words(params)) for name in params[4:]])
+
+    def _fast_bulk_read(self, t: float, present: list[Servo], params: bytes) -> None:
+        self._join(t, present, _bulk(params))
+
+    def _join(self, t: float, present: list[Servo], asked: list[tuple[int, int, int]]) -> None:
+        """Let servos answer with one packet together: id, address and length of each."""
         chain: list[tuple[Servo, Status]] = []
-        known = {servo.get("id"): servo for servo in reversed(present)}
-        for name in names if self.fast else b"":
+        known = {s.get("id"): s for s in reversed(present) if s.get("status_return_level")}
+        for name, address, length in asked if self.fast else []:
             servo = known.get(name)
             if servo is None:
                 break
-            chain.append((servo, _answer(servo, name, *servo.read(address, length))))
-        pieces = packets.fast_reply(len(names), [answer for _, answer in chain], length)
+            error, data = servo.read(address, length)
+            chain.append((servo, instructions.status(servo, error, data.ljust(length, b"\0"))))
+        size = sum(length + 4 for _, _, length in asked)
+        pieces = instructions.fast_pieces(size, [said for _, said in chain])
         for (servo, _), piece in zip(chain, pieces, strict=True):
             broken = any(self._is(servo, f) for f in (Fault.BAD_CRC, Fault.TRUNCATED))
             delay = 0.0 if servo is not chain[0][0] else None
@@ -224,15 +199,20 @@ class ServoBus:
         if trouble and trouble.fault is Fault.LATE:
             start += trouble.delay
         data = bytes(_collide(replies))
-        data = _spoil(data, trouble.fault) if trouble else data
+        data = spoil(data, trouble.fault) if trouble else data
         end = start + self._byte_time * len(data)
         if not (self.loss and self._rng.random() < self.loss):
             self._out.append((end + self.latency, data))
         return end
 
+    @property
+    def _byte_time(self) -> float:
+        """Time that a byte takes [s]: ten bits."""
+        return 10.0 / (self.master_baud or self._baud)
+
     def _understands(self, servo: Servo) -> bool:
-        known = self.master_baud is None or BAUD_RATES[servo.get("baud_rate")] == self.master_baud
-        return known and not self._is(servo, Fault.SILENT)
+        same = self.master_baud is None or BAUD_RATES[servo.get("baud_rate")] == self.master_baud
+        return same and servo.get("protocol_type") != 1 and not self._is(servo, Fault.SILENT)
 
     def _is(self, servo: Servo, fault: Fault) -> bool:
         trouble = self._trouble_of(servo)
@@ -240,7 +220,7 @@ class ServoBus:
 
     def _trouble_of(self, servo: Servo) -> Trouble | None:
         """A fault stays with its servo when the id of that changes."""
-        return self.trouble.get(self._first_ids.get(id(servo), servo.get("id")))
+        return servo.trouble or self.trouble.get(self._first_ids.get(id(servo), servo.get("id")))
 
     def _use(self, servo: Servo) -> Trouble | None:
         trouble = self._trouble_of(servo)
@@ -257,12 +237,9 @@ class ServoBus:
         return [found[name] for name in sorted(found)]
 
 
-def _answer(servo: Servo, name: int, error: StatusError, data: bytes) -> Status:
-    return Status(name, error, servo.get("hardware_error_status") != 0, data)
-
-
-def _two_words(params: bytes) -> tuple[int, int]:
-    return int.from_bytes(params[:2], "little"), int.from_bytes(params[2:4], "little")
+def _bulk(params: bytes) -> list[tuple[int, int, int]]:
+    """Id, address and length of each servo that a bulk read asks."""
+    return [(params[at], *two_words(params[at + 1 :])) for at in range(0, len(params) - 4, 5)]
 
 
 def _collide(replies: list[bytes]) -> list[int]:
@@ -273,21 +250,3 @@ def _collide(replies: list[bytes]) -> list[int]:
             byte &= bits
         mixed.append(byte)
     return mixed
-
-
-def _spoil(data: bytes, fault: Fault) -> bytes:
-    if fault is Fault.BAD_CRC:
-        return data[:-1] + bytes([data[-1] ^ 0x55])
-    if fault is Fault.TRUNCATED:
-        return data[: len(data) // 2]
-    if fault is Fault.DOUBLED:
-        return data + data
-    status = next(iter(Parser().feed(data)), None)
-    answer = status and packets.as_status(status)
-    if answer and fault is Fault.WRONG_ID:
-        return packets.status(Status(answer.id + 1, answer.error, answer.alert, answer.data))
-    if answer and fault is Fault.OVERSIZED:
-        return packets.status(
-            Status(answer.id, answer.error, answer.alert, answer.data + b"\0" * 4)
-        )
-    return data

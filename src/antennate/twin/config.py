@@ -11,6 +11,7 @@ from antennate.robots.spec import RobotSpec
 from antennate.sim.scenes.registry import make_scene
 from antennate.sim.sim_robot import SimRobot
 from antennate.sim.trial import TrialConfig, draw_trial
+from antennate.twin.driven_servo import factory_new
 from antennate.twin.passage import Passage
 from antennate.twin.robot import TwinRobot
 from antennate.twin.touch import TouchStimulus
@@ -40,6 +41,12 @@ class TwinConfig(TrialConfig):
     """Faults, such as servo:7=silent@3s."""
     touch: Annotated[tuple[str, ...], GATHERED] = number((), "1", "assumed: nobody is there")
     """Touches of the standing robot: left@2s, left:20mm@2s, or - to type them; from each client."""
+    push: Annotated[tuple[str, ...], GATHERED] = number((), "1", "assumed: nobody is there")
+    """Joints without torque that are turned, such as yaw1=20deg@3s, from the first packet on."""
+    factory: bool = number(False, "1", "assumed: they are set up")
+    """Servos as delivered: all id 1 at 57600 bit/s."""
+    plugged: Annotated[tuple[str, ...], GATHERED] = number((), "1", "assumed: all")
+    """Joints whose servos are on the bus at first, or `none`."""
     battery: BatteryParams = BatteryParams()
     robot: RobotSpec = RobotSpec()
     control: TwinControlParams = TwinControlParams()
@@ -69,6 +76,9 @@ def watched(config: TwinConfig, boot_id: int | None = None) -> tuple[TwinRobot, 
         touch=touch,
         watch=passage.watch,
         battery=config.battery,
+        servos=factory_new(config.robot) if config.factory else None,
+        pushes=config.push,
     )
     robot.on_return = passage.reset
+    robot.plugging.begin(config.plugged)
     return robot, passage

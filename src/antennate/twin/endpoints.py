@@ -8,12 +8,9 @@ import termios
 import tty
 from typing import Protocol
 
-from antennate.hardware.dynamixel.tables import BAUD_RATES
+from antennate.twin import serial_speed
 
 _CHUNK = 4096
-_SPEEDS: dict[int, int] = {
-    getattr(termios, f"B{baud}"): baud for baud in BAUD_RATES if hasattr(termios, f"B{baud}")
-}
 
 
 class Endpoint(Protocol):
@@ -51,12 +48,13 @@ class Terminal:
     def __init__(self) -> None:
         self._master, self._slave = os.openpty()
         tty.setraw(self._slave, termios.TCSANOW)
+        serial_speed.unset(self._slave)
         os.set_blocking(self._master, False)
         self.path = os.ttyname(self._slave)
 
     def baud(self) -> int | None:
-        """Bits per second that the client has set, None if it is none of the usual ones."""
-        return _SPEEDS.get(termios.tcgetattr(self._slave)[5])
+        """Bits per second that the client has set, None if it has set none."""
+        return serial_speed.speed(self._slave)
 
     def fileno(self) -> int:
         """File descriptor of our side."""

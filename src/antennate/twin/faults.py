@@ -11,9 +11,11 @@ from dataclasses import dataclass
 
 from antennate.errors import BadInputError
 from antennate.hardware.dynamixel.tables import XC430_W240
-from antennate.twin.bus import Fault, Trouble
+from antennate.twin.bus import ServoBus
 from antennate.twin.registers import Servo
 from antennate.twin.robot import TwinRobot
+from antennate.twin.servo_box import ServoBox
+from antennate.twin.trouble import Fault, Trouble
 
 _FORM = re.compile(
     r"(?P<target>servo:(?P<id>\d{1,3})|esp32|bus|link)=(?P<what>[a-z_]+)(:(?P<size>[0-9.e-]+))?"
@@ -94,33 +96,49 @@ def _check_register(name: str, value: float) -> None:
 
 
 class Faults:
-    """Demands that wait for their time."""
+    """Demands that wait for their time.
 
-    def __init__(self, demands: Sequence[Demand], ids: Sequence[int]) -> None:
+    Args:
+        demands: The faults.
+        ids: Ids of the servos, in their order.
+        alone: There are servos and their bus, but no robot.
+
+    Raises:
+        BadInputError: One is for something that is not there.
+    """
+
+    def __init__(self, demands: Sequence[Demand], ids: Sequence[int], alone: bool = False) -> None:
         self._waiting = sorted(demands, key=lambda demand: demand.t)
         self._ids = tuple(ids)
         for demand in demands:
             if demand.target == "servo" and demand.servo not in ids:
                 known = ", ".join(map(str, ids))
                 raise BadInputError(f"--fault: expected a servo of {known}, found {demand.servo}")
+            if alone and (demand.target in ("esp32", "link") or demand.what == "discharge"):
+                raise BadInputError(
+                    "--fault: expected one of a servo or the bus where there is no robot, found "
+                    f"{demand.target}={demand.what}"
+                )
 
-    def apply(self, robot: TwinRobot, t: float) -> None:
+    def apply(self, twin: TwinRobot | ServoBox, t: float) -> None:
         """Let happen what is due at time t [s]."""
         while self._waiting and self._waiting[0].t <= t:
             demand = self._waiting.pop(0)
-            if demand.target == "esp32":
-                _break_board(robot, demand)
-            elif demand.target == "bus":
-                _break_bus(robot, demand)
-            elif demand.target == "link":
-                for noise in (robot.noise, robot.bus.noise):
-                    setattr(noise, demand.what, demand.size)
+            if demand.target == "servo":
+                _break_servo(twin.servos[self._ids.index(demand.servo)], demand, twin.t)
+            elif isinstance(twin, TwinRobot) and demand.target != "bus":
+                _break_robot(twin, demand)
+            elif isinstance(twin, TwinRobot) and demand.what == "discharge":
+                twin.battery.discharge(twin.t, demand.size)
             else:
-                _break_servo(robot, robot.servos[self._ids.index(demand.servo)], demand)
+                _break_bus(twin.bus, demand)
 
 
-def _break_board(robot: TwinRobot, demand: Demand) -> None:
-    if demand.what in _SIDES:
+def _break_robot(robot: TwinRobot, demand: Demand) -> None:
+    if demand.target == "link":
+        for noise in (robot.noise, robot.bus.noise):
+            setattr(noise, demand.what, demand.size)
+    elif demand.what in _SIDES:
         robot.hold(_SIDES.index(demand.what), demand.size)
     elif demand.what == "ber":
         robot.noise.ber = demand.size
@@ -128,22 +146,20 @@ def _break_board(robot: TwinRobot, demand: Demand) -> None:
         robot.break_board(demand.what)
 
 
-def _break_bus(robot: TwinRobot, demand: Demand) -> None:
+def _break_bus(bus: ServoBus, demand: Demand) -> None:
     if demand.what == "latency":
-        robot.bus.latency = demand.size
-    elif demand.what == "discharge":
-        robot.battery.discharge(robot.t, demand.size)
+        bus.latency = demand.size
     elif demand.what == "ber":
-        robot.bus.noise.ber = demand.size
+        bus.noise.ber = demand.size
     else:
-        robot.bus.loss = 1.0 if demand.what == "silent" else demand.size
+        bus.loss = 1.0 if demand.what == "silent" else demand.size
 
 
-def _break_servo(robot: TwinRobot, servo: Servo, demand: Demand) -> None:
+def _break_servo(servo: Servo, demand: Demand, t: float) -> None:
     if demand.what in _SERVO:
-        robot.bus.trouble[demand.servo] = Trouble(_SERVO[demand.what], delay=demand.size)
+        servo.trouble = Trouble(_SERVO[demand.what], delay=demand.size)
     elif demand.what == "reboot":
-        servo.restart(robot.t)
+        servo.restart(t)
     elif demand.what in _HARDWARE:
         servo.fail(_HARDWARE[demand.what])
     elif demand.what in servo.table.registers:

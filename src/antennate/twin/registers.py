@@ -1,10 +1,8 @@
 """One DYNAMIXEL servo as a register machine: what it stores, refuses and does. Time is an argument.
 
-It moves to its goal at a limited speed and without inertia. Where the manuals are silent the worse
-case is assumed: torque on keeps an old goal, as reported in
+Where the manuals are silent the worse case is assumed: torque on keeps an old goal, as reported in
 https://github.com/pollen-robotics/reachy_mini/issues/1136, and so does a Clear; a tripped bus
-watchdog takes nothing but 0; a read that touches an undefined byte is refused as a whole; a restart
-takes a quarter second.
+watchdog takes nothing but 0; a restart takes a quarter second.
 """
 
 from __future__ import annotations
@@ -13,28 +11,35 @@ import math
 
 from antennate.hardware.dynamixel.packets import StatusError
 from antennate.hardware.dynamixel.tables import (
-    EXTENDED_MODE,
+    CURRENT_MODE,
     GOALS,
-    POSITION_UNIT,
-    VELOCITY_UNIT,
+    POSITION_MODE,
+    PWM_MODE,
+    TORQUE_BY_GOAL,
     WATCHDOG_UNIT,
     Register,
     Table,
 )
+from antennate.twin import rules
+from antennate.twin.memory import Memory, backed_up
+from antennate.twin.motion import Motion, MotorMotion
+from antennate.twin.motor import RATINGS
+from antennate.twin.trouble import Trouble
 
 BOOT_TIME = 0.25
 """Time after a reboot in which it takes nothing [s]; assumed, the manual says nothing."""
 
-_POSITION_MODES = (3, 4, 5)
-_VELOCITY_MODE = 1
-_TICKS = 4096
-_SPEED_UNIT = VELOCITY_UNIT / POSITION_UNIT
-_TORQUE_BY_GOAL = 8
-"""Bit of Drive Mode."""
-_TRIPPED = -1
 _FIRMWARE = 48
-_VOLTS_MARGIN = 10
 _ROOM_TEMPERATURE = 25
+_VOLTAGE_ERROR, _HEAT_ERROR = 1, 4
+"""Bits of Hardware Error Status."""
+_TORQUE_AT_START, _RAM_AT_START = 1, 2
+"""Bits of Startup Configuration."""
+_TOLD = frozenset(
+    {"moving", "moving_status", "present_pwm", "present_load", "present_current"}
+    | {"present_velocity", "present_position", "velocity_trajectory", "position_trajectory"}
+)
+"""Registers that tell what the shaft does."""
 
 
 class Servo:
@@ -45,44 +50,49 @@ class Servo:
         servo: Its id.
         position: Where its shaft is [ticks].
         t: Time of power-on [s].
+
+    Attributes:
+        table: Its model.
+        memory: The control table.
+        motion: Its shaft, and how it is moved.
+        eeprom_writes: Registers of the EEPROM written so far.
+        plugged: It is on the bus and has power.
+        registered: Address and data of a Reg Write that waits for its Action.
+        trouble: What is wrong with its answers.
     """
 
     def __init__(self, table: Table, servo: int, position: float = 2048.0, t: float = 0.0) -> None:
         self.table = table
+        self.memory = Memory(table)
+        self.motion = self._make_motion(position)
         self.eeprom_writes = 0
-        self._memory = bytearray(max(r.address + r.size for r in table.registers.values()))
-        self._starts = {r.address: r for r in table.registers.values()}
-        self._where = {
-            r.name: (slice(r.address, r.address + r.size), r.size, r.signed)
-            for r in table.registers.values()
-        }
-        self._defined = {
-            a for r in self._starts.values() for a in range(r.address, r.address + r.size)
-        }
-        for register in table.registers.values():
-            self.set(register.name, register.default or 0)
+        self.plugged = True
+        self.registered: tuple[int, bytes] | None = None
+        self.trouble: Trouble | None = None
+        self._backup: bytes | None = None
+        self._untold = True
+        self._t = self._fed = self._boot = t
         self.set("id", servo)
         self.set("firmware_version", _FIRMWARE)
-        self._position = position
-        self._t = t
         self._start(t)
 
     # for the twin and for tests: anything goes
 
     def get(self, name: str) -> int:
         """The value of a register."""
-        where, _, signed = self._where[name]
-        return int.from_bytes(self._memory[where], "little", signed=signed)
+        if self._untold and name in _TOLD:
+            self._tell()
+        return self.memory.get(name)
 
     def set(self, name: str, value: int) -> None:
         """Change a register, whatever its access."""
-        where, size, signed = self._where[name]
-        self._memory[where] = value.to_bytes(size, "little", signed=signed)
+        self.memory.set(name, value)
 
     @property
     def position(self) -> float:
-        """Where the shaft is [ticks]."""
-        return self._position
+        """Where the shaft is, as the servo counts [ticks]."""
+        self._refresh()
+        return self.motion.position
 
     @property
     def last_fed(self) -> float:
@@ -95,9 +105,17 @@ class Servo:
         return self.get("torque_enable") == 1
 
     def place(self, position: float) -> None:
-        """Somebody turns the shaft [ticks]."""
-        self._position = position
-        self.set("present_position", round(position))
+        """Somebody turns the shaft to where the servo counts this [ticks]."""
+        self._refresh()
+        self.motion.place(position)
+        self._show()
+
+    def push(self, ticks: float) -> None:
+        """Somebody turns the shaft there [ticks], if it has no torque."""
+        if not self.torque:
+            self._refresh()
+            self.motion.turn_to(ticks)
+            self._show()
 
     def fail(self, bits: int) -> None:
         """A hardware error: latched until a reboot; torque goes if Shutdown says so."""
@@ -110,11 +128,22 @@ class Servo:
         self.advance(t)
         self._start(t + time)
 
+    def plug(self, t: float) -> None:
+        """Put it on the bus, which gives it power."""
+        self.plugged = True
+        self.restart(t)
+
+    def unplug(self, t: float) -> None:
+        """Take it off the bus, and its power."""
+        self.restart(t)
+        self.set("torque_enable", 0)
+        self.plugged = False
+
     # what the wire sees
 
     def awake(self, t: float) -> bool:
         """It takes packets."""
-        return t >= self._boot
+        return self.plugged and t >= self._boot
 
     def advance(self, t: float) -> None:
         """Let time pass until t [s]."""
@@ -123,8 +152,8 @@ class Servo:
         trip = self._trip_time()
         if trip < t:
             self._move(trip)
-            self.set("bus_watchdog", _TRIPPED)
-            self._stopped = True
+            self.set("bus_watchdog", rules.TRIPPED)
+            self.motion.stopped = True
         self._move(t)
 
     def feed_watchdog(self, t: float) -> None:
@@ -134,94 +163,128 @@ class Servo:
 
     def read(self, address: int, length: int) -> tuple[StatusError, bytes]:
         """Bytes of the table."""
-        if not length or any(a not in self._defined for a in range(address, address + length)):
-            return StatusError.ACCESS, b""
-        return StatusError.NONE, bytes(self._memory[address : address + length])
+        if self._untold:
+            self._tell()
+        return self.memory.read(address, length)
 
-    def write(self, address: int, data: bytes) -> StatusError:
-        """Write whole registers, all or none of them."""
-        changes: list[tuple[Register, int]] = []
-        at = 0
-        while at < len(data) or not data:
-            register = self._starts.get(address + at)
-            if register is None or not register.writable:
-                return StatusError.ACCESS
-            if len(data) - at < register.size:
-                return StatusError.DATA_LENGTH
-            changes.append((register, register.decode(data[at : at + register.size])))
-            at += register.size
-        for register, value in changes:
-            if (error := self._refuses(register, value)) != StatusError.NONE:
-                return error
+    def write(self, address: int, data: bytes, ram_only: bool = False) -> StatusError:
+        """Write whole registers, all or none of them; of the EEPROM none if `ram_only`."""
+        error, changes = self._changes(address, data, ram_only)
         for register, value in changes:
             self._store(register, value)
-        return StatusError.NONE
+        return error
+
+    def refuses(self, address: int, data: bytes, ram_only: bool = False) -> StatusError:
+        """Why a write could not be done now, NONE if it could."""
+        return self._changes(address, data, ram_only)[0]
 
     def clear_turns(self) -> StatusError:
         """Forget whole turns; not while moving."""
         if self.get("moving"):
             return StatusError.RESULT_FAIL
-        self._position %= _TICKS
-        self._show(0.0)
+        self._refresh()
+        self.motion.rebase()
+        self._show()
+        return StatusError.NONE
+
+    def factory_reset(self, t: float, keep: tuple[str, ...]) -> None:
+        """All registers as delivered but for those to keep; it starts anew."""
+        for name, register in self.table.registers.items():
+            if register.eeprom and register.writable and name not in keep:
+                self.eeprom_writes += 1
+                self.set(name, register.default or 0)
+        self.restart(t)
+
+    def store_backup(self) -> StatusError:
+        """Keep a copy of the registers that a backup has; not under torque."""
+        if self.torque:
+            return StatusError.RESULT_FAIL
+        self._backup = self.memory.store()
+        self.set("backup_ready", 1)
+        return StatusError.NONE
+
+    def restore_backup(self) -> StatusError:
+        """Take them from the copy; not under torque, and not without one."""
+        if self.torque or self._backup is None:
+            return StatusError.RESULT_FAIL
+        self.memory.restore(self._backup, backed_up(self.table))
         return StatusError.NONE
 
     # inside
+
+    def _changes(
+        self, address: int, data: bytes, ram_only: bool
+    ) -> tuple[StatusError, list[tuple[Register, int]]]:
+        error, changes = self.memory.changes(address, data, locked=ram_only or self.torque)
+        for register, value in changes:
+            error = error or rules.refuses(self.memory, register, value)
+        return error, [] if error else changes
+
+    def _make_motion(self, position: float) -> Motion:
+        return MotorMotion(self.memory, position)
 
     def _start(self, boot: float) -> None:
         for register in self.table.registers.values():
             if not register.eeprom:
                 self.set(register.name, register.default or 0)
-        for goal, limit in (("goal_pwm", "pwm_limit"), ("goal_velocity", "velocity_limit")):
-            self.set(goal, self.get(limit))
-        if "goal_current" in self.table.registers:
-            self.set("goal_current", self.get("current_limit"))
-        if self.get("operating_mode") != EXTENDED_MODE:
-            self._position %= _TICKS
-        self.set("goal_position", round(self._position))
-        self.set("present_input_voltage", self.get("min_voltage_limit") + _VOLTS_MARGIN)
+        startup = self.get("startup_configuration")
+        if self._backup is not None:
+            self.set("backup_ready", 1)
+            if startup & _RAM_AT_START:
+                names = [n for n in backed_up(self.table) if not self.table[n].eeprom]
+                self.memory.restore(self._backup, names)
+        self.set("present_input_voltage", round(10 * RATINGS[self.table.model].voltage))
         self.set("present_temperature", _ROOM_TEMPERATURE)
-        self._boot = self._fed = boot
-        self._stopped = False
-        self._show(0.0)
+        self.registered = None
+        self._boot = boot
+        self.motion.stopped = False
+        self.motion.shaft.rest()
+        self._refresh()
+        self.motion.rebase()
+        self._reset_goals()
+        self.set("torque_enable", startup & _TORQUE_AT_START)
+        self._show()
 
-    def _refuses(self, register: Register, value: int) -> StatusError:
-        if register.eeprom and self.torque:
-            return StatusError.ACCESS
-        locked = register.name in GOALS or (register.name == "bus_watchdog" and value != 0)
-        if locked and self.get("bus_watchdog") == _TRIPPED:
-            return StatusError.DATA_RANGE
-        low, high = register.low, register.high
-        if (low is not None and value < low) or (high is not None and value > high):
-            return StatusError.DATA_RANGE
-        if register.name == "torque_enable" and value and self.get("hardware_error_status"):
-            return StatusError.RESULT_FAIL
-        least, most = self._limits(register.name)
-        return StatusError.NONE if least <= value <= most else StatusError.DATA_LIMIT
-
-    def _limits(self, name: str) -> tuple[float, float]:
-        if name == "goal_position" and self.get("operating_mode") != EXTENDED_MODE:
-            return self.get("min_position_limit"), self.get("max_position_limit")
-        limits = {
-            "goal_velocity": "velocity_limit",
-            "profile_velocity": "velocity_limit",
-            "goal_pwm": "pwm_limit",
-            "goal_current": "current_limit",
-        }
-        bound = self.get(limits[name]) if name in limits else math.inf
-        return -bound, bound
+    def _reset_goals(self) -> None:
+        """Goals as after power-on and a change of the mode: full drive, but no motion."""
+        mode = self.get("operating_mode")
+        self.set("goal_pwm", 0 if mode == PWM_MODE else self.get("pwm_limit"))
+        if "goal_current" in self.table.registers:
+            self.set("goal_current", 0 if mode == CURRENT_MODE else self.get("current_limit"))
+        self.set("goal_velocity", 0)
+        self.set("goal_position", round(self.position))
 
     def _store(self, register: Register, value: int) -> None:
+        name, torque = register.name, self.torque
         if register.eeprom:
             self.eeprom_writes += 1
-        if register.name in GOALS or register.name == "torque_enable":
-            self._stopped = False
-        if register.name in ("torque_enable", "bus_watchdog"):
+        if name in GOALS or name == "torque_enable":
+            self.motion.stopped = False
+        if name in ("torque_enable", "bus_watchdog"):
             self._fed = max(self._fed, self._t)
-        self.set(register.name, value)
-        if register.name in GOALS and self.get("drive_mode") & _TORQUE_BY_GOAL:
-            self.set("torque_enable", 1)
-        if register.name == "operating_mode":
-            self.set("goal_position", round(self._position))
+        self.set(name, value)
+        by_goal = name in GOALS and self.get("drive_mode") & TORQUE_BY_GOAL
+        if not torque and (by_goal or (name == "torque_enable" and value)):
+            self._raise_torque()
+        if name == "operating_mode":
+            self._change_mode()
+
+    def _raise_torque(self) -> None:
+        """Torque comes on: in position mode it counts within one turn then."""
+        if rules.shut_down(self.memory):
+            return
+        if self.get("operating_mode") == POSITION_MODE:
+            self.motion.rebase()
+        self.set("torque_enable", 1)
+
+    def _change_mode(self) -> None:
+        """Gains, profile and goals are reset; position mode counts within one turn."""
+        for name, register in self.table.registers.items():
+            if "gain" in name or name.startswith("profile_"):
+                self.set(name, register.default or 0)
+        if self.get("operating_mode") == POSITION_MODE:
+            self.motion.rebase()
+        self._reset_goals()
 
     def _trip_time(self) -> float:
         watchdog = self.get("bus_watchdog")
@@ -229,32 +292,36 @@ class Servo:
             return math.inf
         return self._fed + WATCHDOG_UNIT * watchdog
 
-    def _speed(self) -> float:
-        """Velocity that is aimed at [ticks/s], with sign in velocity mode, else the limit."""
-        if self.get("operating_mode") == _VELOCITY_MODE:
-            return _SPEED_UNIT * self.get("goal_velocity")
-        limit = self.get("velocity_limit")
-        return _SPEED_UNIT * min(self.get("profile_velocity") or limit, limit)
+    def _refresh(self) -> None:
+        """Take note of registers that have changed."""
+        if self.motion.refresh(max(self._t, self._fed)):
+            self._look_at_supply()
+            self.motion.refresh(max(self._t, self._fed))
+
+    def _look_at_supply(self) -> None:
+        """Latch an error if supply or temperature are beyond their limits."""
+        least, most = self.get("min_voltage_limit"), self.get("max_voltage_limit")
+        bits = 0
+        if not least <= self.get("present_input_voltage") <= most:
+            bits |= _VOLTAGE_ERROR
+        if self.get("present_temperature") > self.get("temperature_limit"):
+            bits |= _HEAT_ERROR
+        if bits & ~self.get("hardware_error_status"):
+            self.fail(bits)
 
     def _move(self, t: float) -> None:
-        elapsed = max(t - self._t, 0.0)
+        self._refresh()
+        self._untold |= self.motion.move(t)
         self._t = max(self._t, t)
-        step = 0.0
-        mode = self.get("operating_mode")
-        if self.torque and not self._stopped:
-            reach = self._speed() * elapsed
-            if mode == _VELOCITY_MODE:
-                step = reach
-            elif mode in _POSITION_MODES:
-                step = self.get("goal_position") - self._position
-                step = max(-reach, min(reach, step))
-        self._position += step
-        if elapsed:
-            self._show(step / elapsed)
-
-    def _show(self, speed: float) -> None:
-        self.set("present_velocity", round(speed / _SPEED_UNIT))
-        self.set("present_position", round(self._position))
-        self.set("moving", int(abs(speed) / _SPEED_UNIT > self.get("moving_threshold")))
         since = max(self._t - self._boot, 0.0)
-        self.set("realtime_tick", int(1e3 * since) % 32_768)
+        self.memory.show("realtime_tick", int(1e3 * since) % 32_768)
+
+    def _show(self) -> None:
+        """Something has happened that registers tell, once anybody reads them."""
+        self._refresh()
+        self._untold = True
+
+    def _tell(self) -> None:
+        self._refresh()
+        self._untold = False
+        self.motion.show(self._t)

@@ -8,27 +8,24 @@ robot stands and the board repeats its first reading.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from antennate.errors import SimulationError
-from antennate.hardware.dynamixel.packets import StatusError
-from antennate.hardware.dynamixel.tables import (
-    BAUD_RATES,
-    TABLES,
-)
+from antennate.hardware.dynamixel.tables import POSITION_UNIT
 from antennate.hardware.esp32 import frame
 from antennate.hardware.joints import Joints
 from antennate.params.twin import BatteryParams
-from antennate.robots.servos import TICKS_A_TURN, ServoParams
 from antennate.robots.spec import RobotSpec
 from antennate.sim.sim_robot import SimRobot
 from antennate.sim.world import World
 from antennate.twin.battery import Battery
 from antennate.twin.bus import ServoBus
+from antennate.twin.driven_servo import DrivenServo, servos_of
 from antennate.twin.noise import Noise
-from antennate.twin.registers import Servo
+from antennate.twin.orders import Plugging
+from antennate.twin.push import Pushes
 from antennate.twin.touch import TouchStimulus
 from antennate.twin.visit import Visit
 from antennate.types import Floats
@@ -43,67 +40,6 @@ _STANDING_NOISE = 2.5
 """Standard deviation of the readings of a resting antenna [counts], about that while walking."""
 _DEVICE = b"twin\0\0\0\0"
 ROUNDING = 1e-9
-_REVERSED = 1
-"""Bit of Drive Mode."""
-
-
-class DrivenServo(Servo):
-    """A servo whose shaft the physics moves."""
-
-    _stood: float | None = None
-    _ahead = 0.0
-    """Ticks that it counts more than the shaft has turned."""
-
-    def turn(self, turns: float) -> None:
-        """Let it have counted some turns more, as after a long walk.
-
-        The joint stays where it is.
-        """
-        self._ahead += turns * TICKS_A_TURN
-        self.place(self.position + turns * TICKS_A_TURN)
-
-    def shaft(self, ticks: float) -> None:
-        """Where the physics has turned the shaft [ticks]."""
-        self.place(self._mirrored(ticks) + self._ahead)
-
-    def carry(self, ticks: float) -> None:
-        """Let somebody turn the shaft there without torque; whole turns stay as counted."""
-        before, self._stood = self.position, None
-        self.shaft(ticks)
-        self.turn(round((before - self.position) / TICKS_A_TURN))
-
-    def clear_turns(self) -> StatusError:
-        """Forget whole turns; the shaft stays."""
-        before = self.position
-        error = super().clear_turns()
-        self._ahead += self.position - before
-        self._stood = None
-        return error
-
-    def goal(self) -> float:
-        """Where it pulls the shaft to [ticks]; where that stood when it was stopped or let go.
-
-        A gear of 245 to 1 does not let a leg sink.
-        """
-        if self.torque and not self._stopped:
-            self._stood = None
-            return self._mirrored(self.get("goal_position") - self._ahead)
-        if self._stood is None:
-            self._stood = self._mirrored(self.position - self._ahead)
-        return self._stood
-
-    def _mirrored(self, ticks: float) -> float:
-        """From the shaft to what it counts, and back: Drive Mode may reverse it."""
-        return TICKS_A_TURN - ticks if self.get("drive_mode") & _REVERSED else ticks
-
-    def feed_watchdog(self, t: float) -> None:
-        """An instruction packet was on the bus; all else waits for the next tick."""
-        if self._trip_time() < t:
-            self.advance(t)
-        self._fed = t
-
-    def _speed(self) -> float:
-        return 0.0
 
 
 class TwinRobot:
@@ -121,9 +57,12 @@ class TwinRobot:
         touch: Bends the antennae of the standing robot, None for no touches.
         watch: Told the world after each tick of the physics.
         battery: Numbers of its supply.
+        servos: Its servos in the order of its joints, set up for it by default.
+        pushes: Joints without torque that somebody turns, as `push.Pushes` reads them.
 
     Attributes:
         bus: The servos on their wire.
+        plugging: Plugs servos in and turns shafts, by orders.
         t: Time up to which everything has happened [s].
         touch: Bends the antennae of the standing robot, None for no touches.
         board_silent: The board sends nothing.
@@ -142,10 +81,15 @@ class TwinRobot:
         touch: TouchStimulus | None = None,
         watch: Callable[[World], None] = lambda world: None,
         battery: BatteryParams | None = None,
+        servos: Sequence[DrivenServo] | None = None,
+        pushes: Sequence[str] = (),
     ) -> None:
         self._body = body
         self._watch = watch
         self._joints = Joints(robot)
+        self._sign: Floats = np.array(robot.directions, float)
+        kinds = [robot.servos.of(group.servo) for _, group, n in robot.groups for _ in range(n)]
+        self._stall: Floats = np.array([kind.stall_torque for kind in kinds])
         self._period = period
         self._encoder = frame.SampleEncoder(boot_id)
         self._boot_id = boot_id
@@ -162,8 +106,11 @@ class TwinRobot:
         self.board_silent = False
         self.noise = Noise(seed=0)
         self.battery = Battery(battery or BatteryParams())
-        self.servos = _servos(robot)
+        self.servos = list(servos or servos_of(robot))
         self.bus = ServoBus(self.servos, robot.baud)
+        self._zero: Floats = np.array(robot.zeros, float)
+        self._pushes = Pushes(pushes, robot.joint_names, self._ticks_at)
+        self.plugging = Plugging(self.servos, self._pushes)
         self._visit = Visit()
         self._standing, self._start = True, body.world(0).state()
         self._show(self._shafts())
@@ -197,16 +144,19 @@ class TwinRobot:
         self.bus.advance(self._ticks * self._period)
         self.t = max(self.t, self._ticks * self._period)
         self.battery.feed(self.servos, self._ticks * self._period)
+        if self._pushes.busy:
+            self._push()
         torque = any(servo.torque for servo in self.servos)
         if self._visit.step(self.t, self.servos) and not (torque or self._standing):
             self._carry_back()
         if self._standing and not torque:
             return None
         self._standing = False
-        return np.array([servo.goal() for servo in self.servos])
+        end, lead = (self._ticks + 1) * self._period, 0.5 * self._period
+        return np.array([servo.goal(end, lead) for servo in self.servos])
 
     def move(self, goals: Floats | None) -> Floats | None:
-        """The physics of a tick: where the shafts are then [ticks].
+        """The physics of a tick: position, speed and drive of the shafts then, shape (3, n).
 
         Touches nothing that the bus does, so that another thread may do it meanwhile.
         """
@@ -260,22 +210,51 @@ class TwinRobot:
         """Hold the reading of antenna 0 (left) or 1 at a value [counts]; NaN releases it."""
         self._held[side] = counts
 
+    @property
+    def _used(self) -> bool:
+        """A packet has been on the bus."""
+        return any(servo.last_fed > 0.0 for servo in self.servos)
+
+    def _ticks_at(self, place: int, angle: float) -> float:
+        """Where a shaft is at an angle of its joint [ticks]."""
+        return float(self._zero[place] + self._sign[place] * angle / POSITION_UNIT)
+
+    def _push(self) -> None:
+        """Turn shafts that are pushed; before the physics begins the joints follow at once."""
+        moved = self._pushes.apply(self._ticks * self._period, self._used, self.servos)
+        for place, ticks in moved:
+            self.servos[place].push(ticks)
+        if moved and self._standing:
+            ticks = np.array([servo.motion.shaft.position for servo in self.servos])
+            angles = (ticks - self._zero) * self._sign * POSITION_UNIT
+            self._body.world(0).place_drives(angles)
+
     def _carry_back(self) -> None:
         """To where the trial began, as a person does between two drives."""
         self._body.put_back(0, self._start)
         self._standing = True
-        for servo, ticks in zip(self.servos, self._shafts().tolist(), strict=True):
+        for servo, ticks in zip(
+            self.servos, self._joints.positions(self._body.world(0).drives()).tolist(), strict=True
+        ):
             servo.carry(ticks)
         self._counts = self._body.read().counts[0]
         self.on_return()
 
     def _shafts(self) -> Floats:
-        return self._joints.positions(self._body.world(0).drives())
+        """Positions [ticks], speeds [ticks/s] and shares of the full drive, shape (3, n)."""
+        world = self._body.world(0)
+        return np.stack(
+            [
+                self._joints.positions(world.drives()),
+                self._sign * world.drive_speeds() / POSITION_UNIT,
+                self._sign * world.drive_torques() / self._stall,
+            ]
+        )
 
     def _show(self, shafts: Floats) -> None:
-        """Let the servos know where their shafts are [ticks]."""
-        for servo, ticks in zip(self.servos, shafts.tolist(), strict=True):
-            servo.shaft(ticks)
+        """Let the servos know what their shafts do."""
+        for servo, done in zip(self.servos, shafts.T.tolist(), strict=True):
+            servo.shaft(*done)
 
     def _sample(self) -> None:
         """One sample of the board, and a greeting now and then."""
@@ -316,21 +295,3 @@ class TwinRobot:
 
 def _rail(counts: int, flag: int) -> int:
     return flag if counts in (0, frame.FULL_SCALE) else 0
-
-
-def _servos(robot: RobotSpec) -> list[DrivenServo]:
-    """The servos as the robot needs them: of its models, in its operating modes."""
-    kinds = [robot.servos.of(group.servo) for _, group, count in robot.groups for _ in range(count)]
-    return [
-        _servo(servo, kind, robot.modes[servo], robot.baud)
-        for servo, kind in zip(robot.ids, kinds, strict=True)
-    ]
-
-
-def _servo(servo: int, kind: ServoParams, mode: int, baud: int) -> DrivenServo:
-    made = DrivenServo(TABLES[kind.model_number], servo)
-    made.set("operating_mode", mode)
-    made.set("return_delay_time", 0)
-    made.set("baud_rate", BAUD_RATES.index(baud))
-    made.set("present_input_voltage", round(10 * kind.voltage))
-    return made

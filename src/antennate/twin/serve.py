@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 import select
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from antennate.twin.endpoints import Endpoint, Terminal
 from antennate.twin.faults import Faults
+from antennate.twin.orders import Orders
 from antennate.twin.physics import Physics
 from antennate.twin.robot import TwinRobot
 
@@ -26,6 +27,7 @@ class TwinServer:
         faults: What goes wrong, and when.
         board: Endpoint of the board, a pseudo-terminal by default; it is closed on leaving.
         bus: Endpoint of the servos, likewise.
+        orders: Where orders come from, if they do.
 
     Attributes:
         late: Worst lateness of a control tick of the twin itself [s].
@@ -37,8 +39,10 @@ class TwinServer:
         faults: Faults,
         board: Endpoint | None = None,
         bus: Endpoint | None = None,
+        orders: Orders | None = None,
     ) -> None:
         self._robot = robot
+        self._orders = orders
         self._faults = faults
         self._bus = bus or Terminal()
         self._board = board or Terminal()
@@ -64,7 +68,7 @@ class TwinServer:
         with Physics(robot) as physics:
             while go_on(now := time.monotonic() - begin):
                 wait = self._wait(now, physics)
-                ready, _, _ = select.select([*endpoints, physics.bell], [], [], wait)
+                ready, _, _ = select.select([*endpoints, physics.bell, *self._files], [], [], wait)
                 if physics.bell in ready:
                     physics.end()
                     self._board.write(robot.take())
@@ -73,6 +77,7 @@ class TwinServer:
                     self.late = max(self.late, now - robot.due)
                     self._faults.apply(robot, now)
                     physics.begin()
+                self._take_orders(ready, now)
                 if self._bus in ready:
                     self._receive(now)
                 if self._board in ready:
@@ -90,7 +95,9 @@ class TwinServer:
         bus.on_goals = self._step
         self._board.write(robot.take())
         while go_on(robot.t):
-            ready, _, _ = select.select([self._bus, self._board], [], [], _LONGEST)
+            files = [self._bus, self._board, *self._files]
+            ready, _, _ = select.select(files, [], [], _LONGEST)
+            self._take_orders(ready, robot.t)
             if self._bus in ready:
                 self._receive(robot.t)
                 self._bus.write(bus.transmit(math.inf))
@@ -101,6 +108,14 @@ class TwinServer:
     def _receive(self, now: float) -> None:
         self._robot.bus.master_baud = self._bus.baud()
         self._robot.bus.receive(now, self._bus.read())
+
+    @property
+    def _files(self) -> list[int]:
+        return [] if self._orders is None else self._orders.files
+
+    def _take_orders(self, ready: Sequence[object], now: float) -> None:
+        if self._orders is not None and any(file in ready for file in self._files):
+            self._orders.take(lambda text: self._robot.plugging.order(text, now))
 
     def _step(self) -> None:
         self._faults.apply(self._robot, self._robot.due)

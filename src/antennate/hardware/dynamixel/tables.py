@@ -1,15 +1,20 @@
-"""Control tables of the two servo models as data: what lies where, and what may be written.
+"""Control tables of the servo models as data: what lies where, and what may be written.
 
-Sources: https://emanual.robotis.com/docs/en/dxl/x/xc430-w240/ (XC430-W240-T) and
+Sources: https://emanual.robotis.com/docs/en/dxl/x/xc430-w240/ (XC430-W240-T),
+https://emanual.robotis.com/docs/en/dxl/x/xl430-w250/ (XL430-W250-T) and
 https://emanual.robotis.com/docs/en/dxl/x/xl330-m288/ (XL330-M288-T), section Control Table.
-Indirect addresses (from 168) are left out. Where a bound is another register (a goal by its limit),
-the bound here is the widest that register can set. Bus Watchdog also takes 0, which turns it off.
+Where a bound is another register (a goal by its limit), the bound here is the widest that register
+can set. Bus Watchdog also takes 0, which turns it off, and Secondary ID 253 to 255, which turn it
+off too; so say their descriptions.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+
+EEPROM_END = 64
+"""Registers below this address survive power-off and are locked while torque is on."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +46,7 @@ class Register:
     @property
     def eeprom(self) -> bool:
         """It survives power-off and is locked while torque is on."""
-        return self.address < 64
+        return self.address < EEPROM_END
 
     @property
     def writable(self) -> bool:
@@ -64,23 +69,39 @@ class Table:
     Attributes:
         model: Its number.
         fast_read_firmware: First firmware that understands a fast sync read.
+        modes: Operating modes that it has.
         registers: By name, in the order of their addresses.
+        indirect: Address of each byte of indirect data, and of the register that says whose it is.
     """
 
     model: int
     name: str
     fast_read_firmware: int
+    modes: frozenset[int]
     registers: dict[str, Register]
+    indirect: dict[int, int]
 
     def __getitem__(self, name: str) -> Register:
         return self.registers[name]
 
 
-EXTENDED_MODE = 4
-"""Operating mode: position over many turns."""
+CURRENT_MODE, VELOCITY_MODE, POSITION_MODE, EXTENDED_MODE, CURRENT_POSITION_MODE, PWM_MODE = (
+    0,
+    1,
+    3,
+    4,
+    5,
+    16,
+)
+"""Operating modes; extended is position over many turns."""
+
+REVERSED, TIME_BASED, TORQUE_BY_GOAL = 1, 4, 8
+"""Bits of Drive Mode."""
 
 VELOCITY_UNIT = 0.229 * 2.0 * math.pi / 60.0
 """One count of a velocity [rad/s]."""
+ACCELERATION_UNIT = 214.577 * 2.0 * math.pi / 3600.0
+"""One count of an acceleration [rad/s²]."""
 POSITION_UNIT = 2.0 * math.pi / 4096
 """One count of a position [rad]."""
 WATCHDOG_UNIT = 0.020
@@ -112,7 +133,7 @@ _COMMON: list[_Row] = [
     ("return_delay_time", 9, 1, "RW", "2 us", 250, 0, 254),
     ("drive_mode", 10, 1, "RW", "", 0, 0, 13),
     ("operating_mode", 11, 1, "RW", "", 3, 0, 16),
-    ("secondary_id", 12, 1, "RW", "", 255, 0, 252),
+    ("secondary_id", 12, 1, "RW", "", 255, 0, 255),
     ("protocol_type", 13, 1, "RW", "", 2, 1, 2),
     ("homing_offset", 20, 4, "RW", _PULSE, 0, -1_044_479, 1_044_479),
     ("moving_threshold", 24, 4, "RW", _RPM, 10, 0, 1_023),
@@ -158,52 +179,90 @@ _COMMON: list[_Row] = [
 ]
 
 
-_CURRENT: dict[str, object] = {"name": "present_current", "unit": "1 mA", "low": None, "high": None}
+def _indirect(first: int, address: int, data: int, count: int, last: int) -> list[_Row]:
+    """Indirect addresses and indirect data of `count` bytes, numbered from `first`."""
+    rows: list[_Row] = []
+    for n in range(count):
+        here = data + n
+        rows += [
+            (f"indirect_address_{first + n}", address + 2 * n, 2, "RW", "", here, EEPROM_END, last),
+            (f"indirect_data_{first + n}", here, 1, "RW", "", 0, 0, 255),
+        ]
+    return rows
 
 
-def _registers(changes: dict[str, dict[str, object]], more: list[_Row]) -> dict[str, Register]:
+def _table(
+    model: int,
+    name: str,
+    firmware: int,
+    modes: set[int],
+    changes: dict[str, dict[str, object]],
+    more: list[_Row],
+) -> Table:
     rows = [Register(*row, signed=row[0] in _SIGNED) for row in _COMMON + more]
     rows = [replace(row, **changes.get(row.name, {})) for row in rows]
-    return {row.name: row for row in sorted(rows, key=lambda row: row.address)}
+    registers = {row.name: row for row in sorted(rows, key=lambda row: row.address)}
+    registers["model_number"] = replace(registers["model_number"], default=model)
+    data = {
+        row.address: registers[name.replace("data", "address")].address
+        for name, row in registers.items()
+        if name.startswith("indirect_data")
+    }
+    return Table(model, name, firmware, frozenset(modes), registers, data)
 
 
-XC430_W240 = Table(
-    model=1080,
-    name="XC430-W240-T",
-    fast_read_firmware=45,
-    registers=_registers({"model_number": {"default": 1080}}, []),
+_FOUR_MODES = {VELOCITY_MODE, POSITION_MODE, EXTENDED_MODE, PWM_MODE}
+_INDIRECT_56 = _indirect(1, 168, 224, 28, 661) + _indirect(29, 578, 634, 28, 661)
+_CURRENT: dict[str, object] = {"name": "present_current", "unit": "1 mA", "low": None, "high": None}
+
+XC430_W240 = _table(1080, "XC430-W240-T", 45, _FOUR_MODES, {}, _INDIRECT_56)
+
+XL430_W250 = _table(
+    1060,
+    "XL430-W250-T",
+    45,
+    _FOUR_MODES,
+    {
+        "temperature_limit": {"default": 72},
+        "max_voltage_limit": {"default": 140, "high": 140},
+        "min_voltage_limit": {"high": 140},
+        "velocity_limit": {"default": 265},
+        "velocity_i_gain": {"default": 1_000},
+        "position_d_gain": {"default": 4_000},
+        "position_p_gain": {"default": 640},
+    },
+    _INDIRECT_56,
 )
 
-XL330_M288 = Table(
-    model=1200,
-    name="XL330-M288-T",
-    fast_read_firmware=46,
-    registers=_registers(
-        {
-            "model_number": {"default": 1200},
-            "baud_rate": {"high": 6},
-            "drive_mode": {"high": 5},
-            "protocol_type": {"low": 2, "high": 22},
-            "temperature_limit": {"default": 70},
-            "max_voltage_limit": {"default": 70, "low": 31, "high": 70},
-            "min_voltage_limit": {"default": 35, "low": 31, "high": 70},
-            "velocity_limit": {"default": 445, "high": 2_047},
-            "shutdown": {"default": 53},
-            "velocity_i_gain": {"default": 1_600},
-            "velocity_p_gain": {"default": 180},
-            "position_p_gain": {"default": 400},
-            "goal_velocity": {"low": -2_047, "high": 2_047},
-            "present_load": _CURRENT,
-        },
-        [
-            ("current_limit", 38, 2, "RW", "1 mA", 1_750, 0, 1_750),
-            ("pwm_slope", 62, 1, "RW", "1.977 mV/ms", 140, 1, 255),
-            ("goal_current", 102, 2, "RW", "1 mA", None, -1_750, 1_750),
-        ],
-    ),
+XL330_M288 = _table(
+    1200,
+    "XL330-M288-T",
+    46,
+    _FOUR_MODES | {CURRENT_MODE, CURRENT_POSITION_MODE},
+    {
+        "baud_rate": {"high": 6},
+        "drive_mode": {"high": 5},
+        "protocol_type": {"low": 2, "high": 22},
+        "temperature_limit": {"default": 70},
+        "max_voltage_limit": {"default": 70, "low": 31, "high": 70},
+        "min_voltage_limit": {"default": 35, "low": 31, "high": 70},
+        "velocity_limit": {"default": 445, "high": 2_047},
+        "shutdown": {"default": 53},
+        "velocity_i_gain": {"default": 1_600},
+        "velocity_p_gain": {"default": 180},
+        "position_p_gain": {"default": 400},
+        "goal_velocity": {"low": -2_047, "high": 2_047},
+        "present_load": _CURRENT,
+    },
+    [
+        ("current_limit", 38, 2, "RW", "1 mA", 1_750, 0, 1_750),
+        ("pwm_slope", 62, 1, "RW", "1.977 mV/ms", 140, 1, 255),
+        ("goal_current", 102, 2, "RW", "1 mA", None, -1_750, 1_750),
+        *_indirect(1, 168, 208, 20, 227),
+    ],
 )
 
-TABLES = {table.model: table for table in (XC430_W240, XL330_M288)}
+TABLES = {table.model: table for table in (XC430_W240, XL330_M288, XL430_W250)}
 """By model number."""
 
 HARDWARE_ERRORS = {

@@ -1,0 +1,144 @@
+"""Orders to a twin while it runs: which servos are plugged in, and whose shafts somebody turns.
+
+    plug NAME, unplug NAME     put a servo on the bus with power, or take it off
+    only NAME, next            plug in this one alone, or the next one alone
+    push NAME=ANGLE            turn a shaft without torque
+
+NAME is a joint, the place of a servo in its list (from 1 on), or `all`.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from antennate.errors import BadInputError
+from antennate.twin.push import Pushes
+from antennate.twin.registers import Servo
+
+_CHUNK = 4096
+_WORDS = "plug NAME, unplug NAME, only NAME, next or push NAME=ANGLE"
+NONE = "none"
+
+
+class Plugging:
+    """The plugs and the shafts of some servos.
+
+    Args:
+        servos: The servos.
+        pushes: Turns their shafts.
+    """
+
+    def __init__(self, servos: Sequence[Servo], pushes: Pushes) -> None:
+        self._servos = list(servos)
+        self._pushes = pushes
+
+    def begin(self, plugged: Sequence[str]) -> None:
+        """Leave only some servos on the bus; all if none is named.
+
+        Raises:
+            BadInputError: A name is not known.
+        """
+        names = [name for text in plugged for name in text.split(",") if name]
+        if not names:
+            return
+        chosen = {
+            place
+            for name in names
+            if name != NONE
+            for place in self._pushes.places(name, "--plugged")
+        }
+        for place, servo in enumerate(self._servos):
+            if place not in chosen:
+                servo.unplug(0.0)
+
+    def order(self, text: str, t: float) -> None:
+        """Do what an order says at time t [s].
+
+        Raises:
+            BadInputError: It is none, or names a servo that is not there.
+        """
+        word, _, rest = text.strip().partition(" ")
+        rest = rest.strip()
+        if word == "push":
+            self._pushes.now(rest, t, self._servos)
+        elif word in ("plug", "unplug"):
+            for place in self._pushes.places(rest, word):
+                self._plug(place, word == "plug", t)
+        elif word == "only" or (word, rest) == ("next", ""):
+            chosen = self._pushes.places(rest, word) if rest else [self._following()]
+            for place in range(len(self._servos)):
+                self._plug(place, place in chosen, t)
+        else:
+            raise BadInputError(f"expected {_WORDS}, found {text!r}")
+
+    def _plug(self, place: int, into: bool, t: float) -> None:
+        servo = self._servos[place]
+        if servo.plugged != into:
+            (servo.plug if into else servo.unplug)(t)
+
+    def _following(self) -> int:
+        """Place behind the last servo that is plugged in; the first one behind the end."""
+        plugged = [place for place, servo in enumerate(self._servos) if servo.plugged]
+        return (plugged[-1] + 1) % len(self._servos) if plugged else 0
+
+
+class Orders:
+    """Lines from a named pipe, a file or standard input.
+
+    Args:
+        path: Where they come from; `-` is standard input.
+        say: Told each order that was carried out, and why one was not.
+
+    Raises:
+        BadInputError: It cannot be read.
+    """
+
+    def __init__(self, path: str, say: Callable[[str], None]) -> None:
+        self._say = say
+        self._rest = b""
+        self._mine = path != "-"
+        try:
+            fifo = self._mine and Path(path).is_fifo()
+            # A pipe that is open for writing here too has no end when a writer goes away.
+            way = os.O_RDWR if fifo else os.O_RDONLY
+            self._file: int | None = os.open(path, way | os.O_NONBLOCK) if self._mine else 0
+        except OSError as error:
+            raise BadInputError(f"--orders: cannot read {path}: {error.strerror}") from None
+
+    @property
+    def files(self) -> list[int]:
+        """What `select` waits for: nothing once all has been read."""
+        return [] if self._file is None else [self._file]
+
+    def take(self, order: Callable[[str], None]) -> None:
+        """Carry out the orders that have come."""
+        if self._file is None:
+            return
+        try:
+            came = os.read(self._file, _CHUNK)
+        except BlockingIOError:
+            return
+        except OSError:
+            came = b""
+        if not came:
+            self.close()
+        *lines, self._rest = (self._rest + came).split(b"\n")
+        for line in lines:
+            text = line.decode(errors="replace").strip()
+            if not text:
+                continue
+            try:
+                order(text)
+            except BadInputError as error:
+                text = f"not done: {error}"
+            self._say(text)
+
+    def close(self) -> None:
+        """Read no more."""
+        if self._file is not None and self._mine:
+            with contextlib.suppress(OSError):
+                os.close(self._file)
+        self._file = None

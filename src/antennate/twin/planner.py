@@ -1,0 +1,121 @@
+"""What a servo means to do by its registers: the profile to its goal, and what it tells of it."""
+
+from __future__ import annotations
+
+import math
+
+from antennate.hardware.dynamixel.tables import (
+    ACCELERATION_UNIT,
+    CURRENT_POSITION_MODE,
+    EXTENDED_MODE,
+    POSITION_MODE,
+    POSITION_UNIT,
+    VELOCITY_MODE,
+    VELOCITY_UNIT,
+)
+from antennate.twin.memory import Memory
+from antennate.twin.profile import STEP, Profile
+from antennate.twin.rules import time_based
+
+POSITION_MODES = (POSITION_MODE, EXTENDED_MODE, CURRENT_POSITION_MODE)
+SPEED_UNIT = VELOCITY_UNIT / POSITION_UNIT
+"""One count of a velocity [ticks/s]."""
+_RATE_UNIT = ACCELERATION_UNIT / POSITION_UNIT
+"""One count of an acceleration [ticks/s²]."""
+_ARRIVED, _ONGOING, _NOT_FOLLOWING = 0x01, 0x02, 0x08
+"""Bits of Moving Status."""
+_NEAR, _FAR = 20, 200
+"""Distance at which it has arrived, and at which it does not follow [ticks] (assumed)."""
+
+
+class Planner:
+    """Plans a profile when torque, mode or goal have changed.
+
+    Args:
+        memory: The control table.
+    """
+
+    def __init__(self, memory: Memory) -> None:
+        self._memory = memory
+        self._profile = Profile()
+        self._planned: tuple[bool, int, int, int] | None = None
+
+    @property
+    def end(self) -> float:
+        """When the plan is carried out [s]."""
+        return self._profile.end
+
+    def at(self, t: float) -> tuple[float, float]:
+        """Where it means to be [ticks] and how fast [ticks/s] at time t [s]."""
+        return self._profile.at(t)
+
+    def follow(self, t: float, driven: bool, now: tuple[float, float], base: int) -> bool:
+        """Plan anew if anything has changed; whether torque or mode have.
+
+        Args:
+            t: The time [s].
+            driven: It has torque and was not stopped.
+            now: Where it is [ticks] and how fast it turns [ticks/s].
+            base: What it adds to the turns of its shaft [ticks].
+        """
+        mode = self._memory.get("operating_mode")
+        in_position = mode in POSITION_MODES
+        goal = self._memory.get("goal_position" if in_position else "goal_velocity")
+        plan, before = (driven, mode, base, goal), self._planned
+        if plan == before:
+            return False
+        self._planned = plan
+        same = before is not None and before[:3] == plan[:3]
+        start = self._profile.at(t) if same else now
+        if not driven:
+            self._profile.step(t, now[0])
+        elif in_position:
+            self._to_position(t, start, goal)
+        elif mode == VELOCITY_MODE:
+            self._to_speed(t, start, SPEED_UNIT * goal)
+        return not same
+
+    def show(self, t: float, position: float) -> bool:
+        """Tell trajectory and Moving Status; whether a profile to a position is going on.
+
+        Args:
+            t: The time [s].
+            position: Where it is [ticks].
+        """
+        driven, mode, _, goal = self._planned or (False, 0, 0, 0)
+        wanted, speed = self._profile.at(t)
+        bits, ongoing = 0, False
+        if driven and mode in POSITION_MODES:
+            ongoing = self._profile.kind != STEP and t < self._profile.end
+            bits = self._profile.kind | _ONGOING * ongoing
+            bits |= _NOT_FOLLOWING * (abs(wanted - position) > _FAR)
+            bits |= _ARRIVED * (not ongoing and abs(goal - position) <= _NEAR)
+        elif not (driven and mode == VELOCITY_MODE):
+            wanted, speed = position, 0.0
+        self._memory.show("velocity_trajectory", round(speed / SPEED_UNIT))
+        self._memory.show("position_trajectory", round(wanted))
+        self._memory.show("moving_status", int(bits))
+        return ongoing
+
+    def _to_position(self, t: float, start: tuple[float, float], goal: float) -> None:
+        """By Profile Velocity and Acceleration: their counts, or times of the whole and a ramp."""
+        velocity = self._memory.get("profile_velocity")
+        acceleration = self._memory.get("profile_acceleration")
+        if not velocity or goal == start[0]:
+            self._profile.step(t, goal)
+        elif time_based(self._memory):
+            whole = 1e-3 * velocity
+            ramp = min(1e-3 * acceleration, 0.5 * whole)
+            speed = abs(goal - start[0]) / (whole - ramp)
+            self._profile.go(t, start, goal, speed, speed / ramp if ramp else math.inf)
+        else:
+            rate = _RATE_UNIT * acceleration if acceleration else math.inf
+            self._profile.go(t, start, goal, SPEED_UNIT * velocity, rate)
+
+    def _to_speed(self, t: float, start: tuple[float, float], speed: float) -> None:
+        """By Profile Acceleration alone."""
+        acceleration = self._memory.get("profile_acceleration")
+        rate = _RATE_UNIT * acceleration if acceleration else math.inf
+        if acceleration and time_based(self._memory) and speed != start[1]:
+            rate = abs(speed - start[1]) / (1e-3 * acceleration)
+        self._profile.speed_up(t, start, speed, rate)

@@ -1,0 +1,139 @@
+"""Any set of DYNAMIXEL servos on a bus, without a robot: `1:xl330-m288,2:xl430-w250`."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from antennate.errors import ConfigError
+from antennate.hardware.dynamixel.tables import BAUD_RATES, POSITION_UNIT, TABLES
+from antennate.params.base import Params, number
+from antennate.params.reading import from_values, read_file
+from antennate.twin.bus import ServoBus
+from antennate.twin.orders import Plugging
+from antennate.twin.push import Pushes
+from antennate.twin.registers import Servo
+
+MODELS = {table.name.lower().removesuffix("-t"): table for table in TABLES.values()}
+"""Control tables by the names that a list of servos uses."""
+MIDDLE = 2048
+"""Position at the angle 0 [ticks]."""
+_FORM = re.compile(r"(?P<id>\d{1,3}):(?P<model>[a-z0-9-]+?)(@(?P<baud>\d+))?(x(?P<count>\d{1,3}))?")
+_FACTORY = "datasheet: as delivered"
+
+
+class ServoEntry(Params):
+    """One servo of a list: all else is as delivered."""
+
+    model: str = number("xc430-w240", "1", "assumed: the robot's")
+    """Its model."""
+    id: int = number(1, "1", _FACTORY, ge=0, le=252)
+    """Its id."""
+    baud: int = number(57_600, "bit/s", _FACTORY)
+    """Its speed on the bus."""
+    position: float = number(float(MIDDLE), "ticks", "assumed: the middle")
+    """Where its shaft is."""
+    name: str = number("", "1", "assumed: its place in the list")
+    """Its name for orders."""
+
+    def make(self) -> Servo:
+        """The servo.
+
+        Raises:
+            ConfigError: There is no such model, or it has no such speed.
+        """
+        table = _known(self.model, MODELS, "model")
+        most = table["baud_rate"].high or 0
+        codes = {baud: code for code, baud in enumerate(BAUD_RATES[: most + 1])}
+        servo = Servo(table, self.id, self.position)
+        servo.set("baud_rate", _known(self.baud, codes, f"speed of {self.model}"))
+        return servo
+
+
+class ServoList(Params):
+    """What the file of a list of servos holds: a table `[[servo]]` for each."""
+
+    servo: tuple[ServoEntry, ...] = number((), "1", "assumed: none", min_length=1, max_length=253)
+    """The servos."""
+
+
+def _known(found: Any, known: Mapping[Any, Any], what: str) -> Any:
+    if found not in known:
+        raise ConfigError(
+            f"--servos: expected as {what} one of {', '.join(map(str, known))}, found {found}"
+        )
+    return known[found]
+
+
+def read_list(text: str) -> tuple[ServoEntry, ...]:
+    """Servos from `ID:MODEL[@BAUD][xCOUNT],...` or from a TOML file.
+
+    Raises:
+        ConfigError: It is neither.
+    """
+    if text.endswith(".toml"):
+        return read_file(Path(text), ServoList).servo
+    entries: list[dict[str, Any]] = []
+    for part in text.split(","):
+        match = _FORM.fullmatch(part.strip())
+        if match is None:
+            raise ConfigError(
+                "--servos: expected ID:MODEL[@BAUD][xCOUNT], such as 1:xl330-m288, or a file that "
+                f"ends in .toml, found {part!r}"
+            )
+        model, count = match["model"], match["count"]
+        if count and not match["baud"] and model not in MODELS:
+            model, count = f"{model}x{count}", None  # the x is part of its name
+        entry: dict[str, Any] = {"id": int(match["id"]), "model": model}
+        if match["baud"]:
+            entry["baud"] = int(match["baud"])
+        entries += [entry] * int(count or 1)
+    return from_values(ServoList, {"servo": entries}).servo
+
+
+class ServoBox:
+    """Some servos on their wire.
+
+    Args:
+        entries: The servos.
+        plugged: Names of those on the bus at first, all by default.
+        pushes: Shafts that somebody turns, as `push.Pushes` reads them.
+
+    Attributes:
+        servos: The servos.
+        bus: Their wire.
+        plugging: Plugs servos in and turns shafts, by orders.
+        t: Time up to which everything has happened [s].
+
+    Raises:
+        AntennateError: Something given cannot be used.
+    """
+
+    def __init__(
+        self,
+        entries: Sequence[ServoEntry],
+        plugged: Sequence[str] = (),
+        pushes: Sequence[str] = (),
+    ) -> None:
+        self.servos = [entry.make() for entry in entries]
+        self.bus = ServoBus(self.servos)
+        names = [entry.name or str(place) for place, entry in enumerate(entries, 1)]
+        self._pushes = Pushes(pushes, names, lambda _, angle: MIDDLE + angle / POSITION_UNIT)
+        self.plugging = Plugging(self.servos, self._pushes)
+        self.plugging.begin(plugged)
+        self.t = 0.0
+
+    def advance(self, t: float) -> None:
+        """Let everything happen until t [s]."""
+        used = any(servo.last_fed > 0.0 for servo in self.servos)
+        for place, ticks in self._pushes.apply(t, used, self.servos):
+            self.servos[place].push(ticks)
+        self.bus.advance(t)
+        self.t = max(self.t, t)
+
+    @property
+    def on_order(self) -> Callable[[str], None]:
+        """Carries out an order now."""
+        return lambda text: self.plugging.order(text, self.t)

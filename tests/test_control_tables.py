@@ -1,0 +1,120 @@
+"""Every register of three models in bytes: address, size, access, initial value and range.
+
+The expected values are those of the manual's pages, copied in `manual_tables.py`. What a register
+does is in `test_control_effects.py`.
+"""
+
+from __future__ import annotations
+
+import pytest
+from manual_tables import PAGES, Page, Row
+from servo_bench import ACCESS, LENGTH, LIMIT, NONE, RANGE, Bench
+
+from antennate.hardware.dynamixel.tables import TABLES
+
+ROWS = [(page, row) for page in PAGES for row in page.rows.values()]
+NAMES = [f"{page.name}-{row.name}" for page, row in ROWS]
+WRITABLE = [(page, row) for page, row in ROWS if row.writable]
+WRITABLE_NAMES = [f"{page.name}-{row.name}" for page, row in WRITABLE]
+
+
+def write(page: Page, row: Row, value: int, size: int | None = None) -> int:
+    """Write to a new servo; the number of the error."""
+    data = value.to_bytes(size or row.size, "little", signed=value < 0)
+    (said,) = Bench(page).ask(3, row.address.to_bytes(2, "little") + data)
+    return said.error
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_our_table_has_the_registers_of_the_manual_and_no_others(page: Page) -> None:
+    table = TABLES[page.model]
+    assert table.name == page.name
+    assert table.modes == page.modes
+    ours = {r.address: (r.name, r.size, r.signed, r.writable) for r in table.registers.values()}
+    theirs = {r.address: (r.name, r.size, r.signed, r.writable) for r in page.rows.values()}
+    assert ours == theirs
+
+
+@pytest.mark.parametrize(("page", "row"), ROWS, ids=NAMES)
+def test_a_register_can_be_read_at_its_address_and_has_its_initial_value(
+    page: Page, row: Row
+) -> None:
+    bench = Bench(page)
+    if row.initial is not None:
+        assert bench.get(row.name) == row.initial
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_what_the_page_does_not_list_cannot_be_read(page: Page) -> None:
+    listed = {a for row in page.rows.values() for a in range(row.address, row.address + row.size)}
+    bench = Bench(page)
+    for address in range(max(listed) + 10):
+        error, data = bench.servo.read(address, 1)
+        assert (error, len(data)) == ((NONE, 1) if address in listed else (ACCESS, 0)), address
+
+
+@pytest.mark.parametrize(("page", "row"), ROWS, ids=NAMES)
+def test_what_can_only_be_read_is_not_written_and_half_of_a_register_neither(
+    page: Page, row: Row
+) -> None:
+    if not row.writable:
+        assert write(page, row, 0) == ACCESS
+    elif row.size > 1:
+        assert write(page, row, 0, size=row.size // 2) == LENGTH
+
+
+@pytest.mark.parametrize(("page", "row"), WRITABLE, ids=WRITABLE_NAMES)
+def test_the_ends_of_its_range_can_be_written_and_nothing_beyond(page: Page, row: Row) -> None:
+    if row.low in "-?":
+        pytest.skip("the page gives no range, or a rule: see the effects")
+    if row.low[0] == "~":
+        most = page.row(row.low[1:]).initial
+        assert most is not None
+        assert write(page, row, most) == NONE
+        assert write(page, row, most + 1) == LIMIT
+        if row.signed:
+            assert write(page, row, -most) == NONE
+            assert write(page, row, -most - 1) == LIMIT
+        return
+    low, high = int(row.low), int(row.high)
+    assert write(page, row, low) == NONE
+    assert write(page, row, high) == NONE
+    if row.signed or low:
+        assert write(page, row, low - 1) == RANGE
+    room = 8 * row.size - row.signed
+    if high < 2**room - 1 and row.name != "secondary_id":  # 253 to 255 turn that one off
+        assert write(page, row, high + 1) == RANGE
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_a_mode_that_the_model_lacks_is_refused(page: Page) -> None:
+    row = page.row("operating_mode")
+    for mode in range(256):
+        assert write(page, row, mode) == (NONE if mode in page.modes else RANGE), mode
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_bits_of_drive_mode_that_are_unused_stay_0(page: Page) -> None:
+    row = page.row("drive_mode")
+    used = {0, 1, 4, 5} if page.model == 1200 else {0, 1, 4, 5, 8, 9, 12, 13}
+    for bits in range(16):
+        assert write(page, row, bits) == (NONE if bits in used else RANGE), bits
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_protocols_that_the_page_lists_are_taken(page: Page) -> None:
+    row = page.row("protocol_type")
+    known = {2, 20, 21, 22} if page.model == 1200 else {1, 2}
+    for kind in range(30):
+        assert write(page, row, kind) == (NONE if kind in known else RANGE), kind
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_torque_locks_the_eeprom_and_nothing_else(page: Page) -> None:
+    for row in page.rows.values():
+        if not row.writable or row.name == "torque_enable":
+            continue
+        bench = Bench(page)
+        value = bench.get(row.name)
+        assert bench.put("torque_enable", 1) == NONE
+        assert bench.put(row.name, value) == (ACCESS if row.address < 64 else NONE), row.name
