@@ -52,6 +52,9 @@ class Motors:
         self.seen.append(command)
         return 0
 
+    def away(self, command: JointCommand, time: float) -> int:
+        return 0
+
     def maintain(self, may_begin: bool) -> None: ...
     def look(self) -> None: ...
 

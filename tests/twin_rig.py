@@ -36,6 +36,8 @@ from antennate.twin.lockstep import BoardPort, LockstepClock
 from antennate.twin.robot import TwinRobot
 from antennate.types import AntennaFrame, Clock, Controller, JointCommand, Robot
 
+AT_ONCE = SupervisorParams(approach=20.0)
+"""Walks as soon as it may, without a slow approach to where its gait begins."""
 _WARM_UP = 2.0
 """Longest time until the board's clock is known [s]."""
 
@@ -180,6 +182,7 @@ def rig(
         controller=make_controller(name, params, config.robot),
         period=params.period,
         quality=SignalQuality(params.conditioning, touch=touch),
+        limits=AT_ONCE,
     )
     return Rig(robot, clock, session, board_port, bus_port)
 

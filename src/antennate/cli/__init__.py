@@ -15,9 +15,14 @@ from antennate.cli.exit_codes import BAD_INPUT, INTERRUPTED, OK
 
 ROBOT_COMMANDS = {
     "twin": "serve a simulated robot as real bytes: an antenna board and a bus of servos",
+    "robot": "joints, supply, wiring diagram and bill of materials of a robot",
     "doctor": "examine the real robot, or its twin: what is wrong, and the cure",
+    "setup": "from a box of servos to a robot: ports, ids, speeds, settings, one by one",
+    "zero": "zeros and directions of the joints, by hand",
+    "jog": "move one joint by small steps",
     "record": "antenna readings to a CSV file that calibrate takes",
     "drive": "let a controller walk the real robot, or its twin",
+    "teleop": "walk the real robot, or its twin, by keys",
     "replay": "let a controller decide again upon the log of a drive",
 }
 

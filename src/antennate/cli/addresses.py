@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TypeVar
 
@@ -17,6 +18,7 @@ from antennate.hardware.ports.finder import is_udp
 from antennate.hardware.ports.keys import read_key
 from antennate.hardware.robot_file import RobotFile
 from antennate.params.reading import Config, read_file
+from antennate.params.setup import PortsParams
 
 
 @dataclass(frozen=True)
@@ -39,7 +41,7 @@ class PortOptions(RobotOptions):
     bus: str = option("", "servo bus: a serial port, or tcp://HOST:PORT", "PORT")
 
 
-Chosen = TypeVar("Chosen", bound=RobotOptions)
+Chosen = TypeVar("Chosen", bound=FromFile)
 
 
 def parse_robot(
@@ -62,10 +64,26 @@ def parse_robot(
         ConfigError: A flag, the file or a value cannot be used.
         HelpRequest: Help was asked for.
     """
-    model = type(take(RobotFile()))
-    return parse(
-        command, description, model, argv, options, lambda path: take(read_file(path, RobotFile))
-    )
+    known = RobotFile()
+
+    def read(path: Path) -> Config:
+        nonlocal known
+        known = read_file(path, RobotFile)
+        return take(known)
+
+    model = type(take(known))
+    config, chosen = parse(command, description, model, argv, options, read)
+    return config, _with_ports(chosen, known.ports)
+
+
+def _with_ports(chosen: Chosen, ports: PortsParams) -> Chosen:
+    """Options with the ports of the robot's file where no flag names one."""
+    missing = {
+        name: getattr(ports, name)
+        for name in type(ports).model_fields
+        if getattr(chosen, name, None) == ""
+    }
+    return replace(chosen, **missing) if missing else chosen
 
 
 def key_of(options: RobotOptions) -> bytes | None:

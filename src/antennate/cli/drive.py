@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import shlex
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -35,6 +35,7 @@ from antennate.telemetry.header import Header
 from antennate.telemetry.parts import part, parts
 from antennate.telemetry.reader import count
 from antennate.telemetry.ticks import Tick
+from antennate.types import Controller
 
 DESCRIPTION = """\
 Let a controller walk the real robot, or its twin. First a dry run: everything is read and nothing
@@ -63,6 +64,28 @@ def command(argv: Sequence[str]) -> int:
         AntennateError: A port, a servo or the board is not what is needed; nothing moved then.
     """
     config, orders = parse_robot("drive", DESCRIPTION, RobotFile.for_drive, argv, Orders)
+    return walk("drive", config, orders, argv)
+
+
+def walk(
+    command: str,
+    config: DriveConfig,
+    orders: Orders,
+    argv: Sequence[str],
+    controller: Callable[[Session, DriveConfig], Controller] | None = None,
+) -> int:
+    """Drive by the controller that is named, or by another one: the exit code.
+
+    Args:
+        command: Name of the command.
+        config: The robot, and for how long.
+        orders: Where it is, and whether it moves.
+        argv: The words of the command.
+        controller: Makes the controller once the session is there; None for the one that is named.
+
+    Raises:
+        AntennateError: A port, a servo or the board is not what is needed; nothing moved then.
+    """
     for name in ("esp32", "bus"):
         if not getattr(orders, name):
             raise ConfigError(f"--{name}: expected a serial port, found none")
@@ -71,15 +94,19 @@ def command(argv: Sequence[str]) -> int:
     key = key_of(orders)
     with (
         _operator(config, orders) as operator,
-        folder_for("drive", orders, config, argv) as folder,
+        folder_for(command, orders, config, argv) as folder,
     ):
         folder.without_trials()
         with connect(config, orders.esp32, orders.bus, key) as session:
-            result = _carry_out(config, session, orders, folder.path / LOG, operator)
+            if controller is not None:
+                session.control.controller = controller(session, config)
+                config = config.model_copy(update={"controller": command})
+            result = _carry_out(command, config, session, orders, folder.path / LOG, operator)
         folder.finish(result, ())
         table = Table.of("Drive", {result["controller"]: result}, MEASURES, _note(result))
         log = shlex.quote(str(folder.path / LOG))
-        again = f"\nWhat was read and decided: antennate replay {log}"
+        other = "" if controller is None else " --controller open"
+        again = f"\nWhat was read and decided: antennate replay {log}{other}"
         tell(result, orders, [table], _sentence(result) + again)
     fault = result["worst_state"] in (State.FAULT.name, State.OFF.name)
     stays_on = result["torque_off"] is False
@@ -88,7 +115,12 @@ def command(argv: Sequence[str]) -> int:
 
 
 def _carry_out(
-    config: DriveConfig, session: Session, orders: Orders, log: Path, operator: Operator
+    command: str,
+    config: DriveConfig,
+    session: Session,
+    orders: Orders,
+    log: Path,
+    operator: Operator,
 ) -> dict[str, Any]:
     """Drive, with the log and the status line in a process of their own."""
     header = Header(controller=config.controller, params=config.control, robot=config.robot)
@@ -113,7 +145,7 @@ def _carry_out(
 
     with feed, urgent() as priority:
         report = drive(session, config, orders.arm, keep, operator)
-    head = {"schema": 1, "command": "drive", "controller": config.controller, "armed": orders.arm}
+    head = {"schema": 1, "command": command, "controller": config.controller, "armed": orders.arm}
     tail = {
         "priority": priority.value,
         "unlogged": 0 if feed.complete else feed.offered - count(log),

@@ -123,6 +123,10 @@ class Actuators(Protocol):
         """
         ...
 
+    def away(self, command: JointCommand, time: float) -> int:
+        """How many joints a time [s] is too short for, on their way to a command [rad]."""
+        ...
+
     def maintain(self, may_begin: bool) -> None:
         """One tick's share of what they need besides; it may begin only while the robot walks."""
         ...

@@ -71,6 +71,9 @@ class SupervisorParams(Params):
     """Relative error of the rate allowed."""
     rate_time: float = number(1.0, "s", "assumed: a hundred samples", gt=0, le=60)
     """Window of the rate, and patience."""
+    approach: float = number(1.0, "rad/s", "assumed: a hand can follow", gt=0, le=20)
+    """Fastest that goals move until the first command after torque came on is reached; as much as
+    `fastest` of the joints is no approach."""
     longest_arming: float = number(1.0, "s", "measured: 0.14 s on the twin", gt=0, le=10)
     """Longest time from an arm event to the next tick."""
     longest_pause: float = number(0.12, "s", "assumed: servo watchdogs act before it", gt=0, le=10)

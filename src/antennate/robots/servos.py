@@ -30,11 +30,17 @@ class ServoParams(Params):
 
     Attributes:
         model_number: What the servo answers when it is asked for its model.
-        voltage: Recommended supply [V].
+        voltage: Supply that the robot gives it [V].
+        stall_current: Current at that voltage with the shaft held [A] (datasheet).
+        standby_current: Current without torque [A] (datasheet).
+        product: Name of the maker.
     """
 
     model_number: ClassVar[int] = 1080
     voltage: ClassVar[float] = 11.1
+    stall_current: ClassVar[float] = 1.3
+    standby_current: ClassVar[float] = 0.046
+    product: ClassVar[str] = "XC430-W240-T"
 
     stall_torque: float = number(1.7, "N·m", "datasheet: XC430-W240, 11.1 V", gt=0)
     """Torque at standstill."""
@@ -68,6 +74,9 @@ class XL330Params(ServoParams):
 
     model_number: ClassVar[int] = 1200
     voltage: ClassVar[float] = 5.0
+    stall_current: ClassVar[float] = 1.47
+    standby_current: ClassVar[float] = 0.017
+    product: ClassVar[str] = "XL330-M288-T"
 
     stall_torque: float = number(0.52, "N·m", "datasheet: XL330-M288, 5 V", gt=0)
     """Torque at standstill."""

@@ -43,7 +43,7 @@ CALIBRATION, LOG = "calibration.json", "drive.log"
 _LARGEST = 10**9
 """No file of a run is longer [bytes]."""
 _LOGS = tuple(part(Path(LOG), number).name for number in range(1, MOST_PARTS + 1))
-_FILES = (CALIBRATION, "conditioning.toml", "recording.csv", "ticks.csv", *_LOGS)
+_FILES = (CALIBRATION, "conditioning.toml", "recording.csv", "ticks.csv", "bom.csv", *_LOGS)
 _NAMES = (RESULT, PARTIAL, TABLE, CONFIG, VERSIONS, COMMAND, *_FILES)
 """Every file that a run may write beside its figures."""
 

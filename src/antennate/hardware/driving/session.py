@@ -6,6 +6,9 @@ controller's, or that to stand still for the actuators, for a moment before a re
 tick at half pace. Goals move at a limited speed, so that neither the first command nor a broken
 controller lets one jump.
 
+Torque comes on wherever the joints stand. They approach the first command slowly, all together, and
+the controller stands still meanwhile; where all are within one tick of it there is no approach.
+
 After the bus was lost no goal is sent until an arm event. With that one all is checked anew and
 goals are set to where the joints stand, as with the first.
 """
@@ -65,6 +68,7 @@ class Session:
         frame: What the controller got in the last tick.
         lost: Whether the actuators were lost; no goal is sent until an arm event.
         touched: Whether anything was written to the actuators.
+        approaching: Whether the joints are on their way to the first command since torque came on.
         unrecorded: Whether a record that is required is not kept; the robot holds meanwhile.
     """
 
@@ -89,6 +93,8 @@ class Session:
         self.outputs: Outputs | None = None
         self.frame = AntennaFrame(t=np.zeros(1), counts=np.full((1, 2), math.nan))
         self._refused = 0
+        self._slow = period * min(1.0, self._limits.approach / max(actuators.robot.fastest))
+        self._fresh = self.approaching = False
         self.lost = self.touched = self.unrecorded = False
 
     @property
@@ -110,7 +116,7 @@ class Session:
         clear = self.outputs is not None and self.outputs.clear
         counts = self.quality.counts if clear else [math.nan, math.nan]
         self._mark("read")
-        control.standing, control.rate = self.actuators.resting, self._rate()
+        control.standing, control.rate = self.actuators.resting or self.approaching, self._rate()
         self.frame = AntennaFrame(t=control.time(frame.t), counts=np.array([counts]))
         return self.frame
 
@@ -141,6 +147,7 @@ class Session:
             if out.arming:
                 self.touched = True
                 actuators.enable(command)
+                self._fresh, self.approaching = self._slow < self.period, False
                 self.lost = False
             elif out.feed_watchdog and actuators.enabled and not self.lost:
                 self._move(out, command)
@@ -162,7 +169,12 @@ class Session:
         if out.state < State.FAULT:
             actuators.maintain(out.move)
         moves = out.move and not actuators.resting
-        self.tally.limited += actuators.command(command if moves else None, self.period)
+        if moves and (self._fresh or self.approaching):
+            near = self.period if self._fresh else self._slow
+            self._fresh, self.approaching = False, actuators.away(command, near) > 0
+        pace = self._slow if self.approaching else self.period
+        slow = actuators.command(command if moves else None, pace)
+        self.tally.limited += 0 if self.approaching else slow
         self.tally.sent += moves
 
     def release(self) -> list[int]:

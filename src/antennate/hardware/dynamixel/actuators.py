@@ -113,8 +113,7 @@ class DynamixelActuators:
         if command is not None:
             wanted: Floats = self.joints.ticks(command).astype(float)
             if goals is not None and math.isfinite(time):
-                reach = self.joints.reach(time)
-                slow = int((abs(wanted - goals) > reach).sum())
+                slow, reach = self.away(command, time), self.joints.reach(time)
                 wanted = goals + np.clip(wanted - goals, -reach, reach)
             goals = wanted
         if goals is None:
@@ -124,6 +123,17 @@ class DynamixelActuators:
         if self._goals is not None:
             self._goals = goals
         return slow
+
+    def away(self, command: JointCommand, time: float) -> int:
+        """How many joints a time [s] is too short for, on their way to a command.
+
+        Raises:
+            CommandError: The command cannot be sent.
+        """
+        if self._goals is None:
+            return 0
+        way = abs(self.joints.ticks(command) - self._goals)
+        return int((way > self.joints.reach(time)).sum())
 
     def maintain(self, may_begin: bool) -> None:
         """Let legs that have turned far forget their turns, a step a tick.

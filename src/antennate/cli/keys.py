@@ -1,0 +1,78 @@
+"""Single keys as they are typed, on a terminal as from a pipe."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import select
+import signal
+import sys
+import termios
+import tty
+from collections.abc import Callable, Iterator
+
+from antennate.errors import BadInputError
+
+_CHUNK = 1024
+_ARROWS = {b"A": "up", b"B": "down", b"C": "right", b"D": "left"}
+_START = (b"\x1b[", b"\x1bO")
+END = "end"
+"""In place of a key: no key can come any more."""
+
+ReadKeys = Callable[[float], list[str]]
+"""Keys that have come, the first one within a time [s]."""
+
+
+@contextlib.contextmanager
+def typed_keys() -> Iterator[ReadKeys]:
+    """Yield what reads keys: characters, and `up`, `down`, `left`, `right` for the arrows.
+
+    A terminal gives each key at once and shows none meanwhile; it is as before afterwards. The end
+    of the input is `END`, from then on.
+
+    Raises:
+        BadInputError: There is no standard input.
+    """
+    try:
+        handle = sys.stdin.fileno()
+    except (AttributeError, OSError, ValueError):
+        raise BadInputError("expected keys on a terminal, found no standard input") from None
+    if not os.isatty(handle):
+        yield lambda wait: _read(handle, wait)
+        return
+    before = termios.tcgetattr(handle)
+    ignored = {n: signal.signal(n, signal.SIG_IGN) for n in (signal.SIGTTIN, signal.SIGTTOU)}
+    try:
+        tty.setcbreak(handle)
+        termios.tcflush(handle, termios.TCIFLUSH)
+        yield lambda wait: _read(handle, wait)
+    finally:
+        with contextlib.suppress(termios.error):  # it is gone
+            termios.tcsetattr(handle, termios.TCSAFLUSH, before)
+        for number, handler in ignored.items():
+            signal.signal(number, handler)
+
+
+def _read(handle: int, wait: float) -> list[str]:
+    try:
+        if not select.select([handle], [], [], max(wait, 0.0))[0]:
+            return []
+        data = os.read(handle, _CHUNK)
+    except OSError:  # the terminal is gone
+        data = b""
+    return keys_of(data) if data else [END]
+
+
+def keys_of(data: bytes) -> list[str]:
+    """The keys in bytes of a terminal; line breaks and other sequences are none."""
+    keys: list[str] = []
+    at = 0
+    while at < len(data):
+        if data[at : at + 2] in _START:
+            keys += filter(None, [_ARROWS.get(data[at + 2 : at + 3])])
+            at += 3
+            continue
+        letter = data[at : at + 1].decode("ascii", "ignore")
+        keys += [letter] if letter.isprintable() and letter else []
+        at += 1
+    return keys

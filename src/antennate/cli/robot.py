@@ -1,0 +1,103 @@
+"""`antennate robot`: what a robot's file says, and how to build and wire that robot."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict
+from typing import Any
+
+from antennate.cli.arguments import parse
+from antennate.cli.exit_codes import OK
+from antennate.cli.results import ResultOptions, folder_for, tell
+from antennate.params import Params
+from antennate.robots.parts import bill
+from antennate.robots.servos import EXTENDED_MODE
+from antennate.robots.spec import RobotSpec
+from antennate.robots.supply import Supply, servos_of, supply
+from antennate.studies.formats import to_csv
+from antennate.studies.measures import Measure, Table
+
+DESCRIPTION = """\
+Say what a robot consists of: joints with their ids and servos, what its supply has to give, a
+wiring diagram and a bill of materials. Nothing is sent to any port.
+
+The folder holds figures/wiring.svg and .png, bom.csv and result.json."""
+_COLUMNS = ("id", "servo", "mode", "zero", "direction")
+_RAIL = (
+    Measure("servos", "servos", form="d"),
+    Measure("standby", "standby", "A"),
+    Measure("walking", "walking, mean", "A"),
+    Measure("peak", "walking, most", "A"),
+    Measure("stall", "all stalled", "A"),
+)
+
+
+class RobotConfig(Params):
+    """The robot that is described."""
+
+    robot: RobotSpec = RobotSpec()
+
+
+def command(argv: Sequence[str]) -> int:
+    """Describe the robot, and write the diagram and the bill.
+
+    Raises:
+        AntennateError: The robot or the folder cannot be used.
+    """
+    config, options = parse("robot", DESCRIPTION, RobotConfig, argv, ResultOptions)
+    robot, power = config.robot, supply(config.robot)
+    with folder_for("robot", options, config, argv) as folder:
+        from antennate.robots.wiring import wiring  # slow to import
+
+        folder.without_trials()
+        parts = [asdict(part) for part in bill(robot)]
+        folder.write("bom.csv", to_csv(parts))
+        folder.write_figures({"wiring": wiring(robot)})
+        joints = dict(_joints(robot))
+        supplies = asdict(power)
+        result = {
+            "schema": 1,
+            "command": "robot",
+            "joints": joints,
+            "supply": supplies,
+            "bom": parts,
+        }
+        folder.finish(result)
+        rails = {
+            f"{rail.voltage:g} V": {**asdict(rail), "servos": len(rail.ids)} for rail in power.rails
+        }
+        tables = [
+            Table("Joints", _COLUMNS, _cells(joints)),
+            Table.of("Supply", rails, _RAIL, _note(power)),
+        ]
+        tell(result, options, tables, _sentence(robot, power))
+    return OK
+
+
+def _joints(robot: RobotSpec) -> Iterator[tuple[str, dict[str, Any]]]:
+    servos, modes = servos_of(robot), robot.modes
+    for name, number, servo, zero, direction in zip(
+        robot.joint_names, robot.ids, servos, robot.zeros, robot.directions, strict=True
+    ):
+        mode = "extended position" if modes[number] == EXTENDED_MODE else "position"
+        row = {"id": number, "servo": servo.product, "mode": mode, "zero": zero}
+        yield name, row | {"direction": direction}
+
+
+def _cells(joints: dict[str, dict[str, Any]]) -> list[tuple[str, list[str]]]:
+    return [(name, [str(row[key]) for key in _COLUMNS]) for name, row in joints.items()]
+
+
+def _note(power: Supply) -> str:
+    return (
+        f"A plug of a servo's cable stands 3 A: feed the chain for each {power.per_feed} servos, "
+        f"at {power.feeds} places."
+    )
+
+
+def _sentence(robot: RobotSpec, power: Supply) -> str:
+    drawn = f"{power.walking:.1f} A while walking, at most {power.peak:.1f} A"
+    return (
+        f"{len(robot.ids)} servos draw {drawn}, and {power.stall:.1f} A if all of them stall; fuse "
+        f"{power.fuse:g} A; a battery of 2.2 Ah lasts {60 * power.hours(2.2):.0f} min of walking."
+    )

@@ -1,0 +1,139 @@
+"""`antennate setup`: from a box of servos to a robot, one servo at a time."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from pydantic.dataclasses import dataclass
+
+from antennate.cli.exit_codes import BAD_INPUT, OK
+from antennate.cli.options import option
+from antennate.cli.person import TerminalPerson
+from antennate.cli.progress import stop_signals
+from antennate.cli.results import print_table
+from antennate.cli.robot_toml import BusOptions, parse_writer
+from antennate.errors import ConfigError
+from antennate.hardware.doctor.ports import opener_of
+from antennate.hardware.host_clock import HostClock
+from antennate.hardware.robot_file import RobotFile
+from antennate.hardware.setup import ports
+from antennate.hardware.setup.assembly import Assembly, JointState
+from antennate.hardware.setup.config import SetupConfig
+from antennate.hardware.setup.person import Quit, confirm
+from antennate.hardware.setup.robot_toml import change
+from antennate.hardware.setup.servos import ServoSetup, model_name
+from antennate.hardware.setup.zeros import by_group
+from antennate.messages import nearest, shortened
+from antennate.studies.measures import Table
+
+DESCRIPTION = """\
+Set up the servos of a new robot. First the two ports are found by unplugging one adapter after the
+other; --bus and --esp32 name them instead. Then you connect one servo at a time, in the order of
+the robot, whatever its id and speed: it gets the id, speed, mode, limits and return delay of its
+joint, each written and read back. Torque never comes on.
+
+What is done is kept in robot.toml (--config names another file), so that you may stop and go on
+later. Two servos on the bus, a servo of another model and one that is done are refused."""
+
+
+@dataclass(frozen=True)
+class Orders(BusOptions):
+    """What to set up."""
+
+    esp32: str = option("", "antenna board: a serial port, tcp:// or udp://", "PORT")
+    only: tuple[str, ...] = option((), "set up these joints alone, done or not", "JOINT")
+    among: str = option("", "choose ports from these device files, such as /dev/ttyACM*", "PATTERN")
+
+
+def command(argv: Sequence[str]) -> int:
+    """Set up what is not, and show what is done.
+
+    Raises:
+        AntennateError: Something given cannot be used, or no answer can come.
+    """
+    config, orders, path = parse_writer(
+        "setup", DESCRIPTION, RobotFile.for_setup, argv, Orders, may_make=True
+    )
+    _check(config, orders)
+    person = TerminalPerson()
+    try:
+        with stop_signals():
+            bus = _ports(person, config, orders, path)
+            return _servos(person, config, orders, path, bus)
+    except Quit:
+        sys.stderr.write(f"ended; what is done is in {path}, run `antennate setup` to go on\n")
+        return OK
+    finally:
+        person.close()
+
+
+def _check(config: SetupConfig, orders: Orders) -> None:
+    known = config.robot.joint_names
+    for name in orders.only:
+        if name not in known:
+            raise ConfigError(
+                f"--only: expected joints of the robot{nearest(name, known)}, one of "
+                f"{', '.join(known)}, found {shortened(name)}"
+            )
+
+
+def _ports(person: TerminalPerson, config: SetupConfig, orders: Orders, path: Path) -> str:
+    """The bus; both ports are kept in the file."""
+    listing = ports.ports_like(orders.among) if orders.among else ports.all_ports
+    clock, found = HostClock(), {"bus": orders.bus, "esp32": orders.esp32}
+    for name, what in (("bus", "adapter of the servo bus"), ("esp32", "antenna board")):
+        if not found[name]:
+            found[name] = ports.find_port(
+                person,
+                what,
+                listing,
+                lambda time: clock.sleep_until(clock.now() + time),
+                config.setup.port_time,
+            )
+    if not found["bus"]:
+        raise ConfigError("--bus: expected a serial port, found none; nothing can be set up")
+    change(path, {("ports", name): port for name, port in found.items() if port})
+    return found["bus"]
+
+
+def _servos(
+    person: TerminalPerson, config: SetupConfig, orders: Orders, path: Path, bus: str
+) -> int:
+    robot = config.robot
+    ids = by_group(robot, "ids", robot.ids)
+    servos = ServoSetup(opener_of(bus, "--bus"), robot, config.setup.scan, HostClock().now)
+    assembly = Assembly(
+        servos, config.setup.done, lambda done: change(path, {**ids, ("setup", "done"): done})
+    )
+    states = assembly.look()
+    _show(states)
+    try:
+        assembly.run(person, states, orders.only)
+        whole = "connect all servos as they are in the robot"
+        if len(assembly.done) < len(states) or not confirm(person, whole):
+            raise Quit
+    except Quit:
+        done = len(assembly.done)
+        person.say(f"{done} of {len(states)} servos are set up; this is kept in {path}")
+        return OK
+    states = assembly.look()
+    _show(states)
+    missing = [state.joint.name for state in states if state.note != "answers"]
+    if missing:
+        person.say(f"expected all servos to answer, found none of {', '.join(missing)}")
+        return BAD_INPUT
+    person.say(f"all servos answer; {path} is written. Next: antennate zero")
+    return OK
+
+
+def _show(states: Sequence[JointState]) -> None:
+    rows = [
+        (s.joint.name, [str(s.joint.servo), model_name(s.joint.model), s.state, s.note])
+        for s in states
+    ]
+    done = sum(state.state == "set up" for state in states)
+    note = f"{done} of {len(states)} servos are set up."
+    print_table(Table("Servos", ["id", "model", "state", "note"], rows, note))
+    sys.stdout.flush()

@@ -1,0 +1,160 @@
+"""A controller whose maneuvers are keys or a gamepad: behind the same supervisor as any other.
+
+It feels as the others do: with a reading that cannot be used it holds. Without a key for a while
+it holds too.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from antennate.control.controllers import RuleController
+from antennate.hardware.driving.config import DriveConfig
+from antennate.params import ControlParams
+from antennate.params.setup import TeleopParams
+from antennate.robots.spec import RobotSpec
+from antennate.types import AntennaFrame, Bools, Contact, Floats, Ints, JointCommand, Maneuver
+
+KEYS = {
+    "up": Maneuver.FORWARD,
+    "w": Maneuver.FORWARD,
+    "left": Maneuver.TURN_L,
+    "a": Maneuver.TURN_L,
+    "right": Maneuver.TURN_R,
+    "d": Maneuver.TURN_R,
+    "down": Maneuver.REVERSE,
+    "s": Maneuver.REVERSE,
+    " ": Maneuver.HOLD,
+}
+"""Maneuvers by key."""
+OSCILLATE = "o"
+"""The key that starts the oscillation of the antennae, and stops it."""
+
+
+QUIT = ("q", "end")
+"""Keys that end the drive; the second one stands for the end of the input."""
+
+
+class TeleopConfig(DriveConfig):
+    """What `drive` takes, and how keys walk the robot; the controller that is named is not used."""
+
+    teleop: TeleopParams = TeleopParams()
+
+
+@dataclass
+class Wishes:
+    """What is wanted by keys.
+
+    Attributes:
+        maneuver: The maneuver of the newest key.
+        heard: When it came [s], by the host's clock.
+        oscillating: The antennae oscillate.
+    """
+
+    maneuver: Maneuver = Maneuver.HOLD
+    heard: float = -math.inf
+    oscillating: bool = False
+
+    def press(self, key: str, now: float) -> None:
+        """Take a key at a time [s]; one that means nothing is none.
+
+        Raises:
+            KeyboardInterrupt: It ends the drive.
+        """
+        if key in QUIT:
+            raise KeyboardInterrupt
+        if key in KEYS:
+            self.maneuver, self.heard = KEYS[key], now
+        elif key == OSCILLATE:
+            self.oscillating = not self.oscillating
+
+    def now(self, now: float, patience: float) -> Maneuver:
+        """The maneuver that is wanted at a time [s]; HOLD after so long without a key [s]."""
+        return self.maneuver if now - self.heard <= patience else Maneuver.HOLD
+
+
+class KeyRule:
+    """The decision of a controller that keys decide.
+
+    Args:
+        control: Numbers of the control.
+        wanted: The maneuver that is wanted now.
+    """
+
+    def __init__(self, control: ControlParams, wanted: Callable[[], Maneuver]) -> None:
+        self.turn_offset = control.gait.turn_offset
+        self._wanted = wanted
+
+    def reset(self, rows: Ints | Bools) -> None:
+        """Nothing is remembered."""
+
+    def step(self, t: Floats, level: Floats, contact: Ints, flex: Floats) -> Ints:
+        """The maneuver of the keys; HOLD where a reading cannot be used."""
+        unknown = (contact == int(Contact.UNKNOWN)).any(axis=1)
+        return np.where(unknown, int(Maneuver.HOLD), int(self._wanted()))
+
+
+class KeyController:
+    """One robot by keys.
+
+    Args:
+        control: Numbers of the control.
+        robot: The robot.
+        params: How long a key lasts, how the antennae oscillate.
+        keys: Keys that have come since the last call.
+        clock: The host's time [s].
+    """
+
+    def __init__(
+        self,
+        control: ControlParams,
+        robot: RobotSpec,
+        params: TeleopParams,
+        keys: Callable[[], list[str]],
+        clock: Callable[[], float],
+    ) -> None:
+        self._params, self._wishes = params, Wishes()
+        self._keys, self._clock = keys, clock
+        rule = KeyRule(control, lambda: self._wishes.now(clock(), params.release))
+        self._walk = RuleController(rule, control, robot, 1)
+        self._middle = control.gait.antenna_mean
+        self._swing = 2.0 * math.pi * params.oscillation_frequency * control.period
+        self._phase = 0.0
+
+    @property
+    def maneuver(self) -> Ints:
+        """`Maneuver` of the last step, shape (1,)."""
+        return self._walk.maneuver
+
+    @property
+    def contact(self) -> Ints:
+        """`Contact` of each antenna in the last step, shape (1, 2)."""
+        return self._walk.contact
+
+    @property
+    def level(self) -> Floats:
+        """Bending level of each antenna in the last step, 0 to 1, shape (1, 2)."""
+        return self._walk.level
+
+    def reset(self, rows: Ints | Bools, phase: Floats | float = 0.0) -> None:
+        """Forget everything and start the gait at a phase [rad]."""
+        self._walk.reset(rows, phase)
+        self._phase = 0.0
+
+    def step(self, frame: AntennaFrame) -> JointCommand:
+        """One control period: the command for this frame.
+
+        Raises:
+            KeyboardInterrupt: A key ends the drive.
+        """
+        for key in self._keys():
+            self._wishes.press(key, self._clock())
+        command = self._walk.step(frame)
+        if self._wishes.oscillating:
+            self._phase += self._swing
+        angle = self._middle + self._params.oscillation_amplitude * math.sin(self._phase)
+        return replace(command, antenna=np.full((1, 2), angle))

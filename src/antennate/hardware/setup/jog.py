@@ -1,0 +1,156 @@
+"""One joint moved by small steps: slowly, with little force, and only while somebody is there.
+
+The servo gets a slow profile and a limit of its PWM, and its bus watchdog stops it when the program
+dies. Torque is on that joint alone and goes off at the end.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import math
+from typing import NamedTuple
+
+from antennate.hardware.dynamixel import bringup
+from antennate.hardware.dynamixel.answers import Span, Value
+from antennate.hardware.dynamixel.bus import Bus
+from antennate.hardware.dynamixel.tables import (
+    POSITION_UNIT,
+    TABLES,
+    VELOCITY_UNIT,
+    Register,
+    hardware_errors,
+)
+from antennate.hardware.ports.port import PortError
+from antennate.hardware.setup.person import SetupError
+from antennate.hardware.setup.servos import Joint
+from antennate.params.setup import JogParams
+from antennate.robots.servos import TICKS_A_TURN
+from antennate.robots.spec import RobotSpec
+
+WATCHDOG_COUNTS = 10
+"""Bus watchdog [20 ms]: the joint stops 0.2 s after the last packet (assumed)."""
+_LOST = 10
+"""Readings in a row that may fail (assumed)."""
+
+
+class JogState(NamedTuple):
+    """What a joint does.
+
+    Attributes:
+        angle: Where it is [rad].
+        goal: Where it is to be [rad].
+        ticks: Where its servo is [ticks].
+        load: Load [0.1 %] or current [mA], as the model tells.
+    """
+
+    angle: float
+    goal: float
+    ticks: int
+    load: int
+
+
+class Jog:
+    """A joint with torque, until `end`.
+
+    Args:
+        bus: The bus.
+        robot: The robot, for zeros, directions and limits.
+        joint: The joint.
+        params: How slowly, how strong, how far.
+
+    Raises:
+        BringUpError: The servo is not fit; it has no torque then.
+    """
+
+    def __init__(self, bus: Bus, robot: RobotSpec, joint: Joint, params: JogParams) -> None:
+        at = robot.joint_names.index(joint.name)
+        self.joint, self._bus, self._params = joint, bus, params
+        self._table = TABLES[joint.model]
+        self._sign, self._limit = robot.directions[at], robot.limits[at]
+        self._zero, self._lost = float(robot.zeros[at]), 0
+        self._full = self._read("pwm_limit")
+        try:
+            self._goal = self._begin()
+        except BaseException:
+            self.end()
+            raise
+        self._newest = JogState(self._goal, self._goal, 0, 0)
+
+    def _begin(self) -> float:
+        """Slow, weak, watched, and on where it stands [rad]."""
+        servo, bus = self.joint.servo, self._bus
+        bringup.require_models(bus, {servo: self.joint.model})
+        bringup.arm_watchdogs(bus, [servo], WATCHDOG_COUNTS)
+        bringup.limit_speed(bus, {servo: max(1, round(self._params.speed / VELOCITY_UNIT))})
+        self._write("goal_pwm", max(1, round(self._params.pwm * self._full)))
+        stands = bringup.enable(bus, [servo])[servo]
+        if math.isinf(self._limit):  # a leg counts its turns from where it stands
+            self._zero += TICKS_A_TURN * round((stands - self._zero) / TICKS_A_TURN)
+        return self._angle(stands)
+
+    def step(self, steps: int) -> None:
+        """Set the goal some steps further, within the limit of the joint.
+
+        Raises:
+            SetupError: The servo did not take it.
+        """
+        wanted = self._newest.goal + steps * self._params.step
+        goal = min(max(wanted, -self._limit), self._limit)
+        self._write("goal_position", round(self._zero + self._sign * goal / POSITION_UNIT))
+        self._newest = self._newest._replace(goal=goal)
+
+    def look(self) -> JogState:
+        """What the joint does; call it at least every 0.1 s, or its watchdog stops it.
+
+        Raises:
+            SetupError: It does not answer any more, or reports an error.
+            PortError: The bus is gone.
+        """
+        said = self._bus.read(self.joint.servo, Span(126, 10))
+        if not isinstance(said, Value):
+            self._lost += 1
+            if self._lost >= _LOST:
+                raise SetupError(f"expected an answer of {self.joint}, found none")
+            return self._newest
+        self._lost = 0
+        if said.alert:
+            words = ", ".join(hardware_errors(self._read("hardware_error_status")))
+            raise SetupError(
+                f"expected {self.joint} without an error, found: {words}; take the load off, then "
+                "switch its supply off and on"
+            )
+        ticks = self._register("present_position").decode(said.data[6:])
+        load = int.from_bytes(said.data[:2], "little", signed=True)
+        self._newest = JogState(self._angle(ticks), self._newest.goal, ticks, load)
+        return self._newest
+
+    def end(self) -> list[int]:
+        """Torque off, verified, and the servo as it was: ids that did not confirm it."""
+        left = bringup.disable(self._bus, [self.joint.servo])
+        with contextlib.suppress(PortError, SetupError, bringup.BringUpError):
+            self._write("goal_pwm", self._full)
+            bringup.limit_speed(self._bus, {self.joint.servo: 0})
+        return left
+
+    def _angle(self, ticks: float) -> float:
+        return (ticks - self._zero) * self._sign * POSITION_UNIT
+
+    def _register(self, name: str) -> Register:
+        return self._table[name]
+
+    def _read(self, name: str) -> int:
+        servo = self.joint.servo
+        return bringup.read_register(self._bus, [servo], self._register(name))[servo]
+
+    def _write(self, name: str, value: int) -> None:
+        """Write a register.
+
+        Raises:
+            SetupError: The servo refused it or did not answer.
+        """
+        register = self._register(name)
+        said = self._bus.write(self.joint.servo, register.address, register.encode(value))
+        if not isinstance(said, Value):
+            raise SetupError(
+                f"expected {self.joint} to take {name.replace('_', ' ')} {value}, found {said}"
+            )

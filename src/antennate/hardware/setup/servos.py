@@ -1,0 +1,230 @@
+"""One servo at a time becomes a joint: its id, speed, mode, limits and return delay.
+
+The servo may be factory-new (id 1 at 57600 bit/s) or have any other id and speed. What it has to
+hold is the rule that drive and doctor know (`hardware.settings`). Its id and speed are changed
+last: one that was interrupted before is found as a new one again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterable, Mapping
+from typing import NamedTuple
+
+from antennate.hardware import settings
+from antennate.hardware.doctor.bus_survey import master, read_some
+from antennate.hardware.doctor.check import Opener
+from antennate.hardware.doctor.fix import Change, apply
+from antennate.hardware.dynamixel.bus import Bus
+from antennate.hardware.dynamixel.inquiry import Present, look
+from antennate.hardware.dynamixel.tables import BAUD_RATES, TABLES, XC430_W240
+from antennate.hardware.settings import Setting
+from antennate.hardware.setup.person import SetupError
+from antennate.robots.spec import RobotSpec
+
+FACTORY_BAUD = 57_600
+"""Speed of a new servo [bit/s]: the manual's default of `baud_rate` in both models."""
+_FASTEST = 4_000_000
+"""Fastest that a usual adapter does [bit/s]; the SDK takes no more either."""
+_STATES = {
+    "broken": "answers that are never whole: two servos with one id, or a bad cable",
+    "collides": "answers that collide: two servos with one id",
+    "mute": "a servo that answers pings alone; switch its supply off and on",
+}
+
+
+class Joint(NamedTuple):
+    """A joint and the servo that it needs.
+
+    Attributes:
+        name: Name in the robot's description.
+        servo: Id of its servo.
+        model: Model number of its servo.
+    """
+
+    name: str
+    servo: int
+    model: int
+
+    def __str__(self) -> str:
+        return f"{self.name} (id {self.servo}, {model_name(self.model)})"
+
+
+def joints_of(robot: RobotSpec) -> list[Joint]:
+    """All joints that servos move, in the order of the robot."""
+    models = robot.models
+    return [Joint(n, i, models[i]) for n, i in zip(robot.joint_names, robot.ids, strict=True)]
+
+
+def model_name(model: int | None) -> str:
+    """Name of a model, or its number if it is not known."""
+    return TABLES[model].name if model in TABLES else f"model {model}"
+
+
+class ServoSetup:
+    """Makes servos fit for the joints of a robot.
+
+    Args:
+        opener: Opens the bus at any speed.
+        robot: The robot.
+        scan: Time for the answers of all servos [s].
+        now: Monotonic time [s].
+    """
+
+    def __init__(
+        self, opener: Opener, robot: RobotSpec, scan: float, now: Callable[[], float]
+    ) -> None:
+        self.joints = joints_of(robot)
+        self._opener, self._scan, self._now = opener, scan, now
+        self._baud = robot.baud
+        delay = dict.fromkeys(robot.ids, Setting(0, 0, 0))
+        self._rules = {**settings.settings(robot), "return_delay_time": delay}
+
+    def present(self) -> dict[str, str]:
+        """What each joint's servo lacks, of those that answer at the robot's speed; "" is nothing.
+
+        Raises:
+            PortError: The port is gone or cannot be opened.
+        """
+        with self._opener(self._baud) as port:
+            bus = master(port, self._baud, self._now)
+            answering = {status.id for status in bus.scan(self._scan)}
+            return {j.name: self._lacks(bus, j) for j in self.joints if j.servo in answering}
+
+    def set_up(self, joint: Joint, done: Collection[str]) -> list[Change]:
+        """Make the one servo on the bus that of a joint: the changes that were made.
+
+        Args:
+            joint: The joint.
+            done: Names of joints that have their servo.
+
+        Raises:
+            SetupError: There is not exactly one servo, or not the right one; nothing was changed.
+            BringUpError: It did not take a value.
+            PortError: The port is gone or cannot be opened.
+        """
+        baud, servo = self._only()
+        if servo.state != "ok":
+            raise SetupError(f"expected one servo alone, found {_STATES[servo.state]}")
+        if servo.model != joint.model:
+            raise SetupError(
+                f"expected the servo of {joint}, found an {model_name(servo.model)} (id "
+                f"{servo.servo}); connect one of the right model"
+            )
+        if other := self._owner(baud, servo.servo, done, joint):
+            raise SetupError(
+                f"expected the servo of {joint}, found that of {other}, which is done; connect the "
+                "next one in its place"
+            )
+        changes = self._plan(baud, servo.servo, joint)
+        for change in changes:
+            apply(self._opener, change, self._now)
+        self._verify(joint)
+        return changes
+
+    def _only(self) -> tuple[int, Present]:
+        """The one servo on the bus and its speed.
+
+        Raises:
+            SetupError: There is none, or more than one.
+        """
+        found: list[tuple[int, Present]] = []
+        usual = (FACTORY_BAUD, self._baud)
+        others = [b for b in BAUD_RATES if b not in usual and b <= _FASTEST]
+        for speeds in (tuple(dict.fromkeys(usual)), others):
+            for baud in speeds:
+                with self._opener(baud) as port:
+                    found += [(baud, one) for one in self._here(master(port, baud, self._now))]
+            if found:
+                break
+        if not found:
+            raise SetupError(
+                "expected one servo, found none at any speed; check its cable and its supply"
+            )
+        if len(found) > 1:
+            raise SetupError(
+                f"expected one servo alone, found {len(found)}: {_named(found)}; unplug the others"
+            )
+        return found[0]
+
+    def _here(self, bus: Bus) -> list[Present]:
+        """Servos that answer at the speed of a bus."""
+        ids = sorted({status.id for status in bus.scan(self._scan)})
+        if not ids and bus.tally.bad_crc:
+            return [Present(0, None, None, "broken")]
+        return [one for servo in ids if (one := look(bus, servo)) is not None]
+
+    def _owner(self, baud: int, servo: int, done: Collection[str], joint: Joint) -> Joint | None:
+        """The joint, done already, whose servo this is."""
+        owners = [j for j in self.joints if j.servo == servo and j.name in done and j != joint]
+        if baud != self._baud or not owners:
+            return None
+        with self._opener(baud) as port:
+            lacks = self._lacks(master(port, baud, self._now), owners[0])
+        return owners[0] if not lacks else None
+
+    def _plan(self, baud: int, servo: int, joint: Joint) -> list[Change]:
+        """What differs, in the order in which it is to be changed."""
+        with self._opener(baud) as port:
+            there = self._read(master(port, baud, self._now), servo)
+        changes = [
+            Change(servo, baud, name, there[name], rule.cure)
+            for name, rule in self._wanted(joint).items()
+            if not rule.allows(there[name])
+        ]
+        if servo != joint.servo:
+            changes.append(Change(servo, baud, "id", servo, joint.servo))
+        if baud != self._baud:
+            old, new = BAUD_RATES.index(baud), BAUD_RATES.index(self._baud)
+            changes.append(Change(joint.servo, baud, "baud_rate", old, new))
+        return changes
+
+    def _verify(self, joint: Joint) -> None:
+        """The servo is where it has to be, with all that it has to hold.
+
+        Raises:
+            SetupError: It is not.
+        """
+        with self._opener(self._baud) as port:
+            lacks = self._lacks(master(port, self._baud, self._now), joint)
+        if lacks:
+            raise SetupError(f"expected the servo of {joint} to be set up, found {lacks}")
+
+    def _lacks(self, bus: Bus, joint: Joint) -> str:
+        """What is wrong with the servo of a joint, empty if nothing is."""
+        servo = look(bus, joint.servo)
+        if servo is None:
+            return "no answer"
+        if servo.state != "ok":
+            return _STATES[servo.state]
+        if servo.model != joint.model:
+            return f"an {model_name(servo.model)}"
+        there = self._read(bus, joint.servo)
+        return "; ".join(
+            f"{name.replace('_', ' ')} {there[name]} (expected {rule})"
+            for name, rule in self._wanted(joint).items()
+            if not rule.allows(there[name])
+        )
+
+    def _wanted(self, joint: Joint) -> Mapping[str, Setting]:
+        return {n: rules[joint.servo] for n, rules in self._rules.items() if joint.servo in rules}
+
+    def _read(self, bus: Bus, servo: int) -> dict[str, int]:
+        """The registers of a servo that have to hold something.
+
+        Raises:
+            SetupError: It does not answer.
+        """
+        found: dict[str, int] = {}
+        for name in self._rules:
+            value = read_some(bus, [servo], XC430_W240[name]).get(servo)
+            if value is None:
+                raise SetupError(
+                    f"expected {name.replace('_', ' ')} of servo {servo}, found no answer; check "
+                    "its cable"
+                )
+            found[name] = value
+        return found
+
+
+def _named(found: Iterable[tuple[int, Present]]) -> str:
+    return ", ".join(f"id {one.servo} at {baud}" for baud, one in found)

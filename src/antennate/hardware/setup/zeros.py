@@ -1,0 +1,257 @@
+"""Zeros and directions of all joints, measured on a robot without torque that is held by hand.
+
+A zero is where a joint stands while the robot is held straight, legs at mid-stance, antennae at
+their mounting angle. A direction is the sign by which the ticks change when the joint is moved in
+its positive sense. Nothing here moves anything.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from antennate.hardware.dynamixel.answers import POSITION, Value
+from antennate.hardware.dynamixel.bus import Bus
+from antennate.hardware.dynamixel.tables import XC430_W240
+from antennate.hardware.setup.person import Person, Quit, SetupError
+from antennate.params.setup import SetupParams
+from antennate.robots.joints import QUARTER, STRAIGHT
+from antennate.robots.servos import TICKS_A_TURN
+from antennate.robots.spec import GroupName, RobotSpec
+from antennate.types import Ints
+
+POSE = (
+    "hold the robot straight: links in one line, every leg at mid-stance (ring lowest), both "
+    "antennae at their mounting angle"
+)
+_PERIOD = 0.05
+"""Time between two readings [s]."""
+_BUDGET = 0.1
+"""Time for one reading of all [s]: ten times what 19 answers take (assumed)."""
+_LOST = 20
+"""Readings in a row that one servo may miss: a second (assumed)."""
+_STEP = 2.0 * math.pi / TICKS_A_TURN
+_SENSES: Mapping[GroupName, str] = {
+    "yaw": "swing the part behind it to the robot's right",
+    "legs": "turn it as a wheel rolls forward",
+    "antennae": "turn it towards the tail",
+    "pitch": "lift the part behind it",
+}
+_LIFTING = "lift it"
+
+
+class HornNote(NamedTuple):
+    """A zero that tells of a horn in the wrong place.
+
+    Attributes:
+        joint: Name of the joint.
+        zero: Its zero [ticks].
+        teeth: How many teeth the horn sits off.
+    """
+
+    joint: str
+    zero: int
+    teeth: int
+
+    def __str__(self) -> str:
+        away = self.zero - STRAIGHT
+        return (
+            f"{self.joint}: zero {self.zero} is {away:+d} ticks ({math.degrees(away * _STEP):+.1f} "
+            f"deg) from the middle {STRAIGHT}, about {self.teeth} of its horn's teeth; put the "
+            "horn on anew with its mark at the mark of the shaft, or keep it and lose that much of "
+            "its way"
+        )
+
+
+class Positions:
+    """The positions of all joints, read again and again.
+
+    Args:
+        bus: The bus, torque off.
+        robot: The robot.
+        wait: Lets a time pass [s].
+    """
+
+    def __init__(self, bus: Bus, robot: RobotSpec, wait: Callable[[float], None]) -> None:
+        self._bus, self._ids, self._wait = bus, robot.ids, wait
+        self._missed = dict.fromkeys(robot.ids, 0)
+        self._newest: dict[int, int] = {}
+
+    def __iter__(self) -> Iterator[Ints]:
+        """Positions [ticks], shape (n,), for ever, one every 50 ms.
+
+        Raises:
+            SetupError: A servo does not answer any more.
+            PortError: The bus is gone.
+        """
+        while True:
+            answers = self._bus.read_all(self._ids, POSITION, _BUDGET)
+            for servo, said in answers.items():
+                if isinstance(said, Value):
+                    self._newest[servo] = XC430_W240["present_position"].decode(said.data)
+                    self._missed[servo] = 0
+                else:
+                    self._missed[servo] += 1
+            if lost := [servo for servo, count in self._missed.items() if count >= _LOST]:
+                raise SetupError(
+                    f"expected positions of all servos, found none of {lost} for a second; check "
+                    "cables and supply"
+                )
+            if len(self._newest) == len(self._ids):
+                yield np.array([self._newest[servo] for servo in self._ids], np.int64)
+            self._wait(_PERIOD)
+
+
+class Zeroing:
+    """Measures zeros, then directions.
+
+    Args:
+        robot: The robot as it is described so far.
+        params: How still, how far.
+        positions: The positions of its joints.
+    """
+
+    def __init__(self, robot: RobotSpec, params: SetupParams, positions: Positions) -> None:
+        self._robot, self._params, self._positions = robot, params, positions
+        self._names = robot.joint_names
+        self._limited = np.isfinite(robot.limits)
+
+    def zeros(self, person: Person) -> list[int]:
+        """The zero of each joint [ticks], once the robot is held straight and still.
+
+        Raises:
+            Quit: The person wants to end.
+            BadInputError: No answer can come.
+            SetupError: A servo does not answer any more.
+        """
+        while True:
+            person.say(f"{POSE}; then Enter [q ends]")
+            self._wait_for_enter(person)
+            try:
+                return self._taken()
+            except SetupError as error:
+                person.say(f"{error}; once more")
+
+    def _wait_for_enter(self, person: Person) -> None:
+        for now in self._positions:
+            person.show(self._all(now))
+            if (said := person.answer()) in ("q", "quit"):
+                raise Quit
+            if said is not None:
+                return
+
+    def _taken(self) -> list[int]:
+        """The mean of the positions over a while.
+
+        Raises:
+            SetupError: They moved, or a joint has no room to both sides.
+        """
+        count = max(2, round(self._params.hold / _PERIOD))
+        readings = np.array([now for _, now in zip(range(count), self._positions, strict=False)])
+        moved = np.ptp(readings, axis=0) * _STEP
+        if moved.max() > self._params.still:
+            worst = int(moved.argmax())
+            raise SetupError(
+                f"expected all joints at rest, found {self._names[worst]} moving by "
+                f"{math.degrees(moved[worst]):.1f} deg"
+            )
+        zeros = np.rint(readings.mean(axis=0)).astype(np.int64)
+        zeros[~self._limited] %= TICKS_A_TURN  # legs count turns from wherever they stand
+        room = (zeros >= QUARTER) & (zeros <= TICKS_A_TURN - QUARTER) | ~self._limited
+        if not room.all():
+            at = int(np.argmin(room))
+            raise SetupError(
+                f"expected {self._names[at]} at {QUARTER} to {TICKS_A_TURN - QUARTER} ticks, found "
+                f"it at {zeros[at]}: no room for a quarter turn to both sides; put its horn on anew"
+            )
+        return zeros.tolist()
+
+    def horns(self, zeros: Sequence[int]) -> list[HornNote]:
+        """Joints whose zero is more than half a tooth of the horn off the middle.
+
+        A leg that rolls has no middle.
+        """
+        tooth = TICKS_A_TURN / self._params.horn_teeth
+        away = (np.array(zeros) - STRAIGHT) / tooth
+        return [
+            HornNote(name, zero, max(1, round(abs(off))))
+            for name, zero, off, limited in zip(
+                self._names, zeros, away.tolist(), self._limited, strict=True
+            )
+            if limited and abs(off) > 0.5
+        ]
+
+    def directions(self, person: Person) -> list[int]:
+        """The direction of each joint, 1 or -1, as each is moved by hand in turn.
+
+        Raises:
+            Quit: The person wants to end.
+            BadInputError: No answer can come.
+            SetupError: A servo does not answer any more.
+        """
+        found = list(self._robot.directions)
+        for at, name in enumerate(self._names):
+            before = next(iter(self._positions))  # whoever is asked may be quick
+            where = f"{at + 1} of {len(found)}: {name}"
+            person.say(f"{where}: {self._sense(at)} by 10 to 40 deg [s keeps, r keeps the rest]")
+            sign = self._direction(person, at, before)
+            if sign is None:
+                break
+            found[at] = sign or found[at]
+        return found
+
+    def _direction(self, person: Person, at: int, before: Ints) -> int | None:
+        """The direction of one joint, 0 to keep it, None to keep the rest as well."""
+        name, told = self._names[at], at
+        for now in self._positions:
+            if (said := person.answer()) is not None:
+                if said in ("q", "quit"):
+                    raise Quit
+                return None if said.startswith("r") else 0
+            moved = (now - before) * _STEP
+            person.show(f"{name}: {now[at]} ticks, moved {math.degrees(moved[at]):+6.1f} deg")
+            if abs(moved[at]) >= self._params.turn:
+                sign = 1 if moved[at] > 0 else -1
+                person.say(f"  {name}: direction {sign:+d}")
+                return sign
+            other = int(abs(moved).argmax())
+            if abs(moved[other]) >= 2.0 * self._params.turn and other != told:
+                told = other
+                person.say(self._exchanged(at, other))
+        return None
+
+    def _exchanged(self, at: int, other: int) -> str:
+        names, ids = self._names, self._robot.ids
+        return (
+            f"  expected {names[at]} (id {ids[at]}) to move, found {names[other]} (id "
+            f"{ids[other]}); if you did move {names[at]}, their servos are exchanged: end with q, "
+            "exchange them, run zero again"
+        )
+
+    def _sense(self, at: int) -> str:
+        """What to do to move a joint in its positive sense."""
+        names: list[GroupName] = [n for n, _, k in self._robot.groups for _ in range(k)]
+        lifts = names[at] == "legs" and self._limited[at]
+        return _LIFTING if lifts else _SENSES[names[at]]
+
+    def _all(self, now: Ints) -> str:
+        """All positions in one line, group by group."""
+        return "  ".join(
+            f"{name} {' '.join(map(str, now[self._robot.places(name)].tolist()))}"
+            for name, _, count in self._robot.groups
+            if count
+        )
+
+
+def by_group(
+    robot: RobotSpec, what: str, values: Sequence[int]
+) -> dict[tuple[str, ...], list[int]]:
+    """Values of all joints as keys of a robot's file: `robot.yaw.zeros` and so on."""
+    return {
+        ("robot", name, what): list(values[robot.places(name)])
+        for name, _, count in robot.groups
+        if count
+    }
