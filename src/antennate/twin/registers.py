@@ -125,16 +125,12 @@ class Servo:
         self.advance(t)
         self._start(t + time)
 
-    def plug(self, t: float) -> None:
-        """Put it on the bus, which gives it power."""
-        self.plugged = True
+    def plug(self, t: float, into: bool = True) -> None:
+        """Put it on the bus, which gives it power; or take it off."""
         self.restart(t)
-
-    def unplug(self, t: float) -> None:
-        """Take it off the bus, and its power."""
-        self.restart(t)
-        self.set("torque_enable", 0)
-        self.plugged = False
+        self.plugged = into
+        if not into:
+            self.set("torque_enable", 0)
 
     # what the wire sees
 
