@@ -140,7 +140,7 @@ def test_trajectories_are_a_grid_with_the_verdict_of_each_trial():
         "trial 0: out after 10.0 s",
         "trial 1: out after 20.0 s",
         "trial 2: out of time, 50 s",
-        "trial 3: left",
+        "trial 3: left the scene",
     ]
     assert len(figure.legends) == 1
 

@@ -21,6 +21,7 @@ from antennate.hardware.driving.connect import prepare
 from antennate.hardware.driving.drive import drive
 from antennate.hardware.driving.session import Session
 from antennate.hardware.safety.causes import State
+from antennate.robots.antenna import AntennaSpec
 from antennate.sim.scenes.registry import SCENES, make_scene
 from antennate.sim.scenes.scene import FlatScene
 from antennate.sim.trial import draw_trial
@@ -260,3 +261,29 @@ def test_a_failing_controller_is_named_by_its_path_and_its_invalid_trials_are_to
     assert "my file" not in out
     assert out.endswith("Invalid trials: 1; trials.csv gives the reason of each.\n")
     assert "ZeroDivisionError" in (tmp_path / "run" / "trials.csv").read_text()
+
+
+def test_the_reason_of_a_failure_names_the_line_of_the_user(tmp_path: Path) -> None:
+    file = tmp_path / "mine.py"
+    file.write_text(
+        "from antennate.control.controllers import open_loop\n"
+        "def Fails(control, robot, batch):\n"
+        "    made = open_loop(control, robot, batch)\n"
+        "    made.step = lambda frame: int('x')\n"
+        "    return made\n"
+        "def Forgets(control, robot, batch):\n"
+        "    made = open_loop(control, robot, batch)\n"
+        "    made.step = lambda frame: None\n"
+        "    return made\n"
+    )
+    with pytest.raises(AssertionError, match=r"step raised ValueError: .*mine\.py:4\)"):
+        check_controller(f"{file}:Fails")
+    with pytest.raises(AssertionError, match="expected a JointCommand from step, found None"):
+        check_controller(f"{file}:Forgets")
+    with pytest.raises(ConfigError, match=r"found no forgets in .*\(did you mean Forgets\?\)"):
+        CONTROLLERS.find(f"{file}:forgets")
+
+
+def test_a_sensor_longer_than_its_antenna_is_refused() -> None:
+    with pytest.raises(ValueError, match=r"at most the length of 0\.14 m, got 0\.5 m"):
+        AntennaSpec.model_validate({"length": 0.14, "sensor": {"active_length": 0.5}})

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import traceback
+from pathlib import Path
+
 
 class AntennateError(Exception):
     """Base of all errors of this package; its text is one line fit to be shown to a user."""
@@ -71,3 +74,21 @@ def in_one_line(error: BaseException) -> str:
     except BaseException:  # noqa: BLE001 anybody's __str__ may raise anything
         return name
     return f"{name}: {text}"[:_LONGEST]
+
+
+_OURS = Path(__file__).parent
+
+
+def where(error: BaseException) -> str:
+    """` (FILE:LINE)` of the user's code that raised an error; empty if it was none of the user's.
+
+    It is the last place outside this package, and outside installed packages if there is one.
+    """
+    places = [(Path(f.filename), f.lineno) for f in traceback.extract_tb(error.__traceback__)]
+    outside = [at for at in places if not at[0].is_relative_to(_OURS)]
+    own = [at for at in outside if "site-packages" not in at[0].parts] or outside
+    if not own:
+        return ""
+    path, line = own[-1]
+    here = Path.cwd()
+    return f" ({path.relative_to(here) if path.is_relative_to(here) else path}:{line})"

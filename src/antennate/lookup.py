@@ -12,7 +12,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, Generic, TypeVar, cast
 
-from antennate.errors import ConfigError, WorkerError, in_one_line
+from antennate.errors import ConfigError, WorkerError, in_one_line, where
 from antennate.messages import nearest, shown
 
 T = TypeVar("T")
@@ -85,9 +85,11 @@ class Registry(Generic[T]):
         place, _, attribute = name.rpartition(":")
         if name in self.names or (place and attribute):
             return name
+        forms = "FILE.xml, MODULE:NAME" if self._kind == "scene" else "MODULE:NAME"
+        meant = f" (did you mean {name}:NAME?)" if name.endswith(".py") else ""
         raise ConfigError(
-            f"expected one of {', '.join(self.names)}, or MODULE:NAME or FILE.py:NAME of your own "
-            f"{self._kind}, found {shown(name)}{nearest(name, self.names)}"
+            f"expected one of {', '.join(self.names)}, or {forms} or FILE.py:NAME of your own "
+            f"{self._kind}, found {shown(name)}{meant or nearest(name, self.names)}"
         )
 
     def find(self, name: str) -> T:
@@ -109,9 +111,9 @@ class Registry(Generic[T]):
         except KeyboardInterrupt:
             raise
         except BaseException as error:
-            raise ConfigError(
-                f"expected a {self._kind} at {name!r}, found {in_one_line(error)}"
-            ) from error
+            ours = isinstance(error, LookupError | FileNotFoundError) and str(error)[:3] == "no "
+            what = str(error) if ours else in_one_line(error) + where(error)
+            raise ConfigError(f"expected a {self._kind} at {name!r}, found {what}") from error
         if not callable(found):
             raise ConfigError(
                 f"expected a class or a function at {name!r}, found {type(found).__name__}"
@@ -127,7 +129,8 @@ class Registry(Generic[T]):
         else:
             module = importlib.import_module(place)
         if not hasattr(module, attribute):
-            raise ConfigError(f"no {attribute} in {place}")
+            defined = [n for n, v in vars(module).items() if callable(v) and n[:1] != "_"]
+            raise LookupError(f"no {attribute} in {place}{nearest(attribute, defined)}")
         return getattr(module, attribute)
 
 

@@ -14,7 +14,7 @@ from antennate import __version__
 from antennate.cli.exit_codes import BAD_INPUT, INTERRUPTED, OK
 
 ROBOT_COMMANDS = {
-    "twin": "serve a simulated robot as real bytes: an antenna board and a bus of servos",
+    "twin": "serve a simulated robot on two ports: an antenna board and a bus of servos",
     "robot": "joints, supply, wiring diagram and bill of materials of a robot",
     "doctor": "examine the real robot, or its twin: what is wrong, and the cure",
     "setup": "from a box of servos to a robot: ports, ids, speeds, settings, one by one",
@@ -78,7 +78,10 @@ def carry_out(name: str, argv: Sequence[str]) -> int:
 def _run(words: Sequence[str], name: str) -> int:
     if not words or words[0] in ("-h", "--help"):
         sys.stdout.write(_usage())
-        return OK if words else BAD_INPUT
+        if words:
+            return OK
+        sys.stderr.write("antennate: error: expected a command, found none\n")
+        return BAD_INPUT
     if words[0] == "--version":
         sys.stdout.write(f"antennate {__version__}\n")
         return OK

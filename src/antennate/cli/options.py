@@ -243,7 +243,8 @@ def read_words(argv: Sequence[str], options: Sequence[Option]) -> dict[tuple[str
             rest = words[1:]
         for word in rest:
             if not free:
-                raise ConfigError(f"expected flags only, found {shown(word)}")
+                meant = nearest(word, by_flag) if word.startswith("-") else ""
+                raise ConfigError(f"expected flags only{meant}, found {shown(word)}")
             first = free.pop(0)
             values[first.path] = first.value(word)
     return values

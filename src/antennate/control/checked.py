@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from antennate.errors import ControllerError, in_one_line
+from antennate.errors import ControllerError, in_one_line, where
 from antennate.robots.spec import RobotSpec
 from antennate.types import AntennaFrame, Bools, Controller, Floats, Ints, JointCommand, Maneuver
 
@@ -48,7 +48,7 @@ class CheckedController:
         except KeyboardInterrupt:
             raise
         except BaseException as error:
-            raise ControllerError(f"reset raised {in_one_line(error)}") from error
+            raise ControllerError(f"reset raised {in_one_line(error)}{where(error)}") from error
 
     def step(self, frame: AntennaFrame) -> JointCommand:
         """One control period of all rows.
@@ -59,13 +59,15 @@ class CheckedController:
         self.faults = {}
         try:
             command = self._controller.step(frame)
+            if command is None:  # pyright: ignore[reportUnnecessaryComparison] `return` forgotten
+                raise ControllerError("expected a JointCommand from step, found None")
             self._require_shapes(command)
             self.maneuver = self._controller.maneuver
             sound = self._all_sound(command)
         except (KeyboardInterrupt, ControllerError):
             raise
         except BaseException as error:
-            raise ControllerError(f"step raised {in_one_line(error)}") from error
+            raise ControllerError(f"step raised {in_one_line(error)}{where(error)}") from error
         if not sound:
             self._find_faults(command)
         return command

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Annotated
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from antennate.params.base import Params, number
 from antennate.robots.sensor import SensorParams
@@ -74,6 +74,19 @@ class AntennaSpec(Params):
     base_armature: float = number(1e-4, "kg·m²", "assumed: below the servo's; driven stiffly", ge=0)
     """Its inertia."""
     sensor: SensorParams = SensorParams()
+
+    @model_validator(mode="after")
+    def _sensor_fits(self) -> AntennaSpec:
+        sensed = self.sensor.active_length
+        usual = SensorParams.model_fields[
+            "active_length"
+        ].default  # its end lies idle on a short one
+        if sensed > self.length and sensed != usual:
+            raise ValueError(
+                f"sensor.active_length must be at most the length of {self.length:g} m, got "
+                f"{sensed:g} m"
+            )
+        return self
 
     @property
     def hinges(self) -> int:

@@ -101,6 +101,10 @@ class RobotSpec(Params):
         """
         if (table := ROBOTS.get(str(text))) is not None:
             return cls.model_validate(table)
+        if not str(text):
+            raise ConfigError(
+                f"--robot: expected {', '.join(ROBOTS)} or a TOML file, found nothing"
+            )
         path = folder / text
         if path.suffix != ".toml" and not path.exists():
             known = ", ".join(ROBOTS)

@@ -41,8 +41,8 @@ def sentence(result: Mapping[str, Any]) -> str:
     forward, left = result["maneuvers"]["forward"], result["maneuvers"]["turn_l"]
     return (
         f"FORWARD walks at {forward['speed_m_s']:.3f} m/s and TURN_L turns by "
-        f"{left['yaw_deg_per_cycle']:.0f} deg a cycle in simulation; nothing is left to chance, so "
-        "a second run gives the same."
+        f"{left['yaw_deg_per_cycle']:.0f} deg a cycle in simulation. A walk "
+        "has no random part: a second run gives the same."
     )
 
 

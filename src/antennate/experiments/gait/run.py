@@ -1,6 +1,6 @@
 """The gait on a flat floor: how far each maneuver goes, what the lead of the body wave is worth.
 
-Every walk runs through the same wall and loop as a trial, with nothing left to chance. The gait is
+Every walk runs through the same wall and loop as a trial, without a random part. The gait is
 its own mirror image half a cycle later, so over whole cycles FORWARD neither yaws nor drifts.
 """
 

@@ -22,12 +22,14 @@ from antennate.types import Floats, Maneuver
 SHOWN_TRIALS = 5
 """Trials drawn in the figure of trajectories."""
 MARGIN = 0.3
-"""Shown around the walls; what is farther out is cut off [m]."""
+"""Shown around the scene and the robots at the end [m]."""
+FARTHEST = 1.0
+"""Robots farther out than this are cut off [m]; a trial ends before, unless the physics failed."""
 
 _OUTCOMES = {
     "success": "out after {:.1f} s",
     "timeout": "out of time, {:.0f} s",
-    "left": "left",
+    "left": "left the scene",
     "invalid": "invalid",
 }
 
@@ -100,6 +102,10 @@ def _box(paths: Sequence[TrialPath]) -> tuple[Floats, Floats] | None:
         return None
     path = paths[0]
     points = np.concatenate([*path.fixed, *path.before, path.exit, path.head[:1]])
+    low, high = points.min(axis=0) - MARGIN, points.max(axis=0) + MARGIN
+    links = np.concatenate([path.links for path in paths])
+    near = ((links > low - FARTHEST) & (links < high + FARTHEST)).all(axis=1)  # false for NaN
+    points = np.concatenate([points, links[near]])
     return points.min(axis=0) - MARGIN, points.max(axis=0) + MARGIN
 
 
@@ -179,7 +185,7 @@ def summary(
             continue
         colour, time = colours[name], found["restricted_mean_time_s"]
         _interval(rate, i, found["successes"] / valid, found["wilson95"], colour)
-        _interval(mean, i, time, found["restricted_mean_time_95"], colour)
+        _interval(mean, i, time, found["restricted_mean_time_95"] or (time, time), colour)
         exits = sorted(r.time_s for r in rows if r.controller == name and r.outcome == "success")
         left = 1.0 - np.arange(len(exits) + 1) / valid
         inside.step(
@@ -203,15 +209,15 @@ def summary(
     mean.set(
         xlim=(0, 1.02 * time_limit),
         xlabel="restricted mean time [s]",
-        title="Failures as the limit; bootstrap 95 %",
+        title="Failures count as the time limit; 95 %",
     )
     mean.set_yticklabels([style.short_name(name) for name in names])
     inside.set(
         xlim=(0, time_limit),
         ylim=(-0.03, 1.03),
         xlabel="time [s]",
-        ylabel="trials not out by the exit [%]",
-        title=f"Over time; failures stay to the limit, {time_limit:g} s",
+        ylabel="trials still inside [%]",
+        title=f"Trials still inside; failures until {time_limit:g} s",
     )
     inside.yaxis.set_major_formatter(PercentFormatter(1.0, symbol=""))
     if inside.lines:

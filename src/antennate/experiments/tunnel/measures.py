@@ -74,7 +74,7 @@ def summary(rows: Sequence[TrialResult]) -> dict[str, Any]:
         "time_over_successes_s": mean("time_s", won),
         "progress_per_time_m_s": progress / float(times.sum()) if valid else None,
         "restricted_mean_time_s": restricted if valid else None,
-        "restricted_mean_time_95": (low, high) if valid else None,
+        "restricted_mean_time_95": (low, high) if len(valid) > 1 else None,
     }
 
 
