@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 from antennate.params import GaitParams, Params, number
 from antennate.params.base import GATHERED
@@ -33,6 +33,19 @@ class TwinControlParams(Params):
 class TwinConfig(TrialConfig):
     """The robot that `antennate twin` serves, and the trial at whose start it stands."""
 
+    unread: ClassVar[tuple[str, ...]] = (
+        *(
+            f"control.gait.{name}"
+            for name in (
+                "frequency",
+                "turn_offset",
+                "offset_rate",
+                "antenna_amplitude",
+                "antenna_frequency",
+            )
+        ),
+        "robot.antenna.sensor.rate",
+    )
     trial: int = number(0, "1", "assumed: the first", ge=0)
     """Trial of the seed."""
     duration: float | None = number(None, "s", "assumed: until it is stopped", gt=0)

@@ -9,14 +9,17 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 
 from antennate.control.controllers import RuleController
 from antennate.hardware.driving.config import DriveConfig
-from antennate.params import ControlParams
+from antennate.params import ControlParams, EscapeParams, RepetitionParams
+from antennate.params.base import paths_of
+from antennate.params.dead_man import DeadManParams
 from antennate.params.setup import TeleopParams
-from antennate.robots.spec import RobotSpec
+from antennate.robots.spec import SIMULATION_ALONE, RobotSpec
 from antennate.types import AntennaFrame, Bools, Contact, Floats, Ints, JointCommand, Maneuver
 
 KEYS = {
@@ -42,6 +45,14 @@ QUIT = ("q", "end")
 class TeleopConfig(DriveConfig):
     """What `drive` takes, and how keys walk the robot; the controller that is named is not used."""
 
+    unread: ClassVar[tuple[str, ...]] = (
+        *SIMULATION_ALONE,
+        "controller",
+        *paths_of(DeadManParams, "dead_man"),
+        *(f"control.rule.{name}" for name in ("strong", "similar", "hold_time")),
+        *paths_of(RepetitionParams, "control.repetition"),
+        *paths_of(EscapeParams, "control.escape"),
+    )
     teleop: TeleopParams = TeleopParams()
 
 
