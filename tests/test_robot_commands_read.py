@@ -49,7 +49,7 @@ FAULTS = {
     4: ("esp32=silent", "servo:1=silent"),
     5: (),
 }
-"""What is wrong before the doctor, by the number of its readings; with 5 the ports are swapped."""
+"""What is wrong, by the number of the doctor's readings; with 5 the ports are swapped."""
 REPLACED = {"controller"}
 """What `teleop` reads of a drive and then replaces by the keys."""
 SHORT = {"dry_run": 0.1, "duration": 0.5, "stand": 0.1}
@@ -69,7 +69,7 @@ def fresh(robot: RobotSpec) -> RobotSpec:
 
 def told(patch: Patch, module: Any, config: Params, path: Path | None = None, **orders: Any) -> int:
     """Run a command with a configuration and orders, in place of words."""
-    given = (config, module.Orders(**orders))
+    given = config, module.Orders(**orders)
     if path is None:
         patch.setattr(module, "parse_robot", lambda *_: given)
     else:
@@ -105,9 +105,8 @@ def driven(patch: Patch, module: Any, config: DriveConfig, out: Path, **of_twin:
 
 
 def run_drive(patch: Patch, config: DriveConfig, tmp_path: Path) -> None:
-    weak = {"voltage": 10.5}
     if config.touch_check:
-        touch = ("left@0.6s", "right@2.4s")
+        weak, touch = {"voltage": 10.5}, ("left@0.6s", "right@2.4s")
         fault = "bus=discharge:0.01"
         driven(patch, drive, config, tmp_path / "1", battery=weak, touch=touch, fault=fault)
     else:
