@@ -84,6 +84,7 @@ def drive(
         stop.insists = True
         try:
             try:
+                stop.closed = False
                 run_loop(session, session.control, session.period, go_on)
             finally:
                 stop.closed = True

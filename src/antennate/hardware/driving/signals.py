@@ -6,8 +6,10 @@ swallow it. So what was received is also kept, for the loop to look at.
 
 from __future__ import annotations
 
+import math
 import signal
 import threading
+import time
 from types import FrameType
 from typing import Any
 
@@ -17,6 +19,9 @@ STOPS = tuple(
     if hasattr(signal, name)
 )
 """What asks a program to end; a terminal that goes away, as of a lost connection, sends SIGHUP."""
+
+_BURST = 0.3
+"""Time within which signals are one [s]: `timeout` and `uv run` send several at once (assumed)."""
 
 
 class StopOnce:
@@ -32,14 +37,16 @@ class StopOnce:
 
     Attributes:
         received: One came, whoever may have swallowed the exception.
-        insists: Each of them raises, not the first alone; for code that may swallow one.
-        closed: None raises any more; for the block's owner to set.
+        insists: Each of them raises, not the first alone; for code that may swallow one. A burst
+            of them raises once, so that none interrupts what the first began.
+        closed: None raises; for the block's owner to set.
     """
 
     def __init__(self, last: bool = False) -> None:
         self.received = self.closed = False
         self.insists = not last
         self._last = last
+        self._raised = -math.inf
         self._before: dict[int, Any] = {}
 
     def __enter__(self) -> StopOnce:
@@ -54,5 +61,9 @@ class StopOnce:
     def receive(self, number: int, frame: FrameType | None) -> None:
         """Take note of a signal."""
         first, self.received = not self.received, True
-        if not self.closed and (first or self.insists):
+        now = time.monotonic()
+        if self.closed or now < self._raised + _BURST:
+            return
+        if first or self.insists:
+            self._raised = now
             raise KeyboardInterrupt
