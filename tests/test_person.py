@@ -30,9 +30,7 @@ def test_lines_are_answers_one_by_one(pipe: int) -> None:
 
 def test_a_pipe_that_stays_silent_is_told(pipe: int, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(person, "PATIENCE", 0.05)
-    with pytest.raises(
-        BadInputError, match=r"an answer to 'go on\?', found none in 0.05 s"
-    ):
+    with pytest.raises(BadInputError, match=r"an answer to 'go on\?', found none in 0.05 s"):
         TerminalPerson().ask("go on?")
 
 
