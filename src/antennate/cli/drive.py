@@ -40,7 +40,8 @@ from antennate.types import Controller
 DESCRIPTION = """\
 Let a controller walk the real robot, or its twin. First a dry run: everything is read and nothing
 written. Then, with --arm only, torque comes on with every servo where it stands, and the robot
-walks. Ctrl-C, Ctrl-\\ or SIGTERM ends it: command held, torque off, verified.
+walks. Ctrl-C, Ctrl-\\, SIGTERM or a lost terminal ends it: command held, torque off,
+verified.
 
 A lost board or servo makes the robot hold; the watchdogs of the servos stop it if this program
 dies. The exit code is 2 if it ended in a FAULT or without supply, if torque was refused or is not
