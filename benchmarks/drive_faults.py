@@ -25,7 +25,7 @@ from typing import Any
 from wires import Cable
 
 ANTENNATE = [sys.executable, "-c", "import sys; from antennate.cli import main; sys.exit(main())"]
-DRY_RUN, WALK = 1.0, 6.0
+DRY_RUN, WALK = 1.0, 8.0
 """Times of a drive [s]."""
 EARLY, LATE = 0.3, 3.0
 """When something happens, after the first command was sent [s]."""
@@ -271,7 +271,7 @@ def _disk(case: str, run: Run) -> Iterator[None]:
 
 def main() -> None:
     """Run the cases and print what came of them."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--runs", type=int, default=1, help="runs of each case")
     parser.add_argument("--cases", nargs="*", default=list(CASES), choices=list(CASES))
     parser.add_argument("--seed", type=int, default=0, help="of the moments")
