@@ -19,16 +19,16 @@ _PATIENCE = 90.0
 
 
 class FactoryTwin:
-    """`antennate twin --factory` that takes orders.
+    """`antennate twin` that takes orders on its standard input.
 
     Args:
-        words: Its other words.
+        words: Its words, the command's name first.
         folder: Where it runs.
     """
 
     def __init__(self, words: Sequence[str], folder: Path) -> None:
         self._process = subprocess.Popen(
-            [*ANTENNATE, "twin", "--factory", "--orders", "-", *words],
+            [*ANTENNATE, *words],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
@@ -99,9 +99,9 @@ class Command:
         self._process.stdin.write(text.encode())
         self._process.stdin.flush()
 
-    def end(self) -> int:
-        """Wait for its end: the exit code."""
-        out, err = self._process.communicate(timeout=_PATIENCE)
+    def end(self, patience: float = _PATIENCE) -> int:
+        """Wait for its end, at most so long [s]: the exit code."""
+        out, err = self._process.communicate(timeout=patience)
         self.output, self.text = out.decode(), self.text + err.decode()
         return self._process.returncode
 

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from servo_process import Served, served
 
+from antennate.cli.twin import command
 from antennate.errors import AntennateError, BadInputError, ConfigError
 from antennate.hardware.dynamixel import packets
 from antennate.hardware.dynamixel.parser import Parser
@@ -237,6 +238,20 @@ def test_a_leg_turns_at_a_speed_in_velocity_mode_and_by_a_drive_in_pwm_mode() ->
 # the command
 
 
+@pytest.mark.parametrize("flag", ["--factory", "--touch=left@2s", "--pace=lockstep", "--udp=0"])
+def test_what_is_for_a_robot_is_refused_without_one(flag: str) -> None:
+    with pytest.raises(ConfigError, match="are for a robot"):
+        command(["--servos", "1:xl330-m288", flag])
+
+
+@pytest.mark.parametrize(
+    "fault", ["esp32=reset", "link=loss:0.1", "bus=discharge:1", "servo:2=shock"]
+)
+def test_a_fault_of_what_is_not_there_is_refused(fault: str) -> None:
+    with pytest.raises(BadInputError, match="--fault: expected"):
+        command(["--servos", "1:xl330-m288", "--fault", fault])
+
+
 @pytest.fixture
 def twin() -> Iterator[Served]:
     pytest.importorskip("serial")
@@ -253,10 +268,16 @@ def test_the_first_ping_after_the_ready_line_is_answered(twin: Served) -> None:
         line.write(packets.ping(1))
         assert line.read(14) == b""
         assert twin.order("plug 3").startswith("not done: plug: expected all or one of 1, 2")
-    for speed in (19_200, 500_000, 1_000_000):
-        with serial.Serial(twin.path, speed, timeout=0.1) as line:
-            line.write(packets.ping(1))
-            assert line.read(14) == b""
+
+
+def test_only_a_client_at_the_speed_of_a_servo_is_heard() -> None:
+    """Linux has no name for 4.5 and 10.5 Mbit/s, but programs set them."""
+    serial = pytest.importorskip("serial")
+    with served("1:xc430-w240@4500000") as twin:
+        for speed in (19_200, 57_600, 500_000, 4_000_000, 10_500_000, 4_500_000):
+            with serial.Serial(twin.path, speed, timeout=0.2) as line:
+                line.write(packets.ping(1))
+                assert len(line.read(14)) == (14 if speed == 4_500_000 else 0), speed
 
 
 def test_what_is_pushed_has_an_angle_with_its_unit() -> None:

@@ -6,12 +6,13 @@ import importlib
 import importlib.util
 import sys
 from collections.abc import Mapping
+from dataclasses import dataclass
 from importlib.metadata import entry_points
 from pathlib import Path
 from types import ModuleType
 from typing import Any, Generic, TypeVar, cast
 
-from antennate.errors import ConfigError, in_one_line
+from antennate.errors import ConfigError, WorkerError, in_one_line
 from antennate.messages import nearest, shown
 
 T = TypeVar("T")
@@ -19,6 +20,17 @@ T = TypeVar("T")
 
 ADDED: dict[str, dict[str, Any]] = {}
 """Objects given to `Registry.add`, by group and name; worker processes get them too."""
+
+
+@dataclass(frozen=True)
+class NotSent:
+    """Stands in a worker process for an added object that could not be sent there.
+
+    Attributes:
+        reason: Why, for whoever asks for it.
+    """
+
+    reason: str
 
 
 class Registry(Generic[T]):
@@ -83,10 +95,14 @@ class Registry(Generic[T]):
 
         Raises:
             ConfigError: There is none of that name, or its module cannot be imported.
+            WorkerError: This is a worker process, and the object could not be sent to it.
         """
-        for known in (self._ours, self.added):
-            if name in known:
-                return known[name]
+        if name in self._ours:
+            return self._ours[name]
+        if name in self.added:
+            if isinstance(added := self.added[name], NotSent):
+                raise WorkerError(added.reason)
+            return added
         self.check(name)
         try:
             found = self._load(name)

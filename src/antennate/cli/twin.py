@@ -110,8 +110,12 @@ def _serve_robot(config: TwinConfig, places: Places, orders: Orders | None) -> i
 
 def _serve_servos(config: TwinConfig, places: Places, orders: Orders | None) -> int:
     """Servos without a robot."""
-    if places.udp or places.pace != "real":
-        raise ConfigError("--servos: expected neither --udp nor --pace lockstep beside it")
+    robot = (places.udp, places.passed, places.pace != "real", config.touch, config.factory)
+    if any(robot):
+        raise ConfigError(
+            "--servos: expected no --udp, --passed, --pace lockstep, --touch or --factory, as they "
+            "are for a robot"
+        )
     entries = read_list(places.servos)
     demands = [read(text) for text in config.fault]
     faults = Faults(demands, [entry.id for entry in entries], alone=True)

@@ -21,7 +21,7 @@ from concurrent.futures.process import BrokenProcessPool
 from typing import Any, TypeVar
 
 from antennate.errors import WorkerError, in_one_line
-from antennate.lookup import ADDED
+from antennate.lookup import ADDED, NotSent
 
 Task = TypeVar("Task")
 Result = TypeVar("Result")
@@ -63,18 +63,17 @@ def run_tasks(
         for task in tasks:
             function(task, on_result)
         return
-    try:
-        pickle.dumps((tasks, ADDED))
-    except Exception as error:  # pickle raises what an object's own code raises
-        raise WorkerError(
-            f"expected what can be sent to {workers} workers, found {in_one_line(error)}; an "
-            "object of your own has to be defined at the top of a module, or run with one worker"
-        ) from error
+    if isinstance(checked := _sendable(tasks), NotSent):
+        raise WorkerError(checked.reason)
+    added = {
+        group: {name: _sendable(each) for name, each in objects.items()}
+        for group, objects in ADDED.items()
+    }
     context = multiprocessing.get_context("spawn")
     results = context.Queue()
     others = set(multiprocessing.active_children())
     count = min(workers, len(tasks))
-    pool = ProcessPoolExecutor(count, context, initializer=_begin, initargs=(results, ADDED))
+    pool = ProcessPoolExecutor(count, context, initializer=_begin, initargs=(results, added))
     with _deaf():
         futures = [pool.submit(_work, function, task) for task in tasks]
     crew = set(multiprocessing.active_children()) - others
@@ -162,6 +161,18 @@ def _deaf() -> Iterator[None]:
         signal.signal(signal.SIGINT, before)
 
 
+def _sendable(each: Any) -> Any:
+    """The same object if it can be sent to a worker, else what says why not."""
+    try:
+        pickle.dumps(each)
+    except Exception as error:  # noqa: BLE001  (an object's own code may raise anything)
+        return NotSent(
+            f"expected what can be sent to workers, found {in_one_line(error)}; an object of "
+            "your own has to be defined at the top of a module, or run with one worker"
+        )
+    return each
+
+
 def _begin(results: Any, added: dict[str, dict[str, Any]]) -> None:
     global _results
     _results = results
@@ -181,6 +192,8 @@ def _work(function: Callable[[Any, Emit], None], task: Any) -> int:
 
     try:
         function(task, emit)
+    except WorkerError:
+        raise
     except Exception as error:  # noqa: BLE001  (whatever it is, the parent must hear of it)
         raise WorkerError(f"a worker failed: {type(error).__name__}: {error}") from None
     return count

@@ -15,6 +15,7 @@ import select
 import struct
 import subprocess
 import threading
+import time
 from collections.abc import Callable, Iterator, Sequence
 from select import PIPE_BUF
 from typing import BinaryIO, NamedTuple
@@ -26,8 +27,11 @@ _ROOM = 1 << 20
 """Bytes that the pipe may hold: half a minute of ticks."""
 _PATIENCE = 5.0
 """Time for the other process to write the last ticks to a slow disk under load [s]; assumed."""
+_STARTING = 30.0
+"""Time for it to begin at all, if it has not yet [s]: its imports on a busy machine; assumed."""
 RESTARTS = 3
 """Processes that may follow the first; a defect that more of them meet is not cured (assumed)."""
+_POLL = 0.02
 _LONGEST = 1 << 17
 
 
@@ -101,6 +105,9 @@ class Feed:
             if select.select((), (self._pipe,), (), _PATIENCE)[1]:
                 os.write(self._pipe, _HEAD.pack(0, self.dropped))
         os.close(self._pipe)
+        end = time.monotonic() + _STARTING
+        while self._keeper.is_alive() and not self._begun and time.monotonic() < end:
+            self._keeper.join(_POLL)
         self._keeper.join(_PATIENCE)
         if self._keeper.is_alive() and self._process is not None:
             self._process.kill()

@@ -7,7 +7,7 @@ are silent, a read that touches an undefined byte is refused as a whole.
 from __future__ import annotations
 
 from antennate.hardware.dynamixel.packets import StatusError
-from antennate.hardware.dynamixel.tables import EEPROM_END, Register, Table
+from antennate.hardware.dynamixel.tables import Register, Table
 
 
 class Memory:
@@ -27,6 +27,7 @@ class Memory:
     def __init__(self, table: Table) -> None:
         self.table = table
         self.version = 0
+        self._stored: bytes | None = None
         registers = table.registers.values()
         self._bytes = bytearray(max(r.address + r.size for r in registers))
         self._starts = {r.address: r for r in registers}
@@ -84,15 +85,26 @@ class Memory:
             at = end
         return StatusError.NONE, found
 
-    def store(self) -> bytes:
-        """All bytes, for a backup."""
-        return bytes(self._bytes)
+    def start(self, stored: bool) -> None:
+        """Let the RAM be as after power-on; that of the backup if `stored`."""
+        for register in self.table.registers.values():
+            if not register.eeprom:
+                self.set(register.name, register.default or 0)
+        self.set("backup_ready", int(self._stored is not None))
+        if stored:
+            self.restore(ram_only=True)
 
-    def restore(self, stored: bytes, names: list[str]) -> None:
-        """Take registers from a backup."""
-        for name in names:
-            where, _, _ = self._where[name]
-            self._bytes[where] = stored[where]
+    def store(self) -> None:
+        """Make a backup."""
+        self._stored = bytes(self._bytes)
+        self.set("backup_ready", 1)
+
+    def restore(self, ram_only: bool = False) -> None:
+        """Take from the backup what one has, if there is one."""
+        for register in self.table.registers.values():
+            if self._stored and _backed_up(register) and not (ram_only and register.eeprom):
+                where, _, _ = self._where[register.name]
+                self._bytes[where] = self._stored[where]
         self.version += 1
 
     def _places(self, address: int, length: int) -> list[int]:
@@ -104,11 +116,7 @@ class Memory:
         ]
 
 
-def backed_up(table: Table) -> list[str]:
-    """Registers of a backup: the EEPROM, and of the RAM gains, profile and indirect addresses."""
+def _backed_up(register: Register) -> bool:
+    """A backup has the EEPROM, and of the RAM gains, profile and indirect addresses."""
     ram = ("gain", "profile_", "indirect_address_")
-    return [
-        name
-        for name, row in table.registers.items()
-        if row.writable and (row.address < EEPROM_END or any(part in name for part in ram))
-    ]
+    return register.writable and (register.eeprom or any(part in register.name for part in ram))

@@ -47,16 +47,20 @@ class Rating:
     inertia: float
 
 
-def _rating(servo: ServoParams, stall_current: float) -> Rating:
+def _rating(servo: ServoParams) -> Rating:
     return Rating(
-        servo.voltage, servo.stall_torque, stall_current, servo.no_load_speed, servo.armature
+        servo.voltage,
+        servo.stall_torque,
+        servo.stall_current,
+        servo.no_load_speed,
+        servo.armature,
     )
 
 
 _RPM = 2.0 * math.pi / 60.0
 RATINGS = {
-    1080: _rating(ServoParams(), 1.3),
-    1200: _rating(XL330Params(), 1.47),
+    1080: _rating(ServoParams()),
+    1200: _rating(XL330Params()),
     1060: Rating(11.1, 1.4, 1.3, 57.0 * _RPM, 0.003),
 }
 """By model number; datasheets at 11.1, 5.0 and 11.1 V, inertia of the XL430 as of the XC430."""

@@ -57,7 +57,7 @@ class Plugging:
         }
         for place, servo in enumerate(self._servos):
             if place not in chosen:
-                servo.unplug(0.0)
+                servo.plug(0.0, into=False)
 
     def order(self, text: str, t: float) -> None:
         """Do what an order says at time t [s].
@@ -82,7 +82,7 @@ class Plugging:
     def _plug(self, place: int, into: bool, t: float) -> None:
         servo = self._servos[place]
         if servo.plugged != into:
-            (servo.plug if into else servo.unplug)(t)
+            servo.plug(t, into)
 
     def _following(self) -> int:
         """Place behind the last servo that is plugged in; the first one behind the end."""

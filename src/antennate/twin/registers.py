@@ -21,7 +21,7 @@ from antennate.hardware.dynamixel.tables import (
     Table,
 )
 from antennate.twin import rules
-from antennate.twin.memory import Memory, backed_up
+from antennate.twin.memory import Memory
 from antennate.twin.motion import Motion, MotorMotion
 from antennate.twin.motor import RATINGS
 from antennate.twin.trouble import Trouble
@@ -31,8 +31,6 @@ BOOT_TIME = 0.25
 
 _FIRMWARE = 48
 _ROOM_TEMPERATURE = 25
-_VOLTAGE_ERROR, _HEAT_ERROR = 1, 4
-"""Bits of Hardware Error Status."""
 _TORQUE_AT_START, _RAM_AT_START = 1, 2
 """Bits of Startup Configuration."""
 _TOLD = frozenset(
@@ -69,7 +67,6 @@ class Servo:
         self.plugged = True
         self.registered: tuple[int, bytes] | None = None
         self.trouble: Trouble | None = None
-        self._backup: bytes | None = None
         self._untold = True
         self._t = self._fed = self._boot = t
         self.set("id", servo)
@@ -128,16 +125,12 @@ class Servo:
         self.advance(t)
         self._start(t + time)
 
-    def plug(self, t: float) -> None:
-        """Put it on the bus, which gives it power."""
-        self.plugged = True
+    def plug(self, t: float, into: bool = True) -> None:
+        """Put it on the bus, which gives it power; or take it off."""
         self.restart(t)
-
-    def unplug(self, t: float) -> None:
-        """Take it off the bus, and its power."""
-        self.restart(t)
-        self.set("torque_enable", 0)
-        self.plugged = False
+        self.plugged = into
+        if not into:
+            self.set("torque_enable", 0)
 
     # what the wire sees
 
@@ -199,15 +192,14 @@ class Servo:
         """Keep a copy of the registers that a backup has; not under torque."""
         if self.torque:
             return StatusError.RESULT_FAIL
-        self._backup = self.memory.store()
-        self.set("backup_ready", 1)
+        self.memory.store()
         return StatusError.NONE
 
     def restore_backup(self) -> StatusError:
         """Take them from the copy; not under torque, and not without one."""
-        if self.torque or self._backup is None:
+        if self.torque or not self.get("backup_ready"):
             return StatusError.RESULT_FAIL
-        self.memory.restore(self._backup, backed_up(self.table))
+        self.memory.restore()
         return StatusError.NONE
 
     # inside
@@ -224,15 +216,8 @@ class Servo:
         return MotorMotion(self.memory, position)
 
     def _start(self, boot: float) -> None:
-        for register in self.table.registers.values():
-            if not register.eeprom:
-                self.set(register.name, register.default or 0)
         startup = self.get("startup_configuration")
-        if self._backup is not None:
-            self.set("backup_ready", 1)
-            if startup & _RAM_AT_START:
-                names = [n for n in backed_up(self.table) if not self.table[n].eeprom]
-                self.memory.restore(self._backup, names)
+        self.memory.start(stored=bool(startup & _RAM_AT_START))
         self.set("present_input_voltage", round(10 * RATINGS[self.table.model].voltage))
         self.set("present_temperature", _ROOM_TEMPERATURE)
         self.registered = None
@@ -295,19 +280,9 @@ class Servo:
     def _refresh(self) -> None:
         """Take note of registers that have changed."""
         if self.motion.refresh(max(self._t, self._fed)):
-            self._look_at_supply()
+            if bits := rules.beyond_limits(self.memory):
+                self.fail(bits)
             self.motion.refresh(max(self._t, self._fed))
-
-    def _look_at_supply(self) -> None:
-        """Latch an error if supply or temperature are beyond their limits."""
-        least, most = self.get("min_voltage_limit"), self.get("max_voltage_limit")
-        bits = 0
-        if not least <= self.get("present_input_voltage") <= most:
-            bits |= _VOLTAGE_ERROR
-        if self.get("present_temperature") > self.get("temperature_limit"):
-            bits |= _HEAT_ERROR
-        if bits & ~self.get("hardware_error_status"):
-            self.fail(bits)
 
     def _move(self, t: float) -> None:
         self._refresh()

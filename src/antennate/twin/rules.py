@@ -18,6 +18,8 @@ from antennate.twin.memory import Memory
 TRIPPED = -1
 """Value of a bus watchdog that has stopped the servo."""
 _UNUSED_DRIVE_MODE = 2
+_VOLTAGE_ERROR, _HEAT_ERROR = 1, 4
+"""Bits of Hardware Error Status."""
 _LIMITS = {
     "goal_velocity": "velocity_limit",
     "goal_pwm": "pwm_limit",
@@ -45,6 +47,16 @@ def refuses(memory: Memory, register: Register, value: int) -> StatusError:
 def shut_down(memory: Memory) -> bool:
     """An error that Shutdown selects has taken its torque; only a restart gives it back."""
     return bool(memory.get("hardware_error_status") & memory.get("shutdown"))
+
+
+def beyond_limits(memory: Memory) -> int:
+    """Errors that are new because supply or temperature are beyond their limits, as bits."""
+    get, bits = memory.get, 0
+    if not get("min_voltage_limit") <= get("present_input_voltage") <= get("max_voltage_limit"):
+        bits |= _VOLTAGE_ERROR
+    if get("present_temperature") > get("temperature_limit"):
+        bits |= _HEAT_ERROR
+    return bits & ~get("hardware_error_status")
 
 
 def _in_range(memory: Memory, register: Register, value: int) -> bool:

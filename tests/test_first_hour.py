@@ -1,0 +1,78 @@
+"""docs/first-hour.md, run: a box of new twin servos becomes a robot that crosses the tunnel."""
+
+from __future__ import annotations
+
+import json
+import re
+import shlex
+import time
+import tomllib
+from pathlib import Path
+
+import pytest
+from first_hour import Command, FactoryTwin, connect_each, move_each, plug_in
+
+from antennate.robots.spec import RobotSpec
+
+PAGE = (Path(__file__).parents[1] / "docs" / "first-hour.md").read_text(encoding="utf-8")
+NAMES = RobotSpec().joint_names
+
+
+def commands() -> dict[str, list[str]]:
+    """Words of each command of the page, by its name."""
+    blocks = re.findall(r"```sh\n(.*?)```", PAGE, re.DOTALL)
+    lines = [shlex.split(line)[1:] for block in blocks for line in block.splitlines()]
+    return {words[0]: words for words in lines}
+
+
+def assembled(folder: Path) -> dict:
+    """The robot as it is built, in the page's file."""
+    (text,) = re.findall(r"```toml\n(.*?)```", PAGE, re.DOTALL)
+    (folder / "assembled.toml").write_text(text)
+    return tomllib.loads(text)
+
+
+def links(folder: Path, twin: FactoryTwin) -> dict[str, tuple[Path, str]]:
+    """Links to the twin's ports, as `plug_in` takes them."""
+    (folder / "ports").mkdir()
+    made = {name: folder / "ports" / name for name in ("bus", "esp32")}
+    for name, link in made.items():
+        link.symlink_to(twin.paths[name])
+    return {
+        "adapter of the servo bus": (made["bus"], twin.paths["bus"]),
+        "antenna board": (made["esp32"], twin.paths["esp32"]),
+    }
+
+
+@pytest.mark.slow
+def test_a_box_of_servos_becomes_a_robot_that_crosses_the_tunnel(tmp_path: Path) -> None:
+    page, truth = commands(), assembled(tmp_path)
+    assert list(page) == ["twin", "setup", "zero", "doctor", "drive", "jog", "teleop"]
+    with FactoryTwin(page["twin"], tmp_path) as twin:
+        setup = Command(page["setup"], tmp_path)
+        plug_in(setup, links(tmp_path, twin))
+        connect_each(setup, twin.order, NAMES)
+        assert setup.end() == 0, setup.text
+        assert setup.output.count("answers") == 19
+
+        zero = Command(page["zero"], tmp_path)
+        move_each(zero, twin.order, NAMES)
+        assert zero.end() == 0, zero.text
+        made = tomllib.loads((tmp_path / "robot.toml").read_text())
+        for group, there in truth.items():
+            assert made["robot"][group]["directions"] == there["directions"]
+            measured = zip(made["robot"][group]["zeros"], there["zeros"], strict=True)
+            assert all(abs(one - other) <= 1 for one, other in measured)
+
+        doctor = Command(page["doctor"], tmp_path)
+        assert doctor.end() == 0, doctor.output
+        assert "all 36 checks are good" in doctor.output
+
+        time.sleep(3.0)  # the twin takes who comes later for a new client
+        drive = Command([*page["drive"], "--duration", "120", "--out", "run"], tmp_path)
+        assert drive.end(180.0) == 0, drive.text[-2000:]
+    result = json.loads((tmp_path / "run" / "result.json").read_text())
+    assert result["ended"] == "arrival"
+    assert result["torque_off"] is True
+    assert result["worst_state"] in ("OK", "DEGRADED", "HOLD")
+    assert "the head passed the exit" in twin.said
