@@ -103,12 +103,14 @@ def walk(
                 session.control.controller = controller(session, config)
                 config = config.model_copy(update={"controller": command})
             result = _carry_out(command, config, session, orders, folder.path / LOG, operator)
-        folder.finish(result, ())
         table = Table.of("Drive", {result["controller"]: result}, MEASURES, _note(result))
         log = shlex.quote(str(folder.path / LOG))
         other = "" if controller is None else " --controller open"
         again = f"\nWhat was read and decided: antennate replay {log}{other}"
-        tell(result, orders, [table], _sentence(result) + again)
+        try:
+            folder.finish(result, ())
+        finally:  # the robot's state is told even if it cannot be kept
+            tell(result, orders, [table], _sentence(result) + again)
     fault = result["worst_state"] in (State.FAULT.name, State.OFF.name)
     stays_on = result["torque_off"] is False
     idle = _idle(result)
