@@ -6,10 +6,9 @@ swallow it. So what was received is also kept, for the loop to look at.
 
 from __future__ import annotations
 
-import math
 import signal
 import threading
-import time
+from collections.abc import Callable
 from types import FrameType
 from typing import Any
 
@@ -19,9 +18,6 @@ STOPS = tuple(
     if hasattr(signal, name)
 )
 """What asks a program to end; a terminal that goes away, as of a lost connection, sends SIGHUP."""
-
-_BURST = 0.3
-"""Time within which signals are one [s]: `timeout` and `uv run` send several at once (assumed)."""
 
 
 class StopOnce:
@@ -37,8 +33,9 @@ class StopOnce:
 
     Attributes:
         received: One came, whoever may have swallowed the exception.
-        insists: Each of them raises, not the first alone; for code that may swallow one. A burst
-            of them raises once, so that none interrupts what the first began.
+        insists: Each of them raises, not the first alone; for code that may swallow one.
+        within: They raise while this function runs and not else, so that of several at once none
+            interrupts what the first has begun; None for everywhere.
         closed: None raises; for the block's owner to set.
     """
 
@@ -46,7 +43,7 @@ class StopOnce:
         self.received = self.closed = False
         self.insists = not last
         self._last = last
-        self._raised = -math.inf
+        self.within: Callable[..., object] | None = None
         self._before: dict[int, Any] = {}
 
     def __enter__(self) -> StopOnce:
@@ -61,9 +58,14 @@ class StopOnce:
     def receive(self, number: int, frame: FrameType | None) -> None:
         """Take note of a signal."""
         first, self.received = not self.received, True
-        now = time.monotonic()
-        if self.closed or now < self._raised + _BURST:
-            return
-        if first or self.insists:
-            self._raised = now
+        if not self.closed and (first or self.insists) and self._inside(frame):
             raise KeyboardInterrupt
+
+    def _inside(self, frame: FrameType | None) -> bool:
+        """Whether `within` runs at this frame."""
+        if self.within is None:
+            return True
+        code = getattr(self.within, "__code__", None)
+        while frame is not None and frame.f_code is not code:
+            frame = frame.f_back
+        return frame is not None
