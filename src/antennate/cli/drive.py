@@ -113,17 +113,12 @@ def walk(
         table = Table.of("Drive", {result["controller"]: result}, MEASURES, _note(result))
         log = shlex.quote(str(folder.path / LOG))
         other = "" if controller is None else " --controller open"
-<<<<<<< HEAD
         again = f"What was read and decided: antennate replay {log}{other}"
         again = again if result["logs"] else f"No log was kept: {_LOGLESS}"
-        tell(result, orders, [table], f"{_sentence(result)}\n{again}")
-=======
-        again = f"\nWhat was read and decided: antennate replay {log}{other}"
         try:
             folder.finish(result, ())
         finally:  # the robot's state is told even if it cannot be kept
-            tell(result, orders, [table], _sentence(result) + again)
->>>>>>> main
+            tell(result, orders, [table], f"{_sentence(result)}\n{again}")
     fault = result["worst_state"] in (State.FAULT.name, State.OFF.name)
     stays_on = result["torque_off"] is False
     idle = _idle(result)
