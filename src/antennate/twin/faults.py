@@ -110,15 +110,29 @@ class Faults:
     def __init__(self, demands: Sequence[Demand], ids: Sequence[int], alone: bool = False) -> None:
         self._waiting = sorted(demands, key=lambda demand: demand.t)
         self._ids = tuple(ids)
+        self._alone = alone
         for demand in demands:
-            if demand.target == "servo" and demand.servo not in ids:
-                known = ", ".join(map(str, ids))
-                raise BadInputError(f"--fault: expected a servo of {known}, found {demand.servo}")
-            if alone and (demand.target in ("esp32", "wire") or demand.what == "discharge"):
-                raise BadInputError(
-                    "--fault: expected one of a servo or the bus where there is no robot, found "
-                    f"{demand.target}={demand.what}"
-                )
+            self._require(demand)
+
+    def order(self, text: str) -> None:
+        """Let a fault begin with the next tick.
+
+        Raises:
+            BadInputError: It has another form, or is for something that is not there.
+        """
+        demand = read(text)
+        self._require(demand)
+        self._waiting.insert(0, demand)
+
+    def _require(self, demand: Demand) -> None:
+        if demand.target == "servo" and demand.servo not in self._ids:
+            known = ", ".join(map(str, self._ids))
+            raise BadInputError(f"--fault: expected a servo of {known}, found {demand.servo}")
+        if self._alone and (demand.target in ("esp32", "wire") or demand.what == "discharge"):
+            raise BadInputError(
+                "--fault: expected one of a servo or the bus where there is no robot, found "
+                f"{demand.target}={demand.what}"
+            )
 
     def apply(self, twin: TwinRobot | ServoBox, t: float) -> None:
         """Let happen what is due at time t [s]."""

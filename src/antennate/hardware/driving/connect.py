@@ -82,6 +82,7 @@ def prepare(
     board = Board(esp32, config.limits.stale_age)
     await_board(board, clock, bus, config.swapped)
     require_sensor(board.hello, config.sensor_id)
+    require_sensor(board.hello, config.sensor_id_right)
     require_quick(bus, config.robot.ids[:3], config.robot.baud, clock.now, path)
     master = Bus(bus, Timing(config.robot.baud, latest=LATEST), clock=clock.now)
     require_servos(master, config.robot)
@@ -97,6 +98,7 @@ def prepare(
             drift=config.drift,
             touch=config.touch if config.touch_check else None,
             reach=config.reach,
+            right=config.control.conditioning_right,
         ),
         limits=config.limits,
     )

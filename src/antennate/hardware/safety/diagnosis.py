@@ -19,7 +19,7 @@ from enum import Enum
 from antennate.antenna.calibration import REACH
 from antennate.antenna.sensor import FULL_SCALE
 from antennate.errors import CalibrationError
-from antennate.params import ConditioningParams
+from antennate.params import CurveParams
 
 LOW_RAIL = 5.0
 """Readings up to this are at the lower rail [counts]: two sigma of the noise above 0 (assumed)."""
@@ -95,7 +95,7 @@ class Band:
     reach: float | None = None
 
     @classmethod
-    def of(cls, conditioning: ConditioningParams, reach: float | None = None) -> Band:
+    def of(cls, conditioning: CurveParams, reach: float | None = None) -> Band:
         """The range of a calibration."""
         low, high = conditioning.counts_low, conditioning.counts_high
         return cls(low, high, conditioning.polarity, reach)

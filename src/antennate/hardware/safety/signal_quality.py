@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from antennate.hardware.safety.diagnosis import Band, ChannelDiagnosis, Finding
 from antennate.hardware.safety.drift import Drift
 from antennate.hardware.safety.touch_check import Ask, TouchCheck
-from antennate.params import ConditioningParams, DriftParams, TouchCheckParams
+from antennate.params import ConditioningParams, CurveParams, DriftParams, TouchCheckParams
 from antennate.types import Contact
 
 _SIDES = ("left", "right")
@@ -33,11 +33,12 @@ class SignalQuality:
         drift: DriftParams | None = None,
         touch: TouchCheckParams | None = None,
         reach: float | None = None,
+        right: CurveParams | None = None,
     ) -> None:
-        band = Band.of(conditioning, reach)
-        self.channels = [ChannelDiagnosis(band) for _ in _SIDES]
-        self.check = None if touch is None else TouchCheck(touch, (band, band))
-        self.drifts = [Drift(drift or DriftParams(), band) for _ in _SIDES]
+        bands = Band.of(conditioning, reach), Band.of(right or conditioning, reach)
+        self.channels = [ChannelDiagnosis(band) for band in bands]
+        self.check = None if touch is None else TouchCheck(touch, bands)
+        self.drifts = [Drift(drift or DriftParams(), band) for band in bands]
         self._t = -math.inf
 
     def step(self, t: float, counts: Sequence[float], contact: Sequence[int]) -> None:
