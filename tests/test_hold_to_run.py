@@ -154,7 +154,7 @@ def test_B19_a_key_held_in_a_terminal_is_the_dead_man_of_the_shipped_command(
     assert result["ended"] == "a key that was let go"
     assert result["torque_off"] is True
     assert "HOLD RELEASED" in result["why"]
-    assert result["poses_sent"] > 100
+    assert result["commands_sent"] > 100
 
 
 @pytest.mark.slow

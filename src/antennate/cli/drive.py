@@ -179,7 +179,7 @@ def _operator(config: DriveConfig, orders: Orders) -> Iterator[Operator]:
 
 def _idle(result: Mapping[str, Any]) -> bool:
     """It was to walk, and never did."""
-    return result["armed"] and not result["poses_sent"]
+    return result["armed"] and not result["commands_sent"]
 
 
 def _note(result: Mapping[str, Any]) -> str:
@@ -202,7 +202,7 @@ def _sentence(result: Mapping[str, Any]) -> str:
         return f"A dry run: nothing was written to the servos, {worst}; --arm lets the robot walk."
     if _idle(result):
         return f"The robot never walked, no command was sent; {worst}; {torque}."
-    sent = f"{result['poses_sent']} commands of `{result['controller']}` were sent"
+    sent = f"{result['commands_sent']} commands of `{result['controller']}` were sent"
     shares = ", ".join(f"{name} {100 * s:.0f} %" for name, s in result["shares"].items() if s)
     walked = f"The robot walked for {result['walked_s']:.1f} s ({shares}): {sent}"
     return f"{walked}, {worst}; ended by {result['ended']}; {torque}."
@@ -230,7 +230,7 @@ MEASURES = (
     Measure("resets", "resets", form="d"),
     Measure("missed_answers", "missed answers", form="d"),
     Measure("stale_answers", "stale answers", form="d"),
-    Measure("poses_sent", "commands sent", form="d"),
-    Measure("poses_refused", "commands refused", form="d"),
+    Measure("commands_sent", "commands sent", form="d"),
+    Measure("commands_refused", "commands refused", form="d"),
     Measure("priority", "priority"),
 )

@@ -55,7 +55,7 @@ servo:ID=silent, bad_crc, truncated, late:SECONDS, doubled, wrong_id, oversized,
 encoder, shock, overload, reboot or REGISTER:VALUE;
 esp32=silent, reset, open_left, short_left (or right), left:COUNTS, right:COUNTS or ber:SHARE;
 bus=silent, loss:SHARE, latency:SECONDS, discharge:VOLTS_A_SECOND or ber:SHARE;
-link=ber:SHARE (bits wrong) or loss:SHARE (bytes lost), on both wires both ways."""
+wire=ber:SHARE (bits wrong) or loss:SHARE (bytes lost), on both wires both ways."""
 
 
 @dataclass(frozen=True)

@@ -71,7 +71,7 @@ def targets(
 
 
 class Gait:
-    """The gait's memory: phases and offset. They are continuous whatever the maneuvers."""
+    """Phases and offset of the gait. They are continuous when the maneuver changes."""
 
     def __init__(self, params: GaitParams, robot: RobotSpec, batch: int, period: float) -> None:
         self.params = params
