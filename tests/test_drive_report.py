@@ -148,7 +148,7 @@ def test_L8_a_drive_that_sent_no_pose_ends_with_2_and_says_so(
     assert said in text
     result = json.loads((tmp_path / "result.json").read_text())
     assert result["worst_state"] == worst.name
-    assert result["poses_sent"] == 0
+    assert result["commands_sent"] == 0
     assert ("STALE" in result["refusal"]) == (worst is State.OK)
 
 

@@ -22,8 +22,8 @@ def one_line(text: str) -> str:
 
 
 def shortened(text: str) -> str:
-    """The text on one line, cut if it is long."""
-    text = one_line(text)
+    """The text on one line, cut if it is long; a text of blanks in quotes, so that it is seen."""
+    text = one_line(text) or repr(text)
     return text if len(text) <= _LONGEST else text[: _LONGEST - 3] + "..."
 
 

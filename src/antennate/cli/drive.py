@@ -40,7 +40,8 @@ from antennate.types import Controller
 DESCRIPTION = """\
 Let a controller walk the real robot, or its twin. First a dry run: everything is read and nothing
 written. Then, with --arm only, torque comes on with every servo where it stands, and the robot
-walks. Ctrl-C, Ctrl-\\ or SIGTERM ends it: command held, torque off, verified.
+walks. Ctrl-C, Ctrl-\\, SIGTERM or a lost terminal ends it: command held, torque off,
+verified.
 
 A lost board or servo makes the robot hold; the watchdogs of the servos stop it if this program
 dies. The exit code is 2 if it ended in a FAULT or without supply, if torque was refused or is not
@@ -102,12 +103,14 @@ def walk(
                 session.control.controller = controller(session, config)
                 config = config.model_copy(update={"controller": command})
             result = _carry_out(command, config, session, orders, folder.path / LOG, operator)
-        folder.finish(result, ())
         table = Table.of("Drive", {result["controller"]: result}, MEASURES, _note(result))
         log = shlex.quote(str(folder.path / LOG))
         other = "" if controller is None else " --controller open"
         again = f"\nWhat was read and decided: antennate replay {log}{other}"
-        tell(result, orders, [table], _sentence(result) + again)
+        try:
+            folder.finish(result, ())
+        finally:  # the robot's state is told even if it cannot be kept
+            tell(result, orders, [table], _sentence(result) + again)
     fault = result["worst_state"] in (State.FAULT.name, State.OFF.name)
     stays_on = result["torque_off"] is False
     idle = _idle(result)
@@ -176,7 +179,7 @@ def _operator(config: DriveConfig, orders: Orders) -> Iterator[Operator]:
 
 def _idle(result: Mapping[str, Any]) -> bool:
     """It was to walk, and never did."""
-    return result["armed"] and not result["poses_sent"]
+    return result["armed"] and not result["commands_sent"]
 
 
 def _note(result: Mapping[str, Any]) -> str:
@@ -199,7 +202,7 @@ def _sentence(result: Mapping[str, Any]) -> str:
         return f"A dry run: nothing was written to the servos, {worst}; --arm lets the robot walk."
     if _idle(result):
         return f"The robot never walked, no command was sent; {worst}; {torque}."
-    sent = f"{result['poses_sent']} commands of `{result['controller']}` were sent"
+    sent = f"{result['commands_sent']} commands of `{result['controller']}` were sent"
     shares = ", ".join(f"{name} {100 * s:.0f} %" for name, s in result["shares"].items() if s)
     walked = f"The robot walked for {result['walked_s']:.1f} s ({shares}): {sent}"
     return f"{walked}, {worst}; ended by {result['ended']}; {torque}."
@@ -227,7 +230,7 @@ MEASURES = (
     Measure("resets", "resets", form="d"),
     Measure("missed_answers", "missed answers", form="d"),
     Measure("stale_answers", "stale answers", form="d"),
-    Measure("poses_sent", "commands sent", form="d"),
-    Measure("poses_refused", "commands refused", form="d"),
+    Measure("commands_sent", "commands sent", form="d"),
+    Measure("commands_refused", "commands refused", form="d"),
     Measure("priority", "priority"),
 )

@@ -33,7 +33,7 @@ class ResultOptions(FromFile):
 def folder_for(
     command: str, options: ResultOptions, config: Params, argv: Sequence[str]
 ) -> Iterator[RunDirectory]:
-    """The described folder of a run; where it is is said when it is complete.
+    """A run directory with its configuration; its path is printed when the run is complete.
 
     Raises:
         OutputError: It cannot be written, or it holds another run.

@@ -87,7 +87,7 @@ def targets(
 
 
 class Gait:
-    """The gait's memory: phases and offset. They are continuous whatever the maneuvers.
+    """Phases and offset of the gait. They are continuous when the maneuver changes.
 
     Args:
         params: Wave and timing.

@@ -11,19 +11,19 @@ _SKIP = "; --no-touch-check arms without the check"
 
 
 class DryRun:
-    """Lasts its time, and longer until the antennae are checked and the supervisor allows torque.
+    """Lasts `length`, and longer until antennae are checked and the supervisor allows torque.
 
     Args:
         quality: With the check of the antennae.
-        length: Its time [s].
-        patience: By how much it is extended at most [s], by the check and by the supervisor each.
+        length: Shortest duration [s].
+        patience: Longest extension for the check, and again for the supervisor [s].
         arm: Whether torque is wanted afterwards.
         duration: Time from torque on to off [s].
 
     Attributes:
         over: When torque was last asked for [s], inf while it may not come on.
         end: When all is over [s], inf if not known yet.
-        asks: Whether torque is asked for; the supervisor takes the change to True alone.
+        asks: Whether torque is asked for; the supervisor reacts to the change to True only.
         refusal: Why torque has not come on although it was wanted.
     """
 

@@ -94,9 +94,9 @@ class Report:
             "missed_answers": answers.misses,
             "stale_answers": answers.stale,
             "broken_answers": answers.bad_crc,
-            "poses_sent": session.tally.sent,
-            "poses_limited": session.tally.limited,
-            "poses_refused": session.control.refused,
+            "commands_sent": session.tally.sent,
+            "commands_limited": session.tally.limited,
+            "commands_refused": session.control.refused,
             "tracebacks": [
                 *session.control.tracebacks.kept,
                 *session.actuators.state.tracebacks.kept,

@@ -1,7 +1,7 @@
-r"""Ctrl-C, Ctrl-\, SIGTERM and the loss of the terminal, while servos have torque.
+r"""Signals that end a drive: Ctrl-C, Ctrl-\, SIGTERM and the loss of the terminal.
 
-An exception alone would not do: a controller with a bare `except`, a destructor or a callback may
-swallow it. So what was received is also kept, for the loop to look at.
+A controller with a bare `except`, a destructor or a callback may swallow the exception. So the
+signal is also kept, and the loop looks at it.
 """
 
 from __future__ import annotations
@@ -16,24 +16,24 @@ STOPS = tuple(
     for name in ("SIGINT", "SIGQUIT", "SIGTERM", "SIGHUP")
     if hasattr(signal, name)
 )
-"""What asks a program to end; a terminal that goes away, as of a lost connection, sends SIGHUP."""
+"""Signals that ask a program to end; a terminal whose connection is lost sends SIGHUP."""
 
 
 class StopOnce:
-    """Inside the block a signal that asks to end raises KeyboardInterrupt, until it is closed.
+    """Makes signals that ask to end raise KeyboardInterrupt inside the block, until it is closed.
 
-    Close it before the torque goes off: whoever presses Ctrl-C twice must not keep it on. Outside
-    the main thread Python delivers no signals: whoever starts such a thread has to end it
-    otherwise, as by `orders.stop`.
+    Close it before the torque goes off: a second Ctrl-C must not interrupt that. Python delivers
+    signals to the main thread only; a drive in another thread has to be ended otherwise, as by
+    `orders.stop`.
 
     Args:
-        last: The program ends after the block: if a signal came, none is heard any more, so
-            that the report is written and shown however often it is sent.
+        last: The program ends after the block: once a signal came, later ones are ignored, so that
+            the report is written and shown.
 
     Attributes:
-        received: One came, whoever may have swallowed the exception.
-        insists: Each of them raises, not the first alone; for code that may swallow one.
-        closed: None raises any more; for the block's owner to set.
+        received: A signal came, even if its exception was swallowed.
+        insists: Every signal raises, not only the first; for code that may swallow one.
+        closed: Signals do not raise any more; set by the code that owns the block.
     """
 
     def __init__(self, last: bool = False) -> None:

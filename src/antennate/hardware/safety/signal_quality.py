@@ -1,4 +1,4 @@
-"""What the readings of both antennae are worth: judged here, once, from the counts as they came.
+"""Quality of the readings of both antennae, from the counts as they came.
 
 A channel may be broken, beyond its calibration or at a rail (`diagnosis`), its resting reading may
 have drifted (`drift`), and before walking each antenna is touched once (`touch_check`).
@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from antennate.hardware.safety.diagnosis import Band, ChannelDiagnosis, Finding
 from antennate.hardware.safety.drift import Drift
 from antennate.hardware.safety.touch_check import Ask, TouchCheck
-from antennate.params import ConditioningParams, DriftParams, TouchCheckParams
+from antennate.params import ConditioningParams, CurveParams, DriftParams, TouchCheckParams
 from antennate.types import Contact
 
 _SIDES = ("left", "right")
@@ -20,7 +20,7 @@ _RESTING = {Finding.OK, Finding.OUT_OF_CAL}
 
 
 class SignalQuality:
-    """Judges the readings of both antennae of one robot; checks them by touch if `touch` is given.
+    """Checks the readings of both antennae of one robot, also by touch if `touch` is given.
 
     Attributes:
         channels: Diagnosis of the left and the right antenna.
@@ -33,11 +33,12 @@ class SignalQuality:
         drift: DriftParams | None = None,
         touch: TouchCheckParams | None = None,
         reach: float | None = None,
+        right: CurveParams | None = None,
     ) -> None:
-        band = Band.of(conditioning, reach)
-        self.channels = [ChannelDiagnosis(band) for _ in _SIDES]
-        self.check = None if touch is None else TouchCheck(touch, (band, band))
-        self.drifts = [Drift(drift or DriftParams(), band) for _ in _SIDES]
+        bands = Band.of(conditioning, reach), Band.of(right or conditioning, reach)
+        self.channels = [ChannelDiagnosis(band) for band in bands]
+        self.check = None if touch is None else TouchCheck(touch, bands)
+        self.drifts = [Drift(drift or DriftParams(), band) for band in bands]
         self._t = -math.inf
 
     def step(self, t: float, counts: Sequence[float], contact: Sequence[int]) -> None:
@@ -58,7 +59,7 @@ class SignalQuality:
 
     @property
     def counts(self) -> list[float]:
-        """What contact may be decided on, left and right [counts]; NaN where nothing can be."""
+        """Readings for the contact decision, left and right [counts]; NaN where there is none."""
         return [channel.reading.counts for channel in self.channels]
 
     @property
@@ -69,12 +70,12 @@ class SignalQuality:
 
     @property
     def objections(self) -> tuple[str, ...]:
-        """Why not to arm, empty if nothing speaks against it."""
+        """Reasons not to arm, empty if there is none."""
         return () if self.check is None or not self.check.objection else (self.check.objection,)
 
     @property
     def refused(self) -> bool:
-        """Whether the check has failed: to go on with it is of no use."""
+        """Whether the check has failed for good."""
         return self.check is not None and self.check.ask is Ask.NOTHING and bool(self.objections)
 
     @property
