@@ -14,7 +14,7 @@ from antennate.antenna.sensor import FULL_SCALE
 from antennate.control.conditioning import bending_level
 from antennate.errors import CalibrationError
 from antennate.files import read_limited, write_whole
-from antennate.params import ConditioningParams
+from antennate.params import ConditioningParams, CurveParams
 from antennate.types import Floats
 
 SCHEMA = 1
@@ -104,6 +104,10 @@ class Calibration(_Strict):
             counts_low=self.counts_low,
             counts_high=self.counts_high,
         )
+
+    def curve(self) -> CurveParams:
+        """The same without the running mean, as of one antenna of two."""
+        return CurveParams(**{n: getattr(self, n) for n in CurveParams.model_fields})
 
     def level(self, counts: Floats) -> Floats:
         """Flex level, 0 to 1, of readings [counts], same shape; NaN stays NaN."""

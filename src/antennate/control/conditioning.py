@@ -1,14 +1,16 @@
 """Counts to the bending level b in [0, 1]: a running mean over T_avg, then one sigmoid.
 
-A sample that is not finite makes its side NaN until the window has passed it: a side that cannot be
-trusted says so, and contact.py turns that into UNKNOWN.
+A sample that is not finite makes the level of its side NaN as long as it is in the window of the
+mean. `contact.py` turns NaN into UNKNOWN.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass, fields
+
 import numpy as np
 
-from antennate.params import ConditioningParams
+from antennate.params import ConditioningParams, ControlParams, CurveParams
 from antennate.types import Bools, Floats, Ints
 
 
@@ -17,12 +19,32 @@ def sigmoid(z: Floats) -> Floats:
     return 1.0 / (1.0 + np.exp(-np.minimum(np.maximum(z, -700.0), 700.0)))
 
 
-def bending_level(params: ConditioningParams, counts: Floats) -> Floats:
+@dataclass(frozen=True, slots=True)
+class Curves:
+    """The curves of both antennae, left before right: what `CurveParams` has, shapes (2,)."""
+
+    midpoint: Floats
+    slope: Floats
+    polarity: Floats
+    counts_low: Floats
+    counts_high: Floats
+
+
+def curves(control: ControlParams) -> CurveParams | Curves:
+    """What makes levels of counts (..., 2): one curve for both antennae, or one for each."""
+    left, right = control.conditioning, control.conditioning_right
+    if right is None:
+        return left
+    pairs = ([getattr(one, f.name) for one in (left, right)] for f in fields(Curves))
+    return Curves(*(np.array(pair, float) for pair in pairs))
+
+
+def bending_level(params: CurveParams | Curves, counts: Floats) -> Floats:
     """Sigmoid calibration, b = 1 / (1 + exp(-s k (x - x0))), s the polarity of the reading x.
 
     Args:
         params: Slope k, midpoint x0, polarity and normalisation.
-        counts: Readings [counts], any shape; NaN passes through.
+        counts: Readings [counts], any shape, (..., 2) for two curves; NaN passes through.
 
     Returns:
         b in [0, 1], same shape.
@@ -31,14 +53,14 @@ def bending_level(params: ConditioningParams, counts: Floats) -> Floats:
     return sigmoid(params.polarity * params.slope * (x - params.midpoint))
 
 
-def flex_fraction(params: ConditioningParams, counts: Floats) -> Floats:
+def flex_fraction(params: CurveParams | Curves, counts: Floats) -> Floats:
     """Flex as a fraction of the calibrated range: 0 straight, 1 fully bent, same shape."""
     x = (counts - params.counts_low) / (params.counts_high - params.counts_low)
-    return x if params.polarity > 0 else 1.0 - x
+    return np.where(np.greater(params.polarity, 0), x, 1.0 - x)
 
 
 class RunningMean:
-    """Mean of the last T_avg of counts, per row and side; of what there is while it fills."""
+    """Mean of the counts of the last T_avg, per row and side; of all samples so far before that."""
 
     def __init__(self, params: ConditioningParams, batch: int, period: float) -> None:
         self.length = max(1, round(params.averaging_time / period))

@@ -1,8 +1,8 @@
 """Our controllers: a frame of readings goes in, a command for the joints comes out.
 
-They share the way from counts to contact, and the gait. They differ in one decision:
+Conditioning, contact and gait are the same in all. The rule that chooses the maneuver differs:
 
-- `open` walks FORWARD whatever it feels;
+- `open` always walks FORWARD;
 - `paper` follows the published table and holds each maneuver for a time;
 - `closed` walks FORWARD until its readings repeat, then escapes.
 """
@@ -13,7 +13,7 @@ from typing import Protocol
 
 import numpy as np
 
-from antennate.control.conditioning import RunningMean, bending_level, flex_fraction
+from antennate.control.conditioning import RunningMean, bending_level, curves, flex_fraction
 from antennate.control.contact import ContactState
 from antennate.control.escape import Escape
 from antennate.control.gait import Gait
@@ -125,7 +125,7 @@ class RuleController:
     """
 
     def __init__(self, rule: Rule, control: ControlParams, robot: RobotSpec, batch: int) -> None:
-        self._conditioning = control.conditioning
+        self._curves = curves(control)
         self._mean = RunningMean(control.conditioning, batch, control.period)
         self._contact = ContactState(control.rule, batch)
         self._rule = rule
@@ -149,15 +149,15 @@ class RuleController:
     def step(self, frame: AntennaFrame) -> JointCommand:
         """One control period: the command for this frame, both with B rows."""
         counts = self._mean.step(frame.counts)
-        self.level = bending_level(self._conditioning, counts)
+        self.level = bending_level(self._curves, counts)
         self.contact = self._contact.step(self.level)
-        flex = flex_fraction(self._conditioning, counts)
+        flex = flex_fraction(self._curves, counts)
         self.maneuver = self._rule.step(frame.t, self.level, self.contact, flex)
         return self.gait.step(self.maneuver, self._rule.turn_offset)
 
 
 def open_loop(control: ControlParams, robot: RobotSpec, batch: int) -> RuleController:
-    """`open`: walks FORWARD whatever it feels."""
+    """`open`: always walks FORWARD."""
     return RuleController(_OpenRule(control), control, robot, batch)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import ClassVar, Self
+from typing import Any, ClassVar, Self
 
 from antennate.antenna.calibration import Calibration
 from antennate.errors import ConfigError
@@ -28,8 +28,12 @@ class RobotConfig(Params):
 
     calibration: str | None = number(None, "1", "assumed: the numbers of control.conditioning")
     """File of `antennate calibrate`, for both antennae, in place of control.conditioning."""
+    calibration_right: str | None = number(None, "1", "assumed: that of both antennae")
+    """File of the right antenna, where it has its own; `calibration` is then of the left one."""
     sensor_id: str | None = number(None, "1", "assumed: that of the calibration file")
     """Name of the flex sensor; 16 hexadecimal digits name the board it is soldered to."""
+    sensor_id_right: str | None = number(None, "1", "assumed: that of its calibration file")
+    """The same of the right antenna, where it has its own file."""
     reach: float | None = number(
         None, "1", "assumed: of the calibration file, or 0.8", ge=0, le=200
     )
@@ -46,12 +50,32 @@ class RobotConfig(Params):
             CalibrationError: The file cannot be used, or is of another flex sensor.
             ConfigError: There is another curve, or another theta, beside it.
         """
-        if self.calibration is None:
+        if self.calibration is None and self.calibration_right is None:
             return self
-        path, own = self.calibration, self.control
-        file = Calibration.load(Path(path), self.sensor_id)
-        averaging = own.conditioning.averaging_time
-        if own.conditioning != ConditioningParams(averaging_time=averaging):
+        if self.calibration is None:
+            raise ConfigError(
+                "calibration_right: expected calibration = FILE of the left antenna beside it, "
+                "found none"
+            )
+        own, averaging = self.control, self.control.conditioning.averaging_time
+        left = self._load(self.calibration, self.sensor_id)
+        curve = left.conditioning(averaging)
+        known: dict[str, Any] = {"calibration": None, "sensor_id": left.sensor_id}
+        reach, other = left.reach, None
+        if self.calibration_right is not None:
+            right = self._load(self.calibration_right, self.sensor_id_right)
+            other = right.curve()
+            known |= {"calibration_right": None, "sensor_id_right": right.sensor_id}
+            reach = max(left.reach, right.reach)
+        control = own.model_copy(update={"conditioning": curve, "conditioning_right": other})
+        known |= {"control": control, "reach": reach if self.reach is None else self.reach}
+        return self.model_copy(update=known)
+
+    def _load(self, path: str, sensor_id: str | None) -> Calibration:
+        """A calibration file that nothing contradicts."""
+        file, own = Calibration.load(Path(path), sensor_id), self.control
+        plain = ConditioningParams(averaging_time=own.conditioning.averaging_time)
+        if own.conditioning != plain or own.conditioning_right is not None:
             raise ConfigError(
                 f"control.conditioning: expected no curve beside calibration file {path}, found "
                 "one; give averaging_time alone"
@@ -61,10 +85,7 @@ class RobotConfig(Params):
                 f"control.rule.threshold: expected theta of {path}, {file.threshold:g}, found "
                 f"{own.rule.threshold:g}; set it alike"
             )
-        control = own.model_copy(update={"conditioning": file.conditioning(averaging)})
-        known = {"control": control, "sensor_id": file.sensor_id, "calibration": None}
-        reach = file.reach if self.reach is None else self.reach
-        return self.model_copy(update=known | {"reach": reach})
+        return file
 
 
 _EXAMINED = (

@@ -11,6 +11,7 @@ from antennate.params.bench import BenchVariationParams, WallParams
 from antennate.params.control import (
     ConditioningParams,
     ControlParams,
+    CurveParams,
     EscapeParams,
     GaitParams,
     RepetitionParams,
@@ -49,6 +50,7 @@ __all__ = [
     "ConditioningParams",
     "ControlParams",
     "CornerWallParams",
+    "CurveParams",
     "CylinderParams",
     "DoctorParams",
     "DriftParams",

@@ -43,11 +43,9 @@ class GaitParams(Params):
     """Sweeps of the antenna bases per second."""
 
 
-class ConditioningParams(Params):
-    """From counts to the bending level b."""
+class CurveParams(Params):
+    """From the mean counts of an antenna to its bending level b."""
 
-    averaging_time: float = number(0.1, "s", "assumed: ten samples", gt=0, le=5)
-    """T_avg, length of the running mean."""
     midpoint: float = number(0.305, "1", "paper: midpoint of the sigmoid", gt=-1, lt=2)
     """Reading at which b is one half."""
     slope: float = number(18.3, "1", "paper: slope of the sigmoid", gt=0, le=1000)
@@ -62,13 +60,20 @@ class ConditioningParams(Params):
     """Reading that normalises to 1."""
 
     @model_validator(mode="after")
-    def _span(self) -> ConditioningParams:
+    def _span(self) -> CurveParams:
         if self.counts_high - self.counts_low < 1:
             raise ValueError(
                 f"counts_high must exceed counts_low by at least 1 count, got {self.counts_low} "
                 f"and {self.counts_high}"
             )
         return self
+
+
+class ConditioningParams(CurveParams):
+    """From counts to the bending level b."""
+
+    averaging_time: float = number(0.1, "s", "assumed: ten samples", gt=0, le=5)
+    """T_avg, length of the running mean."""
 
 
 class RuleParams(Params):
@@ -92,9 +97,9 @@ class RepetitionParams(Params):
     window_cycles: float = number(0.5, "1", "fitted: 96 tunnels: sooner than 1", gt=0, le=10)
     """Window of both means below, in gait cycles."""
     change: float = number(0.06, "1", "fitted: 96 tunnels: 59 jams, 8 false alarms", gt=0, le=1)
-    """Mean change of deflection from cycle to cycle under which it repeats."""
+    """Mean change of flex from cycle to cycle under which it repeats."""
     pressure: float = number(0.2, "1", "fitted: 12 tunnels: free below, stuck above it", ge=0, le=1)
-    """Mean deflection above which an antenna is pressed."""
+    """Mean flex above which an antenna is pressed."""
 
 
 class EscapeParams(Params):
@@ -138,6 +143,8 @@ class ControlParams(Params):
     """Control ticks per second."""
     gait: GaitParams = GaitParams()
     conditioning: ConditioningParams = ConditioningParams()
+    conditioning_right: CurveParams | None = number(None, "1", "assumed: both antennae are alike")
+    """Curve of the right antenna, where it has its own."""
     rule: RuleParams = RuleParams()
     repetition: RepetitionParams = RepetitionParams()
     escape: EscapeParams = EscapeParams()

@@ -123,7 +123,7 @@ class RobotSpec(Params):
         if (table := ROBOTS.get(str(text))) is not None:
             return cls.model_validate(table)
         path = folder / text
-        if path.suffix != ".toml" and not path.exists():
+        if not str(text) or (path.suffix != ".toml" and not path.exists()):
             known = ", ".join(ROBOTS)
             raise ConfigError(
                 f"--robot: expected {known} or a TOML file{nearest(str(text), ROBOTS)}, found "

@@ -138,9 +138,9 @@ class Feed:
             process = self._process
             if process is None or process.stdout is None:
                 return
-            with process.stdout as said:
-                self._begun = bool(said.read(1))
-                while said.read(4096):
+            with process.stdout as output:
+                self._begun = bool(output.read(1))
+                while output.read(4096):
                     pass
             died = process.wait() != 0
             self._begun = False

@@ -64,8 +64,8 @@ class Tick:
         lost: Samples that never came.
         misses: Answers that servos did not give so far.
         stale: Late answers thrown away so far.
-        sent: Poses sent so far.
-        refused: Poses refused so far.
+        sent: Commands sent so far.
+        refused: Commands refused so far.
     """
 
     number: int

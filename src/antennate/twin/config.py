@@ -53,7 +53,7 @@ class TwinConfig(TrialConfig):
     fault: Annotated[tuple[str, ...], GATHERED] = number((), "1", "assumed: nothing is broken")
     """Faults, such as servo:7=silent@3s."""
     touch: Annotated[tuple[str, ...], GATHERED] = number((), "1", "assumed: nobody is there")
-    """Touches of the standing robot: left@2s, left:20mm@2s, or - to type them; from each client."""
+    """Touches of the standing robot: left@2s or left:20mm@2s, from the beginning of each client."""
     push: Annotated[tuple[str, ...], GATHERED] = number((), "1", "assumed: nobody is there")
     """Joints without torque that are turned, such as yaw1=20deg@3s, from the first packet on."""
     factory: bool = number(False, "1", "assumed: they are set up")

@@ -15,6 +15,7 @@ from antennate.hardware.esp32.wire import Hello, Reset, objections, require_sens
 from antennate.hardware.robot import DoctorConfig
 from antennate.hardware.safety import diagnosis
 from antennate.hardware.safety.diagnosis import Band, ChannelDiagnosis
+from antennate.params import CurveParams
 
 _LONGEST_TEXT = 60
 _COPY = "copy the three files of firmware/ to the board again"
@@ -125,7 +126,7 @@ def _antenna(
     noisy = Finding(f"{noise:.1f} counts", "warn" if noise > quiet else "ok", cure)
     yield noisy, f"{name} noise", f"at most {quiet:g} counts"
     try:
-        channel = ChannelDiagnosis(Band.of(config.control.conditioning, config.reach))
+        channel = ChannelDiagnosis(Band.of(_curve(config, name), config.reach))
     except CalibrationError as error:
         wrong = Finding(str(error), "bad", "calibrate again, with another divider resistor")
         yield wrong, f"{name} calibration", "leaves the rails free"
@@ -143,8 +144,14 @@ def _antenna(
         yield _at_rest(config, name, middle)
 
 
+def _curve(config: DoctorConfig, name: str) -> CurveParams:
+    """Of the antenna on a side; the right one may have its own."""
+    both, right = config.control.conditioning, config.control.conditioning_right
+    return right if right is not None and name == "right" else both
+
+
 def _at_rest(config: DoctorConfig, name: str, counts: float) -> tuple[Finding, str, str]:
-    curve, threshold = config.control.conditioning, config.control.rule.threshold
+    curve, threshold = _curve(config, name), config.control.rule.threshold
     low, high = curve.counts_low - diagnosis.MARGIN, curve.counts_high + diagnosis.MARGIN
     level = float(bending_level(curve, np.array(counts)))
     finding = Finding(

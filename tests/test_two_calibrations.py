@@ -1,0 +1,118 @@
+"""One calibration for each antenna: each is read by its own curve, everywhere."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from test_bad_calibrations import GOOD
+
+from antennate.control.registry import make_controller
+from antennate.errors import ConfigError
+from antennate.hardware.robot_file import RobotFile
+from antennate.hardware.safety.diagnosis import Finding
+from antennate.hardware.safety.signal_quality import SignalQuality
+from antennate.params import ControlParams
+from antennate.params.reading import read_file
+from antennate.studies.formats import to_toml
+from antennate.types import AntennaFrame, Contact
+
+RIGHT = GOOD.model_copy(
+    update={
+        "sensor_id": "right-1",
+        "polarity": 1,
+        "slope": 6.0,
+        "midpoint": 0.4,
+        "counts_low": 2500.0,
+        "counts_high": 3000.0,
+        "valid_counts": (2500.0, 3000.0),
+    }
+)
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    GOOD.save(tmp_path / "left.json")
+    RIGHT.save(tmp_path / "right.json")
+    path = tmp_path / "robot.toml"
+    left, right = tmp_path / "left.json", tmp_path / "right.json"
+    path.write_text(f'calibration = "{left}"\ncalibration_right = "{right}"\n')
+    return path
+
+
+def level(counts: float, curve) -> float:
+    """The sigmoid as docs/science/calibration.md gives it."""
+    x = (counts - curve.counts_low) / (curve.counts_high - curve.counts_low)
+    return 1 / (1 + math.exp(-curve.polarity * curve.slope * (x - curve.midpoint)))
+
+
+def test_each_antenna_has_its_own_level(file: Path) -> None:
+    config = read_file(file, RobotFile).for_drive().calibrated()
+    assert (config.sensor_id, config.sensor_id_right) == ("left-1", "right-1")
+    control = make_controller("closed", config.control, config.robot)
+    for _ in range(20):
+        control.step(AntennaFrame(t=np.zeros(1), counts=np.array([[1700.0, 2600.0]])))
+    expected = [level(1700.0, GOOD), level(2600.0, RIGHT)]
+    assert control.level[0].tolist() == pytest.approx(expected, abs=1e-12)
+    for _ in range(20):
+        control.step(AntennaFrame(t=np.zeros(1), counts=np.array([[1870.0, 2990.0]])))
+    assert control.contact[0].tolist() == [Contact.FREE, Contact.CONTACT]
+
+
+def test_each_channel_is_judged_by_its_own_range(file: Path) -> None:
+    config = read_file(file, RobotFile).for_doctor().calibrated()
+    control = config.control
+    quality = SignalQuality(control.conditioning, right=control.conditioning_right)
+    for tick in range(20):
+        quality.step(0.01 * tick, [1870.0 + tick % 2, 2505.0 + tick % 2], [0, 0])
+    assert quality.findings == (Finding.OK, Finding.OK)
+    alike = SignalQuality(control.conditioning)
+    for tick in range(20):
+        alike.step(0.01 * tick, [1870.0 + tick % 2, 2505.0 + tick % 2], [0, 0])
+    assert alike.findings[1] is not Finding.OK
+
+
+def test_the_right_curve_is_kept_in_files_and_equal_curves_change_nothing(tmp_path: Path) -> None:
+    control = ControlParams(conditioning_right=RIGHT.curve())
+    path = tmp_path / "control.toml"
+    path.write_text(to_toml(control))
+    assert read_file(path, ControlParams) == control
+    one, two = ControlParams(), ControlParams(conditioning=GOOD.conditioning())
+    assert one.conditioning_right is None
+    same = two.model_copy(update={"conditioning_right": GOOD.curve()})
+    chance = np.random.default_rng(0)
+    frames = [chance.uniform(1500.0, 1900.0, (1, 2)) for _ in range(300)]
+    levels = []
+    for params in (two, same):
+        control_ = make_controller("paper", params)
+        levels.append([])
+        for tick, counts in enumerate(frames):
+            control_.step(AntennaFrame(t=np.array([0.01 * tick]), counts=counts))
+            levels[-1].append(control_.level.tobytes())
+    assert levels[0] == levels[1]
+
+
+def test_one_file_goes_on_serving_both(file: Path) -> None:
+    file.write_text(file.read_text().splitlines()[0])
+    config = read_file(file, RobotFile).for_drive().calibrated()
+    assert config.control.conditioning_right is None
+    assert config.control.conditioning == GOOD.conditioning()
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (("calibration = ", "# "), r"calibration_right: expected calibration = FILE of the left"),
+        (("calibration = ", "[control.conditioning]\nslope = 9.0\n# "), "calibration_right"),
+        (
+            ("calibration = ", 'sensor_id_right = "left-1"\ncalibration = '),
+            "expected left-1, found",
+        ),
+    ],
+)
+def test_what_contradicts_is_refused(file: Path, change: tuple[str, str], said: str) -> None:
+    file.write_text(file.read_text().replace(*change, 1))
+    with pytest.raises(ConfigError if "sensor" not in change[1] else Exception, match=said):
+        read_file(file, RobotFile).for_drive().calibrated()
