@@ -44,17 +44,17 @@ from antennate.twin.lockstep import BoardPort, LockstepClock, SimulatedWire
 
 Patch = pytest.MonkeyPatch
 PORTS = {"bus": "the bus", "esp32": "the board"}
-FAULTS = {
+FAULTS = {  # by the number of its readings; with 5 the ports are swapped
     3: ("servo:7=return_delay_time:250",),
     4: ("esp32=silent", "servo:1=silent"),
     5: (),
 }
-"""What is wrong, by the number of the doctor's readings; with 5 the ports are swapped."""
-REPLACED = {"controller"}
-"""What `teleop` reads of a drive and then replaces by the keys."""
+ELSEWHERE = {"sensor_id_right", "robot.legs.limit"}  # own calibration; controllers that lift legs
+REPLACED = {"controller"}  # `teleop` walks by keys in its place
 SHORT = {"dry_run": 0.1, "duration": 0.5, "stand": 0.1}
 DRIFTING = {"control": {"rate": 25.0}, "drift": {"band": 0.02, "speed": 1.0}}
-LIFTING = {"legs": {"kind": "lifting"}, "pitch": {"kind": "actuated"}}
+PITCHING = {"pitch": {"kind": "actuated"}}
+LIFTING = {"legs": {"kind": "lifting"}, **PITCHING}
 
 
 def reach(network: NetworkParams) -> None:
@@ -236,7 +236,7 @@ RUNS: dict[str, tuple[type[Params], Callable[..., None], list[dict[str, Any]]]] 
                 "touch_check": False,
                 "bus_return": 0.1,
                 "fault_time": 0.1,
-                "robot": LIFTING,
+                "robot": PITCHING,
             },
         ],
     ),
@@ -250,7 +250,7 @@ RUNS: dict[str, tuple[type[Params], Callable[..., None], list[dict[str, Any]]]] 
                 "controller": "open",
                 "drift": {"band": 0.02, "speed": 1.0},
             },
-            {**SHORT, "controller": "open", "touch_check": False, "robot": LIFTING},
+            {**SHORT, "controller": "open", "touch_check": False, "robot": PITCHING},
         ],
     ),
     "doctor": (
@@ -309,7 +309,7 @@ def test_every_parameter_of_a_command_of_the_robot_is_read_or_refused(
             run(monkeypatch, config, folder)
         found |= seen
     every = set(leaves(model))
-    assert every - found == set(model.unread) - REPLACED
+    assert every - found - ELSEWHERE == set(model.unread) - REPLACED
     assert set(model.unread) <= every
 
 

@@ -90,6 +90,7 @@ class RobotConfig(Params):
 
 _EXAMINED = (
     *paths_of(ConditioningParams, "control.conditioning"),
+    "control.conditioning_right",
     "control.rule.threshold",
     *(f"limits.{name}" for name in ("rate", "rate_error", "supply_warn", "supply_hold")),
 )
