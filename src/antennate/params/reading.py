@@ -33,8 +33,8 @@ _EXPECTED = {
     "less_than_equal": "a number of at most {le:g}",
     "finite_number": "a finite number",
     "literal_error": "one of {expected}",
-    "too_short": "at least {min_length} value(s)",
-    "too_long": "at most {max_length} value(s)",
+    "too_short": "at least {min_length} values",
+    "too_long": "at most {max_length} values",
     "missing": "a value",
 }
 """What pydantic's error types ask for."""
@@ -178,7 +178,8 @@ def describe(
 
 def _expected(kind: str, context: Mapping[str, Any]) -> str | None:
     if kind in _EXPECTED:
-        return _EXPECTED[kind].format(**context).replace("'", "")
+        text = _EXPECTED[kind].format(**context).replace("'", "")
+        return text.removesuffix("s") if text.endswith(" 1 values") else text
     return _KINDS.get(kind.split("_")[0])
 
 
