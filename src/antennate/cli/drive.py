@@ -37,6 +37,11 @@ from antennate.telemetry.reader import count
 from antennate.telemetry.ticks import Tick
 from antennate.types import Controller
 
+_LOGLESS = (
+    "the process that writes it had not begun by the end, or could not write; is the machine busy, "
+    "or the disk full? `record_required = true` lets the robot walk with a log only"
+)
+
 DESCRIPTION = """\
 Let a controller walk the real robot, or its twin. First a dry run: everything is read and nothing
 written. Then, with --arm only, torque comes on with every servo where it stands, and the robot
@@ -99,6 +104,8 @@ def walk(
     ):
         folder.without_trials()
         with connect(config, orders.esp32, orders.bus, key) as session:
+            if operator.stop is not None:
+                operator.stop.closed = True  # until the first tick: from here on there is a result
             if controller is not None:
                 session.control.controller = controller(session, config)
                 config = config.model_copy(update={"controller": command})
@@ -106,11 +113,12 @@ def walk(
         table = Table.of("Drive", {result["controller"]: result}, MEASURES, _note(result))
         log = shlex.quote(str(folder.path / LOG))
         other = "" if controller is None else " --controller open"
-        again = f"\nWhat was read and decided: antennate replay {log}{other}"
+        again = f"What was read and decided: antennate replay {log}{other}"
+        again = again if result["logs"] else f"No log was kept: {_LOGLESS}"
         try:
             folder.finish(result, ())
         finally:  # the robot's state is told even if it cannot be kept
-            tell(result, orders, [table], _sentence(result) + again)
+            tell(result, orders, [table], f"{_sentence(result)}\n{again}")
     fault = result["worst_state"] in (State.FAULT.name, State.OFF.name)
     stays_on = result["torque_off"] is False
     idle = _idle(result)
@@ -186,8 +194,8 @@ def _note(result: Mapping[str, Any]) -> str:
     lines: list[str] = []
     if result["priority"] == Priority.ORDINARY.value:
         lines.append("Real-time priority was not allowed; a busy machine will make it miss ticks.")
-    if not result["log_complete"]:
-        lines.append(f"The log is not complete; its files: {', '.join(result['logs']) or 'none'}.")
+    if not result["log_complete"] and result["logs"]:
+        lines.append(f"The log is not complete; its files: {', '.join(result['logs'])}.")
     return "\n".join(lines)
 
 
@@ -230,6 +238,7 @@ MEASURES = (
     Measure("resets", "resets", form="d"),
     Measure("missed_answers", "missed answers", form="d"),
     Measure("stale_answers", "stale answers", form="d"),
+    Measure("unlogged", "unlogged ticks", form="d"),
     Measure("commands_sent", "commands sent", form="d"),
     Measure("commands_refused", "commands refused", form="d"),
     Measure("priority", "priority"),

@@ -93,6 +93,7 @@ def command(argv: Sequence[str]) -> int:
 
 def _serve_robot(config: TwinConfig, places: Places, orders: Orders | None) -> int:
     faults = Faults([read(text) for text in config.fault], config.robot.ids)
+    faults.on_begin = lambda demand, t: _say(f"{t:.1f} s after the addresses: {demand}")
     real = places.pace == "real"
     robot, passage = watched(config, boot_id=secrets.randbits(32) if real else None)
     passage.on_pass = lambda: _tell(passage, places.passed)

@@ -6,7 +6,7 @@ A register of a servo takes a value by its name: `servo:7=return_delay_time:250`
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from antennate.errors import BadInputError
@@ -54,6 +54,11 @@ class Demand:
     what: str
     size: float
     t: float
+
+    def __str__(self) -> str:
+        servo = f":{self.servo}" if self.servo else ""
+        size = f":{self.size:g}" if self.size else ""
+        return f"{self.target}{servo}={self.what}{size}"
 
 
 def read(text: str) -> Demand:
@@ -103,6 +108,9 @@ class Faults:
         ids: Ids of the servos, in their order.
         alone: There are servos and their bus, but no robot.
 
+    Attributes:
+        on_begin: Told each of them as it happens, and the time [s].
+
     Raises:
         BadInputError: One is for something that is not there.
     """
@@ -110,6 +118,7 @@ class Faults:
     def __init__(self, demands: Sequence[Demand], ids: Sequence[int], alone: bool = False) -> None:
         self._waiting = sorted(demands, key=lambda demand: demand.t)
         self._ids = tuple(ids)
+        self.on_begin: Callable[[Demand, float], None] = lambda demand, t: None
         self._alone = alone
         for demand in demands:
             self._require(demand)
@@ -138,6 +147,7 @@ class Faults:
         """Let happen what is due at time t [s]."""
         while self._waiting and self._waiting[0].t <= t:
             demand = self._waiting.pop(0)
+            self.on_begin(demand, t)
             if demand.target == "servo":
                 _break_servo(twin.servos[self._ids.index(demand.servo)], demand, twin.t)
             elif isinstance(twin, TwinRobot) and demand.target != "bus":

@@ -81,13 +81,14 @@ def drive(
         return not report.ended
 
     with contextlib.nullcontext(operator.stop) if operator.stop else StopOnce() as stop:
-        stop.insists = True
+        stop.insists, stop.within = True, run_loop
         try:
             try:
+                stop.closed = False
                 run_loop(session, session.control, session.period, go_on)
             finally:
                 stop.closed = True
-        except KeyboardInterrupt:  # also one that came before `closed` was set
+        except KeyboardInterrupt:
             report.ended = _SIGNAL
         finally:
             stop.closed = True

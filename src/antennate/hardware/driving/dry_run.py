@@ -49,7 +49,8 @@ class DryRun:
         elif self._quality.refused or (
             t >= self._length + self._patience and self._quality.objections
         ):
-            self._give_up(t, "; ".join(self._quality.objections) + _SKIP)
+            skip = "" if self._quality.broken else _SKIP  # a broken wire forbids torque anyway
+            self._give_up(t, "; ".join(self._quality.objections) + skip)
         elif t >= self._length and not self._quality.objections:
             self._first = t
             self._ask(t)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import signal
 import threading
+from collections.abc import Callable
 from types import FrameType
 from typing import Any
 
@@ -33,6 +34,8 @@ class StopOnce:
     Attributes:
         received: A signal came, even if its exception was swallowed.
         insists: Every signal raises, not only the first; for code that may swallow one.
+        within: Signals raise only while this function runs, so that of several at once none
+            interrupts what the first has begun; None for everywhere.
         closed: Signals do not raise any more; set by the code that owns the block.
     """
 
@@ -40,6 +43,7 @@ class StopOnce:
         self.received = self.closed = False
         self.insists = not last
         self._last = last
+        self.within: Callable[..., object] | None = None
         self._before: dict[int, Any] = {}
 
     def __enter__(self) -> StopOnce:
@@ -54,5 +58,14 @@ class StopOnce:
     def receive(self, number: int, frame: FrameType | None) -> None:
         """Take note of a signal."""
         first, self.received = not self.received, True
-        if not self.closed and (first or self.insists):
+        if not self.closed and (first or self.insists) and self._inside(frame):
             raise KeyboardInterrupt
+
+    def _inside(self, frame: FrameType | None) -> bool:
+        """Whether `within` runs at this frame."""
+        if self.within is None:
+            return True
+        code = getattr(self.within, "__code__", None)
+        while frame is not None and frame.f_code is not code:
+            frame = frame.f_back
+        return frame is not None

@@ -78,7 +78,13 @@ class Finding(Enum):
         """Whether contact may be decided on such a channel."""
         return self in _USABLE
 
+    @property
+    def broken(self) -> bool:
+        """Whether wire, plug or sensor has to be mended."""
+        return self in _BROKEN
 
+
+_BROKEN = {Finding.STUCK, Finding.OPEN, Finding.SHORT_LO, Finding.SHORT_HI}
 _USABLE = {Finding.OK, Finding.OUT_OF_CAL, Finding.SPIKY, Finding.SATURATED}
 
 

@@ -71,12 +71,25 @@ class SignalQuality:
     @property
     def objections(self) -> tuple[str, ...]:
         """Reasons not to arm, empty if there is none."""
-        return () if self.check is None or not self.check.objection else (self.check.objection,)
+        if self.check is None or not self.check.objection:
+            return ()
+        return (self.check.objection if self.refused else self.broken or self.check.objection,)
+
+    @property
+    def broken(self) -> str:
+        """Which antennae are broken and what to do, empty if none is."""
+        return "; ".join(
+            f"mend wire, plug or sensor of the {side} antenna, it is {finding.name}: "
+            f"{finding.value}"
+            for side, finding in zip(_SIDES, self.findings, strict=True)
+            if finding.broken
+        )
 
     @property
     def refused(self) -> bool:
         """Whether the check has failed for good."""
-        return self.check is not None and self.check.ask is Ask.NOTHING and bool(self.objections)
+        check = self.check
+        return check is not None and check.ask is Ask.NOTHING and bool(check.objection)
 
     @property
     def drifted(self) -> str:
@@ -92,6 +105,7 @@ class SignalQuality:
         """For the status line: the check, or what the person is to do, and the drift."""
         touch = "skipped" if self.check is None else "passed"
         if self.objections and self.check is not None:
-            touch = f"({self.check.objection if self.refused else self.check.ask.value})"
+            asked = self.broken or self.check.ask.value
+            touch = f"({self.check.objection if self.refused else asked})"
         left, right = (100 * drift.share for drift in self.drifts)
         return f"touch={touch} drift={left:+.0f},{right:+.0f}%"
