@@ -1,4 +1,4 @@
-"""One tick of a drive, as it is kept: what was read, decided and commanded, and how all were.
+"""One tick of a drive, as it is logged: what was read, decided and commanded, and the health.
 
 Packed it is bytes, whose layout follows from the number of joints, and a text after them. Every
 float comes back bit by bit, NaN and infinities too.

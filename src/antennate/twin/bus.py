@@ -6,7 +6,7 @@ A reply leaves one return delay after the request, and is there when its last by
 together answer one after the other; each waits for the one before it, so that the chain stops at a
 silent servo, in sync reads (https://github.com/ROBOTIS-GIT/DynamixelSDK/issues/331) as in fast
 ones. Two servos with one id talk at the same time, and of their bits the zeros win. The master
-is expected to be quiet meanwhile: its packets never collide with an answer.
+is expected to be quiet meanwhile; collisions of its packets with answers are not simulated.
 """
 
 from __future__ import annotations

@@ -178,7 +178,7 @@ class Session:
         self.tally.sent += moves
 
     def release(self) -> list[int]:
-        """Torque off, verified; returns ids that did not confirm it; each tick asks them again."""
+        """Torque off, verified; returns ids that did not confirm it; each tick tells them again."""
         return self.actuators.disable()
 
     def stand(self, time: float) -> None:
