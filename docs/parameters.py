@@ -45,7 +45,7 @@ def groups(module: ModuleType) -> list[type[params.Params]]:
         if inspect.isclass(group)
         and issubclass(group, params.Params)
         and group is not params.Params
-        and group.__module__.startswith(module.__name__)
+        and group.__module__ == module.__name__
         and not name.startswith("_")
     ]
 
@@ -90,8 +90,12 @@ def table(group: type[params.Params]) -> str:
 
 def main() -> int:
     """Write the page, or compare it; return the exit status."""
-    robots = [importlib.import_module(f"antennate.robots.{name}") for name in ROBOTS]
-    parts = [table(group) for module in (params, *robots) for group in groups(module)]
+    numbers = [
+        f"antennate.params.{module.name}" for module in pkgutil.iter_modules(params.__path__)
+    ]
+    robots = [f"antennate.robots.{name}" for name in ROBOTS]
+    modules = map(importlib.import_module, numbers + robots)
+    parts = [table(group) for module in modules for group in groups(module)]
     page = "\n".join([HEAD, *parts, COMMANDS, *(table(group) for group in commands())])
     if "--check" not in sys.argv[1:]:
         PAGE.write_text(page, encoding="utf-8")

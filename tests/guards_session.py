@@ -10,8 +10,10 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
+import test_approach
 import test_bad_controllers
 import test_dynamixel_bus as test_bus
+import test_jog
 import test_loop
 import test_release
 import test_session
@@ -25,7 +27,7 @@ from antennate.hardware.driving import session
 from antennate.hardware.driving.decision import StepResult
 from antennate.hardware.driving.signals import StopOnce
 from antennate.hardware.driving.supervised_controller import SupervisedController
-from antennate.hardware.dynamixel import monitor
+from antennate.hardware.dynamixel import bringup, monitor
 from antennate.hardware.dynamixel.actuators import DynamixelActuators
 from antennate.hardware.ports.port import PortError
 from antennate.hardware.safety.causes import Outputs
@@ -93,6 +95,21 @@ SESSION = [
         "speed of goals",
         put(joints.Joints, "reach", constant(1e6)),
         test_session.test_B10_torque_comes_on_with_goals_where_servos_stand_and_they_move_slowly,
+    ),
+    Guard(
+        "slow approach to the first command",
+        put(DynamixelActuators, "away", constant(0)),
+        test_approach.test_the_first_motion_is_slow_and_the_gait_begins_where_it_ends,
+    ),
+    Guard(
+        "watchdog of a joint moved by keys",
+        put(bringup, "arm_watchdogs", constant(None)),
+        test_jog.test_a_program_that_dies_leaves_a_joint_that_stands,
+    ),
+    Guard(
+        "speed and force of a joint moved by keys",
+        put(bringup, "limit_speed", constant(None)),
+        test_jog.test_it_turns_by_its_step_slowly_and_lets_go,
     ),
     Guard(
         "gait stands still while held",

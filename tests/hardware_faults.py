@@ -26,7 +26,7 @@ BAD: dict[Cause, dict[str, Any]] = {
     Cause.FAILED: {"failure": "ValueError: 3"},
     Cause.UNDECIDED: {"decided_at": 0.0},
     Cause.BAD_ACTION: {"maneuver": 5},
-    Cause.BAD_POSE: {"bad_command": "expected a finite angle, found nan"},
+    Cause.BAD_COMMAND: {"bad_command": "expected a finite angle, found nan"},
     Cause.UNKNOWN_CONTACT: {"contact": (Contact.FREE, Contact.UNKNOWN)},
     Cause.NO_RECORD: {"unrecorded": True},
     Cause.SUPPLY_HOLD: {"supply": 10.1},

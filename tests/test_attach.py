@@ -174,6 +174,11 @@ def test_what_cannot_be_attached_is_one_line() -> None:
         attach_antenna(own, "neck", antenna)
     with pytest.raises(ConfigError, match="side: expected left or right, found up"):
         attach_antenna(own, "head", antenna, "up")  # pyright: ignore[reportArgumentType]
+    for position in ((math.nan, 0, 0), (0, math.inf, 0), (0, 0)):
+        with pytest.raises(ConfigError, match=r"position: expected 3 finite numbers \[m\], found"):
+            attach_antenna(own, "head", antenna, position=position)
+    with pytest.raises(ConfigError, match=r"angle: expected a finite number \[rad\], found nan"):
+        attach_antenna(own, "head", antenna, angle=math.nan)
     name = attach_antenna(own, "head", antenna)
     with pytest.raises(ConfigError, match="expected one that is not taken, found antenna_left"):
         attach_antenna(own, "head", antenna)

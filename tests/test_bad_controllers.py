@@ -191,7 +191,7 @@ def test_B14_a_pose_that_raises_is_refused_as_a_pose(error: BaseException) -> No
     made = Driven(Poses)
     found = made.step()
     assert found is not None
-    assert found.cause is Cause.BAD_POSE
+    assert found.cause is Cause.BAD_COMMAND
     assert "numbers in yaw" in found.detail
     assert np.isnan(angles_of(Odd(), 19)).all()  # type: ignore[arg-type]
     assert np.isnan(Tick.of(made.session, 1.0).angles).all()

@@ -137,7 +137,7 @@ def test_B14_a_bad_pose_is_refused_as_a_whole_and_counted_and_the_goal_held(
     out = made.session.outputs
     assert out is not None
     first = out.causes[0]
-    assert first.cause is Cause.BAD_POSE
+    assert first.cause is Cause.BAD_COMMAND
     assert "expected" in first.detail
     assert made.session.actuators.state.bus_error == ""
     tick = Tick.of(made.session, 1.0)

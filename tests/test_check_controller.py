@@ -200,7 +200,7 @@ BROKEN = {
     KnowsBlind: "expected UNKNOWN for a reading of nan",
     Scribbles: "expected a frame that is left as it is",
     KeepsBuffer: "expected a command that stays as it was returned",
-    TrustsItsCommand: "whatever becomes of a command that was returned",
+    TrustsItsCommand: "when a command that was returned is changed",
 }
 
 

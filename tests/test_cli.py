@@ -118,12 +118,17 @@ def test_the_door_opens_without_heavy_imports():
         (["tunnel", "--trails", "3"], ["did you mean --trials?", "found '--trails'"]),
         (["tunnel", "--tunnel.free_widht=1"], ["did you mean --tunnel.free-width?"]),
         (["tunnel", "--free-width", "1"], ["did you mean --tunnel.free-width?"]),
+        (["tunnel", "--arms", "open"], ["did you mean --controllers?", "found '--arms'"]),
+        (["wall", "--arms", "stiff"], ["did you mean --profiles?", "found '--arms'"]),
         (["tunnel", "--bogus"], ["expected a known flag, found '--bogus'"]),
         (["tunnel", "--json", "yes"], ["expected flags only, found 'yes'"]),
         (["tunnel", "--out", ""], ["--out: expected a path, found nothing"]),
         (["tunnel", "--tunnel.mirror", "often"], ["expected one of random, never or always"]),
         (["tunnel", "stray"], ["expected flags only", "'stray'"]),
         (["tunnel", "--trials", "many"], ["--trials: expected a whole number, found many"]),
+        (["tunnel", "--seed", ""], ["--seed: expected a whole number, found ''"]),
+        (["tunnel", "--robot", ""], ["--robot: expected ", "found ''"]),
+        ([""], ["expected a command", "found ''"]),
         (["tunnel", "--trials"], ["--trials: expected 1 value, INT, found none"]),
         (["tunnel", "--trials", "0"], ["--trials: expected a number of at least 1, found 0"]),
         (
@@ -177,10 +182,14 @@ def test_bad_words(capsys, tmp_path, argv, parts):
         ("tunnel.free_width = 1979-05-27", ["tunnel.free_width: expected a number"]),
         ("tunnel = 3", ["tunnel: expected a table, found 3"]),
         ("tunnel.segments = [1.0, 'x']", ["tunnel.segments[1]: expected a number, found 'x'"]),
-        ("controllers = []", ["controllers: expected at least 1 value"]),
+        ("controllers = []", ["controllers: expected at least 1 value, found []"]),
+        ("tunnel.turns_deg = [" + 20 * "1.0," + "]", ["expected at most 19 values, found"]),
+        ("arms = ['open']", ["expected a known key (did you mean controllers?), found 'arms'"]),
         ("robot.antenna.active_coils = []", ["active_coils: expected at least 1 value"]),
         ('"a\\u001b[31m\\nb" = 1', ["expected a known key"]),
         ("a = " + "[" * 200_000, ["nested too deeply"]),
+        ("seed = " + "9" * 5000, ["c.toml: expected numbers of at most 4300 digits, found more"]),
+        ("seed = 0x" + "f" * 5000, ["c.toml: expected numbers of at most 4300 digits"]),
         ("a." * 400_000 + "a = 1", ["line 1: expected at most 100 dots"]),
         ("#" * 1_000_001, ["expected at most 1000000 bytes"]),
         (b"\xff\xfe", ["expected UTF-8 text, found byte 0xff at 0"]),
@@ -392,8 +401,9 @@ def test_an_invalid_trial_is_a_row_and_no_success(capsys, tmp_path, monkeypatch)
         sound(self, count)
 
     monkeypatch.setattr(World, "step", blow_up)
-    assert main([*SMALL, "--trials", "2", "--out", "run"]) == 0
-    assert "invalid" in capsys.readouterr().out
+    assert main([*SMALL, "--trials", "2", "--out", "run"]) == 2
+    last = capsys.readouterr().out.strip().splitlines()[-1]
+    assert last.startswith("No trial of open is valid: simulation invalid at physics step")
     open_ = json.loads((tmp_path / "run" / "result.json").read_text())["controllers"]["open"]
     assert (open_["trials"], open_["invalid"], open_["successes"]) == (2, 2, 0)
     assert open_["restricted_mean_time_s"] is None

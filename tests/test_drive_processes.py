@@ -131,4 +131,4 @@ def test_S1_S2_what_is_wrong_with_a_wire_is_said_through_bytes(driven: Drive, ca
 
 def test_a_controller_of_ones_own_drives_another_process(driven: Drive) -> None:
     assert driven.result["controller"] == EXAMPLE
-    assert driven.result["poses_sent"] > 150  # it walked on after the reset
+    assert driven.result["commands_sent"] > 150  # it walked on after the reset

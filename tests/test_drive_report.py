@@ -120,15 +120,15 @@ def test_B13_torque_that_went_off_while_walking_is_the_worst() -> None:
 
 
 @pytest.mark.parametrize(
-    ("when", "worst", "said"),
+    ("when", "refused", "said"),
     [
-        ("1.3s", State.OK, "The robot was not armed: HOLD STALE: no fresh sample"),
-        ("1.55s", State.HOLD, "no command was sent; worst state HOLD (HOLD STALE: no fresh sample"),
+        ("1.3s", True, "The robot was not armed: HOLD STALE: no fresh sample"),
+        ("1.55s", False, "no command was sent; worst state HOLD (HOLD STALE: no fresh sample"),
     ],
 )
 def test_L8_a_drive_that_sent_no_pose_ends_with_2_and_says_so(
     when: str,
-    worst: State,
+    refused: bool,
     said: str,
     tmp_path: Path,
     capsys: pytest.CaptureFixture[str],
@@ -147,9 +147,9 @@ def test_L8_a_drive_that_sent_no_pose_ends_with_2_and_says_so(
     text = " ".join(capsys.readouterr().out.split())
     assert said in text
     result = json.loads((tmp_path / "result.json").read_text())
-    assert result["worst_state"] == worst.name
-    assert result["poses_sent"] == 0
-    assert ("STALE" in result["refusal"]) == (worst is State.OK)
+    assert result["worst_state"] == "HOLD"
+    assert result["commands_sent"] == 0
+    assert ("STALE" in result["refusal"]) == refused
 
 
 def test_a_controller_that_does_not_exist_is_named_before_a_port_is_opened(
@@ -160,3 +160,55 @@ def test_a_controller_that_does_not_exist_is_named_before_a_port_is_opened(
     said = capsys.readouterr().err
     assert "controller: expected one of open, paper, closed, or MODULE:NAME" in said
     assert "/no/board" not in said
+
+
+@pytest.mark.parametrize("skip", [[], ["--no-touch-check"]], ids=["check", "skip"])
+@pytest.mark.parametrize(("fault", "cause"), [("open_left", "OPEN"), ("short_right", "SHORT_LO")])
+def test_S1_S2_a_wire_that_broke_before_arming_is_named_while_one_waits_and_at_the_end(
+    fault: str,
+    cause: str,
+    skip: list[str],
+    tmp_path: Path,
+    capfd: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    @contextlib.contextmanager
+    def in_process(config: DriveConfig, *addresses: object) -> Iterator[Session]:
+        robot = build(TwinConfig(), 5)
+        clock = LockstepClock(robot, Faults([read(f"esp32={fault}@0.3s")], config.robot.ids))
+        yield prepare(config, BoardPort(robot, clock), clock, clock)
+
+    monkeypatch.setattr("antennate.cli.drive.connect", in_process)
+    argv = ["drive", "--esp32", "board", "--bus", "bus", "--arm", *skip]
+    argv += ["--dry-run", "2", "--duration", "1", "--touch.patience", "2"]
+    assert main([*argv, "--out", str(tmp_path), "--overwrite"]) == 2
+    said = capfd.readouterr()
+    out = " ".join(said.out.split())
+    last = [line for line in said.err.splitlines() if " maneuver=" in line][-1]
+    assert f"OFF (NOT_ARMED: not armed yet; HOLD {cause}: " in last
+    side = fault.split("_")[1]
+    asked = f"touch=(mend wire, plug or sensor of the {side} antenna, it is {cause}: "
+    assert (asked in last) == (not skip)
+    assert f"worst state HOLD (HOLD {cause}: " in out
+    assert "--no-touch-check" not in out  # it would not help
+    assert json.loads((tmp_path / "result.json").read_text())["worst_state"] == "HOLD"
+
+
+def test_a_drive_without_a_log_says_so(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    @contextlib.contextmanager
+    def in_process(config: DriveConfig, *addresses: object) -> Iterator[Session]:
+        clock = LockstepClock(robot := build(TwinConfig(), 5))
+        yield prepare(config, BoardPort(robot, clock), clock, clock)
+
+    monkeypatch.setattr("antennate.cli.drive.connect", in_process)
+    monkeypatch.setattr("antennate.cli.viewer.__name__", "this")  # `python -m this` keeps nothing
+    argv = ["drive", "--esp32", "board", "--bus", "bus", "--dry-run", "0.5"]
+    assert main([*argv, "--out", str(tmp_path), "--overwrite"]) == 0
+    out = " ".join(capsys.readouterr().out.split())
+    assert "No log was kept" in out
+    assert "antennate replay" not in out
+    result = json.loads((tmp_path / "result.json").read_text())
+    assert (result["logs"], result["log_complete"]) == ([], False)
+    assert result["unlogged"] == result["pace"]["ticks"] > 0

@@ -137,3 +137,26 @@ def test_a_first_turn_can_be_always_right_and_alternation_be_off() -> None:
     same = PARAMS.model_copy(update={"alternate": False})
     turns = [x for x in episodes(TOUCHED_LEFT, (2.0, 8.0), 14.0, params=same) if x[0] == TURN_R]
     assert turns == [(TURN_R, 2.0), (TURN_R, 2.0)]
+
+
+def test_touched_alike_on_both_sides_it_turns_right() -> None:
+    assert episodes((0.9, 0.9), (2.0,), 6.0)[2] == (TURN_R, 2.0)
+
+
+def test_what_was_touched_half_a_second_before_it_got_stuck_decides_the_side() -> None:
+    """A light touch on the left for 1 s, then 0.45 s of a strong one on the right."""
+    escape = Escape(PARAMS, 1, PERIOD)
+    for i in range(64 + 29):
+        tick(escape, i * PERIOD, (0.2, 0.0) if i < 64 else (0.0, 1.0), stuck=i == 92)
+    assert escape.touch[0, 1] > escape.touch[0, 0]
+    assert tick(escape, 92 * PERIOD + PARAMS.reverse_time, (0.0, 1.0)) == TURN_R
+
+
+def test_a_row_that_is_reset_forgets_at_once_what_it_touched() -> None:
+    escape = Escape(PARAMS, 1, PERIOD)
+    for i in range(100):
+        tick(escape, i * PERIOD, TOUCHED_RIGHT)
+    escape.reset(np.array([0]))
+    for i in range(5):
+        tick(escape, i * PERIOD, TOUCHED_LEFT, stuck=i == 4)
+    assert tick(escape, 4 * PERIOD + PARAMS.reverse_time, TOUCHED_LEFT) == TURN_R

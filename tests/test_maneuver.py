@@ -54,6 +54,17 @@ def test_the_table_answers_as_the_paper_says(
     assert decision(contact, b) == expected
 
 
+@pytest.mark.parametrize(
+    ("b", "expected"),
+    [((1.0, 0.75), TURN_R), ((0.75, 1.0), TURN_L), ((1.0, 0.875), REVERSE), ((0.25, 0.25), TURN_R)],
+)
+def test_levels_that_differ_by_the_bound_are_not_similar_and_a_tie_turns_right(
+    b: tuple[float, float], expected: Maneuver
+) -> None:
+    params = RuleParams(strong=0.5, similar=0.25)
+    assert decide(params, np.array([(C, C)]), np.array([b])).tolist() == [expected]
+
+
 @given(contacts, contacts, levels, levels)
 def test_swapping_the_sides_swaps_the_turns(left: int, right: int, bl: float, br: float) -> None:
     assume(not (left == right == C and bl == br))  # a tie has no side to turn away from

@@ -28,6 +28,8 @@ def _elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     [
         ["replay"],
         ["calibrate", "--recording"],
+        ["tunnel", "--config"],
+        ["tunnel", "--robot"],
         ["drive", *PORTS, "--calibration"],
         ["drive", *PORTS, "--config"],
         ["drive", "--esp32", "udp://127.0.0.1:9", "--bus", "right", "--key"],

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import pickle
 import sys
 import tomllib
 from dataclasses import FrozenInstanceError
@@ -14,6 +15,7 @@ import numpy as np
 import pytest
 
 import antennate
+from antennate import experiments
 from antennate.control.controllers import open_loop
 from antennate.params import ControlParams, SpringParams
 
@@ -67,13 +69,38 @@ def test_a_configuration_serves_as_well_as_its_name() -> None:
     by_config, by_name = antennate.run(config), antennate.run("springs", coil_mm=4.0)
     assert by_config.summary == by_name.summary
     assert by_config.summary["spring_index"] == 8.0
-    assert by_config.to_dataframe().empty
+    lost = (
+        r"expected trials, found none: springs .* pandas.DataFrame\(result.summary\['springs'\]\)"
+    )
+    with pytest.raises(antennate.BadInputError, match=lost):
+        by_config.to_dataframe()
 
 
 def test_every_listed_experiment_can_be_named() -> None:
     found = antennate.list_experiments()
     assert {"tunnel", "wall", "touch", "sweep", "force", "calibrate", "gait"} <= set(found)
     assert all(summary and "\n" not in summary for summary in found.values())
+
+
+@pytest.mark.parametrize("name", experiments.names())
+def test_a_result_of_every_experiment_can_be_pickled(name: str, tunnel: antennate.Result) -> None:
+    known = experiments.load(name)
+    result = antennate.Result(known, known.config(), tunnel.outcome, Path("kept"))
+    again = pickle.loads(pickle.dumps(result))
+    assert (again.experiment, again.config, again.path) == (known, known.config(), Path("kept"))
+
+
+@pytest.mark.parametrize("name", ["springs", "sensor", "taper"])
+def test_what_came_out_survives_pickling(name: str) -> None:
+    result = antennate.run(name)
+    again = pickle.loads(pickle.dumps(result))
+    assert (again.summary, again.sentence) == (result.summary, result.sentence)
+
+
+def test_trials_survive_pickling(tunnel: antennate.Result) -> None:
+    again = pickle.loads(pickle.dumps(tunnel))
+    assert again.to_dataframe().equals(tunnel.to_dataframe())
+    assert again.summary == tunnel.summary
 
 
 class Cell:

@@ -6,28 +6,16 @@ configuration itself, and writing it down, do not count.
 
 from __future__ import annotations
 
-import ast
-from collections.abc import Iterator
-from contextlib import contextmanager
-from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from pydantic import ValidationError
+from recorded import act, leaves, recorded
 
-import antennate
 from antennate import experiments
 from antennate.cli import main
-from antennate.control.registry import make_controller
-from antennate.hardware.doctor.checkup import DoctorConfig
-from antennate.hardware.driving.config import DriveConfig
-from antennate.hardware.esp32.recorder import RecordConfig
-from antennate.params import Params
-from antennate.telemetry.replay import ReplayConfig
-from antennate.twin.config import TwinConfig
-from antennate.types import AntennaFrame
 
 RECORDING = "time,counts,bend,trial,speed_m_s\n" + "".join(
     f"{0.01 * i:.2f},{1600 + 60 * np.log((k + 1) / (20 - k)):.0f},{k / 19},{trial},0.1\n"
@@ -106,75 +94,6 @@ TINY: dict[str, list[dict[str, Any]]] = {
     "springs": [{}],
     "taper": [{}],
 }
-HARDWARE = {
-    "twin": TwinConfig,
-    "drive": DriveConfig,
-    "doctor": DoctorConfig,
-    "record": RecordConfig,
-    "replay": ReplayConfig,
-}
-
-
-@contextmanager
-def recorded(config: Params) -> Iterator[set[str]]:
-    """Yield the dotted parameters of this configuration that are read within the block."""
-    read: set[str] = set()
-    held: dict[int, tuple[Params, tuple[str, ...]]] = {}
-    plain, copied = object.__getattribute__, Params.model_copy
-
-    def watch(group: Params, path: tuple[str, ...]) -> None:
-        held[id(group)] = group, path
-        for name in type(group).model_fields:
-            if isinstance(inner := plain(group, name), Params):
-                watch(inner, (*path, name))
-
-    def get(self: Params, name: str) -> Any:
-        if id(self) in held and name in type(self).model_fields:
-            read.add(".".join((*held[id(self)][1], name)))
-        return plain(self, name)
-
-    def copy(self: Params, **changes: Any) -> Any:
-        new = copied(self, **changes)
-        if id(self) in held:
-            watch(new, held[id(self)][1])
-        return new
-
-    watch(config, ())
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Params, "__getattribute__", get, raising=False)
-        patch.setattr(Params, "model_copy", copy)
-        yield read
-
-
-def leaves(model: type[Params], path: tuple[str, ...] = ()) -> Iterator[str]:
-    """Every parameter of a configuration, dotted."""
-    for name, field in model.model_fields.items():
-        kind = field.annotation
-        if isinstance(kind, type) and issubclass(kind, Params):
-            yield from leaves(kind, (*path, name))
-        else:
-            yield ".".join((*path, name))
-
-
-def act(config: Any) -> None:
-    """Let our controllers be pressed for longer than any of their times."""
-    period = config.control.period
-    for name in config.controllers:
-        controller = make_controller(name, config.control, config.robot, 1)
-        controller.reset(np.zeros(1, dtype=np.int64))
-        for tick in range(round(60.0 / period)):
-            pressed = 1.0 < tick * period < 35.0
-            counts = np.array([[1400.0 if pressed else 1870.0, 1410.0 if pressed else 1870.0]])
-            controller.step(AntennaFrame(t=np.array([tick * period]), counts=counts))
-
-
-@cache
-def used() -> set[str]:
-    """Every attribute that our code reads."""
-    files = Path(antennate.__file__).parent.rglob("*.py")
-    nodes = [node for file in files for node in ast.walk(ast.parse(file.read_text("utf-8")))]
-    read = [n for n in nodes if isinstance(n, ast.Attribute) and isinstance(n.ctx, ast.Load)]
-    return {node.attr for node in read}
 
 
 @pytest.mark.parametrize("name", TINY)
@@ -191,7 +110,8 @@ def test_every_parameter_of_an_experiment_is_read_or_refused(
             outcome = experiment.run(config, 1, lambda done, total: None, lambda row: None)
             outcome.result()
             if name == "tunnel" and config.control.rate < 50.0:
-                act(config)
+                for one in config.controllers:
+                    act(one, config.control, config.robot)
         read |= found
     every = set(leaves(experiment.config))
     assert every - read == set(experiment.config.unread) & every
@@ -200,12 +120,6 @@ def test_every_parameter_of_an_experiment_is_read_or_refused(
 
 def test_all_experiments_of_ours_are_walked() -> None:
     assert set(TINY) == set(experiments.names())
-
-
-@pytest.mark.parametrize("command", HARDWARE)
-def test_every_parameter_of_a_command_of_the_robot_is_used_somewhere(command: str) -> None:
-    names = {leaf.rpartition(".")[2] for leaf in leaves(HARDWARE[command])}
-    assert names - used() == set()
 
 
 def test_the_walk_sees_what_is_not_read() -> None:

@@ -50,7 +50,7 @@ def said(capsys: pytest.CaptureFixture[str], *argv: str) -> dict:
 
 def test_G7_the_same_code_decides_the_same(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
     result = said(capsys, str(log))
-    assert (result["ticks"], result["different"], result["different_poses"]) == (TICKS, 0, 0)
+    assert (result["ticks"], result["different"], result["different_commands"]) == (TICKS, 0, 0)
     assert result["first_difference"] is None
     assert result["duration_s"] == pytest.approx((TICKS - 1) * 0.01)
     assert sum(result["shares"].values()) == pytest.approx(1.0)
@@ -74,7 +74,7 @@ def test_G6_all_files_of_a_log_are_replayed_as_one(
             writer.write(tick)
     result = said(capsys, str(first))
     assert result["parts"] == ["drive.log", "drive-3.log"]
-    assert (result["ticks"], result["different"], result["different_poses"]) == (TICKS, 0, 0)
+    assert (result["ticks"], result["different"], result["different_commands"]) == (TICKS, 0, 0)
     assert result["closed"]
     data = third.read_bytes()
     third.write_bytes(data[:-200] + bytes([data[-200] ^ 1]) + data[-199:])

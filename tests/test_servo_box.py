@@ -245,7 +245,7 @@ def test_what_is_for_a_robot_is_refused_without_one(flag: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "fault", ["esp32=reset", "link=loss:0.1", "bus=discharge:1", "servo:2=shock"]
+    "fault", ["esp32=reset", "wire=loss:0.1", "bus=discharge:1", "servo:2=shock"]
 )
 def test_a_fault_of_what_is_not_there_is_refused(fault: str) -> None:
     with pytest.raises(BadInputError, match="--fault: expected"):

@@ -392,8 +392,8 @@ def test_S5_B14_a_pose_that_is_not_finite_never_reaches_the_bus(bad: float) -> N
     made.session.control.controller.step = step  # type: ignore[method-assign]
     log = Log(made)
     drive(made.session, CONFIG, arm=True, on_tick=log)
-    assert Cause.BAD_POSE in set().union(*log.causes)
-    bad_since = log.first(Cause.BAD_POSE)
+    assert Cause.BAD_COMMAND in set().union(*log.causes)
+    bad_since = log.first(Cause.BAD_COMMAND)
     sent = {tuple(g) for g, t in zip(log.goals, log.t, strict=True) if t >= bad_since}
     assert len(sent) == 1
 

@@ -13,7 +13,8 @@ from antennate.hardware.driving.drive import drive
 from antennate.hardware.driving.report import Report
 from antennate.hardware.driving.session import Session
 from antennate.hardware.safety.causes import Cause, State
-from antennate.params import ConditioningParams, TouchCheckParams
+from antennate.params import TouchCheckParams
+from antennate.robots.antenna import AntennaSpec
 from antennate.twin.config import TwinConfig
 from antennate.twin.touch import TouchStimulus
 from antennate.types import Floats
@@ -58,13 +59,13 @@ def swapped(made: Rig) -> None:
 
 
 class Inverted(TouchStimulus):
-    def change(self, t: float, bus_used: bool) -> Floats:
-        return super().change(t, bus_used) * (-1, 1)
+    def change(self, t: float, begun: float) -> Floats:
+        return super().change(t, begun) * (-1, 1)
 
 
 def inverted(made: Rig) -> None:
-    """Let the left film straighten where it should bend."""
-    made.robot.touch = Inverted(TOUCHED.touch, ConditioningParams())
+    """Let the left reading rise where it should fall."""
+    made.robot.touch = Inverted(TOUCHED.touch, AntennaSpec())
 
 
 def test_S8_a_robot_whose_antennae_were_bent_by_hand_is_armed() -> None:
@@ -140,6 +141,6 @@ def test_S8_an_arm_event_before_the_check_has_passed_is_not_accepted() -> None:
 
 
 @pytest.mark.parametrize("order", ["left", "left@2", "middle@2s", "left@-1s", "left@1es"])
-def test_orders_to_the_hand_that_do_not_exist_are_refused(order: str) -> None:
-    with pytest.raises(BadInputError, match="--touch: expected left@Ts"):
-        TouchStimulus([order], ConditioningParams())
+def test_touches_that_do_not_exist_are_refused(order: str) -> None:
+    with pytest.raises(BadInputError, match="--touch: expected left or right"):
+        TouchStimulus([order], AntennaSpec())

@@ -12,6 +12,7 @@ from twin_rig import Rig, rig
 
 from antennate.hardware.driving.config import DriveConfig
 from antennate.hardware.driving.drive import drive
+from antennate.hardware.driving.operator import Operator
 from antennate.hardware.driving.signals import STOPS, StopOnce
 from antennate.twin.config import TwinConfig
 
@@ -107,3 +108,31 @@ def test_B19_no_signal_is_heard_once_the_walk_is_over_of_itself(during: str) -> 
     assert report.on == []
     assert report.timing is not None
     assert not any(servo.torque for servo in made.robot.servos)
+
+
+def test_B19_of_several_signals_none_interrupts_what_the_first_has_begun() -> None:
+    def work() -> None:
+        signal.raise_signal(signal.SIGTERM)
+
+    with StopOnce() as stop:
+        stop.within = work
+        signal.raise_signal(signal.SIGTERM)
+        assert stop.received
+        with pytest.raises(KeyboardInterrupt):
+            work()
+        for number in STOPS:
+            signal.raise_signal(number)
+
+
+def test_B19_a_signal_that_came_before_the_first_tick_ends_the_drive_with_a_report() -> None:
+    made, before = rig(TwinConfig()), [signal.getsignal(number) for number in STOPS]
+    with StopOnce(last=True) as stop:
+        stop.closed = True
+        signal.raise_signal(signal.SIGHUP)
+        report = drive(made.session, CONFIG, arm=True, operator=Operator(stop))
+        assert signal.getsignal(signal.SIGHUP) == stop.receive
+    for number, handler in zip(STOPS, before, strict=True):
+        signal.signal(number, handler)
+    assert report.ended == "a signal"
+    assert report.timing is not None
+    assert made.session.tally.sent == 0

@@ -165,3 +165,14 @@ def test_leg_slip_is_drawn_anew_after_its_time_only() -> None:
     draw = chance(0)
     drawn = [tick for tick in range(600) if draw.leg_friction(tick) is not None]
     assert drawn == [0, 250, 500]
+
+
+def test_joint_zeros_are_added_to_the_commanded_yaw_angles() -> None:
+    draw = chance(0)
+    assert draw.joint_bias.all()
+    body = SimRobot(1, ROBOT, PERIOD, PhysicsParams().timestep)
+    body.load(0, World(compile_world(PhysicsParams(), ROBOT), ROBOT), draw)
+    yaw = np.full((1, 5), 0.1)
+    body.write(JointCommand(yaw=yaw, leg=np.zeros((1, 6, 2)), antenna=np.zeros((1, 2))))
+    ctrl = [body.world(0).data.actuator(f"{PREFIX}yaw{j}").ctrl[0] for j in range(1, 6)]
+    assert ctrl == pytest.approx(0.1 + draw.joint_bias)

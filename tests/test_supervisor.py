@@ -95,7 +95,7 @@ def test_S5_an_age_that_is_no_age_is_stale(age: float) -> None:
 def test_S5_a_pose_or_maneuver_that_is_none_is_not_sent(changes: dict[str, Any]) -> None:
     outputs = armed().step(**changes)
     assert outputs.state is State.HOLD
-    assert {Cause.BAD_ACTION, Cause.BAD_POSE} & causes(outputs)
+    assert {Cause.BAD_ACTION, Cause.BAD_COMMAND} & causes(outputs)
 
 
 @pytest.mark.parametrize("contact", list(itertools.product(Contact, Contact)))

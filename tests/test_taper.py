@@ -75,7 +75,7 @@ def test_measured_diameters_replace_the_law(tmp_path: Path) -> None:
     ("text", "word"),
     [
         ("", "row 1: expected a header with diameter_mm"),
-        ("diameter_m\n1\n", "row 1: expected a header"),
+        ("diameter_m\n1\n", "row 1: expected a column diameter_mm, found diameter_m"),
         ("diameter_mm\n1.5\n", "at least 2 rows"),
         ("diameter_mm\n1.5\nwide\n", "row 3: expected a diameter above 0.*'wide'"),
         ("diameter_mm\n1.5\n-1\n", "row 3"),

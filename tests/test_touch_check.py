@@ -11,8 +11,10 @@ from pydantic import ValidationError
 
 from antennate.hardware.safety.causes import Cause
 from antennate.hardware.safety.diagnosis import Band
+from antennate.hardware.safety.signal_quality import SignalQuality
 from antennate.hardware.safety.touch_check import Ask, TouchCheck
-from antennate.params import TouchCheckParams
+from antennate.params import ConditioningParams, TouchCheckParams
+from antennate.types import Contact
 
 RISING = Band(500.0, 2500.0, 1)
 
@@ -100,3 +102,16 @@ def test_S8_an_objection_keeps_the_robot_from_being_armed() -> None:
 def test_limits_in_the_wrong_order_are_refused() -> None:
     with pytest.raises(ValidationError, match="still must be below level"):
         TouchCheckParams(still=0.3)
+
+
+def test_S8_a_sample_that_is_read_again_counts_once() -> None:
+    """A loop faster than the board reads each sample more than once."""
+    params = TouchCheckParams(readings=10)
+    quality = SignalQuality(ConditioningParams(), touch=params)
+    free = (int(Contact.FREE), int(Contact.FREE))
+    asks = []
+    for sample in range(10):
+        for _ in range(30):
+            quality.step(0.01 * sample, (FREE + sample % 3, FREE - sample % 2), free)
+        asks.append(quality.check.ask if quality.check else None)
+    assert asks == [Ask.REST] * 9 + [Ask.LEFT]

@@ -53,14 +53,14 @@ def test_lost_bytes_leave_the_others_as_they_are_and_chance_has_a_seed() -> None
 
 def test_each_wire_has_the_noise_that_was_asked_for() -> None:
     robot = build(TwinConfig())
-    broken(robot, "bus=ber:1e-3", "link=loss:0.02", "esp32=ber:1e-4")
+    broken(robot, "bus=ber:1e-3", "wire=loss:0.02", "esp32=ber:1e-4")
     assert (robot.bus.noise.ber, robot.bus.noise.loss) == (1e-3, 0.02)
     assert (robot.noise.ber, robot.noise.loss) == (1e-4, 0.02)
-    broken(robot, "link=ber:1e-5")
+    broken(robot, "wire=ber:1e-5")
     assert (robot.bus.noise.ber, robot.noise.ber) == (1e-5, 1e-5)
 
 
-@pytest.mark.parametrize("text", ["link=ber:2", "link=loss:-1", "bus=loss:1.5", "esp32=ber:1e1"])
+@pytest.mark.parametrize("text", ["wire=ber:2", "wire=loss:-1", "bus=loss:1.5", "esp32=ber:1e1"])
 def test_a_share_is_not_above_one_or_below_zero(text: str) -> None:
     with pytest.raises(BadInputError, match="share of 0 to 1"):
         read(text)
@@ -119,7 +119,7 @@ def test_L1_B3_bit_errors_are_counted_and_no_wrong_value_is_ever_used(
         if t < 1.5:
             return
         if not made.robot.noise.ber:
-            broken(made.robot, f"link=ber:{ber}")
+            broken(made.robot, f"wire=ber:{ber}")
         out, newest = session.outputs, session.board.clock.newest
         assert out is not None
         assert newest is not None

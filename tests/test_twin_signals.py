@@ -11,10 +11,10 @@ import sys
 import pytest
 
 PROGRAM = "import sys; from antennate.cli import main; sys.exit(main())"
-INT, TERM = signal.SIGINT, signal.SIGTERM
+INT, TERM, HUP = signal.SIGINT, signal.SIGTERM, signal.SIGHUP
 
 
-@pytest.mark.parametrize("pair", [(INT, TERM), (TERM, TERM)])
+@pytest.mark.parametrize("pair", [(INT, TERM), (TERM, TERM), (HUP, HUP)])
 def test_a_twin_ends_in_order_however_often_it_is_asked_to(pair: tuple[int, int]) -> None:
     with subprocess.Popen(
         [sys.executable, "-c", PROGRAM, "twin"],

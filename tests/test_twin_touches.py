@@ -49,9 +49,8 @@ def test_touches_begin_with_each_client_and_last_a_second() -> None:
         assert touch.change(begun + 6.5, begun).tolist() == [0, 0]
 
 
-def test_touches_can_be_typed_and_the_next_client_finds_none_of_them() -> None:
-    touch = TouchStimulus(["-", "left@2s"], ANTENNA)
-    assert touch.typed
+def test_touches_can_be_ordered_and_the_next_client_finds_none_of_them() -> None:
+    touch = TouchStimulus(["left@2s"], ANTENNA)
     assert touch.change(1.0, begun=0.0).tolist() == [0, 0]
     touch.order("left:60deg")
     touch.order("right")
@@ -69,7 +68,7 @@ def test_other_orders_are_refused(text: str) -> None:
     with pytest.raises(BadInputError, match="--touch: expected"):
         TouchStimulus([text], ANTENNA)
     with pytest.raises(BadInputError, match="--touch: expected"):
-        TouchStimulus(["-"], ANTENNA).order("left@1s")
+        TouchStimulus([], ANTENNA).order("left@1s")
 
 
 def test_one_twin_serves_many_drives_each_with_its_touches_from_the_same_start() -> None:
@@ -98,7 +97,7 @@ def test_one_twin_serves_many_drives_each_with_its_touches_from_the_same_start()
 def typing_twin(*words: str) -> Iterator[tuple[subprocess.Popen[bytes], str]]:
     """A twin whose standard input takes orders, and the path of its board."""
     with subprocess.Popen(
-        [*ANTENNATE, "twin", "--touch", "-", *words],
+        [*ANTENNATE, "twin", "--orders", "-", *words],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
@@ -114,13 +113,15 @@ def test_the_shipped_twin_takes_typed_touches_and_answers_others(tmp_path_factor
     with typing_twin() as (process, board):
         assert process.stdin is not None
         assert process.stderr is not None
-        process.stdin.write(b"left:20mm\nnonsense\n")
+        process.stdin.write(b"touch left:20mm\ntouch up\nfault servo:40=silent\n")
         process.stdin.flush()
-        said = process.stderr.readline().decode()
+        said = [process.stderr.readline().decode() for _ in range(3)]
         path = tmp_path_factory.mktemp("record") / "left.csv"
         record = ["record", "--esp32", board, "--duration", "0.3", "--out", str(path)]
         subprocess.run([*ANTENNATE, *record], check=True, capture_output=True)
         rows = [line.split(",") for line in path.read_text().splitlines()[1:]]
-    assert said.startswith("--touch: expected left or right")
+    assert said[0] == "touch left:20mm\n"
+    assert said[1].startswith("not done: --touch: expected left or right")
+    assert said[2].startswith("not done: --fault: expected a servo of 1, 2")
     left, right = (np.median([float(row[i]) for row in rows]) for i in (1, 2))
     assert left < right - 50

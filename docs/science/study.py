@@ -21,7 +21,8 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
 from antennate.experiments.tunnel.run import TunnelConfig, run
-from antennate.figures import INK, canvas, render, short_name, styled
+from antennate.figures import INK, canvas, render, styled
+from antennate.messages import short_name
 from antennate.studies.pool import core_count
 
 HERE = Path(__file__).parent

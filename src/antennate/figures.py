@@ -109,11 +109,6 @@ def controller_colours(names: Sequence[str]) -> dict[str, str]:
     return {**CONTROLLER_COLOURS, **dict(zip(others, series(len(others)), strict=True))}
 
 
-def short_name(controller: str) -> str:
-    """The name of a controller for a label: only the last part of MODULE:NAME or FILE.py:NAME."""
-    return controller.rpartition(":")[2]
-
-
 def canvas(width: float, height: float) -> Figure:
     """An empty figure of this size [inches] whose parts keep clear of one another."""
     return Figure(figsize=(width, height), layout="constrained")

@@ -22,14 +22,23 @@ def one_line(text: str) -> str:
 
 
 def shortened(text: str) -> str:
-    """The text on one line, cut if it is long."""
-    text = one_line(text)
+    """The text on one line, cut if it is long; a text of blanks in quotes, so that it is seen."""
+    text = one_line(text) or repr(text)
     return text if len(text) <= _LONGEST else text[: _LONGEST - 3] + "..."
+
+
+def short_name(controller: str) -> str:
+    """The name of a controller for a label: only the last part of MODULE:NAME or FILE.py:NAME."""
+    return controller.rpartition(":")[2]
 
 
 def shown(value: Any) -> str:
     """A value as Python writes it, in one short line."""
     return shortened(repr(value))
+
+
+_RENAMED = {"arms": ("controllers", "profiles")}
+"""New names of what had another one in version 1."""
 
 
 def nearest(word: str, known: Iterable[str]) -> str:
@@ -44,11 +53,16 @@ def nearest(word: str, known: Iterable[str]) -> str:
     choices = {choice.lstrip("-"): choice for choice in known}
     wanted = word.lstrip("-").lower()
     ends = [name for name in choices if name.endswith(f".{wanted}")]
-    close = ends[:2] or [
-        name
-        for name in get_close_matches(wanted, choices, n=1, cutoff=_SIMILAR)
-        if SequenceMatcher(None, _last(wanted), _last(name)).ratio() >= _SIMILAR_END
-    ]
+    renamed = [name for name in _RENAMED.get(wanted, ()) if name in choices]
+    close = (
+        renamed
+        or ends[:2]
+        or [
+            name
+            for name in get_close_matches(wanted, choices, n=1, cutoff=_SIMILAR)
+            if SequenceMatcher(None, _last(wanted), _last(name)).ratio() >= _SIMILAR_END
+        ]
+    )
     return f" (did you mean {' or '.join(choices[name] for name in close)}?)" if close else ""
 
 

@@ -1,4 +1,4 @@
-"""Checks for the tests of whoever writes a controller, a robot or a scene of their own."""
+"""Checks for the tests of a controller, a robot or a scene of your own."""
 
 from antennate.control.check_controller import check_controller
 from antennate.sim.check_robot import check_robot

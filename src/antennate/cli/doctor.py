@@ -8,10 +8,6 @@ from contextlib import nullcontext
 from pathlib import Path
 
 from pydantic.dataclasses import dataclass
-from rich.box import SIMPLE_HEAD
-from rich.console import Console
-from rich.table import Table
-from rich.text import Text
 
 from antennate.cli.addresses import PortOptions, key_of, parse_robot, require_two_ports
 from antennate.cli.exit_codes import BAD_INPUT, OK
@@ -140,6 +136,11 @@ def _agreed(change: Change, yes: bool) -> bool:
 
 def show_rows(rows: Sequence[Row]) -> None:
     """Print one line for each row, then the cures."""
+    from rich.box import SIMPLE_HEAD  # slow to import
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
     console = Console(file=sys.stdout, highlight=False)
     table = Table(box=SIMPLE_HEAD, pad_edge=False)
     for head in ("", "check", "expected", "found"):

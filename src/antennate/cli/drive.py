@@ -37,10 +37,16 @@ from antennate.telemetry.reader import count
 from antennate.telemetry.ticks import Tick
 from antennate.types import Controller
 
+_LOGLESS = (
+    "the process that writes it had not begun by the end, or could not write; is the machine busy, "
+    "or the disk full? `record_required = true` lets the robot walk with a log only"
+)
+
 DESCRIPTION = """\
 Let a controller walk the real robot, or its twin. First a dry run: everything is read and nothing
 written. Then, with --arm only, torque comes on with every servo where it stands, and the robot
-walks. Ctrl-C, Ctrl-\\ or SIGTERM ends it: command held, torque off, verified.
+walks. Ctrl-C, Ctrl-\\, SIGTERM or a lost terminal ends it: command held, torque off,
+verified.
 
 A lost board or servo makes the robot hold; the watchdogs of the servos stop it if this program
 dies. The exit code is 2 if it ended in a FAULT or without supply, if torque was refused or is not
@@ -98,16 +104,21 @@ def walk(
     ):
         folder.without_trials()
         with connect(config, orders.esp32, orders.bus, key) as session:
+            if operator.stop is not None:
+                operator.stop.closed = True  # until the first tick: from here on there is a result
             if controller is not None:
                 session.control.controller = controller(session, config)
                 config = config.model_copy(update={"controller": command})
             result = _carry_out(command, config, session, orders, folder.path / LOG, operator)
-        folder.finish(result, ())
         table = Table.of("Drive", {result["controller"]: result}, MEASURES, _note(result))
         log = shlex.quote(str(folder.path / LOG))
         other = "" if controller is None else " --controller open"
-        again = f"\nWhat was read and decided: antennate replay {log}{other}"
-        tell(result, orders, [table], _sentence(result) + again)
+        again = f"What was read and decided: antennate replay {log}{other}"
+        again = again if result["logs"] else f"No log was kept: {_LOGLESS}"
+        try:
+            folder.finish(result, ())
+        finally:  # the robot's state is told even if it cannot be kept
+            tell(result, orders, [table], f"{_sentence(result)}\n{again}")
     fault = result["worst_state"] in (State.FAULT.name, State.OFF.name)
     stays_on = result["torque_off"] is False
     idle = _idle(result)
@@ -176,15 +187,15 @@ def _operator(config: DriveConfig, orders: Orders) -> Iterator[Operator]:
 
 def _idle(result: Mapping[str, Any]) -> bool:
     """It was to walk, and never did."""
-    return result["armed"] and not result["poses_sent"]
+    return result["armed"] and not result["commands_sent"]
 
 
 def _note(result: Mapping[str, Any]) -> str:
     lines: list[str] = []
     if result["priority"] == Priority.ORDINARY.value:
         lines.append("Real-time priority was not allowed; a busy machine will make it miss ticks.")
-    if not result["log_complete"]:
-        lines.append(f"The log is not complete; its files: {', '.join(result['logs']) or 'none'}.")
+    if not result["log_complete"] and result["logs"]:
+        lines.append(f"The log is not complete; its files: {', '.join(result['logs'])}.")
     return "\n".join(lines)
 
 
@@ -199,7 +210,7 @@ def _sentence(result: Mapping[str, Any]) -> str:
         return f"A dry run: nothing was written to the servos, {worst}; --arm lets the robot walk."
     if _idle(result):
         return f"The robot never walked, no command was sent; {worst}; {torque}."
-    sent = f"{result['poses_sent']} commands of `{result['controller']}` were sent"
+    sent = f"{result['commands_sent']} commands of `{result['controller']}` were sent"
     shares = ", ".join(f"{name} {100 * s:.0f} %" for name, s in result["shares"].items() if s)
     walked = f"The robot walked for {result['walked_s']:.1f} s ({shares}): {sent}"
     return f"{walked}, {worst}; ended by {result['ended']}; {torque}."
@@ -227,7 +238,8 @@ MEASURES = (
     Measure("resets", "resets", form="d"),
     Measure("missed_answers", "missed answers", form="d"),
     Measure("stale_answers", "stale answers", form="d"),
-    Measure("poses_sent", "commands sent", form="d"),
-    Measure("poses_refused", "commands refused", form="d"),
+    Measure("unlogged", "unlogged ticks", form="d"),
+    Measure("commands_sent", "commands sent", form="d"),
+    Measure("commands_refused", "commands refused", form="d"),
     Measure("priority", "priority"),
 )

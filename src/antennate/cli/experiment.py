@@ -9,7 +9,7 @@ from typing import Any
 from pydantic.dataclasses import dataclass
 
 from antennate.cli.arguments import parse
-from antennate.cli.exit_codes import INTERRUPTED, OK
+from antennate.cli.exit_codes import BAD_INPUT, INTERRUPTED, OK
 from antennate.cli.options import option
 from antennate.cli.progress import progress, stop_signals
 from antennate.cli.results import ResultOptions, folder_for, tell
@@ -66,7 +66,9 @@ def carry_out(
                 f"antennate {experiment.name}: interrupted: kept {len(outcome.rows)} trials, all "
                 "that had ended\n"
             )
-    return INTERRUPTED if interrupted else OK
+    if interrupted:
+        return INTERRUPTED
+    return BAD_INPUT if experiment.failed(result) else OK
 
 
 def _keep(

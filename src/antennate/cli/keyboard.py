@@ -5,12 +5,10 @@ from __future__ import annotations
 import contextlib
 import os
 import select
-import signal
 import sys
-import termios
-import tty
 from collections.abc import Callable, Iterator
 
+from antennate.cli.keys import single_keys
 from antennate.errors import ConfigError
 
 _MOST = 1024
@@ -36,17 +34,8 @@ def pressed_keys(flag: str) -> Iterator[Callable[[], bool]]:
     handle = stdin.fileno()
     if os.tcgetpgrp(handle) != os.getpgrp():
         raise ConfigError(f"{flag}: expected to run in the foreground of its terminal, without &")
-    before = termios.tcgetattr(handle)
-    ignored = {n: signal.signal(n, signal.SIG_IGN) for n in (signal.SIGTTIN, signal.SIGTTOU)}
-    try:
-        tty.setcbreak(handle)
-        termios.tcflush(handle, termios.TCIFLUSH)
+    with single_keys(handle):
         yield lambda: _came(handle)
-    finally:
-        with contextlib.suppress(termios.error):  # it is gone
-            termios.tcsetattr(handle, termios.TCSAFLUSH, before)
-        for number, handler in ignored.items():
-            signal.signal(number, handler)
 
 
 def _came(handle: int) -> bool:

@@ -40,12 +40,22 @@ def typed_keys() -> Iterator[ReadKeys]:
     if not os.isatty(handle):
         yield lambda wait: _read(handle, wait)
         return
+    with single_keys(handle):
+        yield lambda wait: _read(handle, wait)
+
+
+@contextlib.contextmanager
+def single_keys(handle: int) -> Iterator[None]:
+    r"""Let a terminal give each key as it is typed, and show none; it is as before afterwards.
+
+    Ctrl-C, Ctrl-\ and Ctrl-Z do what they always do.
+    """
     before = termios.tcgetattr(handle)
     ignored = {n: signal.signal(n, signal.SIG_IGN) for n in (signal.SIGTTIN, signal.SIGTTOU)}
     try:
         tty.setcbreak(handle)
         termios.tcflush(handle, termios.TCIFLUSH)
-        yield lambda wait: _read(handle, wait)
+        yield
     finally:
         with contextlib.suppress(termios.error):  # it is gone
             termios.tcsetattr(handle, termios.TCSAFLUSH, before)

@@ -49,9 +49,9 @@ class TerminalPerson:
             termios.tcflush(sys.stdin, termios.TCIFLUSH)
             self._pending = b""
         self.say(text)
-        while (said := self._line(1.0)) is None:
+        while (answer := self._line(1.0)) is None:
             pass
-        return said
+        return answer
 
     def answer(self) -> str | None:
         """An answer that has come since `ask` or `say`, without waiting; None so far.

@@ -147,13 +147,13 @@ class Status:
         """The line."""
         span = self._shown[-1].arrived - self._shown[0].arrived
         rate = (len(self._shown) - 1) / span if span > 0 else 0.0
-        said = ["waiting for Enter" if self._waiting else "recording"]
+        parts = ["waiting for Enter" if self._waiting else "recording"]
         for side in ("left", "right"):
             counts = [float(getattr(one.sample, side)) for one in self._shown]
-            said.append(f"{side} {fmean(counts):6.1f} ± {pstdev(counts):4.1f}")
+            parts.append(f"{side} {fmean(counts):6.1f} ± {pstdev(counts):4.1f}")
         bytes_ = self._board.decoder.counters
         lost = self._board.clock.sequence.lost
-        return f"{'  '.join(said)}  {rate:5.1f} Hz  lost {lost}  crc {bytes_.crc_errors} "
+        return f"{'  '.join(parts)}  {rate:5.1f} Hz  lost {lost}  crc {bytes_.crc_errors} "
 
 
 def _entered() -> bool:

@@ -37,7 +37,7 @@ _MOST_DRAWN = 5000
 """Most ticks that a figure shows."""
 COUNTS = (
     Measure("different", "maneuvers that differ", form="d"),
-    Measure("different_poses", "commands that differ", form="d"),
+    Measure("different_commands", "commands that differ", form="d"),
     Measure("failures", "exceptions", form="d"),
     Measure("missing", "ticks missing", form="d"),
 )
@@ -111,7 +111,7 @@ def _result(log: LogReader, found: Replayed, controller: str | None) -> dict[str
             "recorded": Maneuver.label(first.recorded),
             "replayed": Maneuver.label(first.replayed),
         },
-        "different_poses": found.commands,
+        "different_commands": found.commands,
         "failures": found.failures,
         "missing": log.missing,
         "damaged": log.bad,

@@ -13,6 +13,7 @@ from pydantic.dataclasses import dataclass
 
 from antennate.cli.arguments import FromFile
 from antennate.cli.options import option
+from antennate.messages import short_name
 from antennate.params import Params
 from antennate.studies.formats import to_json
 from antennate.studies.measures import Table
@@ -32,7 +33,7 @@ class ResultOptions(FromFile):
 def folder_for(
     command: str, options: ResultOptions, config: Params, argv: Sequence[str]
 ) -> Iterator[RunDirectory]:
-    """The described folder of a run; where it is is said when it is complete.
+    """A run directory with its configuration; its path is printed when the run is complete.
 
     Raises:
         OutputError: It cannot be written, or it holds another run.
@@ -58,7 +59,8 @@ def tell(
 def print_table(table: Table) -> None:
     """Print a table and its note; as a list where it is too wide for the terminal.
 
-    Underscores of a name are shown as spaces; a path has a line for each of its parts.
+    Underscores of a name are shown as spaces. Of MODULE:NAME or FILE.py:NAME only NAME is shown, or
+    all of it, with a line for each part, where two names are the same.
     """
     from rich.box import SIMPLE_HEAD  # slow to import
     from rich.console import Console
@@ -68,7 +70,9 @@ def print_table(table: Table) -> None:
 
     drawn = Drawn(title=table.title, title_justify="left", box=SIMPLE_HEAD, pad_edge=False)
     drawn.add_column("", overflow="fold")
-    for name in table.columns:
+    short = [short_name(name) for name in table.columns]
+    alike = len(set(short)) < len(short)
+    for name in table.columns if alike else short:
         parts = re.sub(r"(?<=[/:])", "\n", name) if ":" in name else name.replace("_", " ")
         drawn.add_column(Text(parts), justify="right", overflow="fold")
     for name, cells in table.rows:
@@ -80,7 +84,8 @@ def print_table(table: Table) -> None:
     else:
         console.print(Text(table.title))
         for name, cells in table.rows:
-            found = (f"{each} {cell}" for each, cell in zip(table.columns, cells, strict=True))
+            names = table.columns if alike else short
+            found = (f"{each} {cell}" for each, cell in zip(names, cells, strict=True))
             console.print(Text(f"{name}: {', '.join(found)}"))
         console.print()
     if table.note:

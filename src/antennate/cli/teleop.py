@@ -12,6 +12,7 @@ from antennate.cli import drive
 from antennate.cli.addresses import parse_robot
 from antennate.cli.keys import END, typed_keys
 from antennate.cli.options import option
+from antennate.control.gait import require_step
 from antennate.errors import BadInputError, ConfigError
 from antennate.hardware.driving.config import DriveConfig
 from antennate.hardware.driving.gamepad import Gamepad
@@ -47,6 +48,7 @@ def command(argv: Sequence[str]) -> int:
         raise ConfigError(
             "--hold-to-run: expected none with teleop, which stands without a key, found it"
         )
+    require_step(config.robot)
     with _keys(orders.gamepad) as keys:
         return drive.walk("teleop", config, orders, argv, _controller(config, keys))
 

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
-import os
 import re
 import secrets
 import sys
-import threading
 from collections.abc import Callable, Sequence
 from contextlib import nullcontext
 from pathlib import Path
@@ -20,7 +17,7 @@ from antennate.cli.arguments import FromFile, parse
 from antennate.cli.exit_codes import OK
 from antennate.cli.options import option
 from antennate.cli.progress import stop_signals
-from antennate.errors import BadInputError, ConfigError
+from antennate.errors import ConfigError
 from antennate.hardware.driving.priority import LEVEL, urgent
 from antennate.hardware.ports.keys import read_key
 from antennate.twin.config import TwinConfig, watched
@@ -32,7 +29,6 @@ from antennate.twin.serve import TwinServer
 from antennate.twin.serve_servos import ServoServer
 from antennate.twin.servo_box import ServoBox, read_list
 from antennate.twin.tcp import TcpEndpoint
-from antennate.twin.touch import TouchStimulus
 from antennate.twin.udp import UdpEndpoint
 
 _LAST_PORT = 65_534
@@ -44,22 +40,22 @@ ready. Physics begins when the first servo gets torque. --fault and --touch may 
 
 --touch left@2s right@5s bends the antennae of the standing robot, as the check by touch of
 `antennate drive` wants it, from the beginning of each client on. left:20mm@2s holds the left one,
-its tip 20 mm aside. --touch - takes left, left:20mm and so on as lines of standard input, to follow
-the marks of `antennate record`. A robot that has walked is put back to the start when a new client
-begins and no servo has torque.
+its tip 20 mm aside. A robot that has walked is put back to the start when a new client begins and
+no servo has torque.
 
 --push yaw1=20deg@3s turns a joint whose servo has no torque.
 
 --servos 1:xl330-m288,2:xl430-w250@1000000,1:xc430-w240x17 serves DYNAMIXEL servos alone, all else
 as delivered. --orders reads lines while it runs: plug NAME, unplug NAME, only NAME, next,
-push NAME=ANGLE; a NAME is a joint, a number from 1 on, or all.
+push NAME=ANGLE, where a NAME is a joint, a number from 1 on, or all; touch left:20mm, to follow
+the marks of `antennate record`; fault servo:7=silent.
 
 Faults, each with @Ts for its time:
 servo:ID=silent, bad_crc, truncated, late:SECONDS, doubled, wrong_id, oversized, voltage, overheat,
 encoder, shock, overload, reboot or REGISTER:VALUE;
 esp32=silent, reset, open_left, short_left (or right), left:COUNTS, right:COUNTS or ber:SHARE;
 bus=silent, loss:SHARE, latency:SECONDS, discharge:VOLTS_A_SECOND or ber:SHARE;
-link=ber:SHARE (bits wrong) or loss:SHARE (bytes lost), on both wires both ways."""
+wire=ber:SHARE (bits wrong) or loss:SHARE (bytes lost), on both wires both ways."""
 
 
 @dataclass(frozen=True)
@@ -97,13 +93,10 @@ def command(argv: Sequence[str]) -> int:
 
 def _serve_robot(config: TwinConfig, places: Places, orders: Orders | None) -> int:
     faults = Faults([read(text) for text in config.fault], config.robot.ids)
+    faults.on_begin = lambda demand, t: _say(f"{t:.1f} s after the addresses: {demand}")
     real = places.pace == "real"
     robot, passage = watched(config, boot_id=secrets.randbits(32) if real else None)
     passage.on_pass = lambda: _tell(passage, places.passed)
-    if robot.touch is not None and robot.touch.typed:
-        if places.orders == "-":
-            raise ConfigError("--orders -: expected another file beside --touch -")
-        threading.Thread(target=_take_orders, args=(robot.touch,), daemon=True).start()
     with TwinServer(robot, faults, *_endpoints(places), orders) as server:
         try:
             with urgent(LEVEL + 1) if real else nullcontext():
@@ -169,21 +162,6 @@ def _tell(passage: Passage, file: Path | None) -> None:
             file.touch()
         except OSError as error:
             sys.stderr.write(f"--passed: expected to make {file}, found: {error.strerror}\n")
-
-
-def _take_orders(touch: TouchStimulus) -> None:
-    """Carry out touches that are typed; a line that is none is answered."""
-    rest = b""
-    with contextlib.suppress(OSError):  # nobody types any more
-        while part := os.read(
-            0, 4096
-        ):  # without the lock of a buffer, which an exit would wait for
-            *lines, rest = (rest + part).split(b"\n")
-            for line in lines:
-                try:
-                    touch.order(line.decode("utf-8", "replace"))
-                except BadInputError as error:
-                    sys.stderr.write(f"{error}\n")
 
 
 def _endpoints(places: Places) -> tuple[Endpoint | None, Endpoint | None]:

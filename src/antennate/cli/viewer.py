@@ -12,6 +12,7 @@ import os
 import re
 import signal
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 from antennate.cli.status import StatusLine, write
@@ -26,6 +27,8 @@ from antennate.types import Maneuver
 
 REQUIRED = "required"
 _STDOUT = 1
+_BEFORE = re.compile(r"(HOLD|FAULT|OFF) (?!NOT_READY|UNKNOWN_CONTACT|UNDECIDED)")
+"""A cause that is also shown while the robot is not armed."""
 _ASKED = re.compile(r"touch=\((.*?)\)")
 """What a person is to do, within the note of a tick."""
 
@@ -53,7 +56,7 @@ def line(tick: Tick, dropped: int) -> str:
     """All counters of a tick in one line."""
     left, right = ("-" if math.isnan(counts) else f"{counts:.0f}" for counts in tick.reading)
     state = tick.state or "-"
-    why = " (" + tick.causes[0].removeprefix(f"{state} ") + ")" if tick.causes else ""
+    why = f" ({_why(state, tick.causes)})" if tick.causes else ""
     maneuver = Maneuver.label(tick.maneuver)
     return (
         f"{tick.now:7.1f} s {state}{why} maneuver={maneuver} counts={left},{right} "
@@ -61,6 +64,15 @@ def line(tick: Tick, dropped: int) -> str:
         f"missed_answers={tick.misses} stale={tick.stale} frames={tick.frames} crc={tick.crc} "
         f"lost={tick.lost} sent={tick.sent} refused={tick.refused} unlogged={dropped}"
     )
+
+
+def _why(state: str, causes: Sequence[str]) -> str:
+    """The first cause; of a robot that is not armed yet also what is wrong."""
+    first, *others = causes
+    why = first.removeprefix(f"{state} ")
+    if why.startswith("NOT_ARMED"):
+        why = "; ".join([why, *filter(_BEFORE.match, others)][:2])
+    return why
 
 
 def main() -> int:

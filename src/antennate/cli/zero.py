@@ -21,7 +21,7 @@ from antennate.hardware.dynamixel import bringup
 from antennate.hardware.dynamixel.bringup import BringUpError
 from antennate.hardware.host_clock import HostClock
 from antennate.hardware.robot_file import RobotFile
-from antennate.hardware.setup.config import SetupConfig
+from antennate.hardware.setup.config import ZeroConfig
 from antennate.hardware.setup.person import Quit
 from antennate.hardware.setup.robot_toml import change
 from antennate.hardware.setup.zeros import Positions, Zeroing, by_group
@@ -51,7 +51,7 @@ def command(argv: Sequence[str]) -> int:
         AntennateError: Something given cannot be used, the servos are not fit, or no answer can
             come; nothing was written then.
     """
-    config, orders, path = parse_writer("zero", DESCRIPTION, RobotFile.for_setup, argv, Orders)
+    config, orders, path = parse_writer("zero", DESCRIPTION, RobotFile.for_zero, argv, Orders)
     require_bus(orders.bus)
     person = TerminalPerson()
     try:
@@ -64,7 +64,7 @@ def command(argv: Sequence[str]) -> int:
         person.close()
 
 
-def _measure(person: TerminalPerson, config: SetupConfig, orders: Orders, path: Path) -> int:
+def _measure(person: TerminalPerson, config: ZeroConfig, orders: Orders, path: Path) -> int:
     robot, clock = config.robot, HostClock()
     with opener_of(orders.bus, "--bus")(robot.baud) as port:
         bus = master(port, robot.baud, clock.now)

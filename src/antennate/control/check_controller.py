@@ -1,4 +1,4 @@
-"""Check that a controller keeps its protocol; for the tests of whoever writes one."""
+"""Check that a controller keeps its protocol. Authors of controllers call it in their tests."""
 
 from __future__ import annotations
 
@@ -29,14 +29,15 @@ class _Trace:
     """All answers of a run, the first axis over ticks, the second over rows."""
 
     commands: dict[str, Floats]
-    said: dict[str, Floats]
+    decisions: dict[str, Floats]
 
     def expect_same(
         self, what: str, other: _Trace, mine: Sequence[int], its: Sequence[int]
     ) -> None:
         """Expect the same answers in these rows of the two."""
-        for name, values in (self.commands | self.said).items():
-            here, there = values[:, list(mine)], (other.commands | other.said)[name][:, list(its)]
+        for name, values in (self.commands | self.decisions).items():
+            here = values[:, list(mine)]
+            there = (other.commands | other.decisions)[name][:, list(its)]
             equal = (here == there) | (np.isnan(here) & np.isnan(there))
             for tick in np.argwhere(~equal)[:1, 0].tolist():
                 raise AssertionError(f"expected {what}, found another {name} at tick {tick}")
@@ -54,8 +55,8 @@ def check_controller(
     again. Rows do not influence one another, whatever their order and number. A row that is reset
     answers as a new controller, and the others go on. A reading that is not finite makes its
     antenna UNKNOWN and its row HOLD, with joint targets that stand still. Frames are left as they
-    are. A command that was returned does not change later, and whoever changes it changes no
-    answer.
+    are. A command that was returned does not change later, and changing it does not change later
+    answers.
 
     Args:
         factory: The controller: its name, a class, or a function (control, robot, batch).
@@ -70,7 +71,7 @@ def check_controller(
     together = run.trace(counts, rows)
     again, spoiled = run.trace(counts, rows), run.trace(counts, rows, spoil=True)
     again.expect_same("the same answers to the same readings", together, rows, rows)
-    what = "the same answers whatever becomes of a command that was returned"
+    what = "the same answers when a command that was returned is changed"
     spoiled.expect_same(what, together, rows, rows)
     turned = rows[::-1]
     other = run.trace(counts[:, turned], turned)
@@ -113,7 +114,8 @@ class _Runs:
             checked.reset(np.arange(batch), offsets)
             commands: list[JointCommand] = []
             kept: list[list[Floats]] = []
-            said: dict[str, list[Floats]] = {name: [] for name in ("maneuver", "contact", "level")}
+            names = ("maneuver", "contact", "level")
+            decisions: dict[str, list[Floats]] = {name: [] for name in names}
             for tick, reading in enumerate(counts[first:], first):
                 if tick == _RESET_AT and reset is not None:
                     checked.reset(np.array([reset]), offsets[[reset]])
@@ -122,7 +124,7 @@ class _Runs:
                 kept.append([getattr(commands[-1], part).copy() for part in self._parts])
                 for part in self._parts if spoil else ():
                     getattr(commands[-1], part)[...] = math.nan
-                for name, values in said.items():
+                for name, values in decisions.items():
                     values.append(np.array(getattr(made, name), float))
         except AntennateError as error:
             raise AssertionError(f"{error} (with {batch} rows)") from error
@@ -136,7 +138,7 @@ class _Runs:
                     f"another {part} in that of tick {tick} later",
                 )
         arrays = {part: np.array([c[i] for c in kept]) for i, part in enumerate(self._parts)}
-        found = _Trace(arrays, {name: np.array(values) for name, values in said.items()})
+        found = _Trace(arrays, {name: np.array(values) for name, values in decisions.items()})
         _check_values(found)
         return found
 
@@ -152,7 +154,7 @@ def _step(checked: CheckedController, t: Floats, reading: Floats) -> JointComman
 
 
 def _check_values(found: _Trace) -> None:
-    contact, level = found.said["contact"], found.said["level"]
+    contact, level = found.decisions["contact"], found.decisions["level"]
     known = np.isin(contact, [int(state) for state in Contact])
     expect(bool(known.all()), "contacts of 0 to 2", f"{contact[~known][:1]}")
     wrong = (level < 0.0) | (level > 1.0)
@@ -165,7 +167,7 @@ def _check_reset(run: _Runs, together: _Trace) -> None:
     others = [row for row in rows if row != 1]
     after.expect_same("the other rows to go on when one is reset", together, others, others)
     fresh = run.trace(run.counts[:, [1]], [1], first=_RESET_AT)
-    parts = (after.commands, after.said)
+    parts = (after.commands, after.decisions)
     again = _Trace(*({name: v[_RESET_AT:] for name, v in part.items()} for part in parts))
     again.expect_same("a row that is reset to answer as a new one", fresh, [1], [0])
 
@@ -181,8 +183,8 @@ def _check_blind(run: _Runs, together: _Trace) -> None:
             others = [row for row in rows if row != 2]
             what = f"the other rows to go on when one reads {bad}"
             found.expect_same(what, together, others, others)
-            held = found.said["maneuver"][blind, 2] == int(Maneuver.HOLD)
-            unknown = found.said["contact"][blind, 2, side] == int(Contact.UNKNOWN)
+            held = found.decisions["maneuver"][blind, 2] == int(Maneuver.HOLD)
+            unknown = found.decisions["contact"][blind, 2, side] == int(Contact.UNKNOWN)
             expect(held.all(), f"HOLD while an antenna reads {bad}", "another maneuver")
             expect(unknown.all(), f"UNKNOWN for a reading of {bad}", "another contact")
             for part, values in found.commands.items():

@@ -1,4 +1,4 @@
-"""A controller whose answers are checked at every step, for controllers from anywhere."""
+"""Checks every answer of a controller, since it may be anybody's code."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ _LAST = max(Maneuver)
 class CheckedController:
     """A controller, and what is wrong with its last step.
 
-    Whatever it raises, an array of another shape, or a decision that is no whole number concerns
-    all rows and becomes a `ControllerError`. Angles that are not finite, and numbers that are no
-    `Maneuver`, concern their own row and are listed in `faults`.
+    An exception, an array of another shape or a decision that is no integer affects all rows and
+    raises `ControllerError`. An angle that is not finite, or a number that is no `Maneuver`,
+    affects one row and is listed in `faults`.
 
     Args:
         controller: The controller of `batch` robots.
@@ -33,7 +33,7 @@ class CheckedController:
     def __init__(self, controller: Controller, robot: RobotSpec, batch: int) -> None:
         self._controller = controller
         self._shapes = robot.command_shapes(batch)
-        self._said = {"maneuver": (batch,), "contact": (batch, 2), "level": (batch, 2)}
+        self._attributes = {"maneuver": (batch,), "contact": (batch, 2), "level": (batch, 2)}
         self.maneuver: Ints = np.full(batch, int(Maneuver.FORWARD))
         self.faults: dict[int, str] = {}
 
@@ -78,7 +78,7 @@ class CheckedController:
         Raises:
             ControllerError: One is something else.
         """
-        for owner, shapes in ((command, self._shapes), (self._controller, self._said)):
+        for owner, shapes in ((command, self._shapes), (self._controller, self._attributes)):
             for name, shape in shapes.items():
                 value = getattr(owner, name)
                 if not isinstance(value, np.ndarray):

@@ -1,7 +1,7 @@
 """Counts to the bending level b in [0, 1]: a running mean over T_avg, then one sigmoid.
 
-A sample that is not finite makes its side NaN until the window has passed it: a side that cannot be
-trusted says so, and contact.py turns that into UNKNOWN.
+A sample that is not finite makes the level of its side NaN as long as it is in the window of the
+mean. `contact.py` turns NaN into UNKNOWN.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ def flex_fraction(params: CurveParams | Curves, counts: Floats) -> Floats:
 
 
 class RunningMean:
-    """Mean of the last T_avg of counts, per row and side; of what there is while it fills."""
+    """Mean of the counts of the last T_avg, per row and side; of all samples so far before that."""
 
     def __init__(self, params: ConditioningParams, batch: int, period: float) -> None:
         self.length = max(1, round(params.averaging_time / period))

@@ -1,4 +1,7 @@
-"""Bending level to contact, per side: CONTACT at theta, FREE somewhat below, UNKNOWN for NaN."""
+"""Bending level to contact, per side, with hysteresis.
+
+CONTACT begins at the threshold theta and ends below theta - hysteresis. NaN is UNKNOWN.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +19,7 @@ def classify(params: RuleParams, level: Floats, before: Ints) -> Ints:
 
     Args:
         params: Threshold and hysteresis.
-        level: Bending levels, shape (B, 2); NaN where nothing can be said.
+        level: Bending levels, shape (B, 2); NaN where it is unknown.
         before: Contact at the tick before, shape (B, 2).
 
     Returns:

@@ -1,8 +1,8 @@
 """Our controllers: a frame of readings goes in, a command for the joints comes out.
 
-They share the way from counts to contact, and the gait. They differ in one decision:
+Conditioning, contact and gait are the same in all. The rule that chooses the maneuver differs:
 
-- `open` walks FORWARD whatever it feels;
+- `open` always walks FORWARD;
 - `paper` follows the published table and holds each maneuver for a time;
 - `closed` walks FORWARD until its readings repeat, then escapes.
 """
@@ -157,7 +157,7 @@ class RuleController:
 
 
 def open_loop(control: ControlParams, robot: RobotSpec, batch: int) -> RuleController:
-    """`open`: walks FORWARD whatever it feels."""
+    """`open`: always walks FORWARD."""
     return RuleController(_OpenRule(control), control, robot, batch)
 
 

@@ -1,12 +1,11 @@
 """What to do when stuck: back off, turn to one side, and to the other if that fails.
 
-The first turn goes away from the side that was touched more while walking, before it got stuck:
-what it feels since then says little about where the passage goes on. If the robot is stuck again
-soon after, it turns the other way and farther, past its first course: alternating like this, it
-searches both sides.
+The first turn goes away from the side that was touched more while the robot still walked. Readings
+of a robot that is stuck say little about where the passage goes on. If it is stuck again within
+`retry_time`, it turns the other way, and farther. Turning to alternate sides searches both.
 
-A wrong turn can still lead back out of a passage. Whoever has turned and then touches nothing at
-all for a while has lost the walls: the robot turns round, back to where it last felt them.
+A wrong turn can lead the robot back out of a passage, where its antennae touch no wall. So a robot
+that has turned and then touches nothing for `lost_time` turns round, back towards the walls.
 """
 
 from __future__ import annotations
@@ -19,7 +18,7 @@ from antennate.types import Bools, Floats, Ints, Maneuver
 
 
 class Escape:
-    """The state of one escape per row: what it does, until when, and which way it turned last."""
+    """The escape of each row: its maneuver, when that ends, and the side of the last turn."""
 
     def __init__(self, params: EscapeParams, batch: int, period: float) -> None:
         self._params = params
@@ -49,9 +48,9 @@ class Escape:
 
         Args:
             t: Time [s], shape (B,).
-            level: Bending levels, shape (B, 2); a row with NaN answers HOLD and keeps its state.
+            level: Bending levels, shape (B, 2); a row with NaN holds and keeps its state.
             stuck: Rows found stuck, shape (B,).
-            pressed: Rows that feel anything at all, shape (B,).
+            pressed: Rows with at least one pressed antenna, shape (B,).
 
         Returns:
             One `Maneuver` a row, shape (B,).
@@ -79,7 +78,7 @@ class Escape:
         self._until = np.where(rows, until, self._until)
 
     def _remember(self) -> Floats:
-        """Keep the memory of touch; return that of memory_delay ago, if it reaches so far."""
+        """Store the mean touch; return that of `memory_delay` ago, the present one at the start."""
         at = self._ticks % len(self._past)
         self._ticks += 1
         before = self._past[at].copy()
@@ -103,7 +102,7 @@ class Escape:
         self._turned |= rows
 
     def _return(self, rows: Bools, t: Floats) -> None:
-        """Turn round, unwinding the last turn, and remember it no longer."""
+        """Turn back, opposite to the last turn, and forget that turn."""
         self._to(rows, _turn_to(~self._right), t + self._params.return_time)
         self._ended = np.where(rows, -np.inf, self._ended)
         self._turned &= ~rows

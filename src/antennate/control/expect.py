@@ -1,10 +1,10 @@
-"""One line for what a check expected and found, for the checks of `antennate.testing`."""
+"""The error line of the checks of `antennate.testing`."""
 
 from __future__ import annotations
 
 
 def expect(holds: bool, expected: str, found: str) -> None:
-    """Fail with both in one line.
+    """Raise an error that says what was expected and found.
 
     Raises:
         AssertionError: It does not hold.

@@ -20,6 +20,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from antennate.errors import ConfigError
 from antennate.params import GaitParams
 from antennate.robots.spec import RobotSpec
 from antennate.types import Bools, Floats, Ints, JointCommand
@@ -42,6 +43,19 @@ def _lags(wave_number: float, body_phase: float, links: int) -> tuple[Floats, Fl
     return joints, lag * np.arange(links) / links
 
 
+def require_step(robot: RobotSpec) -> None:
+    """Check that this gait has a step for the legs of a robot.
+
+    Raises:
+        ConfigError: Its legs do not roll.
+    """
+    if robot.legs.kind != "rolling":
+        raise ConfigError(
+            f"expected rolling legs for the gait of antennate, found {robot.legs.kind} legs; bring "
+            "a controller of your own that moves them, see docs/controllers.md"
+        )
+
+
 def targets(
     params: GaitParams,
     robot: RobotSpec,
@@ -49,7 +63,7 @@ def targets(
     offset: Floats,
     sweep: Floats | None = None,
 ) -> JointCommand:
-    """Joint targets at a gait phase.
+    """Joint targets at a gait phase. Legs that do not roll stay at 0, as do pitch joints.
 
     Args:
         params: Wave and timing of the gait.
@@ -61,6 +75,8 @@ def targets(
     joints, links = _lags(params.wave_number, params.body_phase, robot.links)
     yaw = params.amplitude * np.sin(joints - phase[:, None]) + offset[:, None]
     leg = (phase[:, None] - links)[:, :, None] + _SIDES
+    if robot.legs.kind != "rolling":
+        leg = np.zeros_like(leg)
     antenna = np.full((phase.shape[0], 2), params.antenna_mean)
     if sweep is not None:
         antenna += params.antenna_amplitude * np.sin(sweep)[:, None]
@@ -71,9 +87,20 @@ def targets(
 
 
 class Gait:
-    """The gait's memory: phases and offset. They are continuous whatever the maneuvers."""
+    """Phases and offset of the gait. They are continuous when the maneuver changes.
+
+    Args:
+        params: Wave and timing.
+        robot: The robot that walks; the shapes of all commands follow from it.
+        batch: Number of robots B.
+        period: Control period [s].
+
+    Raises:
+        ConfigError: The legs of the robot do not roll.
+    """
 
     def __init__(self, params: GaitParams, robot: RobotSpec, batch: int, period: float) -> None:
+        require_step(robot)
         self.params = params
         self._robot = robot
         self.phase: Floats = np.zeros(batch)

@@ -1,4 +1,4 @@
-"""The one loop: read, decide, write, wait for the next tick. There is no other."""
+"""The control loop of all robots: read, decide, write, wait for the next tick."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ def run_loop(
 ) -> int:
     """Run until `go_on` says no.
 
-    The n-th tick is due at start + n * period: an overrun delays one tick and shifts none after it.
-    Ticks that have come due meanwhile are left out, never made up for in a burst.
+    The n-th tick is due at start + n * period. A tick that takes too long delays none but the next;
+    ticks whose time has passed by then are left out.
 
     Args:
         body: The robot.

@@ -13,7 +13,7 @@ def decide(params: RuleParams, contact: Ints, level: Floats) -> Ints:
     """The paper's table.
 
     No side in contact: FORWARD. Both strong and similar: REVERSE. Otherwise turn away from the side
-    that touches, or that touches more. A side that is UNKNOWN: HOLD.
+    that touches, or that touches more; right if both touch alike. A side that is UNKNOWN: HOLD.
 
     Args:
         params: Bounds of strong and similar.

@@ -39,13 +39,16 @@ def make_controller(
         batch: Number of robots.
 
     Raises:
-        ConfigError: There is no controller of that name, or it cannot be made.
+        ConfigError: There is no controller of that name, it cannot be made, or it cannot walk the
+            robot.
     """
     factory = CONTROLLERS.find(name) if isinstance(name, str) else name
     try:
         made = factory(control or ControlParams(), robot or RobotSpec(), batch)
     except KeyboardInterrupt:
         raise
+    except ConfigError as error:
+        raise ConfigError(f"{name!r}: {error}") from error
     except BaseException as error:
         raise ConfigError(
             f"expected a controller that is made from (control, robot, batch), found {name!r}: "

@@ -1,7 +1,7 @@
-"""Is the robot stuck? A reading that repeats itself from one gait cycle to the next says so.
+"""Is the robot stuck? It is if its readings repeat from one gait cycle to the next.
 
-A walking robot that gets on meets something new in every cycle, so its antennae read something new.
-A robot that walks on the spot feels the same cycle again and again. The measure is the mean over a
+A robot that advances touches new things in every cycle, so its readings change. A robot that walks
+on the spot gets the same readings in every cycle. The measure is the mean over a
 window of |y(t) - y(t - T)|, T the gait period and y the flex of an antenna as a fraction of its
 calibrated range (0 straight, 1 fully bent). Where it stays small while an antenna is pressed, the
 robot is stuck. In free air it is small too, but nothing is pressed.

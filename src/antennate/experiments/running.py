@@ -11,7 +11,7 @@ from typing import Any
 from antennate import experiments
 from antennate.control.registry import CONTROLLERS, ControllerFactory
 from antennate.dataframe import from_rows
-from antennate.errors import ConfigError
+from antennate.errors import BadInputError, ConfigError
 from antennate.params import Params
 from antennate.params.reading import from_values
 from antennate.studies.experiment import Experiment, Outcome
@@ -57,9 +57,31 @@ class Result:
         """A pandas DataFrame with a row for each trial and the columns of trials.csv.
 
         Raises:
+            BadInputError: The experiment has no trials.
             MissingPackageError: pandas is not installed.
         """
+        if not self.rows:
+            raise BadInputError(
+                f"to_dataframe: expected trials, found none: {self.experiment.name} has no rows of "
+                f"trials{_elsewhere(self.summary)}"
+            )
         return from_rows(self.rows)
+
+    def __reduce__(self) -> tuple[Callable[..., Result], tuple[Any, ...]]:
+        """Pickle the name of the experiment in place of its functions."""
+        return _restored, (self.experiment.name, self.config, self.outcome, self.path)
+
+
+def _restored(name: str, config: Params, outcome: Outcome, path: Path | None) -> Result:
+    return Result(experiments.load(name), config, outcome, path)
+
+
+def _elsewhere(summary: Mapping[str, Any]) -> str:
+    """Where its numbers are: the first list of tables that a summary holds."""
+    for name, value in summary.items():
+        if isinstance(value, list) and value and isinstance(value[0], Mapping):
+            return f"; take pandas.DataFrame(result.summary[{name!r}])"
+    return "; take result.summary"
 
 
 def run(

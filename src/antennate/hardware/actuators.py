@@ -128,7 +128,7 @@ class Actuators(Protocol):
         ...
 
     def maintain(self, may_begin: bool) -> None:
-        """One tick's share of what they need besides; it may begin only while the robot walks."""
+        """Upkeep of one tick, as clearing leg turns; it may begin only while the robot walks."""
         ...
 
     def look(self) -> None:

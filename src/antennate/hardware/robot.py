@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 from antennate.antenna.calibration import Calibration
 from antennate.errors import ConfigError
@@ -16,11 +16,15 @@ from antennate.params import (
     SupervisorParams,
     number,
 )
-from antennate.robots.spec import RobotSpec
+from antennate.params.base import paths_of
+from antennate.robots.spec import SIMULATION_ALONE, RobotSpec
 
 
 class RobotConfig(Params):
     """One robot: its servos, its flex sensors, its controller's numbers and its network."""
+
+    shared: ClassVar[bool] = True
+    unread: ClassVar[tuple[str, ...]] = SIMULATION_ALONE
 
     calibration: str | None = number(None, "1", "assumed: the numbers of control.conditioning")
     """File of `antennate calibrate`, for both antennae, in place of control.conditioning."""
@@ -84,7 +88,27 @@ class RobotConfig(Params):
         return file
 
 
+_EXAMINED = (
+    *paths_of(ConditioningParams, "control.conditioning"),
+    "control.conditioning_right",
+    "control.rule.threshold",
+    *(f"limits.{name}" for name in ("rate", "rate_error", "supply_warn", "supply_hold")),
+)
+"""What the doctor looks at of control and supervisor."""
+
+
 class DoctorConfig(RobotConfig):
     """What `antennate doctor` has to know: the robot, and what is good."""
 
+    unread: ClassVar[tuple[str, ...]] = (
+        *SIMULATION_ALONE,
+        *(f"robot.{name}.directions" for name in ("yaw", "legs", "antennae", "pitch")),
+        "robot.release",
+        *(path for path in paths_of(ControlParams, "control") if path not in _EXAMINED),
+        *(path for path in paths_of(SupervisorParams, "limits") if path not in _EXAMINED),
+        "control.conditioning.averaging_time",
+        "doctor.silence",
+        "doctor.quiet",
+        "doctor.unasked",
+    )
     doctor: DoctorParams = DoctorParams()

@@ -8,7 +8,7 @@ from antennate.hardware.driving.config import DriveConfig
 from antennate.hardware.driving.teleop import TeleopConfig
 from antennate.hardware.esp32.recorder import RecordConfig
 from antennate.hardware.robot import DoctorConfig, RobotConfig
-from antennate.hardware.setup.config import JogConfig, SetupConfig
+from antennate.hardware.setup.config import JogConfig, SetupConfig, ZeroConfig
 from antennate.params import DoctorParams, RecordParams
 from antennate.params.setup import JogParams, PortsParams, SetupParams, TeleopParams
 
@@ -42,8 +42,12 @@ class RobotFile(DriveConfig):
         return RecordConfig(**dict(self.record), network=self.network)
 
     def for_setup(self) -> SetupConfig:
-        """What `antennate setup` and `antennate zero` take: the robot, and their own table."""
+        """What `antennate setup` takes: the robot, and its own table."""
         return SetupConfig(robot=self.robot, setup=self.setup)
+
+    def for_zero(self) -> ZeroConfig:
+        """What `antennate zero` takes: the same."""
+        return ZeroConfig(robot=self.robot, setup=self.setup)
 
     def for_jog(self) -> JogConfig:
         """What `antennate jog` takes: the robot, and its own table."""

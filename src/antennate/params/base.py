@@ -20,16 +20,18 @@ class Params(BaseModel):
     Attributes:
         unread: Parameters of its groups, dotted, that a command with this configuration does not
             read. They are no flags, and a value other than the default is an error.
+        shared: Whether its file serves other commands too, and so may hold what is not read here.
     """
 
     model_config = ConfigDict(
         frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True
     )
     unread: ClassVar[tuple[str, ...]] = ()
+    shared: ClassVar[bool] = False
 
     @model_validator(mode="after")
     def _refuse_unread(self) -> Self:
-        for path in self.unread:
+        for path in () if self.shared else self.unread:
             *groups, name = path.split(".")
             group: Any = self
             for part in groups:
@@ -40,6 +42,16 @@ class Params(BaseModel):
                     f"{path}: expected {default}, as it is not read here, found {found}"
                 )
         return self
+
+
+def paths_of(model: type[Params], path: str) -> tuple[str, ...]:
+    """Every parameter of a group that stands at a dotted path."""
+    found: list[str] = []
+    for name, field in model.model_fields.items():
+        kind = field.annotation
+        deeper = isinstance(kind, type) and issubclass(kind, Params)
+        found += paths_of(kind, f"{path}.{name}") if deeper else (f"{path}.{name}",)
+    return tuple(found)
 
 
 def require_different(name: str, values: Sequence[Any]) -> None:

@@ -97,9 +97,9 @@ class RepetitionParams(Params):
     window_cycles: float = number(0.5, "1", "fitted: 96 tunnels: sooner than 1", gt=0, le=10)
     """Window of both means below, in gait cycles."""
     change: float = number(0.06, "1", "fitted: 96 tunnels: 59 jams, 8 false alarms", gt=0, le=1)
-    """Mean change of deflection from cycle to cycle under which it repeats."""
+    """Mean change of flex from cycle to cycle under which it repeats."""
     pressure: float = number(0.2, "1", "fitted: 12 tunnels: free below, stuck above it", ge=0, le=1)
-    """Mean deflection above which an antenna is pressed."""
+    """Mean flex above which an antenna is pressed."""
 
 
 class EscapeParams(Params):

@@ -20,6 +20,8 @@ LARGEST_FILE = 1_000_000
 """Most bytes of a configuration file."""
 _MOST_DOTS = 100
 """Most dots on a line of it; keys of thousands of parts would keep the reader busy for minutes."""
+_TOO_LONG = "expected numbers of at most 4300 digits, found more"
+"""Python's own limit for whole numbers."""
 
 Config = TypeVar("Config", bound=Params)
 Place = tuple[int | str, ...]
@@ -31,8 +33,8 @@ _EXPECTED = {
     "less_than_equal": "a number of at most {le:g}",
     "finite_number": "a finite number",
     "literal_error": "one of {expected}",
-    "too_short": "at least {min_length} value(s)",
-    "too_long": "at most {max_length} value(s)",
+    "too_short": "at least {min_length} values",
+    "too_long": "at most {max_length} values",
     "missing": "a value",
 }
 """What pydantic's error types ask for."""
@@ -64,22 +66,28 @@ def read_file(path: Path, model: type[Config]) -> Config:
     """
     table = with_bases(_table_of(path), model, path.parent)
     try:
-        return model.model_validate_json(json.dumps(table, default=str), strict=True)
+        text = json.dumps(table, default=str)
+    except ValueError:  # of TOML's whole numbers in other bases
+        raise ConfigError(f"{path}: {_TOO_LONG}") from None
+    try:
+        return model.model_validate_json(text, strict=True)
     except ValidationError as error:
         raise ConfigError(f"{path}: {describe(error, model)}") from None
 
 
 def _table_of(path: Path) -> dict[str, Any]:
     text = decoded(path, read_limited(path, LARGEST_FILE, ConfigError), ConfigError)
+    for number, line in enumerate(text.splitlines(), 1):
+        if line.count(".") > _MOST_DOTS:
+            raise ConfigError(
+                f"{path}: line {number}: expected at most {_MOST_DOTS} dots, found more"
+            )
     try:
-        for number, line in enumerate(text.splitlines(), 1):
-            if line.count(".") > _MOST_DOTS:
-                raise ConfigError(
-                    f"{path}: line {number}: expected at most {_MOST_DOTS} dots, found more"
-                )
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise ConfigError(f"{path}: expected TOML, found: {error}") from None
+    except ValueError:
+        raise ConfigError(f"{path}: {_TOO_LONG}") from None
     except RecursionError:
         raise ConfigError(f"{path}: expected plain tables, found them nested too deeply") from None
 
@@ -170,7 +178,8 @@ def describe(
 
 def _expected(kind: str, context: Mapping[str, Any]) -> str | None:
     if kind in _EXPECTED:
-        return _EXPECTED[kind].format(**context).replace("'", "")
+        text = _EXPECTED[kind].format(**context).replace("'", "")
+        return text.removesuffix("s") if text.endswith(" 1 values") else text
     return _KINDS.get(kind.split("_")[0])
 
 

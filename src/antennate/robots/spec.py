@@ -15,7 +15,7 @@ from pydantic import model_validator
 
 from antennate.errors import ConfigError
 from antennate.messages import nearest, shown
-from antennate.params.base import Params, number
+from antennate.params.base import Params, number, paths_of
 from antennate.params.reading import read_file
 from antennate.robots.antenna import BASE, AntennaSpec
 from antennate.robots.joints import (
@@ -45,6 +45,27 @@ HARDWARE_ALONE = (
     "robot.release",
 )
 """Parameters that only the robot's hardware, or its twin, reads; the simulation alone does not."""
+SIMULATION_ALONE = (
+    *(
+        f"robot.{name}"
+        for name in (
+            "link_pitch",
+            "mass",
+            "width",
+            "leg_radius",
+            "leg_eccentricity",
+            "leg_width",
+            "leg_mass",
+            "leg_friction",
+            "body_friction",
+            "body_radius",
+            "pitch.stiffness",
+        )
+    ),
+    *paths_of(ServosParams, "robot.servos"),
+    *paths_of(AntennaSpec, "robot.antenna"),
+)
+"""Parameters that only the simulation, or the twin, reads; the robot's hardware does not."""
 ANTENNA_PREFIXES = tuple(f"antenna_{side}_" for side in SIDES)
 
 
@@ -106,7 +127,7 @@ class RobotSpec(Params):
                 f"--robot: expected {', '.join(ROBOTS)} or a TOML file, found nothing"
             )
         path = folder / text
-        if path.suffix != ".toml" and not path.exists():
+        if not str(text) or (path.suffix != ".toml" and not path.exists()):
             known = ", ".join(ROBOTS)
             raise ConfigError(
                 f"--robot: expected {known} or a TOML file{nearest(str(text), ROBOTS)}, found "

@@ -9,6 +9,7 @@ import numpy as np
 
 from antennate.antenna.sensor import SensorChain, reading_noise
 from antennate.errors import ConfigError
+from antennate.messages import shown
 from antennate.robots.antenna import AntennaSpec
 from antennate.sim import antenna_part
 from antennate.sim.antenna_part import Side
@@ -52,7 +53,8 @@ def attach_antenna(
         The name.
 
     Raises:
-        ConfigError: There is no such body, the name is taken, or the side is unknown.
+        ConfigError: There is no such body, the name is taken, the side is unknown, or the position
+            or the angle is not finite.
     """
     name = f"antenna_{side}" if name is None else name
     carrier = spec.body(body)
@@ -61,12 +63,16 @@ def attach_antenna(
         raise ConfigError(f"body: expected the name of a body, {known}, found {body}")
     if spec.body(f"{name}/base") is not None:
         raise ConfigError(f"name: expected one that is not taken, found {name} twice")
+    outwards = antenna.base_angle if angle is None else angle
+    if np.shape(position) != (3,) or not np.isfinite(position).all():
+        raise ConfigError(f"position: expected 3 finite numbers [m], found {shown(position)}")
+    if not np.isfinite(outwards):
+        raise ConfigError(f"angle: expected a finite number [rad], found {shown(angle)}")
     part = antenna_part.build(antenna)
     for geom in part.geoms:
         if geom.name:  # the links; the base is no obstacle to anything
             geom.contype, geom.conaffinity = contype, conaffinity
     _add_sensors(part, antenna)
-    outwards = antenna.base_angle if angle is None else angle
     quaternion = antenna_part.mounting_quaternion(outwards, side)
     frame = carrier.add_frame(pos=list(position), quat=quaternion)
     spec.attach(part, frame=frame, prefix=f"{name}/")

@@ -225,13 +225,13 @@ class Bench:
             yield
         except mujoco.FatalError as error:
             raise SimulationError(self._steps, str(error).splitlines()[0]) from error
-        bend, speed = self.hinges(), self.data.qvel
+        flex, speed = self.hinges(), self.data.qvel
         if self.data.warning.number.any() or not self.data.time > before:
             raise SimulationError(self._steps, "engine warning")
-        if not abs(bend).max() < _ANGLE_LIMIT or not abs(speed).max() < _SPEED_LIMIT:
+        if not abs(flex).max() < _ANGLE_LIMIT or not abs(speed).max() < _SPEED_LIMIT:
             raise SimulationError(
                 self._steps,
-                f"a hinge is at {abs(bend).max():.3g} rad, a coordinate moves at "
+                f"a hinge is at {abs(flex).max():.3g} rad, a coordinate moves at "
                 f"{abs(speed).max():.3g} m/s or rad/s",
             )
 

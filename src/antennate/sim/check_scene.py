@@ -1,4 +1,4 @@
-"""Check that a scene keeps its protocol; for the tests of whoever writes one."""
+"""Check that a scene keeps its protocol. Authors of scenes call it in their tests."""
 
 from __future__ import annotations
 

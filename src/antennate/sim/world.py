@@ -232,11 +232,11 @@ class World:
         data = self.data
         warned = [n for n, count in zip(_WARNINGS, data.warning.number, strict=True) if count]
         far, height = float(abs(self.head[:2]).max()), float(self.head[2])
-        bend, speed = (float(abs(v).max()) for v in (data.qpos[self._bounded], data.qvel))
+        angle, speed = (float(abs(v).max()) for v in (data.qpos[self._bounded], data.qvel))
         checks = (
             (not warned, f"engine warning {', '.join(warned)}"),
             (far < _DISTANCE_LIMIT, f"the head is {far:.3g} m away"),
-            (bend < _ANGLE_LIMIT, f"a joint is at {bend:.3g} rad"),
+            (angle < _ANGLE_LIMIT, f"a joint is at {angle:.3g} rad"),
             (data.time > before, f"time stood still at {data.time:.6g} s"),
             (speed < _SPEED_LIMIT, f"a coordinate moves at {speed:.3g} m/s or rad/s"),
             (0.0 < height < _HEIGHT_LIMIT, f"the head is at a height of {height:.3g} m"),

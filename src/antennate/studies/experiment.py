@@ -63,6 +63,7 @@ class Experiment(Generic[Config, Found]):
         figures: Figures of an outcome by name.
         files: Further files of an outcome by name.
         check: Raises if a configuration cannot be run; called before anything is written.
+        failed: Whether a result says nothing, so that the command ends with exit code 2.
         parts: What `on_step` counts.
     """
 
@@ -75,6 +76,7 @@ class Experiment(Generic[Config, Found]):
     figures: Callable[[Found], Mapping[str, Figure]] = lambda outcome: {}
     files: Callable[[Found], Mapping[str, str]] = lambda outcome: {}
     check: Callable[[Config], None] = lambda config: None
+    failed: Callable[[Mapping[str, Any]], bool] = lambda result: False
     parts: str = "trials"
 
     @classmethod

@@ -43,11 +43,18 @@ def to_csv(rows: Iterable[Mapping[str, Any]]) -> str:
 
 
 def from_csv(text: str) -> list[dict[str, Any]]:
-    """Rows of such a table; numbers as int or float, empty cells as None."""
-    return [
-        {key: _value_of(cell) for key, cell in row.items()}
-        for row in csv.DictReader(io.StringIO(text))
-    ]
+    """Rows of such a table; numbers as int or float, empty cells as None.
+
+    Raises:
+        ValueError: It is no such table.
+    """
+    try:
+        return [
+            {key: _value_of(cell) for key, cell in row.items()}
+            for row in csv.DictReader(io.StringIO(text))
+        ]
+    except csv.Error as error:
+        raise ValueError(str(error)) from None
 
 
 def _cell(value: Any) -> Any:

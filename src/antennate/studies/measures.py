@@ -1,4 +1,4 @@
-"""Measures: what a study tells of many trials, each named once for JSON, tables and figures."""
+"""Measures of a study over many trials, each named once for JSON, tables and figures."""
 
 from __future__ import annotations
 

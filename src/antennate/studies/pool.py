@@ -28,6 +28,10 @@ Result = TypeVar("Result")
 Emit = Callable[[Any], None]
 """Takes one result."""
 
+_GUARD = (
+    '; a script that uses several workers needs `if __name__ == "__main__":` around what it runs'
+)
+"""What a worker that ended with code 1 most often lacks: it raised while it imported the script."""
 _POLL = 0.1
 """How often the parent looks for finished tasks while it waits for results [s]."""
 _results: Any = None
@@ -83,7 +87,7 @@ def run_tasks(
         codes = [p.exitcode for p in crew if p.exitcode not in (None, 0, -signal.SIGTERM)]
         raise WorkerError(
             f"a worker process ended with code {codes[0] if codes else 'unknown'} in the middle of "
-            "its work"
+            f"its work{_GUARD if codes[:1] == [1] else ''}"
         ) from None
     except KeyboardInterrupt:
         with contextlib.suppress(queue.Empty):

@@ -44,7 +44,11 @@ _LARGEST = 10**9
 """No file of a run is longer [bytes]."""
 _LOGS = tuple(part(Path(LOG), number).name for number in range(1, MOST_PARTS + 1))
 _FILES = (CALIBRATION, "conditioning.toml", "recording.csv", "ticks.csv", "bom.csv", *_LOGS)
-_NAMES = (RESULT, PARTIAL, TABLE, CONFIG, VERSIONS, COMMAND, *_FILES)
+ROOM = ".room"
+"""File that keeps room for the result."""
+_KEPT_FREE = 1 << 16
+"""Its size [bytes]: eight times the result of a drive."""
+_NAMES = (RESULT, PARTIAL, TABLE, CONFIG, VERSIONS, COMMAND, ROOM, *_FILES)
 """Every file that a run may write beside its figures."""
 
 
@@ -157,8 +161,13 @@ class RunDirectory:
             self.write(COMMAND, shlex.join(command) + "\n")
 
     def without_trials(self) -> None:
-        """Say that this run has none, so that no empty file of them is left if it is killed."""
+        """Say that this run has none, so that no empty file of them is left if it is killed.
+
+        Room for the result is kept, so that a disk that fills meanwhile does not cost it.
+        """
         self._drop_partial()
+        with _writing(self.path / ROOM):
+            (self.path / ROOM).write_bytes(bytes(_KEPT_FREE))
 
     def append(self, row: Any) -> None:
         """Keep one finished trial, a dataclass or a mapping, at once."""
@@ -174,6 +183,7 @@ class RunDirectory:
         table = to_csv(_plain(row) for row in rows)
         if table:
             self.write(TABLE, table)
+        self._give_room()
         self.write(RESULT, to_json(result))
         self._kept = True
         self._drop_partial()
@@ -205,6 +215,10 @@ class RunDirectory:
             self._partial.close()
             (self.path / PARTIAL).unlink(missing_ok=True)
 
+    def _give_room(self) -> None:
+        with _writing(self.path / ROOM):
+            (self.path / ROOM).unlink(missing_ok=True)
+
     def __enter__(self) -> RunDirectory:
         return self
 
@@ -216,6 +230,7 @@ class RunDirectory:
             return
         with contextlib.suppress(OSError, OutputError):
             self._drop_partial()
+            self._give_room()
             for name in (CONFIG, VERSIONS, COMMAND) if self._created else ():
                 (self.path / name).unlink(missing_ok=True)
             for path in self._created:

@@ -80,7 +80,7 @@ class Feed:
 
     @property
     def keeps(self) -> bool:
-        """Whether a process runs that has said that it keeps what it gets, and took the last."""
+        """Whether a process runs, has reported that it keeps messages, and took the last one."""
         return self._begun and self._taken
 
     @property
@@ -138,9 +138,9 @@ class Feed:
             process = self._process
             if process is None or process.stdout is None:
                 return
-            with process.stdout as said:
-                self._begun = bool(said.read(1))
-                while said.read(4096):
+            with process.stdout as output:
+                self._begun = bool(output.read(1))
+                while output.read(4096):
                     pass
             died = process.wait() != 0
             self._begun = False
@@ -176,7 +176,7 @@ class Feed:
 
 
 def messages(stream: BinaryIO) -> Iterator[Message]:
-    """What the sending end has said, in order.
+    """The messages of the sending end, in order.
 
     Raises:
         LogError: The stream ended in the middle: the sender was killed.

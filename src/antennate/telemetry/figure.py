@@ -32,7 +32,7 @@ class Course:
 
     Attributes:
         t: Time since the first tick [s], shape (n,).
-        reading: What the board said [counts], shape (n, 2).
+        reading: Readings of the board [counts], shape (n, 2).
         level: Bending levels, shape (n, 2).
         contact: `Contact`, shape (n, 2).
         recorded: `Maneuver` decided then, shape (n,).

@@ -1,4 +1,4 @@
-"""A log as a robot: a controller gets the readings of then, and decides upon them now."""
+"""A log as a robot: a controller decides again on the recorded readings."""
 
 from __future__ import annotations
 
@@ -38,8 +38,8 @@ class ReplayConfig(Params):
 class ReplayRobot:
     """Recorded readings in place of a robot's; also their clock.
 
-    Each sleep goes on to the next tick, however long it is, so that none is left out. Time is that
-    of the sleeper; frames carry the recorded one.
+    Each sleep goes on to the next tick, however long it is, so that none is left out. The clock
+    shows the time slept to; frames carry the recorded time.
 
     Args:
         ticks: The log, in order.

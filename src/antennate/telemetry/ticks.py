@@ -1,4 +1,4 @@
-"""One tick of a drive, as it is kept: what was read, decided and commanded, and how all were.
+"""One tick of a drive, as it is logged: what was read, decided and commanded, and the health.
 
 Packed it is bytes, whose layout follows from the number of joints, and a text after them. Every
 float comes back bit by bit, NaN and infinities too.
@@ -64,8 +64,8 @@ class Tick:
         lost: Samples that never came.
         misses: Answers that servos did not give so far.
         stale: Late answers thrown away so far.
-        sent: Poses sent so far.
-        refused: Poses refused so far.
+        sent: Commands sent so far.
+        refused: Commands refused so far.
     """
 
     number: int

@@ -56,7 +56,7 @@ class LogWriter:
         """Add a tick, packed or not. After a failure or `close` it does nothing.
 
         Raises:
-            LogError: The disk is full or gone; said once, what was written stays readable.
+            LogError: The disk is full or gone; raised once; what was written stays readable.
         """
         if not self.failure:
             self._put(tick.pack() if isinstance(tick, Tick) else tick)

@@ -6,7 +6,7 @@ A reply leaves one return delay after the request, and is there when its last by
 together answer one after the other; each waits for the one before it, so that the chain stops at a
 silent servo, in sync reads (https://github.com/ROBOTIS-GIT/DynamixelSDK/issues/331) as in fast
 ones. Two servos with one id talk at the same time, and of their bits the zeros win. The master
-is expected to be quiet meanwhile: its packets never collide with an answer.
+is expected to be quiet meanwhile; collisions of its packets with answers are not simulated.
 """
 
 from __future__ import annotations
@@ -123,8 +123,8 @@ class ServoBus:
             return
         reached = [s for s in present if instructions.is_for(s, packet)]
         for servos in self._by_id(reached):
-            said = [a for s in servos if (a := instructions.answer(t, s, packet)) is not None]
-            t = self._reply(t, servos[0], [packets.status(one) for one in said])
+            replies = [a for s in servos if (a := instructions.answer(t, s, packet)) is not None]
+            t = self._reply(t, servos[0], [packets.status(reply) for reply in replies])
 
     def _sync_write(self, t: float, present: list[Servo], params: bytes) -> None:
         address, length = two_words(params)
@@ -158,8 +158,8 @@ class ServoBus:
             servos = [s for s in present if s.get("id") == name and s.get("status_return_level")]
             if not servos:
                 return
-            said = [instructions.status(s, *s.read(address, length)) for s in servos]
-            t = self._reply(t, servos[0], [packets.status(one) for one in said])
+            replies = [instructions.status(s, *s.read(address, length)) for s in servos]
+            t = self._reply(t, servos[0], [packets.status(reply) for reply in replies])
 
     def _fast_sync_read(self, t: float, present: list[Servo], params: bytes) -> None:
         self._join(t, present, [(name, *two_words(params)) for name in params[4:]])
@@ -178,7 +178,7 @@ class ServoBus:
             error, data = servo.read(address, length)
             chain.append((servo, instructions.status(servo, error, data.ljust(length, b"\0"))))
         size = sum(length + 4 for _, _, length in asked)
-        pieces = instructions.fast_pieces(size, [said for _, said in chain])
+        pieces = instructions.fast_pieces(size, [reply for _, reply in chain])
         for (servo, _), piece in zip(chain, pieces, strict=True):
             broken = any(self._is(servo, f) for f in (Fault.BAD_CRC, Fault.TRUNCATED))
             delay = 0.0 if servo is not chain[0][0] else None

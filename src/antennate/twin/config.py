@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 from antennate.params import GaitParams, Params, number
 from antennate.params.base import GATHERED
@@ -33,6 +33,19 @@ class TwinControlParams(Params):
 class TwinConfig(TrialConfig):
     """The robot that `antennate twin` serves, and the trial at whose start it stands."""
 
+    unread: ClassVar[tuple[str, ...]] = (
+        *(
+            f"control.gait.{name}"
+            for name in (
+                "frequency",
+                "turn_offset",
+                "offset_rate",
+                "antenna_amplitude",
+                "antenna_frequency",
+            )
+        ),
+        "robot.antenna.sensor.rate",
+    )
     trial: int = number(0, "1", "assumed: the first", ge=0)
     """Trial of the seed."""
     duration: float | None = number(None, "s", "assumed: until it is stopped", gt=0)
@@ -40,7 +53,7 @@ class TwinConfig(TrialConfig):
     fault: Annotated[tuple[str, ...], GATHERED] = number((), "1", "assumed: nothing is broken")
     """Faults, such as servo:7=silent@3s."""
     touch: Annotated[tuple[str, ...], GATHERED] = number((), "1", "assumed: nobody is there")
-    """Touches of the standing robot: left@2s, left:20mm@2s, or - to type them; from each client."""
+    """Touches of the standing robot: left@2s or left:20mm@2s, from the beginning of each client."""
     push: Annotated[tuple[str, ...], GATHERED] = number((), "1", "assumed: nobody is there")
     """Joints without torque that are turned, such as yaw1=20deg@3s, from the first packet on."""
     factory: bool = number(False, "1", "assumed: they are set up")

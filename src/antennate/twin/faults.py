@@ -1,4 +1,4 @@
-"""Faults on demand: `servo:7=silent@3s`, `esp32=reset@5s`, `link=ber:1e-4`.
+"""Faults on demand: `servo:7=silent@3s`, `esp32=reset@5s`, `wire=ber:1e-4`.
 
 A register of a servo takes a value by its name: `servo:7=return_delay_time:250`.
 """
@@ -6,7 +6,7 @@ A register of a servo takes a value by its name: `servo:7=return_delay_time:250`
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from antennate.errors import BadInputError
@@ -18,7 +18,7 @@ from antennate.twin.servo_box import ServoBox
 from antennate.twin.trouble import Fault, Trouble
 
 _FORM = re.compile(
-    r"(?P<target>servo:(?P<id>\d{1,3})|esp32|bus|link)=(?P<what>[a-z_]+)(:(?P<size>[0-9.e-]+))?"
+    r"(?P<target>servo:(?P<id>\d{1,3})|esp32|bus|wire)=(?P<what>[a-z_]+)(:(?P<size>[0-9.e-]+))?"
     r"(@(?P<t>[0-9.]+)s)?"
 )
 _SERVO = {fault.name.lower(): fault for fault in Fault}
@@ -30,7 +30,7 @@ _KNOWN = {
     "servo": (*_SERVO, *_HARDWARE, "reboot"),
     "esp32": (*_BOARD, *_SIDES, "ber"),
     "bus": ("loss", "silent", "latency", "discharge", "ber"),
-    "link": ("loss", "ber"),
+    "wire": ("loss", "ber"),
 }
 _SHARES = ("loss", "ber")
 
@@ -40,7 +40,7 @@ class Demand:
     """One fault, and when.
 
     Attributes:
-        target: "servo", "esp32", "bus", or "link" for the wires of both.
+        target: "servo", "esp32", "bus", or "wire" for the wires of both.
         servo: Id, for a servo.
         what: Its name.
         size: Delay of a late answer or of all [s], share of answers or bytes lost or of bits
@@ -54,6 +54,11 @@ class Demand:
     what: str
     size: float
     t: float
+
+    def __str__(self) -> str:
+        servo = f":{self.servo}" if self.servo else ""
+        size = f":{self.size:g}" if self.size else ""
+        return f"{self.target}{servo}={self.what}{size}"
 
 
 def read(text: str) -> Demand:
@@ -103,6 +108,9 @@ class Faults:
         ids: Ids of the servos, in their order.
         alone: There are servos and their bus, but no robot.
 
+    Attributes:
+        on_begin: Told each of them as it happens, and the time [s].
+
     Raises:
         BadInputError: One is for something that is not there.
     """
@@ -110,20 +118,36 @@ class Faults:
     def __init__(self, demands: Sequence[Demand], ids: Sequence[int], alone: bool = False) -> None:
         self._waiting = sorted(demands, key=lambda demand: demand.t)
         self._ids = tuple(ids)
+        self.on_begin: Callable[[Demand, float], None] = lambda demand, t: None
+        self._alone = alone
         for demand in demands:
-            if demand.target == "servo" and demand.servo not in ids:
-                known = ", ".join(map(str, ids))
-                raise BadInputError(f"--fault: expected a servo of {known}, found {demand.servo}")
-            if alone and (demand.target in ("esp32", "link") or demand.what == "discharge"):
-                raise BadInputError(
-                    "--fault: expected one of a servo or the bus where there is no robot, found "
-                    f"{demand.target}={demand.what}"
-                )
+            self._require(demand)
+
+    def order(self, text: str) -> None:
+        """Let a fault begin with the next tick.
+
+        Raises:
+            BadInputError: It has another form, or is for something that is not there.
+        """
+        demand = read(text)
+        self._require(demand)
+        self._waiting.insert(0, demand)
+
+    def _require(self, demand: Demand) -> None:
+        if demand.target == "servo" and demand.servo not in self._ids:
+            known = ", ".join(map(str, self._ids))
+            raise BadInputError(f"--fault: expected a servo of {known}, found {demand.servo}")
+        if self._alone and (demand.target in ("esp32", "wire") or demand.what == "discharge"):
+            raise BadInputError(
+                "--fault: expected one of a servo or the bus where there is no robot, found "
+                f"{demand.target}={demand.what}"
+            )
 
     def apply(self, twin: TwinRobot | ServoBox, t: float) -> None:
         """Let happen what is due at time t [s]."""
         while self._waiting and self._waiting[0].t <= t:
             demand = self._waiting.pop(0)
+            self.on_begin(demand, t)
             if demand.target == "servo":
                 _break_servo(twin.servos[self._ids.index(demand.servo)], demand, twin.t)
             elif isinstance(twin, TwinRobot) and demand.target != "bus":
@@ -135,7 +159,7 @@ class Faults:
 
 
 def _break_robot(robot: TwinRobot, demand: Demand) -> None:
-    if demand.target == "link":
+    if demand.target == "wire":
         for noise in (robot.noise, robot.bus.noise):
             setattr(noise, demand.what, demand.size)
     elif demand.what in _SIDES:

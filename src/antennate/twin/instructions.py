@@ -76,10 +76,10 @@ def fast_pieces(asked: int, answers: Sequence[Status]) -> list[bytes]:
     """
     pieces: list[bytes] = []
     crc = 0
-    for said in answers:
+    for reply in answers:
         head = HEADER + bytes([BROADCAST]) + (asked + 1).to_bytes(2, "little") + b"\x55"
         piece = b"" if pieces else head
-        piece += bytes([said.error_byte, said.id]) + said.data
+        piece += bytes([reply.error_byte, reply.id]) + reply.data
         crc = crc16(piece, crc)
         end = crc.to_bytes(2, "little")
         crc = crc16(end, crc)

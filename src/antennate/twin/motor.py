@@ -67,7 +67,7 @@ RATINGS = {
 
 
 class Shaft:
-    """The shaft of a servo, moved by whoever knows how.
+    """The shaft of a servo; subclasses move it.
 
     Args:
         position: Where it is [ticks], whole turns counted.

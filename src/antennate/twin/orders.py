@@ -1,8 +1,10 @@
-"""Orders to a twin while it runs: which servos are plugged in, and whose shafts somebody turns.
+"""Orders to a twin while it runs: plugs, shafts, and of a robot hands on its antennae and faults.
 
     plug NAME, unplug NAME     put a servo on the bus with power, or take it off
     only NAME, next            plug in this one alone, or the next one alone
     push NAME=ANGLE            turn a shaft without torque
+    touch left:20mm            hold an antenna, or `touch left` for a second; 0mm lets go
+    fault servo:7=silent       let a fault begin
 
 NAME is a joint, the place of a servo in its list (from 1 on), or `all`.
 """
@@ -19,7 +21,10 @@ from antennate.twin.push import Pushes
 from antennate.twin.registers import Servo
 
 _CHUNK = 4096
-_WORDS = "plug NAME, unplug NAME, only NAME, next or push NAME=ANGLE"
+_WORDS = (
+    "plug NAME, unplug NAME, only NAME, next, push NAME=ANGLE, or of a robot touch SIDE[:SIZE] or "
+    "fault FAULT"
+)
 NONE = "none"
 
 

@@ -1,4 +1,4 @@
-"""What a servo means to do by its registers: the profile to its goal, and what it tells of it."""
+"""The profile of a servo to its goal, from its registers, and the registers that report it."""
 
 from __future__ import annotations
 

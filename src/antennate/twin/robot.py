@@ -54,7 +54,7 @@ class TwinRobot:
         period: Control period of the board and the physics [s].
         boot_id: Random number of the board's boot.
         standing_noise: Whether readings are noisy before the physics begins, as real ones are.
-        touch: Bends the antennae of the standing robot, None for no touches.
+        touch: Bends the antennae of the standing robot; no touches by default.
         watch: Told the world after each tick of the physics.
         battery: Numbers of its supply.
         servos: Its servos in the order of its joints, set up for it by default.
@@ -100,7 +100,7 @@ class TwinRobot:
         self._floating = np.random.default_rng(boot_id)
         self._held = [math.nan, math.nan]
         self._chance = np.random.default_rng(boot_id) if standing_noise else None
-        self.touch = touch
+        self.touch = touch or TouchStimulus((), robot.antenna)
         self.on_return: Callable[[], None] = lambda: None
         self.t = 0.0
         self.board_silent = False
@@ -266,7 +266,7 @@ class TwinRobot:
         noise = np.zeros(2)
         if self._chance is not None and self._standing:
             noise = np.rint(self._chance.normal(0.0, _STANDING_NOISE, 2))
-        if self.touch is not None and self._standing:
+        if self._standing:
             now = self._ticks * self._period
             noise = noise + np.rint(self.touch.change(now, self._visit.begun))
         read = np.where(np.isnan(self._held), self._counts, self._held)

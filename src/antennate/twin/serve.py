@@ -115,7 +115,21 @@ class TwinServer:
 
     def _take_orders(self, ready: Sequence[object], now: float) -> None:
         if self._orders is not None and any(file in ready for file in self._files):
-            self._orders.take(lambda text: self._robot.plugging.order(text, now))
+            self._orders.take(lambda text: self._order(text, now))
+
+    def _order(self, text: str, now: float) -> None:
+        """Carry out one order: hands on the antennae, a fault, or plugs and shafts.
+
+        Raises:
+            BadInputError: It is none.
+        """
+        word, _, rest = text.partition(" ")
+        if word == "touch":
+            self._robot.touch.order(rest)
+        elif word == "fault":
+            self._faults.order(rest)
+        else:
+            self._robot.plugging.order(text, now)
 
     def _step(self) -> None:
         self._faults.apply(self._robot, self._robot.due)

@@ -5,7 +5,7 @@ Only the readings change; the simulated antenna itself is not bent. Orders:
 - `left@2s` bends the left antenna for a second, 2 s after a client has begun;
 - `left:20mm@2s` holds it from then on as a ruler beside it is read: its tip pushed 20 mm aside;
 - `left:60deg@2s` likewise by the sum of its hinge angles; 0mm or 0deg lets go;
-- `-` takes orders while the twin runs: `left`, `left:20mm` and so on, at once.
+- while the twin runs, `left`, `left:20mm` and so on, at once.
 """
 
 from __future__ import annotations
@@ -23,8 +23,6 @@ from antennate.errors import BadInputError
 from antennate.robots.antenna import AntennaSpec
 from antennate.types import Floats
 
-TYPED = "-"
-"""The order that lets others come while the twin runs."""
 FLEX = 1.0
 """Flex of a touch [rad]: more than twice what the check by touch asks for."""
 LENGTH = 1.0
@@ -42,18 +40,14 @@ class TouchStimulus:
         orders: As above.
         antenna: The antenna, for its springs and its flex sensor.
 
-    Attributes:
-        typed: Whether orders are to come while the twin runs.
-
     Raises:
         BadInputError: An order has another form.
     """
 
     def __init__(self, orders: Sequence[str], antenna: AntennaSpec) -> None:
         self._antenna = antenna
-        self.typed = TYPED in orders
         self._timed = sorted(
-            (_read(text, antenna, timed=True) for text in orders if text != TYPED),
+            (_read(text, antenna, timed=True) for text in orders),
             key=lambda order: order[3],
         )
         self._fresh: deque[tuple[int, float, float]] = deque()
@@ -61,7 +55,7 @@ class TouchStimulus:
         self._begun = math.inf
 
     def order(self, text: str) -> None:
-        """Take an order, to be carried out at once; from any thread.
+        """Take an order, to be carried out at once.
 
         Raises:
             BadInputError: It has another form.

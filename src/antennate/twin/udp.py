@@ -69,7 +69,7 @@ class UdpEndpoint:
         return b""
 
     def write(self, data: bytes) -> None:
-        """Send whole frames; a greeting is kept for whoever asks."""
+        """Send whole frames; a greeting is kept for clients that ask."""
         now = self._now()
         self._written = now
         for chunk in data.split(b"\0"):

@@ -1,4 +1,4 @@
-"""When a client begins to use the servo bus: after a pause of the one before it."""
+"""When a client begins to use the servo bus: with the first packet after a pause."""
 
 from __future__ import annotations
 

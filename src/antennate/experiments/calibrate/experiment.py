@@ -54,14 +54,14 @@ def tables(result: Mapping[str, Any]) -> Sequence[Table]:
 
 def _rivals(found: Mapping[str, Any]) -> str:
     errors = found["cross_validated_rmse"]
-    said = ", ".join(f"{model} {errors[model]:.4f}" for model in ("sigmoid", "line", "isotonic"))
+    listed = ", ".join(f"{model} {errors[model]:.4f}" for model in ("sigmoid", "line", "isotonic"))
     better = " and ".join(found["better_than_sigmoid"])
     word = (
         f"The data prefer: {better}."
         if better
         else "None is better than the sigmoid by more than a standard error."
     )
-    return f"Cross-validated error of b: {said}.\n{word}"
+    return f"Cross-validated error of b: {listed}.\n{word}"
 
 
 def sentence(result: Mapping[str, Any]) -> str:

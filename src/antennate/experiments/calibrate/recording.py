@@ -6,6 +6,7 @@ import csv
 import hashlib
 import io
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -13,8 +14,9 @@ from typing import Literal
 import numpy as np
 
 from antennate.antenna.fitting import Samples
+from antennate.csv_files import csv_rows, number_of
 from antennate.errors import CalibrationError
-from antennate.files import decoded, read_limited
+from antennate.files import read_limited
 from antennate.params import Params
 from antennate.params.base import number
 from antennate.types import Floats, Ints
@@ -75,7 +77,7 @@ def read(path: Path, params: RecordingParams) -> Recording:
     Raises:
         CalibrationError: Names the row and the cure.
     """
-    data = _bytes(path)
+    data = read_limited(path, _LARGEST_FILE, CalibrationError)
     rows = _rows(path, data, params)
     table = np.array([values for _, values in rows])
     lines = np.array([line for line, _ in rows], dtype=np.int64)
@@ -89,47 +91,29 @@ def read(path: Path, params: RecordingParams) -> Recording:
     return Recording(t, samples, hashlib.sha256(data).hexdigest())
 
 
-def _bytes(path: Path) -> bytes:
-    data = read_limited(path, _LARGEST_FILE, CalibrationError)
+def _rows(path: Path, data: bytes, params: RecordingParams) -> list[tuple[int, list[float]]]:
+    needed = (params.time_column, params.counts_column, params.bend_column)
+    cure = "; name yours with --columns.*-column"
+    lines = csv_rows(path, data, needed, CalibrationError, cure)
+    _, header = next(lines)
     if not data.endswith((b"\n", b"\r")):
-        last = data.count(b"\n") + 1
+        last = len(data.splitlines())
         raise CalibrationError(
             f"{path}: row {last}: expected a line break at its end, found none (truncated); "
             "delete the last row, or add the line break if it is whole"
         )
-    return data
-
-
-def _rows(path: Path, data: bytes, params: RecordingParams) -> list[tuple[int, list[float]]]:
-    reader = csv.reader(io.StringIO(decoded(path, data, CalibrationError)))
-    header = [name.strip() for name in next(reader, [])]
-    places = _places(path, header, params)
-    try:
-        rows = [
-            (reader.line_num, _values(path, reader.line_num, header, cells, places))
-            for cells in reader
-            if cells
-        ]
-    except csv.Error as error:
-        raise CalibrationError(
-            f"{path}: row {reader.line_num}: expected CSV, found {error}"
-        ) from None
+    places = _places(path, header, (params.trial_column, params.speed_column, *needed))
+    rows = [(line, _values(path, line, header, cells, places)) for line, cells in lines]
     if not rows:
         raise CalibrationError(f"{path}: row 2: expected readings, found none; record longer")
     return rows
 
 
-def _places(path: Path, header: list[str], params: RecordingParams) -> list[int | None]:
+def _places(path: Path, header: list[str], names: Sequence[str]) -> list[int | None]:
     found: list[int | None] = []
-    needed = (params.time_column, params.counts_column, params.bend_column)
-    for name in (params.trial_column, params.speed_column, *needed):
+    for name in names:
         if header.count(name) > 1:
             raise CalibrationError(f"{path}: row 1: expected one column {name}, found several")
-        if name not in header and name in needed:
-            raise CalibrationError(
-                f"{path}: row 1: expected a column {name}, found "
-                f"{', '.join(header) or 'nothing'}; name yours with --columns.*-column"
-            )
         found.append(header.index(name) if name in header else None)
     return found
 
@@ -138,23 +122,24 @@ def _values(
     path: Path, line: int, header: list[str], cells: list[str], places: list[int | None]
 ) -> list[float]:
     if len(cells) != len(header):
+        few = len(cells) < len(header)
+        why = " (truncated); delete the row" if few else "; are there decimal commas? write points"
         raise CalibrationError(
-            f"{path}: row {line}: expected {len(header)} cells, found {len(cells)} (truncated); "
-            "delete the row"
+            f"{path}: row {line}: expected {len(header)} cells, found {len(cells)}{why}"
         )
     values = []
     for place in places:
         if place is None:
             values.append(math.nan)
             continue
+        found = f"in {header[place]}, found {cells[place][:40]!r}"
         try:
-            value = float(cells[place])
-        except ValueError:
-            value = math.nan
+            value = number_of(cells[place])
+        except ValueError as error:
+            raise CalibrationError(f"{path}: row {line}: expected {error} {found}") from None
         if not math.isfinite(value):
             raise CalibrationError(
-                f"{path}: row {line}: expected a finite number in {header[place]}, found "
-                f"{cells[place][:40]!r}; delete the row"
+                f"{path}: row {line}: expected a finite number {found}; delete the row"
             )
         values.append(value)
     return values

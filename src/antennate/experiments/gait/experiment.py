@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from antennate.control.gait import require_step
 from antennate.experiments.gait import run as gait
 from antennate.studies.experiment import Experiment
 from antennate.studies.measures import Measure, Table
@@ -52,5 +53,6 @@ EXPERIMENT = Experiment.of_folder(
     lambda config, workers, on_step, _: gait.run(config, workers, on_step),
     tables,
     sentence,
+    check=lambda config: require_step(config.robot),
     parts="walks",
 )

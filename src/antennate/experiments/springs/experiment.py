@@ -147,7 +147,7 @@ def tables(result: Mapping[str, Any]) -> Sequence[Table]:
 
 def _rounding(result: Mapping[str, Any]) -> str:
     """Where the paper's table is rounded."""
-    said = [
+    rounded = [
         f"{row['active_coils']:g} coils {row['paper_exact_n_mm_per_deg']:.4f}, printed "
         f"{row['paper_n_mm_per_deg']:.{PAPER_DIGITS}f}"
         for row in result["springs"]
@@ -155,7 +155,9 @@ def _rounding(result: Mapping[str, Any]) -> str:
         and abs(row["paper_exact_n_mm_per_deg"] - row["paper_n_mm_per_deg"]) > 1e-9
     ]
     exact = "Stiffness goes with 1 / coils"
-    return f"{exact}; the paper rounds: {'; '.join(said)} N·mm/deg.\n" if said else f"{exact}.\n"
+    return (
+        f"{exact}; the paper rounds: {'; '.join(rounded)} N·mm/deg.\n" if rounded else f"{exact}.\n"
+    )
 
 
 def sentence(result: Mapping[str, Any]) -> str:

@@ -100,14 +100,14 @@ def summarise(trials: list[Trial], spacing: float) -> dict[str, Any]:
     """Errors of every condition, with and without sensor noise, by quantity and cue."""
     return {
         condition: {
-            noise: _judge([t for t in trials if t.condition == condition], noise, spacing)
+            noise: _errors([t for t in trials if t.condition == condition], noise, spacing)
             for noise in ("noisy", "exact")
         }
         for condition in CONDITIONS
     }
 
 
-def _judge(trials: list[Trial], noise: str, spacing: float) -> dict[str, Any]:
+def _errors(trials: list[Trial], noise: str, spacing: float) -> dict[str, Any]:
     by_split = {split: [t for t in trials if t.split == split] for split in SPLITS}
     felt = {
         split: [(t, getattr(t, noise)) for t in some if getattr(t, noise) is not None]

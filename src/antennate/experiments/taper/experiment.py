@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,8 +10,9 @@ from typing import Any
 import numpy as np
 
 from antennate.antenna import taper
+from antennate.csv_files import csv_rows, number_of
 from antennate.errors import BadInputError, ConfigError
-from antennate.files import decoded, read_limited
+from antennate.files import read_limited
 from antennate.params import TaperParams
 from antennate.params.base import number
 from antennate.studies.experiment import Experiment, Outcome
@@ -116,28 +115,21 @@ def read_diameters(path: Path) -> Floats:
     Raises:
         BadInputError: The file cannot be read, or a row holds no diameter.
     """
-    text = decoded(path, read_limited(path, _LARGEST_FILE))
-    rows = csv.DictReader(io.StringIO(text))
-    if COLUMN not in (rows.fieldnames or ()):
-        raise BadInputError(
-            f"{path}: row 1: expected a header with {COLUMN}, found {rows.fieldnames or 'nothing'}"
-        )
-    found = [_diameter(path, rows.line_num, row[COLUMN]) for row in rows]
+    rows = csv_rows(path, read_limited(path, _LARGEST_FILE), [COLUMN], BadInputError)
+    place = next(rows)[1].index(COLUMN)
+    found = [_diameter(path, line, "".join(cells[place : place + 1])) for line, cells in rows]
     if len(found) < 2:
         raise BadInputError(f"{path}: expected at least 2 rows of diameters, found {len(found)}")
     return 1e-3 * np.array(found)
 
 
-def _diameter(path: Path, line: int, cell: str | None) -> float:
+def _diameter(path: Path, line: int, cell: str) -> float:
     try:
-        value = float(cell or "")
-    except ValueError:
-        value = float("nan")
+        value, wanted = number_of(cell), f"a diameter above 0 and up to {_LARGEST_MM:g} mm"
+    except ValueError as error:
+        value, wanted = 0.0, str(error)
     if not 0 < value <= _LARGEST_MM:
-        raise BadInputError(
-            f"{path}: row {line}: expected a diameter above 0 and up to {_LARGEST_MM:g} mm, found "
-            f"{cell!r}"
-        )
+        raise BadInputError(f"{path}: row {line}: expected {wanted}, found {cell[:40]!r}")
     return value
 
 

@@ -37,16 +37,35 @@ def tables(result: Mapping[str, Any]) -> Sequence[Table]:
 
 def sentence(result: Mapping[str, Any]) -> str:
     """Which controllers came through, and how sure it is."""
-    found = successes(result["controllers"])
+    none_valid = _none_valid(result)
+    found = successes({n: r for n, r in result["controllers"].items() if n not in none_valid})
     pair = next(iter(reversed(result["paired"].items())), None)
     test = f"; McNemar p of {pair[0]} {pair[1]['mcnemar_p']:.2g}" if pair else ""
     invalid = sum(row["invalid"] for row in result["controllers"].values())
     why = f" Invalid trials: {invalid}; trials.csv gives the reason of each." if invalid else ""
     scene = result["scene"]
     what = "Tunnels crossed" if scene == TUNNEL else f"Trials that succeeded in {scene}"
-    return f"{what} (95 % interval): {found}{test}.{why}"
+    text = f"{what} (95 % interval): {found}{test}." if found else ""
+    for name, reason in none_valid.items():
+        text += f" No trial of {name} is valid: {reason}."
+    return f"{text}{why}".strip()
+
+
+def _none_valid(result: Mapping[str, Any]) -> dict[str, str]:
+    """Controllers of which every trial is invalid, and why the first one is."""
+    return {
+        name: row["first_reason"]
+        for name, row in result["controllers"].items()
+        if row["trials"] and row["invalid"] == row["trials"]
+    }
 
 
 EXPERIMENT = Experiment.of_folder(
-    __name__, tunnel.TunnelConfig, tunnel.run, tables, sentence, check=tunnel.check
+    __name__,
+    tunnel.TunnelConfig,
+    tunnel.run,
+    tables,
+    sentence,
+    check=tunnel.check,
+    failed=lambda result: bool(_none_valid(result)),
 )

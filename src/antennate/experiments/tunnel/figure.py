@@ -17,6 +17,7 @@ from matplotlib.ticker import MaxNLocator, PercentFormatter
 from antennate import figures as style
 from antennate.experiments.tunnel.monitor import TrialPath, TrialResult
 from antennate.experiments.tunnel.run import TunnelOutcome
+from antennate.messages import short_name
 from antennate.types import Floats, Maneuver
 
 SHOWN_TRIALS = 5
@@ -80,7 +81,7 @@ def trajectories(
                 panel.set_xlabel("x [m]")
         panels[i, 0].set_ylabel("y [m]")
         panels[i, 0].annotate(
-            style.short_name(controller),
+            short_name(controller),
             (0.0, 0.5),
             (-54.0, 0.0),
             xycoords="axes fraction",
@@ -195,7 +196,7 @@ def summary(
             color=colour,
             linestyle=style.CONTROLLER_LINES.get(name, "solid"),
             linewidth=3.2 - 0.8 * i,
-            label=style.short_name(name),
+            label=short_name(name),
         )
     for panel in (rate, mean):
         panel.set_yticks(range(len(names)), [_label(name, controllers[name]) for name in names])
@@ -211,7 +212,7 @@ def summary(
         xlabel="restricted mean time [s]",
         title="Failures count as the time limit; 95 %",
     )
-    mean.set_yticklabels([style.short_name(name) for name in names])
+    mean.set_yticklabels([short_name(name) for name in names])
     inside.set(
         xlim=(0, time_limit),
         ylim=(-0.03, 1.03),
@@ -226,7 +227,7 @@ def summary(
 
 
 def _label(name: str, found: Mapping[str, Any]) -> str:
-    return f"{style.short_name(name)}\nn = {found['trials'] - found['invalid']}"
+    return f"{short_name(name)}\nn = {found['trials'] - found['invalid']}"
 
 
 def _interval(panel: Axes, at: int, value: float, ends: Sequence[float], colour: str) -> None:

@@ -67,6 +67,7 @@ def summary(rows: Sequence[TrialResult]) -> dict[str, Any]:
     return {
         "trials": len(rows),
         "invalid": len(rows) - len(valid),
+        "first_reason": next((row.reason for row in rows if row.outcome == "invalid"), None),
         **summarise(CONTROLLER, valid),
         "success_share": len(won) / len(valid) if valid else None,
         "wilson95": statistics.wilson95(len(won), len(valid)),

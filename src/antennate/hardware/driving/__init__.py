@@ -1,1 +1,1 @@
-"""A robot that walks: one session between bytes and a controller, from dry run to torque off."""
+"""Drives the real robot: one session from the dry run to torque off."""

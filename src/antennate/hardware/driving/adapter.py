@@ -1,4 +1,4 @@
-"""Whether the adapter of a servo bus hands bytes over at once."""
+"""Whether the adapter of the servo bus delivers bytes without delay."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from antennate.hardware.ports.port import Port
 from antennate.params import DoctorParams
 
 _PINGS = 5
-"""Pings timed: a median that two late ones do not move (assumed)."""
+"""Number of pings that are timed: two late ones do not move their median (assumed)."""
 _SLOW = 0.008
 """Median time to an answer from which on an adapter is refused [s]: half the 16 ms of an FTDI
 adapter's default (AN232B-04), which a busy computer does not reach (assumed)."""
@@ -26,10 +26,10 @@ def require_quick(
 ) -> float | None:
     """Ping the first servo that answers; the median time to its answers [s], None without any.
 
-    `path` is what the port is called, for the cure.
+    `path` is the port's name for the error message.
 
     Raises:
-        BringUpError: Answers come too late; with the command that cures it.
+        BringUpError: Answers come too late; the message has the command that cures it.
     """
     bus = Bus(port, Timing(baud, gap=_PATIENCE, latest=_PATIENCE), clock=clock)
     times: list[float] = []

@@ -1,4 +1,4 @@
-"""A file that says that the robot has arrived, as a light gate behind the exit may make it."""
+"""A file whose existence means that the robot has arrived; a light gate may write it."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ _EVERY = 0.05
 
 
 class Arrival:
-    """Looks for a file in a thread of its own, since a disk may be slow; as a context.
+    """Looks for a file in a thread of its own, since a disk may be slow. A context manager.
 
     Args:
         path: The file.
@@ -24,7 +24,7 @@ class Arrival:
         self._thread = threading.Thread(target=self._look, name="arrival", daemon=True)
 
     def __call__(self) -> bool:
-        """Whether it is there."""
+        """Whether the file exists."""
         return self._there
 
     def __enter__(self) -> Arrival:

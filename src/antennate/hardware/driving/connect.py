@@ -1,4 +1,4 @@
-"""From two ports to a session, once both sides have said who they are."""
+"""Opens both ports and makes a session, once board and servos are identified."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ LATEST = 0.07
 def connect(
     config: DriveConfig, esp32: str, bus: str, key: bytes | None = None
 ) -> Iterator[Session]:
-    """Open both ports, find who is there, and close them again afterwards.
+    """Open both ports, identify board and servos, and close the ports afterwards.
 
     Args:
         config: The robot.
@@ -52,7 +52,7 @@ def connect(
     Raises:
         ConfigError: There is no such controller.
         PortError: A port cannot be opened.
-        BadInputError: No antenna board speaks, or it is refused.
+        BadInputError: No antenna board sends, or it is refused.
         BringUpError: The servos are not those expected.
     """
     controller = make_controller(config.controller, config.control, config.robot)
@@ -75,9 +75,9 @@ def prepare(
     path: str = "the bus",
     controller: Controller | None = None,
 ) -> Session:
-    """A session before two open ports, after both sides have said who they are.
+    """A session on two open ports, once board and servos are identified.
 
-    `path` is what the bus is called, for errors.
+    `path` is the name of the bus for error messages.
     """
     board = Board(esp32, config.limits.stale_age)
     await_board(board, clock, bus, config.swapped)
@@ -107,12 +107,12 @@ def prepare(
 def await_board(
     board: Board, clock: Any, bus: Port | None = None, swapped: float = math.inf
 ) -> None:
-    """Wait for a greeting and samples; what the bus says unasked is read, and nothing written.
+    """Wait for a greeting and samples of the board. The bus is read only; nothing is written to it.
 
-    A silent port is given up earlier than one on which a board may be starting.
+    A port without any byte is given up earlier than one on which a board may be starting.
 
     Raises:
-        BadInputError: None came, and says what came instead; or the bus speaks unasked.
+        BadInputError: None came; the message says what came instead. Or the bus sends unasked.
     """
     begin, unasked = clock.now(), 0
     while board.clock.newest is None:
@@ -142,7 +142,7 @@ def await_board(
 
 
 def _require_quiet(bus: Port, clock: Any) -> None:
-    """No servo speaks unasked; an antenna board does."""
+    """Check that the bus sends nothing unasked: servos do not, an antenna board does."""
     _unasked(bus)
     clock.sleep_until(clock.now() + _WHO.quiet)
     if (count := _unasked(bus)) >= _WHO.unasked:
@@ -160,10 +160,10 @@ def _unasked(bus: Port) -> int:
 
 
 def require_servos(bus: Bus, robot: RobotSpec) -> None:
-    """All servos are there, of the right model and set as they have to be.
+    """Check that all servos answer, are of the right model and have the right settings.
 
     Raises:
-        BringUpError: Otherwise; names each id that is not, and the cure.
+        BringUpError: One does not; the message names its id and the cure.
     """
     try:
         bringup.require(bus, robot.models)

@@ -1,8 +1,8 @@
 """A key that is held lets the robot walk.
 
-A terminal tells no release. A key that is held repeats its character, after a first pause of 0.25 s
-(Linux console) to 0.66 s (X server). So a key is held from its second character in quick succession
-on: a single press never lets a robot walk.
+A terminal does not report the release of a key. A key that is held repeats its character, after a
+first pause of 0.25 s (Linux console) to 0.66 s (X server). So a key counts as held once a second
+character has followed quickly: a single press never lets a robot walk.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ class DeadMan:
     """Whether a key is held.
 
     Args:
-        params: How long it may be let go.
+        params: How long the key may be released.
         pressed: Whether a character has come since the last call.
 
     Attributes:

@@ -17,7 +17,7 @@ _MOST = (1 << 31) - 1
 
 @dataclass(frozen=True, slots=True)
 class Decision:
-    """A `Maneuver` and a `Contact` a side; the defaults are those of one that was not asked yet."""
+    """A `Maneuver` and a `Contact` a side; the defaults stand until the first step."""
 
     maneuver: int = int(Maneuver.HOLD)
     contact: tuple[int, int] = (int(Contact.UNKNOWN), int(Contact.UNKNOWN))
@@ -25,7 +25,7 @@ class Decision:
 
 @dataclass(slots=True)
 class StepResult:
-    """What became of the controller in one tick.
+    """The result of a controller's step in one tick.
 
     Attributes:
         asked: Whether it was asked at all.
@@ -43,7 +43,7 @@ class StepResult:
 def decision_of(controller: Controller) -> Decision:
     """The decision of a controller of one robot after its step.
 
-    Whether there is such a maneuver is for the supervisor to judge.
+    Whether the number is a valid `Maneuver` is checked by the supervisor.
 
     Raises:
         ControllerError: `maneuver` or `contact` is not of the form that `Controller` asks for.

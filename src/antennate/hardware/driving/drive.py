@@ -1,4 +1,4 @@
-"""A dry run, a walk, and back to a robot without torque."""
+"""A drive: dry run, walk, torque off."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def drive(
         config: For how long.
         arm: Whether torque may come on.
         on_tick: Called after every tick with the session and the time [s].
-        operator: Who may stop it. Its signals are not heard any more afterwards.
+        operator: Who may stop it. Its signals are ignored afterwards.
     """
     report, clock = Report(), session.clock
     start = clock.now()
@@ -50,7 +50,7 @@ def drive(
     session.orders.released = key is not None
 
     def failed(t: float) -> bool:
-        """After a fault and a time to look at it: torque can be taken off now, or never."""
+        """Whether the time to look at a fault is over, and torque can be taken off now or never."""
         nonlocal failed_at
         state = State.OK if session.outputs is None else session.outputs.state
         if t > dry.over + config.limits.longest_arming and state >= State.FAULT:
@@ -81,13 +81,14 @@ def drive(
         return not report.ended
 
     with contextlib.nullcontext(operator.stop) if operator.stop else StopOnce() as stop:
-        stop.insists = True
+        stop.insists, stop.within = True, run_loop
         try:
             try:
+                stop.closed = False
                 run_loop(session, session.control, session.period, go_on)
             finally:
                 stop.closed = True
-        except KeyboardInterrupt:  # also one that came before `closed` was set
+        except KeyboardInterrupt:
             report.ended = _SIGNAL
         finally:
             stop.closed = True

@@ -11,19 +11,19 @@ _SKIP = "; --no-touch-check arms without the check"
 
 
 class DryRun:
-    """Lasts its time, and longer until the antennae are checked and the supervisor allows torque.
+    """Lasts `length`, and longer until antennae are checked and the supervisor allows torque.
 
     Args:
         quality: With the check of the antennae.
-        length: Its time [s].
-        patience: By how much it is extended at most [s], by the check and by the supervisor each.
+        length: Shortest duration [s].
+        patience: Longest extension for the check, and again for the supervisor [s].
         arm: Whether torque is wanted afterwards.
         duration: Time from torque on to off [s].
 
     Attributes:
         over: When torque was last asked for [s], inf while it may not come on.
         end: When all is over [s], inf if not known yet.
-        asks: Whether torque is asked for; the supervisor takes the change to True alone.
+        asks: Whether torque is asked for; the supervisor reacts to the change to True only.
         refusal: Why torque has not come on although it was wanted.
     """
 
@@ -49,7 +49,8 @@ class DryRun:
         elif self._quality.refused or (
             t >= self._length + self._patience and self._quality.objections
         ):
-            self._give_up(t, "; ".join(self._quality.objections) + _SKIP)
+            skip = "" if self._quality.broken else _SKIP  # a broken wire forbids torque anyway
+            self._give_up(t, "; ".join(self._quality.objections) + skip)
         elif t >= self._length and not self._quality.objections:
             self._first = t
             self._ask(t)

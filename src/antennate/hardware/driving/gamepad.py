@@ -17,7 +17,7 @@ from antennate.errors import BadInputError
 _EVENT = struct.Struct("<IhBB")
 _BUTTON, _AXIS, _FIRST = 0x01, 0x02, 0x80
 _HALF = 16_384
-"""Half of the way of a stick: from there on it is pushed."""
+"""Half of the travel of a stick; beyond it the stick counts as pushed."""
 _CROSS = (6, 7)
 """Axes of the cross of most pads; the first stick has 0 and 1."""
 
@@ -55,11 +55,11 @@ class Gamepad:
         return keys + self._pushed()
 
     def close(self) -> None:
-        """Let it go."""
+        """Close it."""
         os.close(self._handle)
 
     def _read(self) -> bytes:
-        """What has come; a pad that is gone pushes nothing any more."""
+        """Read the events that have come; a pad that was unplugged has nothing pushed."""
         try:
             data = os.read(self._handle, 64 * _EVENT.size)
         except BlockingIOError:

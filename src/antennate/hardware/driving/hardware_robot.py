@@ -13,8 +13,8 @@ from antennate.types import AntennaFrame, Clock, JointCommand
 class HardwareRobot:
     """One robot. A reading that is missing or too old is NaN.
 
-    Frames are stamped with the board's own time since the first reading, so that neither its way to
-    the host nor the host's load shows in them. Their time never goes back.
+    Frames carry the board's own time since the first reading. So a delay on the way to the host, or
+    a busy host, does not change it. It never goes back.
 
     Attributes:
         clock: The host's time, which never steps.
@@ -38,7 +38,7 @@ class HardwareRobot:
         return AntennaFrame(t=np.array([self._t]), counts=counts_of(timed))
 
     def _time(self, timed: Timed | None, now: float) -> float:
-        """The board's time [s]; by the host's clock where the board has none or begins anew."""
+        """The board's time [s]; the host's clock where the board has none or restarts."""
         last = self._stamp
         if self._stamp_now is None:
             self._stamp_now = now

@@ -1,4 +1,4 @@
-"""What a drive is told from outside while it runs."""
+"""What stops a drive from outside while it runs."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ class Operator:
     """Who may stop a drive.
 
     Attributes:
-        stop: Hears signals; by default inside the drive alone.
+        stop: Receives signals; by default while the drive runs.
         pressed: Whether a character of the key that has to be held came since the last call; None
             if no key has to be held.
         arrived: Whether the robot is where it was to go.

@@ -28,11 +28,11 @@ class Priority(Enum):
 
 @contextlib.contextmanager
 def urgent(level: int = LEVEL) -> Iterator[Priority]:
-    """Run the block, which must sleep most of the time, before all ordinary processes if allowed.
+    """Run the block before all ordinary processes if allowed; it must sleep most of the time.
 
-    Processes and threads started inside are ordinary again. What was made before is also kept from
-    the collector of garbage, which would walk through all of it in one tick or another. Yields what
-    was got; the real-time level is 1 to 99.
+    Processes and threads started inside are ordinary again. Objects made before are left out of
+    garbage collection (`gc.freeze`), which would delay single ticks. Yields the scheduling that was
+    granted; the real-time level is 1 to 99.
     """
     before = (os.sched_getscheduler(0), os.sched_getparam(0)) if _LINUX else None
     gc.collect()
@@ -46,10 +46,10 @@ def urgent(level: int = LEVEL) -> Iterator[Priority]:
 
 
 def _give_back(policy: int, param: os.sched_param) -> None:
-    """As before as far as allowed.
+    """Set the scheduling back as far as allowed.
 
-    SCHED_RESET_ON_FORK once set stays for whoever lacks CAP_SYS_NICE (sched(7)): what is started
-    later is then ordinary too, which is what it would be anyway.
+    Without CAP_SYS_NICE a process cannot unset SCHED_RESET_ON_FORK (sched(7)). What it starts later
+    is then ordinary, as it would be anyway.
     """
     for allowed in (policy, policy | os.SCHED_RESET_ON_FORK):
         with contextlib.suppress(OSError):
@@ -58,7 +58,7 @@ def _give_back(policy: int, param: os.sched_param) -> None:
 
 
 def claim(level: int = LEVEL) -> Priority:
-    """Ask for a real-time level for this thread, for good; what was got."""
+    """Ask for a real-time level for this thread, for good; the scheduling granted."""
     if not _LINUX:
         return Priority.ORDINARY
     try:

@@ -8,7 +8,7 @@ from typing import Any
 from antennate.hardware.driving.session import Session
 from antennate.hardware.driving.timing import LoopTiming
 from antennate.hardware.driving.walk import Walk
-from antennate.hardware.safety.causes import Cause, Outputs, State
+from antennate.hardware.safety.causes import DATA, Cause, Outputs, State
 
 
 @dataclass(slots=True)
@@ -19,7 +19,8 @@ class Report:
         timing: How well the pace was kept, None if no tick was run.
         before: The same up to the first tick with torque, None if it never came on.
         worst: Worst state since torque came on, and why. The short wait for the first decision is
-            left out, unless no command follows it.
+            left out, unless no command follows it. If torque never came on, HOLD if data are
+            missing at the end.
         refusal: Why torque did not come on although it was wanted, empty if nothing forbade it.
         on: Servos that did not confirm that their torque is off; None if it never was on.
         ended: What ended it.
@@ -72,6 +73,10 @@ class Report:
         self.timing = None if session.timing is None else session.timing.report()
         if self.before is None and self._waits and self.worst < State.HOLD:
             self.worst, self.why = State.HOLD, self._waits
+        causes = () if session.outputs is None else session.outputs.causes
+        missing = [each.text for each in causes if each.present and each.cause in DATA]
+        if not self._torque and missing:
+            self.worst, self.why = State.HOLD, "; ".join(missing)
 
     def result(self, session: Session) -> dict[str, Any]:
         """All of it as plain numbers and words, for result.json."""
@@ -94,9 +99,9 @@ class Report:
             "missed_answers": answers.misses,
             "stale_answers": answers.stale,
             "broken_answers": answers.bad_crc,
-            "poses_sent": session.tally.sent,
-            "poses_limited": session.tally.limited,
-            "poses_refused": session.control.refused,
+            "commands_sent": session.tally.sent,
+            "commands_limited": session.tally.limited,
+            "commands_refused": session.control.refused,
             "tracebacks": [
                 *session.control.tracebacks.kept,
                 *session.actuators.state.tracebacks.kept,

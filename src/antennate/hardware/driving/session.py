@@ -1,16 +1,16 @@
-"""One robot under a supervisor: the robot of the one loop, and its controller.
+"""One robot under a supervisor: the robot that the loop runs, and its controller.
 
-Nothing reaches the actuators but what the supervisor lets through. Any packet feeds their
-watchdogs, and with torque on packets are sent only upon a decision of this very tick: the
-controller's, or that to stand still for the actuators, for a moment before a release, or for one
-tick at half pace. Goals move at a limited speed, so that neither the first command nor a broken
-controller lets one jump.
+Only what the supervisor allows is sent to the actuators. Every packet feeds their watchdogs. So
+with torque on, packets are sent only in a tick with a decision: the controller's, or to stand still
+(for the actuators, before torque goes off, or for one tick at half pace). Goals move at a limited
+speed, so that neither the first command nor a broken controller makes a joint jump.
 
-Torque comes on wherever the joints stand. They approach the first command slowly, all together, and
-the controller stands still meanwhile; where all are within one tick of it there is no approach.
+Torque comes on with the joints where they are. They approach the first command slowly, all
+together, and the controller's time stands still meanwhile. If all joints can reach it in one tick
+there is no approach.
 
-After the bus was lost no goal is sent until an arm event. With that one all is checked anew and
-goals are set to where the joints stand, as with the first.
+After the bus was lost no goal is sent until an arm event. Then all servos are checked again and
+goals are set to the present positions, as at the first arm event.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ class Session:
     Attributes:
         period: Control period [s].
         quality: What the readings of the antennae are worth.
-        control: The controller, as the loop asks it.
+        control: The controller under supervision.
         orders: Read in every tick.
         outputs: The supervisor's of the last tick, None before the first.
         timing: Whether the loop keeps its pace, None before the first tick.
@@ -99,7 +99,7 @@ class Session:
 
     @property
     def mute(self) -> bool:
-        """No actuator answers: the bus, its adapter or the power of all of them is gone."""
+        """Whether no actuator answers: bus, adapter or power is gone."""
         return self.actuators.state.silent(self._limits.late_answers)
 
     def read(self) -> AntennaFrame:
@@ -127,7 +127,7 @@ class Session:
         return self._limits.slow_rate if empty else 1.0
 
     def write(self, command: JointCommand) -> None:
-        """Let the supervisor judge this tick, and do what it says; then look at the actuators."""
+        """Let the supervisor judge this tick, carry it out, then read the actuators."""
         self._mark("decide")
         now = self.clock.now()
         self.outputs = out = self.supervisor.step(now, self._inputs(now))
@@ -164,7 +164,7 @@ class Session:
         self.lost |= actuators.state.silent(self._limits.silent_answers)
 
     def _move(self, out: Outputs, command: JointCommand) -> None:
-        """Goals nearer to the command, or where they are; a fault lets nothing else begin."""
+        """Send goals nearer to the command, or unchanged; after a fault nothing else begins."""
         actuators = self.actuators
         if out.state < State.FAULT:
             actuators.maintain(out.move)
@@ -178,7 +178,7 @@ class Session:
         self.tally.sent += moves
 
     def release(self) -> list[int]:
-        """Torque off, verified: ids that did not confirm it; they are told again in each tick."""
+        """Torque off, verified; returns ids that did not confirm it; each tick tells them again."""
         return self.actuators.disable()
 
     def stand(self, time: float) -> None:

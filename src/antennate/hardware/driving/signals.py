@@ -1,13 +1,14 @@
-r"""Ctrl-C, Ctrl-\, SIGTERM and the loss of the terminal, while servos have torque.
+r"""Signals that end a drive: Ctrl-C, Ctrl-\, SIGTERM and the loss of the terminal.
 
-An exception alone would not do: a controller with a bare `except`, a destructor or a callback may
-swallow it. So what was received is also kept, for the loop to look at.
+A controller with a bare `except`, a destructor or a callback may swallow the exception. So the
+signal is also kept, and the loop looks at it.
 """
 
 from __future__ import annotations
 
 import signal
 import threading
+from collections.abc import Callable
 from types import FrameType
 from typing import Any
 
@@ -16,30 +17,33 @@ STOPS = tuple(
     for name in ("SIGINT", "SIGQUIT", "SIGTERM", "SIGHUP")
     if hasattr(signal, name)
 )
-"""What asks a program to end; a terminal that goes away, as of a lost connection, sends SIGHUP."""
+"""Signals that ask a program to end; a terminal whose connection is lost sends SIGHUP."""
 
 
 class StopOnce:
-    """Inside the block a signal that asks to end raises KeyboardInterrupt, until it is closed.
+    """Makes signals that ask to end raise KeyboardInterrupt inside the block, until it is closed.
 
-    Close it before the torque goes off: whoever presses Ctrl-C twice must not keep it on. Outside
-    the main thread Python delivers no signals: whoever starts such a thread has to end it
-    otherwise, as by `orders.stop`.
+    Close it before the torque goes off: a second Ctrl-C must not interrupt that. Python delivers
+    signals to the main thread only; a drive in another thread has to be ended otherwise, as by
+    `orders.stop`.
 
     Args:
-        last: The program ends after the block: if a signal came, none is heard any more, so
-            that the report is written and shown however often it is sent.
+        last: The program ends after the block: once a signal came, later ones are ignored, so that
+            the report is written and shown.
 
     Attributes:
-        received: One came, whoever may have swallowed the exception.
-        insists: Each of them raises, not the first alone; for code that may swallow one.
-        closed: None raises any more; for the block's owner to set.
+        received: A signal came, even if its exception was swallowed.
+        insists: Every signal raises, not only the first; for code that may swallow one.
+        within: Signals raise only while this function runs, so that of several at once none
+            interrupts what the first has begun; None for everywhere.
+        closed: Signals do not raise any more; set by the code that owns the block.
     """
 
     def __init__(self, last: bool = False) -> None:
         self.received = self.closed = False
         self.insists = not last
         self._last = last
+        self.within: Callable[..., object] | None = None
         self._before: dict[int, Any] = {}
 
     def __enter__(self) -> StopOnce:
@@ -54,5 +58,14 @@ class StopOnce:
     def receive(self, number: int, frame: FrameType | None) -> None:
         """Take note of a signal."""
         first, self.received = not self.received, True
-        if not self.closed and (first or self.insists):
+        if not self.closed and (first or self.insists) and self._inside(frame):
             raise KeyboardInterrupt
+
+    def _inside(self, frame: FrameType | None) -> bool:
+        """Whether `within` runs at this frame."""
+        if self.within is None:
+            return True
+        code = getattr(self.within, "__code__", None)
+        while frame is not None and frame.f_code is not code:
+            frame = frame.f_back
+        return frame is not None

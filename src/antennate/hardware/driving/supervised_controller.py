@@ -1,4 +1,4 @@
-"""A controller under supervision: what it raises is a cause, and its time may stand still."""
+"""A controller under supervision: its exceptions become causes, and its time can be stopped."""
 
 from __future__ import annotations
 
@@ -13,24 +13,23 @@ from antennate.types import AntennaFrame, Controller, Floats, JointCommand, Mane
 
 
 class SupervisedController:
-    """Asks a controller for a command, and keeps what the supervisor has to know of it.
+    """Asks a controller for a command, and keeps what the supervisor has to know about it.
 
     While the robot stands still for its actuators, the controller is not asked and its time stands
-    still: to stand is a decision of its own. So it is to go slowly, which leaves out single ticks,
-    but none after a failure.
+    still. At a `rate` below 1 it is left out in single ticks, but never in the one after a failure.
 
     Args:
-        controller: Of one robot; anybody's.
+        controller: Any controller, made for one robot.
         robot: That robot.
-        check: A copy of a command that can be sent, or CommandError.
+        check: Returns a copy of a command that can be sent; otherwise raises CommandError.
         now: The host's time [s].
 
     Attributes:
         standing: Whether the robot has to stand still.
         rate: How fast the controller's time goes, 1 as the clock.
-        command: What it said last.
-        decision: What it decided, whenever it was asked last without failing.
-        result: What became of it in the last tick.
+        command: Its last command.
+        decision: Its decision in the last step that did not fail.
+        result: The result of the last tick.
         sound: Whether the last command asked for could be sent.
         refused: Commands that could not be sent.
         tracebacks: Of its failures.

@@ -1,7 +1,7 @@
-"""A controller whose maneuvers are keys or a gamepad: behind the same supervisor as any other.
+"""A controller whose maneuvers come from keys or a gamepad, under the same supervisor as any other.
 
-It feels as the others do: with a reading that cannot be used it holds. Without a key for a while
-it holds too.
+It holds while a reading cannot be used, as other controllers do, and when no key has come for a
+while.
 """
 
 from __future__ import annotations
@@ -9,14 +9,17 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 
 from antennate.control.controllers import RuleController
 from antennate.hardware.driving.config import DriveConfig
-from antennate.params import ControlParams
+from antennate.params import ControlParams, EscapeParams, RepetitionParams
+from antennate.params.base import paths_of
+from antennate.params.dead_man import DeadManParams
 from antennate.params.setup import TeleopParams
-from antennate.robots.spec import RobotSpec
+from antennate.robots.spec import SIMULATION_ALONE, RobotSpec
 from antennate.types import AntennaFrame, Bools, Contact, Floats, Ints, JointCommand, Maneuver
 
 KEYS = {
@@ -36,31 +39,39 @@ OSCILLATE = "o"
 
 
 QUIT = ("q", "end")
-"""Keys that end the drive; the second one stands for the end of the input."""
+"""Keys that end the drive; `end` stands for the end of the input."""
 
 
 class TeleopConfig(DriveConfig):
-    """What `drive` takes, and how keys walk the robot; the controller that is named is not used."""
+    """The configuration of `drive`, and the numbers of teleoperation; `controller` is not used."""
 
+    unread: ClassVar[tuple[str, ...]] = (
+        *SIMULATION_ALONE,
+        "controller",
+        *paths_of(DeadManParams, "dead_man"),
+        *(f"control.rule.{name}" for name in ("strong", "similar", "hold_time")),
+        *paths_of(RepetitionParams, "control.repetition"),
+        *paths_of(EscapeParams, "control.escape"),
+    )
     teleop: TeleopParams = TeleopParams()
 
 
 @dataclass
 class Wishes:
-    """What is wanted by keys.
+    """What the keys ask for.
 
     Attributes:
         maneuver: The maneuver of the newest key.
-        heard: When it came [s], by the host's clock.
+        pressed_at: When its key came [s], by the host's clock.
         oscillating: The antennae oscillate.
     """
 
     maneuver: Maneuver = Maneuver.HOLD
-    heard: float = -math.inf
+    pressed_at: float = -math.inf
     oscillating: bool = False
 
     def press(self, key: str, now: float) -> None:
-        """Take a key at a time [s]; one that means nothing is none.
+        """Take a key at a time [s]; a key without a meaning is ignored.
 
         Raises:
             KeyboardInterrupt: It ends the drive.
@@ -68,17 +79,17 @@ class Wishes:
         if key in QUIT:
             raise KeyboardInterrupt
         if key in KEYS:
-            self.maneuver, self.heard = KEYS[key], now
+            self.maneuver, self.pressed_at = KEYS[key], now
         elif key == OSCILLATE:
             self.oscillating = not self.oscillating
 
     def now(self, now: float, patience: float) -> Maneuver:
-        """The maneuver that is wanted at a time [s]; HOLD after so long without a key [s]."""
-        return self.maneuver if now - self.heard <= patience else Maneuver.HOLD
+        """The maneuver wanted at a time [s]; HOLD if the last key is older than `patience` [s]."""
+        return self.maneuver if now - self.pressed_at <= patience else Maneuver.HOLD
 
 
 class KeyRule:
-    """The decision of a controller that keys decide.
+    """The rule of a controller: the maneuver of the keys.
 
     Args:
         control: Numbers of the control.
@@ -90,7 +101,7 @@ class KeyRule:
         self._wanted = wanted
 
     def reset(self, rows: Ints | Bools) -> None:
-        """Nothing is remembered."""
+        """Do nothing: there is no memory."""
 
     def step(self, t: Floats, level: Floats, contact: Ints, flex: Floats) -> Ints:
         """The maneuver of the keys; HOLD where a reading cannot be used."""
@@ -99,7 +110,7 @@ class KeyRule:
 
 
 class KeyController:
-    """One robot by keys.
+    """The controller of one robot by keys.
 
     Args:
         control: Numbers of the control.

@@ -1,4 +1,4 @@
-"""Whether the loop keeps its pace: overruns, ticks left out, and which stage cost them."""
+"""Whether the loop keeps its period: overruns, ticks left out, and which stage caused them."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class StageTiming:
 
 @dataclass(slots=True)
 class LoopTiming:
-    """Accounts for the time of a loop.
+    """Measures the time of a loop and its stages.
 
     A tick is `begin`, then `mark` after each stage, then `finish`.
 

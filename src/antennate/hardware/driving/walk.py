@@ -22,7 +22,7 @@ class Walk:
         self._last: float | None = None
 
     def watch(self, session: Session) -> None:
-        """Take note of a tick."""
+        """Count a tick."""
         now = session.clock.now()
         if self._last is not None and session.tally.sent > self._sent:
             self.time += now - self._last

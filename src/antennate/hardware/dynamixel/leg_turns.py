@@ -87,7 +87,7 @@ class LegTurns:
             self._left.extend(turning[turned >= 0.5 * MOST_TURNS].tolist())
 
     def step(self, goals: Floats, positions: Mapping[int, int], may_begin: bool = True) -> None:
-        """One tick's share; goals of legs that have forgotten are changed in place.
+        """Do one step of one leg; the goals of legs that were cleared are changed in place.
 
         Args:
             goals: Of all servos [ticks], shape (n,).

@@ -65,7 +65,7 @@ class ServoMonitor(ActuatorState):
             self.watchdogs = ()
 
     def step(self) -> None:
-        """One tick's share. A dead wire is noted, not raised."""
+        """Read all positions, and one servo's watchdog and torque. A bus error is kept."""
         try:
             self._look()
             self.bus_error = ""

@@ -167,7 +167,7 @@ class DeviceClock:
 
     def take(self, sample: Sample, now: float) -> SampleState:
         """Judge a sample that arrived at host's time now [s]; a USED one becomes `newest`."""
-        state = self._judge(sample, now)
+        state = self._state_of(sample, now)
         self.states[state] += 1
         return state
 
@@ -178,7 +178,7 @@ class DeviceClock:
             return math.inf
         return max(0.0, now - self._floor - 1e-6 * newest.elapsed_us)
 
-    def _judge(self, sample: Sample, now: float) -> SampleState:
+    def _state_of(self, sample: Sample, now: float) -> SampleState:
         if sample.boot_id != self._boot:
             return SampleState.OTHER_BOOT
         if sample.ticks >= self._modulus:

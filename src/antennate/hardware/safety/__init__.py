@@ -1,1 +1,1 @@
-"""What a robot that drives is judged by; the supervisor decides. Nothing here writes to a servo."""
+"""Checks of signals and servos in a drive, and the supervisor. Nothing writes to a servo."""

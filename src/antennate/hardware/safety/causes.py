@@ -1,4 +1,4 @@
-"""Why a robot is not simply well: the ladder of states, the causes, and what they need to know."""
+"""States of the supervisor, causes that ask for them, and the inputs that they follow from."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class Cause(Enum):
     FAILED = (State.HOLD, "the controller raised an exception")
     UNDECIDED = (State.HOLD, "the controller took no decision in this tick")
     BAD_ACTION = (State.HOLD, "the controller asked for what does not exist")
-    BAD_POSE = (State.HOLD, "a command of the controller was refused")
+    BAD_COMMAND = (State.HOLD, "a command of the controller was refused")
     UNKNOWN_CONTACT = (State.HOLD, "contact is not known")
     NO_RECORD = (State.HOLD, "no log is kept, and one is required")
     RELEASED = (State.HOLD, "hold a key, such as the space bar, to let it walk")
@@ -80,18 +80,18 @@ class Cause(Enum):
 
 OF_FINDING = {f: Cause[f.name] for f in Finding if f is not Finding.OK}
 DATA = frozenset({Cause.STALE, Cause.REBOOT}) | {c for f, c in OF_FINDING.items() if not f.usable}
-"""Losses of data: they end after enough fresh valid samples in a row."""
+"""Losses of data: each ends after enough fresh valid samples in a row."""
 OF_CONTROLLER = frozenset(
-    {Cause.FAILED, Cause.UNDECIDED, Cause.BAD_ACTION, Cause.BAD_POSE, Cause.UNKNOWN_CONTACT}
+    {Cause.FAILED, Cause.UNDECIDED, Cause.BAD_ACTION, Cause.BAD_COMMAND, Cause.UNKNOWN_CONTACT}
 )
-"""Causes in the controller: they end as soon as it decides well again."""
+"""Causes in the controller: each ends as soon as its decision is valid again."""
 CURED_BY_ARMING = frozenset({Cause.UNKNOWN_CONTACT, Cause.WATCHDOG, Cause.DISARMED})
-"""Causes that do not stand against an arm event."""
+"""Causes that do not prevent an arm event."""
 
 
 @dataclass(frozen=True, slots=True)
 class Inputs:
-    """What is known in one tick, after the controller had its turn.
+    """Inputs of the supervisor in one tick, after the controller's step.
 
     Attributes:
         age: Age of the newest valid sample [s]; inf if there is none.
@@ -100,11 +100,11 @@ class Inputs:
         findings: Of the left and the right channel.
         decided_at: Time at which the controller finished its newest decision [s].
         maneuver: That decision.
-        contact: What it rests on, left and right.
+        contact: The contact that it was decided on, left and right.
         bad_command: Why its command must not be sent, empty if it may.
         failure: Text of an exception of the controller in this tick, empty if none.
         resets: Restarts of the antenna board so far.
-        reset_reason: Why it last restarted, as far as it can tell.
+        reset_reason: Why it last restarted, as far as known.
         board_error: What is wrong with its port, empty if nothing is.
         missed: Answers missed in a row, by servo id; ids without any may be left out.
         servo_errors: Hardware errors in words, by servo id.
@@ -113,11 +113,11 @@ class Inputs:
         disarmed: Ids of servos that have lost their torque or their watchdog while armed.
         supply: Voltage of the supply [V], NaN if unknown.
         drift: How far resting readings have drifted, empty if not far.
-        objections: What speaks against arming, such as a failed touch check or foreign firmware.
+        objections: Reasons not to arm, such as a failed touch check or unknown firmware.
         unrecorded: Whether a record that is required is not kept.
         stop: Whether the operator wants the torque off.
         released: Whether the key that lets the robot walk is not held.
-        arm: Whether he wants it on; only the change to True in FAULT or OFF counts.
+        arm: Whether the operator wants it on; only the change to True in FAULT or OFF counts.
     """
 
     age: float

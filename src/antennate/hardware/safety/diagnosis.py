@@ -1,8 +1,8 @@
-"""State of one channel: its readings in, the counts to use and a finding out.
+"""Diagnosis of one channel: it takes readings and gives the counts to use and a finding.
 
-Nothing here reads a clock. A reading that jumps, or lies far outside the calibrated range, is bad:
-the last good one stands in for it for a few readings, so a spike changes nothing. A jump that three
-readings in a row agree on is believed. Where nothing is left to believe, the counts are NaN.
+Nothing here reads a clock. A reading that jumps, or lies far outside the calibrated range, is bad.
+The last good one replaces it for a few readings, so a spike changes nothing. A jump is accepted
+once three readings in a row agree on it. Without a reading to use, the counts are NaN.
 
 The flex sensor is the upper half of a divider, so one torn off its wire reads 0 like a short to
 ground, and both are SHORT_LO. OPEN is a pin of the converter that is connected to nothing: its
@@ -78,7 +78,13 @@ class Finding(Enum):
         """Whether contact may be decided on such a channel."""
         return self in _USABLE
 
+    @property
+    def broken(self) -> bool:
+        """Whether wire, plug or sensor has to be mended."""
+        return self in _BROKEN
 
+
+_BROKEN = {Finding.STUCK, Finding.OPEN, Finding.SHORT_LO, Finding.SHORT_HI}
 _USABLE = {Finding.OK, Finding.OUT_OF_CAL, Finding.SPIKY, Finding.SATURATED}
 
 
@@ -122,7 +128,7 @@ class Reading:
     """A reading after diagnosis.
 
     Attributes:
-        counts: Reading to use [counts]; NaN where nothing can be said.
+        counts: Reading to use [counts]; NaN where there is none.
         taken: Reading as it came [counts]; NaN if it is beyond what a flex sensor can give.
     """
 
@@ -135,7 +141,7 @@ _NOTHING = Reading(math.nan, Finding.LOST)
 
 
 class ChannelDiagnosis:
-    """Judges the readings of one antenna by its calibrated range.
+    """Diagnoses the readings of one antenna by its calibrated range.
 
     Attributes:
         reading: The newest result; LOST before the first.
@@ -161,7 +167,7 @@ class ChannelDiagnosis:
         self.reset()
 
     def reset(self) -> None:
-        """Forget all readings; the counters stay."""
+        """Forget all readings but not the counters."""
         self.reading = _NOTHING
         self._t = -math.inf
         self._raw: deque[float] = deque(maxlen=WINDOW)

@@ -1,9 +1,8 @@
 """How far the resting reading of an antenna has drifted from the calibrated one.
 
-Readings without contact hold light touches as well, but most of the time nothing bends the flex
-sensor. Their low quantile is followed in small steps, up by `speed` and down by more, so that the
-share `quantile` of them lies nearer to straight; a touch of some seconds moves it by less than its
-step.
+Readings without contact include light touches, but most of the time nothing bends the flex sensor.
+So their low quantile is followed in small steps, up by `speed` and down by more, such that the
+share `quantile` of the readings lies nearer to straight. A touch of some seconds hardly moves it.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""How many samples come per second, and whether that is what was agreed."""
+"""The rate of samples, and whether it is the expected one."""
 
 from __future__ import annotations
 

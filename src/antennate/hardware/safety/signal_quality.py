@@ -1,4 +1,4 @@
-"""What the readings of both antennae are worth: judged here, once, from the counts as they came.
+"""Quality of the readings of both antennae, from the counts as they came.
 
 A channel may be broken, beyond its calibration or at a rail (`diagnosis`), its resting reading may
 have drifted (`drift`), and before walking each antenna is touched once (`touch_check`).
@@ -20,7 +20,7 @@ _RESTING = {Finding.OK, Finding.OUT_OF_CAL}
 
 
 class SignalQuality:
-    """Judges the readings of both antennae of one robot; checks them by touch if `touch` is given.
+    """Checks the readings of both antennae of one robot, also by touch if `touch` is given.
 
     Attributes:
         channels: Diagnosis of the left and the right antenna.
@@ -59,7 +59,7 @@ class SignalQuality:
 
     @property
     def counts(self) -> list[float]:
-        """What contact may be decided on, left and right [counts]; NaN where nothing can be."""
+        """Readings for the contact decision, left and right [counts]; NaN where there is none."""
         return [channel.reading.counts for channel in self.channels]
 
     @property
@@ -70,13 +70,26 @@ class SignalQuality:
 
     @property
     def objections(self) -> tuple[str, ...]:
-        """Why not to arm, empty if nothing speaks against it."""
-        return () if self.check is None or not self.check.objection else (self.check.objection,)
+        """Reasons not to arm, empty if there is none."""
+        if self.check is None or not self.check.objection:
+            return ()
+        return (self.check.objection if self.refused else self.broken or self.check.objection,)
+
+    @property
+    def broken(self) -> str:
+        """Which antennae are broken and what to do, empty if none is."""
+        return "; ".join(
+            f"mend wire, plug or sensor of the {side} antenna, it is {finding.name}: "
+            f"{finding.value}"
+            for side, finding in zip(_SIDES, self.findings, strict=True)
+            if finding.broken
+        )
 
     @property
     def refused(self) -> bool:
-        """Whether the check has failed: to go on with it is of no use."""
-        return self.check is not None and self.check.ask is Ask.NOTHING and bool(self.objections)
+        """Whether the check has failed for good."""
+        check = self.check
+        return check is not None and check.ask is Ask.NOTHING and bool(check.objection)
 
     @property
     def drifted(self) -> str:
@@ -92,6 +105,7 @@ class SignalQuality:
         """For the status line: the check, or what the person is to do, and the drift."""
         touch = "skipped" if self.check is None else "passed"
         if self.objections and self.check is not None:
-            touch = f"({self.check.objection if self.refused else self.check.ask.value})"
+            asked = self.broken or self.check.ask.value
+            touch = f"({self.check.objection if self.refused else asked})"
         left, right = (100 * drift.share for drift in self.drifts)
         return f"touch={touch} drift={left:+.0f},{right:+.0f}%"

@@ -1,7 +1,7 @@
 """Decides in every tick whether the robot may walk, must hold, or is switched off.
 
-The most severe cause in force decides. Losses of data wait for fresh samples; a FAULT and OFF are
-latched until an arm event finds their causes gone. Nothing here reads a clock.
+The most severe cause in force decides. A loss of data ends after fresh samples. FAULT and OFF
+end only with an arm event, once their causes are gone. Nothing here reads a clock.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from antennate.types import Contact, Maneuver
 
 _ACTIONS = frozenset(Maneuver)
 _CONTACTS = frozenset({Contact.FREE, Contact.CONTACT})
-_FAILURES = frozenset({Cause.FAILED, Cause.BAD_ACTION, Cause.BAD_POSE})
+_FAILURES = frozenset({Cause.FAILED, Cause.BAD_ACTION, Cause.BAD_COMMAND})
 _SUPPLY = (Cause.SUPPLY_WARN, Cause.SUPPLY_HOLD, Cause.SUPPLY_OFF)
 
 
@@ -179,7 +179,7 @@ class Supervisor:
         elif inputs.maneuver not in _ACTIONS:
             found[Cause.BAD_ACTION] = f"maneuver {inputs.maneuver}"
         elif inputs.bad_command:
-            found[Cause.BAD_POSE] = inputs.bad_command
+            found[Cause.BAD_COMMAND] = inputs.bad_command
         elif not _CONTACTS.issuperset(inputs.contact):
             found[Cause.UNKNOWN_CONTACT] = ""
         failed = _FAILURES & found.keys()

@@ -47,7 +47,7 @@ class TouchCheck:
         return f"the antennae were not yet checked by touch, {felt}: {self.ask.value}"
 
     def step(self, left: float, right: float) -> Ask:
-        """Take the newest readings as they came [counts]; NaN if unknown. What to do next."""
+        """Take the newest readings [counts], NaN if unknown; returns what to do next."""
         if self.ask is Ask.NOTHING:
             return self.ask
         seen = self._see([b.level(c) for b, c in zip(self._bands, (left, right), strict=True)])
@@ -58,7 +58,7 @@ class TouchCheck:
         return self.ask
 
     def _see(self, levels: list[float]) -> str:
-        """What the readings say: rest, right, swapped or reversed; empty if nothing clear."""
+        """What the readings show: rest, right, swapped or reversed; empty if unclear."""
         if not all(map(math.isfinite, levels)):
             return ""
         still = [abs(level) < self._params.still for level in levels]

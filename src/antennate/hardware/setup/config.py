@@ -2,20 +2,44 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 from antennate.params.base import Params
 from antennate.params.setup import JogParams, SetupParams
-from antennate.robots.spec import RobotSpec
+from antennate.robots.spec import SIMULATION_ALONE, RobotSpec
+
+_UNREAD = (*SIMULATION_ALONE, "robot.release")
 
 
 class SetupConfig(Params):
     """The robot, and how it is set up."""
 
+    shared: ClassVar[bool] = True
+    unread: ClassVar[tuple[str, ...]] = (
+        *_UNREAD,
+        *(f"robot.{name}.directions" for name in ("yaw", "legs", "antennae", "pitch")),
+        *(f"setup.{name}" for name in ("hold", "still", "turn", "horn_teeth")),
+    )
     robot: RobotSpec = RobotSpec()
     setup: SetupParams = SetupParams()
+
+
+class ZeroConfig(SetupConfig):
+    """The robot, and how its zeros are measured."""
+
+    unread: ClassVar[tuple[str, ...]] = (
+        *_UNREAD,
+        *(f"setup.{name}" for name in ("done", "scan", "port_time")),
+    )
 
 
 class JogConfig(Params):
     """The robot, and how a joint of it is moved by keys."""
 
+    shared: ClassVar[bool] = True
+    unread: ClassVar[tuple[str, ...]] = (
+        *_UNREAD,
+        *(f"robot.{name}.fastest" for name in ("yaw", "legs", "antennae", "pitch")),
+    )
     robot: RobotSpec = RobotSpec()
     jog: JogParams = JogParams()

@@ -106,21 +106,21 @@ class Jog:
             SetupError: It does not answer any more, or reports an error.
             PortError: The bus is gone.
         """
-        said = self._bus.read(self.joint.servo, Span(126, 10))
-        if not isinstance(said, Value):
+        reply = self._bus.read(self.joint.servo, Span(126, 10))
+        if not isinstance(reply, Value):
             self._lost += 1
             if self._lost >= _LOST:
                 raise SetupError(f"expected an answer of {self.joint}, found none")
             return self._newest
         self._lost = 0
-        if said.alert:
+        if reply.alert:
             words = ", ".join(hardware_errors(self._read("hardware_error_status")))
             raise SetupError(
                 f"expected {self.joint} without an error, found: {words}; take the load off, then "
                 "switch its supply off and on"
             )
-        ticks = self._register("present_position").decode(said.data[6:])
-        load = int.from_bytes(said.data[:2], "little", signed=True)
+        ticks = self._register("present_position").decode(reply.data[6:])
+        load = int.from_bytes(reply.data[:2], "little", signed=True)
         self._newest = JogState(self._angle(ticks), self._newest.goal, ticks, load)
         return self._newest
 
@@ -149,8 +149,8 @@ class Jog:
             SetupError: The servo refused it or did not answer.
         """
         register = self._register(name)
-        said = self._bus.write(self.joint.servo, register.address, register.encode(value))
-        if not isinstance(said, Value):
+        reply = self._bus.write(self.joint.servo, register.address, register.encode(value))
+        if not isinstance(reply, Value):
             raise SetupError(
-                f"expected {self.joint} to take {name.replace('_', ' ')} {value}, found {said}"
+                f"expected {self.joint} to take {name.replace('_', ' ')} {value}, found {reply}"
             )

@@ -47,9 +47,9 @@ def confirm(person: Person, text: str) -> bool:
         BadInputError: No answer can come.
     """
     while True:
-        said = person.ask(f"{text} [Enter; s leaves it out, q ends]")
-        if said in ("q", "quit"):
+        answer = person.ask(f"{text} [Enter; s leaves it out, q ends]")
+        if answer in ("q", "quit"):
             raise Quit
-        if said in ("", "s", "skip"):
-            return not said
-        person.say(f"expected Enter, s or q, found {said[:20]!r}")
+        if answer in ("", "s", "skip"):
+            return not answer
+        person.say(f"expected Enter, s or q, found {answer[:20]!r}")

@@ -102,7 +102,7 @@ class ServoSetup:
             BringUpError: It did not take a value.
             PortError: The port is gone or cannot be opened.
         """
-        baud, servo = self._only()
+        baud, servo = self.alone()
         if servo.state != "ok":
             raise SetupError(f"expected one servo alone, found {_STATES[servo.state]}")
         if servo.model != joint.model:
@@ -121,7 +121,7 @@ class ServoSetup:
         self._verify(joint)
         return changes
 
-    def _only(self) -> tuple[int, Present]:
+    def alone(self) -> tuple[int, Present]:
         """The one servo on the bus and its speed.
 
         Raises:

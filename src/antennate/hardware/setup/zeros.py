@@ -89,9 +89,9 @@ class Positions:
         """
         while True:
             answers = self._bus.read_all(self._ids, POSITION, _BUDGET)
-            for servo, said in answers.items():
-                if isinstance(said, Value):
-                    self._newest[servo] = XC430_W240["present_position"].decode(said.data)
+            for servo, reply in answers.items():
+                if isinstance(reply, Value):
+                    self._newest[servo] = XC430_W240["present_position"].decode(reply.data)
                     self._missed[servo] = 0
                 else:
                     self._missed[servo] += 1
@@ -138,9 +138,9 @@ class Zeroing:
     def _wait_for_enter(self, person: Person) -> None:
         for now in self._positions:
             person.show(self._all(now))
-            if (said := person.answer()) in ("q", "quit"):
+            if (answer := person.answer()) in ("q", "quit"):
                 raise Quit
-            if said is not None:
+            if answer is not None:
                 return
 
     def _taken(self) -> list[int]:
@@ -207,10 +207,10 @@ class Zeroing:
         """The direction of one joint, 0 to keep it, None to keep the rest as well."""
         name, told = self._names[at], at
         for now in self._positions:
-            if (said := person.answer()) is not None:
-                if said in ("q", "quit"):
+            if (answer := person.answer()) is not None:
+                if answer in ("q", "quit"):
                     raise Quit
-                return None if said.startswith("r") else 0
+                return None if answer.startswith("r") else 0
             moved = (now - before) * _STEP
             person.show(f"{name}: {now[at]} ticks, moved {math.degrees(moved[at]):+6.1f} deg")
             if abs(moved[at]) >= self._params.turn:

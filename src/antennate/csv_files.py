@@ -1,0 +1,100 @@
+"""CSV files that people bring: with commas, points as decimal marks, and names of columns first."""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from antennate.errors import BadInputError
+from antennate.files import decoded
+from antennate.messages import shortened
+
+_SEPARATORS = {";": "semicolons", "\t": "tabs", "|": "bars", " ": "spaces"}
+"""What may stand between columns in place of commas."""
+_DECIMAL_COMMA = re.compile(r"\s*[+-]?\d+,\d+\s*")
+Row = tuple[int, list[str]]
+"""Number of the line in which a row ends, and its cells."""
+
+
+def csv_rows(
+    path: Path, data: bytes, needed: Sequence[str], error: type[BadInputError], cure: str = ""
+) -> Iterator[Row]:
+    """The rows of a file that are not empty, the names of the columns first; any line ends.
+
+    Args:
+        path: The file, for messages.
+        data: Its content.
+        needed: Columns that have to be there.
+        error: What is raised.
+        cure: What is said if a column is missing.
+
+    Raises:
+        BadInputError: Of the given type: it is no CSV, or lacks a column.
+    """
+    if not data:
+        raise error(
+            f"{path}: row 1: expected a header with {', '.join(needed)}, found an empty file"
+        )
+    try:
+        text = decoded(path, data, error)
+    except BadInputError as cause:
+        raise error(f"{cause}; save it as CSV in UTF-8") from None
+    reader = csv.reader(io.StringIO(text, newline=None))
+    try:
+        header = [name.strip() for name in next(reader, [])]
+        _check_header(path, header, needed, error, cure)
+        yield reader.line_num, header
+        for cells in reader:
+            if cells:
+                yield reader.line_num, cells
+    except csv.Error as cause:
+        raise error(f"{path}: row {reader.line_num}: expected CSV, found {cause}") from None
+
+
+def number_of(cell: str) -> float:
+    """The number of a cell, NaN if it holds none.
+
+    Raises:
+        ValueError: It has a comma as decimal mark.
+    """
+    if _DECIMAL_COMMA.fullmatch(cell):
+        raise ValueError("a point as decimal mark")
+    try:
+        return float(cell)
+    except ValueError:
+        return float("nan")
+
+
+def _check_header(
+    path: Path, header: list[str], needed: Sequence[str], error: type[BadInputError], cure: str
+) -> None:
+    missing = [name for name in needed if name not in header]
+    if not missing:
+        return
+    line = ",".join(header)
+    other = next((what for mark, what in _SEPARATORS.items() if mark in line), None)
+    if "\0" in line:
+        why = "UTF-8 text, found a zero byte; save it as CSV in UTF-8"
+    elif line.startswith("#"):
+        why = f"the names of the columns, found a comment, {shortened(line)}; delete that row"
+    elif header and all(map(_is_number, header)):
+        wanted = ", ".join(needed)
+        why = f"the names of the columns, such as {wanted}, found numbers; add that row"
+    elif len(header) == 1 and other is not None:
+        why = f"columns separated by commas, and points as decimal marks, found {other}"
+    else:
+        found = shortened(", ".join(header)) if line else "nothing"
+        why = f"a column {missing[0]}, found {found}{cure}"
+    raise error(f"{path}: row 1: expected {why}")
+
+
+def _is_number(cell: str) -> bool:
+    """Whether every part of a cell is a number, whatever stands between them."""
+    parts = re.split(r"[;\t| ]+", cell.replace(",", "."))
+    try:
+        return bool([float(part) for part in parts if part])
+    except ValueError:
+        return False

@@ -1,0 +1,94 @@
+"""The shipped `drive` before the shipped `twin`, whatever happens: all of it in the slow tier."""
+
+from __future__ import annotations
+
+import os
+import random
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from antennate.studies.run_directory import RunDirectory
+
+FOLDER = Path(__file__).parents[1] / "benchmarks"
+RUNS = 20
+"""Runs of each case, each broken at another moment."""
+
+
+@pytest.fixture(scope="module")
+def cases() -> Any:
+    if not FOLDER.is_dir():
+        pytest.skip("benchmarks are not part of this copy")
+    sys.path.insert(0, str(FOLDER))
+    try:
+        import drive_faults  # type: ignore[import-not-found]
+
+        return drive_faults
+    finally:
+        sys.path.remove(str(FOLDER))
+
+
+def as_documented(cases: Any, case: str) -> None:
+    found = [cases.once(case, random.Random(f"slow {case} {n}")) for n in range(RUNS)]
+    assert [one for one in found if not one["as_documented"]] == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("case", ["nothing", "board reset", "board replugged"])
+def test_E1_L12_a_board_that_comes_back_ends_no_drive(cases: Any, case: str) -> None:
+    as_documented(cases, case)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("case", ["bus replugged", "bus silent"])
+def test_B6_a_lost_bus_is_a_fault_and_its_servos_are_named(cases: Any, case: str) -> None:
+    as_documented(cases, case)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "case",
+    ["servo silent", "servo reboots", "servo overloaded", "servo 50 ms late", "servo bad CRC"],
+)
+def test_B1_B3_B11_B12_one_bad_servo_is_a_fault_that_names_it(cases: Any, case: str) -> None:
+    as_documented(cases, case)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("case", ["BER 1e-5", "BER 1e-4", "BER 1e-3", "BER 1e-2"])
+def test_L1_wrong_bits_on_both_wires(cases: Any, case: str) -> None:
+    as_documented(cases, case)
+
+
+@pytest.mark.slow
+def test_B13_a_supply_that_sags(cases: Any) -> None:
+    as_documented(cases, "supply sags 1 V/s")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("case", ["SIGINT", "SIGTERM", "SIGQUIT", "SIGHUP"])
+def test_B19_signals_end_it_in_order(cases: Any, case: str) -> None:
+    as_documented(cases, case)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("case", ["SIGKILL", "SIGSTOP"])
+def test_B7_T5_a_program_that_is_killed_or_stands_still(cases: Any, case: str) -> None:
+    as_documented(cases, case)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(os.geteuid() != 0, reason="needs root to mount a small disk")
+def test_G4_a_full_disk_costs_the_log_and_not_the_result(cases: Any) -> None:
+    as_documented(cases, "full disk")
+
+
+def test_G4_room_for_the_result_is_kept_while_a_robot_is_driven(tmp_path: Path) -> None:
+    with RunDirectory.create("drive", tmp_path / "run") as folder:
+        folder.without_trials()
+        kept = [path.stat().st_size for path in folder.path.iterdir()]
+        folder.finish({"schema": 1})
+        assert [path.name for path in folder.path.iterdir()] == ["result.json"]
+    assert sum(kept) >= 2**16

@@ -1,0 +1,196 @@
+"""Actuated pitch joints and lifting legs: what our gait does with them, and what it refuses."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from driven_rig import driven, simulated_alike
+
+from antennate.cli import BAD_INPUT, OK, main
+from antennate.control.gait import Gait
+from antennate.control.registry import BUILT_IN, CONTROLLERS, make_controller
+from antennate.errors import ConfigError
+from antennate.experiments.gait.run import GaitStudyConfig, walk_flat
+from antennate.experiments.tunnel.run import TunnelConfig
+from antennate.params import ControlParams, GaitParams, PhysicsParams
+from antennate.robots.spec import RobotSpec
+from antennate.sim.scenes.scene import FlatScene
+from antennate.sim.sim_robot import SimRobot
+from antennate.sim.trial import make_world, place_at_start
+from antennate.types import AntennaFrame, Bools, Floats, Ints, JointCommand, Maneuver
+
+NODDING = RobotSpec.model_validate({"pitch": {"kind": "actuated"}})
+LIFTING = RobotSpec.model_validate({"links": 3, "legs": {"kind": "lifting"}})
+REFUSED = "expected rolling legs for the gait of antennate, found lifting legs"
+
+
+class Lift:
+    """Presses all legs down by 0.3 rad and commands the pitch joints, where there are any."""
+
+    pitch = 0.0
+
+    def __init__(self, control: ControlParams, robot: RobotSpec, batch: int) -> None:
+        self._command = JointCommand(
+            yaw=np.zeros((batch, robot.yaw_count)),
+            leg=np.full((batch, robot.links, 2), -0.3),
+            antenna=np.zeros((batch, 2)),
+            pitch=np.full((batch, robot.pitch_count), self.pitch),
+        )
+        self.maneuver = np.zeros(batch, dtype=int)
+        self.contact = np.zeros((batch, 2), dtype=int)
+        self.level = np.zeros((batch, 2))
+
+    def reset(self, rows: Ints | Bools, phase: Floats | float = 0.0) -> None:
+        """Nothing is remembered."""
+
+    def step(self, frame: AntennaFrame) -> JointCommand:
+        """Always the same command."""
+        self.maneuver = np.where(np.isnan(frame.t), int(Maneuver.HOLD), int(Maneuver.FORWARD))
+        return self._command
+
+
+def speed(walk: Any) -> float:
+    """Speed of the middle of the robot over the last gait cycle [m/s]."""
+    last = walk.t >= walk.t[-1] - 1.0 / walk.gait.frequency
+    there, here = walk.centre[last][-1], walk.centre[last][0]
+    return float(np.linalg.norm(there - here) / np.ptp(walk.t[last]))
+
+
+def test_actuated_pitch_joints_are_commanded_level_in_every_maneuver() -> None:
+    gait = Gait(GaitParams(), NODDING, 3, 0.01)
+    for maneuver in Maneuver:
+        command = gait.step(np.full(3, int(maneuver)))
+        assert command.pitch.shape == (3, 5)
+        assert not command.pitch.any()
+
+
+def test_a_robot_with_actuated_pitch_walks_level_and_as_fast_as_a_locked_one(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    config = GaitStudyConfig(cycles=2, settling_cycles=1)
+    locked = walk_flat(config, "locked", config.gait, Maneuver.FORWARD)
+    pitch: list[Floats] = []
+    write = SimRobot.write
+
+    def watched(robot: SimRobot, command: JointCommand) -> None:
+        pitch.append(robot.world(0).drives()[-NODDING.pitch_count :].copy())
+        write(robot, command)
+
+    monkeypatch.setattr(SimRobot, "write", watched)
+    config = GaitStudyConfig(cycles=2, settling_cycles=1, robot=NODDING)
+    moved = walk_flat(config, "actuated", config.gait, Maneuver.FORWARD)
+    angles = np.array(pitch)
+    assert angles.shape[1] == 5
+    assert np.abs(angles).max() < 0.1  # they give way a little under the legs' load
+    assert np.ptp(angles, axis=0).min() > 1e-6  # each one is free to
+    assert speed(moved) == pytest.approx(speed(locked), rel=0.1)
+
+
+def test_actuated_pitch_is_driven_through_bytes_as_in_simulation() -> None:
+    config = TunnelConfig(robot=NODDING)
+    one = driven(config, "closed", 0, 60)
+    other = simulated_alike(config, "closed", 0, one.start, 60)
+    assert len(one.walk.commands) == 60
+    assert one.walk.commands == other.commands
+    assert one.walk.readings == other.readings
+    middle = one.walk.goals[-1][-NODDING.pitch_count :]
+    assert middle == (2048,) * 5  # level, half a turn of the servo
+
+
+@pytest.mark.parametrize("name", BUILT_IN)
+def test_our_controllers_refuse_legs_that_they_have_no_step_for(name: str) -> None:
+    with pytest.raises(ConfigError, match=REFUSED):
+        make_controller(name, robot=LIFTING)
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["tunnel", "--trials", "1", "--workers", "1"],
+        ["gait", "--workers", "1"],
+        ["drive", "--esp32", "/dev/null", "--bus", "/dev/zero"],
+        ["teleop", "--esp32", "/dev/null", "--bus", "/dev/zero"],
+    ],
+)
+def test_commands_refuse_them_in_one_line_and_leave_nothing(
+    words: list[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main([*words, "--robot.legs.kind", "lifting"]) == BAD_INPUT
+    shown = capsys.readouterr()
+    assert (shown.out, shown.err.count("\n")) == ("", 1)
+    assert REFUSED in shown.err
+    assert "docs/controllers.md" in shown.err
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_controller_of_ones_own_stands_on_lifting_legs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setitem(CONTROLLERS.added, "lift", Lift)
+    words = ["--robot.links", "3", "--robot.legs.kind", "lifting", "--time-limit", "1"]
+    words += ["--trials", "2", "--workers", "1", "--no-figures", "--out", str(tmp_path / "run")]
+    assert main(["tunnel", "--controllers", "lift", *words]) == OK
+    assert "lift 0 of 2" in capsys.readouterr().out
+    one = driven(TunnelConfig(robot=LIFTING), "lift", 0, 60)
+    assert len(one.walk.commands) == 60  # it was armed, and obeyed
+    ticks = round(-0.3 * 4096 / math.tau)
+    assert one.walk.goals[-1][2:8] == pytest.approx((2048 + ticks,) * 6, abs=1)
+
+
+class Nod(Lift):
+    """Commands all pitch joints to 0.2 rad."""
+
+    pitch = 0.2
+
+
+def test_actuated_pitch_joints_move_to_where_they_are_commanded() -> None:
+    scene = FlatScene().draw(NODDING, np.random.default_rng(0))
+    world = make_world(PhysicsParams(), NODDING, scene)
+    place_at_start(world, scene, GaitParams())
+    before = world.drives()[-5:].copy()
+    nod = Nod(ControlParams(), NODDING, 1)
+    command = nod.step(AntennaFrame(t=np.zeros(1), counts=np.zeros((1, 2))))
+    world.command(np.concatenate([getattr(command, n).ravel() for n in NODDING.command_shapes()]))
+    world.step(1000)
+    assert before == pytest.approx(np.zeros(5))
+    assert (world.drives()[-5:] > 0.04).all()  # the weight of the robot keeps them from 0.2
+
+
+def test_pitch_joints_get_their_commands_through_bytes(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(CONTROLLERS.added, "nod", Nod)
+    one = driven(TunnelConfig(robot=NODDING), "nod", 0, 60)
+    assert one.walk.goals[-1][-5:] == pytest.approx((2048 + 130,) * 5, abs=1)
+
+
+class Broken(Lift):
+    """Answers what is no angle."""
+
+    def step(self, frame: AntennaFrame) -> JointCommand:
+        """NaN for the first joint."""
+        command = super().step(frame)
+        command.yaw[:, 0] = np.nan
+        return command
+
+
+def test_a_controller_without_a_valid_trial_ends_the_command_with_exit_code_2(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setitem(CONTROLLERS.added, "broken", Broken)
+    words = ["--trials", "2", "--workers", "1", "--time-limit", "0.2", "--no-figures"]
+    out = tmp_path / "run"
+    found = main(["tunnel", "--controllers", "broken", "open", *words, "--out", str(out)])
+    assert found == BAD_INPUT
+    last = capsys.readouterr().out.strip().splitlines()[-1]
+    assert "open 0 of 2" in last
+    assert "broken 0 of 0" not in last
+    assert "No trial of broken is valid: controller: expected finite angles in yaw" in last
+    assert len((out / "trials.csv").read_text().splitlines()) == 5
+    assert (out / "result.json").exists()

@@ -1,0 +1,350 @@
+"""No command of the robot accepts a parameter that it does not read.
+
+Each command's own code runs before the twin, all but `twin` in invented time, with a configuration
+that records which of its parameters are read.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from doctor_rig import Patient
+from log_ticks import HEADER
+from recorded import act, leaves, recorded
+from setup_rig import Box, Script
+from worlds import recorded as logged
+from worlds import simulated
+
+from antennate.cli import doctor, drive, jog, main, record, replay, setup, teleop, twin, zero
+from antennate.control.registry import BUILT_IN
+from antennate.hardware.driving.config import DriveConfig
+from antennate.hardware.driving.connect import prepare
+from antennate.hardware.driving.drive import drive as walk
+from antennate.hardware.driving.session import Session
+from antennate.hardware.driving.teleop import TeleopConfig
+from antennate.hardware.esp32.recorder import RecordConfig
+from antennate.hardware.ports.finder import finder
+from antennate.hardware.robot import DoctorConfig
+from antennate.hardware.robot_file import RobotFile
+from antennate.hardware.setup.config import JogConfig, SetupConfig, ZeroConfig
+from antennate.hardware.setup.servos import ServoSetup, joints_of
+from antennate.params import NetworkParams, Params
+from antennate.params.reading import read_file
+from antennate.robots.spec import RobotSpec
+from antennate.studies.run_directory import RunDirectory
+from antennate.telemetry.replay import ReplayConfig
+from antennate.twin.config import TwinConfig, build
+from antennate.twin.faults import Faults, read
+from antennate.twin.lockstep import BoardPort, LockstepClock, SimulatedWire
+
+Patch = pytest.MonkeyPatch
+PORTS = {"bus": "the bus", "esp32": "the board"}
+FAULTS = {  # by the number of its readings; with 5 the ports are swapped
+    3: ("servo:7=return_delay_time:250",),
+    4: ("esp32=silent", "servo:1=silent"),
+    5: (),
+}
+ELSEWHERE = {"sensor_id_right", "robot.legs.limit"}  # own calibration; controllers that lift legs
+REPLACED = {"controller"}  # `teleop` walks by keys in its place
+SHORT = {"dry_run": 0.1, "duration": 0.5, "stand": 0.1}
+DRIFTING = {"control": {"rate": 25.0}, "drift": {"band": 0.02, "speed": 1.0}}
+PITCHING = {"pitch": {"kind": "actuated"}}
+LIFTING = {"legs": {"kind": "lifting"}, **PITCHING}
+
+
+def reach(network: NetworkParams) -> None:
+    """Open a board's port on the network."""
+    finder("udp://127.0.0.1:9", 0, "", b"", network)().close()
+
+
+def fresh(robot: RobotSpec) -> RobotSpec:
+    """The same robot, for what stands before the command; nobody notes what is read of it."""
+    return RobotSpec.model_validate(robot.model_dump())
+
+
+def told(patch: Patch, module: Any, config: Params, path: Path | None = None, **orders: Any) -> int:
+    """Run a command with a configuration and orders, in place of words."""
+    given = config, module.Orders(**orders)
+    if path is None:
+        patch.setattr(module, "parse_robot", lambda *_: given)
+    else:
+        patch.setattr(module, "parse_writer", lambda *_, **__: (*given, path))
+    return module.command([])
+
+
+def connected(**of_twin: Any) -> Callable[..., Any]:
+    """In place of `connect`: a twin in lock-step, with a fault."""
+    fault = of_twin.pop("fault", None)
+
+    @contextlib.contextmanager
+    def connect(config: DriveConfig, *_: Any) -> Iterator[Session]:
+        reach(config.network)
+        robot = build(TwinConfig(robot=fresh(config.robot), **of_twin))
+        clock = LockstepClock(robot)
+        session = prepare(config, BoardPort(robot, clock), clock, clock)
+        if fault:
+            Faults([read(fault)], config.robot.ids).apply(robot, robot.t)
+        yield session
+
+    return connect
+
+
+def driven(patch: Patch, module: Any, config: DriveConfig, out: Path, **of_twin: Any) -> None:
+    patch.setattr(drive, "Header", lambda **_: HEADER)
+    patch.setattr(RunDirectory, "describe", lambda *_: None)
+    patch.setattr(drive, "connect", connected(**of_twin))
+    patch.setattr(drive, "pressed_keys", lambda _: contextlib.nullcontext(lambda: True))
+    told(patch, module, config, arm=True, out=out, **PORTS)
+    for name in BUILT_IN if module is drive and config.control.rate < 100.0 else ():
+        act(name, config.control, config.robot)
+
+
+def run_drive(patch: Patch, config: DriveConfig, tmp_path: Path) -> None:
+    if config.touch_check:
+        weak, touch = {"voltage": 10.5}, ("left@0.6s", "right@2.4s")
+        fault = "bus=discharge:0.01"
+        driven(patch, drive, config, tmp_path / "1", battery=weak, touch=touch, fault=fault)
+    else:
+        driven(patch, drive, config, tmp_path / "2", fault="bus=silent")
+
+
+def run_teleop(patch: Patch, config: TeleopConfig, tmp_path: Path) -> None:
+    patch.setattr(teleop, "typed_keys", lambda: contextlib.nullcontext(lambda _: ["w", "o"]))
+    touch = ("left@0.6s", "right@2.4s")
+    fault = "bus=discharge:0.01" if config.touch_check else "bus=silent"
+    driven(patch, teleop, config, tmp_path, battery={"voltage": 10.5}, touch=touch, fault=fault)
+
+
+def run_doctor(patch: Patch, config: DoctorConfig, tmp_path: Path) -> None:
+    patient = Patient(*FAULTS[config.doctor.reads])
+
+    def opener(address: str, flag: str, key: object = None, network: Any = None) -> Any:
+        if network is not None:
+            reach(network)
+        return patient.bus if (flag == "--bus") == (config.doctor.reads < 5) else patient.esp32
+
+    patch.setattr(doctor, "opener_of", opener)
+    patch.setattr(doctor, "HostClock", lambda: patient.clock)
+    told(patch, doctor, config, fix=True, yes=True, **PORTS)
+
+
+def run_record(patch: Patch, config: RecordConfig, tmp_path: Path) -> None:
+    patient = Patient()
+
+    def opener(address: str, flag: str, key: object, network: NetworkParams) -> Any:
+        reach(network)
+        return patient.esp32
+
+    enters = tmp_path / "enters"
+    enters.write_text("\n" * 20)
+    patch.setattr(record, "opener_of", opener)
+    patch.setattr(record, "HostClock", lambda: patient.clock)
+    with enters.open() as stdin, pytest.MonkeyPatch.context() as inner:
+        inner.setattr("sys.stdin", stdin)
+        told(patch, record, config, esp32="the board", out=tmp_path / "recording.csv")
+
+
+class Waiting:
+    """The time of a wire, for who sleeps until a time."""
+
+    def __init__(self, wire: SimulatedWire) -> None:
+        self._wire, self.now = wire, wire.now
+
+    def sleep_until(self, t: float) -> None:
+        self._wire.sleep(t - self._wire.now())
+
+
+def boxed(patch: Patch, module: Any, robot: RobotSpec, ready: bool) -> Box:
+    """A box of servos on the bus of a command."""
+    robot = fresh(robot)
+    box = Box(robot)
+    for joint in joints_of(robot) if ready else ():
+        box.plug(joint.name)
+        ServoSetup(box.opener, robot, 0.02, box.wire.now).set_up(joint, ())
+    box.plug_all()
+    patch.setattr(module, "opener_of", lambda *_: box.opener)
+    patch.setattr(module, "HostClock", lambda: Waiting(box.wire))
+    return box
+
+
+def run_setup(patch: Patch, config: SetupConfig, tmp_path: Path) -> None:
+    box = boxed(patch, setup, config.robot, ready=False)
+    steps = [(rf"servo of {n} ", lambda n=n: box.plug(n), "") for n in box.servos]
+    script = Script([*steps, ("whole|connect all", box.plug_all, "")])
+    patch.setattr(script, "close", lambda: None, raising=False)
+    patch.setattr(setup, "TerminalPerson", lambda: script)
+    patch.setattr(setup.ports, "find_port", lambda *_: "the bus")
+    told(patch, setup, config, tmp_path / "robot.toml")
+
+
+def run_zero(patch: Patch, config: ZeroConfig, tmp_path: Path) -> None:
+    box = boxed(patch, zero, config.robot, ready=True)
+    turned = [
+        (rf": {n}: ", lambda s=s: s.place(s.position + 300), None) for n, s in box.servos.items()
+    ]
+    script = Script([("straight", None, ""), *turned])
+    patch.setattr(script, "close", lambda: None, raising=False)
+    patch.setattr(zero, "TerminalPerson", lambda: script)
+    told(patch, zero, config, tmp_path / "robot.toml", bus="the bus")
+
+
+def run_jog(patch: Patch, config: JogConfig, tmp_path: Path) -> None:
+    boxed(patch, jog, config.robot, ready=True)
+    keys = iter("++-q")
+    typed = contextlib.nullcontext(lambda _: [next(keys)])
+    patch.setattr(jog, "typed_keys", lambda: typed)
+    told(patch, jog, config, Path("robot.toml"), bus="the bus")
+
+
+def run_replay(patch: Patch, config: ReplayConfig, tmp_path: Path) -> None:
+    log = logged(simulated(tmp_path, "paper", 0), tmp_path / "log", 20)
+    patch.setattr(replay, "parse", lambda *_: (config, replay.Options(log=str(log))))
+    replay.command([])
+
+
+def run_twin(patch: Patch, config: TwinConfig, tmp_path: Path) -> None:
+    patch.setattr(twin, "parse", lambda *_: (config, twin.Places()))
+    twin.command([])
+    if config.factory or config.scene == "flat":
+        return
+    robot = build(config)
+    clock = LockstepClock(robot)
+    orders = DriveConfig(
+        dry_run=0.1, duration=0.3, touch_check=False, robot=fresh(config.robot), stand=0.0
+    )
+    walk(prepare(orders, BoardPort(robot, clock), clock, clock), orders, arm=True)
+
+
+RUNS: dict[str, tuple[type[Params], Callable[..., None], list[dict[str, Any]]]] = {
+    "drive": (
+        DriveConfig,
+        run_drive,
+        [
+            {
+                **SHORT,
+                "hold_to_run": True,
+                "control": {"rate": 25.0},
+                "drift": {"band": 0.02, "speed": 1.0},
+            },
+            {
+                **SHORT,
+                "touch_check": False,
+                "bus_return": 0.1,
+                "fault_time": 0.1,
+                "robot": PITCHING,
+            },
+        ],
+    ),
+    "teleop": (
+        TeleopConfig,
+        run_teleop,
+        [
+            {
+                **SHORT,
+                "control": {"rate": 25.0},
+                "controller": "open",
+                "drift": {"band": 0.02, "speed": 1.0},
+            },
+            {**SHORT, "controller": "open", "touch_check": False, "robot": PITCHING},
+        ],
+    ),
+    "doctor": (
+        DoctorConfig,
+        run_doctor,
+        [{"doctor": {"reads": n}, "robot": LIFTING if n == 4 else {}} for n in FAULTS],
+    ),
+    "record": (
+        RecordConfig,
+        run_record,
+        [
+            {"marks": [0.0, 1.0], "hold": 0.05, "passes": 1},
+            {"speed": 0.5, "passes": 1},
+            {"duration": 0.1},
+        ],
+    ),
+    "setup": (
+        SetupConfig,
+        run_setup,
+        [{"setup": {"scan": 0.02}}, {"setup": {"scan": 0.02}, "robot": LIFTING}],
+    ),
+    "zero": (ZeroConfig, run_zero, [{}, {"robot": LIFTING}]),
+    "jog": (JogConfig, run_jog, [{}, {"robot": LIFTING}]),
+    "replay": (ReplayConfig, run_replay, [{}]),
+    "twin": (
+        TwinConfig,
+        run_twin,
+        [
+            {"duration": 0.1, "fault": ["bus=discharge:0.01"]},
+            {
+                "duration": 0.05,
+                "scene": "flat",
+                "robot": {
+                    **LIFTING,
+                    "yaw": {"servo": "xl330_m288"},
+                    "antenna": {"sensor": {"kind": "fsr"}},
+                },
+            },
+            {"duration": 0.05, "factory": True},
+        ],
+    ),
+}
+
+
+@pytest.mark.parametrize("command", RUNS)
+def test_every_parameter_of_a_command_of_the_robot_is_read_or_refused(
+    command: str, tmp_path: Path, monkeypatch: Patch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    model, run, settings = RUNS[command]
+    found: set[str] = set()
+    for at, values in enumerate(settings):
+        config = model.model_validate(values).model_copy(deep=True)
+        (folder := tmp_path / str(at)).mkdir()
+        with recorded(config) as seen, contextlib.redirect_stdout(io.StringIO()):
+            run(monkeypatch, config, folder)
+        found |= seen
+    every = set(leaves(model))
+    assert every - found - ELSEWHERE == set(model.unread) - REPLACED
+    assert set(model.unread) <= every
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["doctor", "--robot.mass", "5"],
+        ["drive", "--robot.leg-friction=0.5"],
+        ["teleop", "--robot.servos.xc430-w240.stall-torque", "1"],
+        ["teleop", "--controller", "open"],
+        ["doctor", "--control.gait.frequency", "0.4"],
+        ["setup", "--setup.horn-teeth", "20"],
+        ["zero", "--setup.scan", "1"],
+        ["jog", "--robot.antenna.length", "0.1"],
+        ["twin", "--control.gait.frequency", "0.4"],
+    ],
+)
+def test_a_flag_that_is_not_read_is_refused(
+    words: list[str], tmp_path: Path, monkeypatch: Patch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(words) == 2
+    err = capsys.readouterr().err
+    assert f"expected a parameter that {words[0]} reads, found this one" in err
+    assert err.count("\n") == 1
+
+
+def test_the_file_of_a_robot_may_hold_what_a_command_does_not_read(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "robot.toml"
+    file.write_text('controller = "paper"\n[robot]\nmass = 3.0\n[control.gait]\nfrequency = 0.4\n')
+    for command in ("doctor", "drive", "teleop", "jog", "zero", "setup", "record"):
+        assert main([command, "--config", str(file), "--no-such-flag"]) == 2
+        assert "--no-such-flag" in capsys.readouterr().err
+    known = read_file(file, RobotFile)
+    assert known.for_doctor().control.gait.frequency == known.for_teleop().control.gait.frequency
+    assert known.for_drive().robot.mass == known.for_jog().robot.mass == 3.0

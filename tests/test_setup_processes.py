@@ -1,0 +1,98 @@
+"""`setup`, `zero`, `jog` and `teleop` as processes: keys from a terminal, scripts, and no input."""
+
+from __future__ import annotations
+
+import os
+import pty
+import re
+import subprocess
+import time
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from first_hour import ANTENNATE, FactoryTwin
+
+SMALL = ["--robot.links", "2"]
+"""Seven servos: one yaw joint, four legs, two antennae."""
+
+
+@pytest.fixture(scope="module")
+def twin(tmp_path_factory: pytest.TempPathFactory) -> Iterator[FactoryTwin]:
+    words = ["twin", *SMALL, "--scene", "flat", "--orders", "-"]
+    with FactoryTwin(words, tmp_path_factory.mktemp("twin")) as made:
+        yield made
+
+
+def ran(words: list[str], folder: Path, said: str = "") -> subprocess.CompletedProcess[str]:
+    """A command whose standard input holds this and no more."""
+    return subprocess.run(
+        [*ANTENNATE, *words], input=said, capture_output=True, text=True, check=False, cwd=folder
+    )
+
+
+@pytest.mark.parametrize("command", ["setup", "zero", "teleop"])
+def test_without_input_it_ends_with_one_plain_line(
+    command: str, twin: FactoryTwin, tmp_path: Path
+) -> None:
+    ports = ["--bus", twin.paths["bus"]] if command != "setup" else ["--among", "none/*"]
+    ports += ["--esp32", twin.paths["esp32"]] if command == "teleop" else []
+    run = ran([command, *ports, *SMALL], tmp_path)
+    assert run.returncode == 2
+    *_, last = run.stderr.strip().splitlines()
+    assert re.match(rf"antennate {command}: error: expected .*found the end of the input", last)
+    assert "Traceback" not in run.stderr
+    assert not (tmp_path / "robot.toml").exists()
+
+
+@pytest.mark.slow
+def test_zero_takes_a_script_and_keeps_what_else_is_in_the_file(
+    twin: FactoryTwin, tmp_path: Path
+) -> None:
+    file = tmp_path / "robot.toml"
+    file.write_text(f'# mine\n[ports]\nbus = "{twin.paths["bus"]}"\n[robot]\nlinks = 2\n')
+    twin.order("push all=0deg")
+    time.sleep(0.8)
+    run = ran(["zero"], tmp_path, "\nr\n")
+    assert run.returncode == 0, run.stderr
+    text = file.read_text()
+    assert text.startswith("# mine\n[ports]\n")
+    robot = tomllib.loads(text)["robot"]
+    assert [abs(zero - 2048) <= 1 for zero in robot["yaw"]["zeros"]] == [True]
+    assert robot["legs"]["directions"] == [1, 1, 1, 1]
+    assert "yaw 2048  legs" in run.stderr
+
+
+def test_jog_takes_keys_from_a_terminal_and_gives_it_back(twin: FactoryTwin) -> None:
+    master, slave = pty.openpty()
+    words = ["jog", "--bus", twin.paths["bus"], *SMALL, "--joint", "antenna_l_base"]
+    with subprocess.Popen(
+        [*ANTENNATE, *words], stdin=slave, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE
+    ) as process:
+        os.close(slave)
+        assert process.stderr is not None
+        text = process.stderr.readline().decode()
+        for key in (b"+", b"\x1b[C", b"+", b"+"):
+            os.write(master, key)
+        end = time.monotonic() + 30.0
+        while "goal   +11.5 deg" not in text or not re.search(r"base:   \+1[01]\.\d deg", text):
+            assert time.monotonic() < end, text
+            text = process.stderr.readline().decode()
+        os.write(master, b"q")
+        assert process.wait(30) == 0
+        assert process.stderr.read().decode().endswith("torque is off, verified\n")
+    os.close(master)
+
+
+@pytest.mark.slow
+def test_jog_takes_a_script_and_refuses_a_joint_that_is_none(
+    twin: FactoryTwin, tmp_path: Path
+) -> None:
+    bus = ["--bus", twin.paths["bus"], *SMALL]
+    run = ran(["jog", *bus, "--joint", "antenna_r_base"], tmp_path, "+++")
+    assert run.returncode == 0
+    assert re.search(r"goal    \+8\.6 deg", run.stderr)
+    run = ran(["jog", *bus, "--joint", "yaw2"], tmp_path)
+    assert run.returncode == 2
+    assert "expected a joint of the robot (did you mean yaw1?), one of yaw1, leg_l0" in run.stderr
