@@ -48,9 +48,11 @@ def paths_of(model: type[Params], path: str) -> tuple[str, ...]:
     """Every parameter of a group that stands at a dotted path."""
     found: list[str] = []
     for name, field in model.model_fields.items():
-        kind = field.annotation
-        deeper = isinstance(kind, type) and issubclass(kind, Params)
-        found += paths_of(kind, f"{path}.{name}") if deeper else (f"{path}.{name}",)
+        kind, deeper = field.annotation, f"{path}.{name}"
+        if isinstance(kind, type) and issubclass(kind, Params):
+            found += paths_of(kind, deeper)
+        else:
+            found.append(deeper)
     return tuple(found)
 
 
