@@ -127,7 +127,7 @@ def test_the_door_opens_without_heavy_imports():
         (["tunnel", "stray"], ["expected flags only", "'stray'"]),
         (["tunnel", "--trials", "many"], ["--trials: expected a whole number, found many"]),
         (["tunnel", "--seed", ""], ["--seed: expected a whole number, found ''"]),
-        (["tunnel", "--robot", ""], ["--robot: expected ", "found ''"]),
+        (["tunnel", "--robot", ""], ["--robot: expected ", "found nothing"]),
         ([""], ["expected a command", "found ''"]),
         (["tunnel", "--trials"], ["--trials: expected 1 value, INT, found none"]),
         (["tunnel", "--trials", "0"], ["--trials: expected a number of at least 1, found 0"]),
