@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from pydantic import field_validator, model_validator
 
-from antennate.control.registry import BUILT_IN, CONTROLLERS
+from antennate.control.registry import BUILT_IN, CONTROLLERS, require_read
 from antennate.params import ControlParams, number
 from antennate.params.base import require_different, require_whole_steps
 from antennate.robots.spec import HARDWARE_ALONE
@@ -43,5 +43,6 @@ class TunnelConfig(TrialConfig):
     @model_validator(mode="after")
     def _agree(self) -> TunnelConfig:
         require_different("controllers", self.controllers)
+        require_read(self.controllers, self.control)
         require_whole_steps("control.rate", self.control.rate, self.physics.timestep)
         return self
