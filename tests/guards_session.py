@@ -143,7 +143,7 @@ SESSION = [
     ),
     Guard(
         "signals while the torque goes off",
-        before(StopOnce, "receive", lambda self, *_: setattr(self, "closed", False)),
+        before(StopOnce, "receive", lambda self, *_: vars(self).update(closed=False, within=None)),
         partial(test_signals.test_B19_no_signal_is_heard_once_the_walk_is_over_of_itself, "stand"),
         by=(KeyboardInterrupt,),
     ),

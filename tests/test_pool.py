@@ -35,8 +35,7 @@ def test_a_script_without_the_main_guard_is_told_of_it(tmp_path: Path) -> None:
         [sys.executable, str(script)], capture_output=True, text=True, timeout=120, check=False
     )
     assert done.returncode == 1
-    last = done.stderr.strip().splitlines()[-1]
-    assert 'needs `if __name__ == "__main__":`' in last
+    assert 'needs `if __name__ == "__main__":`' in done.stderr
 
 
 def test_a_worker_that_dies_is_noticed() -> None:

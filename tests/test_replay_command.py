@@ -152,7 +152,7 @@ def test_a_log_that_was_not_closed_is_no_error(
     [
         ([], "expected the log of a drive, found none"),
         (["nothing.log"], "nothing.log: No such file"),
-        (["."], "Is a directory"),
+        (["."], "it is a folder"),
         (["text"], "no intact header, 0 intact ticks; damaged places: 1"),
         (["own"], "give --controller with this name if its code may run"),
         (["own", "--controller", "zigzag"], "controller: expected one of open, paper, closed"),

@@ -31,9 +31,11 @@ class ServoEntry(Params):
     """Its model."""
     id: int = number(1, "1", _FACTORY, ge=0, le=252)
     """Its id."""
-    baud: int = number(57_600, "bit/s", _FACTORY)
+    baud: int = number(57_600, "bit/s", _FACTORY, gt=0)
     """Its speed on the bus."""
-    position: float = number(float(MIDDLE), "ticks", "assumed: the middle")
+    position: float = number(
+        float(MIDDLE), "ticks", "assumed: the middle", ge=-1_048_575, le=1_048_575
+    )
     """Where its shaft is."""
     name: str = number("", "1", "assumed: its place in the list")
     """Its name for orders."""
