@@ -18,6 +18,12 @@ _PATIENCE = 90.0
 """Longest silence of a command [s]; the machine may be busy."""
 
 
+def start(words: Sequence[str], folder: Path) -> subprocess.Popen[bytes]:
+    """A command of `antennate` in a folder, all its streams piped."""
+    pipe = subprocess.PIPE
+    return subprocess.Popen([*ANTENNATE, *words], stdin=pipe, stdout=pipe, stderr=pipe, cwd=folder)
+
+
 class FactoryTwin:
     """`antennate twin` that takes orders on its standard input.
 
@@ -27,13 +33,7 @@ class FactoryTwin:
     """
 
     def __init__(self, words: Sequence[str], folder: Path) -> None:
-        self._process = subprocess.Popen(
-            [*ANTENNATE, *words],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            cwd=folder,
-        )
+        self._process = start(words, folder)
         assert self._process.stdout is not None
         self.paths: dict[str, str] = json.loads(self._process.stdout.readline())
 
@@ -70,13 +70,7 @@ class Command:
     """
 
     def __init__(self, words: Sequence[str], folder: Path) -> None:
-        self._process = subprocess.Popen(
-            [*ANTENNATE, *words],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            cwd=folder,
-        )
+        self._process = start(words, folder)
         self.text = self.output = ""
         self._read = 0
 

@@ -68,17 +68,12 @@ def test_a_box_of_servos_becomes_a_robot_that_crosses_the_tunnel(tmp_path: Path)
         assert doctor.end() == 0, doctor.output
         assert "all 36 checks are good" in doctor.output
 
-        for attempt in range(3):  # a busy machine may be too late for its servos: a FAULT
-            time.sleep(3.0)  # the twin takes who comes later for a new client
-            out = f"run{attempt}"
-            drive = Command([*page["drive"], "--duration", "120", "--out", out], tmp_path)
-            code = drive.end(240.0)
-            result = json.loads((tmp_path / out / "result.json").read_text())
-            assert result["torque_off"] is True, drive.text[-2000:]
-            if code == 0:
-                break
-            assert result["worst_state"] == "FAULT", drive.text[-2000:]
-        assert code == 0, result["why"]
+        time.sleep(3.0)  # the twin takes who comes later for a new client
+        drive = Command([*page["drive"], "--duration", "120", "--out", "run"], tmp_path)
+        code = drive.end(240.0)
+        result = json.loads((tmp_path / "run" / "result.json").read_text())
+        assert result["torque_off"] is True, drive.text[-2000:]
+        assert code == 0, (result["why"], drive.text[-2000:])
     assert result["ended"] == "arrival"
     assert result["worst_state"] in ("OK", "DEGRADED", "HOLD")
     assert "the head passed the exit" in twin.said

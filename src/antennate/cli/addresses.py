@@ -114,5 +114,14 @@ def require_two_ports(options: PortOptions) -> None:
     bus = options.bus
     if bus and options.esp32 and same(options.esp32, bus):
         raise ConfigError(f"--esp32 and --bus: expected two ports, found {bus} twice")
+    refuse_udp(bus)
+
+
+def refuse_udp(bus: str) -> None:
+    """Refuse a servo bus on a network that loses packets.
+
+    Raises:
+        ConfigError: It is behind udp://.
+    """
     if is_udp(bus):
         raise ConfigError("--bus: expected a serial port or tcp://, found udp://; it loses packets")

@@ -8,11 +8,10 @@ from typing import TypeVar
 
 from pydantic.dataclasses import dataclass
 
-from antennate.cli.addresses import parse_robot
+from antennate.cli.addresses import parse_robot, refuse_udp
 from antennate.cli.arguments import FromFile
 from antennate.cli.options import option
 from antennate.errors import ConfigError
-from antennate.hardware.ports.finder import is_udp
 from antennate.hardware.robot_file import RobotFile
 from antennate.params.reading import Config
 
@@ -66,8 +65,7 @@ def require_bus(bus: str) -> None:
     """
     if not bus:
         raise ConfigError("--bus: expected a serial port, found none; `antennate setup` finds it")
-    if is_udp(bus):
-        raise ConfigError("--bus: expected a serial port or tcp://, found udp://; it loses packets")
+    refuse_udp(bus)
 
 
 def _given(words: Sequence[str]) -> Path | None:

@@ -92,7 +92,7 @@ def run_tasks(
     except KeyboardInterrupt:
         with contextlib.suppress(queue.Empty):
             while True:
-                on_result(pickle.loads(results.get(timeout=_POLL)))  # noqa: S301
+                on_result(pickle.loads(results.get(timeout=_POLL)))  # noqa: S301  (as below)
         raise
     finally:
         if any(not future.done() for future in futures):

@@ -58,7 +58,7 @@ def require_compiles(
         SceneError: The engine crashes, or takes longer.
     """
     try:
-        code = subprocess.run(  # noqa: S603 our own module
+        code = subprocess.run(  # noqa: S603 a list of words, no shell: this Python and our own module
             [sys.executable, "-P", *child, str(path)],
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
