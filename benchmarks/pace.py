@@ -7,6 +7,9 @@ of both antennae, then a walk. A cycle is missed if the loop still runs when the
 - `walking_missed_share`: the same from the first command on.
 - `worst_lateness_ms`: farthest that a tick began behind its time.
 - `fault`: causes of a FAULT or worse with their details, the first one first; empty without one.
+- `ended`, `walked_s`: why the drive ended, and after which time of walking [s].
+
+`--crossings 10` walks that many trials of `--seed` as far as the exit, in place of the rest.
 """
 
 from __future__ import annotations
@@ -54,11 +57,18 @@ def running(words: list[str], **how: Any) -> Iterator[subprocess.Popen[str]]:
         process.wait()
 
 
-def walk(seconds: float, busy: int, viewers: int = 0) -> dict[str, Any]:
-    """One drive against a twin of its own; the content of its result.json."""
+def walk(
+    seconds: float, busy: int, viewers: int = 0, trial: tuple[int, int] | None = None
+) -> dict[str, Any]:
+    """One drive against a twin of its own; the content of its result.json.
+
+    With a `trial`, its seed and its number, the drive ends once the head passes the exit.
+    """
     with ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
-        twin = [*PROGRAM, "twin", "--touch", *TOUCH]
+        twin, until = [*PROGRAM, "twin", "--touch", *TOUCH], str(folder / "passed")
+        if trial is not None:
+            twin += ["--seed", str(trial[0]), "--trial", str(trial[1]), "--passed", until]
         pipe, quiet = subprocess.PIPE, subprocess.DEVNULL
         server = stack.enter_context(running(twin, stdout=pipe, stderr=quiet))
         assert server.stdout is not None
@@ -71,6 +81,7 @@ def walk(seconds: float, busy: int, viewers: int = 0) -> dict[str, Any]:
         words = [*PROGRAM, "drive", "--esp32", paths["esp32"], "--bus", paths["bus"], "--arm"]
         words += ["--json", "--out", str(folder / "run")]
         words += ["--dry-run", str(DRY_RUN), "--duration", str(seconds)]
+        words += [] if trial is None else ["--until", until]
         subprocess.run(words, stdout=quiet, stderr=quiet, check=False)
         result = folder / "run" / "result.json"
         return json.loads(result.read_text()) if result.exists() else {}
@@ -90,6 +101,8 @@ def summary(result: dict[str, Any]) -> dict[str, Any]:
         "walking_missed_share": walking["missed_share"],
         "worst_lateness_ms": 1e3 * pace["worst_lateness_s"],
         "missed_answers": result["missed_answers"],
+        "ended": result["ended"],
+        "walked_s": result["walked_s"],
         "worst_state": result["worst_state"],
         "why": result["why"],
         "torque_off": result["torque_off"],
@@ -103,10 +116,17 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=30.0, help="time of each walk")
     parser.add_argument("--busy", type=int, nargs="*", default=[0, 4], help="busy processes beside")
     parser.add_argument("--viewers", type=int, nargs="*", default=[], help="viewers of the log")
+    parser.add_argument("--crossings", type=int, default=0, help="trials to walk to the exit")
+    parser.add_argument("--seed", type=int, default=0, help="of those trials")
     parser.add_argument("--json", action="store_true", help="print one JSON object and no table")
     args = parser.parse_args()
-    rows = {f"busy_{count}": summary(walk(args.seconds, count)) for count in args.busy}
-    rows |= {f"viewers_{count}": summary(walk(args.seconds, 0, count)) for count in args.viewers}
+    if args.crossings:
+        trials = [(args.seed, number) for number in range(args.crossings)]
+        rows = {f"trial_{one[1]}": summary(walk(args.seconds, 0, trial=one)) for one in trials}
+    else:
+        rows = {f"busy_{count}": summary(walk(args.seconds, count)) for count in args.busy}
+        viewed = {count: walk(args.seconds, 0, count) for count in args.viewers}
+        rows |= {f"viewers_{count}": summary(found) for count, found in viewed.items()}
     result = {"cores": os.cpu_count(), "seconds": args.seconds, **rows}
     if args.json:
         print(json.dumps(result))
