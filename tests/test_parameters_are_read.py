@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 from recorded import act, leaves, recorded
+from servo_recordings import of_twin
 
 from antennate import experiments
 from antennate.cli import main
@@ -91,6 +92,10 @@ TINY: dict[str, list[dict[str, Any]]] = {
         {"recording": "recording.csv", "draws": 20},
     ],
     "sensor": [{"hold_time": 1.0}, {"sensor": OTHER_SENSOR}],
+    "servo": [
+        {"recording": ["servo.json"], "fit": True, "draws": 20},
+        {"recording": ["servo.json"], "servo": "xc430_w240"},
+    ],
     "springs": [{}],
     "taper": [{}],
 }
@@ -102,6 +107,7 @@ def test_every_parameter_of_an_experiment_is_read_or_refused(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     Path("recording.csv").write_text(RECORDING)
+    of_twin(Path("servo.json"), 1200, 400, 0.5, 2.5)
     experiment = experiments.load(name)
     read: set[str] = set()
     for values in TINY[name]:

@@ -79,6 +79,28 @@ def test_full_drive_is_balanced_by_damping_at_the_no_load_speed(
     assert model.dof_damping[model.joint(PREFIX + name).dofadr[0]] == pytest.approx(DAMPING)
 
 
+def test_friction_of_a_gear_grows_with_the_torque_of_its_motor() -> None:
+    gear = {"friction": 0.02, "load_friction": 0.4}
+    robot = RobotSpec.model_validate({"servos": {"xc430_w240": gear}})
+    world = World(compile_world(PhysicsParams(), robot), robot)
+    world.command(np.full(19, 0.4))
+    world.step(20)
+    data, dofs = world.data, [world.model.joint(PREFIX + n).dofadr[0] for n in SERVOS]
+    force = np.array([data.actuator(PREFIX + n).force[0] for n in SERVOS])
+    motor = force - DAMPING * data.qvel[dofs]
+    assert abs(motor).max() > 0.5
+    world.step(1)
+    assert world.model.dof_frictionloss[dofs] == pytest.approx(0.02 + 0.4 * abs(motor))
+
+
+def test_the_base_of_an_antenna_pulls_no_harder_than_its_servo() -> None:
+    robot = RobotSpec.model_validate({"antenna": {"base_torque": 0.05}})
+    world = World(compile_world(PhysicsParams(), robot), robot)
+    world.command(np.full(19, 1.0))
+    world.step(1)
+    assert world.drive_torques()[-2:] == pytest.approx([0.05, 0.05])
+
+
 @pytest.mark.parametrize("name", SERVOS)
 def test_every_actuator_drives_the_joint_of_its_name(model: mujoco.MjModel, name: str) -> None:
     target = int(model.actuator(PREFIX + name).trnid[0])

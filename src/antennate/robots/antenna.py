@@ -73,6 +73,8 @@ class AntennaSpec(Params):
     """Damping of the base servo."""
     base_armature: float = number(1e-4, "kg·m²", "assumed: below the servo's; driven stiffly", ge=0)
     """Its inertia."""
+    base_torque: float | None = number(None, "N·m", "assumed: never reached", gt=0)
+    """Largest torque of the base servo's drive; without limit if not given."""
     sensor: SensorParams = SensorParams()
 
     @model_validator(mode="after")

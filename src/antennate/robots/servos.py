@@ -18,21 +18,22 @@ EXTENDED_MODE = 4
 
 ServoName = Literal["xc430_w240", "xl330_m288"]
 _RPM = 2.0 * math.pi / 60.0
-_PWM_LIMIT = 885
+FULL_DRIVE = 885
 """Datasheet of both models: counts of the full drive."""
 
 
 class ServoParams(Params):
     """A servo in position mode, a DYNAMIXEL XC430-W240-T at 11.1 V.
 
-    Torque follows the position error up to the torque-speed line. Another model is a subclass with
-    its own numbers.
+    The drive follows the position error up to full drive. Torque follows the drive, less what speed
+    takes on the torque-speed line, less friction. Another model is a subclass with its own numbers.
 
     Attributes:
         model_number: What the servo answers when it is asked for its model.
         voltage: Supply that the robot gives it [V].
         stall_current: Current at that voltage with the shaft held [A] (datasheet).
         standby_current: Current without torque [A] (datasheet).
+        datasheet: Stall torque [N·m] and no-load speed [rad/s] at that voltage (datasheet).
         product: Name of the maker.
     """
 
@@ -40,6 +41,7 @@ class ServoParams(Params):
     voltage: ClassVar[float] = 11.1
     stall_current: ClassVar[float] = 1.3
     standby_current: ClassVar[float] = 0.046
+    datasheet: ClassVar[tuple[float, float]] = (1.7, 65.0 * _RPM)
     product: ClassVar[str] = "XC430-W240-T"
 
     stall_torque: float = number(1.7, "N·m", "datasheet: XC430-W240, 11.1 V", gt=0)
@@ -48,15 +50,26 @@ class ServoParams(Params):
         65.0 * _RPM, "rad/s", "datasheet: XC430-W240, 65 rpm at 11.1 V", gt=0
     )
     """Speed unloaded."""
-    position_gain: float = number(
-        700 / 128 * TICKS_A_TURN / (2 * math.pi) / _PWM_LIMIT,
-        "1/rad",
-        "datasheet: Position P Gain 700, over 128 PWM counts a tick, PWM limit 885",
+    p_gain: float = number(700.0, "1", "datasheet: Position P Gain of a new one", gt=0)
+    """Gain of the position loop as its register holds it."""
+    gain_divisor: float = number(
+        128.0,
+        "1",
+        "datasheet: block diagram of X servos; no recording of this model is known",
         gt=0,
     )
-    """Share of the full drive per radian of position error."""
+    """What that gain is divided by: counts of drive per tick of position error."""
     armature: float = number(0.003, "kg·m²", "assumed: rotor of 5e-8 behind a 245:1 gear", ge=0)
     """Inertia at the output."""
+    friction: float = number(0.0, "N·m", "assumed: none, until it is measured", ge=0)
+    """Friction at the output that is always there."""
+    load_friction: float = number(0.0, "1", "assumed: none, until it is measured", ge=0, lt=1)
+    """Friction of the gear as a share of the torque of its motor."""
+
+    @property
+    def position_gain(self) -> float:
+        """Share of the full drive per radian of position error [1/rad]."""
+        return self.p_gain / self.gain_divisor * TICKS_A_TURN / (2 * math.pi) / FULL_DRIVE
 
     @property
     def stiffness(self) -> float:
@@ -76,6 +89,7 @@ class XL330Params(ServoParams):
     voltage: ClassVar[float] = 5.0
     stall_current: ClassVar[float] = 1.47
     standby_current: ClassVar[float] = 0.017
+    datasheet: ClassVar[tuple[float, float]] = (0.52, 103.0 * _RPM)
     product: ClassVar[str] = "XL330-M288-T"
 
     stall_torque: float = number(0.52, "N·m", "datasheet: XL330-M288, 5 V", gt=0)
@@ -84,13 +98,12 @@ class XL330Params(ServoParams):
         103.0 * _RPM, "rad/s", "datasheet: XL330-M288, 103 rpm at 5 V", gt=0
     )
     """Speed unloaded."""
-    position_gain: float = number(
-        400 / 256 * TICKS_A_TURN / (2 * math.pi) / _PWM_LIMIT,
-        "1/rad",
-        "datasheet: Position P Gain 400, PWM limit 885; a recording shows a scale of 1/256",
-        gt=0,
+    p_gain: float = number(400.0, "1", "datasheet: Position P Gain of a new one", gt=0)
+    """Gain of the position loop as its register holds it."""
+    gain_divisor: float = number(
+        256.0, "1", "measured: drive over position error in a recording; `antennate servo`", gt=0
     )
-    """Share of the full drive per radian of position error."""
+    """What that gain is divided by: counts of drive per tick of position error."""
     armature: float = number(0.0014, "kg·m²", "measured: on a recording of one", ge=0)
     """Inertia at the output."""
 

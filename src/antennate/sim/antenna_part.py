@@ -52,6 +52,9 @@ def build(params: AntennaSpec) -> mujoco.MjSpec:
     )
     servo = spec.add_actuator(name=BASE, trntype=mujoco.mjtTrn.mjTRN_JOINT, target=BASE)
     servo.set_to_position(kp=params.base_stiffness)
+    if params.base_torque is not None:
+        servo.forcelimited = mujoco.mjtLimited.mjLIMITED_TRUE
+        servo.forcerange = [-params.base_torque, params.base_torque]
 
     parent, where = base, [0.0, 0.0, 0.0]
     for name, k in zip(params.hinge_names, params.hinge_stiffness(), strict=True):

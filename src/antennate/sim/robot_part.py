@@ -59,6 +59,7 @@ def _add_hinge(
         pos=at,
         damping=servo.damping,
         armature=servo.armature,
+        frictionloss=servo.friction,
         **more,
     )
 

@@ -16,6 +16,7 @@ from antennate.errors import SceneError, SimulationError, in_one_line
 from antennate.params import PhysicsParams
 from antennate.robots.spec import ANTENNA_PREFIXES, RobotSpec
 from antennate.sim import layers, robot_part
+from antennate.sim.gears import Gears
 from antennate.sim.outline import outline
 from antennate.sim.scenes.scene import SceneInstance, add_floor
 from antennate.types import Bools, Floats, Ints
@@ -119,6 +120,7 @@ class World:
         self._drive: Ints = np.array([model.actuator(n).id for n in names])
         self._driven = self._addresses(names)
         self._turning: Ints = np.array([model.joint(n).dofadr[0] for n in names])
+        self._gears = Gears(model, robot, PREFIX)
         self._root: int = model.joint(PREFIX + "root").qposadr[0]
         self._links: Ints = np.array([model.body(PREFIX + n).id for n in robot.link_names])
         self._leg_geoms: Ints = np.array([model.geom(PREFIX + n).id for n in robot.leg_names])
@@ -205,6 +207,7 @@ class World:
         """
         before = self.data.time
         self._steps += count
+        self._gears.load(self.data)
         try:
             mujoco.mj_step(self.model, self.data, count)
         except mujoco.FatalError as error:

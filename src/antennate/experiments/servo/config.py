@@ -1,0 +1,54 @@
+"""Everything that decides the outcome of `antennate servo`."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from pydantic import model_validator
+
+from antennate.params.base import Params, number
+from antennate.robots.servos import ServoName, ServoParams, ServosParams
+
+_OF_THE_FIT = ("draws", "seed")
+
+
+class ServoConfig(Params):
+    """Everything that decides the outcome of `antennate servo`."""
+
+    unread: ClassVar[tuple[str, ...]] = ("servos.xc430_w240.p_gain", "servos.xl330_m288.p_gain")
+    recording: tuple[str, ...] = number((), "1", "assumed: has to be named")
+    """Recordings: JSON of Rhoban/bam."""
+    servo: ServoName = number("xl330_m288", "1", "assumed: the model with a known recording")
+    """Model of the servo."""
+    servos: ServosParams = ServosParams()
+    mass: float | None = number(None, "kg", "assumed: as the recording says", ge=0)
+    """Mass at the end of the arm; as the recording says if not given."""
+    length: float | None = number(None, "m", "assumed: as the recording says", ge=0)
+    """Length of the arm, which hangs down at 0 rad; as the recording says if not given."""
+    inertia: float = number(0.0, "kg·m²", "assumed: only the mass and the servo", ge=0)
+    """Inertia of the load beside that of the mass."""
+    fit: bool = number(False, "1", "assumed: a replay alone")
+    """Identify the model from the recordings."""
+    draws: int = number(100, "1", "assumed: enough for an interval", ge=20, le=2000)
+    """Bootstrap draws of the fit."""
+    seed: int = number(1, "1", "assumed: any", ge=0)
+    """Seed of the draws."""
+
+    @property
+    def given(self) -> ServoParams:
+        """The numbers of the servo."""
+        return self.servos.of(self.servo)
+
+    @model_validator(mode="after")
+    def _agree(self) -> ServoConfig:
+        fields = type(self).model_fields
+        for name in () if self.fit else _OF_THE_FIT:
+            if getattr(self, name) != fields[name].default:
+                raise ValueError(f"{name}: expected the default, as nothing is fitted, got another")
+        for name, field in ServosParams.model_fields.items():
+            if name != self.servo and getattr(self.servos, name) != field.default:
+                raise ValueError(
+                    f"servos.{name}: expected the default, as the servo is {self.servo}, got "
+                    "another"
+                )
+        return self

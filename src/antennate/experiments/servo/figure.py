@@ -1,0 +1,61 @@
+"""Figure of `antennate servo`: goals, measured positions and those of the models."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from antennate import figures as style
+from antennate.experiments.servo.run import SHOWN, ServoOutcome
+from antennate.robots.servo_model import STEP
+from antennate.types import Floats
+
+_MOST = 8
+"""Recordings drawn."""
+_COLUMNS = 2
+
+
+def figures(outcome: ServoOutcome) -> dict[str, Figure]:
+    """The figure of a run."""
+    return {"servo": servo(outcome)}
+
+
+@style.styled
+def servo(outcome: ServoOutcome) -> Figure:
+    """Each recording with the simplest and the whole model; dotted where torque is off."""
+    count = min(_MOST, len(outcome.recordings))
+    columns = min(_COLUMNS, count)
+    rows = -(-count // columns)
+    figure = style.canvas(10.0 if columns > 1 else 6.4, 1.2 + 2.2 * rows)
+    panels = figure.subplots(rows, columns, squeeze=False, sharex=True).ravel()
+    traces = np.degrees(outcome.traces())
+    for i, panel in enumerate(panels):
+        if i < count:
+            _draw(panel, outcome, i, traces[:, :, i])
+        else:
+            panel.set_axis_off()
+    for panel in panels[max(0, count - columns) : count]:
+        panel.set_xlabel("time [s]")
+    handles, labels = panels[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper center", ncols=4)
+    return figure
+
+
+def _draw(panel: Axes, outcome: ServoOutcome, place: int, traces: Floats) -> None:
+    recording, names = outcome.recordings[place], [model.name for model in outcome.models]
+    t = STEP * SHOWN * np.arange(len(traces))
+    inside = t <= recording.t[-1]
+    panel.plot(recording.t, np.degrees(recording.goal), color=style.FAINT, label="goal")
+    panel.plot(recording.t, np.degrees(recording.position), color=style.INK, label="measured")
+    for row, colour in ((0, style.SERIES[4]), (-1, style.SERIES[0])):
+        drawn = traces[inside, row]
+        panel.plot(t[inside], drawn, color=colour, linewidth=1.1, label=names[row])
+    off = ~recording.torque
+    if off.any():
+        first = recording.t[int(np.argmax(off))]
+        panel.axvline(first, color=style.MUTED, linewidth=0.8, linestyle=":")
+        where = {"xycoords": ("data", "axes fraction"), "textcoords": "offset points"}
+        panel.annotate("torque off", (first, 0), xytext=(3, 3), fontsize=7, **where)
+    panel.set_ylabel("position [deg]")
+    panel.set_title(f"{recording.name}, gain {recording.p_gain:g}")

@@ -1,0 +1,177 @@
+"""Identify servo models from recordings: many fits at once.
+
+Each fit minimises a robust error of the positions (soft L1, 3°) by Levenberg-Marquardt, for its own
+free parameters and its own weights of the pieces of the recordings. Sizes are searched on a
+logarithmic scale, frictions on a linear one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from antennate.robots.servo_model import NAMES, STEP, Course, replay
+from antennate.types import Bools, Floats, Ints
+
+EVERY = 5
+"""Positions are compared at every so many steps of the model."""
+PIECE = 1.0
+"""Length of a piece of a recording [s]."""
+_ROBUST = 0.05
+"""Errors beyond this count in proportion, not by their square [rad]."""
+_LOG = np.array([name not in ("friction", "load_friction") for name in NAMES])
+_LOW = np.where(_LOG, np.log([10.0, 0.01, 0.5, 1e-6, 1.0, 1.0]), 0.0)
+_HIGH = np.where(_LOG, np.log([3000.0, 20.0, 200.0, 0.2, 1.0, 1.0]), (0, 0, 0, 0, 2.0, 0.95))
+_NUDGE = np.where(_LOG, 1e-3, (0, 0, 0, 0, 2e-4, 2e-3))
+_ROUNDS = 40
+_ENOUGH = 1e-4
+"""A fit is done when a round improves it by less than this share."""
+_STUCK = 100.0
+"""It is done, too, when no shorter step than that of this damping improves it."""
+_CHUNK = 24
+"""Fits that are simulated together; more would need more memory."""
+
+
+@dataclass(frozen=True)
+class Data:
+    """A course, and which of its times count.
+
+    Attributes:
+        course: What servos were told.
+        known: Times at which there is a measurement, shape (T, F).
+    """
+
+    course: Course
+    known: Bools
+
+    @property
+    def pieces(self) -> Ints:
+        """Number of the piece of each compared time, shape (S,)."""
+        count = -(-len(self.known) // EVERY)
+        return np.arange(count) // round(PIECE / STEP / EVERY)
+
+    def parts(self) -> Bools:
+        """Pieces that hold a measurement, shape (F, K)."""
+        piece = self.pieces
+        return np.array(
+            [self.known[::EVERY][piece == k].any(axis=0) for k in range(piece[-1] + 1)]
+        ).T
+
+
+def errors(data: Data, values: Floats, parts: Floats) -> Floats:
+    """Mean error of position [rad] with torque on, over the recordings, shape (B,).
+
+    Args:
+        data: What was recorded.
+        values: B models, shape (B, 6).
+        parts: Pieces that count, by a number above 0, shape (B, F, K).
+    """
+    away = abs(replay(values, data.course, EVERY) - data.course.position[::EVERY, None])
+    counts = (data.known & data.course.torque)[::EVERY]
+    weight = (_spread(data, parts) > 0) & counts[:, None]
+    time = weight.sum(axis=0)
+    with np.errstate(invalid="ignore"):
+        each = np.where(weight, away, 0.0).sum(axis=0) / time
+    return np.asarray(np.nanmean(np.where(time > 0, each, np.nan), axis=1))
+
+
+def fit(data: Data, start: Floats, free: Bools, parts: Floats) -> Floats:
+    """Best parameters of B fits, shape (B, 6).
+
+    Args:
+        data: What was recorded.
+        start: Where each begins; parameters that are not free stay there, shape (B, 6).
+        free: Which parameters may change, shape (B, 6).
+        parts: Weight of every piece in every fit, shape (B, F, K).
+    """
+    cuts = range(_CHUNK, len(start), _CHUNK)
+    chunks = zip(*(np.split(each, cuts) for each in (start, free, parts)), strict=True)
+    return np.concatenate([_fit(data, *chunk) for chunk in chunks])
+
+
+def _fit(data: Data, start: Floats, free: Bools, parts: Floats) -> Floats:
+    weight = _spread(data, parts) * data.known[::EVERY, None]
+    x = np.where(_LOG, np.log(np.maximum(start, 1e-9)), start)
+    x = np.where(free, np.clip(x, _LOW, _HIGH), x)
+    damping = np.full(len(x), 1e-2)
+    cost, slope, bend = _normal(data, x, free, weight)
+    done = np.zeros(len(x), bool)
+    for _ in range(_ROUNDS):
+        step = _step(x, slope, bend, damping)
+        trial = np.where(free, np.clip(x - step, _LOW, _HIGH), x)
+        new_cost, new_slope, new_bend = _normal(data, trial, free, weight)
+        better = new_cost < cost
+        done |= np.where(better, cost - new_cost < _ENOUGH * cost, damping > _STUCK)
+        x, cost = np.where(better[:, None], trial, x), np.where(better, new_cost, cost)
+        slope = np.where(better[:, None], new_slope, slope)
+        bend = np.where(better[:, None, None], new_bend, bend)
+        damping = np.clip(np.where(better, damping / 5, damping * 5), 1e-6, 1e6)
+        if done.all():
+            break
+    return _plain(x, start, free)
+
+
+def _step(x: Floats, slope: Floats, bend: Floats, damping: Floats) -> Floats:
+    """How far to go against the slope, shape (B, 6); not through a bound that is reached."""
+    stays = ((x <= _LOW) & (slope > 0.0)) | ((x >= _HIGH) & (slope < 0.0))
+    moves = ~stays
+    slope = np.where(moves, slope, 0.0)
+    scale = np.einsum("bii->bi", bend)
+    eye = np.eye(len(NAMES))
+    bend = np.where(moves[:, :, None] & moves[:, None], bend, eye * scale[:, None])
+    damped = bend + damping[:, None, None] * (eye * scale[:, None])
+    return np.asarray(np.linalg.solve(damped, slope[..., None])[..., 0])
+
+
+def _plain(x: Floats, start: Floats, free: Bools) -> Floats:
+    """Parameters from where they are searched; those not free stay to the last bit."""
+    return np.where(free, np.where(_LOG, np.exp(np.where(_LOG, x, 0.0)), x), start)
+
+
+def _normal(data: Data, x: Floats, free: Bools, weight: Floats) -> tuple[Floats, Floats, Floats]:
+    """Cost (B,), its slope (B, 6) and its curvature after Gauss and Newton (B, 6, 6)."""
+    size = len(NAMES)
+    tried = x[:, None] + np.vstack([np.zeros(size), np.diag(_NUDGE)])
+    values = np.where(_LOG, np.exp(np.where(_LOG, tried, 0.0)), tried).reshape(-1, size)
+    found = replay(values, data.course, EVERY)
+    found = found.reshape(len(found), len(x), size + 1, -1)
+    away = found[:, :, 0] - data.course.position[::EVERY, None]
+    root = np.sqrt(1.0 + (away / _ROBUST) ** 2)
+    cost = (weight * 2.0 * _ROBUST**2 * (root - 1.0)).sum(axis=(0, 2))
+    grown = np.sqrt(weight / root)
+    change = (found[:, :, 1:] - found[:, :, :1]) / _NUDGE[:, None] * grown[:, :, None]
+    change = np.where(free[:, :, None], change, 0.0)
+    flat = change.transpose(1, 2, 0, 3).reshape(len(x), size, -1)
+    left = (away * grown).transpose(1, 0, 2).reshape(len(x), -1)
+    bend = flat @ flat.transpose(0, 2, 1)
+    # a parameter that is not free, or changes nothing, stays
+    still = np.einsum("bii->bi", bend) <= 0.0
+    bend = bend + np.eye(size) * still[:, None]
+    return cost, (flat @ left[..., None])[..., 0], bend
+
+
+def _spread(data: Data, parts: Floats) -> Floats:
+    """Weights of pieces (B, F, K) as weights of times, shape (S, B, F)."""
+    found = np.moveaxis(parts, 2, 0)
+    return np.array([found[k] for k in data.pieces], np.float64)
+
+
+def draws(parts: Bools, count: int, rng: np.random.Generator, by_file: bool) -> Floats:
+    """Weights of bootstrap draws, shape (count, F, K): files or pieces with replacement.
+
+    Args:
+        parts: Pieces that hold a measurement, shape (F, K).
+        count: Number of draws.
+        rng: Source of chance.
+        by_file: Draw whole files, else pieces.
+    """
+    if by_file:
+        files = len(parts)
+        picked = rng.multinomial(files, np.full(files, 1.0 / files), count)
+        return np.asarray(picked[:, :, None] * parts, np.float64)
+    places = np.flatnonzero(parts)
+    picked = rng.multinomial(len(places), np.full(len(places), 1.0 / len(places)), count)
+    found = np.zeros((count, parts.size))
+    found[:, places] = picked
+    return found.reshape(count, *parts.shape)

@@ -1,0 +1,242 @@
+"""Recordings of a servo that follows goals: JSON of Rhoban/bam."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from antennate.errors import BadInputError
+from antennate.experiments.servo.fitting import Data
+from antennate.files import decoded, read_limited
+from antennate.messages import shown
+from antennate.robots.servo_model import STEP, Course
+from antennate.robots.servos import FULL_DRIVE, TICKS_A_TURN
+from antennate.types import Bools, Floats
+
+GRAVITY = 9.80665
+_LARGEST_FILE = 100_000_000
+_FEWEST = 50
+"""Fewest samples of a recording."""
+_COARSEST = 0.02
+"""Positions of a servo are told in finer steps than this [rad]: 4096 a turn make 0.0015."""
+_LARGEST_GAP = 0.5
+"""Samples lie closer together in time [s]."""
+_SLOW = 0.05
+"""A slower shaft rests [rad/s]."""
+_SMOOTHING = 0.05
+"""Speeds are means over this time [s]."""
+_LARGEST_NUMBER = 1e9
+"""Nothing that is measured is larger."""
+_NUMBERS = ("timestamp", "position", "goal_position")
+_UNUSABLE = 65_536
+"""A negative drive is told as one less than this many counts."""
+
+
+@dataclass(frozen=True)
+class Recording:
+    """One recording.
+
+    Attributes:
+        name: Name of the file.
+        sha256: Hash of its bytes.
+        p_gain: Gain of the position loop as its register held it.
+        mass: Mass at the end of the arm [kg], `length` the length of the arm [m].
+        t: Times [s], shape (n,), from 0.
+        position: Positions [rad], shape (n,), `goal` the goals.
+        torque: Whether torque was on, shape (n,).
+        supply: Supply [V], NaN where it is not known, shape (n,).
+        drive: Drive [counts], NaN where it is not known, shape (n,).
+    """
+
+    name: str
+    sha256: str
+    p_gain: float
+    mass: float
+    length: float
+    t: Floats
+    position: Floats
+    goal: Floats
+    torque: Bools
+    supply: Floats
+    drive: Floats
+
+    def divisor(self) -> float | None:
+        """What its drive says of the divisor of the gain; None if nothing.
+
+        That is the median of gain times position error over the drive, at rest and well within
+        full drive.
+        """
+        error = (self.goal - self.position) * TICKS_A_TURN / (2.0 * math.pi)
+        size = abs(self.drive)
+        useful = self.torque & (size > 0.05 * FULL_DRIVE) & (size < 0.9 * FULL_DRIVE)
+        useful &= abs(np.gradient(self.position, self.t)) < _SLOW
+        if useful.sum() < _FEWEST // 2:
+            return None
+        return float(np.median(self.p_gain * error[useful] / self.drive[useful]))
+
+
+def read(path: Path, mass: float | None, length: float | None) -> Recording:
+    """Read a recording.
+
+    Args:
+        path: The file.
+        mass: Mass at the end of the arm [kg]; None for what the file says.
+        length: Length of the arm [m]; None for what the file says.
+
+    Raises:
+        BadInputError: It cannot be used; says where and why.
+    """
+    data = read_limited(path, _LARGEST_FILE)
+    try:
+        table = json.loads(decoded(path, data))
+    except json.JSONDecodeError as error:
+        raise BadInputError(
+            f"{path}: expected JSON, found an error at line {error.lineno}, column {error.colno} "
+            f"({error.msg}); is the file truncated?"
+        ) from None
+    except RecursionError:
+        raise BadInputError(f"{path}: expected JSON of a recording, found it too deep") from None
+    if not isinstance(table, dict) or not isinstance(table.get("entries"), list):
+        raise BadInputError(f"{path}: expected an object with a list `entries`, found none")
+    entries = table["entries"]
+    if len(entries) < _FEWEST:
+        raise BadInputError(
+            f"{path}: entries: expected at least {_FEWEST}, found {len(entries)}; record longer"
+        )
+    t, position, goal = (_column(path, entries, name) for name in _NUMBERS)
+    _check(path, t, position, goal)
+    drive = _column(path, entries, "load", math.nan)
+    return Recording(
+        path.name,
+        hashlib.sha256(data).hexdigest(),
+        _of_table(path, table, "kp"),
+        _of_table(path, table, "mass") if mass is None else mass,
+        _of_table(path, table, "length") if length is None else length,
+        t - t[0],
+        position,
+        goal,
+        _torque(path, entries),
+        _column(path, entries, "input_volts", math.nan),
+        np.where(drive >= _UNUSABLE / 2, drive - _UNUSABLE, drive),
+    )
+
+
+def _of_table(path: Path, table: Mapping[str, Any], name: str) -> float:
+    value = _number(table.get(name))
+    if value is None or value < 0:
+        raise BadInputError(
+            f"{path}: expected a number {name} beside entries, found {_found(table.get(name))}"
+        )
+    return value
+
+
+def _number(value: Any) -> float | None:
+    """A finite number, else None."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return None
+    return float(value) if abs(value) < _LARGEST_NUMBER else None
+
+
+def _found(value: Any) -> str:
+    return "none" if value is None else shown(value)
+
+
+def _column(path: Path, entries: list[Any], name: str, missing: float | None = None) -> Floats:
+    """Numbers of all entries; `missing` where there is none."""
+    found: list[float] = []
+    for i, entry in enumerate(entries):
+        cell = entry.get(name) if isinstance(entry, dict) else None
+        value = missing if cell is None else _number(cell)
+        if value is None:
+            raise BadInputError(
+                f"{path}: entry {i}: expected a finite number {name}, found {_found(cell)}"
+            )
+        found.append(value)
+    return np.array(found, float)
+
+
+def _torque(path: Path, entries: list[Any]) -> Bools:
+    for i, entry in enumerate(entries):
+        if entry.get("torque_enable") not in (True, False):
+            raise BadInputError(
+                f"{path}: entry {i}: expected torque_enable, true or false, found "
+                f"{shown(entry.get('torque_enable'))}; without it nobody knows when goals counted"
+            )
+    found = np.array([bool(entry["torque_enable"]) for entry in entries])
+    if not found.any():
+        raise BadInputError(f"{path}: expected torque_enable to be true once, found it nowhere")
+    return found
+
+
+def _check(path: Path, t: Floats, position: Floats, goal: Floats) -> None:
+    steps = np.diff(t)
+    if (steps <= 0).any():
+        i = int(np.argmax(steps <= 0)) + 1
+        raise BadInputError(
+            f"{path}: entry {i}: expected timestamp to rise, found {t[i]:g} after {t[i - 1]:g}; "
+            "sort the entries"
+        )
+    if steps.max() > _LARGEST_GAP:
+        i = int(np.argmax(steps)) + 1
+        raise BadInputError(
+            f"{path}: entry {i}: expected samples less than {_LARGEST_GAP:g} s apart, found "
+            f"{steps[i - 1]:g}; are times in seconds?"
+        )
+    distances = np.diff(np.unique(position))
+    if not len(distances):
+        raise BadInputError(f"{path}: expected a shaft that moves, found it at {position[0]:g}")
+    if distances.min() > _COARSEST:
+        raise BadInputError(
+            f"{path}: expected positions in radians, whose smallest step is "
+            f"{2 * math.pi / TICKS_A_TURN:.4f}, found steps of {distances.min():.4g}; are these "
+            "degrees or ticks?"
+        )
+    away = abs(goal - position)
+    if np.median(away) > 2 * math.pi:
+        raise BadInputError(
+            f"{path}: expected goal_position in radians within a turn of position, found "
+            f"{np.median(away):.4g} between them; are goals in degrees or ticks?"
+        )
+
+
+def data_of(recordings: list[Recording], voltage: float, inertia: float) -> Data:
+    """All recordings as one course, each ends in times that do not count.
+
+    Args:
+        recordings: F recordings.
+        voltage: Nominal voltage of the servo [V]; taken where a supply is not known.
+        inertia: Inertia of the loads beside that of their masses [kg·m²].
+    """
+    longest = max(r.t[-1] for r in recordings)
+    grid = np.arange(math.floor(longest / STEP + 1e-9) + 1) * STEP
+    held = [
+        np.clip(np.searchsorted(r.t, grid + STEP / 2, "right") - 1, 0, None) for r in recordings
+    ]
+    pairs = list(zip(recordings, held, strict=True))
+    position = np.array([np.interp(grid, r.t, r.position) for r in recordings]).T
+    course = Course(
+        goal=np.array([r.goal[i] for r, i in pairs]).T,
+        torque=np.array([r.torque[i] for r, i in pairs]).T,
+        supply=np.array([np.nan_to_num(r.supply[i] / voltage, nan=1.0) for r, i in pairs]).T,
+        position=position,
+        speed=_speed(position),
+        p_gain=np.array([r.p_gain for r in recordings]),
+        inertia=np.array([r.mass * r.length**2 + inertia for r in recordings]),
+        gravity=np.array([r.mass * GRAVITY * r.length for r in recordings]),
+    )
+    return Data(course, np.array([grid <= r.t[-1] for r in recordings]).T)
+
+
+def _speed(position: Floats) -> Floats:
+    """Speeds [rad/s] of positions (T, F), smoothed."""
+    width = round(_SMOOTHING / STEP)
+    kernel = np.ones(width) / width
+    slopes = np.gradient(position, STEP, axis=0)
+    return np.array([np.convolve(column, kernel, "same") for column in slopes.T]).T

@@ -1,0 +1,39 @@
+"""Friction of gears that grows with the torque of their motors, where servos have it."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+
+from antennate.robots.spec import RobotSpec
+from antennate.types import Floats, Ints
+
+
+class Gears:
+    """The joints of a robot in a model, but its antennae.
+
+    Args:
+        model: The model, whose joints get that friction.
+        robot: The robot.
+        prefix: Before its names in the model.
+    """
+
+    def __init__(self, model: mujoco.MjModel, robot: RobotSpec, prefix: str) -> None:
+        self._model = model
+        share: dict[str, float] = {}
+        for group, joints, _ in robot.groups:
+            if group != "antennae":
+                loaded = robot.servos.of(joints.servo).load_friction
+                share |= dict.fromkeys(robot.joint_names[robot.places(group)], loaded)
+        names = [name for name in share if share[name] > 0.0]
+        self._share: Floats = np.array([share[name] for name in names])
+        self._drive: Ints = np.array([model.actuator(prefix + n).id for n in names], np.int64)
+        self._dof: Ints = np.array([model.joint(prefix + n).dofadr[0] for n in names], np.int64)
+        self._dry: Floats = model.dof_frictionloss[self._dof]
+        self._damping: Floats = model.dof_damping[self._dof]
+
+    def load(self, data: mujoco.MjData) -> None:
+        """Set the friction of the coming steps from the torques of the motors in the last one."""
+        if len(self._dof):
+            motor = data.actuator_force[self._drive] - self._damping * data.qvel[self._dof]
+            self._model.dof_frictionloss[self._dof] = self._dry + self._share * abs(motor)
