@@ -94,7 +94,7 @@ def test_B15_servos_of_another_speed_are_found_there() -> None:
 
 def test_a_bus_where_nobody_answers_says_power_and_wiring() -> None:
     row = wrong(Patient("bus=silent").examine(esp32=False))["bus: baud"]
-    assert row.found == "nobody answers at any usual speed"
+    assert row.found == "no servo answers at any usual speed"
     assert "supply" in row.cure
     assert "swapped" in row.cure
 

@@ -48,7 +48,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             return INTERRUPTED
         output.flush()
         if output.error is None or isinstance(output.error, BrokenPipeError):
-            return code  # whoever read a pipe has seen enough
+            return code  # the reader of the pipe has ended, as `head` does
         reason = output.error.strerror or output.error
         sys.stderr.write(f"{name}: error: standard output: expected to write, found: {reason}\n")
         return BAD_INPUT

@@ -16,7 +16,7 @@ class TouchCheckParams(Params):
     """Change below which an antenna is at rest, in calibrated spans."""
     readings: int = number(10, "1", "assumed: 100 ms at 100 Hz", ge=1, le=1000)
     """Readings in a row that count."""
-    patience: float = number(60.0, "s", "assumed: somebody walks there, bends both", ge=0, le=3600)
+    patience: float = number(60.0, "s", "assumed: time to walk there and bend both", ge=0, le=3600)
     """Time by which the dry run is extended for the check, and then while torque is refused."""
 
     @model_validator(mode="after")

@@ -38,7 +38,7 @@ class EstimateParams(Params):
     """Trials of the estimates, and what differs between them."""
 
     trials: int = number(60, "1", "assumed: three times the paper's 20", ge=6, le=100000)
-    """Trials to calibrate, and as many to judge, in every condition."""
+    """Trials to calibrate, and as many to test, in every condition."""
     distance: tuple[_Place, _Place] = number((0.4, 0.9), "1", "assumed: reached by default")
     """Range of wall distances, over the length of the antenna."""
     centre_range: float = number(math.radians(10.0), "rad", "assumed: yaw of the gait", ge=0, le=1)

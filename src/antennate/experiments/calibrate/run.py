@@ -1,7 +1,7 @@
 """Calibrate an antenna: from a recording, or from a rig that pushes a simulated one.
 
 On the rig a rod indents the antenna from the side, at several speeds, several times each. The bend
-is the rod's way from the first touch over its whole way: what an experimenter knows.
+is the rod's way from the first touch over its whole way, which an experimenter can measure.
 """
 
 from __future__ import annotations

@@ -25,7 +25,7 @@ _ANSWERS_ALL = 2
 _VOLT = 0.1
 _SHUTDOWNS = XC430_W240["shutdown"].default or 0
 
-Judge = Callable[[BusSurvey, DoctorConfig, int, int], Grade]
+Grading = Callable[[BusSurvey, DoctorConfig, int, int], Grade]
 """The grade of a register of a servo: given survey, configuration, id and value."""
 
 
@@ -39,7 +39,7 @@ class _Check(NamedTuple):
     name: str
     register: str
     expected: str
-    judge: Judge
+    grading: Grading
     cure: str
     text: Callable[[int], str] = str
 
@@ -50,7 +50,7 @@ def register_findings(bus: BusSurvey, config: DoctorConfig) -> Iterator[tuple[Fi
     yield _position_limits(bus, config)
     for check in _CHECKS:
         values = _values(bus, config, check.register)
-        grades: dict[int, Grade] = {i: check.judge(bus, config, i, values[i]) for i in values}
+        grades: dict[int, Grade] = {i: check.grading(bus, config, i, values[i]) for i in values}
         finding = _of_servos(grades, grouped(values, check.text), check.cure)
         yield finding, check.name, check.expected.format(config=config, modes=modes)
 
@@ -66,14 +66,14 @@ def _of_servos(grades: Mapping[int, Grade], found: str, cure: str) -> Finding:
     return Finding(found, worst(grades.values()), cure.replace("{ids}", ids))
 
 
-def _required(register: str) -> Judge:
+def _required(register: str) -> Grading:
     """What `drive` requires, as `hardware.settings` says."""
     return lambda bus, config, servo, value: (
         "ok" if settings(config.robot)[register][servo].allows(value) else "bad"
     )
 
 
-def _only(good: int, grade: Grade) -> Judge:
+def _only(good: int, grade: Grade) -> Grading:
     """A grade of all values but one."""
     return lambda bus, config, servo, value: "ok" if value == good else grade
 
