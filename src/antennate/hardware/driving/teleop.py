@@ -77,7 +77,7 @@ class Wishes:
             KeyboardInterrupt: It ends the drive.
         """
         if key in QUIT:
-            raise KeyboardInterrupt
+            raise KeyboardInterrupt("a key" if key == "q" else "the end of the keys")
         if key in KEYS:
             self.maneuver, self.pressed_at = KEYS[key], now
         elif key == OSCILLATE:
