@@ -210,8 +210,8 @@ _CHECKS = (
         "goal_pwm",
         "all that the PWM limit allows",
         _full,
-        "{ids}: little force, left by a program that died, such as jog; drive, teleop and jog set it "
-        "when they arm",
+        "{ids}: little force, left by a program that died, such as jog; drive, teleop and jog set "
+        "it when they arm",
         lambda pwm: f"{100 * pwm / _FULL_PWM:.0f} %",
     ),
     _Check(
