@@ -123,7 +123,8 @@ def fields_of(kind: Any) -> Mapping[str, FieldInfo]:
 def options_of(default: Any, path: tuple[str, ...] = ()) -> Iterator[Option]:
     """An option for each field that a flag can set, group by group.
 
-    A group whose class has `named(text)` is also an option of its own: a name, or a file.
+    A group whose class has `named(text)` is also an option of its own: a name or a file, which its
+    `choice` describes.
 
     Args:
         default: A model or pydantic dataclass with its default values.
@@ -137,10 +138,8 @@ def options_of(default: Any, path: tuple[str, ...] = ()) -> Iterator[Option]:
             if option is not None:
                 yield option
         else:
-            if hasattr(group, "named"):
-                words = meaning(field) or first_line(group)
-                known = tuple(map(str, field.examples or ()))
-                yield Option((*path, name), "NAME|FILE", frozenset({str}), words, known)
+            if words := getattr(group, "choice", ""):
+                yield Option((*path, name), "NAME|FILE", frozenset({str}), words, ())
             yield from options_of(group() if value is None else value, (*path, name))
 
 

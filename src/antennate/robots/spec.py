@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Literal, Self
+from typing import Any, ClassVar, Literal, Self
 
 from pydantic import model_validator
 
@@ -72,6 +72,7 @@ ANTENNA_PREFIXES = tuple(f"antenna_{side}_" for side in SIDES)
 class RobotSpec(Params):
     """A walking robot: links with a pair of legs each, yaw joints between them, two antennae."""
 
+    choice: ClassVar[str] = f"{', '.join(ROBOTS)} (the default), or a TOML file of your own robot"
     links: int = number(6, "1", "paper: six links", ge=2, le=50)
     """Number of links."""
     link_pitch: float = number(0.10, "m", "assumed: three servos, 28.5 x 46.5 x 34 mm", gt=0.03)
