@@ -93,6 +93,7 @@ TINY: dict[str, list[dict[str, Any]]] = {
     "sensor": [{"hold_time": 1.0}, {"sensor": OTHER_SENSOR}],
     "springs": [{}],
     "taper": [{}],
+    "ringdown": [{}],
 }
 
 

@@ -138,7 +138,7 @@ def _meaning(model: Any, group: tuple[str, ...]) -> str:
     """What a group is, by its description or its docstring."""
     text = ""
     for part in group:
-        field = fields_of(model)[part]
-        model = group_of(field.annotation)
-        text = meaning(field) or first_line(model)
+        text = meaning(model, part)
+        model = group_of(fields_of(model)[part].annotation)
+        text = text or first_line(model)
     return text
