@@ -145,7 +145,7 @@ class Calibration(_Strict):
         except ValidationError as error:
             first = error.errors(include_url=False)[0]
             if first["type"] == "json_invalid":
-                what = first["ctx"]["error"].replace("EOF", "the end of the file")
+                what = first.get("ctx", {})["error"].replace("EOF", "the end of the file")
                 raise CalibrationError(
                     f"{path}: expected the file to be JSON, found {what}"
                 ) from None
