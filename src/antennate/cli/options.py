@@ -77,9 +77,9 @@ class Option:
 
     @property
     def meaning(self) -> str:
-        """What the field means, with its unit; of a named group also what its class is."""
+        """What the field means, with its unit; of a named group its choice."""
         kind = group_of(fields_of(self.model)[self.path[-1]].annotation)
-        return meaning(self.model, self.path[-1]) or ("" if kind is None else first_line(kind))
+        return getattr(kind, "choice", "") or meaning(self.model, self.path[-1])
 
     @property
     def offered(self) -> str:
@@ -129,7 +129,8 @@ def fields_of(kind: Any) -> Mapping[str, FieldInfo]:
 def options_of(default: Any, path: tuple[str, ...] = ()) -> Iterator[Option]:
     """An option for each field that a flag can set, group by group.
 
-    A group whose class has `named(text)` is also an option of its own: a name, or a file.
+    A group whose class has `named(text)` is also an option of its own: a name or a file, which its
+    `choice` describes.
 
     Args:
         default: A model or pydantic dataclass with its default values.
@@ -144,7 +145,7 @@ def options_of(default: Any, path: tuple[str, ...] = ()) -> Iterator[Option]:
             if option is not None:
                 yield option
         else:
-            if hasattr(group, "named"):
+            if hasattr(group, "choice"):
                 known = tuple(map(str, field.examples or ()))
                 yield Option((*path, name), "NAME|FILE", frozenset({str}), model, known)
             yield from options_of(group() if value is None else value, (*path, name))

@@ -136,8 +136,5 @@ class DoctorConfig(RobotConfig):
         *(path for path in paths_of(ControlParams, "control") if path not in _EXAMINED),
         *(path for path in paths_of(SupervisorParams, "limits") if path not in _EXAMINED),
         "control.conditioning.averaging_time",
-        "doctor.silence",
-        "doctor.quiet",
-        "doctor.unasked",
     )
     doctor: DoctorParams = DoctorParams()
