@@ -145,6 +145,11 @@ class Calibration(_Strict):
             json.loads(data, object_pairs_hook=_once)
         except ValidationError as error:
             first = error.errors(include_url=False)[0]
+            if first["type"] == "json_invalid":
+                what = first.get("ctx", {})["error"].replace("EOF", "the end of the file")
+                raise CalibrationError(
+                    f"{path}: expected the file to be JSON, found {what}"
+                ) from None
             field = ".".join(str(part) for part in first["loc"]) or "the file"
             raise CalibrationError(f"{path}: {field}: {first['msg']}") from None
         except CalibrationError as error:

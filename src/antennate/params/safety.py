@@ -48,7 +48,9 @@ class SupervisorParams(Params):
     """Answers missed in a row that degrade."""
     silent_answers: int = number(5, "1", "assumed: at 1 % loss once in 10^10", ge=1, le=100)
     """Answers missed in a row that mean a silent servo."""
-    supply_warn: float = number(10.8, "V", "assumed: three lithium cells near empty", gt=0, le=100)
+    supply_warn: float = number(
+        10.8, "V", "assumed: three lithium cells at 3.6 V, near empty", gt=0, le=100
+    )
     """Supply below which is warned."""
     slow_rate: float = number(
         0.5,

@@ -59,7 +59,7 @@ def sentence(result: Mapping[str, Any]) -> str:
     what = "Tunnels crossed" if scene == TUNNEL else f"Trials that succeeded in {scene}"
     text = f"{what} (95 % interval): {found}{test}." if found else ""
     for name, reason in none_valid.items():
-        text += f" No trial of {short[name]} is valid: {reason}."
+        text += f" No trial of {name} is valid: {reason}."
     return f"{text}{why}".strip()
 
 
