@@ -23,6 +23,7 @@ _MODES = ((1, "reversed"), (4, "timed"), (8, "torque by goal"))
 _ANSWERS_ALL = 2
 """Status return level at which a servo answers reads and writes."""
 _VOLT = 0.1
+_FULL_PWM = XC430_W240["pwm_limit"].high or 1
 _SHUTDOWNS = XC430_W240["shutdown"].default or 0
 
 Grading = Callable[[BusSurvey, DoctorConfig, int, int], Grade]
@@ -107,6 +108,10 @@ def _heat(bus: BusSurvey, config: DoctorConfig, servo: int, heat: int) -> Grade:
     default = XC430_W240["temperature_limit"].default or 0
     most = bus.registers[servo].get("temperature_limit", default)
     return "bad" if heat >= most else "warn" if heat >= most - config.doctor.heat_margin else "ok"
+
+
+def _full(bus: BusSurvey, config: DoctorConfig, servo: int, pwm: int) -> Grade:
+    return "ok" if pwm >= bus.registers[servo].get("pwm_limit", pwm) else "warn"
 
 
 def _watchdog(counts: int) -> str:
@@ -199,6 +204,15 @@ _CHECKS = (
         _only(0, "warn"),
         "{ids}: left by a program that died, or in use by one; drive clears it when it arms",
         _watchdog,
+    ),
+    _Check(
+        "goal PWM",
+        "goal_pwm",
+        "all that the PWM limit allows",
+        _full,
+        "{ids}: little force, left by a program that died, such as jog; drive, teleop and jog set "
+        "it when they arm",
+        lambda pwm: f"{100 * pwm / _FULL_PWM:.0f} %",
     ),
     _Check(
         "torque",

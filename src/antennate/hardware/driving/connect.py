@@ -103,7 +103,7 @@ def prepare(
             config.control.conditioning,
             drift=config.drift,
             touch=config.touch if config.touch_check else None,
-            reach=config.reach,
+            reaches=config.reaches,
             right=config.control.conditioning_right,
         ),
         limits=config.limits,
