@@ -126,6 +126,32 @@ def test_orders_that_cannot_be_are_refused_in_one_line(
     assert told.err.count("\n") == 1
 
 
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["twin", "--servos", ""],
+        ["twin", "--tcp", ""],
+        ["twin", "--udp", ""],
+        ["twin", "--orders", ""],
+        ["twin", "--key", "k"],
+        ["drive", "--key", "k", "--esp32", "/dev/nowhere", "--bus", "/dev/null"],
+        ["doctor", "--insecure-udp", "--esp32", "/dev/nowhere"],
+    ],
+    ids=" ".join,
+)
+def test_a_flag_that_has_nothing_to_say_is_refused(
+    words: list[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(words) == BAD_INPUT
+    told = capsys.readouterr()
+    assert told.err.count("\n") == 1
+    assert f"{words[1]}: expected " in told.err
+
+
 def test_bad_robot_toml_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / "robot.toml"
     file.write_text("[robot]\nbuad = 1\n")
