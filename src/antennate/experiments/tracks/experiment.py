@@ -32,21 +32,22 @@ LABELS = {
 
 def tables(result: Mapping[str, Any]) -> Sequence[Table]:
     """The shapes, what hangs on each criterion, and what was wrong with the tracks."""
-    found = result["frames"]
-    note = (
-        "With two points along an antenna its bend is not seen: straight is not told, and forward "
-        "and\nbackward are the side to which it points."
-        if result["told_by"] == "direction"
-        else ""
-    )
+    found, notes = result["frames"], []
+    if result["told_by"] == "direction":
+        notes.append(
+            "With two points along an antenna its bend is not seen: straight is not told, and "
+            "forward and\nbackward are the side to which it points."
+        )
+    if _free_air(result):
+        notes.append("Without a wall every frame counts as contact.")
     shapes = Table(
-        f"Share of the frames in contact, mean over {result['trials_in_contact']} trials",
+        f"Share of the frames in contact, trials: {result['trials_in_contact']}",
         ["share", "95 %"],
         [
             (name, [shown(row["share"]), shown(row["share_95"] or NONE)])
             for name, row in result["shapes"].items()
         ],
-        note,
+        "\n".join(notes),
     )
     varied = Table(
         f"The same with each criterion {100 * result['vary']:g} % less and more",
@@ -72,6 +73,10 @@ def tables(result: Mapping[str, Any]) -> Sequence[Table]:
     return shapes, varied, counts
 
 
+def _free_air(result: Mapping[str, Any]) -> bool:
+    return all(wall["kind"] == "none" for wall in result["wall"].values())
+
+
 def sentence(result: Mapping[str, Any]) -> str:
     """Which shapes antennae in contact have, and how much hangs on the criteria."""
     if not result["trials_in_contact"]:
@@ -86,8 +91,9 @@ def sentence(result: Mapping[str, Any]) -> str:
     correct = result["correct"]
     told = "" if correct is None else f" {100 * correct:.1f} % of the frames are told right."
     single = " Of one trial: nothing is known about the next." * (result["trials_in_contact"] == 1)
+    where = "With no wall given" if _free_air(result) else "In contact"
     return (
-        f"In contact: {listed} of the frames. Of all criteria {LABELS[most['criterion']]} matters "
+        f"{where}: {listed} of the frames. Of all criteria {LABELS[most['criterion']]} matters "
         f"most: changed by {100 * result['vary']:g} % it moves a share by "
         f"{100 * most['change']:.1f} points.{told}{single}"
     )

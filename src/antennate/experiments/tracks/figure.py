@@ -147,6 +147,7 @@ def _draw_change(panel: Axes, result: Mapping[str, Any]) -> None:
     signs = ("−", "+") * len(rows)
     labels = [f"{row['criterion']}\n{s}{percent}" for row, s in zip(rows, signs, strict=False)]
     style.categories(panel, labels)
+    panel.margins(y=0.12)
     panel.set_ylim(bottom=-0.03)
     panel.set_ylabel("share, mean over trials")
     panel.set_title("With one criterion changed; lines: with none changed")
