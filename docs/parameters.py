@@ -72,7 +72,7 @@ def table(group: type[params.Params]) -> str:
         default = field.get_default(call_default_factory=True)
         if isinstance(default, params.Params):  # its numbers have a table of their own
             kind = type(default).__name__
-            rows.append(f"| `{name}` | [{kind}](#{kind.lower()}) | | {meaning(field)} | |")
+            rows.append(f"| `{name}` | [{kind}](#{kind.lower()}) | | {meaning(group, name)} | |")
             continue
         extra = field.json_schema_extra
         assert isinstance(extra, dict), f"{group.__name__}.{name} has no unit and no source"
@@ -81,7 +81,7 @@ def table(group: type[params.Params]) -> str:
             f"`{name}`",
             f"`{value}`",
             extra["unit"],
-            meaning(field, unit=False),
+            meaning(group, name, unit=False),
             extra["source"],
         ]
         rows.append("| " + " | ".join(str(cell).replace("|", "\\|") for cell in cells) + " |")

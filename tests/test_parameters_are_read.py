@@ -112,6 +112,7 @@ TINY: dict[str, list[dict[str, Any]]] = {
     ],
     "springs": [{}],
     "taper": [{}],
+    "ringdown": [{}],
 }
 
 

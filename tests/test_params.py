@@ -15,6 +15,7 @@ from antennate.params import (
     PhysicsParams,
     TunnelParams,
 )
+from antennate.params.base import meaning
 from antennate.robots.antenna import AntennaSpec
 from antennate.robots.sensor import SensorParams
 from antennate.robots.servos import ServoParams
@@ -66,7 +67,7 @@ def test_every_field_has_a_meaning_a_unit_and_a_source_of_a_known_kind(
     extra = cls.model_fields[name].json_schema_extra
     assert isinstance(extra, dict)
     assert str(extra["unit"]).strip()
-    assert (cls.model_fields[name].description or "").endswith(".")
+    assert meaning(cls, name, unit=False)
     kind, _, why = str(extra["source"]).partition(":")
     assert kind in SOURCES
     assert why.strip()

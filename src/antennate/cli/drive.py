@@ -28,6 +28,7 @@ from antennate.hardware.driving.session import Session
 from antennate.hardware.driving.signals import StopOnce
 from antennate.hardware.robot_file import RobotFile
 from antennate.hardware.safety.causes import State
+from antennate.messages import short_names
 from antennate.studies.measures import Measure, Table
 from antennate.studies.run_directory import LOG
 from antennate.telemetry.feed import Feed
@@ -110,7 +111,8 @@ def walk(
                 session.control.controller = controller(session, config)
                 config = config.model_copy(update={"controller": command})
             result = _carry_out(command, config, session, orders, folder.path / LOG, operator)
-        table = Table.of("Drive", {result["controller"]: result}, MEASURES, _note(result))
+        name = result["controller"]
+        table = Table.of("Drive", {short_names([name])[name]: result}, MEASURES, _note(result))
         log = shlex.quote(str(folder.path / LOG))
         other = "" if controller is None else " --controller open"
         again = f"What was read and decided: antennate replay {log}{other}"

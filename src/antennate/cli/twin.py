@@ -34,9 +34,10 @@ from antennate.twin.udp import UdpEndpoint
 _LAST_PORT = 65_534
 
 DESCRIPTION = """\
-Serve the simulated robot in a scene as real bytes on two pseudo-terminals: the frames of the
-antenna board, and a DYNAMIXEL bus with all its servos. Prints one JSON line with the paths when
-ready. Physics begins when the first servo gets torque. --fault and --touch may be repeated.
+Serve the simulated robot in a scene on two serial ports (pseudo-terminals), which carry the same
+bytes as those of a real robot: one the frames of the antenna board, one a DYNAMIXEL bus with all
+servos. Prints one JSON line with the paths when ready. Physics begins when the first servo gets
+torque. --fault and --touch may be repeated.
 
 --touch left@2s right@5s bends the antennae of the standing robot, as the check by touch of
 `antennate drive` wants it, from the beginning of each client on. left:20mm@2s holds the left one,

@@ -55,7 +55,9 @@ class ServoParams(Params):
         gt=0,
     )
     """Share of the full drive per radian of position error."""
-    armature: float = number(0.003, "kg·m²", "assumed: rotor of 5e-8 behind a 245:1 gear", ge=0)
+    armature: float = number(
+        0.003, "kg·m²", "assumed: a rotor of 5e-8 kg·m² behind a 245:1 gear", ge=0
+    )
     """Inertia at the output."""
 
     @property

@@ -1,6 +1,6 @@
 """Tasks over processes: each result at once, and nothing lost when somebody presses Ctrl-C.
 
-A task hands out results one by one through `emit`; they travel back at once, beside the executor,
+A task gives each result to `emit`; it is sent to the parent at once, beside the executor,
 which returns a task's value only at its end. Processes are started fresh (spawn) and leave Ctrl-C
 to the parent. One worker means this process, without any start-up cost. Results come in no
 particular order; sort them.

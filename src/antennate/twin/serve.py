@@ -118,7 +118,7 @@ class TwinServer:
             self._orders.take(lambda text: self._order(text, now))
 
     def _order(self, text: str, now: float) -> None:
-        """Carry out one order: hands on the antennae, a fault, or plugs and shafts.
+        """Carry out one order: a touch of an antenna, a fault, or plugs and shafts.
 
         Raises:
             BadInputError: It is none.

@@ -43,7 +43,7 @@ def _errors(condition: str, by_noise: Mapping[str, Any]) -> Table:
             (cue.replace("_", " "), [_error(noisy[quantity], cue) for quantity in QUANTITIES])
             for cue in CUES
         ],
-        f"{noisy['sweeps']} sweeps to judge, {noisy['missed']} felt nothing, "
+        f"{noisy['sweeps']} test sweeps, {noisy['missed']} felt nothing, "
         f"{noisy['invalid']} invalid.",
     )
 

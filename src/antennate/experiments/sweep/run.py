@@ -1,4 +1,4 @@
-"""Base sweeps beside walls: which shapes appear when, and what active touch tells of distances."""
+"""Base sweeps beside walls: which shapes appear when, and how well touch measures distances."""
 
 from __future__ import annotations
 

@@ -117,7 +117,7 @@ class Bus:
         fast, dumb = self.fast, False
         while left and self._time_for(span, len(left), end):
             got = (self._read_fast if fast else self._read_chain)(left, span, end)
-            dumb = self._judge_fast(fast, dumb, bool(got))
+            dumb = self._count_fast(fast, dumb, bool(got))
             answers |= got
             left, fast = [servo for servo in left if servo not in got], False
             self._note(got, left[:1])
@@ -268,7 +268,7 @@ class Bus:
         for servo in silent:
             self.missed[servo] = self.missed.pop(servo, 0) + 1
 
-    def _judge_fast(self, fast: bool, dumb: bool, answered: bool) -> bool:
+    def _count_fast(self, fast: bool, dumb: bool, answered: bool) -> bool:
         if fast:
             self._fast_failures = 0 if answered else self._fast_failures
             return not answered
