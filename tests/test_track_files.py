@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from test_tracks import NAMES, POINTS, animal, dwelling, told, write
+from tracked import NAMES, POINTS, animal, classified, dwelling, write
 
 import antennate
 from antennate.cli import main
@@ -96,14 +96,14 @@ def message(capsys: pytest.CaptureFixture[str], *words: object) -> str:
 @pytest.mark.parametrize("kind", ["csv", "turned", "sleap", "pandas"])
 def test_every_container_holds_the_same_animal(kind: str, tmp_path: Path) -> None:
     points = animal(dwelling(5, 200))
-    plain, wanted = told(write(tmp_path / "plain.csv", points))
+    plain, wanted = classified(write(tmp_path / "plain.csv", points))
     path = {
         "csv": lambda: deeplabcut(tmp_path / "a.csv", points),
         "turned": lambda: sleap(tmp_path / "a.h5", points, turned=True),
         "sleap": lambda: sleap(tmp_path / "a.h5", points),
         "pandas": lambda: pandas_table(tmp_path / "a.h5", points),
     }[kind]()
-    result, found = told(path, rate=100.0)
+    result, found = classified(path, rate=100.0)
     assert found == wanted
     assert result.rows[0].angle_median_rad == pytest.approx(
         plain.rows[0].angle_median_rad, abs=1e-4
@@ -112,7 +112,7 @@ def test_every_container_holds_the_same_animal(kind: str, tmp_path: Path) -> Non
 
 def test_each_individual_of_a_file_is_a_trial(tmp_path: Path) -> None:
     path = deeplabcut(tmp_path / "a.csv", animal(dwelling(6, 150)), ("one", "two"))
-    result, _ = told(path, rate=100.0)
+    result, _ = classified(path, rate=100.0)
     assert [(row.trial, row.animal, row.side) for row in result.rows] == [
         (0, "one", "left"),
         (0, "one", "right"),

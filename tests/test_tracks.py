@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tracked import DWELL, POINTS, animal, bent, classified, dwelling, write
 
 import antennate
 from antennate.antenna.shapes import Shape, held, outline, pointing
@@ -17,82 +18,6 @@ ERRORS = (
     Path(__file__).parents[2]
     / "shared/data/antenna_ant_labels_metrics/derived/harpegnathos_node_error_px.csv"
 )
-POINTS = {
-    "left": ("l0", "l1", "l2", "l3"),
-    "right": ("r0", "r1", "r2", "r3"),
-    "tail": "tail",
-    "head": "head",
-}
-NAMES = (*POINTS["left"], *POINTS["right"], "tail", "head")
-DWELL = {  # direction of the first segment and turns [deg], outwards, of antennae held so
-    "forward": (60.0, -30.0, -25.0),
-    "straight": (50.0, 0.0, 0.0),
-    "backward": (80.0, 30.0, 30.0),
-    "transition": (50.0, 45.0, -45.0),
-}
-
-
-def bent(direction: float, *turns: float, length: float = 1.0) -> np.ndarray:
-    """Points of an antenna of equal segments from the origin, ahead and outwards; angles [deg]."""
-    angles = np.radians(np.cumsum([direction, *turns]))
-    steps = length / len(angles) * np.stack([np.cos(angles), np.sin(angles)], axis=1)
-    return np.concatenate([[(0.0, 0.0)], np.cumsum(steps, axis=0)])
-
-
-def animal(names: list[str], heading: float = 0.3) -> dict[str, np.ndarray]:
-    """Points (n, 2) of a walking animal, y up, both antennae of these shapes frame by frame."""
-    t = np.arange(len(names)) / 100.0
-    heading_now = heading + 0.2 * np.sin(t)
-    ahead = np.stack([np.cos(heading_now), np.sin(heading_now)], axis=1)
-    left = np.stack([-ahead[:, 1], ahead[:, 0]], axis=1)
-    head = np.stack([300.0 + 40.0 * t, 200.0 + 10.0 * t], axis=1)
-    found = {"head": head, "tail": head - 150.0 * ahead}
-    shape = np.array([bent(*DWELL[name], length=100.0) for name in names])
-    for side, sign in (("l", 1.0), ("r", -1.0)):
-        for k in range(4):
-            x, y = shape[:, k, 0], sign * (10.0 + shape[:, k, 1])
-            found[f"{side}{k}"] = head + x[:, None] * ahead + y[:, None] * left
-    return found
-
-
-def write(
-    path: Path,
-    points: dict[str, np.ndarray],
-    likelihood: dict[str, np.ndarray] | None = None,
-    frames: np.ndarray | None = None,
-) -> Path:
-    """Plain CSV with the default names of columns."""
-    count = len(next(iter(points.values())))
-    frames = np.arange(count) if frames is None else frames
-    with path.open("w", newline="") as file:
-        writer = csv.writer(file)
-        scored = likelihood or {}
-        header = [f"{n}_{a}" for n in points for a in "xy"]
-        writer.writerow(["frame", "time", *header, *("_".join((n, "likelihood")) for n in scored)])
-        for i in range(count):
-            cells = [v for n in points for v in points[n][i]]
-            cells = ["" if v != v else f"{v:.3f}" for v in cells]
-            likely = [f"{scored[n][i]:.2f}" for n in scored]
-            writer.writerow([frames[i], f"{frames[i] / 100.0:.2f}", *cells, *likely])
-    return path
-
-
-def dwelling(seed: int, frames: int) -> list[str]:
-    """A name of a shape for each frame, each held for 0.4 to 1.5 s at 100 Hz."""
-    rng, found = np.random.default_rng(seed), []
-    while len(found) < frames:
-        found += [list(DWELL)[rng.integers(4)]] * int(rng.integers(40, 150))
-    return found[:frames]
-
-
-def told(path: Path, **settings) -> tuple[antennate.Result, dict[str, list[str]]]:
-    """A run, and the shapes frame by frame of each side."""
-    values = {"files": [str(path)], "points": POINTS, "y_down": False, **settings}
-    result = antennate.run("tracks", **values)
-    rows = list(csv.DictReader(result.experiment.files(result.outcome)["frames.csv"].splitlines()))
-    return result, {
-        side: [row["shape"] for row in rows if row["side"] == side] for side in ("left", "right")
-    }
 
 
 def agreement(wanted: list[str], found: list[str]) -> float:
@@ -133,7 +58,7 @@ def test_shapes_that_are_not_held_are_transitions() -> None:
     assert held(shapes[:0], 3).tolist() == []
 
 
-def test_the_synthetic_animal_is_told_right_in_98_of_100_frames() -> None:
+def test_the_synthetic_animal_is_classified_correctly_in_98_of_100_frames() -> None:
     result = antennate.run("tracks", synthetic={"trials": 2, "frames": 1500})
     assert result.summary["correct"] >= 0.98
     assert result.summary["wall"]["synthetic0"]["rms"] < 3.0  # px: the tips' errors
@@ -154,7 +79,7 @@ def test_known_shapes_with_the_errors_of_a_real_network(tmp_path: Path) -> None:
     for name in POINTS["left"] + POINTS["right"]:
         size, way = rng.choice(errors, len(names)), rng.uniform(0, 2 * np.pi, len(names))
         points[name] = points[name] + size[:, None] * np.stack([np.cos(way), np.sin(way)], 1)
-    result, shapes = told(write(tmp_path / "a.csv", points))
+    result, shapes = classified(write(tmp_path / "a.csv", points))
     assert agreement(names, shapes["left"]) >= 0.98
     assert agreement(names, shapes["right"]) >= 0.98
     usual = {name: row["share"] for name, row in result.summary["shapes"].items()}
@@ -180,7 +105,7 @@ def test_defects_are_mended_and_counted_one_by_one(tmp_path: Path) -> None:
     keep = np.r_[0:50, 49:500, 503:600]  # frame 49 twice, 500 to 502 absent
     points = {name: values[keep] for name, values in points.items()}
     likelihood = {name: values[keep] for name, values in likelihood.items()}
-    result, shapes = told(write(tmp_path / "a.csv", points, likelihood, frames[keep]))
+    result, shapes = classified(write(tmp_path / "a.csv", points, likelihood, frames[keep]))
     handled = result.summary["handled"]
     counts = {"duplicated": 1, "absent": 3, "low_likelihood": 4, "missing": 3, "swapped": 2}
     assert {name: handled[name] for name in counts} == counts
@@ -197,7 +122,7 @@ def test_a_long_gap_stays_unknown_and_counts_nowhere(tmp_path: Path) -> None:
     names = ["straight"] * 300
     points = animal(names)
     points["l1"][100:150] = np.nan
-    result, shapes = told(write(tmp_path / "a.csv", points))
+    result, shapes = classified(write(tmp_path / "a.csv", points))
     assert shapes["left"].count("unknown") == 50
     assert result.rows[0].straight == 1.0
     assert result.summary["frames"]["unknown"] == 50
@@ -211,9 +136,9 @@ def test_antennae_of_one_base_are_put_back_by_their_way(tmp_path: Path) -> None:
         tips["l3"][i], tips["r3"][i] = points["r3"][i], points["l3"][i]
     held_points = {"head": points["head"], "tail": points["tail"], **tips}
     two = {"left": ("head", "l3"), "right": ("head", "r3"), "tail": "tail", "head": "head"}
-    result, shapes = told(write(tmp_path / "a.csv", held_points), points=two)
+    result, shapes = classified(write(tmp_path / "a.csv", held_points), points=two)
     assert result.summary["handled"]["swapped"] == 2
-    assert result.summary["told_by"] == "direction"
+    assert result.summary["classified_by"] == "direction"
     assert result.summary["shapes"]["straight"]["share"] is None
     found = agreement(["backward" if n == "backward" else "forward" for n in names], shapes["left"])
     assert found > 0.98
@@ -228,13 +153,15 @@ def test_only_contact_counts_and_a_line_is_found(tmp_path: Path) -> None:
     jitter = np.random.default_rng(0).normal(0.0, 1.0, 800)
     points = {n: v + np.stack([0.0 * off, 400.0 - reach - off], 1) for n, v in points.items()}
     points["l3"][:, 1] += jitter
-    result, shapes = told(write(tmp_path / "a.csv", points), wall={"kind": "line"})
+    result, shapes = classified(write(tmp_path / "a.csv", points), wall={"kind": "line"})
     assert result.summary["wall"][str(tmp_path / "a.csv")]["rms"] < 2.0
     _, y0, _, y1 = result.summary["wall"][str(tmp_path / "a.csv")]["numbers"]
     assert (y0, y1) == pytest.approx((400.0, 400.0), abs=2.0)
     assert agreement(names[:400] + ["free"] * 400, shapes["left"]) > 0.98
     assert set(shapes["right"]) == {"free"}
-    given, again = told(tmp_path / "a.csv", wall={"kind": "line", "line": (0.0, 400.0, 9.0, 400.0)})
+    given, again = classified(
+        tmp_path / "a.csv", wall={"kind": "line", "line": (0.0, 400.0, 9.0, 400.0)}
+    )
     assert agreement(shapes["left"], again["left"]) > 0.99
     assert not given.summary["wall"][str(tmp_path / "a.csv")]["fitted"]
 
@@ -250,18 +177,18 @@ def test_a_circle_is_found_from_the_tips_along_it(tmp_path: Path) -> None:
     points = {"head": head, "tail": head - 150.0 * inward, "l3": tip}
     names = {"left": ("head", "l3"), "right": ("none",), "tail": "tail", "head": "head"}
     file = write(tmp_path / "a.csv", points)
-    result, _ = told(file, points=names, wall={"kind": "circle"})
+    result, _ = classified(file, points=names, wall={"kind": "circle"})
     x, y, r = result.summary["wall"][str(file)]["numbers"]
     assert (x, y, r) == pytest.approx((640.0, 512.0, 500.0), abs=2.0)
     write(file, {name: values[:200] for name, values in points.items()})
     with pytest.raises(antennate.AntennateError, match=r"tips along a circle .* --wall\.circle"):
-        told(file, points=names, wall={"kind": "circle"})
+        classified(file, points=names, wall={"kind": "circle"})
 
 
 def test_one_trial_has_no_interval_and_says_so(tmp_path: Path) -> None:
-    result, _ = told(write(tmp_path / "a.csv", animal(dwelling(4, 300))))
+    result, _ = classified(write(tmp_path / "a.csv", animal(dwelling(4, 300))))
     assert all(row["share_95"] is None for row in result.summary["shapes"].values())
-    assert result.sentence.endswith("nothing is known about the next.")
+    assert result.sentence.endswith("One trial alone gives no interval.")
 
 
 def test_the_simulated_antenna_goes_through_the_same_classifier(tmp_path: Path) -> None:

@@ -37,7 +37,7 @@ class Antennae:
         sides: Points of each antenna in the body's frame with y outwards, shape (n, k, 2), NaN
             where not known.
         places: The same points as in the file's frame.
-        contact: Whether each antenna touches, shape (n,), where the file tells it.
+        contact: Whether each antenna touches, shape (n,), where the file has it.
         counts: What was wrong, by the names in `COUNTED`.
     """
 

@@ -81,7 +81,7 @@ class ColumnsParams(Params):
     contact: str = number("{}_contact", "1", "assumed: plain", pattern=_FORMAT)
     """Columns of contact, 0 or 1, for wall kind `file`; {} stands for left and right."""
     trial: str = number("trial", "1", "assumed: plain")
-    """Column that tells trials or animals apart, if any."""
+    """Column with the name of the trial or animal, if any."""
 
 
 class CleaningParams(Params):
@@ -97,7 +97,7 @@ class CleaningParams(Params):
     """How much longer than its median an antenna may be before its tip is wrong."""
     longest_gap: float = number(0.1, "s", "assumed: twice the running median", ge=0, le=10)
     """Longest gap that is bridged by a straight line in the body's frame."""
-    least_frames: int = number(10, "1", "assumed: fewer tell nothing", ge=1, le=1000000)
+    least_frames: int = number(10, "1", "assumed: too few for a distribution", ge=1, le=1000000)
     """Known frames below which an animal is left out."""
 
 
@@ -128,7 +128,7 @@ class TrackWallParams(Params):
 
 
 class CriteriaParams(Params):
-    """What tells contact and shapes apart."""
+    """Criteria of contact and of the shapes."""
 
     gap: float = number(0.15, "1", "assumed: three times a good network's error", gt=0, le=1)
     """Distance to the wall, over the antenna's length, below which an antenna touches."""

@@ -31,12 +31,12 @@ LABELS = {
 
 
 def tables(result: Mapping[str, Any]) -> Sequence[Table]:
-    """The shapes, what hangs on each criterion, and what was wrong with the tracks."""
+    """The shapes, what depends on each criterion, and what was wrong with the tracks."""
     found, notes = result["frames"], []
-    if result["told_by"] == "direction":
+    if result["classified_by"] == "direction":
         notes.append(
-            "With two points along an antenna its bend is not seen: straight is not told, and "
-            "forward and\nbackward are the side to which it points."
+            "With two points along an antenna its bend cannot be seen: forward and "
+            "backward\nare the side to which it points, and straight is not known."
         )
     if _free_air(result):
         notes.append("Without a wall every frame counts as contact.")
@@ -78,7 +78,7 @@ def _free_air(result: Mapping[str, Any]) -> bool:
 
 
 def sentence(result: Mapping[str, Any]) -> str:
-    """Which shapes antennae in contact have, and how much hangs on the criteria."""
+    """Which shapes antennae in contact have, and how much depends on the criteria."""
     if not result["trials_in_contact"]:
         return "No antenna was seen in contact."
     listed = ", ".join(
@@ -89,13 +89,15 @@ def sentence(result: Mapping[str, Any]) -> str:
     )
     most = max(result["sensitivity"], key=lambda row: row["change"])
     correct = result["correct"]
-    told = "" if correct is None else f" {100 * correct:.1f} % of the frames are told right."
-    single = " Of one trial: nothing is known about the next." * (result["trials_in_contact"] == 1)
+    right = (
+        "" if correct is None else f" {100 * correct:.1f} % of the frames are classified correctly."
+    )
+    single = " One trial alone gives no interval." * (result["trials_in_contact"] == 1)
     where = "With no wall given" if _free_air(result) else "In contact"
     return (
         f"{where}: {listed} of the frames. Of all criteria {LABELS[most['criterion']]} matters "
         f"most: changed by {100 * result['vary']:g} % it moves a share by "
-        f"{100 * most['change']:.1f} points.{told}{single}"
+        f"{100 * most['change']:.1f} points.{right}{single}"
     )
 
 

@@ -63,7 +63,7 @@ def seen(trial: int, side: str, found: Antennae, wall: Wall) -> Seen:
         contact = found.contact.get(side)
         if contact is None:
             raise BadInputError(
-                f"{found.track.file}: expected a column that tells the contact of the {side} "
+                f"{found.track.file}: expected a column with the contact of the {side} "
                 "antenna, found none; name it with --columns.contact, or choose another --wall.kind"
             )
         distance = np.where(np.isfinite(contact), np.where(contact > 0.5, 0.0, np.inf), np.nan)
@@ -79,7 +79,7 @@ def shapes_of(criteria: CriteriaParams, antenna: Seen) -> Ints:
 
     With three points or more the shape follows from the bend; forward and backward also need the
     tip's segment to point there. With two it follows from the direction alone: straight is not
-    told. Shapes that are not held for `duration` are transitions.
+    known. Shapes that are not held for `duration` are transitions.
     """
     angles = antenna.outline
     if antenna.points.shape[1] > 2:
@@ -118,7 +118,7 @@ def over_trials(criteria: CriteriaParams, antennae: Sequence[Seen]) -> dict[str,
     """Mean share of each shape over trials, with its bootstrap 95 % interval.
 
     The interval is None with fewer than two trials, as one says nothing about the next. With two
-    points along the antenna straight is not told: its share is None.
+    points along the antenna straight cannot be seen: its share is None.
     """
     table = by_trial(criteria, antennae)
     found = {}
@@ -139,8 +139,8 @@ def sensitivity(config: TracksConfig, antennae: Sequence[Seen]) -> list[dict[str
             value = factor * getattr(config.criteria, name)
             other = over_trials(config.criteria.model_copy(update={name: value}), antennae)
             share = {shape: other[shape]["share"] for shape in SHAPES}
-            told = [shape for shape in SHAPES if share[shape] is not None]
-            change = max(abs(share[shape] - usual[shape]["share"]) for shape in told)
+            seen_shapes = [shape for shape in SHAPES if share[shape] is not None]
+            change = max(abs(share[shape] - usual[shape]["share"]) for shape in seen_shapes)
             rows.append({"criterion": name, "value": value, "share": share, "change": change})
     return rows
 

@@ -32,7 +32,7 @@ def read(path: Path, names: Sequence[str], columns: ColumnsParams) -> list[Track
     """The animals of a file, with the named points.
 
     Args:
-        path: The file; its suffix tells the format.
+        path: The file; its suffix gives the format.
         names: Points that are wanted.
         columns: Columns of plain CSV.
 

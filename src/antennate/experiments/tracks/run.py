@@ -1,4 +1,4 @@
-"""Read tracks, clean them, and tell the shapes of the antennae."""
+"""Read tracks, clean them, and classify the shapes of the antennae."""
 
 from __future__ import annotations
 
@@ -92,7 +92,7 @@ class TracksOutcome:
             "command": "tracks",
             "seed": config.seed,
             "source": "files" if config.files else "synthetic",
-            "told_by": "bend" if config.points.count > 2 else "direction",
+            "classified_by": "bend" if config.points.count > 2 else "direction",
             "wall": {
                 name: {"kind": w.kind, "numbers": w.numbers, "fitted": w.fitted, "rms": w.rms}
                 for name, w in self.walls.items()
@@ -141,7 +141,7 @@ def run(
     on_step: OnStep = no_step,
     on_row: OnRow = no_row,
 ) -> TracksOutcome:
-    """Tell the shapes of the antennae in every file.
+    """Classify the shapes of the antennae in every file.
 
     Raises:
         BadInputError: A file cannot be read, lacks a point, or states another frame rate.
@@ -265,7 +265,7 @@ def _row(config: TracksConfig, animal: Antennae, one: Seen, truth: Ints | None) 
         name: float(np.median(values[contact])) if contact.any() else None
         for name, values in (("angle", one.outline.direction), ("flex", one.outline.flex))
     }
-    told = {
+    classes = {
         name: None if math.isnan(value) else float(value)
         for name, value in zip(SHAPES, share, strict=True)
     }
@@ -285,6 +285,6 @@ def _row(config: TracksConfig, animal: Antennae, one: Seen, truth: Ints | None) 
         angle_median_rad=median["angle"],
         flex_median_rad=median["flex"],
         correct=None if truth is None else float((shape == truth).mean()),
-        **told,
+        **classes,
         **counts,
     )

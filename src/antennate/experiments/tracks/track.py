@@ -28,7 +28,7 @@ class Track:
         rate: Frames a second that the file states, None if it states none.
         points: Named points in the file's unit, each of shape (n, 2); NaN where missing.
         scores: Likelihood of each point, shape (n,); absent where the file has none.
-        contact: Whether each side's antenna touches, 0 or 1, shape (n,), where the file tells it.
+        contact: Whether each side's antenna touches, 0 or 1, shape (n,), where the file has it.
     """
 
     file: str

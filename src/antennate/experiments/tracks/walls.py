@@ -63,7 +63,7 @@ def wall_of(params: TrackWallParams, file: str, tips: Floats, length: float) -> 
         length: Length of the antennae, in the same unit.
 
     Raises:
-        BadInputError: It has to be fitted and the tips do not tell where it is.
+        BadInputError: It has to be fitted and the tips do not fix it.
     """
     given = params.line if params.kind == "line" else params.circle
     if params.kind in ("none", "file") or given is not None:
