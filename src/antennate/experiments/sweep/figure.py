@@ -70,7 +70,7 @@ def study(result: Mapping[str, Any]) -> Figure:
         panel.axhline(published, color=style.INK, linewidth=1, linestyle=(0, (4, 2)))
         panel.annotate(
             f"CITRAS {published:g} %{note}",
-            (0.5, published),
+            (0.62, published),
             (0, -2),
             textcoords="offset points",
             ha="center",
