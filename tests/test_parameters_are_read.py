@@ -26,6 +26,9 @@ RECORDING = "time,counts,bend,trial,speed_m_s\n" + "".join(
     for i in range(20)
     for k in [i]
 )
+TRACKS = "frame,time,a_x,a_y,b_x,b_y\n" + "".join(
+    f"{i},{0.02 * i:.2f},{i},5,{i + 3},4\n" for i in range(30)
+)
 OTHER_SENSOR = {"kind": "fsr"}
 TINY: dict[str, list[dict[str, Any]]] = {
     "tunnel": [
@@ -94,6 +97,22 @@ TINY: dict[str, list[dict[str, Any]]] = {
         {"recording": "recording.csv", "draws": 20},
     ],
     "sensor": [{"hold_time": 1.0}, {"sensor": OTHER_SENSOR}],
+    "tracks": [
+        {"synthetic": {"trials": 1, "frames": 200}},
+        *(
+            {
+                "files": ["tracks.csv"],
+                "points": {"left": ["a", "b"], "right": ["none"], "tail": "b", "head": "a"},
+                "rate": 100.0,
+                "playback_rate": 50.0,
+                "wall": wall,
+            }
+            for wall in (
+                {"kind": "line", "line": [0.0, 9.0, 1.0, 9.0]},
+                {"kind": "circle", "circle": [0.0, 0.0, 9.0]},
+            )
+        ),
+    ],
     "springs": [{}],
     "taper": [{}],
     "ringdown": [{}],
@@ -106,6 +125,7 @@ def test_every_parameter_of_an_experiment_is_read_or_refused(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     Path("recording.csv").write_text(RECORDING)
+    Path("tracks.csv").write_text(TRACKS)
     experiment = experiments.load(name)
     read: set[str] = set()
     for values in TINY[name]:
