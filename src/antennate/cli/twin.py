@@ -25,8 +25,7 @@ from antennate.twin.endpoints import Endpoint
 from antennate.twin.faults import Faults, read
 from antennate.twin.orders import Orders
 from antennate.twin.passage import Passage
-from antennate.twin.serve import TwinServer
-from antennate.twin.serve_servos import ServoServer
+from antennate.twin.serve import ServoServer, TwinServer
 from antennate.twin.servo_box import ServoBox, read_list
 from antennate.twin.tcp import TcpEndpoint
 from antennate.twin.udp import UdpEndpoint
