@@ -92,10 +92,13 @@ def key_of(options: RobotOptions) -> bytes | None:
     """The key for a board behind udp://, None if there is no such board.
 
     Raises:
-        ConfigError: --insecure-udp beside a key.
+        ConfigError: --insecure-udp beside a key, or either without such a board.
         BadInputError: There is no key, or it cannot be used.
     """
     if not is_udp(options.esp32):
+        for flag, given in (("--key", options.key), ("--insecure-udp", options.insecure_udp)):
+            if given:
+                raise ConfigError(f"{flag}: expected a board behind udp:// beside it, found none")
         return None
     if not options.insecure_udp:
         return read_key(options.key, "or give --insecure-udp for a board without one")
