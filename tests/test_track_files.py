@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import json
 import pickle
 import sys
 from pathlib import Path
@@ -70,6 +71,33 @@ def sleap(path: Path, points: dict[str, np.ndarray], turned: bool = False) -> Pa
     return path
 
 
+def labels(path: Path, points: dict[str, np.ndarray]) -> Path:
+    """SLEAP's own file, with predictions of one tracked animal."""
+    nodes, count = list(points), len(next(iter(points.values())))
+    skeleton = {"nodes": [{"id": i} for i in range(len(nodes))]}
+    about = {"skeletons": [skeleton], "nodes": [{"name": name} for name in nodes]}
+    starts = [(name, "<u8") for name in ("instance_id_start", "instance_id_end")]
+    frames = np.zeros(count, [("video", "<u4"), ("frame_idx", "<u8"), *starts])
+    ends = [(name, "<u8") for name in ("point_id_start", "point_id_end")]
+    instances = np.zeros(count, [("instance_type", "u1"), ("track", "<i4"), *ends])
+    number = np.arange(count)
+    frames["frame_idx"] = frames["instance_id_start"] = number
+    frames["instance_id_end"] = number + 1
+    instances["instance_type"] = 1
+    instances["point_id_start"] = len(nodes) * number
+    instances["point_id_end"] = len(nodes) * (number + 1)
+    place = [("x", "<f8"), ("y", "<f8"), ("visible", "?")]
+    predicted = np.zeros(len(nodes) * count, [*place, ("score", "<f8")])
+    every = np.stack(list(points.values()), axis=1).reshape(-1, 2)
+    predicted["x"], predicted["y"] = every.T
+    predicted["visible"], predicted["score"] = True, 0.5
+    with h5py.File(path, "w") as file:
+        file.create_group("metadata").attrs.update({"json": json.dumps(about), "format_id": 1.2})
+        file["frames"], file["instances"] = frames, instances
+        file["points"], file["pred_points"] = np.zeros(0, place), predicted
+    return path
+
+
 def pandas_table(path: Path, points: dict[str, np.ndarray], names: bytes | None = None) -> Path:
     """HDF5 as pandas writes it in format `table`, which DeepLabCut uses."""
     columns = [("net", n, c) for n in points for c in ("x", "y")]
@@ -93,7 +121,7 @@ def message(capsys: pytest.CaptureFixture[str], *words: object) -> str:
     return err
 
 
-@pytest.mark.parametrize("kind", ["csv", "turned", "sleap", "pandas"])
+@pytest.mark.parametrize("kind", ["csv", "turned", "sleap", "labels", "pandas"])
 def test_every_container_holds_the_same_animal(kind: str, tmp_path: Path) -> None:
     points = animal(dwelling(5, 200))
     plain, wanted = classified(write(tmp_path / "plain.csv", points))
@@ -101,6 +129,7 @@ def test_every_container_holds_the_same_animal(kind: str, tmp_path: Path) -> Non
         "csv": lambda: deeplabcut(tmp_path / "a.csv", points),
         "turned": lambda: sleap(tmp_path / "a.h5", points, turned=True),
         "sleap": lambda: sleap(tmp_path / "a.h5", points),
+        "labels": lambda: labels(tmp_path / "a.slp", points),
         "pandas": lambda: pandas_table(tmp_path / "a.h5", points),
     }[kind]()
     result, found = classified(path, rate=100.0)

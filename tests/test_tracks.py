@@ -118,6 +118,21 @@ def test_defects_are_mended_and_counted_one_by_one(tmp_path: Path) -> None:
     assert result.rows[0].rate_hz == pytest.approx(100.0)
 
 
+@pytest.mark.parametrize(("angle", "expected"), [(90.0, "transition"), (120.0, "forward")])
+def test_bent_forward_is_forward_only_if_the_end_points_there(
+    angle: float, expected: str, tmp_path: Path
+) -> None:
+    """Segments at 150, 130 and 110 deg: bent towards the heading, but pointing to the tail."""
+    points, t = animal(["straight"] * 60, heading=0.0), np.arange(60) / 100.0
+    ahead = np.stack([np.cos(0.2 * np.sin(t)), np.sin(0.2 * np.sin(t))], axis=1)
+    left = np.stack([-ahead[:, 1], ahead[:, 0]], axis=1)
+    for k, (x, y) in enumerate(bent(150.0, -20.0, -20.0, length=100.0)):
+        points[f"l{k}"] = points["head"] + x * ahead + (10.0 + y) * left
+    criteria = {"angle": math.radians(angle)}
+    _, shapes = classified(write(tmp_path / "a.csv", points), criteria=criteria)
+    assert set(shapes["left"]) == {expected}
+
+
 def test_a_long_gap_stays_unknown_and_counts_nowhere(tmp_path: Path) -> None:
     names = ["straight"] * 300
     points = animal(names)

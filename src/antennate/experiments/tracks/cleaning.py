@@ -24,6 +24,8 @@ low likelihood and missing ones; frames with exchanged sides; wrong points; and 
 _MOST_EXCHANGED, _MOST_ACROSS = 0.5, 0.8
 """Shares of frames beyond which left and right are not exchanged now and then but always: with two
 antennae, and with one, which may swing across the body axis."""
+_CLEARLY = 0.3
+"""Sine of the angle by which a single antenna points across the body axis."""
 _FRAMES_TO_JUDGE = 10
 
 
@@ -109,6 +111,7 @@ def _each_frame_once(
 ) -> dict[str, Floats]:
     """Points with a row for each frame from first to last; what is not known is NaN."""
     kept = np.concatenate([[True], np.diff(track.frames) > 0])
+    cutoff = track.cutoff if params.likelihood is None else params.likelihood
     counts["duplicated"] = int((~kept).sum())
     counts["absent"] = int(track.frames[-1] - track.frames[0] + 1 - kept.sum())
     found = {}
@@ -117,7 +120,7 @@ def _each_frame_once(
         gone = np.asarray(~np.isfinite(values).all(axis=1))
         low = np.zeros(len(raw), bool)
         if name in track.scores:
-            low = ~gone & ~(track.scores[name] >= params.likelihood)
+            low = ~gone & ~(track.scores[name] >= cutoff)
         counts["missing"] += int(gone[kept].sum())
         counts["low_likelihood"] += int(low[kept].sum())
         values[gone | low] = np.nan
@@ -136,10 +139,9 @@ def _exchange(track: Track, body: dict[str, Floats], counts: dict[str, int]) -> 
     """
     if set(body) != {"left", "right"}:
         for side, values in body.items():
-            out = values[:, -1, 1] - values[:, 0, 1]
-            _refuse_mirrored(
-                track, (out < 0) if side == "left" else (out > 0), np.isfinite(out), _MOST_ACROSS
-            )
+            ahead, out = (values[:, -1] - values[:, 0]).T
+            across = (-out if side == "left" else out) > _CLEARLY * np.hypot(ahead, out)
+            _refuse_mirrored(track, across, np.isfinite(out), _MOST_ACROSS)
         return
     left, right = body["left"], body["right"]
     apart = left[..., 1] - right[..., 1]

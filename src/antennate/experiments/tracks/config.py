@@ -87,7 +87,9 @@ class ColumnsParams(Params):
 class CleaningParams(Params):
     """What is done about points that are missing or wrong."""
 
-    likelihood: float = number(0.6, "1", "assumed: DeepLabCut's usual cutoff", ge=0, le=1)
+    likelihood: float | None = number(
+        None, "1", "assumed: 0.2 for SLEAP, else 0.6: what these programs use", ge=0, le=1
+    )
     """Likelihood below which a point counts as missing."""
     smoothing: float = number(0.05, "s", "assumed: far below a stroke of 0.5 s", ge=0, le=1)
     """Width of the running median; below three frames there is none."""

@@ -26,6 +26,8 @@ from antennate.experiments.tracks.track import (
 from antennate.files import read_limited
 from antennate.types import Floats
 
+_SLEAP_CUTOFF = 0.2
+"""Height of a peak below which SLEAP's inference leaves a point out by default."""
 _SLEAP_AXES = ("track", "xy", "node", "frame")
 
 
@@ -92,6 +94,7 @@ def _analysis(path: Path, file: Any, names: Sequence[str]) -> list[Track]:
             None,
             {n: points[i, :, nodes.index(n)] for n in names},
             {} if scores is None else {n: scores[i, :, nodes.index(n)] for n in names},
+            _SLEAP_CUTOFF,
         )
         for i, title in enumerate(titles)
     ]
@@ -158,6 +161,7 @@ def _labels(path: Path, file: Any, names: Sequence[str]) -> list[Track]:
             None,
             {n: points[:, nodes.index(n)] for n in names},
             {n: scores[:, nodes.index(n)] for n in names},
+            _SLEAP_CUTOFF,
         )
         for number, (points, scores) in sorted(tracks.items())
     ]

@@ -162,7 +162,7 @@ def _plain(
         scores = {n: part[extra[n]] for n in names if extra[n] in part}
         rate = _rate(path, numbers, part[extra["time"]]) if extra["time"] in part else None
         contact = {side: part[column] for side, column in touch.items() if column in part}
-        tracks.append(Track(str(path), trial, numbers, rate, points, scores, contact))
+        tracks.append(Track(str(path), trial, numbers, rate, points, scores, contact=contact))
     return tracks
 
 

@@ -166,7 +166,7 @@ def run(
     if not made.rows:
         raise BadInputError(
             f"{', '.join(names)}: expected an animal known in {config.cleaning.least_frames} "
-            "frames, found none"
+            "frames, found none; are the points right, and --cleaning.likelihood not too high?"
         )
     return TracksOutcome(made.config, made.rows, made.antennae, made.walls, made.skipped)
 

@@ -28,6 +28,7 @@ class Track:
         rate: Frames a second that the file states, None if it states none.
         points: Named points in the file's unit, each of shape (n, 2); NaN where missing.
         scores: Likelihood of each point, shape (n,); absent where the file has none.
+        cutoff: Likelihood below which a point is usually left out in this format.
         contact: Whether each side's antenna touches, 0 or 1, shape (n,), where the file has it.
     """
 
@@ -37,6 +38,7 @@ class Track:
     rate: float | None
     points: Mapping[str, Floats]
     scores: Mapping[str, Floats]
+    cutoff: float = 0.6
     contact: Mapping[str, Floats] = field(default_factory=dict[str, Floats])
 
 
