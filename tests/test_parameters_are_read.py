@@ -17,6 +17,7 @@ from recorded import act, leaves, recorded
 from antennate import experiments
 from antennate.cli import main
 from antennate.control.registry import BUILT_IN, UNREAD
+from antennate.experiments.reproduce import run as reproduce
 from antennate.params import ControlParams
 from antennate.robots.spec import RobotSpec
 
@@ -116,7 +117,10 @@ TINY: dict[str, list[dict[str, Any]]] = {
     "springs": [{}],
     "taper": [{}],
     "ringdown": [{}],
+    "reproduce": [{"quick": True}],
 }
+PARTS = {"springs": {}, "calibrate": {"rig": {"pushes": 2, "speeds": [0.3]}, "draws": 20}}
+"""All that `reproduce` runs here."""
 
 
 @pytest.mark.parametrize("name", TINY)
@@ -126,6 +130,7 @@ def test_every_parameter_of_an_experiment_is_read_or_refused(
     monkeypatch.chdir(tmp_path)
     Path("recording.csv").write_text(RECORDING)
     Path("tracks.csv").write_text(TRACKS)
+    monkeypatch.setattr(reproduce, "QUICK", PARTS)
     experiment = experiments.load(name)
     read: set[str] = set()
     for values in TINY[name]:
