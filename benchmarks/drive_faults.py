@@ -25,8 +25,8 @@ from typing import Any
 from wires import Cable
 
 ANTENNATE = [sys.executable, "-c", "import sys; from antennate.cli import main; sys.exit(main())"]
-DRY_RUN, WALK = 1.0, 8.0
-"""Times of a drive [s]."""
+DRY_RUN, WALK, LONG_WALK = 1.0, 8.0, 30.0
+"""Times of a drive [s]: a long walk where what happens is to end it sooner."""
 EARLY, LATE = 0.3, 3.0
 """When something happens, after the first command was sent [s]."""
 PATIENCE = 90.0
@@ -51,7 +51,7 @@ class Run:
     def start(self, *more: str) -> None:
         """Start the drive, and wait until it walks."""
         ports = ["--esp32", self.paths["esp32"], "--bus", self.paths["bus"]]
-        times = ["--dry-run", str(DRY_RUN), "--duration", str(WALK), "--fault-time", "1"]
+        times = ["--dry-run", str(DRY_RUN), "--fault-time", "1"]
         words = ["drive", "--arm", "--no-touch-check", "--bus-return", "5", *ports, *times, *more]
         self.drive = subprocess.Popen(
             [*ANTENNATE, *words, "--out", str(self.folder)],
@@ -226,7 +226,8 @@ def once(case: str, chance: random.Random) -> dict[str, Any]:
     """One run of a case: what came of it, and whether that is as documented."""
     act, check, _ = CASES[case]
     with twin(tcp="replugged" in case) as run, _disk(case, run):
-        run.start()
+        walk = LONG_WALK if check in (ends, faults, killed) else WALK
+        run.start("--duration", str(walk))
         walked = run.drive.poll() is None
         time.sleep(chance.uniform(EARLY, LATE))
         if run.drive.poll() is None:

@@ -5,6 +5,8 @@ import select
 import socket
 import threading
 
+from antennate.hardware.driving.priority import LEVEL, claim
+
 
 class Cable:
     """Between one client and one server, while it is entered.
@@ -44,6 +46,7 @@ class Cable:
         self._plugged = True
 
     def _pass_on(self) -> None:
+        claim(LEVEL + 2)  # a wire waits for no program
         while not self._end:
             if not self._plugged:
                 self._close()

@@ -28,6 +28,7 @@ OTHERS = (
     "antennate.hardware.driving.config",
     "antennate.hardware.esp32.recorder",
     "antennate.telemetry.replay",
+    "antennate.twin.config",
 )
 """Modules beside the experiments that hold the parameters of a command."""
 COMMANDS = """\
@@ -52,10 +53,20 @@ def groups(module: ModuleType) -> list[type[params.Params]]:
 
 def commands() -> list[type[params.Params]]:
     """Return the classes that hold the top level of a command's parameters."""
-    names = sorted(module.name for module in pkgutil.iter_modules(experiments.__path__))
-    modules = [importlib.import_module(f"{experiments.__name__}.{name}") for name in names]
-    modules += map(importlib.import_module, OTHERS)
-    return [group for module in modules for group in groups(module)]
+    ours = sorted(name for name in experiments.names() if experiments.is_ours(name))
+    found = [group for name in ours for group in nested(experiments.load(name).config)]
+    found += [group for name in OTHERS for group in groups(importlib.import_module(name))]
+    return list(dict.fromkeys(found))
+
+
+def nested(config: type[params.Params]) -> list[type[params.Params]]:
+    """Return a configuration and the groups in it that belong to an experiment alone."""
+    found = [config] if "experiments" in config.__module__ else []
+    for field in config.model_fields.values():
+        default = field.get_default(call_default_factory=True)
+        if isinstance(default, params.Params) and "experiments" in type(default).__module__:
+            found += nested(type(default))
+    return found
 
 
 def table(group: type[params.Params]) -> str:
@@ -72,7 +83,7 @@ def table(group: type[params.Params]) -> str:
         default = field.get_default(call_default_factory=True)
         if isinstance(default, params.Params):  # its numbers have a table of their own
             kind = type(default).__name__
-            rows.append(f"| `{name}` | [{kind}](#{kind.lower()}) | | {meaning(field)} | |")
+            rows.append(f"| `{name}` | [{kind}](#{kind.lower()}) | | {meaning(group, name)} | |")
             continue
         extra = field.json_schema_extra
         assert isinstance(extra, dict), f"{group.__name__}.{name} has no unit and no source"
@@ -81,7 +92,7 @@ def table(group: type[params.Params]) -> str:
             f"`{name}`",
             f"`{value}`",
             extra["unit"],
-            meaning(field, unit=False),
+            meaning(group, name, unit=False),
             extra["source"],
         ]
         rows.append("| " + " | ".join(str(cell).replace("|", "\\|") for cell in cells) + " |")

@@ -1,7 +1,7 @@
 """A controller of one's own: it follows the wall on its left, and turns away when it is pressed.
 
-antennate tunnel --controllers open closed examples/own_controller.py:OwnController
-antennate drive --controller examples/own_controller.py:OwnController --esp32 PORT --bus PORT --arm
+uv run antennate tunnel --controllers open closed examples/own_controller.py:OwnController
+uv run antennate drive --controller examples/own_controller.py:OwnController --config robot.toml
 """
 
 import numpy as np

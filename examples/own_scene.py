@@ -1,6 +1,6 @@
 """A scene of one's own: pillars on a floor, in other places in each trial.
 
-antennate tunnel --scene examples/own_scene.py:Pillars --trials 4
+uv run antennate tunnel --scene examples/own_scene.py:Pillars --trials 4
 """
 
 import mujoco

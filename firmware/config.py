@@ -1,4 +1,4 @@
-"""Settings of one antenna board; the host knows them by their hash."""
+"""Settings of one antenna board; the host compares their hash."""
 
 RATE = 100
 """Samples per second [Hz]."""
@@ -18,4 +18,4 @@ PASSWORD = ""
 UDP_PORT = 4210
 """Port on which the board is asked for frames."""
 KEY = ""
-"""64 hexadecimal digits that only this board and its host know; empty: anybody can feign it."""
+"""64 hexadecimal digits that only this board and its host have; empty: anybody can imitate it."""

@@ -24,7 +24,7 @@ class Station:
         self._password = password
         self._wlan = network.WLAN(network.STA_IF)
         self._wlan.active(True)
-        self._wlan.config(pm=self._wlan.PM_NONE)  # asleep between beacons it hears late
+        self._wlan.config(pm=self._wlan.PM_NONE)  # asleep between beacons, it receives late
         self._looked = time.ticks_ms()
         self._tried = self._looked
         self._join()

@@ -23,7 +23,7 @@ import numpy as np
 
 from antennate.antenna import fitting
 from antennate.antenna.calibration import Calibration
-from antennate.antenna.fitting import Samples
+from antennate.antenna.curves import Samples
 from antennate.cli.experiment import Options, carry_out
 from antennate.errors import CalibrationError
 from antennate.experiments.calibrate.experiment import EXPERIMENT

@@ -12,7 +12,7 @@ import pytest
 
 from antennate.antenna import fitting
 from antennate.antenna.calibration import Calibration
-from antennate.antenna.fitting import Samples
+from antennate.antenna.curves import Samples
 from antennate.cli import main
 from antennate.errors import CalibrationError, OutputError
 from antennate.experiments.calibrate.recording import Recording, RecordingParams, read, write

@@ -111,6 +111,45 @@ def test_the_door_opens_without_heavy_imports():
     assert door.returncode == 0, err
 
 
+_HEAVY = ("scipy", "matplotlib", "rich", "pandas", "pyarrow", "serial")
+_SIMULATED = tuple(f"antennate.params.{name}" for name in ("bench", "spring", "sweep", "touch"))
+"""Groups of numbers that no command of the real robot has."""
+
+
+@pytest.mark.parametrize(
+    ("words", "unneeded"),
+    [
+        (["drive", "--nonsense"], ("mujoco", *_SIMULATED)),
+        (["drive", "--esp32=/nowhere", "--bus=/nowhere2", "--robot=nobody"], ("mujoco",)),
+        (["teleop", "--config=/nowhere.toml"], ("mujoco", *_SIMULATED)),
+        (["doctor", "--doctor.silence=x"], ("mujoco", *_SIMULATED)),
+        (["jog", "--joint=nobody", "--bus=/nowhere"], ("mujoco", *_SIMULATED)),
+        (["zero", "--config=/nowhere.toml"], ("mujoco", *_SIMULATED)),
+        (["setup", "--nonsense"], ("mujoco", *_SIMULATED)),
+        (["record", "--marks", "x"], ("mujoco", *_SIMULATED)),
+        (["replay", "/nowhere"], ("mujoco", *_SIMULATED)),
+        (["twin", "--servos=1:nothing"], _SIMULATED),
+        (["tunnel", "--trials=x"], _SIMULATED),
+        (["touch", "--nonsense"], _SIMULATED[:3]),
+        (["nonsense"], ("mujoco", "numpy", "antennate.params.control")),
+    ],
+    ids=" ".join,
+)
+def test_a_refusal_imports_nothing_that_it_does_not_need(
+    words: list[str], unneeded: tuple[str, ...]
+) -> None:
+    script = f"""if True:
+        import json, sys, antennate.cli as c
+        code = c.main({words})
+        print(json.dumps([code, *sys.modules]))"""
+    process = child(script, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    out, err = process.communicate(timeout=60)
+    code, *loaded = json.loads(out)
+    assert code == 2
+    assert len(err.splitlines()) == 1
+    assert not {*_HEAVY, *unneeded} & set(loaded)
+
+
 @pytest.mark.parametrize(
     ("argv", "parts"),
     [

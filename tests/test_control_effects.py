@@ -335,15 +335,37 @@ def effect_position_d_gain(bench: Bench) -> None:
     assert way[1] < way[0] - 50
 
 
+def fed_forward(bench: Bench, gain: str, value: int, after: float) -> int:
+    """PWM in the profile of a long way, that gain alone: 100 x 214.577 rev/min², 100 x 0.229."""
+    bench.mode(EXTENDED)
+    for name in ("position_p_gain", "position_i_gain", "position_d_gain"):
+        bench.put(name, 0)
+    bench.put("profile_acceleration", 100)
+    bench.put("profile_velocity", 100)
+    assert bench.put(gain, value) == NONE
+    begin = bench.t
+    bench.put("goal_position", bench.get("present_position") + 3 * TURN)
+    bench.bus.advance(begin + after)
+    bench.t = max(bench.t, begin + after)
+    return bench.servo.get("present_pwm")
+
+
 def effect_feedforward_2nd_gain(bench: Bench) -> None:
-    """Kept, but not used: the manual gives no unit for it."""
-    assert bench.put("feedforward_2nd_gain", 16_383) == NONE
-    assert bench.get("feedforward_2nd_gain") == 16_383
+    """K = gain / 4, on the acceleration: 24 414 pulses/s², for 64 ms; none in the cruise."""
+    pwm = 16_383 / 4 * 24_414 * 1e-6
+    assert fed_forward(bench, "feedforward_2nd_gain", 16_383, 0.5) == 0
+    bench = Bench(bench.page)
+    bench.wait(1.0)
+    assert fed_forward(bench, "feedforward_2nd_gain", 0, 0.0) == 0
+    bench.put("feedforward_2nd_gain", 16_383)
+    bench.put("goal_position", bench.get("goal_position") - 3 * TURN)
+    assert bench.servo.get("present_pwm") == pytest.approx(-pwm, rel=0.05)
 
 
 def effect_feedforward_1st_gain(bench: Bench) -> None:
-    assert bench.put("feedforward_1st_gain", 5) == NONE
-    assert bench.get("feedforward_1st_gain") == 5
+    """K = gain / 4, on the speed: 1563 pulses/s, after the acceleration."""
+    pwm = 400 / 4 * 1563e-3
+    assert fed_forward(bench, "feedforward_1st_gain", 400, 0.5) == pytest.approx(pwm, rel=0.02)
 
 
 def effect_bus_watchdog(bench: Bench) -> None:

@@ -358,6 +358,39 @@ def test_a_babbling_bus_is_given_up_in_time() -> None:
     assert link.now() - begin <= 0.011
 
 
+@pytest.mark.parametrize("stopped", ["drain", "read"])
+def test_a_process_that_did_not_run_for_a_while_does_not_take_the_bus_for_busy(
+    stopped: str,
+) -> None:
+    """For 30 ms the machine ran something else. The late answer that came meanwhile was all."""
+    late = {"drain": [b""], "read": [b""]}
+
+    class Late(SimulatedWire):
+        def read(self, most: int, timeout: float) -> bytes:
+            return self.come("read") or super().read(most, timeout)
+
+        def drain(self) -> int:
+            return len(self.come("drain")) + super().drain()
+
+        def come(self, where: str) -> bytes:
+            if not (data := late[where].pop() if late[where] else b""):
+                return b""
+            self.sleep(0.03)
+            return data
+
+    rig = Rig()
+    wire = Late(rig.twin)
+    bus = Bus(wire, clock=wire.now)
+    late[stopped].append(b"\xff\xff\xfd\x00\x01")
+    if stopped == "read":  # something has to come first, or nothing is awaited
+        wire.write(packets.ping(1))
+        wire.sleep(0.001)
+    bus.write_all(116, {1: (2000).to_bytes(4, "little")})
+    assert wire.now() > 0.03
+    wire.sleep(0.01)
+    assert rig.twin.servos[0].get("goal_position") == 2000
+
+
 def test_the_wall_clock_is_never_asked(monkeypatch: pytest.MonkeyPatch) -> None:
     def fail() -> float:
         raise AssertionError("wall clock")

@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -73,17 +74,37 @@ def test_the_viewer_keeps_every_tick_in_order(
 
 
 def test_G5_a_reader_that_stands_still_costs_no_time_and_what_it_misses_is_counted() -> None:
-    """A pipe holds 1 MiB at most, 400 bytes a tick: 3000 ticks do not fit twice."""
+    """A pipe holds 1 MiB at most, 400 bytes a tick; 3000 more wait: 6000 do not fit twice."""
     count = "import sys; print(len(sys.stdin.buffer.read()))"
     feed = Feed(script(f"import time; time.sleep(1.0); {count}"), b"first")
     content = bytes(400)
     with feed:
         begin = time.monotonic()
-        taken = sum(feed.send(content) for _ in range(6000))
+        taken = sum(feed.send(content) for _ in range(12000))
         assert time.monotonic() - begin < 0.9, "it must not wait for the reader"
-    assert taken + feed.dropped == 6000
-    assert feed.dropped > 3000
+    assert taken + feed.dropped == 12000
+    assert feed.dropped > 6000
     assert not feed.failed
+
+
+def test_G5_a_recorder_that_starts_late_misses_no_tick(tmp_path: Path) -> None:
+    """40 s of ticks with causes are sent before it reads a byte; the pipe alone holds 13 s."""
+    log, go = tmp_path / "drive.log", tmp_path / "go"
+    late = (
+        "import os, sys, time\n"
+        f"while not os.path.exists({str(go)!r}): time.sleep(0.01)\n"
+        f"os.execv(sys.executable, {viewer(log)(1)!r})"
+    )
+    causes = ("FAULT NOT_READY: " + 400 * "x",)
+    contents = [replace(tick(number), causes=causes).pack() for number in range(1, 4001)]
+    assert len(contents[0]) > 750
+    with Feed(script(late), HEADER.pack()) as feed:
+        assert all(feed.send(content) for content in contents)
+        assert not feed.keeps
+        go.touch()
+    assert (feed.dropped, feed.complete) == (0, True)
+    with LogReader(log) as kept:
+        assert [each.number for each in kept] == list(range(1, 4001))
 
 
 def test_G6_a_reader_that_dies_ends_nothing() -> None:

@@ -21,8 +21,9 @@ NAMES = RobotSpec().joint_names
 def commands() -> dict[str, list[str]]:
     """Words of each command of the page, by its name."""
     blocks = re.findall(r"```sh\n(.*?)```", PAGE, re.DOTALL)
-    lines = [shlex.split(line)[1:] for block in blocks for line in block.splitlines()]
-    return {words[0]: words for words in lines}
+    lines = [shlex.split(line) for block in blocks for line in block.splitlines()]
+    assert all(words[:3] == ["uv", "run", "antennate"] for words in lines), lines
+    return {words[3]: words[3:] for words in lines}
 
 
 def assembled(folder: Path) -> dict:

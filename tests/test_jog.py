@@ -108,3 +108,12 @@ def test_a_servo_that_falls_silent_is_told() -> None:
     ready.box.plug()
     with pytest.raises(SetupError, match=r"expected an answer of yaw1 .*, found none"):
         ready.wait(jog, 2.0)
+
+
+def test_a_joint_that_a_killed_jog_left_weak_has_the_force_of_the_next_one() -> None:
+    ready = Ready()
+    ready.servo.set("goal_pwm", 20)
+    jog = ready.jog()
+    assert ready.servo.get("goal_pwm") == pytest.approx(0.3 * 885, abs=1)
+    assert jog.end() == []
+    assert ready.servo.get("goal_pwm") == 885

@@ -68,6 +68,23 @@ def test_actuated_pitch_joints_are_commanded_level_in_every_maneuver() -> None:
         assert not command.pitch.any()
 
 
+@pytest.mark.parametrize("maneuver", list(Maneuver))
+def test_the_wave_of_the_yaw_joints_is_there_without_the_legs(maneuver: Maneuver) -> None:
+    """For lifting legs it is the wave of the same robot with rolling ones."""
+    rolling = LIFTING.model_copy(update={"legs": RobotSpec().legs})
+    alone = [Gait(GaitParams(), robot, 2, 0.01, legs=False) for robot in (LIFTING, rolling)]
+    whole = Gait(GaitParams(), rolling, 2, 0.01)
+    for _ in range(30):
+        wanted = whole.step(np.full(2, int(maneuver)))
+        for gait in alone:
+            command = gait.step(np.full(2, int(maneuver)))
+            assert command.leg.shape == (2, 3, 2)
+            assert not command.leg.any()
+            np.testing.assert_array_equal(command.yaw, wanted.yaw)
+            np.testing.assert_array_equal(command.antenna, wanted.antenna)
+    assert wanted.yaw.any()
+
+
 def test_a_robot_with_actuated_pitch_walks_level_and_as_fast_as_a_locked_one(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -14,6 +14,7 @@ from terminal import Terminal
 
 from antennate.cli.output import Output
 from antennate.cli.results import print_table
+from antennate.messages import short_names
 from antennate.studies.measures import Table
 
 RUN = [sys.executable, "-m", "antennate", "springs", "--out", "run"]
@@ -112,13 +113,19 @@ def test_a_stream_that_was_closed_meanwhile_is_flushed_in_silence() -> None:
 
 
 def test_a_column_of_a_controller_has_its_short_name(capsys: pytest.CaptureFixture[str]) -> None:
-    mine, other = "far/away/controllers.py:Mine", "my.module:Other"
-    print_table(Table("Drive", [mine, "closed", other], [("frames", ["1", "2", "3"])]))
+    names = ["far/away/controllers.py:Mine", "closed", "my.module:Other"]
+    short = short_names(names)
+    assert list(short) == names
+    print_table(Table("Drive", list(short.values()), [("frames", ["1", "2", "3"])]))
     printed = capsys.readouterr().out
     assert ["Mine", "closed", "Other"] in [line.split() for line in printed.splitlines()]
-    assert "far/" not in printed
 
 
 def test_two_controllers_of_one_name_are_told_apart(capsys: pytest.CaptureFixture[str]) -> None:
-    print_table(Table("Drive", ["a.py:Mine", "b.py:Mine"], [("frames", ["1", "2"])]))
+    short = short_names(
+        ["x/a.py:Mine", "x/b.py:Mine", "x/b.py:Other", "y/c.py:Last", "z/c.py:Last"]
+    )
+    wanted = ["a.py:Mine", "b.py:Mine", "Other", "y/c.py:Last", "z/c.py:Last"]
+    assert list(short.values()) == wanted
+    print_table(Table("Drive", wanted[:2], [("frames", ["1", "2"])]))
     assert ["a.py:", "b.py:"] in [line.split() for line in capsys.readouterr().out.splitlines()]

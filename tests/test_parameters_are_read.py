@@ -17,12 +17,19 @@ from servo_recordings import of_twin
 
 from antennate import experiments
 from antennate.cli import main
+from antennate.control.registry import BUILT_IN, UNREAD
+from antennate.experiments.reproduce import run as reproduce
+from antennate.params import ControlParams
+from antennate.robots.spec import RobotSpec
 
 RECORDING = "time,counts,bend,trial,speed_m_s\n" + "".join(
     f"{0.01 * i:.2f},{1600 + 60 * np.log((k + 1) / (20 - k)):.0f},{k / 19},{trial},0.1\n"
     for trial in range(6)
     for i in range(20)
     for k in [i]
+)
+TRACKS = "frame,time,a_x,a_y,b_x,b_y\n" + "".join(
+    f"{i},{0.02 * i:.2f},{i},5,{i + 3},4\n" for i in range(30)
 )
 OTHER_SENSOR = {"kind": "fsr"}
 TINY: dict[str, list[dict[str, Any]]] = {
@@ -96,9 +103,29 @@ TINY: dict[str, list[dict[str, Any]]] = {
         {"recording": ["servo.json"], "fit": True, "draws": 20},
         {"recording": ["servo.json"], "servo": "xc430_w240"},
     ],
+    "tracks": [
+        {"synthetic": {"trials": 1, "frames": 200}},
+        *(
+            {
+                "files": ["tracks.csv"],
+                "points": {"left": ["a", "b"], "right": ["none"], "tail": "b", "head": "a"},
+                "rate": 100.0,
+                "playback_rate": 50.0,
+                "wall": wall,
+            }
+            for wall in (
+                {"kind": "line", "line": [0.0, 9.0, 1.0, 9.0]},
+                {"kind": "circle", "circle": [0.0, 0.0, 9.0]},
+            )
+        ),
+    ],
     "springs": [{}],
     "taper": [{}],
+    "ringdown": [{}],
+    "reproduce": [{"quick": True}],
 }
+PARTS = {"springs": {}, "calibrate": {"rig": {"pushes": 2, "speeds": [0.3]}, "draws": 20}}
+"""All that `reproduce` runs here."""
 
 
 @pytest.mark.parametrize("name", TINY)
@@ -108,6 +135,8 @@ def test_every_parameter_of_an_experiment_is_read_or_refused(
     monkeypatch.chdir(tmp_path)
     Path("recording.csv").write_text(RECORDING)
     of_twin(Path("servo.json"), 1200, 400, 0.5, 2.5)
+    Path("tracks.csv").write_text(TRACKS)
+    monkeypatch.setattr(reproduce, "QUICK", PARTS)
     experiment = experiments.load(name)
     read: set[str] = set()
     for values in TINY[name]:
@@ -122,6 +151,16 @@ def test_every_parameter_of_an_experiment_is_read_or_refused(
     every = set(leaves(experiment.config))
     assert every - read == set(experiment.config.unread) & every
     assert set(experiment.config.unread) <= every
+
+
+@pytest.mark.parametrize("name", BUILT_IN)
+def test_groups_that_a_controller_is_said_not_to_read_are_those(name: str) -> None:
+    control = ControlParams(rate=25.0)
+    groups = {leaf.partition(".")[0] for leaf in leaves(ControlParams) if "." in leaf}
+    with recorded(control) as read:
+        act(name, control, RobotSpec())
+    seen = {leaf.partition(".")[0] for leaf in read if "." in leaf}
+    assert groups - seen == UNREAD.get(name, set())
 
 
 def test_all_experiments_of_ours_are_walked() -> None:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import pytest
 from pydantic import ValidationError
 
+from antennate import experiments
 from antennate.params import (
     ConditioningParams,
     ControlParams,
@@ -15,6 +17,7 @@ from antennate.params import (
     PhysicsParams,
     TunnelParams,
 )
+from antennate.params.base import meaning
 from antennate.robots.antenna import AntennaSpec
 from antennate.robots.sensor import SensorParams
 from antennate.robots.servos import ServoParams
@@ -66,7 +69,7 @@ def test_every_field_has_a_meaning_a_unit_and_a_source_of_a_known_kind(
     extra = cls.model_fields[name].json_schema_extra
     assert isinstance(extra, dict)
     assert str(extra["unit"]).strip()
-    assert (cls.model_fields[name].description or "").endswith(".")
+    assert meaning(cls, name, unit=False)
     kind, _, why = str(extra["source"]).partition(":")
     assert kind in SOURCES
     assert why.strip()
@@ -152,3 +155,12 @@ def test_a_tunnel_needs_one_turn_between_every_two_pieces() -> None:
 
 def test_the_control_period_is_ten_milliseconds() -> None:
     assert ControlParams().period == pytest.approx(0.01)
+
+
+def test_the_page_of_parameters_has_every_command() -> None:
+    page = Path(__file__).parents[1] / "docs" / "parameters.md"
+    if not page.exists():
+        pytest.skip("the pages are not part of this copy")
+    titles = {line[3:] for line in page.read_text(encoding="utf-8").splitlines()}
+    ours = [name for name in experiments.names() if experiments.is_ours(name)]
+    assert {experiments.load(name).config.__name__ for name in ours} <= titles

@@ -73,18 +73,29 @@ def test_L15_a_second_program_is_told_the_pid_of_the_first() -> None:
         os.close(slave)
 
 
-@pytest.mark.parametrize("command", ["doctor", "drive"])
+@pytest.mark.parametrize("command", ["doctor", "drive", "setup", "jog", "zero"])
 @pytest.mark.parametrize(
     ("path", "said"),
     [("/dev/nowhere", "no such file"), ("/dev/null", "not a serial port"), ("/", "not a serial")],
 )
 def test_every_command_says_it_and_ends_with_2(
-    command: str, path: str, said: str, capsys: pytest.CaptureFixture[str]
+    command: str,
+    path: str,
+    said: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
+    """Before anything is asked of a person."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "robot.toml").touch()
     both = ["--esp32", path, "--bus", "/dev/another"]
-    assert main([command, *(both if command == "drive" else ["--bus", path])]) == BAD_INPUT
+    ports = both if command == "drive" else ["--bus", path]
+    ports += ["--joint", "yaw1"] if command == "jog" else []
+    assert main([command, *ports]) == BAD_INPUT
     told = capsys.readouterr()
     assert said in told.out + told.err
+    assert "[Enter" not in told.out + told.err
     assert "Traceback" not in told.err
 
 
@@ -113,6 +124,32 @@ def test_orders_that_cannot_be_are_refused_in_one_line(
     assert told.out == ""
     assert said in told.err
     assert told.err.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["twin", "--servos", ""],
+        ["twin", "--tcp", ""],
+        ["twin", "--udp", ""],
+        ["twin", "--orders", ""],
+        ["twin", "--key", "k"],
+        ["drive", "--key", "k", "--esp32", "/dev/nowhere", "--bus", "/dev/null"],
+        ["doctor", "--insecure-udp", "--esp32", "/dev/nowhere"],
+    ],
+    ids=" ".join,
+)
+def test_a_flag_that_has_nothing_to_say_is_refused(
+    words: list[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(words) == BAD_INPUT
+    told = capsys.readouterr()
+    assert told.err.count("\n") == 1
+    assert f"{words[1]}: expected " in told.err
 
 
 def test_bad_robot_toml_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

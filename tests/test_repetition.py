@@ -95,6 +95,20 @@ def test_a_mean_change_at_the_bound_decides() -> None:
     assert not stuck(rising(0.081), 6)[-1]
 
 
+def test_a_mean_reading_at_the_bound_decides() -> None:
+    """Both signals repeat, and their mean over the window of half a cycle is `mean`."""
+
+    def constant(mean: float) -> Signal:
+        return lambda c: (0.0, mean)
+
+    def square(mean: float) -> Signal:
+        return lambda c: (2.0 * mean if 4.0 * c % 2.0 < 1.0 else 0.0, 0.0)
+
+    for signal in (constant, square):
+        assert stuck(signal(1.01 * PARAMS.pressure), 6)[-1]
+        assert not any(stuck(signal(0.99 * PARAMS.pressure), 6))
+
+
 def test_a_row_that_is_reset_answers_like_a_new_one() -> None:
     used, new = detector(), detector()
     for i in range(3 * CYCLE):

@@ -13,6 +13,7 @@ from antennate.experiments.force.run import TraverseRow
 from antennate.experiments.gait.experiment import MANEUVER
 from antennate.experiments.sweep.run import SweepRow
 from antennate.experiments.touch.experiment import AVERAGING, PROFILE
+from antennate.experiments.tracks.run import TrackRow
 from antennate.experiments.tunnel import measures as tunnel
 from antennate.experiments.tunnel.monitor import TrialResult
 from antennate.experiments.wall import measures as wall
@@ -31,6 +32,7 @@ ROWS = {
     ("results.md", "tunnel"): TrialResult,
     ("results-bench.md", "wall"): WallTrial,
     ("results-bench.md", "force"): TraverseRow,
+    ("tracks.md", "tracks"): TrackRow,
 }
 
 

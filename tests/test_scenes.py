@@ -304,6 +304,19 @@ def test_a_bad_file_is_refused_in_one_line(tmp_path, name):
     assert "scene.xml" in str(found.value)
 
 
+def test_an_error_of_the_engine_has_the_line_of_the_file(tmp_path):
+    """Although the engine never sees the comments, and each tag on one line."""
+    path = tmp_path / "scene.xml"
+    lines = ['<?xml version="1.0"?>', "<!-- a", " <geom> -->", "<mujoco>", " <worldbody>", ""]
+    lines += ['<geom type="box"', ' size="1 1 1"/> <geom size="1"/>', "<body>", "</body>"]
+    path.write_text("\n".join([*lines, "<geom", ' sizee="1"/>', "</worldbody>", "</mujoco>"]))
+    with pytest.raises(SceneError, match=r"found unrecognized attribute: 'sizee' .* line 11$"):
+        MjcfScene(path)
+    path.write_text("<mujoco>\n <geom>\n  </mujoco>")
+    with pytest.raises(SceneError, match=r"broken XML at line 3, column 5: mismatched tag$"):
+        MjcfScene(path)
+
+
 def test_entities_and_large_files_are_refused(tmp_path):
     path = tmp_path / "scene.xml"
     path.write_text('<!DOCTYPE m [<!ENTITY a "aaaa">]><mujoco model="&a;"/>')

@@ -62,7 +62,9 @@ class Log:
             self._act(self.rig, t)
 
     def first(self, cause: Cause) -> float:
-        return next(t for t, causes in zip(self.t, self.causes, strict=True) if cause in causes)
+        times = [t for t, causes in zip(self.t, self.causes, strict=True) if cause in causes]
+        assert times, f"no {cause.name} until {self.t[-1]:.2f} s, ended by {self.report.ended}"
+        return times[0]
 
 
 def walked(act: Callable[[Rig, float], None] | None = None, config: DriveConfig = CONFIG) -> Log:

@@ -143,3 +143,23 @@ def test_the_twin_turns_the_other_way_if_its_drive_mode_says_so() -> None:
     servo.set("torque_enable", 1)
     servo.set("goal_position", 1000)
     assert servo.goal() == 3096.0
+
+
+def test_a_low_goal_pwm_that_another_program_left_is_raised_before_torque() -> None:
+    """As by a `jog` that was killed. 885 is all of it, by the manuals; 700 a limit in EEPROM."""
+    made = rig(TwinConfig())
+    servos = made.robot.servos
+    servos[4].set("pwm_limit", 700)
+    for servo in servos:
+        servo.set("goal_pwm", 265)
+    pwm: list[int] = []
+    write = servos[0].write
+
+    def note(address: int, data: bytes) -> StatusError:
+        if address == 64 and data == b"\1":
+            pwm.extend(servo.get("goal_pwm") for servo in servos)
+        return write(address, data)
+
+    servos[0].write = note  # type: ignore[method-assign]
+    drive(made.session, DriveConfig(dry_run=0.3, duration=0.5), arm=True)
+    assert pwm == [700 if at == 4 else 885 for at in range(len(servos))]

@@ -118,6 +118,7 @@ def test_keys_walk_the_twin_and_q_ends_it_with_the_torque_off() -> None:
     orders = DriveConfig(dry_run=0.5, touch_check=False, stand=0.1)
     report = drive(made.session, orders, arm=True, on_tick=note)
     assert report.on == []
+    assert report.ended == "a key"
     assert report.worst <= State.HOLD  # before contact is known
     walked = [tick for tick, one in enumerate(maneuvers) if one == Maneuver.FORWARD]
     assert len(walked) > 300

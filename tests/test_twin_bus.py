@@ -1,4 +1,4 @@
-"""The twin servos: what the manuals say of registers; real bytes for the manufacturer's program."""
+"""The twin servos: what the manuals say of registers; the manufacturer's program on a port."""
 
 from __future__ import annotations
 
@@ -304,7 +304,7 @@ def test_B7_any_packet_feeds_every_watchdog() -> None:
     assert rig.servo(1).get("bus_watchdog") == 5
 
 
-# real bytes, in real time
+# on a serial port, in real time
 
 
 @pytest.fixture

@@ -1,4 +1,4 @@
-"""A client over real bytes, as slow as it likes, gets what invented time gives."""
+"""A client on a serial port, as slow as it likes, gets what invented time gives."""
 
 from __future__ import annotations
 

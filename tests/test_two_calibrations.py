@@ -102,6 +102,47 @@ def test_one_file_goes_on_serving_both(file: Path) -> None:
 
 
 @pytest.mark.parametrize(
+    ("line", "reaches"),
+    [
+        ("", (1.5, 1.8)),
+        ("reach = 1.2", (1.2, 1.2)),
+        ("reach_right = 1.2", (1.5, 1.2)),
+        ("reach = 1.0\nreach_right = 1.2", (1.0, 1.2)),
+    ],
+)
+def test_each_antenna_has_its_own_reach(
+    tmp_path: Path, line: str, reaches: tuple[float, float]
+) -> None:
+    """Bent readings are believed up to so many spans beyond the range, on each side its own."""
+    left, right = GOOD.model_copy(update={"reach": 1.5}), RIGHT.model_copy(update={"reach": 1.8})
+    words = [line]
+    for name, each in (("calibration", left), ("calibration_right", right)):
+        each.save(tmp_path / f"{name}.json")
+        words.append(f'{name} = "{tmp_path / name}.json"')
+    (file := tmp_path / "robot.toml").write_text("\n".join(words))
+    config = read_file(file, RobotFile).for_drive().calibrated()
+    curves = config.control.conditioning, config.control.conditioning_right
+    for extra, believed in ((-0.1, True), (0.1, False)):
+        quality = SignalQuality(curves[0], reaches=config.reaches, right=curves[1])
+        bent = (
+            1616.0 - (reaches[0] + extra) * (1874.0 - 1616.0),
+            3000.0 + (reaches[1] + extra) * (3000.0 - 2500.0),
+        )
+        for tick in range(20):
+            quality.step(0.01 * tick, [counts + tick % 2 for counts in bent], [0, 0])
+        assert [finding.usable for finding in quality.findings] == [believed, believed]
+
+
+def test_the_name_of_a_flex_sensor_without_its_file_is_refused(file: Path) -> None:
+    for line in ('sensor_id = "left-1"', 'sensor_id_right = "right-1"'):
+        file.write_text(line)
+        with pytest.raises(ConfigError, match=r"^sensor_id\w*: expected calibration\w* = FILE"):
+            read_file(file, RobotFile).for_drive().calibrated()
+    file.write_text('sensor_id = "0123456789abcdef"')
+    read_file(file, RobotFile).for_drive().calibrated()
+
+
+@pytest.mark.parametrize(
     ("change", "said"),
     [
         (("calibration = ", "# "), r"calibration_right: expected calibration = FILE of the left"),

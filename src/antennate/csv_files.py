@@ -15,6 +15,8 @@ from antennate.messages import shortened
 _SEPARATORS = {";": "semicolons", "\t": "tabs", "|": "bars", " ": "spaces"}
 """What may stand between columns in place of commas."""
 _DECIMAL_COMMA = re.compile(r"\s*[+-]?\d+,\d+\s*")
+_UNIT = re.compile(r"[\[(]([^\])]*)[\])]\s*[\"']?\s*$")
+"""A unit in brackets at the end of a column's name."""
 Row = tuple[int, list[str]]
 """Number of the line in which a row ends, and its cells."""
 
@@ -54,6 +56,27 @@ def csv_rows(
         raise error(f"{path}: row {reader.line_num}: expected CSV, found {cause}") from None
 
 
+def column(header: Sequence[str], name: str) -> int | None:
+    """Place of a column: its exact name, or the only one that differs in case, quotes or unit.
+
+    `Time [s]`, `"time"` and `TIME` are taken for `time` if no column has that name itself.
+    """
+    if name in header:
+        return header.index(name)
+    same = [place for place, cell in enumerate(header) if _plain(cell) == _plain(name)]
+    return same[0] if len(same) == 1 else None
+
+
+def unit_of(cell: str) -> str:
+    """The unit that a column's name gives in brackets, empty without."""
+    return "".join(_UNIT.findall(cell)[-1:]).strip()
+
+
+def _plain(cell: str) -> str:
+    bare = _UNIT.sub("", cell).strip(" \t\"'\ufeff").casefold()
+    return re.sub(r"[\s-]+", "_", bare)
+
+
 def number_of(cell: str) -> float:
     """The number of a cell, NaN if it holds none.
 
@@ -71,7 +94,7 @@ def number_of(cell: str) -> float:
 def _check_header(
     path: Path, header: list[str], needed: Sequence[str], error: type[BadInputError], cure: str
 ) -> None:
-    missing = [name for name in needed if name not in header]
+    missing = [name for name in needed if column(header, name) is None]
     if not missing:
         return
     line = ",".join(header)

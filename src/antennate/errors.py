@@ -76,7 +76,7 @@ def in_one_line(error: BaseException) -> str:
     return f"{name}: {text}"[:_LONGEST]
 
 
-_OURS = Path(__file__).parent
+_OURS, _PYTHON = Path(__file__).parent, Path(traceback.__file__).parent
 
 
 def where(error: BaseException) -> str:
@@ -85,8 +85,10 @@ def where(error: BaseException) -> str:
     It is the last place outside this package, and outside installed packages if there is one.
     """
     places = [(Path(f.filename), f.lineno) for f in traceback.extract_tb(error.__traceback__)]
-    outside = [at for at in places if not at[0].is_relative_to(_OURS)]
-    own = [at for at in outside if "site-packages" not in at[0].parts] or outside
+    outside = [at for at in places if at[0].is_file() and not at[0].is_relative_to(_OURS)]
+    installed = [at for at in outside if "site-packages" in at[0].parts]
+    own = [at for at in outside if at not in installed and not at[0].is_relative_to(_PYTHON)]
+    own = own or installed
     if not own:
         return ""
     path, line = own[-1]

@@ -54,6 +54,15 @@ PROFILE_LOOKS = {
 }
 """Colour, marker and line of each profile: apart in grey, too."""
 
+SHAPE_COLOURS = {
+    "forward": "#0072B2",
+    "backward": "#D55E00",
+    "straight": "#F0E442",
+    "transition": "#000000",
+    "free": "#DDDDDD",
+}
+"""Shapes of an antenna that touches, and no contact."""
+
 SERIES = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#D55E00", "#56B4E9", "#332288")
 """For whatever has no colour of its own; after Okabe and Ito."""
 

@@ -27,7 +27,7 @@ class NotSent:
     """Stands in a worker process for an added object that could not be sent there.
 
     Attributes:
-        reason: Why, for whoever asks for it.
+        reason: Why; it is said where the object is used.
     """
 
     reason: str

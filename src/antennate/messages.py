@@ -27,9 +27,17 @@ def shortened(text: str) -> str:
     return text if len(text) <= _LONGEST else text[: _LONGEST - 3] + "..."
 
 
-def short_name(controller: str) -> str:
-    """The name of a controller for a label: only the last part of MODULE:NAME or FILE.py:NAME."""
-    return controller.rpartition(":")[2]
+def short_names(controllers: Iterable[str]) -> dict[str, str]:
+    """A label for each controller: of MODULE:NAME or FOLDER/FILE.py:NAME only NAME.
+
+    Where two share it, FILE.py:NAME, and all of it where they share that.
+    """
+    names = list(dict.fromkeys(controllers))
+    ends = [{name: name.rpartition(mark)[2] for name in names} for mark in ":/"]
+    return {
+        name: next((e[name] for e in ends if list(e.values()).count(e[name]) == 1), name)
+        for name in names
+    }
 
 
 def shown(value: Any) -> str:

@@ -1,1 +1,1 @@
-"""The antenna as physics: springs, taper, statics, sensor, calibration."""
+"""The antenna as physics: springs, taper, statics, dynamics, sensor, calibration."""

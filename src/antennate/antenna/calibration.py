@@ -68,7 +68,8 @@ class Calibration(_Strict):
         cross_validated_rmse: Error on unseen pushes of the sigmoid and of two other models.
         reach: How far beyond the bent end of this range readings are still those of the sensor
             [spans].
-        better_than_sigmoid: Models that were better by more than one standard error.
+        better_than_sigmoid: Models that were better on these readings beyond noise: the 95 %
+            interval over pushes left out lies above 0. Empty with a single push.
     """
 
     schema_version: Literal[1] = SCHEMA
@@ -144,6 +145,11 @@ class Calibration(_Strict):
             json.loads(data, object_pairs_hook=_once)
         except ValidationError as error:
             first = error.errors(include_url=False)[0]
+            if first["type"] == "json_invalid":
+                what = first.get("ctx", {})["error"].replace("EOF", "the end of the file")
+                raise CalibrationError(
+                    f"{path}: expected the file to be JSON, found {what}"
+                ) from None
             field = ".".join(str(part) for part in first["loc"]) or "the file"
             raise CalibrationError(f"{path}: {field}: {first['msg']}") from None
         except CalibrationError as error:

@@ -1,28 +1,23 @@
 """From readings with a known flex level to a calibration: a sigmoid and its 95 % intervals.
 
-    b = 1 / (1 + exp(-s k (x - x0))),   x = (counts - low) / (high - low)
-
-b is the level, 0 straight and 1 full; s the polarity, found from the data; x0 the midpoint and k
-the slope. The fit minimises the squared error of b. A straight line and an isotonic regression are
-fitted beside it for comparison. Data that cannot be calibrated are refused.
+Data that cannot be calibrated are refused.
 """
 
 from __future__ import annotations
 
 import hashlib
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
 from antennate import __version__
 from antennate.antenna.calibration import FEWEST, NARROWEST_SPAN, REACH, Calibration, SpeedFit
+from antennate.antenna.curves import MODELS, Samples, curve, ends, fit_sigmoid, polarity, predict
+from antennate.antenna.rivals import gain_of, left_out
 from antennate.antenna.sensor import FULL_SCALE
-from antennate.control.conditioning import sigmoid
 from antennate.errors import CalibrationError
 from antennate.types import Floats, Ints
 
-MODELS = ("sigmoid", "line", "isotonic")
 REVERSAL = 0.15
 """Share of the span by which mean readings may fall back while the level rises."""
 _BINS = 10
@@ -31,25 +26,6 @@ _RAILS = (0.0, 4090.0)
 """Readings at or beyond these say nothing about the level [counts]."""
 _RAIL_SHARE = 0.2
 """Share of such readings that is too much."""
-
-
-@dataclass(frozen=True)
-class Samples:
-    """Readings with known levels.
-
-    Attributes:
-        counts: Readings [counts], shape (n,).
-        level: Level of each, 0 straight and 1 full, shape (n,).
-        trial: Number of the push of each, shape (n,).
-        speed: Pushing speed [m/s], NaN where unknown, shape (n,).
-        row: Row of the file, for errors, shape (n,).
-    """
-
-    counts: Floats
-    level: Floats
-    trial: Ints
-    speed: Floats
-    row: Ints
 
 
 def check(samples: Samples) -> None:
@@ -104,41 +80,6 @@ def _check_monotonic(samples: Samples, span: float) -> None:
         )
 
 
-def polarity(samples: Samples) -> Literal[-1, 1]:
-    """1 if readings rise with the level, -1 if they fall."""
-    return 1 if float((samples.level - samples.level.mean()) @ samples.counts) >= 0 else -1
-
-
-def curve(z: Floats, slope: float, midpoint: float) -> Floats:
-    """Level, 0 to 1, of signed normalised readings z = s x, same shape; midpoint is s x0."""
-    return sigmoid(slope * (z - midpoint))
-
-
-def fit_sigmoid(x: Floats, level: Floats, sign: int) -> tuple[float, float]:
-    """Slope k and midpoint x0 that minimise the squared error of the level.
-
-    Args:
-        x: Normalised readings, shape (n,).
-        level: Levels, shape (n,).
-        sign: Polarity, 1 or -1.
-    """
-    from scipy.optimize import least_squares  # takes long; only where it is needed
-
-    z = sign * x
-    start = (np.log(8.0), float(np.interp(0.5, *_sorted(level, z))))
-
-    def error(p: Floats) -> Floats:
-        return curve(z, float(np.exp(p[0])), float(p[1])) - level
-
-    found = least_squares(error, start, bounds=([-5.0, -3.0], [np.log(1000.0), 3.0])).x
-    return float(np.exp(found[0])), sign * float(found[1])
-
-
-def _sorted(by: Floats, other: Floats) -> tuple[Floats, Floats]:
-    order = np.argsort(by, kind="stable")
-    return by[order], other[order]
-
-
 def fit(
     samples: Samples,
     sensor_id: str,
@@ -166,7 +107,7 @@ def fit(
     """
     check(samples)
     sign = polarity(samples)
-    low, high = (0.0, float(FULL_SCALE)) if full_scale else _ends(samples)
+    low, high = (0.0, float(FULL_SCALE)) if full_scale else ends(samples)
     x = (samples.counts - low) / (high - low)
     slope, midpoint = fit_sigmoid(x, samples.level, sign)
     predicted = curve(sign * x, slope, sign * midpoint)
@@ -200,7 +141,7 @@ def fit(
         rmse=_rmse(predicted, samples.level),
         speeds=tuple(_per_speed(samples, predicted)),
         cross_validated_rmse=rmse,  # pyright: ignore[reportArgumentType]
-        better_than_sigmoid=_better(errors),
+        better_than_sigmoid=_better(samples, full_scale),
         reach=_reach(low, high, sign),
     )
 
@@ -248,12 +189,6 @@ def fit_calibration(
     samples = Samples(counts, level, trial, speed, np.arange(1, len(counts) + 1))
     digest = hashlib.sha256(np.stack([counts, level]).tobytes()).hexdigest()
     return fit(samples, sensor_id, digest, threshold)
-
-
-def _ends(samples: Samples) -> tuple[float, float]:
-    """Readings that normalise to 0 and 1: the outermost ones, a few outliers apart."""
-    low, high = np.percentile(samples.counts, [0.5, 99.5])
-    return float(low), float(high)
 
 
 def _r2(predicted: Floats, level: Floats) -> float:
@@ -310,29 +245,15 @@ def cross_validate(samples: Samples, x: Floats, sign: int) -> dict[str, Floats]:
     for held in folds:
         rest = np.setdiff1d(np.arange(len(x)), held)
         for model in MODELS:
-            predicted = _predict(model, x[rest], samples.level[rest], x[held], sign)
+            predicted = predict(model, x[rest], samples.level[rest], x[held], sign)
             errors[model].append(_rmse(predicted, samples.level[held]))
     return {model: np.array(e) for model, e in errors.items()}
 
 
-def _predict(model: str, x: Floats, level: Floats, at: Floats, sign: int) -> Floats:
-    from scipy.optimize import isotonic_regression  # takes long; only where it is needed
-
-    if model == "sigmoid":
-        slope, midpoint = fit_sigmoid(x, level, sign)
-        return curve(sign * at, slope, sign * midpoint)
-    if model == "line":
-        straight = np.polyval(np.polyfit(x, level, 1), at)
-        return np.asarray(np.clip(straight, 0.0, 1.0), dtype=np.float64)
-    z, b = _sorted(sign * x, level)
-    return np.asarray(np.interp(sign * at, z, isotonic_regression(b).x), dtype=np.float64)
-
-
-def _better(errors: dict[str, Floats]) -> tuple[Literal["line", "isotonic"], ...]:
-    """Models whose error is smaller than the sigmoid's by more than one standard error."""
-    found: list[Literal["line", "isotonic"]] = []
-    for model in ("line", "isotonic"):
-        gain = errors["sigmoid"] - errors[model]
-        if len(gain) > 1 and gain.mean() > gain.std(ddof=1) / np.sqrt(len(gain)):
-            found.append(model)
-    return tuple(found)
+def _better(samples: Samples, full_scale: bool) -> tuple[Literal["line", "isotonic"], ...]:
+    """Models that beat the sigmoid beyond noise on trials left out; none with a single trial."""
+    errors = left_out(samples, samples.trial, np.ones(len(samples.counts), bool), full_scale)
+    if len(errors["sigmoid"]) < 2:
+        return ()
+    rivals: tuple[Literal["line", "isotonic"], ...] = ("line", "isotonic")
+    return tuple(rival for rival in rivals if gain_of(errors, rival).wins)

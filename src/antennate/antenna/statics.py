@@ -78,7 +78,7 @@ class Rest:
             was a follower.
         solved: Whether equilibrium was found on the branch that begins straight, shape (m,).
         stable: Whether that equilibrium is a minimum of the potential energy, shape (m,); a
-            follower load has no potential, and is judged by the same matrix.
+            follower load has no potential, and is tested by the same matrix.
     """
 
     angles: Floats

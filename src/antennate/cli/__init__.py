@@ -39,7 +39,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     from antennate.cli.output import safe_streams
 
     words = list(sys.argv[1:] if argv is None else argv)
-    name = f"antennate {words[0]}" if words and words[0] in commands() else "antennate"
+    name = f"antennate {words[0]}" if words and _known(words[0]) else "antennate"
     with safe_streams() as output:
         try:
             code = _run(words, name)
@@ -48,7 +48,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             return INTERRUPTED
         output.flush()
         if output.error is None or isinstance(output.error, BrokenPipeError):
-            return code  # whoever read a pipe has seen enough
+            return code  # the reader of the pipe has ended, as `head` does
         reason = output.error.strerror or output.error
         sys.stderr.write(f"{name}: error: standard output: expected to write, found: {reason}\n")
         return BAD_INPUT
@@ -95,7 +95,7 @@ def _run(words: Sequence[str], name: str) -> int:
 
             sys.stdout.write(script(words[1:], commands(), carry_out))
             return OK
-        if words[0] not in commands():
+        if not _known(words[0]):
             known = f"{nearest(words[0], commands())}, one of {', '.join(commands())}"
             raise BadInputError(f"expected a command{known}, found {shortened(words[0])}")
         return carry_out(words[0], words[1:])
@@ -105,6 +105,13 @@ def _run(words: Sequence[str], name: str) -> int:
     except AntennateError as error:
         sys.stderr.write(f"{name}: error: {one_line(str(error))}\n")
         return BAD_INPUT
+
+
+def _known(word: str) -> bool:
+    """Whether it is a command; other packages are asked only where it is none of ours."""
+    from antennate.experiments import is_ours, names
+
+    return word in ROBOT_COMMANDS or is_ours(word) or word in names()
 
 
 def _usage() -> str:

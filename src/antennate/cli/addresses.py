@@ -31,7 +31,9 @@ class RobotOptions(FromFile):
     key: Path | None = option(
         None, "file with the key of a board behind udp://, mode 0600; else ANTENNATE_KEY", "FILE"
     )
-    insecure_udp: bool = option(False, "a board without a key; anybody on the network can feign it")
+    insecure_udp: bool = option(
+        False, "a board without a key; anybody on the network can then send frames in its place"
+    )
 
 
 @dataclass(frozen=True)
@@ -90,16 +92,21 @@ def key_of(options: RobotOptions) -> bytes | None:
     """The key for a board behind udp://, None if there is no such board.
 
     Raises:
-        ConfigError: --insecure-udp beside a key.
+        ConfigError: --insecure-udp beside a key, or either without such a board.
         BadInputError: There is no key, or it cannot be used.
     """
     if not is_udp(options.esp32):
+        for flag, given in (("--key", options.key), ("--insecure-udp", options.insecure_udp)):
+            if given:
+                raise ConfigError(f"{flag}: expected a board behind udp:// beside it, found none")
         return None
     if not options.insecure_udp:
         return read_key(options.key, "or give --insecure-udp for a board without one")
     if options.key is not None:
         raise ConfigError("--insecure-udp: expected no --key beside it, found both")
-    warning = "UDP without a key: anybody on this network can feign the antenna board"
+    warning = (
+        "UDP without a key: anybody on this network can send frames in place of the antenna board"
+    )
     red = "\x1b[1;31m{}\x1b[0m" if sys.stderr.isatty() else "{}"
     sys.stderr.write(red.format(warning) + "\n")
     return b""

@@ -28,6 +28,7 @@ from antennate.hardware.driving.session import Session
 from antennate.hardware.driving.signals import StopOnce
 from antennate.hardware.robot_file import RobotFile
 from antennate.hardware.safety.causes import State
+from antennate.messages import short_names
 from antennate.studies.measures import Measure, Table
 from antennate.studies.run_directory import LOG
 from antennate.telemetry.feed import Feed
@@ -110,19 +111,24 @@ def walk(
                 session.control.controller = controller(session, config)
                 config = config.model_copy(update={"controller": command})
             result = _carry_out(command, config, session, orders, folder.path / LOG, operator)
-        table = Table.of("Drive", {result["controller"]: result}, MEASURES, _note(result))
-        log = shlex.quote(str(folder.path / LOG))
-        other = "" if controller is None else " --controller open"
-        again = f"What was read and decided: antennate replay {log}{other}"
-        again = again if result["logs"] else f"No log was kept: {_LOGLESS}"
         try:
             folder.finish(result, ())
         finally:  # the robot's state is told even if it cannot be kept
-            tell(result, orders, [table], f"{_sentence(result)}\n{again}")
+            other = "" if controller is None else " --controller open"
+            _tell(result, orders, f"{shlex.quote(str(folder.path / LOG))}{other}")
     fault = result["worst_state"] in (State.FAULT.name, State.OFF.name)
     stays_on = result["torque_off"] is False
     idle = _idle(result)
     return BAD_INPUT if fault or stays_on or result["refusal"] or idle else OK
+
+
+def _tell(result: Mapping[str, Any], orders: Orders, log: str) -> None:
+    """Table and sentences; `log` are the words with which `replay` reads the log."""
+    name = result["controller"]
+    table = Table.of("Drive", {short_names([name])[name]: result}, MEASURES, _note(result))
+    again = f"What was read and decided: antennate replay {log}"
+    again = again if result["logs"] else f"No log was kept: {_LOGLESS}"
+    tell(result, orders, [table], f"{_sentence(result)}\n{again}")
 
 
 def _carry_out(

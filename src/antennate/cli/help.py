@@ -40,8 +40,9 @@ class Command(NamedTuple):
 
 
 def short_page(command: Command) -> str:
-    """What people use first: options outside all groups, and the names of the groups."""
-    top = [option for option in command.parameters if len(option.path) == 1]
+    """What people use first: options outside all groups, names first, and the groups' names."""
+    outside = (option for option in command.parameters if len(option.path) == 1)
+    top = sorted(outside, key=lambda option: not option.metavar.startswith("NAME"))
     groups = _groups(command.model, command.parameters)
     head = _head(command, command.description.split("\n\n")[0])
     tail = [*groups, "", f"`antennate {command.name} --help-all` shows every option."]
@@ -137,7 +138,7 @@ def _meaning(model: Any, group: tuple[str, ...]) -> str:
     """What a group is, by its description or its docstring."""
     text = ""
     for part in group:
-        field = fields_of(model)[part]
-        model = group_of(field.annotation)
-        text = meaning(field) or first_line(model)
+        text = meaning(model, part)
+        model = group_of(fields_of(model)[part].annotation)
+        text = text or first_line(model)
     return text

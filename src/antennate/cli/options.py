@@ -48,7 +48,7 @@ class Option:
         path: Field that it sets, within the model.
         metavar: What stands for a value in the help; empty for a switch.
         kinds: Types that a word is tried as, beside text.
-        meaning: What the field means, with its unit.
+        model: Group that the field belongs to.
         examples: Known values among others, for completion.
         many: Whether it takes several values.
         gathered: Whether those of a flag given again add to the first ones.
@@ -61,7 +61,7 @@ class Option:
     path: tuple[str, ...]
     metavar: str
     kinds: frozenset[type]
-    meaning: str
+    model: type
     examples: tuple[str, ...]
     many: bool = False
     gathered: bool = False
@@ -74,6 +74,12 @@ class Option:
     def flag(self) -> str:
         """The flag, such as `--tunnel.free-width`."""
         return flag_of(self.path)
+
+    @property
+    def meaning(self) -> str:
+        """What the field means, with its unit; of a named group its choice."""
+        kind = group_of(fields_of(self.model)[self.path[-1]].annotation)
+        return getattr(kind, "choice", "") or meaning(self.model, self.path[-1])
 
     @property
     def offered(self) -> str:
@@ -123,28 +129,30 @@ def fields_of(kind: Any) -> Mapping[str, FieldInfo]:
 def options_of(default: Any, path: tuple[str, ...] = ()) -> Iterator[Option]:
     """An option for each field that a flag can set, group by group.
 
-    A group whose class has `named(text)` is also an option of its own: a name, or a file.
+    A group whose class has `named(text)` is also an option of its own: a name or a file, which its
+    `choice` describes.
 
     Args:
         default: A model or pydantic dataclass with its default values.
         path: Where it stands in the model of the command.
     """
-    for name, field in fields_of(type(default)).items():
+    model = type(default)
+    for name, field in fields_of(model).items():
         value = getattr(default, name)
         group = group_of(field.annotation)
         if group is None:
-            option = _option((*path, name), field, value)
+            option = _option((*path, name), model, value)
             if option is not None:
                 yield option
         else:
-            if hasattr(group, "named"):
-                words = meaning(field) or first_line(group)
+            if hasattr(group, "choice"):
                 known = tuple(map(str, field.examples or ()))
-                yield Option((*path, name), "NAME|FILE", frozenset({str}), words, known)
+                yield Option((*path, name), "NAME|FILE", frozenset({str}), model, known)
             yield from options_of(group() if value is None else value, (*path, name))
 
 
-def _option(path: tuple[str, ...], field: FieldInfo, default: Any) -> Option | None:
+def _option(path: tuple[str, ...], model: type, default: Any) -> Option | None:
+    field = fields_of(model)[path[-1]]
     extra = field.json_schema_extra if isinstance(field.json_schema_extra, dict) else {}
     types, many = _types(field.annotation)
     choices = tuple(c for kind in types if get_origin(kind) is Literal for c in get_args(kind))
@@ -162,7 +170,7 @@ def _option(path: tuple[str, ...], field: FieldInfo, default: Any) -> Option | N
         gathered=GATHERED in field.metadata,
         choices=choices,
         examples=tuple(map(str, field.examples or ())),
-        meaning=meaning(field),
+        model=model,
         limits=_limits(field),
         default=_words(default),
         kinds=kinds,

@@ -19,7 +19,7 @@ _CHUNK = 1024
 
 
 class TerminalPerson:
-    """Says on stderr and hears lines on stdin, on a terminal as from a pipe.
+    """Writes to stderr and reads lines from stdin, on a terminal as from a pipe.
 
     On a terminal what was typed before a question is no answer to it.
     """

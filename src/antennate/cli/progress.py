@@ -40,10 +40,12 @@ def progress(what: str) -> Iterator[Callable[[int, int], None]]:
 
 
 def _plain(what: str) -> Callable[[int, int], None]:
-    start = time.monotonic()
+    start, shown = time.monotonic(), 0
 
     def step(done: int, total: int) -> None:
-        if done * _LINES // total > (done - 1) * _LINES // total:
+        nonlocal shown
+        if done * _LINES // total > shown:
+            shown = done * _LINES // total
             seconds = time.monotonic() - start
             sys.stderr.write(f"{what}: {done} of {total} after {seconds:.0f} s\n")
             sys.stderr.flush()

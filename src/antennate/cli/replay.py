@@ -16,7 +16,7 @@ from antennate.cli.exit_codes import BAD_INPUT, OK
 from antennate.cli.options import option
 from antennate.cli.results import ResultOptions, folder_for, tell
 from antennate.errors import ConfigError
-from antennate.messages import one_line
+from antennate.messages import one_line, short_names
 from antennate.studies.formats import to_csv
 from antennate.studies.measures import Measure, Table
 from antennate.studies.run_directory import RunDirectory
@@ -134,7 +134,8 @@ def _table(result: Mapping[str, Any]) -> Table:
         f"{one_line(result['version'])}; "
         f"{'the log is complete' if result['closed'] else 'not ended: its program was killed'}."
     )
-    columns = {"recorded": then, one_line(result["controller"]): now}
+    name = one_line(result["controller"])
+    columns = {"recorded": then, short_names([name])[name]: now}
     return Table.of("Replay", columns, (*measures, *COUNTS), note)
 
 

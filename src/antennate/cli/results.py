@@ -13,7 +13,6 @@ from pydantic.dataclasses import dataclass
 
 from antennate.cli.arguments import FromFile
 from antennate.cli.options import option
-from antennate.messages import short_name
 from antennate.params import Params
 from antennate.studies.formats import to_json
 from antennate.studies.measures import Table
@@ -59,8 +58,7 @@ def tell(
 def print_table(table: Table) -> None:
     """Print a table and its note; as a list where it is too wide for the terminal.
 
-    Underscores of a name are shown as spaces. Of MODULE:NAME or FILE.py:NAME only NAME is shown, or
-    all of it, with a line for each part, where two names are the same.
+    Underscores of a name are shown as spaces; one with a colon may have a line for each part.
     """
     from rich.box import SIMPLE_HEAD  # slow to import
     from rich.console import Console
@@ -70,9 +68,7 @@ def print_table(table: Table) -> None:
 
     drawn = Drawn(title=table.title, title_justify="left", box=SIMPLE_HEAD, pad_edge=False)
     drawn.add_column("", overflow="fold")
-    short = [short_name(name) for name in table.columns]
-    alike = len(set(short)) < len(short)
-    for name in table.columns if alike else short:
+    for name in table.columns:
         parts = re.sub(r"(?<=[/:])", "\n", name) if ":" in name else name.replace("_", " ")
         drawn.add_column(Text(parts), justify="right", overflow="fold")
     for name, cells in table.rows:
@@ -84,8 +80,7 @@ def print_table(table: Table) -> None:
     else:
         console.print(Text(table.title))
         for name, cells in table.rows:
-            names = table.columns if alike else short
-            found = (f"{each} {cell}" for each, cell in zip(names, cells, strict=True))
+            found = (f"{each} {cell}" for each, cell in zip(table.columns, cells, strict=True))
             console.print(Text(f"{name}: {', '.join(found)}"))
         console.print()
     if table.note:

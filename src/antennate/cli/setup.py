@@ -80,7 +80,10 @@ def _check(config: SetupConfig, orders: Orders) -> None:
 
 
 def _ports(person: TerminalPerson, config: SetupConfig, orders: Orders, path: Path) -> str:
-    """The bus; both ports are kept in the file."""
+    """The bus; both ports are kept in the file. One that is given is opened before any question."""
+    if orders.bus:
+        with opener_of(orders.bus, "--bus")(config.robot.baud):
+            pass
     listing = ports.ports_like(orders.among) if orders.among else ports.all_ports
     clock, found = HostClock(), {"bus": orders.bus, "esp32": orders.esp32}
     for name, what in (("bus", "adapter of the servo bus"), ("esp32", "antenna board")):

@@ -25,18 +25,18 @@ from antennate.twin.endpoints import Endpoint
 from antennate.twin.faults import Faults, read
 from antennate.twin.orders import Orders
 from antennate.twin.passage import Passage
-from antennate.twin.serve import TwinServer
-from antennate.twin.serve_servos import ServoServer
-from antennate.twin.servo_box import ServoBox, read_list
+from antennate.twin.serve import ServoServer, TwinServer
+from antennate.twin.servo_box import ServoBox, ServoEntry, read_list
 from antennate.twin.tcp import TcpEndpoint
 from antennate.twin.udp import UdpEndpoint
 
 _LAST_PORT = 65_534
 
 DESCRIPTION = """\
-Serve the simulated robot in a scene as real bytes on two pseudo-terminals: the frames of the
-antenna board, and a DYNAMIXEL bus with all its servos. Prints one JSON line with the paths when
-ready. Physics begins when the first servo gets torque. --fault and --touch may be repeated.
+Serve the simulated robot in a scene on two serial ports (pseudo-terminals), which carry the same
+bytes as those of a real robot: one the frames of the antenna board, one a DYNAMIXEL bus with all
+servos. Prints one JSON line with the paths when ready. Physics begins when the first servo gets
+torque. --fault and --touch may be repeated.
 
 --touch left@2s right@5s bends the antennae of the standing robot, as the check by touch of
 `antennate drive` wants it, from the beginning of each client on. left:20mm@2s holds the left one,
@@ -62,15 +62,19 @@ wire=ber:SHARE (bits wrong) or loss:SHARE (bytes lost), on both wires both ways.
 class Places(FromFile):
     """Where to serve; two pseudo-terminals if no port is given."""
 
-    tcp: str = option("", "TCP: the board on PORT, the bus on PORT+1; 0 takes any", "[HOST:]PORT")
-    udp: str = option("", "the board on a UDP port instead, likewise", "[HOST:]PORT")
+    tcp: str | None = option(
+        None, "TCP: the board on PORT, the bus on PORT+1; 0 takes any", "[HOST:]PORT"
+    )
+    udp: str | None = option(None, "the board on a UDP port instead, likewise", "[HOST:]PORT")
     key: Path | None = option(
         None, "file with the key for --udp, mode 0600; else ANTENNATE_KEY", "FILE"
     )
-    servos: str = option(
-        "", "these servos alone, without a robot; or a TOML file", "ID:MODEL[@BAUD][xCOUNT],..."
+    servos: str | None = option(
+        None, "these servos alone, without a robot; or a TOML file", "ID:MODEL[@BAUD][xCOUNT],..."
     )
-    orders: str = option("", "take orders from a file, a named pipe or - for stdin", "FILE")
+    orders: Path | None = option(
+        None, "take orders from a file, a named pipe or - for stdin", "FILE"
+    )
     passed: Path | None = option(
         None, "make this file when the head passes the exit, for `drive --until FILE`", "FILE"
     )
@@ -87,8 +91,12 @@ def command(argv: Sequence[str]) -> int:
         AntennateError: Something given cannot be used.
     """
     config, places = parse("twin", DESCRIPTION, TwinConfig, argv, Places)
-    orders = Orders(places.orders, _say) if places.orders else None
-    return (_serve_servos if places.servos else _serve_robot)(config, places, orders)
+    if places.key is not None and places.udp is None:
+        raise ConfigError("--key: expected --udp beside it, found none")
+    orders = None if places.orders is None else Orders(str(places.orders), _say)
+    if places.servos is None:
+        return _serve_robot(config, places, orders)
+    return _serve_servos(config, places, read_list(places.servos), orders)
 
 
 def _serve_robot(config: TwinConfig, places: Places, orders: Orders | None) -> int:
@@ -109,7 +117,9 @@ def _serve_robot(config: TwinConfig, places: Places, orders: Orders | None) -> i
     return OK
 
 
-def _serve_servos(config: TwinConfig, places: Places, orders: Orders | None) -> int:
+def _serve_servos(
+    config: TwinConfig, places: Places, entries: Sequence[ServoEntry], orders: Orders | None
+) -> int:
     """Servos without a robot."""
     robot = (places.udp, places.passed, places.pace != "real", config.touch, config.factory)
     if any(robot):
@@ -117,11 +127,10 @@ def _serve_servos(config: TwinConfig, places: Places, orders: Orders | None) -> 
             "--servos: expected no --udp, --passed, --pace lockstep, --touch or --factory, as they "
             "are for a robot"
         )
-    entries = read_list(places.servos)
     demands = [read(text) for text in config.fault]
     faults = Faults(demands, [entry.id for entry in entries], alone=True)
     box = ServoBox(entries, config.plugged, config.push)
-    bus = TcpEndpoint(*_place("--tcp", places.tcp)) if places.tcp else None
+    bus = TcpEndpoint(*_place("--tcp", places.tcp)) if places.tcp is not None else None
     with ServoServer(box, faults, bus, orders) as server, urgent(LEVEL + 1):
         server.run(_until(config, server.paths, lambda: True))
     return OK
@@ -167,9 +176,9 @@ def _tell(passage: Passage, file: Path | None) -> None:
 def _endpoints(places: Places) -> tuple[Endpoint | None, Endpoint | None]:
     """Endpoints of the board and the bus, None for a pseudo-terminal."""
     board = bus = None
-    if places.udp:
+    if places.udp is not None:
         board = UdpEndpoint(*_place("--udp", places.udp), read_key(places.key))
-    if places.tcp:
+    if places.tcp is not None:
         host, port = _place("--tcp", places.tcp)
         board = board or TcpEndpoint(host, port)
         bus = TcpEndpoint(host, port and port + 1)

@@ -16,6 +16,7 @@ second in every maneuver but HOLD.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -52,7 +53,8 @@ def require_step(robot: RobotSpec) -> None:
     if robot.legs.kind != "rolling":
         raise ConfigError(
             f"expected rolling legs for the gait of antennate, found {robot.legs.kind} legs; bring "
-            "a controller of your own that moves them, see docs/controllers.md"
+            "a controller of your own that moves them (`Gait(..., legs=False)` moves the other "
+            "joints for it), see docs/controllers.md"
         )
 
 
@@ -94,14 +96,19 @@ class Gait:
         robot: The robot that walks; the shapes of all commands follow from it.
         batch: Number of robots B.
         period: Control period [s].
+        legs: Whether it moves the legs. False leaves them at 0, for a controller that moves them
+            itself and takes the wave of the yaw joints and the antennae alone.
 
     Raises:
-        ConfigError: The legs of the robot do not roll.
+        ConfigError: It is to move legs that do not roll.
     """
 
-    def __init__(self, params: GaitParams, robot: RobotSpec, batch: int, period: float) -> None:
-        require_step(robot)
-        self.params = params
+    def __init__(
+        self, params: GaitParams, robot: RobotSpec, batch: int, period: float, legs: bool = True
+    ) -> None:
+        if legs:
+            require_step(robot)
+        self.params, self._legs = params, legs
         self._robot = robot
         self.phase: Floats = np.zeros(batch)
         self.offset: Floats = np.zeros(batch)
@@ -129,4 +136,5 @@ class Gait:
         self.offset += change * _STEERS[maneuver]
         self.phase += _DIRECTION[maneuver] * self._advance
         self.sweep += _STEERS[maneuver] * self._swing
-        return targets(self.params, self._robot, self.phase, self.offset, self.sweep)
+        command = targets(self.params, self._robot, self.phase, self.offset, self.sweep)
+        return command if self._legs else replace(command, leg=np.zeros_like(command.leg))

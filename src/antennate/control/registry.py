@@ -52,7 +52,7 @@ def make_controller(
     """A controller of `batch` robots, as it begins.
 
     Args:
-        name: A name that `CONTROLLERS` knows, or a factory.
+        name: A name that `CONTROLLERS` finds, or a factory.
         control: Numbers of the control, the defaults if not given.
         robot: The robot, the default one if not given.
         batch: Number of robots.

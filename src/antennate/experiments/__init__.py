@@ -21,6 +21,11 @@ GROUP = "antennate.experiments"
 """Group of the entry points."""
 
 
+def is_ours(name: str) -> bool:
+    """Whether it is an experiment of this package."""
+    return name in _folders()
+
+
 def names() -> list[str]:
     """Names of all experiments, ours first."""
     return list(dict.fromkeys([*_folders(), *_entries()]))
@@ -47,7 +52,7 @@ def load(name: str) -> Experiment[Any, Any]:
     Raises:
         BadInputError: There is none, or the one of another package cannot be loaded.
     """
-    if name in _folders():
+    if is_ours(name):
         return importlib.import_module(f"{__name__}.{name}.experiment").EXPERIMENT
     entries = _entries()
     if name not in entries:

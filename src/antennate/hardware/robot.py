@@ -7,6 +7,8 @@ from typing import Any, ClassVar, Self
 
 from antennate.antenna.calibration import Calibration
 from antennate.errors import ConfigError
+from antennate.hardware.esp32.wire import names_board
+from antennate.messages import shown
 from antennate.params import (
     ConditioningParams,
     ControlParams,
@@ -38,18 +40,29 @@ class RobotConfig(Params):
         None, "1", "assumed: of the calibration file, or 0.8", ge=0, le=200
     )
     """How far beyond the bent end of its range a reading is believed, in calibrated spans."""
+    reach_right: float | None = number(
+        None, "1", "assumed: of its calibration file, or that of both", ge=0, le=200
+    )
+    """The same of the right antenna, where it has its own."""
     robot: RobotSpec = RobotSpec()
     control: ControlParams = ControlParams()
     limits: SupervisorParams = SupervisorParams()
     network: NetworkParams = NetworkParams()
+
+    @property
+    def reaches(self) -> tuple[float | None, float | None]:
+        """`reach` of the left and the right antenna [spans], None for the default."""
+        return self.reach, self.reach if self.reach_right is None else self.reach_right
 
     def calibrated(self) -> Self:
         """The same with the curve and the flex sensor of the calibration file in place of its name.
 
         Raises:
             CalibrationError: The file cannot be used, or is of another flex sensor.
-            ConfigError: There is another curve, or another theta, beside it.
+            ConfigError: There is another curve, or another theta, beside it, or the name of a flex
+                sensor without its file.
         """
+        self._require_files()
         if self.calibration is None and self.calibration_right is None:
             return self
         if self.calibration is None:
@@ -61,15 +74,31 @@ class RobotConfig(Params):
         left = self._load(self.calibration, self.sensor_id)
         curve = left.conditioning(averaging)
         known: dict[str, Any] = {"calibration": None, "sensor_id": left.sensor_id}
-        reach, other = left.reach, None
+        own_reach, other = self.reach is not None, None
+        known["reach"] = self.reach if own_reach else left.reach
         if self.calibration_right is not None:
             right = self._load(self.calibration_right, self.sensor_id_right)
             other = right.curve()
             known |= {"calibration_right": None, "sensor_id_right": right.sensor_id}
-            reach = max(left.reach, right.reach)
+            if self.reach_right is None:
+                known["reach_right"] = self.reach if own_reach else right.reach
         control = own.model_copy(update={"conditioning": curve, "conditioning_right": other})
-        known |= {"control": control, "reach": reach if self.reach is None else self.reach}
-        return self.model_copy(update=known)
+        return self.model_copy(update=known | {"control": control})
+
+    def _require_files(self) -> None:
+        """Refuse the name of a flex sensor beside neither its file nor the curve of one."""
+        own, plain = self.control, ConditioningParams()
+        curve = own.conditioning.model_copy(update={"averaging_time": plain.averaging_time})
+        sides = (
+            ("", self.sensor_id, self.calibration, curve != plain),
+            ("_right", self.sensor_id_right, self.calibration_right, own.conditioning_right),
+        )
+        for side, name, file, own_curve in sides:
+            if name is not None and not names_board(name) and not file and not own_curve:
+                raise ConfigError(
+                    f"sensor_id{side}: expected calibration{side} = FILE beside it, or 16 "
+                    f"hexadecimal digits of a board, found {shown(name)}"
+                )
 
     def _load(self, path: str, sensor_id: str | None) -> Calibration:
         """A calibration file that nothing contradicts."""
@@ -107,8 +136,5 @@ class DoctorConfig(RobotConfig):
         *(path for path in paths_of(ControlParams, "control") if path not in _EXAMINED),
         *(path for path in paths_of(SupervisorParams, "limits") if path not in _EXAMINED),
         "control.conditioning.averaging_time",
-        "doctor.silence",
-        "doctor.quiet",
-        "doctor.unasked",
     )
     doctor: DoctorParams = DoctorParams()

@@ -4,78 +4,80 @@ Each class groups the numbers of one part as a frozen model: unknown keys, non-f
 values out of bounds are refused. A source begins with one of `paper` (arXiv:2603.07795),
 `datasheet`, `measured`, `fitted` (by which command) or `assumed` (why; the paper does not
 say). Derived numbers are properties, computed here and never typed.
+
+A group is imported when it is first used: a command builds the models that it has, and no others.
 """
 
-from antennate.params.base import Params, number
-from antennate.params.bench import BenchVariationParams, WallParams
-from antennate.params.control import (
-    ConditioningParams,
-    ControlParams,
-    CurveParams,
-    EscapeParams,
-    GaitParams,
-    RepetitionParams,
-    RuleParams,
-)
-from antennate.params.doctor import DoctorParams
-from antennate.params.endurance import DriftParams
-from antennate.params.network import NetworkParams
-from antennate.params.record import RecordParams
-from antennate.params.safety import SupervisorParams, TouchCheckParams
-from antennate.params.scene import (
-    BenchPhysicsParams,
-    CylinderParams,
-    PhysicsParams,
-    TunnelParams,
-    VariationParams,
-)
-from antennate.params.spring import SpringParams, TaperParams
-from antennate.params.sweep import EstimateParams, ShapeParams, SweepParams
-from antennate.params.touch import (
-    BouldersWallParams,
-    CornerWallParams,
-    FlatWallParams,
-    GapWallParams,
-    SinusoidalWallParams,
-    StepWallParams,
-    TouchWallsParams,
-)
-from antennate.params.twin import BatteryParams
+from importlib import import_module
+from typing import Any
 
-__all__ = [
-    "BatteryParams",
-    "BenchPhysicsParams",
-    "BenchVariationParams",
-    "BouldersWallParams",
-    "ConditioningParams",
-    "ControlParams",
-    "CornerWallParams",
-    "CurveParams",
-    "CylinderParams",
-    "DoctorParams",
-    "DriftParams",
-    "EscapeParams",
-    "EstimateParams",
-    "FlatWallParams",
-    "GaitParams",
-    "GapWallParams",
-    "NetworkParams",
-    "Params",
-    "PhysicsParams",
-    "RecordParams",
-    "RepetitionParams",
-    "RuleParams",
-    "ShapeParams",
-    "SinusoidalWallParams",
-    "SpringParams",
-    "StepWallParams",
-    "SupervisorParams",
-    "SweepParams",
-    "TaperParams",
-    "TouchCheckParams",
-    "TouchWallsParams",
-    "TunnelParams",
-    "VariationParams",
-    "WallParams",
-    "number",
-]
+_PLACES = {
+    "antennate.params.base": (
+        "Params",
+        "number",
+    ),
+    "antennate.params.bench": (
+        "BenchVariationParams",
+        "WallParams",
+    ),
+    "antennate.params.control": (
+        "ConditioningParams",
+        "ControlParams",
+        "CurveParams",
+        "EscapeParams",
+        "GaitParams",
+        "RepetitionParams",
+        "RuleParams",
+    ),
+    "antennate.params.doctor": ("DoctorParams",),
+    "antennate.params.endurance": ("DriftParams",),
+    "antennate.params.network": ("NetworkParams",),
+    "antennate.params.record": ("RecordParams",),
+    "antennate.params.safety": (
+        "SupervisorParams",
+        "TouchCheckParams",
+    ),
+    "antennate.params.scene": (
+        "BenchPhysicsParams",
+        "CylinderParams",
+        "PhysicsParams",
+        "TunnelParams",
+        "VariationParams",
+    ),
+    "antennate.params.spring": (
+        "SpringParams",
+        "TaperParams",
+    ),
+    "antennate.params.sweep": (
+        "EstimateParams",
+        "ShapeParams",
+        "SweepParams",
+    ),
+    "antennate.params.touch": (
+        "BouldersWallParams",
+        "CornerWallParams",
+        "FlatWallParams",
+        "GapWallParams",
+        "SinusoidalWallParams",
+        "StepWallParams",
+        "TouchWallsParams",
+    ),
+    "antennate.params.twin": ("BatteryParams",),
+}
+"""Which module holds which groups; `__init__.pyi` says the same to type checkers."""
+
+__all__ = sorted(name for names in _PLACES.values() for name in names)  # pyright: ignore[reportUnsupportedDunderAll]
+
+
+def __getattr__(name: str) -> Any:
+    """Import a group when it is first asked for."""
+    for place, names in _PLACES.items():
+        if name in names:
+            value = globals()[name] = getattr(import_module(place), name)
+            return value
+    raise AttributeError(f"module 'antennate.params' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    """The groups, for completion."""
+    return __all__

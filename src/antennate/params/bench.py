@@ -15,10 +15,16 @@ class WallParams(Params):
     """Diameter and pitch."""
     speed: float = number(0.008, "m/s", "paper: 8 mm/s", gt=1e-5, le=0.5)
     """Speed of the base."""
-    travel: float = number(0.16, "m", "assumed: four times the start", gt=0.02, le=2)
+    travel: float = number(
+        0.16, "m", "assumed: unpublished; four times what `start` leaves out", gt=0.02, le=2
+    )
     """Travel of the base along the wall."""
     base_angle: float = number(
-        math.radians(53.0), "rad", "fitted: docs/science/wall_study.py window", gt=0.17, lt=2.9
+        math.radians(53.0),
+        "rad",
+        "fitted: where the profiles differ most (docs/science/wall_study.py window)",
+        gt=0.17,
+        lt=2.9,
     )
     """Angle of the antenna from the direction of travel; a right angle faces the wall."""
     overlap: float = number(0.008, "m", "assumed: a few spheres' radii", gt=0, le=0.1)
@@ -40,7 +46,9 @@ class WallParams(Params):
 class BenchVariationParams(Params):
     """What differs from trial to trial on the bench."""
 
-    stiffness: float = number(0.05, "1", "assumed: makers quote 10 % (2 sigma)", ge=0, le=0.3)
+    stiffness: float = number(
+        0.05, "1", "assumed: makers quote 10 % of the rate, taken as two sigma", ge=0, le=0.3
+    )
     """Standard deviation of a spring's stiffness."""
     friction: float = number(0.02, "1", "assumed: clean and dusty places", ge=0)
     """Standard deviation of the friction."""

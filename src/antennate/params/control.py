@@ -13,7 +13,9 @@ from antennate.params.base import Params, number
 class GaitParams(Params):
     """The serpenoid body wave and the stepping O-legs."""
 
-    frequency: float = number(0.5, "Hz", "assumed: legs at 46 % of no-load speed", gt=0, le=1.0)
+    frequency: float = number(
+        0.5, "Hz", "assumed: legs then turn at 46 % of the servo's no-load speed", gt=0, le=1.0
+    )
     """Cycles per second."""
     wave_number: float = number(1.0, "1", "assumed: one wave, as in other robots", gt=0, le=3)
     """Waves along the body."""
@@ -54,9 +56,21 @@ class CurveParams(Params):
         -1, "1", "paper: called a decreasing sigmoid; counts fall when the flex sensor bends"
     )
     """+1 if the reading rises with bending."""
-    counts_low: float = number(1399.0, "counts", "fitted: antenna.sensor, 90 deg", ge=0, le=4095)
+    counts_low: float = number(
+        1399.0,
+        "counts",
+        "fitted: antennate.antenna.sensor at a flex of 90 deg, without noise",
+        ge=0,
+        le=4095,
+    )
     """Reading that normalises to 0."""
-    counts_high: float = number(1872.0, "counts", "fitted: antenna.sensor, straight", ge=0, le=4095)
+    counts_high: float = number(
+        1872.0,
+        "counts",
+        "fitted: antennate.antenna.sensor, straight antenna, without noise",
+        ge=0,
+        le=4095,
+    )
     """Reading that normalises to 1."""
 
     @model_validator(mode="after")
@@ -94,11 +108,25 @@ class RuleParams(Params):
 class RepetitionParams(Params):
     """When readings that repeat themselves mean that the robot is stuck; fitted in open loop."""
 
-    window_cycles: float = number(0.5, "1", "fitted: 96 tunnels: sooner than 1", gt=0, le=10)
+    window_cycles: float = number(
+        0.5,
+        "1",
+        "fitted: open loop, 96 tunnels: sooner than a whole cycle, with as few errors",
+        gt=0,
+        le=10,
+    )
     """Window of both means below, in gait cycles."""
-    change: float = number(0.06, "1", "fitted: 96 tunnels: 59 jams, 8 false alarms", gt=0, le=1)
+    change: float = number(
+        0.06, "1", "fitted: open loop, 96 tunnels: 59 jams found, 8 false alarms", gt=0, le=1
+    )
     """Mean change of flex from cycle to cycle under which it repeats."""
-    pressure: float = number(0.2, "1", "fitted: 12 tunnels: free below, stuck above it", ge=0, le=1)
+    pressure: float = number(
+        0.2,
+        "1",
+        "fitted: open loop, 12 tunnels: free antennae stay below, stuck ones above",
+        ge=0,
+        le=1,
+    )
     """Mean flex above which an antenna is pressed."""
 
 
@@ -112,9 +140,17 @@ class EscapeParams(Params):
         "repetition", "1", "fitted: open loop; repetition tells stuck from moving, contact does not"
     )
     """What counts as stuck: repeated readings, or the paper's both strong and similar."""
-    reverse_time: float = number(2.2, "s", "fitted: 60 tunnels; 2/3 of the body", gt=0, le=30)
+    reverse_time: float = number(
+        2.2,
+        "s",
+        "fitted: `closed` on 60 tuning tunnels (docs/science/study.py); 2/3 of the body",
+        gt=0,
+        le=30,
+    )
     """Time to back off."""
-    turn_time: float = number(1.3, "s", "fitted: 60 tunnels; 60 deg at turn_offset", gt=0, le=30)
+    turn_time: float = number(
+        1.3, "s", "fitted: `closed` on 60 tuning tunnels; about 60 deg at turn_offset", gt=0, le=30
+    )
     """Time of the first turn."""
     turn_offset: float = number(0.52, "rad", "assumed: a turn nearly on the spot", gt=0, le=1.0)
     """Yaw offset of turns."""
@@ -122,15 +158,33 @@ class EscapeParams(Params):
     """Side of the first turn: away from what was touched more, or always right."""
     alternate: bool = number(True, "1", "assumed: searching both sides")
     """Whether a second turn goes the other way, second_turn times as far."""
-    second_turn: float = number(1.5, "1", "fitted: 192 of 200 tunnels; 188 with 2.0", gt=0, le=5)
+    second_turn: float = number(
+        1.5,
+        "1",
+        "fitted: `closed` on 200 tuning tunnels (seeds 31, 32): 192 successes, 188 with 2.0",
+        gt=0,
+        le=5,
+    )
     """Length of a turn the other way, in first turns."""
     retry_time: float = number(12.0, "s", "assumed: six gait cycles", gt=0, le=300)
     """Stuck again within this time, it turns the other way."""
     memory_time: float = number(4.0, "s", "assumed: two gait cycles", gt=0, le=300)
     """Time constant of the memory of touch."""
-    memory_delay: float = number(3.0, "s", "fitted: 61 % of turns right, 56 % with 0", ge=0, le=60)
+    memory_delay: float = number(
+        3.0,
+        "s",
+        "fitted: open loop, 96 tunnels, 57 jams: first turn right in 61 %, 56 % with 0",
+        ge=0,
+        le=60,
+    )
     """How long before the jam was noticed the memory is read."""
-    lost_time: float = number(2.0, "s", "fitted: ten pauses in 30 s are longer", gt=0, le=3600)
+    lost_time: float = number(
+        2.0,
+        "s",
+        "fitted: open loop, 96 tunnels: ten times in 30 s nothing is felt for longer",
+        gt=0,
+        le=3600,
+    )
     """Nothing felt for so long after a turn means that the walls are lost."""
     return_time: float = number(3.8, "s", "assumed: about 180 deg at the offset above", gt=0, le=60)
     """Time to turn round."""

@@ -12,12 +12,6 @@ class DoctorParams(Params):
     """Time over which the board is listened to."""
     greeting: float = number(3.0, "s", "assumed: boots in 2 s, greets every second", gt=0, le=60)
     """Longest wait for a greeting."""
-    silence: float = number(1.9, "s", "assumed: a board sends every 10 ms", gt=0, le=60)
-    """Silence of a port after which no board is there."""
-    quiet: float = number(0.1, "s", "assumed: ten samples; servos only answer", gt=0, le=1)
-    """Time for which the bus is listened to before a servo is asked."""
-    unasked: int = number(32, "byte", "assumed: above a sample or a plug's noise", ge=1, le=1000)
-    """Bytes in that time that nobody asked for, from which on servos are not alone on the bus."""
     reads: int = number(20, "1", "assumed: enough for a median", ge=3, le=1000)
     """Reads of all servos that are timed."""
     answer_time: float = number(0.002, "s", "assumed: the bus gives up then", gt=0, le=0.1)

@@ -10,7 +10,13 @@ class DriftParams(Params):
 
     quantile: float = number(0.1, "1", "assumed: touches may take nine tenths", gt=0, lt=1)
     """Share of readings without contact that lie nearer to straight than the resting one."""
-    speed: float = number(0.002, "1/s", "assumed: four times row S7, 30 % in 10 min", gt=0, le=1)
+    speed: float = number(
+        0.002,
+        "1/s",
+        "assumed: four times the fastest drift of row S7 of reliability, 30 % in 10 min",
+        gt=0,
+        le=1,
+    )
     """Fastest that the resting reading is taken to drift, in spans."""
     band: float = number(
         0.15,

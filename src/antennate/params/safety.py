@@ -16,7 +16,7 @@ class TouchCheckParams(Params):
     """Change below which an antenna is at rest, in calibrated spans."""
     readings: int = number(10, "1", "assumed: 100 ms at 100 Hz", ge=1, le=1000)
     """Readings in a row that count."""
-    patience: float = number(60.0, "s", "assumed: somebody walks there, bends both", ge=0, le=3600)
+    patience: float = number(60.0, "s", "assumed: time to walk there and bend both", ge=0, le=3600)
     """Time by which the dry run is extended for the check, and then while torque is refused."""
 
     @model_validator(mode="after")
@@ -48,7 +48,9 @@ class SupervisorParams(Params):
     """Answers missed in a row that degrade."""
     silent_answers: int = number(5, "1", "assumed: at 1 % loss once in 10^10", ge=1, le=100)
     """Answers missed in a row that mean a silent servo."""
-    supply_warn: float = number(10.8, "V", "assumed: three lithium cells near empty", gt=0, le=100)
+    supply_warn: float = number(
+        10.8, "V", "assumed: three lithium cells at 3.6 V, near empty", gt=0, le=100
+    )
     """Supply below which is warned."""
     slow_rate: float = number(
         0.5,

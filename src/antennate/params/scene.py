@@ -36,7 +36,9 @@ class TunnelParams(Params):
         (1.0, 1.0), "m", "assumed: room for the body", min_length=1, max_length=20
     )
     """Lengths of the straight pieces of the centre line."""
-    turns_deg: tuple[float, ...] = number((90.0,), "deg", "fitted: antennate tunnel", max_length=19)
+    turns_deg: tuple[float, ...] = number(
+        (90.0,), "deg", "fitted: antennate tunnel, open loop alone", max_length=19
+    )
     """Turn between one piece and the next."""
     mirror: Literal["random", "never", "always"] = number("random", "1", "assumed: sides are equal")
     """Whether a trial's tunnel is mirrored."""
@@ -81,7 +83,9 @@ class VariationParams(Params):
     """Half range of the start's side offset."""
     start_heading: float = number(0.15, "rad", "assumed: placed by hand", ge=0, le=1.5)
     """Half range of the start's heading."""
-    joint_bias: float = number(0.02, "rad", "assumed: mounted by hand, about 1 deg", ge=0, le=0.3)
+    joint_bias: float = number(
+        0.02, "rad", "assumed: a horn mounted by hand, about 1 deg", ge=0, le=0.3
+    )
     """Standard deviation of a yaw joint's zero."""
     slip_log_sd: float = number(0.3, "1", "assumed: dust and worn tread", ge=0, le=3)
     """Standard deviation of the logarithm of a leg's friction factor."""
@@ -92,14 +96,28 @@ class VariationParams(Params):
 class PhysicsParams(Params):
     """Numerics of the simulation, measured by benchmarks/numerics.py."""
 
-    timestep: float = number(0.002, "s", "measured: benchmarks/numerics.py", gt=1e-5, le=0.004)
+    timestep: float = number(
+        0.002, "s", "measured: benchmarks/numerics.py, agrees with 0.25 ms", gt=1e-5, le=0.004
+    )
     """Physics step."""
-    contact_time: float = number(0.004, "s", "measured: with more, legs sink in", gt=1e-5, le=0.05)
+    contact_time: float = number(
+        0.004,
+        "s",
+        "measured: benchmarks/numerics.py; with longer ones the legs sink into the floor",
+        gt=1e-5,
+        le=0.05,
+    )
     """Time constant of contacts."""
-    impratio: float = number(1.0, "1", "measured: 100 changes speeds by 0.2 %", gt=0, le=1000)
+    impratio: float = number(
+        1.0,
+        "1",
+        "measured: benchmarks/numerics.py, 10 and 100 change speeds by less than 0.2 %",
+        gt=0,
+        le=1000,
+    )
     """Stiffness of friction over that of the normal."""
     sleep_tolerance: float = number(
-        1e-3, "m/s", "measured: outcomes as without sleep", gt=0, le=0.1
+        1e-3, "m/s", "measured: benchmarks/numerics.py, outcomes as without sleep", gt=0, le=0.1
     )
     """Speed under which resting parts are skipped."""
 
@@ -107,9 +125,13 @@ class PhysicsParams(Params):
 class BenchPhysicsParams(PhysicsParams):
     """Numerics of the bench: a light chain that sticks and slips on small spheres."""
 
-    timestep: float = number(5e-4, "s", "measured: half gives the same wall", gt=1e-5, le=0.002)
+    timestep: float = number(
+        5e-4, "s", "measured: antennate wall at half of it gives the same table", gt=1e-5, le=0.002
+    )
     """Physics step."""
-    contact_time: float = number(1e-3, "s", "assumed: the stiffest: two steps", gt=1e-5, le=0.05)
+    contact_time: float = number(
+        1e-3, "s", "assumed: two timesteps, the stiffest that the engine allows", gt=1e-5, le=0.05
+    )
     """Time constant of contacts."""
     impratio: float = number(10.0, "1", "assumed: with 1 friction creeps", gt=0, le=1000)
     """Stiffness of friction over that of the normal."""

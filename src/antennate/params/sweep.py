@@ -19,16 +19,34 @@ class SweepParams(Params):
     """Centre theta0 of the sweep from the heading, outwards."""
     amplitude: float = number(math.radians(30.0), "rad", "assumed: ahead to sideways", gt=0, le=1.5)
     """Amplitude A of the sweep."""
-    frequency: float = number(0.5, "Hz", "assumed: that of the gait; slow for inertia", gt=0, le=3)
+    frequency: float = number(
+        0.5,
+        "Hz",
+        "assumed: that of the gait; inertia bends the antenna by 2.3 deg, at 1 Hz by 7",
+        gt=0,
+        le=3,
+    )
     """Sweeps a second, f."""
 
 
 class ShapeParams(Params):
     """What tells the shapes of a touching antenna apart."""
 
-    flex: float = number(math.radians(5.0), "rad", "assumed: twice that of inertia", gt=0, le=1)
+    flex: float = number(
+        math.radians(5.0),
+        "rad",
+        "assumed: twice the 2.3 deg that inertia bends it in free air",
+        gt=0,
+        le=1,
+    )
     """Summed hinge angles under the flex sensor below which the antenna is straight."""
-    offset: float = number(math.radians(2.5), "rad", "assumed: half, if evenly bent", gt=0, le=1)
+    offset: float = number(
+        math.radians(2.5),
+        "rad",
+        "assumed: half of that flex, as at the tip of an evenly bent chain",
+        gt=0,
+        le=1,
+    )
     """Angle of the tip off the base's direction below which the antenna is straight."""
     gap: float = number(5e-4, "m", "assumed: depth over which contacts stiffen", gt=0, le=0.01)
     """Distance to a wall that counts as touching."""
@@ -38,16 +56,24 @@ class EstimateParams(Params):
     """Trials of the estimates, and what differs between them."""
 
     trials: int = number(60, "1", "assumed: three times the paper's 20", ge=6, le=100000)
-    """Trials to calibrate, and as many to judge, in every condition."""
-    distance: tuple[_Place, _Place] = number((0.4, 0.9), "1", "assumed: reached by default")
+    """Trials to calibrate, and as many to test, in every condition."""
+    distance: tuple[_Place, _Place] = number(
+        (0.4, 0.9), "1", "assumed: within reach of the default sweep"
+    )
     """Range of wall distances, over the length of the antenna."""
-    centre_range: float = number(math.radians(10.0), "rad", "assumed: yaw of the gait", ge=0, le=1)
+    centre_range: float = number(
+        math.radians(10.0), "rad", "assumed: the body yaws by so much while it walks", ge=0, le=1
+    )
     """Half range of the centre where the sweep is varied."""
-    amplitude_range: float = number(math.radians(10.0), "rad", "assumed: a third", ge=0, le=1)
+    amplitude_range: float = number(
+        math.radians(10.0), "rad", "assumed: a third of the default amplitude", ge=0, le=1
+    )
     """Half range of the amplitude where the sweep is varied."""
     tilt_range: float = number(0.15, "rad", "assumed: placed by hand, as in the tunnel", ge=0, le=1)
     """Half range of the walls' angle where they are tilted."""
-    base_zero: float = number(0.02, "rad", "assumed: mounted by hand, about 1 deg", ge=0, le=0.3)
+    base_zero: float = number(
+        0.02, "rad", "assumed: a horn mounted by hand, about 1 deg", ge=0, le=0.3
+    )
     """Standard deviation of the base's zero."""
     gain: float = number(0.05, "1", "assumed: strips repeat within 10 % (2 sigma)", ge=0, le=1)
     """Standard deviation of the sensor's gain from trial to trial, where there is sensor noise."""

@@ -31,7 +31,12 @@ class JointParams(Params):
     """Sign between ticks and angle."""
     zeros: tuple[_Zero, ...] = number((), "ticks", "assumed: 2048, half a turn, if not given")
     """Position at the angle 0."""
-    fastest: float = number(4.5, "rad/s", "assumed: 2/3 of an unloaded XC430-W240", gt=0)
+    fastest: float = number(
+        4.5,
+        "rad/s",
+        "assumed: 2/3 of an unloaded XC430-W240 at 11.1 V, 6.8 rad/s (datasheet)",
+        gt=0,
+    )
     """Fastest that goals move."""
 
     @property
@@ -59,7 +64,9 @@ class PitchParams(YawParams):
 
     kind: Literal["locked", "actuated"] = number("locked", "1", "paper: pitch is left unused")
     """Whether servos on the bus move them."""
-    stiffness: float = number(30.0, "N·m/rad", "assumed: a servo that holds", gt=0)
+    stiffness: float = number(
+        30.0, "N·m/rad", "assumed: a servo that holds; the paper leaves pitch unused", gt=0
+    )
     """Stiffness of a locked pitch joint."""
 
 
@@ -84,7 +91,18 @@ class BaseParams(YawParams):
 
     servo: ServoName = number("xl330_m288", "1", "paper: XL330 at the antennae")
     """Model of the group's servos."""
-    fastest: float = number(4.5, "rad/s", "assumed: as the others; XL330-M288 makes 10.8", gt=0)
+    fastest: float = number(
+        4.5,
+        "rad/s",
+        "assumed: as the others; an XL330-M288 makes 10.8 rad/s at 5 V (datasheet)",
+        gt=0,
+    )
     """Fastest that goals move."""
-    limit: float = number(_RIGHT_ANGLE, "rad", "assumed: beyond, they cross", gt=0, le=_RIGHT_ANGLE)
+    limit: float = number(
+        _RIGHT_ANGLE,
+        "rad",
+        "assumed: outwards it lies along the body, inwards it crosses the other",
+        gt=0,
+        le=_RIGHT_ANGLE,
+    )
     """Largest angle either way from the mounting angle."""

@@ -69,9 +69,17 @@ class SensorParams(Params):
     """Voltage over the divider."""
     reference: float = number(1.1, "V", "datasheet: ESP32, nominal; 1.0 to 1.2 V", ge=1.0, le=1.2)
     """Reference voltage of the converter."""
-    oversampling: int = number(16, "1", "assumed: time is left for so many", ge=1, le=1024)
+    oversampling: int = number(
+        16,
+        "1",
+        "assumed: 100 readings a second of two sensors leave time for 16 samples each",
+        ge=1,
+        le=1024,
+    )
     """Samples averaged to one reading."""
-    sample_noise_counts: float = number(8.0, "counts", "assumed: 25 reported, peak to peak", ge=0)
+    sample_noise_counts: float = number(
+        8.0, "counts", "assumed: reports of 25 counts peak to peak", ge=0
+    )
     """Standard deviation of one sample on its own."""
     common_noise_counts: float = number(
         1.5, "counts", "assumed: 16 samples leave 2 to 3 counts, so a part is common", ge=0

@@ -59,7 +59,9 @@ class ServoParams(Params):
         gt=0,
     )
     """What that gain is divided by: counts of drive per tick of position error."""
-    armature: float = number(0.003, "kg·m²", "assumed: rotor of 5e-8 behind a 245:1 gear", ge=0)
+    armature: float = number(
+        0.003, "kg·m²", "assumed: a rotor of 5e-8 kg·m² behind a 245:1 gear", ge=0
+    )
     """Inertia at the output."""
     friction: float = number(0.0, "N·m", "assumed: none, until it is measured", ge=0)
     """Friction at the output that is always there."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Literal, Self
+from typing import Any, ClassVar, Literal, Self
 
 from pydantic import model_validator
 
@@ -72,15 +72,23 @@ ANTENNA_PREFIXES = tuple(f"antenna_{side}_" for side in SIDES)
 class RobotSpec(Params):
     """A walking robot: links with a pair of legs each, yaw joints between them, two antennae."""
 
+    choice: ClassVar[str] = f"{', '.join(ROBOTS)} (the default), or a TOML file of your own robot"
     links: int = number(6, "1", "paper: six links", ge=2, le=50)
     """Number of links."""
     link_pitch: float = number(0.10, "m", "assumed: three servos, 28.5 x 46.5 x 34 mm", gt=0.03)
     """Joint spacing."""
-    mass: float = number(2.0, "kg", "assumed: 17 servos of 65 g, as much in frames", gt=0.3)
+    mass: float = number(
+        2.0,
+        "kg",
+        "assumed: 17 servos of 65 g (datasheet), as much again in frames and legs",
+        gt=0.3,
+    )
     """Total mass."""
     width: float = number(0.20, "m", "paper: a section of 0.40 m is twice as wide", gt=0.08)
     """Width over the legs."""
-    leg_radius: float = number(0.030, "m", "assumed: 0.12 m/s within the servo's speed", gt=0)
+    leg_radius: float = number(
+        0.030, "m", "assumed: a ring under the 34 mm body; 0.12 m/s within the servo's speed", gt=0
+    )
     """Outer radius of an O-leg."""
     leg_eccentricity: float = number(0.012, "m", "assumed: as leg_radius", ge=0)
     """Distance of the ring's centre from its axle."""

@@ -57,17 +57,9 @@ def attach_antenna(
             or the angle is not finite.
     """
     name = f"antenna_{side}" if name is None else name
-    carrier = spec.body(body)
-    if carrier is None:
-        known = ", ".join(b.name for b in spec.bodies if b.name) or "none"
-        raise ConfigError(f"body: expected the name of a body, {known}, found {body}")
-    if spec.body(f"{name}/base") is not None:
-        raise ConfigError(f"name: expected one that is not taken, found {name} twice")
     outwards = antenna.base_angle if angle is None else angle
-    if np.shape(position) != (3,) or not np.isfinite(position).all():
-        raise ConfigError(f"position: expected 3 finite numbers [m], found {shown(position)}")
-    if not np.isfinite(outwards):
-        raise ConfigError(f"angle: expected a finite number [rad], found {shown(angle)}")
+    carrier = _carrier(spec, body, name)
+    _require_place(position, outwards)
     part = antenna_part.build(antenna)
     for geom in part.geoms:
         if geom.name:  # the links; the base is no obstacle to anything
@@ -79,6 +71,24 @@ def attach_antenna(
     for link in [b.name for b in spec.bodies if b.name.startswith(f"{name}/")]:
         spec.add_exclude(name=f"{link}-{body}", bodyname1=body, bodyname2=link)
     return name
+
+
+def _carrier(spec: mujoco.MjSpec, body: str, name: str) -> mujoco.MjsBody:
+    """The body of this name, if an antenna of that name can be added."""
+    carrier = spec.body(body)
+    if carrier is None:
+        known = ", ".join(b.name for b in spec.bodies if b.name) or "none"
+        raise ConfigError(f"body: expected the name of a body, {known}, found {body}")
+    if spec.body(f"{name}/base") is not None:
+        raise ConfigError(f"name: expected one that is not taken, found {name} twice")
+    return carrier
+
+
+def _require_place(position: Sequence[float], angle: float) -> None:
+    if np.shape(position) != (3,) or not np.isfinite(position).all():
+        raise ConfigError(f"position: expected 3 finite numbers [m], found {shown(position)}")
+    if not np.isfinite(angle):
+        raise ConfigError(f"angle: expected a finite number [rad], found {shown(angle)}")
 
 
 def _add_sensors(part: mujoco.MjSpec, antenna: AntennaSpec) -> None:

@@ -166,6 +166,7 @@ class Bench:
         self.carriage = Slider(model, self.data, "carriage")
         self._base = _addresses(model, [PREFIX + BASE])
         self._hinges = _addresses(model, names)
+        self._chain: Ints = np.concatenate([self._base, self._hinges])  # speeds have the same
         self._sensed = antenna.sensed_hinges
         self._links: Ints = np.array([model.body(name).id for name in names])
         self._end = 2.0 * float(model.geom(names[-1]).pos[0])
@@ -182,6 +183,15 @@ class Bench:
         self.data.qpos[self._base] = base
         self.data.ctrl[self._base_servo] = base
         self.carriage.place(x, y)
+
+    def bend(self, angles: Floats) -> None:
+        """Turn the base and the n hinges to angles [rad], shape (n + 1,); targets stay."""
+        self.data.qpos[self._chain] = angles
+        mujoco.mj_forward(self.model, self.data)
+
+    def chain(self) -> tuple[Floats, Floats]:
+        """Angles [rad] and speeds [rad/s] of the base and the n hinges, each of shape (n + 1,)."""
+        return self.data.qpos[self._chain], self.data.qvel[self._chain]
 
     def command(self, x: float, y: float, speed_x: float, speed_y: float, base: float) -> None:
         """Set the carriage's target [m], its speed there [m/s] and the base angle [rad]."""

@@ -24,7 +24,7 @@ OnRow = Callable[[Any], None]
 
 
 def no_step(done: int, total: int) -> None:
-    """Tell nobody."""
+    """Show nothing."""
 
 
 def no_row(row: Any) -> None:

@@ -90,14 +90,14 @@ def _lines(group: Params, path: tuple[str, ...]) -> Iterator[str]:
         yield ""
         yield f"[{'.'.join(path)}]"
     groups = []
-    for name, field in type(group).model_fields.items():
+    for name in type(group).model_fields:
         value = getattr(group, name)
         if isinstance(value, Params):
             groups.append((name, value))
         elif value is None:
-            yield f"# {name} is not set: {meaning(field)}"
+            yield f"# {name} is not set: {meaning(type(group), name)}"
         else:
-            yield f"{name} = {_toml(value)}  # {meaning(field)}"
+            yield f"{name} = {_toml(value)}  # {meaning(type(group), name)}"
     for name, value in groups:
         yield from _lines(value, (*path, name))
 

@@ -1,6 +1,6 @@
 """Tasks over processes: each result at once, and nothing lost when somebody presses Ctrl-C.
 
-A task hands out results one by one through `emit`; they travel back at once, beside the executor,
+A task gives each result to `emit`; it is sent to the parent at once, beside the executor,
 which returns a task's value only at its end. Processes are started fresh (spawn) and leave Ctrl-C
 to the parent. One worker means this process, without any start-up cost. Results come in no
 particular order; sort them.
@@ -61,12 +61,18 @@ def run_tasks(
 
     Raises:
         WorkerError: A worker died, or the function raised there.
-        KeyboardInterrupt: After the results that had arrived by then were handed on.
+        KeyboardInterrupt: After the results that had arrived by then were given to `on_result`.
     """
     if workers == 1 or len(tasks) <= 1:
         for task in tasks:
             function(task, on_result)
-        return
+    else:
+        _run_in_processes(function, tasks, min(workers, len(tasks)), on_result)
+
+
+def _run_in_processes(
+    function: Callable[[Task, Emit], None], tasks: Sequence[Task], count: int, on_result: Emit
+) -> None:
     if isinstance(checked := _sendable(tasks), NotSent):
         raise WorkerError(checked.reason)
     added = {
@@ -76,7 +82,6 @@ def run_tasks(
     context = multiprocessing.get_context("spawn")
     results = context.Queue()
     others = set(multiprocessing.active_children())
-    count = min(workers, len(tasks))
     pool = ProcessPoolExecutor(count, context, initializer=_begin, initargs=(results, added))
     with _deaf():
         futures = [pool.submit(_work, function, task) for task in tasks]
@@ -84,6 +89,7 @@ def run_tasks(
     try:
         _collect(futures, results, on_result)
     except BrokenProcessPool:
+        pool.shutdown()  # its thread waits for the processes too: codes are known after that
         codes = [p.exitcode for p in crew if p.exitcode not in (None, 0, -signal.SIGTERM)]
         raise WorkerError(
             f"a worker process ended with code {codes[0] if codes else 'unknown'} in the middle of "
@@ -117,7 +123,7 @@ def gather(
         workers: As above.
         on_step: Called after each with how many of how many tasks are done.
         on_result: Called with each result as it comes, in no particular order.
-        chunk: Tasks handed to a process at once.
+        chunk: Tasks given to a process at once.
     """
     found: dict[int, Result] = {}
 

@@ -57,7 +57,7 @@ class Explained:
 
 
 def explained(truth: Floats, prediction: Floats, groups: Ints, seed: int = 0) -> Explained:
-    """Judge a prediction made without these points.
+    """Test a prediction made without these points.
 
     Args:
         truth: What was to be predicted, shape (n,).

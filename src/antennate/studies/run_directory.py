@@ -39,11 +39,21 @@ RESULT, TABLE, PARTIAL = "result.json", "trials.csv", "trials.partial.jsonl"
 CONFIG, VERSIONS, COMMAND = "config.toml", "versions.json", "command.txt"
 FIGURES = "figures"
 """Folder of the figures; what it holds as svg and png belongs to the run."""
-CALIBRATION, LOG = "calibration.json", "drive.log"
+CALIBRATION, LOG, REPORT = "calibration.json", "drive.log", "report.html"
 _LARGEST = 10**9
 """No file of a run is longer [bytes]."""
 _LOGS = tuple(part(Path(LOG), number).name for number in range(1, MOST_PARTS + 1))
-_FILES = (CALIBRATION, "conditioning.toml", "recording.csv", "ticks.csv", "bom.csv", *_LOGS)
+_FILES = (
+    CALIBRATION,
+    "conditioning.toml",
+    "recording.csv",
+    "ticks.csv",
+    "bom.csv",
+    "points.csv",
+    "frames.csv",
+    REPORT,
+    *_LOGS,
+)
 ROOM = ".room"
 """File that keeps room for the result."""
 _KEPT_FREE = 1 << 16

@@ -12,7 +12,7 @@ from antennate.params import ControlParams
 from antennate.params.reading import from_values
 from antennate.sim.scenes.registry import make_scene
 from antennate.sim.sim_robot import SimRobot
-from antennate.sim.trial import TrialConfig, draw_trial
+from antennate.sim.trial import Trial, TrialConfig, draw_trial
 from antennate.telemetry.time_series import TimeSeries, TimeSeriesRecorder
 from antennate.types import AntennaFrame, JointCommand
 
@@ -60,12 +60,9 @@ def simulate(
         nonlocal ticks, outcome
         recorder.take(frame, command)
         ticks += 1
-        if robot.failure(0) is not None:
-            outcome = "invalid"
-        elif ticks % _EVERY == 0 and start.scene.succeeded(start.world.head[:2]):
-            outcome = "success"
-        elif ticks % _EVERY == 0 and start.scene.left(start.world.head[:2]):
-            outcome = "left"
+        outcome = "invalid" if robot.failure(0) is not None else "timeout"
+        if outcome == "timeout" and ticks % _EVERY == 0:
+            outcome = _seen(start)
         return outcome == "timeout" and start.world.t < time_limit
 
     run_loop(robot, controlling, control.period, go_on)
@@ -79,3 +76,11 @@ def simulate(
             "outcome": outcome,
         }
     )
+
+
+def _seen(trial: Trial) -> str:
+    """How the trial has ended by what the scene says of the head; `timeout` if it goes on."""
+    head = trial.world.head[:2]
+    if trial.scene.succeeded(head):
+        return "success"
+    return "left" if trial.scene.left(head) else "timeout"

@@ -1,9 +1,10 @@
 """Ticks on their way to another process, which keeps and shows them; the loop never waits for it.
 
 A message is the content of a record behind its length and how many were dropped before it. The
-loop writes it to a pipe at once or not at all: what the other process cannot take is dropped and
-counted. The content of no bytes says that
-the loop has ended in order; a pipe that closes without it means that the loop was killed.
+loop writes it to a pipe without waiting. What does not fit, as while the other process starts on a
+busy machine, is kept here and follows with the next ticks; beyond `_WAITING` it is dropped and
+counted. The content of no bytes says that the loop has ended in order; a pipe that closes without
+it means that the loop was killed.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ import struct
 import subprocess
 import threading
 import time
+from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from select import PIPE_BUF
 from typing import BinaryIO, NamedTuple
@@ -24,7 +26,12 @@ from antennate.errors import LogError
 
 _HEAD = struct.Struct("<II")
 _ROOM = 1 << 20
-"""Bytes that the pipe may hold: half a minute of ticks."""
+"""Bytes that the pipe may hold, whole ticks to each page of 4096: 26 s of ticks of 0.4 kB, 10 s of
+the longest, which have 1 kB with their causes."""
+_WAITING = 3000
+"""Most ticks that wait for room in the pipe: 30 s at 100 Hz, as long as a start may take."""
+_AT_ONCE = 16
+"""Most of them that go to the pipe with one tick, so that the loop is not held up."""
 _PATIENCE = 5.0
 """Time for the other process to write the last ticks to a slow disk under load [s]; assumed."""
 _STARTING = 30.0
@@ -56,7 +63,7 @@ class Feed:
 
     Attributes:
         offered: Ticks that were to be sent.
-        dropped: Those of them that found no room, or nobody.
+        dropped: Those of them for which there was no room, or nobody to take them.
         started: Processes started so far.
         failed: The last one is gone for good, or ended with an error.
     """
@@ -76,12 +83,12 @@ class Feed:
         self._keeper = threading.Thread(target=self._look_after, name="recorder", daemon=True)
         self.offered = self.dropped = self.started = 0
         self.failed = self._begun = False
-        self._taken = True
+        self._waiting = deque[bytes]()
 
     @property
     def keeps(self) -> bool:
         """Whether a process runs, has reported that it keeps messages, and took the last one."""
-        return self._begun and self._taken
+        return self._begun and not self._waiting
 
     @property
     def pid(self) -> int | None:
@@ -99,13 +106,17 @@ class Feed:
         return self
 
     def __exit__(self, *_: object) -> None:
+        end = time.monotonic() + (_PATIENCE if self._begun else _STARTING)
+        while self._waiting and not self.failed and time.monotonic() < end:
+            if not self._pass_on():
+                time.sleep(_POLL)
+        self.dropped += len(self._waiting)
         with self._lock:
             self._ending = True
         with contextlib.suppress(OSError):  # one that takes nothing is not waited for
             if select.select((), (self._pipe,), (), _PATIENCE)[1]:
                 os.write(self._pipe, _HEAD.pack(0, self.dropped))
         os.close(self._pipe)
-        end = time.monotonic() + _STARTING
         while self._keeper.is_alive() and not self._begun and time.monotonic() < end:
             self._keeper.join(_POLL)
         self._keeper.join(_PATIENCE)
@@ -116,16 +127,24 @@ class Feed:
     def send(self, content: bytes) -> bool:
         """Hand over one record; False if it was dropped."""
         message = _HEAD.pack(len(content), self.dropped) + content
-        done = len(message) <= PIPE_BUF  # more may be taken in part
-        try:
-            if done:
-                os.write(self._pipe, message)
-        except OSError:  # full, or nobody reads
-            done = False
+        self._pass_on()
+        room = len(self._waiting) < _WAITING and not self.failed
+        taken = room and len(message) <= PIPE_BUF  # more may be taken in part
+        if taken:
+            self._waiting.append(message)
+            self._pass_on()
         self.offered += 1
-        self.dropped += not done
-        self._taken = done
-        return done
+        self.dropped += not taken
+        return taken
+
+    def _pass_on(self) -> bool:
+        """Write what waits to the pipe, a few ticks at most; whether any was taken."""
+        before = len(self._waiting)
+        with contextlib.suppress(OSError):  # full, or nobody reads yet
+            while self._waiting and before - len(self._waiting) < _AT_ONCE:
+                os.write(self._pipe, self._waiting[0])
+                self._waiting.popleft()
+        return len(self._waiting) < before
 
     def skip(self) -> None:
         """Count a record that could not be made, and so is not sent."""

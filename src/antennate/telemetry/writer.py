@@ -17,7 +17,7 @@ from antennate.telemetry.header import Header
 from antennate.telemetry.ticks import Tick
 
 LEAST_FREE = 1e9
-"""Room for seven hours of ticks at 100 Hz [byte]: 40 kB a second (assumed)."""
+"""Room for seven hours of ticks at 100 Hz [byte], three with many causes (assumed)."""
 
 
 class LogWriter:

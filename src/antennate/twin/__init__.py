@@ -1,1 +1,1 @@
-"""The simulated robot behind real bytes, with faults on demand."""
+"""The simulated robot on serial ports, with the bytes of a real one, and faults on demand."""

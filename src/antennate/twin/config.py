@@ -1,4 +1,4 @@
-"""What `antennate twin` serves: the robot at the start of a trial, behind real bytes."""
+"""What `antennate twin` serves: the simulated robot at the start of a trial."""
 
 from __future__ import annotations
 
@@ -52,9 +52,9 @@ class TwinConfig(TrialConfig):
     """Time to serve."""
     fault: Annotated[tuple[str, ...], GATHERED] = number((), "1", "assumed: nothing is broken")
     """Faults, such as servo:7=silent@3s."""
-    touch: Annotated[tuple[str, ...], GATHERED] = number((), "1", "assumed: nobody is there")
+    touch: Annotated[tuple[str, ...], GATHERED] = number((), "1", "assumed: no touch unless wanted")
     """Touches of the standing robot: left@2s or left:20mm@2s, from the beginning of each client."""
-    push: Annotated[tuple[str, ...], GATHERED] = number((), "1", "assumed: nobody is there")
+    push: Annotated[tuple[str, ...], GATHERED] = number((), "1", "assumed: no touch unless wanted")
     """Joints without torque that are turned, such as yaw1=20deg@3s, from the first packet on."""
     factory: bool = number(False, "1", "assumed: they are set up")
     """Servos as delivered: all id 1 at 57600 bit/s."""

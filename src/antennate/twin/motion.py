@@ -14,7 +14,7 @@ from antennate.hardware.dynamixel.tables import (
 )
 from antennate.robots.servos import TICKS_A_TURN
 from antennate.twin.memory import Memory
-from antennate.twin.motor import FULL, RATINGS, STEP, Loops, Motor, Shaft
+from antennate.twin.motor import FULL, LOOP, RATINGS, STEP, Loops, Motor, Shaft
 from antennate.twin.planner import POSITION_MODES, SPEED_UNIT, Planner
 
 _MOST_OFFSET = 1_024
@@ -196,11 +196,19 @@ class MotorMotion(Motion):
         behind = speed - sign * motor.speed
         if self.mode == VELOCITY_MODE:
             return sign * self._loops.velocity(behind / SPEED_UNIT, dt, self.limit)
-        duty = sign * self._loops.position(wanted - self.position, behind, dt, self.limit)
+        ahead = self._ahead(speed)
+        duty = sign * self._loops.position(wanted - self.position, behind, dt, self.limit, ahead)
         if self.mode == CURRENT_POSITION_MODE:
             most = abs(get("goal_current")) / 1e3 / motor.rating.stall_current
             duty = max(motor.needed(-most, supply), min(duty, motor.needed(most, supply)))
         return duty
+
+    def _ahead(self, speed: float) -> float:
+        """PWM by the feedforward gains at a speed of the profile [ticks/s]."""
+        loops = self._loops
+        if not (loops.first or loops.second):
+            return 0.0
+        return loops.ahead(speed, (self.plan.at(self._t + LOOP)[1] - speed) / LOOP)
 
     def _sloped(self, duty: float, dt: float) -> float:
         """The drive changes no faster than PWM Slope says, where there is one."""

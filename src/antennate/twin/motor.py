@@ -3,8 +3,9 @@
 The motor is that of the simulated robot: a torque-speed line through stall torque and unloaded
 speed, both in proportion to the supply, and the inertia at its output; nothing hangs on its horn.
 That gives a time constant of 12 ms (XC430). Without torque the gear stops the shaft, and nothing
-turns it. The loops run once a millisecond (assumed) with the gains of the manuals; feedforwards are
-left out, the manuals give no unit for them.
+turns it. The loops run once a millisecond (assumed) with the gains of the manuals. Feedforward
+gains have the divisor of the manuals, 4; that the speed and the acceleration of the profile count
+in pulses and loops, as the D gain does, is assumed.
 """
 
 from __future__ import annotations
@@ -139,23 +140,41 @@ class Motor(Shaft):
 
 @dataclass(slots=True)
 class Loops:
-    """Position and velocity loop: their gains as in the control table, and their sums."""
+    """Position and velocity loop: their gains as in the control table, and their sums.
+
+    Attributes:
+        first: Feedforward of the speed of the profile.
+        second: Feedforward of its acceleration.
+    """
 
     p: float = 0.0
     i: float = 0.0
     d: float = 0.0
     vp: float = 0.0
     vi: float = 0.0
+    first: float = 0.0
+    second: float = 0.0
     total: float = 0.0
 
     def read(self, memory: Memory) -> None:
         """Take the gains from a control table."""
         self.p, self.i, self.d = (memory.get(f"position_{gain}_gain") for gain in "pid")
         self.vp, self.vi = (memory.get(f"velocity_{gain}_gain") for gain in "pi")
+        self.first = memory.get("feedforward_1st_gain")
+        self.second = memory.get("feedforward_2nd_gain")
 
-    def position(self, away: float, behind: float, dt: float, limit: float) -> float:
-        """Drive for a distance [ticks] and a difference of speeds [ticks/s], within a limit."""
-        wanted = self.p / 128 * away + self.d / 16 * behind * LOOP + self.total
+    def ahead(self, speed: float, acceleration: float) -> float:
+        """PWM for a speed [ticks/s] and an acceleration [ticks/s²] of the profile."""
+        return self.first / 4 * speed * LOOP + self.second / 4 * acceleration * LOOP**2
+
+    def position(
+        self, away: float, behind: float, dt: float, limit: float, ahead: float = 0.0
+    ) -> float:
+        """Drive for a distance [ticks] and a difference of speeds [ticks/s], within a limit.
+
+        `ahead` is PWM that is added, as by the feedforward gains.
+        """
+        wanted = self.p / 128 * away + self.d / 16 * behind * LOOP + self.total + ahead
         return self._limited(wanted, self.i / 65_536 * away * dt / LOOP, limit)
 
     def velocity(self, behind: float, dt: float, limit: float) -> float:

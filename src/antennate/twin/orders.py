@@ -1,4 +1,4 @@
-"""Orders to a twin while it runs: plugs, shafts, and of a robot hands on its antennae and faults.
+"""Orders to a twin while it runs: plugs, shafts, and of a robot touches of its antennae and faults.
 
     plug NAME, unplug NAME     put a servo on the bus with power, or take it off
     only NAME, next            plug in this one alone, or the next one alone

@@ -1,4 +1,4 @@
-"""The simulated robot behind real bytes: a bus of servos and the stream of an antenna board.
+"""The simulated robot as two streams of bytes: a bus of servos and an antenna board.
 
 Time is an argument. Servos do not move by themselves: every control period the physics takes their
 goals and gives back their positions. Physics begins when the first servo has torque; until then the

@@ -1,4 +1,4 @@
-"""Simulated hands on the antennae of the standing twin.
+"""Simulated touches of the antennae of the standing twin.
 
 Only the readings change; the simulated antenna itself is not bent. Orders:
 
@@ -70,7 +70,7 @@ class TouchStimulus:
             t: The twin's time.
             begun: When the present client began, inf if none has.
         """
-        if begun != self._begun:  # the hands of the last client let go
+        if begun != self._begun:  # touches of the last client end
             self._begun, self._typed = begun, [(0.0, -math.inf), (0.0, -math.inf)]
         while self._fresh:
             side, held, length = self._fresh.popleft()

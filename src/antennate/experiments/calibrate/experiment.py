@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from antennate.antenna.next_push import RECORDED
 from antennate.experiments.calibrate import recording
 from antennate.experiments.calibrate import run as calibrate
 from antennate.studies.experiment import Experiment
-from antennate.studies.measures import Measure, Table
+from antennate.studies.measures import Measure, Table, shown
 
 _95 = "  95 %"
 CURVE = (
@@ -30,10 +31,21 @@ SPEED = (
     Measure("r2", "R²", form=".3f"),
     Measure("rmse", "RMSE of b", form=".4f"),
 )
+NEXT = (
+    Measure("curve_95", "error of the curve at b = 0.5, 95 %", form="+.3f"),
+    Measure("new_push.error_95", "error of b in a new push, 95 %", form="+.3f"),
+    Measure("new_push.rmse", "RMSE of b, pushes left out", form=".4f"),
+    Measure("new_push.worst_rmse", "  of the worst", form=".4f"),
+    Measure("hysteresis.mean", "hysteresis, mean gap", "% of the span", form="+.1f", scale=100.0),
+    Measure("hysteresis.mean_95", _95, form="+.1f", scale=100.0),
+    Measure("hysteresis.largest", "  largest gap", "% of the span", form="+.1f", scale=100.0),
+    Measure("hysteresis.at_bend", "  at a bend of"),
+    Measure("hysteresis.level", "  largest gap in b", form="+.3f"),
+)
 
 
 def tables(result: Mapping[str, Any]) -> Sequence[Table]:
-    """The curve, its rivals and how it serves each speed."""
+    """The curve, how it serves each speed, and what is known about the next push."""
     found = result["calibration"]
     way = "rise" if found["polarity"] > 0 else "fall"
     speeds = {
@@ -48,20 +60,37 @@ def tables(result: Mapping[str, Any]) -> Sequence[Table]:
             f"Readings {way} with flex. Readings: {found['samples']}, pushes: {found['trials']}; "
             "intervals are bootstrapped\nover whole pushes.",
         ),
-        Table.of("The one curve at each speed", speeds, SPEED, _rivals(found)),
+        Table.of("The one curve at each speed", speeds, SPEED),
+        _next_push(result),
     )
 
 
-def _rivals(found: Mapping[str, Any]) -> str:
-    errors = found["cross_validated_rmse"]
-    listed = ", ".join(f"{model} {errors[model]:.4f}" for model in ("sigmoid", "line", "isotonic"))
-    better = " and ".join(found["better_than_sigmoid"])
-    word = (
-        f"The data prefer: {better}."
-        if better
-        else "None is better than the sigmoid by more than a standard error."
-    )
-    return f"Cross-validated error of b: {listed}.\n{word}"
+def _next_push(result: Mapping[str, Any]) -> Table:
+    """What a user meets: a push that served no fit."""
+    found, known = result["calibration"], result["assessment"]
+    low, high = (end - found["midpoint"] for end in found["midpoint_95"])
+    ends = sorted(-found["slope"] * found["polarity"] * end / 4 for end in (low, high))
+    notes = []
+    if known["new_push"] is None:
+        notes.append("One push only: nothing is known about the next one; record more pushes.")
+    if known["hysteresis"] is None:
+        notes.append("No push was bent and released: nothing is known about hysteresis.")
+    notes += [_rival(name, checks) for name, checks in known["rivals"].items() if checks]
+    columns = {f"{known['pushes']} pushes": {**known, "curve_95": ends}}
+    return Table.of("The next push", columns, NEXT, "\n".join(notes))
+
+
+def _rival(name: str, checks: Mapping[str, Any]) -> str:
+    """Whether a rival of the sigmoid is better beyond noise, and under which checks."""
+    first = checks[RECORDED]
+    by = f"{first['mean']:+.4f} ({shown(first['interval_95'], '+.4f')})"
+    lost = [check for check, gain in checks.items() if gain["interval_95"][0] <= 0]
+    if RECORDED in lost:
+        return f"{name}: not better than the sigmoid beyond noise; gain {by} in b."
+    if lost:
+        return f"{name}: better here by {by} in b, but not with: {', '.join(lost)}."
+    others = ", ".join(check for check in checks if check != RECORDED)
+    return f"{name}: better than the sigmoid by {by} in b; also with {others}."
 
 
 def sentence(result: Mapping[str, Any]) -> str:
@@ -74,9 +103,16 @@ def sentence(result: Mapping[str, Any]) -> str:
         if result["poor"]
         else ""
     )
+    following = result["assessment"]["new_push"]
+    errors = Measure("error_95", form="+.2f").cell(following) if following else ""
+    ahead = (
+        f"in a new push b errs by {errors} (95 %)"
+        if following
+        else "nothing is known about the next push"
+    )
     return (
         f"One sigmoid explains R² {found['r2']:.2f} of {found['trials']} pushes, with a slope of "
-        f"{found['slope']:.1f} (95 % interval {slope}){warning}."
+        f"{found['slope']:.1f} (95 % interval {slope}); {ahead}{warning}."
     )
 
 

@@ -10,6 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from antennate import figures as style
+from antennate.antenna.curves import Samples
+from antennate.antenna.next_push import Pushes, branches
 from antennate.experiments.calibrate.run import CalibrateOutcome
 from antennate.types import Floats
 
@@ -19,52 +21,122 @@ _BINS = 12
 def figures(outcome: CalibrateOutcome) -> dict[str, Figure]:
     """The figure of a run."""
     s = outcome.recording.samples
-    return {"calibrate": calibrate(outcome.result(), s.counts, s.level, s.speed, outcome.levels())}
+    loop = branches(s, Pushes.of(s))
+    return {"calibrate": calibrate(outcome.result(), s, outcome.levels(), loop)}
 
 
 @style.styled
 def calibrate(
-    result: Mapping[str, Any], counts: Floats, bend: Floats, speed: Floats, level: Floats
+    result: Mapping[str, Any],
+    samples: Samples,
+    level: Floats,
+    loop: tuple[Floats, Floats, Floats],
 ) -> Figure:
-    """Readings against bends with the curve above, residuals below.
+    """Readings against bends with the curve, residuals, both directions, and rival curves.
 
     Args:
         result: The content of result.json.
-        counts: Readings [counts], shape (n,).
-        bend: Bends, 0 to 1, shape (n,).
-        speed: Pushing speeds [m/s], NaN where unknown, shape (n,).
+        samples: Readings, bends and speeds.
         level: What the curve makes of the readings, shape (n,).
+        loop: Bends (g,), and readings of loading and of unloading (pushes, g) [counts].
     """
-    found = result["calibration"]
-    figure = style.canvas(6.4, 5.6)
-    above, below = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
-    keys = np.where(np.isnan(speed), -1.0, speed)
+    known = result["assessment"]
+    drawn = [part for part in ("hysteresis", "rivals") if _has(known, part)]
+    figure = style.canvas(6.4 + 4.8 * bool(drawn), 5.6)
+    widths = (6.4, 4.8)[: 1 + bool(drawn)]
+    left, *right = figure.subfigures(1, len(widths), width_ratios=widths, squeeze=False)[0]
+    above, below = left.subplots(2, 1, sharex=True, height_ratios=(2, 1))
+    _draw_speeds(above, below, samples, level)
+    _draw_curve(above, result["calibration"])
+    if known["new_push"] is not None:
+        ends = known["new_push"]["error_95"]
+        below.axhspan(*ends, color=style.FAINT, alpha=0.6, linewidth=0, zorder=0)
+        below.set_title("grey: 95 % of the readings of a new push")
+    below.axhline(0, color=style.MUTED, linewidth=0.8)
+    below.set(xlabel="reading [counts]", ylabel="level − bend")
+    if drawn:
+        panels = right[0].subplots(len(drawn), 1, squeeze=False)[:, 0]
+        for panel, part in zip(panels, drawn, strict=True):
+            if part == "hysteresis":
+                _draw_loop(panel, known[part], loop)
+            else:
+                _draw_rivals(panel, known)
+    return figure
+
+
+def _has(known: Mapping[str, Any], part: str) -> bool:
+    return any(known[part].values()) if known[part] else False
+
+
+def _draw_speeds(above: Axes, below: Axes, s: Samples, level: Floats) -> None:
+    keys = np.where(np.isnan(s.speed), -1.0, s.speed)
     known = np.unique(keys).tolist()
     for key, colour in zip(known, style.series(len(known)), strict=True):
         here = keys == key
         name = "all" if key < 0 else f"{100 * key:g} cm/s"
         label = f"{name}, {here.sum()} readings"
-        _draw_bins(above, counts[here], bend[here], colour, label)
-        _draw_bins(below, counts[here], level[here] - bend[here], colour, "")
+        _draw_bins(above, s.counts[here], s.level[here], colour, label)
+        _draw_bins(below, s.counts[here], (level - s.level)[here], colour, "")
+
+
+def _draw_curve(panel: Axes, found: Mapping[str, Any]) -> None:
     low, high = found["valid_counts"]
     axis = np.linspace(low, high, 300)
     x = (axis - found["counts_low"]) / (found["counts_high"] - found["counts_low"])
     z = found["polarity"] * found["slope"] * (x - found["midpoint"])
-    above.plot(
+    panel.plot(
         axis,
         1 / (1 + np.exp(-z)),
         color=style.INK,
         label=f"one sigmoid, R² {found['r2']:.3f}",
         zorder=3,
     )
-    below.axhline(0, color=style.MUTED, linewidth=0.8)
-    above.set_ylabel("bend, 0 straight, 1 full")
-    above.set_title(
+    panel.set_ylabel("bend, 0 straight, 1 full")
+    panel.set_title(
         f"{found['sensor_id']}: {found['trials']} pushes; mean ± standard deviation of each bin"
     )
-    below.set(xlabel="reading [counts]", ylabel="level − bend")
-    above.legend(fontsize=8)
-    return figure
+    panel.legend(fontsize=8)
+
+
+def _draw_loop(panel: Axes, found: Mapping[str, Any], loop: tuple[Floats, Floats, Floats]) -> None:
+    bend, *ways = loop
+    for name, counts, colour in zip(("loading", "unloading"), ways, style.series(2), strict=True):
+        there = np.isfinite(counts).any(axis=0)
+        panel.plot(bend[there], np.nanmean(counts[:, there], axis=0), color=colour, label=name)
+    panel.axvline(found["at_bend"], color=style.MUTED, linewidth=0.8)
+    panel.set(xlabel="bend", ylabel="mean reading [counts]")
+    panel.set_title(
+        f"Hysteresis: mean {100 * abs(found['mean']):.1f} %, largest "
+        f"{100 * abs(found['largest']):.1f} % of the span"
+    )
+    panel.legend()
+
+
+def _draw_rivals(panel: Axes, known: Mapping[str, Any]) -> None:
+    rivals = known["rivals"]
+    checks = list(next(iter(rivals.values())))
+    for i, (name, colour) in enumerate(zip(rivals, style.series(len(rivals)), strict=True)):
+        rows = [rivals[name][check] for check in checks]
+        middle = np.array([row["mean"] for row in rows])
+        ends = np.array([row["interval_95"] for row in rows]).T
+        panel.errorbar(
+            middle,
+            -np.arange(len(checks)) - 0.2 * i,
+            xerr=abs(ends - middle),
+            color=colour,
+            label=name,
+            marker="o",
+            markersize=4,
+            linestyle="",
+            capsize=2.5,
+        )
+    panel.axvline(0, color=style.MUTED, linewidth=0.8)
+    panel.set_yticks(-np.arange(len(checks)) - 0.1, checks)
+    panel.set_xlabel("gain: error of the sigmoid minus the rival's")
+    named = " and ".join(known["named"]) or "none"
+    panel.set_title(f"Beats the sigmoid under every check: {named}")
+    panel.set_ylim(-len(checks) + 0.2, 0.9)
+    panel.legend(loc="upper center", ncols=2)
 
 
 def _draw_bins(panel: Axes, x: Floats, y: Floats, colour: str, label: str) -> None:

@@ -13,8 +13,8 @@ from typing import Literal
 
 import numpy as np
 
-from antennate.antenna.fitting import Samples
-from antennate.csv_files import csv_rows, number_of
+from antennate.antenna.curves import Samples
+from antennate.csv_files import column, csv_rows, number_of, unit_of
 from antennate.errors import CalibrationError
 from antennate.files import read_limited
 from antennate.params import Params
@@ -71,29 +71,49 @@ class Recording:
     sha256: str
 
 
-def read(path: Path, params: RecordingParams) -> Recording:
+def read(path: Path, params: RecordingParams, rate: float | None = None) -> Recording:
     """Read a recording.
+
+    Args:
+        path: The file.
+        params: Its columns and units.
+        rate: Readings a second [Hz] of a file without a column of time.
 
     Raises:
         CalibrationError: Names the row and the cure.
     """
     data = read_limited(path, _LARGEST_FILE, CalibrationError)
-    rows = _rows(path, data, params)
+    rows = _rows(path, data, params, rate)
     table = np.array([values for _, values in rows])
     lines = np.array([line for line, _ in rows], dtype=np.int64)
     trial, speed, t, counts, raw = table.T
     trial = np.where(np.isnan(trial), 0, trial).astype(np.int64)
-    t = t * TIME_UNITS[params.time_unit]
-    _check_time(path, t, trial, lines, params)
+    if rate is None:
+        t = t * TIME_UNITS[params.time_unit]
+        _check_time(path, t, trial, lines, params)
+    else:
+        t = _counted(trial) / rate
     _check_counts(path, counts, lines)
     bend = _normalised(path, raw, lines, params)
     samples = Samples(counts, bend, trial, speed, lines)
     return Recording(t, samples, hashlib.sha256(data).hexdigest())
 
 
-def _rows(path: Path, data: bytes, params: RecordingParams) -> list[tuple[int, list[float]]]:
-    needed = (params.time_column, params.counts_column, params.bend_column)
+def _counted(trial: Ints) -> Ints:
+    """How many readings of the same push came before each, shape (n,)."""
+    before = np.zeros_like(trial)
+    for push in np.unique(trial):
+        here = trial == push
+        before[here] = np.arange(here.sum())
+    return before
+
+
+def _rows(
+    path: Path, data: bytes, params: RecordingParams, rate: float | None
+) -> list[tuple[int, list[float]]]:
+    needed = [params.time_column] * (rate is None) + [params.counts_column, params.bend_column]
     cure = "; name yours with --columns.*-column"
+    cure += ", or give --rate if there is no time" if rate is None else ""
     lines = csv_rows(path, data, needed, CalibrationError, cure)
     _, header = next(lines)
     if not data.endswith((b"\n", b"\r")):
@@ -102,7 +122,14 @@ def _rows(path: Path, data: bytes, params: RecordingParams) -> list[tuple[int, l
             f"{path}: row {last}: expected a line break at its end, found none (truncated); "
             "delete the last row, or add the line break if it is whole"
         )
-    places = _places(path, header, (params.trial_column, params.speed_column, *needed))
+    if rate is not None and column(header, params.time_column) is not None:
+        raise CalibrationError(
+            f"{path}: row 1: expected no column {params.time_column} beside --rate, found one; "
+            "leave out --rate"
+        )
+    names = (params.trial_column, params.speed_column, params.time_column, *needed[-2:])
+    places = _places(path, header, names)
+    _check_units(path, header, places, params)
     rows = [(line, _values(path, line, header, cells, places)) for line, cells in lines]
     if not rows:
         raise CalibrationError(f"{path}: row 2: expected readings, found none; record longer")
@@ -110,12 +137,24 @@ def _rows(path: Path, data: bytes, params: RecordingParams) -> list[tuple[int, l
 
 
 def _places(path: Path, header: list[str], names: Sequence[str]) -> list[int | None]:
-    found: list[int | None] = []
     for name in names:
         if header.count(name) > 1:
             raise CalibrationError(f"{path}: row 1: expected one column {name}, found several")
-        found.append(header.index(name) if name in header else None)
-    return found
+    return [column(header, name) for name in names]
+
+
+def _check_units(
+    path: Path, header: list[str], places: list[int | None], params: RecordingParams
+) -> None:
+    """Refuse a column whose name gives another unit than the one declared."""
+    units = ((places[2], TIME_UNITS, params.time_unit), (places[4], BEND_UNITS, params.bend_unit))
+    for (place, known, declared), flag in zip(units, ("time-unit", "bend-unit"), strict=True):
+        named = unit_of(header[place]) if place is not None else ""
+        if named in known and named != declared:
+            raise CalibrationError(
+                f"{path}: row 1: expected {header[place or 0]} in {declared} as declared, found "
+                f"{named}; is it the right --columns.{flag}?"
+            )
 
 
 def _values(

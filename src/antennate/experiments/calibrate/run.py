@@ -1,13 +1,14 @@
 """Calibrate an antenna: from a recording, or from a rig that pushes a simulated one.
 
 On the rig a rod indents the antenna from the side, at several speeds, several times each. The bend
-is the rod's way from the first touch over its whole way: what an experimenter knows.
+is the rod's way from the first touch over its whole way, which an experimenter can measure.
 """
 
 from __future__ import annotations
 
+import functools
 import hashlib
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
@@ -16,7 +17,8 @@ from pydantic import Field, model_validator
 
 from antennate.antenna import fitting
 from antennate.antenna.calibration import Calibration
-from antennate.antenna.fitting import Samples
+from antennate.antenna.curves import Samples
+from antennate.antenna.next_push import Assessment, assess
 from antennate.antenna.sensor import SensorChain, reading_noise
 from antennate.control.conditioning import bending_level
 from antennate.experiments.calibrate.recording import Recording, RecordingParams, read, write
@@ -48,6 +50,8 @@ class RigParams(Params):
     """Full indentation."""
     rod_radius: float = number(0.006, "m", "assumed: a dowel", gt=1e-3, le=0.1)
     """Radius of the rod."""
+    withdraw: bool = number(False, "1", "assumed: the paper pushes only")
+    """Whether the rod also goes back at the same speed, so that hysteresis shows."""
     start_spread: float = number(0.0005, "m", "assumed: set by hand", ge=0)
     """Half range of the rod's first distance."""
 
@@ -68,6 +72,10 @@ class CalibrateConfig(Params):
     recording: str | None = number(None, "1", "assumed: no recording")
     """CSV file to calibrate from; the rig if not given."""
     columns: RecordingParams = RecordingParams()
+    rate: float | None = number(
+        None, "Hz", "assumed: the recording has a column of time", gt=0, le=1e6
+    )
+    """Readings a second of a recording without a column of time."""
     sensor_id: str | None = number(
         None,
         "1",
@@ -99,7 +107,7 @@ class CalibrateConfig(Params):
     @model_validator(mode="after")
     def _rig_or_recording(self) -> CalibrateConfig:
         """A recording needs no rig, and the rig no columns."""
-        names = ("columns",) if self.recording is None else _OF_THE_RIG
+        names = ("columns", "rate") if self.recording is None else _OF_THE_RIG
         for name in names:
             if getattr(self, name) != type(self).model_fields[name].default:
                 without = "without" if self.recording is None else "with"
@@ -107,6 +115,11 @@ class CalibrateConfig(Params):
                     f"{name}: expected the default, as {without} a recording it is not "
                     "read, found another"
                 )
+        named = {"time_column", "time_unit"} & self.columns.model_fields_set
+        if self.rate is not None and named:
+            raise ValueError(
+                f"rate: expected none beside columns.{min(named)}, found {self.rate:g} Hz"
+            )
         return self
 
     @model_validator(mode="after")
@@ -140,6 +153,11 @@ class CalibrateOutcome(Outcome):
     raw: Recording
     calibration: Calibration
 
+    @functools.cached_property
+    def assessment(self) -> Assessment:
+        """What is known about the next push."""
+        return assess(self.recording.samples, self.calibration)
+
     def result(self) -> dict[str, Any]:
         """The content of result.json."""
         return {
@@ -149,6 +167,7 @@ class CalibrateOutcome(Outcome):
             "source": "rig" if self.config.recording is None else "recording",
             "poor": self.calibration.r2 < self.config.good_r2,
             "calibration": self.calibration.model_dump(mode="json"),
+            "assessment": asdict(self.assessment),
         }
 
     def levels(self) -> Floats:
@@ -178,7 +197,8 @@ def push(config: CalibrateConfig, trial: int) -> Recording:
     period = 1.0 / config.antenna.sensor.rate
     touch = config.antenna.radius + rig.rod_radius
     rate = config.antenna.sensor.rate
-    ticks = int(np.ceil((gap + rig.depth) / speed * rate)) + 1
+    ways = 2 if rig.withdraw else 1
+    ticks = ways * int(np.ceil((gap + rig.depth) / speed * rate)) + 1
     noise = reading_noise(config.antenna.sensor, rng, (ticks,))
     sensor = SensorChain(config.antenna.sensor, (), period)
     rod = Slider(bench.model, bench.data, "probe")
@@ -190,8 +210,10 @@ def push(config: CalibrateConfig, trial: int) -> Recording:
         counts = float(sensor.step(np.array(bench.flex()), float(noise[i])))
         rows.append((i * period, counts, at / rig.depth))
         for k in range(1, round(period / _COMMAND_PERIOD) + 1):
-            y = -touch - gap + speed * (i * period + k * _COMMAND_PERIOD)
-            rod.command(rig.place, y, 0.0, speed)
+            way = speed * (i * period + k * _COMMAND_PERIOD)
+            back = rig.withdraw and way > gap + rig.depth
+            y = -touch - gap + (2 * (gap + rig.depth) - way if back else way)
+            rod.command(rig.place, y, 0.0, -speed if back else speed)
             bench.step(round(_COMMAND_PERIOD / config.physics.timestep))
     t, counts, bend = np.array(rows).T
     inside = (bend >= 0) & (bend <= 1)
@@ -259,7 +281,7 @@ def run(
     if config.recording is None:
         raw = record(config, workers, on_step)
     else:
-        raw = read(Path(config.recording), config.columns)
+        raw = read(Path(config.recording), config.columns, config.rate)
     used = averaged(raw, config.averaging_time)
     found = fitting.fit(
         used.samples,

@@ -74,7 +74,7 @@ def _draw_ranges(panel: Axes, result: Mapping[str, Any]) -> None:
         low, high = np.array([row["r2_95"] for row in rows]).T
         colour = style.PROFILE_LOOKS[name][0]
         panel.fill_between(place, low, high, color=colour, alpha=0.12, linewidth=0)
-        panel.plot(place, [row["r2"] for row in rows], color=colour, label=name)
+        panel.plot(place, [row["r2"] for row in rows], color=colour, label=name.replace("_", " "))
     panel.axvline(result["from_place"], color=style.MUTED, linewidth=1, linestyle=(0, (4, 2)))
     panel.set(
         xlabel="nearest place where the contact may be / length",

@@ -48,7 +48,7 @@ class ForceConfig(Params):
         30.0, "deg", "paper: deflection of a spring below 30 deg", gt=0, le=80
     )
     """Largest hinge angle."""
-    traverses: int = number(24, "1", "assumed: half of them judge the curves", ge=4, le=10000)
+    traverses: int = number(24, "1", "assumed: half of them test the curves", ge=4, le=10000)
     """Traverses of every profile."""
     speeds: tuple[float, ...] = number(
         (0.05, 0.10, 0.15), "m/s", "paper: calibration at 5, 10 and 15 cm/s", min_length=1
@@ -86,7 +86,7 @@ class Points:
         scalars: Each of SCALARS, shape (n,).
         force: Size of the force [N]; `place` over the length; both of shape (n,).
         trial: What counts as one in intervals: load or traverse, shape (n,).
-        fit: Whether the point serves to fit, shape (n,); the others judge.
+        fit: Whether the point serves to fit, shape (n,); the others test the fit.
         age: Time since the contact began, shape (n,) [s]; infinite at rest.
     """
 

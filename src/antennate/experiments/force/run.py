@@ -1,6 +1,6 @@
 """How much of a contact's force does one scalar tell? By statics, and by traverses past a post.
 
-A curve of force over flex is fitted to one half of the loads and judged on the other: one curve for
+A curve of force over flex is fitted to one half of the loads and tested on the other: one curve for
 every place of contact, as if a second sense told where it is, and one curve for all places. Forces
 reach up to that which, normal to the tip, turns a hinge by the limit; no load that turns a hinge
 farther takes part.
@@ -109,7 +109,7 @@ def _row(points: Points, which: Ints, guess: Floats, largest: float) -> dict[str
     return row | {"rmse_percent": 100.0 * row["rmse"] / largest}
 
 
-def _judge_all(points: Points, config: ForceConfig, largest: float) -> dict[str, Any]:
+def _score_all(points: Points, config: ForceConfig, largest: float) -> dict[str, Any]:
     """Every scalar, with the place known and unknown."""
     known = {"known": config.place_step, "unknown": None}
     return {
@@ -133,7 +133,7 @@ def study_profile(config: ForceConfig, profile: str) -> ProfileOutcome:
         "force_max_n": largest,
         "statics": {
             name: {"loads": len(points.force), "left_out": out}
-            | _judge_all(points, config, largest)
+            | _score_all(points, config, largest)
             for name, points, out in (
                 ("frictionless", plain, left_out),
                 ("friction", rubbed, also_out),
@@ -146,7 +146,7 @@ def study_profile(config: ForceConfig, profile: str) -> ProfileOutcome:
         "traverses": {
             "trials": len(rows),
             "invalid": sum(row.status == "invalid" for row in rows),
-            **_judge_all(dragged, config, largest),
+            **_score_all(dragged, config, largest),
             "closed_form": {
                 name: _row(dragged, np.flatnonzero(which), guess[which], largest)
                 for name, which in (("all", settled | True), ("settled", settled))

@@ -60,6 +60,8 @@ class SweepConfig(Params):
         0.05, "m/s", "assumed: slowly; under half of the paper's 0.12 m/s", gt=0, le=1
     )
     """Speed of the base along the wall where it moves."""
+    points: bool = number(False, "1", "assumed: a large file that few need")
+    """Whether to save the points of the antenna of `profile` in every cell, for `tracks`."""
     sweep: SweepParams = SweepParams()
     shape: ShapeParams = ShapeParams()
     estimate: EstimateParams = EstimateParams()

@@ -2,7 +2,7 @@
 
 Every trial is a gap: a left and a right antenna, each beside its own wall, sweep outwards once. The
 distance of the left wall and the width of the whole are estimated by curves calibrated on one set
-of trials and judged on a fresh one.
+of trials and tested on a fresh one.
 """
 
 from __future__ import annotations

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from antennate.experiments.sweep import outlines
 from antennate.experiments.sweep import run as sweep
 from antennate.experiments.sweep.config import SweepConfig
 from antennate.experiments.sweep.reach import CUES
@@ -42,7 +43,7 @@ def _errors(condition: str, by_noise: Mapping[str, Any]) -> Table:
             (cue.replace("_", " "), [_error(noisy[quantity], cue) for quantity in QUANTITIES])
             for cue in CUES
         ],
-        f"{noisy['sweeps']} sweeps to judge, {noisy['missed']} felt nothing, "
+        f"{noisy['sweeps']} test sweeps, {noisy['missed']} felt nothing, "
         f"{noisy['invalid']} invalid.",
     )
 
@@ -70,6 +71,10 @@ def sentence(result: Mapping[str, Any]) -> str:
     )
 
 
+def _files(outcome: sweep.SweepOutcome) -> Mapping[str, str]:
+    return {"points.csv": outlines.to_csv(outcome.outlines)} if outcome.outlines else {}
+
+
 EXPERIMENT = Experiment.of_folder(
-    __name__, SweepConfig, sweep.run, tables, sentence, parts="sweeps"
+    __name__, SweepConfig, sweep.run, tables, sentence, files=_files, parts="sweeps"
 )

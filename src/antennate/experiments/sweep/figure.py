@@ -13,13 +13,6 @@ from matplotlib.figure import Figure
 from antennate import figures as style
 from antennate.experiments.sweep.run import SweepOutcome
 
-SHAPE_COLOURS = {
-    "forward": "#0072B2",
-    "backward": "#D55E00",
-    "straight": "#F0E442",
-    "transition": "#000000",
-    "free": "#DDDDDD",
-}
 _CUE_MARKS = {
     "flex_and_base": ("o", "#332288"),
     "flex": ("s", "#CC79A7"),
@@ -62,7 +55,7 @@ def study(result: Mapping[str, Any]) -> Figure:
     upper.axes[0].set_ylabel("distance of the wall / length")
     handles = [
         upper.axes[0].plot([], [], marker="s", linestyle="", color=colour, label=shape)[0]
-        for shape, colour in SHAPE_COLOURS.items()
+        for shape, colour in style.SHAPE_COLOURS.items()
     ]
     upper.legend(handles=handles, loc="outside lower center", ncols=len(handles))
     panels = lower.subplots(1, 2, sharey=True)
@@ -77,7 +70,7 @@ def study(result: Mapping[str, Any]) -> Figure:
         panel.axhline(published, color=style.INK, linewidth=1, linestyle=(0, (4, 2)))
         panel.annotate(
             f"CITRAS {published:g} %{note}",
-            (0.5, published),
+            (0.62, published),
             (0, -2),
             textcoords="offset points",
             ha="center",
@@ -99,7 +92,7 @@ def _draw_map(panel: Axes, cells: Sequence[Mapping[str, Any]]) -> None:
     for cell in cells:
         left = step * centres.index(cell["centre_rad"]) + amplitudes.index(cell["amplitude_rad"])
         row = distances.index(cell["distance"])
-        for shape, colour in SHAPE_COLOURS.items():
+        for shape, colour in style.SHAPE_COLOURS.items():
             panel.barh(row, 0.92 * cell[shape], 0.8, left=left, color=colour, linewidth=0)
             left += 0.92 * cell[shape]
     ticks = [

@@ -1,19 +1,20 @@
-"""Base sweeps beside walls: which shapes appear when, and what active touch tells of distances."""
+"""Base sweeps beside walls: which shapes appear when, and how well touch measures distances."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import product
 from typing import Any, Literal
 
 import numpy as np
 
 from antennate.antenna.statics import Profile, with_profile
-from antennate.experiments.sweep import estimates
+from antennate.experiments.sweep import estimates, outlines
 from antennate.experiments.sweep import scan as sweeping
 from antennate.experiments.sweep.config import SweepConfig
 from antennate.experiments.sweep.estimates import Trial
+from antennate.experiments.sweep.outlines import Outlines
 from antennate.params import SweepParams
 from antennate.studies.experiment import OnRow, OnStep, no_row, no_step
 from antennate.studies.pool import gather
@@ -59,11 +60,13 @@ class SweepOutcome:
         config: What was run.
         cells: Rows of the map in the order of profile, motion, distance, centre and amplitude.
         trials: Sweeps of the estimates in the order of condition, split, trial and side.
+        outlines: Points of the antenna in each cell of `profile`, if they were to be saved.
     """
 
     config: SweepConfig
     cells: list[SweepRow]
     trials: list[Trial]
+    outlines: list[Outlines] = field(default_factory=list[Outlines])
 
     @property
     def rows(self) -> list[SweepRow]:
@@ -134,7 +137,7 @@ def map_cell(
     distance: float,
     centre: float,
     amplitude: float,
-) -> SweepRow:
+) -> tuple[SweepRow, Outlines | None]:
     """Sweep in one cell of the map and share out the time between the shapes."""
     sweep = SweepParams(centre=centre, amplitude=amplitude, frequency=config.sweep.frequency)
     wall = sweeping.Wall(distance * config.antenna.length)
@@ -151,7 +154,8 @@ def map_cell(
     if not trace.reason:
         found = sweeping.shares(config.shape, trace, 1.0 / sweep.frequency)
         found["peak_flex_rad"] = float(abs(trace.flex).max())
-    return SweepRow(
+    kept = config.points and profile == config.profile and not trace.reason
+    row = SweepRow(
         seed=config.seed,
         kind="map",
         profile=profile,
@@ -165,9 +169,12 @@ def map_cell(
         reason=trace.reason,
         **found,
     )
+    return row, outlines.of_trace(
+        f"{motion} {number}", trace, 1.0 / sweep.frequency
+    ) if kept else None
 
 
-def _sweep(function: Callable[..., SweepRow | Trial], *arguments: Any) -> SweepRow | Trial:
+def _sweep(function: Callable[..., Any], *arguments: Any) -> Any:
     return function(*arguments)
 
 
@@ -190,8 +197,10 @@ def run(
     ]
     trials = [(estimates.run_trial, *trial) for trial in estimates.plan(config)]
 
-    def keep(found: SweepRow | Trial) -> None:
-        on_row(_row(config, found) if isinstance(found, Trial) else found)
+    def keep(found: Any) -> None:
+        on_row(_row(config, found) if isinstance(found, Trial) else found[0])
 
     found: list[Any] = gather(_sweep, [*cells, *trials], workers, on_step, keep, _TASK)
-    return SweepOutcome(config, found[: len(cells)], found[len(cells) :])
+    made = found[: len(cells)]
+    kept = [points for _, points in made if points is not None]
+    return SweepOutcome(config, [row for row, _ in made], found[len(cells) :], kept)

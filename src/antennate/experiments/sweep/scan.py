@@ -8,31 +8,24 @@ antenna is the mirror image, so it needs no bench of its own.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from enum import IntEnum
+from dataclasses import dataclass, field
 
 import numpy as np
 
+from antennate.antenna.shapes import Shape, classify
 from antennate.errors import SimulationError
 from antennate.experiments.force.post_traverse import speed_at, way
 from antennate.params import BenchPhysicsParams, ShapeParams, SweepParams
 from antennate.robots.antenna import AntennaSpec
 from antennate.sim.bench import Bar, Bench, compile_bench
-from antennate.types import Bools, Floats, Ints
+from antennate.types import Bools, Floats
 
 _APPROACH = 0.5
 """Time from the heading to the near end of the sweep [s]."""
+_BEFORE = 0.005
+"""Distance from the first point of an outline to the first hinge, along the base [m]."""
 _THICK, _LONG = 0.02, 2.0
 """Radius and half length of the wall's capsule [m]."""
-
-
-class Shape(IntEnum):
-    """Shape of an antenna that touches."""
-
-    FORWARD = 0
-    BACKWARD = 1
-    STRAIGHT = 2
-    TRANSITION = 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,6 +64,8 @@ class Trace:
         offset: Angle of the tip, seen from the base, off the base's direction [rad].
         reach: Distance from base to tip [m].
         touching: Whether the antenna touches the wall.
+        points: A point on the base before the first hinge, the hinges and the tip [m], of shape
+            (n, hinges + 2, 2).
         reason: Why the trial is invalid, or empty.
     """
 
@@ -81,6 +76,7 @@ class Trace:
     reach: Floats
     touching: Bools
     reason: str = ""
+    points: Floats = field(default_factory=lambda: np.zeros((0, 2, 2)))
 
 
 def record(
@@ -108,6 +104,7 @@ def record(
     steps = round(1.0 / (rate * physics.timestep))
     end = _APPROACH + sweeps / sweep.frequency - 0.5 / rate
     rows: list[tuple[float, float, float, float, float, bool]] = []
+    outlines: list[Floats] = []
     try:
         while bench.t < end:
             t = bench.t
@@ -120,11 +117,13 @@ def record(
             off = math.remainder(off, 2.0 * math.pi)
             reach = float(np.hypot(*tip))
             rows.append((bench.t - _APPROACH, base, bench.flex(), off, reach, near < gap))
+            before = joints[:1] - _BEFORE * np.array([[math.cos(base), math.sin(base)]])
+            outlines.append(np.concatenate([before, joints]))
     except SimulationError as error:
         none = np.zeros(0)
         return Trace(none, none, none, none, none, none > 0, str(error))
     t, base, flex, offset, reach, touching = np.array(rows, np.float64).T
-    return Trace(t, base, flex, offset, reach, touching > 0.5)
+    return Trace(t, base, flex, offset, reach, touching > 0.5, "", np.array(outlines))
 
 
 def commanded(sweep: SweepParams, t: float) -> float:
@@ -134,22 +133,6 @@ def commanded(sweep: SweepParams, t: float) -> float:
         return (sweep.centre - sweep.amplitude) * share * share * (3.0 - 2.0 * share)
     turned = 2.0 * math.pi * sweep.frequency * (t - _APPROACH)
     return sweep.centre - sweep.amplitude * math.cos(turned)
-
-
-def classify(params: ShapeParams, flex: Floats, offset: Floats) -> Ints:
-    """Shape of a touching antenna, one `Shape` for every flex and offset of the tip [rad].
-
-    FORWARD points ahead: flex sensor and tip both bend towards the heading. BACKWARD points to the
-    tail: both bend there. STRAIGHT does neither. All else is a TRANSITION, like an S.
-    """
-    straight = (abs(flex) < params.flex) & (abs(offset) < params.offset)
-    forward = (flex <= -params.flex) & (offset <= -params.offset)
-    backward = (flex >= params.flex) & (offset >= params.offset)
-    return np.select(
-        [straight, forward, backward],
-        [Shape.STRAIGHT, Shape.FORWARD, Shape.BACKWARD],
-        Shape.TRANSITION,
-    ).astype(np.int64)
 
 
 def shares(params: ShapeParams, trace: Trace, first: float) -> dict[str, float]:

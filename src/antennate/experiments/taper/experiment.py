@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from antennate.antenna import taper
-from antennate.csv_files import csv_rows, number_of
+from antennate.csv_files import column, csv_rows, number_of
 from antennate.errors import BadInputError, ConfigError
 from antennate.files import read_limited
 from antennate.params import TaperParams
@@ -116,7 +116,7 @@ def read_diameters(path: Path) -> Floats:
         BadInputError: The file cannot be read, or a row holds no diameter.
     """
     rows = csv_rows(path, read_limited(path, _LARGEST_FILE), [COLUMN], BadInputError)
-    place = next(rows)[1].index(COLUMN)
+    place = column(next(rows)[1], COLUMN) or 0
     found = [_diameter(path, line, "".join(cells[place : place + 1])) for line, cells in rows]
     if len(found) < 2:
         raise BadInputError(f"{path}: expected at least 2 rows of diameters, found {len(found)}")

@@ -1,4 +1,4 @@
-"""One traverse of the bench along a wall: flex and force at every tick, nothing judged yet."""
+"""One traverse of the bench along a wall: flex and force at every tick, before any measure."""
 
 from __future__ import annotations
 

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import combinations
 from typing import Any
 
 from antennate.experiments.tunnel import measures
 from antennate.experiments.tunnel import run as tunnel
+from antennate.messages import short_names
 from antennate.sim.scenes.registry import TUNNEL
 from antennate.studies.experiment import Experiment
 from antennate.studies.measures import Table, successes
@@ -14,13 +16,14 @@ from antennate.studies.measures import Table, successes
 
 def tables(result: Mapping[str, Any]) -> Sequence[Table]:
     """The controllers one by one and two by two."""
-    controllers = result["controllers"]
+    controllers, pairs = result["controllers"], result["paired"]
+    short = short_names(controllers)
     counts = sorted({row["trials"] for row in controllers.values()})
     many = " to ".join(str(n) for n in dict.fromkeys([counts[0], counts[-1]]))
     many += " trial" if many == "1" else " trials"
     one_by_one = Table.of(
         "Controllers",
-        controllers,
+        {short[name]: row for name, row in controllers.items()},
         measures.CONTROLLER,
         f"{many} a controller, seed {result['seed']}. A failure counts as the time limit, "
         f"{result['time_limit_s']:g} s; invalid trials\nare left out of all rows below theirs. "
@@ -28,19 +31,28 @@ def tables(result: Mapping[str, Any]) -> Sequence[Table]:
     )
     two_by_two = Table.of(
         "Pairs, trial by trial",
-        result["paired"],
+        {
+            f"{short[first]} minus {short[second]}": pairs[f"{first}-{second}"]
+            for first, second in combinations(controllers, 2)
+            if f"{first}-{second}" in pairs
+        },
         measures.PAIR,
         "McNemar's test is exact; Wilcoxon's takes failures as the limit; both two-sided.",
     )
-    return (one_by_one, two_by_two) if result["paired"] else (one_by_one,)
+    return (one_by_one, two_by_two) if pairs else (one_by_one,)
 
 
 def sentence(result: Mapping[str, Any]) -> str:
     """Which controllers came through, and how sure it is."""
     none_valid = _none_valid(result)
-    found = successes({n: r for n, r in result["controllers"].items() if n not in none_valid})
-    pair = next(iter(reversed(result["paired"].items())), None)
-    test = f"; McNemar p of {pair[0]} {pair[1]['mcnemar_p']:.2g}" if pair else ""
+    short = short_names(result["controllers"])
+    found = successes(
+        {short[n]: row for n, row in result["controllers"].items() if n not in none_valid}
+    )
+    test = ""
+    for first, second in combinations(result["controllers"], 2):
+        if pair := result["paired"].get(f"{first}-{second}"):
+            test = f"; {short[first]} against {short[second]}: McNemar p {pair['mcnemar_p']:.2g}"
     invalid = sum(row["invalid"] for row in result["controllers"].values())
     why = f" Invalid trials: {invalid}; trials.csv gives the reason of each." if invalid else ""
     scene = result["scene"]

@@ -17,7 +17,7 @@ from matplotlib.ticker import MaxNLocator, PercentFormatter
 from antennate import figures as style
 from antennate.experiments.tunnel.monitor import TrialPath, TrialResult
 from antennate.experiments.tunnel.run import TunnelOutcome
-from antennate.messages import short_name
+from antennate.messages import short_names
 from antennate.types import Floats, Maneuver
 
 SHOWN_TRIALS = 5
@@ -53,6 +53,8 @@ def trajectories(
 ) -> Figure:
     """Trials from above: a column for each trial, a row for each controller.
 
+    A single trial is drawn larger, with the controllers side by side.
+
     Args:
         paths: Courses by controller and trial; a missing one leaves its panel empty.
         controllers: Names from top to bottom.
@@ -61,40 +63,55 @@ def trajectories(
     """
     table = {(row.controller, row.trial): row for row in rows}
     boxes = {t: _box([paths[a, t] for a in controllers if (a, t) in paths]) for t in trials}
-    sides = [box[1] - box[0] for box in boxes.values() if box is not None] or [np.ones(2)]
-    aspect = float(max(side[1] for side in sides) / max(side[0] for side in sides))
-    width = 0.5 + 2.3 * len(trials)
-    figure = style.canvas(max(width, 6.4), 0.9 + len(controllers) * (2.0 * aspect + 0.35))
-    panels = figure.subplots(len(controllers), len(trials), squeeze=False)
-    for i, controller in enumerate(controllers):
+    alone = len(trials) == 1
+    figure, panels = _panels(len(controllers), len(trials), [b for b in boxes.values() if b])
+    for i, (controller, label) in enumerate(short_names(controllers).items()):
         for j, trial in enumerate(trials):
-            panel, box = panels[i, j], boxes[trial]
-            _frame(panel, box)
-            if (controller, trial) in paths:
-                _draw_trial(panel, paths[controller, trial])
-                row = table[controller, trial]
-                outcome = _OUTCOMES[row.outcome].format(row.time_s)
-                panel.set_title(f"trial {trial}: {outcome}", fontsize=8.5)
-            else:
-                panel.set_title(f"trial {trial}: not run", fontsize=8.5)
-            if i == len(controllers) - 1:
-                panel.set_xlabel("x [m]")
-        panels[i, 0].set_ylabel("y [m]")
-        panels[i, 0].annotate(
-            short_name(controller),
-            (0.0, 0.5),
-            (-54.0, 0.0),
-            xycoords="axes fraction",
-            textcoords="offset points",
-            rotation=90,
-            ha="center",
-            va="center",
-            fontsize=11,
-            fontweight="bold",
-        )
+            panel, place = (panels[0, i] if alone else panels[i, j]), (controller, trial)
+            _frame(panel, boxes[trial])
+            said = "not run"
+            if place in paths:
+                _draw_trial(panel, paths[place])
+                said = _OUTCOMES[table[place].outcome].format(table[place].time_s)
+            panel.set_title(f"{label}\n" * alone + f"trial {trial}: {said}", fontsize=8.5)
+        if not alone:
+            _name_row(panels[i, 0], label)
+    for panel in panels[-1]:
+        panel.set_xlabel("x [m]")
+    for panel in panels[:, 0]:
+        panel.set_ylabel("y [m]")
     handles = _handles(list(paths.values()))
-    figure.legend(handles=handles, loc="outside lower center", ncols=min(5, 2 + len(trials)))
+    columns = min(5, 2 + panels.shape[1])
+    figure.legend(handles=handles, loc="outside lower center", ncols=columns)
     return figure
+
+
+def _panels(
+    controllers: int, trials: int, boxes: Sequence[tuple[Floats, Floats]]
+) -> tuple[Figure, Any]:
+    """An empty figure and its panels, shape (rows, columns), as high as the boxes need."""
+    rows, columns = (1, controllers) if trials == 1 else (controllers, trials)
+    sides = [high - low for low, high in boxes] or [np.ones(2)]
+    aspect = float(max(side[1] for side in sides) / max(side[0] for side in sides))
+    width = min(max(2.3, 7.0 / trials), 5.5 if columns == 1 else 3.5)
+    height = (width - 0.3) * aspect + (0.7 if trials == 1 else 0.35)
+    figure = style.canvas(max(0.5 + width * columns, 6.4), 0.9 + rows * height)
+    return figure, figure.subplots(rows, columns, squeeze=False)
+
+
+def _name_row(panel: Axes, label: str) -> None:
+    panel.annotate(
+        label,
+        (0.0, 0.5),
+        (-54.0, 0.0),
+        xycoords="axes fraction",
+        textcoords="offset points",
+        rotation=90,
+        ha="center",
+        va="center",
+        fontsize=11,
+        fontweight="bold",
+    )
 
 
 def _box(paths: Sequence[TrialPath]) -> tuple[Floats, Floats] | None:
@@ -179,40 +196,51 @@ def summary(
     """
     figure = style.canvas(10.5, 3.4)
     rate, inside, mean = figure.subplots(1, 3, width_ratios=(1, 1.5, 1))
-    names, colours = list(controllers), style.controller_colours(list(controllers))
+    colours, short = style.controller_colours(list(controllers)), short_names(controllers)
     for i, (name, found) in enumerate(controllers.items()):
-        valid = found["trials"] - found["invalid"]
+        valid, colour = found["trials"] - found["invalid"], colours[name]
         if not valid:
             continue
-        colour, time = colours[name], found["restricted_mean_time_s"]
+        time = found["restricted_mean_time_s"]
         _interval(rate, i, found["successes"] / valid, found["wilson95"], colour)
         _interval(mean, i, time, found["restricted_mean_time_95"] or (time, time), colour)
         exits = sorted(r.time_s for r in rows if r.controller == name and r.outcome == "success")
-        left = 1.0 - np.arange(len(exits) + 1) / valid
         inside.step(
             [0.0, *exits, time_limit],
-            [*left, left[-1]],
+            [*(left := 1.0 - np.arange(len(exits) + 1) / valid), left[-1]],
             where="post",
             color=colour,
             linestyle=style.CONTROLLER_LINES.get(name, "solid"),
-            linewidth=3.2 - 0.8 * i,
-            label=short_name(name),
+            linewidth=max(1.2, 3.2 - 0.8 * i),
+            label=short[name],
         )
-    for panel in (rate, mean):
-        panel.set_yticks(range(len(names)), [_label(name, controllers[name]) for name in names])
-        panel.tick_params(axis="y", labelsize=9, labelcolor=style.INK, length=0)
-        panel.set_ylim(len(names) - 0.5, -0.5)
-        panel.grid(visible=False, axis="y")
+    valid = [found["trials"] - found["invalid"] for found in controllers.values()]
+    counted = [f"{label}\nn = {n}" for label, n in zip(short.values(), valid, strict=True)]
+    _name_lines(rate, counted)
+    _name_lines(mean, list(short.values()))
+    _title_panels(rate, inside, mean, time_limit)
+    if inside.lines:
+        inside.legend(loc="upper right")
+    return figure
+
+
+def _name_lines(panel: Axes, labels: Sequence[str]) -> None:
+    """A line for each controller, from top to bottom."""
+    panel.set_yticks(range(len(labels)), labels)
+    panel.tick_params(axis="y", labelsize=9, labelcolor=style.INK, length=0)
+    panel.set_ylim(len(labels) - 0.5, -0.5)
+    panel.grid(visible=False, axis="y")
+
+
+def _title_panels(rate: Axes, inside: Axes, mean: Axes, time_limit: float) -> None:
     rate.set(
         xlim=(-0.02, 1.02), xlabel="trials that succeeded [%]", title="Success with Wilson 95 %"
     )
-    rate.xaxis.set_major_formatter(PercentFormatter(1.0, symbol=""))
     mean.set(
         xlim=(0, 1.02 * time_limit),
         xlabel="restricted mean time [s]",
-        title="Failures count as the time limit; 95 %",
+        title="Failures as the limit; 95 %",
     )
-    mean.set_yticklabels([short_name(name) for name in names])
     inside.set(
         xlim=(0, time_limit),
         ylim=(-0.03, 1.03),
@@ -220,14 +248,8 @@ def summary(
         ylabel="trials still inside [%]",
         title=f"Trials still inside; failures until {time_limit:g} s",
     )
-    inside.yaxis.set_major_formatter(PercentFormatter(1.0, symbol=""))
-    if inside.lines:
-        inside.legend(loc="upper right")
-    return figure
-
-
-def _label(name: str, found: Mapping[str, Any]) -> str:
-    return f"{short_name(name)}\nn = {found['trials'] - found['invalid']}"
+    for axis in (rate.xaxis, inside.yaxis):
+        axis.set_major_formatter(PercentFormatter(1.0, symbol=""))
 
 
 def _interval(panel: Axes, at: int, value: float, ends: Sequence[float], colour: str) -> None:

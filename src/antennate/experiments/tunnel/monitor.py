@@ -1,4 +1,4 @@
-"""What is measured on one trial while it runs, with the truth of the simulation at hand.
+"""What is measured on one trial while it runs, from the true state of the simulation.
 
 The controller sees nothing of this. Progress is what the scene says of the head's position. The
 robot is stuck when its progress has gained less than STUCK_GAIN on its own maximum for STUCK_TIME;

@@ -57,12 +57,13 @@ def _findings(board: BoardSurvey, config: DoctorConfig) -> Iterator[tuple[Findin
         yield broken, "broken frames", "none"
         for side, name in enumerate(("left", "right")):
             yield from _antenna(board, config, name, board.counts[:, side].tolist())
-    try:
-        require_sensor(hello, config.sensor_id)
-    except CalibrationError:
-        cure = "calibrate the antennae of this board, or name their file in calibration"
-        other = Finding(f"board {hello.device_id}", "bad", cure)
-        yield other, "sensors", f"on board {config.sensor_id}"
+    for sensor_id in dict.fromkeys((config.sensor_id, config.sensor_id_right)):
+        try:
+            require_sensor(hello, sensor_id)
+        except CalibrationError:
+            cure = "calibrate the antennae of this board, or name their file in calibration"
+            other = Finding(f"board {hello.device_id}", "bad", cure)
+            yield other, "sensors", f"on board {sensor_id}"
 
 
 def _greeting(board: BoardSurvey) -> Finding:
@@ -126,7 +127,7 @@ def _antenna(
     noisy = Finding(f"{noise:.1f} counts", "warn" if noise > quiet else "ok", cure)
     yield noisy, f"{name} noise", f"at most {quiet:g} counts"
     try:
-        channel = ChannelDiagnosis(Band.of(_curve(config, name), config.reach))
+        channel = ChannelDiagnosis(Band.of(_curve(config, name), config.reaches[name == "right"]))
     except CalibrationError as error:
         wrong = Finding(str(error), "bad", "calibrate again, with another divider resistor")
         yield wrong, f"{name} calibration", "leaves the rails free"

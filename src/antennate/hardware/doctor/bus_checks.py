@@ -72,7 +72,7 @@ def _baud(bus: BusSurvey) -> Finding:
         cure = "swap the ports of --esp32 and --bus"
         return Finding("the antenna board is on this port", "bad", cure)
     return Finding(
-        "nobody answers at any usual speed",
+        "no servo answers at any usual speed",
         "bad",
         "check the supply of the servos, the cable of the bus and its first plug; see whether "
         "--esp32 and --bus are swapped",

@@ -38,6 +38,8 @@ REGISTERS = (
     "status_return_level",
     "hardware_error_status",
     "bus_watchdog",
+    "pwm_limit",
+    "goal_pwm",
     "present_input_voltage",
     "present_temperature",
 )

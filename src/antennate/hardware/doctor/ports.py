@@ -40,7 +40,7 @@ def opener_of(
 
 
 def port_row(part: str, path: str, opener: Opener, baud: int = BOARD_BAUD) -> Row:
-    """Whether a port is there, may be opened, and is nobody else's."""
+    """Whether a port is there, may be opened, and is used by no other program."""
     try:
         with opener(baud):
             others = ", ".join(holders(path))
@@ -48,7 +48,7 @@ def port_row(part: str, path: str, opener: Opener, baud: int = BOARD_BAUD) -> Ro
         finding = Finding(f"{path}, in use by {others}", "warn", cure) if others else Finding(path)
     except OpenError as error:
         finding = Finding(f"{path}: {error.found}", "bad", error.cure)
-    return finding.row(part, "port", "opens, in use by nobody else")
+    return finding.row(part, "port", "opens, used by no other program")
 
 
 def latency_row(path: str, slow: bool, params: DoctorParams, timers: Path = _TIMERS) -> Row:

@@ -23,9 +23,10 @@ _MODES = ((1, "reversed"), (4, "timed"), (8, "torque by goal"))
 _ANSWERS_ALL = 2
 """Status return level at which a servo answers reads and writes."""
 _VOLT = 0.1
+_FULL_PWM = XC430_W240["pwm_limit"].high or 1
 _SHUTDOWNS = XC430_W240["shutdown"].default or 0
 
-Judge = Callable[[BusSurvey, DoctorConfig, int, int], Grade]
+Grading = Callable[[BusSurvey, DoctorConfig, int, int], Grade]
 """The grade of a register of a servo: given survey, configuration, id and value."""
 
 
@@ -39,7 +40,7 @@ class _Check(NamedTuple):
     name: str
     register: str
     expected: str
-    judge: Judge
+    grading: Grading
     cure: str
     text: Callable[[int], str] = str
 
@@ -50,7 +51,7 @@ def register_findings(bus: BusSurvey, config: DoctorConfig) -> Iterator[tuple[Fi
     yield _position_limits(bus, config)
     for check in _CHECKS:
         values = _values(bus, config, check.register)
-        grades: dict[int, Grade] = {i: check.judge(bus, config, i, values[i]) for i in values}
+        grades: dict[int, Grade] = {i: check.grading(bus, config, i, values[i]) for i in values}
         finding = _of_servos(grades, grouped(values, check.text), check.cure)
         yield finding, check.name, check.expected.format(config=config, modes=modes)
 
@@ -66,14 +67,14 @@ def _of_servos(grades: Mapping[int, Grade], found: str, cure: str) -> Finding:
     return Finding(found, worst(grades.values()), cure.replace("{ids}", ids))
 
 
-def _required(register: str) -> Judge:
+def _required(register: str) -> Grading:
     """What `drive` requires, as `hardware.settings` says."""
     return lambda bus, config, servo, value: (
         "ok" if settings(config.robot)[register][servo].allows(value) else "bad"
     )
 
 
-def _only(good: int, grade: Grade) -> Judge:
+def _only(good: int, grade: Grade) -> Grading:
     """A grade of all values but one."""
     return lambda bus, config, servo, value: "ok" if value == good else grade
 
@@ -107,6 +108,10 @@ def _heat(bus: BusSurvey, config: DoctorConfig, servo: int, heat: int) -> Grade:
     default = XC430_W240["temperature_limit"].default or 0
     most = bus.registers[servo].get("temperature_limit", default)
     return "bad" if heat >= most else "warn" if heat >= most - config.doctor.heat_margin else "ok"
+
+
+def _full(bus: BusSurvey, config: DoctorConfig, servo: int, pwm: int) -> Grade:
+    return "ok" if pwm >= bus.registers[servo].get("pwm_limit", pwm) else "warn"
 
 
 def _watchdog(counts: int) -> str:
@@ -199,6 +204,15 @@ _CHECKS = (
         _only(0, "warn"),
         "{ids}: left by a program that died, or in use by one; drive clears it when it arms",
         _watchdog,
+    ),
+    _Check(
+        "goal PWM",
+        "goal_pwm",
+        "all that the PWM limit allows",
+        _full,
+        "{ids}: little force, left by a program that died, such as jog; drive, teleop and jog set "
+        "it when they arm",
+        lambda pwm: f"{100 * pwm / _FULL_PWM:.0f} %",
     ),
     _Check(
         "torque",

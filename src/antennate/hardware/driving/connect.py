@@ -31,7 +31,13 @@ from antennate.params import DoctorParams
 from antennate.robots.spec import RobotSpec
 from antennate.types import Controller
 
-_WHO = DoctorParams()
+_GREETING = DoctorParams().greeting
+_SILENCE = 1.9
+"""Silence of a port after which no board is there [s] (assumed: a board sends every 10 ms)."""
+_QUIET = 0.1
+"""Time for which the bus is listened to before a servo is asked [s] (assumed: ten samples)."""
+_UNASKED = 32
+"""Bytes in that time from which on servos are not alone on the bus (assumed: a plug gives less)."""
 _PATIENCE = 0.05
 LATEST = 0.07
 """Latest answer while servos have torque [s]: less than the 100 ms of their watchdogs (assumed)."""
@@ -97,7 +103,7 @@ def prepare(
             config.control.conditioning,
             drift=config.drift,
             touch=config.touch if config.touch_check else None,
-            reach=config.reach,
+            reaches=config.reaches,
             right=config.control.conditioning_right,
         ),
         limits=config.limits,
@@ -123,7 +129,7 @@ def await_board(
                 f"--esp32: expected an antenna board, found silence, and {unasked} bytes on --bus "
                 "that no servo was asked for; --esp32 and --bus are swapped"
             )
-        patience = _WHO.silence if silent else _WHO.greeting
+        patience = _SILENCE if silent else _GREETING
         if clock.now() > begin + patience:
             came = board.decoder.counters
             why = (
@@ -144,11 +150,11 @@ def await_board(
 def _require_quiet(bus: Port, clock: Any) -> None:
     """Check that the bus sends nothing unasked: servos do not, an antenna board does."""
     _unasked(bus)
-    clock.sleep_until(clock.now() + _WHO.quiet)
-    if (count := _unasked(bus)) >= _WHO.unasked:
+    clock.sleep_until(clock.now() + _QUIET)
+    if (count := _unasked(bus)) >= _UNASKED:
         raise BadInputError(
             f"--bus: expected servos, which speak only if asked, found {count} bytes in "
-            f"{_WHO.quiet:g} s that nobody asked for; is it the port of another antenna board, or "
+            f"{_QUIET:g} s without a request; is it the port of another antenna board, or "
             "has the bus another master?"
         )
 

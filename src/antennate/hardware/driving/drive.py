@@ -88,8 +88,8 @@ def drive(
                 run_loop(session, session.control, session.period, go_on)
             finally:
                 stop.closed = True
-        except KeyboardInterrupt:
-            report.ended = _SIGNAL
+        except KeyboardInterrupt as error:  # of a signal, or of a controller that asks to end
+            report.ended = _SIGNAL if stop.received else str(error) or "its controller"
         finally:
             stop.closed = True
             report.on = _off(session, config.stand)

@@ -103,7 +103,7 @@ class Session:
         return self.actuators.state.silent(self._limits.late_answers)
 
     def read(self) -> AntennaFrame:
-        """The newest reading, judged; NaN while the supervisor wants the gait to stand still."""
+        """The newest reading; NaN if it is not good or while the supervisor stops the gait."""
         now = self.clock.now()
         if self.timing is None:
             self.timing = LoopTiming(now, self.period)
@@ -127,7 +127,7 @@ class Session:
         return self._limits.slow_rate if empty else 1.0
 
     def write(self, command: JointCommand) -> None:
-        """Let the supervisor judge this tick, carry it out, then read the actuators."""
+        """Let the supervisor decide on this tick, carry that out, then read the actuators."""
         self._mark("decide")
         now = self.clock.now()
         self.outputs = out = self.supervisor.step(now, self._inputs(now))

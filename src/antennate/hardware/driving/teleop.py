@@ -48,6 +48,7 @@ class TeleopConfig(DriveConfig):
     unread: ClassVar[tuple[str, ...]] = (
         *SIMULATION_ALONE,
         "controller",
+        "robot.legs.limit",
         *paths_of(DeadManParams, "dead_man"),
         *(f"control.rule.{name}" for name in ("strong", "similar", "hold_time")),
         *paths_of(RepetitionParams, "control.repetition"),
@@ -77,7 +78,7 @@ class Wishes:
             KeyboardInterrupt: It ends the drive.
         """
         if key in QUIT:
-            raise KeyboardInterrupt
+            raise KeyboardInterrupt("a key" if key == "q" else "the end of the keys")
         if key in KEYS:
             self.maneuver, self.pressed_at = KEYS[key], now
         elif key == OSCILLATE:

@@ -76,6 +76,7 @@ class DynamixelActuators:
         bringup.require_models(bus, self.joints.models)
         bringup.arm_watchdogs(bus, ids)
         bringup.limit_speed(bus, self.joints.profiles)
+        bringup.allow_full_pwm(bus, ids)
         stood = bringup.hold_here(bus, ids)
         self.joints.align(np.array([stood[servo] for servo in ids], float), command)
         present = bringup.enable(bus, ids)

@@ -111,6 +111,18 @@ def limit_speed(bus: Bus, velocities: Mapping[int, int]) -> None:
     _write_checked(bus, _COMMON["profile_velocity"], velocities)
 
 
+def allow_full_pwm(bus: Bus, ids: Sequence[int]) -> None:
+    """Let each servo use all of the PWM that its EEPROM allows.
+
+    Goal PWM bounds the force in every mode of position. It stays as it is written until the supply
+    goes off, so that a `jog` that was killed would leave a joint without force.
+
+    Raises:
+        BringUpError: A servo did not take it.
+    """
+    _write_checked(bus, _COMMON["goal_pwm"], read_register(bus, ids, _COMMON["pwm_limit"]))
+
+
 def enable(bus: Bus, ids: Sequence[int]) -> dict[int, int]:
     """Torque on, each servo where it stands: those positions [ticks].
 

@@ -96,7 +96,7 @@ class Bus:
         Raises:
             PortError: The bus did not become quiet in time.
         """
-        if not self._send(packets.sync_write(address, data), self._clock() + BUSY, anyway):
+        if not self._send(packets.sync_write(address, data), None, anyway):
             raise PortError(f"expected a quiet bus, found it busy for {1e3 * BUSY:g} ms")
         self._calm = True
 
@@ -117,7 +117,7 @@ class Bus:
         fast, dumb = self.fast, False
         while left and self._time_for(span, len(left), end):
             got = (self._read_fast if fast else self._read_chain)(left, span, end)
-            dumb = self._judge_fast(fast, dumb, bool(got))
+            dumb = self._count_fast(fast, dumb, bool(got))
             answers |= got
             left, fast = [servo for servo in left if servo not in got], False
             self._note(got, left[:1])
@@ -268,7 +268,7 @@ class Bus:
         for servo in silent:
             self.missed[servo] = self.missed.pop(servo, 0) + 1
 
-    def _judge_fast(self, fast: bool, dumb: bool, answered: bool) -> bool:
+    def _count_fast(self, fast: bool, dumb: bool, answered: bool) -> bool:
         if fast:
             self._fast_failures = 0 if answered else self._fast_failures
             return not answered
@@ -285,8 +285,8 @@ class Bus:
         wire = self.timing.wire(2 * OVERHEAD + 3 + count + span.length + span.spare)
         return self._clock() + wire + 0.5 * self.timing.gap <= end
 
-    def _send(self, request: bytes, end: float, anyway: bool = False) -> bool:
-        """Send once the bus is known to be quiet; False, unless `anyway`, if not by `end`."""
+    def _send(self, request: bytes, end: float | None, anyway: bool = False) -> bool:
+        """Send once the bus is known to be quiet; False, unless `anyway`, if `_quiet` says no."""
         calm, self._calm = self._calm, False
         dropped = self._port.drain()
         self.tally.drained += dropped
@@ -298,14 +298,21 @@ class Bus:
         self._sent = max(self._sent, self._clock()) + self.timing.wire(len(request))
         return True
 
-    def _quiet(self, end: float) -> bool:
-        """Whether nothing has come for a while; a process that is late looks once all the same."""
+    def _quiet(self, end: float | None) -> bool:
+        """Whether nothing has come for a while, by `end` [s].
+
+        None lets the bus be busy for BUSY. Time for which the process did not run does not count
+        then: the bytes that came meanwhile are all there when it runs again, and may be the last.
+        """
+        until = self._clock() + BUSY if end is None else end
         while True:
             now = self._clock()
             left = max(self._last_byte, self._sent) + self.timing.quiet - now
-            if left <= 0.0 or now >= end:
+            if left <= 0.0 or now >= until:
                 return left <= 0.0
-            self.tally.drained += len(self._listen(left, end))
+            self.tally.drained += len(self._listen(left, until))
+            if end is None:
+                until += max(self._clock() - now - left, 0.0)
 
     def _listen(self, timeout: float, end: float) -> bytes:
         part = self._port.read(CHUNK, max(min(timeout, end - self._clock()), 0.0))

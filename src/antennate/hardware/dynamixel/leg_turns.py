@@ -3,9 +3,9 @@
 A servo counts 256 turns either way and then takes no goal. Before that the robot stands still, and
 one leg after the other forgets its turns: torque off, clear, the goal where it stands, torque on.
 Each step takes one tick and is read back before the next. A leg without torque may be turned by
-weight or by hand, for as long as the program is stopped: it gets torque only after its position was
-read anew and its goal seen to be that. The others keep their torque, and the gait goes on at the
-same phase.
+weight or by a person, for as long as the program is stopped: it gets torque only after its position
+was read anew and its goal seen to be that. The others keep their torque, and the gait goes on at
+the same phase.
 Source of the instruction: https://emanual.robotis.com/docs/en/dxl/protocol2/#clear-0x10.
 """
 

@@ -115,7 +115,7 @@ class Timed:
 
 
 class DeviceClock:
-    """Judges samples by boot, number and the board's time.
+    """Classifies samples by boot, number and the board's time.
 
     Attributes:
         states: How many samples got which state.
@@ -166,7 +166,7 @@ class DeviceClock:
         return self._lost_before + self.sequence.lost
 
     def take(self, sample: Sample, now: float) -> SampleState:
-        """Judge a sample that arrived at host's time now [s]; a USED one becomes `newest`."""
+        """Classify a sample that arrived at host's time now [s]; a USED one becomes `newest`."""
         state = self._state_of(sample, now)
         self.states[state] += 1
         return state
@@ -191,7 +191,7 @@ class DeviceClock:
             self._rebase(sample, now)
             return SampleState.USED
         step = (sample.ticks - newest.sample.ticks) % self._modulus
-        state = self._judge_time(newest, step, now)
+        state = self._state_by_time(newest, step, now)
         if state is SampleState.USED:
             self._follow(sample, newest.elapsed_us + step, step, now)
         elif self._consistent(sample):
@@ -199,7 +199,7 @@ class DeviceClock:
             return SampleState.USED
         return state
 
-    def _judge_time(self, newest: Timed, step: int, now: float) -> SampleState:
+    def _state_by_time(self, newest: Timed, step: int, now: float) -> SampleState:
         if step == 0:
             return SampleState.FROZEN
         if step >= self._modulus // 2:

@@ -65,19 +65,19 @@ class Signer:
 def same(a: bytes | memoryview, b: bytes | memoryview) -> bool:
     """Whether two tags are equal, in a time that does not tell where they differ."""
     differing = len(a) ^ len(b)
-    for x, y in zip(a, b):  # noqa: B905  (MicroPython knows no strict)
+    for x, y in zip(a, b):  # noqa: B905  (MicroPython has no `strict`)
         differing |= x ^ y
     return differing == 0
 
 
 def encode_ask(signer: Signer, nonce: bytes, number: int, boot_id: int, count: int) -> bytes:
-    """Datagram by which the host asks for frames; boot id and count as last heard, else 0."""
+    """Datagram by which the host asks for frames; boot id and count as last received, else 0."""
     ask = struct.pack(ASK_LAYOUT, VERSION, ASK, nonce, number, boot_id, count, _BLANK)
     return ask + signer.tag(FROM_HOST, ask)
 
 
 class Speaker:
-    """The board's end: answers asks with a greeting, signs frames for whoever was granted them."""
+    """The board's end: answers asks with a greeting, signs frames for the host that asked."""
 
     def __init__(self, signer: Signer, boot_id: int, hello: bytes, frame_size: int) -> None:
         self.listener = None

@@ -112,7 +112,7 @@ class FrameDecoder:
         self._spilled = True
 
     def _close(self) -> Frame | None:
-        """Judge what lies between two delimiters."""
+        """Classify what lies between two delimiters."""
         chunk, counters = bytes(self._held), self.counters
         self._held = bytearray()
         counters.judged += len(chunk)

@@ -59,7 +59,7 @@ class Tally:
 
 
 class Verifier:
-    """Asks one board for frames and hands on what is authentic and new.
+    """Asks one board for frames and passes on what is authentic and new.
 
     Args:
         key: The board's.
@@ -89,7 +89,7 @@ class Verifier:
         return self.ask()
 
     def ask(self) -> bytes:
-        """The next ask: with what the board last said, which proves that it is heard."""
+        """The next ask: with what the board last sent, which proves that its datagrams arrive."""
         self._number += 1  # 2**32 of them last for 34 years
         return datagram.encode_ask(
             self._signer, self._nonce, self._number, self._boot or 0, self._grants

@@ -139,13 +139,18 @@ def objections(hello: Hello, config_hash: int | None = None) -> tuple[str, ...]:
     return tuple(reasons)
 
 
+def names_board(sensor_id: str) -> bool:
+    """Whether the name of a flex sensor is the serial number of the board it is soldered to."""
+    return _SERIAL.fullmatch(sensor_id) is not None
+
+
 def require_sensor(hello: Hello | None, sensor_id: str | None) -> None:
     """Refuse a board to which the calibrated sensor is not soldered, where its id names a board.
 
     Raises:
         CalibrationError: Says both serial numbers.
     """
-    if sensor_id is None or not _SERIAL.fullmatch(sensor_id) or hello is None:
+    if sensor_id is None or not names_board(sensor_id) or hello is None:
         return
     if hello.device_id != sensor_id:
         raise CalibrationError(

@@ -42,7 +42,7 @@ def finder(
     if key is None:
         raise BadInputError(
             f"{address}: expected the key of the board; give --key FILE, or --insecure-udp for a "
-            "board without one, which anybody on the network can feign"
+            "board without one (anybody on the network can then send frames in its place)"
         )
     from antennate.hardware.ports.udp_port import UdpPort
 

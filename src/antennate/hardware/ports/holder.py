@@ -15,7 +15,7 @@ _MASTER = "/dev/ptmx"
 def holders(path: str) -> list[str]:
     """Other programs that have locked a port or have it open, as `pid 12 (name)`.
 
-    Whoever made a pseudo-terminal holds both its ends, and is left out.
+    The process that made a pseudo-terminal holds both its ends, and is left out.
     """
     found: dict[int, str] = {}
     for process in (*_lockers(path), *_openers(path)):

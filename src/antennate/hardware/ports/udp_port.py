@@ -20,12 +20,12 @@ _ABSENT = {errno.ECONNREFUSED, errno.EHOSTUNREACH, errno.ENETUNREACH, errno.ENET
 
 
 class UdpPort(Port):
-    """The frames of one board. Other senders are not even heard.
+    """The frames of one board. Datagrams of other senders are not received.
 
     Args:
         host: Where the board is, a name or an address.
         port: Its UDP port.
-        key: The board's key; empty for a board without one, which anybody can feign.
+        key: The board's key; empty for a board without one, in whose place anybody can send frames.
         params: Pace and limits.
         clock: Time that never steps [s].
 
@@ -52,7 +52,7 @@ class UdpPort(Port):
             family, kind, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[0]
             self._socket = socket.socket(family, kind)
             self._socket.setblocking(False)
-            self._socket.connect(address)  # binds one address, and hears this sender alone
+            self._socket.connect(address)  # the kernel drops datagrams of other senders
         except OSError as error:
             raise PortError(f"could not open {self._where}: {error}") from error
 

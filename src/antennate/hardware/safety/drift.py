@@ -37,7 +37,7 @@ class Drift:
         Args:
             t: Time at which it was taken [s]; one not newer than the last is not counted again.
             counts: The reading as it came [counts]; NaN if it cannot be used.
-            free: Whether the antenna is judged not to touch.
+            free: Whether the antenna touches nothing, as its contact detector says.
         """
         elapsed = t - self._t
         self._t = t

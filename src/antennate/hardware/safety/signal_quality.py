@@ -32,10 +32,10 @@ class SignalQuality:
         conditioning: ConditioningParams,
         drift: DriftParams | None = None,
         touch: TouchCheckParams | None = None,
-        reach: float | None = None,
+        reaches: tuple[float | None, float | None] = (None, None),
         right: CurveParams | None = None,
     ) -> None:
-        bands = Band.of(conditioning, reach), Band.of(right or conditioning, reach)
+        bands = Band.of(conditioning, reaches[0]), Band.of(right or conditioning, reaches[1])
         self.channels = [ChannelDiagnosis(band) for band in bands]
         self.check = None if touch is None else TouchCheck(touch, bands)
         self.drifts = [Drift(drift or DriftParams(), band) for band in bands]

@@ -74,7 +74,7 @@ class Supervisor:
         self._reboots = _Repeats(params.repeats, params.repeat_time)
 
     def step(self, now: float, inputs: Inputs) -> Outputs:
-        """Judge one tick at a time [s], from a clock that never steps."""
+        """Decide on one tick at a time [s], from a clock that never steps."""
         decided = self._last < inputs.decided_at <= now
         present = self._world(now, inputs) | self._controller(now, inputs, decided)
         self._recover(inputs, present)

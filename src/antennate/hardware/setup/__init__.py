@@ -1,1 +1,1 @@
-"""From a box of servos to a robot: ports, ids, zeros and directions, and single joints by hand."""
+"""From a box of servos to a robot: ports, ids, zeros, directions; single joints moved slowly."""

@@ -16,7 +16,7 @@ class Quit(Exception):
 
 
 class Person(Protocol):
-    """Whoever is told things and asked for things."""
+    """The person who is asked, and who answers."""
 
     def say(self, text: str) -> None:
         """Tell something that stays to be read."""

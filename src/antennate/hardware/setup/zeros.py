@@ -44,7 +44,7 @@ _LIFTING = "lift it"
 
 
 class HornNote(NamedTuple):
-    """A zero that tells of a horn in the wrong place.
+    """A zero that shows a horn in the wrong place.
 
     Attributes:
         joint: Name of the joint.
@@ -194,7 +194,7 @@ class Zeroing:
         """
         found = list(self._robot.directions)
         for at, name in enumerate(self._names):
-            before = next(iter(self._positions))  # whoever is asked may be quick
+            before = next(iter(self._positions))  # the person may answer at once
             where = f"{at + 1} of {len(found)}: {name}"
             person.say(f"{where}: {self._sense(at)} by 10 to 40 deg [s keeps, r keeps the rest]")
             sign = self._direction(person, at, before)

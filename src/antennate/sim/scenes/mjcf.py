@@ -8,11 +8,11 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
-from antennate.errors import SceneError, in_one_line
+from antennate.errors import SceneError
 from antennate.robots.spec import RobotSpec
 from antennate.sim import layers
 from antennate.sim.outline import outline
-from antennate.sim.scenes.mjcf_file import read_spec
+from antennate.sim.scenes.mjcf_file import in_words, read_spec
 from antennate.sim.scenes.scene import Route, add_floor
 from antennate.types import Floats
 
@@ -46,7 +46,7 @@ class MjcfScene:
         try:
             model = self._spec.compile()
         except ValueError as error:
-            raise self._error("a model that compiles", in_one_line(error)) from error
+            raise self._error("a model that compiles", in_words(error)) from error
         data = mujoco.MjData(model)
         mujoco.mj_forward(model, data)
         self._route = self._read_route(model, data)

@@ -10,17 +10,20 @@ from __future__ import annotations
 
 import math
 import os
+import re
 import resource
 import subprocess
 import sys
 from collections.abc import Sequence
+from itertools import pairwise
 from pathlib import Path
 from xml.etree import ElementTree
 
 import mujoco
 
-from antennate.errors import SceneError, in_one_line
+from antennate.errors import SceneError
 from antennate.files import read_limited
+from antennate.messages import one_line
 
 LARGEST_MODEL = 5_000_000
 """Most bytes of a model."""
@@ -39,6 +42,9 @@ _COUNTED = ("replicate", "composite", "flexcomp")
 _DIRECTORIES = ("assetdir", "meshdir", "texturedir")
 _LARGEST_SIDE = 4096
 """Most rows or columns of a height field or texture."""
+_PREFIX = re.compile(r"^(XML )?Error: (Schema violation: )?")
+_ASIDE = re.compile(r"<!--.*?-->|<\?.*?\?>|<!\[CDATA\[.*?\]\]>", re.DOTALL)
+_MARK = re.compile(r"\n|<(?!/)")
 _TEXTS = ("name", "class", "childclass", "file", "content_type")
 
 
@@ -89,12 +95,47 @@ def read_spec(path: Path) -> mujoco.MjSpec:
         root = ElementTree.fromstring(data)  # noqa: S314 without DOCTYPE there are no entities
         _check(root)
         assets = _take_assets(root, path.parent)
-        text = ElementTree.tostring(root, encoding="unicode")
-        return mujoco.MjSpec.from_string(text, assets=assets)
+        return mujoco.MjSpec.from_string(_text(root, data), assets=assets)
     except SceneError as error:
         raise SceneError(f"{path}: {error}") from error
-    except (ElementTree.ParseError, ValueError, mujoco.FatalError) as error:
-        raise SceneError(f"{path}: expected an MJCF model, found {in_one_line(error)}") from error
+    except ElementTree.ParseError as error:
+        (line, column), what = error.position, str(error).split(":")[0]
+        raise SceneError(
+            f"{path}: expected an MJCF model, found broken XML at line {line}, column "
+            f"{column + 1}: {what}"
+        ) from error
+    except (ValueError, mujoco.FatalError) as error:
+        raise SceneError(f"{path}: expected an MJCF model, found {in_words(error)}") from error
+
+
+def in_words(error: Exception) -> str:
+    """What the engine says of a model, without the names of its parts."""
+    return _PREFIX.sub("", one_line(str(error)))
+
+
+def _text(root: ElementTree.Element, data: bytes) -> str:
+    """The model as text, each element at its line of the file, which the engine's messages name."""
+    elements, lines, line = list(root.iter()), [], 1
+    text = data.decode(errors="replace")
+    for mark in _MARK.finditer(_ASIDE.sub(lambda aside: "\n" * aside.group().count("\n"), text)):
+        if mark.group() == "\n":
+            line += 1
+        else:
+            lines.append(line)
+    if len(lines) != len(elements):  # another encoding
+        return ElementTree.tostring(root, encoding="unicode")
+    before = {}
+    for parent in elements:
+        parent.text = parent.tail = None
+        before |= dict(zip(parent, [None, *parent], strict=False))
+    parents = {child: parent for parent in elements for child in parent}
+    for child, (last, own) in zip(elements[1:], pairwise(lines), strict=True):
+        gap, previous = "\n" * (own - last), before[child]
+        if previous is None:
+            parents[child].text = gap
+        else:
+            previous.tail = gap
+    return "\n" * (lines[0] - 1) + ElementTree.tostring(root, encoding="unicode")
 
 
 def _check(root: ElementTree.Element) -> None:

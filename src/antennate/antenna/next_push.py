@@ -1,0 +1,256 @@
+"""What a calibration is worth on the next push: hysteresis, predictive interval, rival curves.
+
+A push is one way from straight to bent and back: a trial of the recording, or a part of one that
+ends where the next loading begins. Everything here leaves out whole pushes, since readings of one
+push err together.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from antennate.antenna.calibration import Calibration
+from antennate.antenna.curves import MODELS, Samples
+from antennate.antenna.rivals import (
+    OTHER_DIVIDERS,
+    Gain,
+    gain_of,
+    left_out,
+    rms,
+    student,
+    with_divider,
+)
+from antennate.antenna.sensor import FULL_SCALE
+from antennate.types import Bools, Floats, Ints
+
+TURN = 0.1
+"""Share of the bend's range by which it must fall back or rise again to count as a turn."""
+_GRID = 41
+"""Bends at which loading and unloading are compared."""
+_SLICES = 20
+"""Parts of the range of bends over which readings of one direction are averaged."""
+
+
+@dataclass(frozen=True, slots=True)
+class Pushes:
+    """Readings sorted into pushes and directions.
+
+    Attributes:
+        number: Number of the push of each reading, from 0, shape (n,).
+        way: 1 while it is bent, -1 while it is released, 0 while it is held, shape (n,).
+    """
+
+    number: Ints
+    way: Ints
+
+    @classmethod
+    def of(cls, samples: Samples) -> Pushes:
+        """Find turns of the bend in each trial, whose readings are in the order of time."""
+        turn = TURN * float(np.ptp(samples.level))
+        number, way = np.zeros_like(samples.trial), np.zeros_like(samples.trial)
+        count = 0
+        for trial in np.unique(samples.trial):
+            rows = np.flatnonzero(samples.trial == trial)
+            first = True
+            for start, end, sign in _monotonic(samples.level[rows], turn):
+                count += sign > 0 and not first
+                number[rows[start:end]], way[rows[start:end]] = count, sign
+                first = False
+            count += 1
+        return cls(number, way)
+
+    @property
+    def count(self) -> int:
+        """How many pushes there are."""
+        return int(self.number.max()) + 1
+
+
+def _monotonic(level: Floats, turn: float) -> Iterator[tuple[int, int, int]]:
+    """Parts of a row of bends: first row, row after the last, and 1, -1 or 0 for its way."""
+    start, low, high, sign = 0, 0, 0, 0
+    for row, value in enumerate(level.tolist()):
+        low = row if value < level[low] else low
+        high = row if value > level[high] else high
+        if sign >= 0 and level[high] - value > turn:  # it has fallen back since its peak
+            if high > start:
+                yield start, high, 1
+            start, low, sign = high, row, -1
+        elif sign <= 0 and value - level[low] > turn:
+            if low > start:
+                yield start, low, -1 if sign else 0
+            start, high, sign = low, row, 1
+    yield start, len(level), sign
+
+
+@dataclass(frozen=True, slots=True)
+class Hysteresis:
+    """How far readings of loading and unloading lie apart at the same bend.
+
+    Attributes:
+        largest: Largest gap of mean readings, loading minus unloading, over the span of readings.
+        at_bend: Where.
+        mean: Mean gap over all bends that both directions reach, over the span of readings.
+        mean_95: 95 % interval of it over pushes, None with fewer than two.
+        level: What the curve makes of it: largest gap in b at the same bend.
+        pushes: Pushes that have both directions.
+    """
+
+    largest: float
+    at_bend: float
+    mean: float
+    mean_95: tuple[float, float] | None
+    level: float
+    pushes: int
+
+
+@dataclass(frozen=True, slots=True)
+class NewPush:
+    """What to expect of a push that served no fit.
+
+    Attributes:
+        error_95: Predictive interval: lowest and highest error of b, curve minus bend, between
+            which 95 % of the readings of a new push are expected, with 95 % confidence.
+        rmse: Root mean squared error of b on pushes left out; `worst_rmse` of the worst of them.
+        pushes: Pushes that were left out in turn.
+    """
+
+    error_95: tuple[float, float]
+    rmse: float
+    worst_rmse: float
+    pushes: int
+
+
+@dataclass(frozen=True, slots=True)
+class Assessment:
+    """What is known about the next push.
+
+    Attributes:
+        pushes: Pushes found.
+        hysteresis: None if no push was both loaded and unloaded.
+        new_push: None with a single push: nothing is known about the next one.
+        rivals: Gain of each rival under each check; the first check is the recording as it is.
+        named: Rivals that win beyond noise under every check.
+    """
+
+    pushes: int
+    hysteresis: Hysteresis | None
+    new_push: NewPush | None
+    rivals: dict[str, dict[str, Gain]]
+    named: tuple[str, ...]
+
+
+RECORDED = "as recorded"
+"""Name of the first check of a rival."""
+
+
+def assess(samples: Samples, found: Calibration) -> Assessment:
+    """Ask what a calibration is worth beyond its own pushes.
+
+    Args:
+        samples: The readings that it was fitted to, those of a trial in the order of time.
+        found: The calibration.
+    """
+    pushes = Pushes.of(samples)
+    full_scale = (found.counts_low, found.counts_high) == (0.0, float(FULL_SCALE))
+    whole = np.ones(len(samples.counts), dtype=bool)
+
+    def check(of: Samples, used: Bools) -> dict[str, list[Floats]]:
+        return left_out(of, pushes.number, used, full_scale)
+
+    checks = {RECORDED: check(samples, whole)}
+    if pushes.count > 1:
+        for name, factor in OTHER_DIVIDERS.items():
+            checks[name] = check(with_divider(samples, factor), whole)
+        if (pushes.way > 0).any() and (pushes.way < 0).any():
+            for name, sign in (("loading alone", 1), ("unloading alone", -1)):
+                checks[name] = check(samples, pushes.way == sign)
+    kept = {name: errors for name, errors in checks.items() if len(errors["sigmoid"]) > 1}
+    rivals = {
+        rival: {name: gain_of(errors, rival) for name, errors in kept.items()}
+        for rival in MODELS[1:]
+    }
+    named = tuple(r for r, gains in rivals.items() if gains and all(g.wins for g in gains.values()))
+    return Assessment(
+        pushes.count,
+        hysteresis(samples, pushes, found),
+        _new_push(checks[RECORDED]["sigmoid"]),
+        rivals,
+        named,
+    )
+
+
+def _new_push(errors: list[Floats]) -> NewPush | None:
+    """The predictive interval: both ends of a push's errors are normal from push to push."""
+    if len(errors) < 2:
+        return None
+    sizes = rms(errors)
+    spread = np.array([np.percentile(error, [2.5, 97.5]) for error in errors])
+    wide = student(len(errors)) * spread.std(axis=0, ddof=1) * np.sqrt(1 + 1 / len(errors))
+    low, high = spread.mean(axis=0) + wide * [-1.0, 1.0]
+    return NewPush(
+        (float(low), float(high)),
+        float(np.sqrt(np.mean(np.concatenate(errors) ** 2))),
+        float(sizes.max()),
+        len(errors),
+    )
+
+
+def branches(samples: Samples, pushes: Pushes) -> tuple[Floats, Floats, Floats]:
+    """Mean readings while bent and while released at the same bends.
+
+    Returns:
+        Bends, shape (g,), and readings of loading and of unloading of each push that has both
+        [counts], each of shape (pushes, g), NaN where a push has not both.
+    """
+    grid = np.linspace(samples.level.min(), samples.level.max(), _GRID)
+    pairs = []
+    for number in np.unique(pushes.number):
+        here = pushes.number == number
+        both = [_branch(samples, here & (pushes.way == sign), grid) for sign in (1, -1)]
+        if np.isfinite(both[0] + both[1]).any():
+            pairs.append(both)
+    loaded, released = np.array(pairs).reshape(-1, 2, _GRID).swapaxes(0, 1)
+    return grid, loaded, released
+
+
+def _branch(samples: Samples, rows: Bools, grid: Floats) -> Floats:
+    """Readings at the bends of a grid by straight lines between means of slices of the bend."""
+    if rows.sum() < 2:
+        return np.full(len(grid), np.nan)
+    level, counts = samples.level[rows], samples.counts[rows]
+    edges = np.linspace(grid[0], grid[-1], _SLICES + 1)
+    place = np.clip(np.digitize(level, edges) - 1, 0, _SLICES - 1)
+    size = np.bincount(place, minlength=_SLICES)
+    kept = size > 0
+    middle = np.bincount(place, level, _SLICES)[kept] / size[kept]
+    mean = np.bincount(place, counts, _SLICES)[kept] / size[kept]
+    return np.interp(grid, middle, mean, left=np.nan, right=np.nan)
+
+
+def hysteresis(samples: Samples, pushes: Pushes, found: Calibration) -> Hysteresis | None:
+    """The gap between loading and unloading; None if no push has both."""
+    grid, loaded, released = branches(samples, pushes)
+    usual = np.isfinite(loaded - released).sum(axis=0) >= max(1, len(loaded) / 2)
+    if not usual.any():
+        return None
+    up, down = loaded[:, usual], released[:, usual]
+    span = found.counts_high - found.counts_low
+    gap = np.nanmean(up - down, axis=0) / span
+    levels = np.nanmean(found.level(up) - found.level(down), axis=0)
+    worst = int(np.argmax(abs(gap)))
+    each = [float(np.nanmean(one)) / span for one in up - down if np.isfinite(one).any()]
+    mean, interval = float(np.mean(each)), None
+    if len(each) > 1:
+        half = student(len(each)) * float(np.std(each, ddof=1)) / len(each) ** 0.5
+        interval = (mean - half, mean + half)
+    return Hysteresis(
+        float(gap[worst]),
+        float(grid[usual][worst]),
+        mean,
+        interval,
+        float(levels[np.argmax(abs(levels))]),
+        len(each),
+    )

@@ -1,0 +1,40 @@
+"""The experiment `reproduce`."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from antennate.experiments.reproduce.run import ReproduceConfig, ReproduceOutcome, run
+from antennate.experiments.reproduce.verdict import VERDICTS
+from antennate.studies.experiment import Experiment
+from antennate.studies.measures import Table
+from antennate.studies.run_directory import REPORT
+
+
+def tables(result: Mapping[str, Any]) -> Sequence[Table]:
+    """All claims with their verdicts."""
+    rows = [
+        (row["claim"], [row["paper"], row["ours"], VERDICTS[row["verdict"]]])
+        for row in result["claims"]
+    ]
+    note = f"Reasons and figures: {REPORT}. Seed {result['seed']}."
+    return (Table("Claims", ["paper", "ours", "verdict"], rows, note),)
+
+
+def sentence(result: Mapping[str, Any]) -> str:
+    """How many claims hold."""
+    found = ", ".join(f"{result['verdicts'][name]} {text}" for name, text in VERDICTS.items())
+    few = " With --quick the intervals are wide." if result["quick"] else ""
+    return f"Of {len(result['claims'])} claims: {found}.{few}"
+
+
+def _files(outcome: ReproduceOutcome) -> Mapping[str, str]:
+    page = importlib.import_module("antennate.experiments.reproduce.page").page
+    return {REPORT: page(outcome)}
+
+
+EXPERIMENT = Experiment.of_folder(
+    __name__, ReproduceConfig, run, tables, sentence, files=_files, parts="parts of 9 experiments"
+)

@@ -1,0 +1,84 @@
+"""A claim of the paper, and what our runs make of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, Literal
+
+Verdict = Literal["reproduced", "conditional", "not_reproduced"]
+VERDICTS: Mapping[Verdict, str] = {
+    "reproduced": "reproduced",
+    "conditional": "conditional",
+    "not_reproduced": "not reproduced",
+}
+"""Verdicts and what people read."""
+Results = Mapping[str, Mapping[str, Any]]
+"""Content of result.json of each experiment, by its name."""
+
+
+@dataclass(frozen=True, slots=True)
+class Bar:
+    """One number of a claim's figure.
+
+    Attributes:
+        label: Whose number it is.
+        value: The number.
+        interval: Its 95 % interval, None without one.
+    """
+
+    label: str
+    value: float
+    interval: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """What our runs say of a claim.
+
+    Attributes:
+        ours: Our numbers, in words.
+        verdict: The verdict.
+        reason: Why, and for `conditional` under which condition.
+        bars: The paper's numbers and ours, in the claim's unit; the paper's first.
+    """
+
+    ours: str
+    verdict: Verdict
+    reason: str
+    bars: tuple[Bar, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Claim:
+    """One claim.
+
+    Attributes:
+        name: Short name; file name of its figure.
+        claim: What is claimed, in our words.
+        paper: The paper's numbers.
+        rule: What has to hold for `reproduced`.
+        experiment: Experiment that tests it.
+        unit: Unit of the figure's numbers.
+        judge: From the results to a finding.
+    """
+
+    name: str
+    claim: str
+    paper: str
+    rule: str
+    experiment: str
+    unit: str
+    judge: Callable[[Mapping[str, Any]], Finding]
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """A judged claim: a row of claims.csv and of `claims` in result.json."""
+
+    claim: str
+    paper: str
+    ours: str
+    verdict: Verdict
+    reason: str
+    command: str

@@ -1,0 +1,290 @@
+"""Read tracks, clean them, and classify the shapes of the antennae."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from antennate.errors import BadInputError
+from antennate.experiments.tracks import measures, synthetic
+from antennate.experiments.tracks.cleaning import COUNTED, Antennae, clean
+from antennate.experiments.tracks.config import TracksConfig
+from antennate.experiments.tracks.measures import FREE, NAMES, SHAPES, UNKNOWN, Seen
+from antennate.experiments.tracks.readers import read
+from antennate.experiments.tracks.track import Track
+from antennate.experiments.tracks.walls import Wall, wall_of
+from antennate.studies.experiment import OnRow, OnStep, no_row, no_step
+from antennate.types import Ints
+
+_RATES_AGREE = 0.02
+"""Relative difference of two frame rates that are the same."""
+
+
+@dataclass(frozen=True, slots=True)
+class TrackRow:
+    """One antenna of one animal, a row of trials.csv.
+
+    Shares are of the frames in contact, None without any. The counts from `duplicated` to `bridged`
+    are those of the animal and the same on both sides; docs/tracks.md says what they count.
+    """
+
+    seed: int
+    trial: int
+    file: str
+    animal: str
+    side: str
+    status: str
+    rate_hz: float
+    frames: int
+    unknown: int
+    free: int
+    contact: int
+    forward: float | None
+    backward: float | None
+    straight: float | None
+    transition: float | None
+    angle_median_rad: float | None
+    flex_median_rad: float | None
+    correct: float | None
+    duplicated: int
+    absent: int
+    still: int
+    low_likelihood: int
+    missing: int
+    swapped: int
+    outliers: int
+    bridged: int
+
+
+@dataclass(frozen=True)
+class TracksOutcome:
+    """Everything that was measured.
+
+    Attributes:
+        config: What was asked, with the points and the wall of the synthetic animal if it was one.
+        rows: A row for each antenna.
+        antennae: The antennae in the same order.
+        walls: The wall of each file.
+        skipped: Animals known in too few frames.
+    """
+
+    config: TracksConfig
+    rows: Sequence[TrackRow]
+    antennae: Sequence[Seen]
+    walls: dict[str, Wall]
+    skipped: int
+
+    def result(self) -> dict[str, Any]:
+        """The content of result.json."""
+        config, criteria = self.config, self.config.criteria
+        table = measures.by_trial(criteria, self.antennae)
+        counted = {r.trial: r for r in self.rows}.values()
+        correct = [row.correct for row in self.rows if row.correct is not None]
+        return {
+            "schema": 1,
+            "command": "tracks",
+            "seed": config.seed,
+            "source": "files" if config.files else "synthetic",
+            "classified_by": "bend" if config.points.count > 2 else "direction",
+            "wall": {
+                name: {"kind": w.kind, "numbers": w.numbers, "fitted": w.fitted, "rms": w.rms}
+                for name, w in self.walls.items()
+            },
+            "animals": len(counted),
+            "skipped": self.skipped,
+            "trials_in_contact": len(table),
+            "frames": {
+                name: sum(getattr(row, name) for row in self.rows)
+                for name in ("frames", "contact", "free", "unknown")
+            },
+            "handled": {name: sum(getattr(row, name) for row in counted) for name in COUNTED},
+            "shapes": measures.over_trials(criteria, self.antennae),
+            "vary": config.vary,
+            "sensitivity": measures.sensitivity(config, self.antennae),
+            "curvature_rad": measures.curvatures(criteria, self.antennae),
+            "correct": float(np.mean(correct)) if correct else None,
+        }
+
+    def frames_csv(self) -> str:
+        """Every frame of every antenna: angles, curvature and shape."""
+        file = io.StringIO()
+        writer = csv.writer(file, lineterminator="\n")
+        inner = self.config.points.count - 2
+        bends = [f"curvature{i}_rad" for i in range(1, inner + 1)]
+        writer.writerow(
+            ["trial", "side", "frame", "time_s", "angle_rad", "flex_rad", *bends, "shape"]
+        )
+        for one in self.antennae:
+            shapes = measures.shapes_of(self.config.criteria, one)
+            values = np.column_stack(
+                [one.outline.direction, one.outline.flex, one.outline.curvature]
+            ).round(5)
+            for i, (numbers, shape) in enumerate(
+                zip(values.tolist(), shapes.tolist(), strict=True)
+            ):
+                cells = ["" if math.isnan(v) else v for v in numbers[: 2 + inner]]
+                time = f"{i / one.rate:.6f}"
+                writer.writerow([one.trial, one.side, i, time, *cells, NAMES[shape]])
+        return file.getvalue()
+
+
+def run(
+    config: TracksConfig,
+    workers: int = 1,
+    on_step: OnStep = no_step,
+    on_row: OnRow = no_row,
+) -> TracksOutcome:
+    """Classify the shapes of the antennae in every file.
+
+    Raises:
+        BadInputError: A file cannot be read, lacks a point, or states another frame rate.
+        MissingPackageError: A file is HDF5 and h5py is not installed.
+    """
+    del workers  # reading and measuring take less time than starting processes
+    made = _Made(config)
+    if not config.files:
+        made.config = config.model_copy(
+            update={"points": synthetic.POINTS, "wall": synthetic.WALL, "y_down": False}
+        )
+    names = config.files or [f"synthetic{k}" for k in range(config.synthetic.trials)]
+    for number, name in enumerate(names):
+        if config.files:
+            rows = made.add(name, _read(config, Path(name)))
+        else:
+            track, truth = synthetic.animal(config.synthetic, config.seed, number)
+            rows = made.add(name, [track], truth)
+        for row in rows:
+            on_row(row)
+        on_step(number + 1, len(names))
+    if not made.rows:
+        raise BadInputError(
+            f"{', '.join(names)}: expected an animal known in {config.cleaning.least_frames} "
+            "frames, found none; are the points right, and --cleaning.likelihood not too high?"
+        )
+    return TracksOutcome(made.config, made.rows, made.antennae, made.walls, made.skipped)
+
+
+@dataclass
+class _Made:
+    """What has been measured so far."""
+
+    config: TracksConfig
+    rows: list[TrackRow] = field(default_factory=list[TrackRow])
+    antennae: list[Seen] = field(default_factory=list[Seen])
+    walls: dict[str, Wall] = field(default_factory=dict[str, Wall])
+    skipped: int = 0
+
+    def add(
+        self, name: str, tracks: Sequence[Track], truth: Ints | None = None
+    ) -> Sequence[TrackRow]:
+        """Measure the animals of one file; `truth` are the shapes of the left antenna."""
+        config, before = self.config, len(self.rows)
+        found, few = _cleaned(config, tracks)
+        self.skipped += few
+        self.walls[name] = wall = _wall(config, found)
+        trial = self.rows[-1].trial + 1 if self.rows else 0
+        for number, animal in enumerate(found, trial):
+            for side in config.points.sides:
+                one = measures.seen(number, side, animal, wall)
+                self.rows.append(_row(config, animal, one, truth if side == "left" else None))
+                self.antennae.append(one)
+        return self.rows[before:]
+
+
+def _read(config: TracksConfig, path: Path) -> list[Track]:
+    tracks = read(path, config.points.parts, config.columns)
+    if not tracks:
+        raise BadInputError(f"{path}: expected an animal with the named points, found none")
+    return tracks
+
+
+def _cleaned(config: TracksConfig, tracks: Sequence[Track]) -> tuple[list[Antennae], int]:
+    """The antennae of the animals that are known in enough frames, and how many are not."""
+    found, few = [], 0
+    for track in tracks:
+        antennae = clean(config, track, frame_rate(config, track), config.y_down)
+        known = [np.isfinite(points).all(axis=(1, 2)).sum() for points in antennae.sides.values()]
+        if max(known) < config.cleaning.least_frames:
+            few += 1
+        else:
+            found.append(antennae)
+    return found, few
+
+
+def _wall(config: TracksConfig, found: Sequence[Antennae]) -> Wall:
+    if not found:
+        return Wall("none")
+    tips = [places[:, -1] for animal in found for places in animal.places.values()]
+    lengths = [measures.length_of(points) for animal in found for points in animal.sides.values()]
+    usual = float(np.nanmedian(lengths))
+    return wall_of(config.wall, found[0].track.file, np.concatenate(tips), usual)
+
+
+def frame_rate(config: TracksConfig, track: Track) -> float:
+    """Frames a second at which a track was recorded [Hz].
+
+    Raises:
+        BadInputError: Neither file nor configuration gives it, or they differ.
+    """
+    stated = track.rate
+    if stated is None:
+        if config.rate is None:
+            raise BadInputError(
+                f"{track.file}: expected a frame rate, found none in the file; give --rate"
+            )
+        if config.playback_rate is not None:
+            raise BadInputError(
+                f"{track.file}: expected a file that states --playback-rate "
+                f"{config.playback_rate:g}, found none stated; leave the flag out"
+            )
+        return config.rate
+    if not 0.0 < stated < math.inf:
+        raise BadInputError(f"{track.file}: expected a frame rate above 0, found {stated:g}")
+    wanted = config.playback_rate or config.rate
+    if wanted is not None and abs(stated / wanted - 1.0) > _RATES_AGREE:
+        raise BadInputError(
+            f"{track.file}: expected the frame rate {wanted:g} Hz, found {stated:g} Hz in the "
+            f"file; if it was recorded at {config.rate:g} Hz and the file states another rate, add "
+            f"--playback-rate {stated:g}"
+        )
+    return config.rate or stated
+
+
+def _row(config: TracksConfig, animal: Antennae, one: Seen, truth: Ints | None) -> TrackRow:
+    shape = measures.shapes_of(config.criteria, one)
+    contact = shape >= 0
+    share = measures.shares([shape])
+    median = {
+        name: float(np.median(values[contact])) if contact.any() else None
+        for name, values in (("angle", one.outline.direction), ("flex", one.outline.flex))
+    }
+    classes = {
+        name: None if math.isnan(value) else float(value)
+        for name, value in zip(SHAPES, share, strict=True)
+    }
+    counts = {f.name: animal.counts[f.name] for f in fields(TrackRow) if f.name in animal.counts}
+    return TrackRow(
+        seed=config.seed,
+        trial=one.trial,
+        file=animal.track.file,
+        animal=animal.track.animal,
+        side=one.side,
+        status="contact" if contact.any() else "no_contact",
+        rate_hz=one.rate,
+        frames=animal.frames,
+        unknown=int((shape == UNKNOWN).sum()),
+        free=int((shape == FREE).sum()),
+        contact=int(contact.sum()),
+        angle_median_rad=median["angle"],
+        flex_median_rad=median["flex"],
+        correct=None if truth is None else float((shape == truth).mean()),
+        **classes,
+        **counts,
+    )

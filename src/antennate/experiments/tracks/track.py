@@ -1,0 +1,103 @@
+"""One animal as a file of tracking software holds it, and what every format has to fulfil."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import NoReturn
+
+import numpy as np
+
+from antennate.errors import BadInputError
+from antennate.messages import nearest, shortened
+from antennate.types import Floats, Ints
+
+LARGEST = 10**9
+"""No file is longer [bytes]."""
+
+
+@dataclass(frozen=True)
+class Track:
+    """One animal of one file, as it stands there.
+
+    Attributes:
+        file: Name of the file.
+        animal: What the file calls the animal, empty if it has one alone.
+        frames: Numbers of the frames, shape (n,).
+        rate: Frames a second that the file states, None if it states none.
+        points: Named points in the file's unit, each of shape (n, 2); NaN where missing.
+        scores: Likelihood of each point, shape (n,); absent where the file has none.
+        cutoff: Likelihood below which a point is usually left out in this format.
+        contact: Whether each side's antenna touches, 0 or 1, shape (n,), where the file has it.
+    """
+
+    file: str
+    animal: str
+    frames: Ints
+    rate: float | None
+    points: Mapping[str, Floats]
+    scores: Mapping[str, Floats]
+    cutoff: float = 0.6
+    contact: Mapping[str, Floats] = field(default_factory=dict[str, Floats])
+
+
+def require_points(path: Path, names: Sequence[str], known: Sequence[str]) -> None:
+    """Check that a file has the named points.
+
+    Raises:
+        BadInputError: One is missing.
+    """
+    for name in names:
+        if name not in known:
+            listed = shortened(", ".join(dict.fromkeys(known)) or "none")
+            raise BadInputError(
+                f"{path}: expected a point {name}{nearest(name, known)}, found {listed}; name the "
+                "points of the antennae and the body axis with --points.*"
+            )
+
+
+def refuse_labels(path: Path, index: str) -> NoReturn:
+    """Refuse hand labels, whose rows are images and no frames of a video."""
+    raise BadInputError(
+        f"{path}: expected numbers of frames, found an image, {shortened(index)}: these are "
+        "labels; give the file that analysing a video wrote"
+    )
+
+
+def from_columns(
+    path: Path, frames: Floats, columns: Mapping[tuple[str, str, str], Floats], names: Sequence[str]
+) -> list[Track]:
+    """DeepLabCut's columns, by individual, bodypart and coordinate, as tracks."""
+    known = [part for _, part, _ in columns]
+    require_points(path, names, known)
+    tracks = []
+    for animal in dict.fromkeys(animal for animal, _, _ in columns):
+        if (animal, names[0], "x") not in columns:
+            continue  # `single`: points that belong to no animal, such as corners of the arena
+        lacking = [n for n in names for c in "xy" if (animal, n, c) not in columns]
+        if lacking:
+            raise BadInputError(f"{path}: {animal}: expected x and y of {lacking[0]}, found none")
+        points = {n: np.stack([columns[animal, n, c] for c in "xy"], axis=1) for n in names}
+        scores = {n: columns[key] for n in names if (key := (animal, n, "likelihood")) in columns}
+        tracks.append(Track(str(path), animal, numbered(path, frames), None, points, scores))
+    return tracks
+
+
+def numbered(path: Path, frames: Floats) -> Ints:
+    """Numbers of frames as whole numbers.
+
+    Raises:
+        BadInputError: They are none, or do not rise.
+    """
+    if not np.isfinite(frames).all() or (frames != np.round(frames)).any():
+        raise BadInputError(f"{path}: expected whole numbers of frames, found others")
+    whole = frames.astype(np.int64)
+    falling = np.flatnonzero(np.diff(whole) < 0)
+    if len(falling):
+        at = int(falling[0])
+        raise BadInputError(
+            f"{path}: expected frames in rising order, found {whole[at + 1]} after {whole[at]}; "
+            "sort the rows, or name the column of trials with --columns.trial"
+        )
+    return whole

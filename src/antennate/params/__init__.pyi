@@ -1,0 +1,37 @@
+"""The groups for type checkers, which do not run `__getattr__`."""
+
+from antennate.params.base import Params as Params
+from antennate.params.base import number as number
+from antennate.params.bench import BenchVariationParams as BenchVariationParams
+from antennate.params.bench import WallParams as WallParams
+from antennate.params.control import ConditioningParams as ConditioningParams
+from antennate.params.control import ControlParams as ControlParams
+from antennate.params.control import CurveParams as CurveParams
+from antennate.params.control import EscapeParams as EscapeParams
+from antennate.params.control import GaitParams as GaitParams
+from antennate.params.control import RepetitionParams as RepetitionParams
+from antennate.params.control import RuleParams as RuleParams
+from antennate.params.doctor import DoctorParams as DoctorParams
+from antennate.params.endurance import DriftParams as DriftParams
+from antennate.params.network import NetworkParams as NetworkParams
+from antennate.params.record import RecordParams as RecordParams
+from antennate.params.safety import SupervisorParams as SupervisorParams
+from antennate.params.safety import TouchCheckParams as TouchCheckParams
+from antennate.params.scene import BenchPhysicsParams as BenchPhysicsParams
+from antennate.params.scene import CylinderParams as CylinderParams
+from antennate.params.scene import PhysicsParams as PhysicsParams
+from antennate.params.scene import TunnelParams as TunnelParams
+from antennate.params.scene import VariationParams as VariationParams
+from antennate.params.spring import SpringParams as SpringParams
+from antennate.params.spring import TaperParams as TaperParams
+from antennate.params.sweep import EstimateParams as EstimateParams
+from antennate.params.sweep import ShapeParams as ShapeParams
+from antennate.params.sweep import SweepParams as SweepParams
+from antennate.params.touch import BouldersWallParams as BouldersWallParams
+from antennate.params.touch import CornerWallParams as CornerWallParams
+from antennate.params.touch import FlatWallParams as FlatWallParams
+from antennate.params.touch import GapWallParams as GapWallParams
+from antennate.params.touch import SinusoidalWallParams as SinusoidalWallParams
+from antennate.params.touch import StepWallParams as StepWallParams
+from antennate.params.touch import TouchWallsParams as TouchWallsParams
+from antennate.params.twin import BatteryParams as BatteryParams

@@ -1,0 +1,151 @@
+"""`antennate reproduce`: verdicts follow their stated rules, and the page needs nothing else."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import shlex
+import subprocess
+import sys
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from antennate import experiments
+from antennate.cli.arguments import parse
+from antennate.cli.experiment import Options
+from antennate.experiments.reproduce import run as reproduce
+from antennate.experiments.reproduce.experiment import EXPERIMENT
+from antennate.experiments.reproduce.page import page
+from antennate.experiments.reproduce.run import CLAIMS, ReproduceConfig, ReproduceOutcome
+from antennate.experiments.reproduce.verdict import VERDICTS, Bar, Claim, Finding
+
+JUDGES = {claim.name: claim.judge for claim in CLAIMS}
+
+
+def springs(*stiffness: float) -> dict[str, Any]:
+    paper = (0.274, 0.137, 0.091)
+    return {
+        "springs": [
+            {"active_coils": c, "stiffness_n_mm_per_deg": ours, "paper_n_mm_per_deg": theirs}
+            for c, ours, theirs in zip((3, 6, 9), stiffness, paper, strict=True)
+        ]
+    }
+
+
+def profile(**counts: int) -> dict[str, Any]:
+    usual = {"trials": 20, "invalid": 0, "successes": 0, "jams": 0, "slips": 0}
+    return usual | {"flex_max_deg": 20.0} | counts
+
+
+def tunnel(name: str, successes: int, blind: int, p: float) -> dict[str, Any]:
+    row = {"trials": 100, "invalid": 0, "speed_m_s": 0.12}
+    pair = {"only_first": 1, "only_second": 1 + successes - blind, "mcnemar_p": p}
+    controllers = {"open": row | {"successes": blind}, name: row | {"successes": successes}}
+    return {"controllers": controllers, "paired": {f"open-{name}": pair}}
+
+
+@pytest.mark.parametrize(
+    ("name", "result", "verdict"),
+    [
+        ("springs", springs(0.2744, 0.1372, 0.0914), "reproduced"),  # half of the last digit
+        ("springs", springs(0.2744, 0.1372, 0.0916), "not_reproduced"),
+        ("stiff_jams", {"profiles": {"stiff": profile(jams=19)}}, "conditional"),
+        ("stiff_jams", {"profiles": {"stiff": profile(successes=20)}}, "not_reproduced"),
+        ("soft_slips", {"profiles": {"compliant": profile(slips=11)}}, "reproduced"),
+        ("soft_slips", {"profiles": {"compliant": profile(jams=20)}}, "not_reproduced"),
+        (
+            "descending_passes",
+            {"profiles": {"descending": profile(successes=16)}},
+            "not_reproduced",
+        ),
+        ("descending_passes", {"profiles": {"descending": profile(successes=17)}}, "conditional"),
+        ("published_rule", tunnel("paper", 95, 50, 1e-9), "reproduced"),
+        ("published_rule", tunnel("paper", 94, 50, 1e-9), "not_reproduced"),
+        ("feedback", tunnel("closed", 95, 50, 1e-9), "conditional"),
+        ("speed", tunnel("closed", 95, 50, 1e-9), "conditional"),
+        ("blind_speed", tunnel("closed", 95, 50, 1e-9), "not_reproduced"),
+    ],
+)
+def test_a_verdict_follows_its_rule(name: str, result: dict[str, Any], verdict: str) -> None:
+    assert JUDGES[name](result).verdict == verdict
+
+
+def test_a_difference_that_may_be_chance_is_said() -> None:
+    assert "not told from blind" in JUDGES["feedback"](tunnel("closed", 100, 95, 0.06)).reason
+    assert "not told from blind" not in JUDGES["feedback"](tunnel("closed", 100, 90, 0.002)).reason
+
+
+def test_there_are_as_many_claims_as_asked_for_and_each_is_run() -> None:
+    assert len({claim.name for claim in CLAIMS}) == len(CLAIMS) >= 14
+    assert {claim.experiment for claim in CLAIMS} == set(reproduce.QUICK) == set(reproduce.FULL)
+
+
+@pytest.mark.parametrize("quick", [True, False])
+@pytest.mark.parametrize("name", list(reproduce.QUICK))
+def test_the_command_beside_a_claim_runs_just_that(name: str, quick: bool) -> None:
+    config = ReproduceConfig(quick=quick)
+    words = shlex.split(reproduce.command(name, config))
+    assert words[:2] == ["antennate", name]
+    told = experiments.load(name).config
+    parsed, _ = parse(name, "", told, words[2:], Options)
+    assert parsed == told.model_validate(reproduce.settings(name, config))
+
+
+class Page(HTMLParser):
+    """What a page refers to, and its headings."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.references: list[str] = []
+        self.tags: list[str] = []
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append(tag)
+        self.references += [value or "" for name, value in attrs if name in ("src", "href")]
+
+
+def test_the_page_needs_nothing_else_and_shows_text_as_it_is() -> None:
+    claim = Claim("one", "2 < 3 & <b>", "no number", "always", "springs", "N", lambda _: finding)
+    finding = Finding("<script>", "conditional", "why", (Bar("paper", 1.0), Bar("ours", 2.0)))
+    text = page(ReproduceOutcome(ReproduceConfig(), ((claim, finding),), interrupted=False))
+    found = Page(text)
+    assert {ref.split(",")[0] for ref in found.references} == {"#one", "data:image/png;base64"}
+    assert not {"script", "link", "iframe", "b"} & set(found.tags)
+    assert "2 &lt; 3 &amp; &lt;b&gt;" in text
+    assert "prefers-color-scheme: dark" in text
+
+
+def test_claims_of_what_ran_are_kept_and_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(reproduce, "QUICK", {"springs": {}, "taper": {}})
+    whole = EXPERIMENT.run(ReproduceConfig(quick=True), 1, lambda *_: None, lambda row: None)
+    assert [row.verdict for row in whole.rows] == ["reproduced", "conditional"]
+    assert sum(whole.result()["verdicts"].values()) == 2
+    assert "2 claims: 1 reproduced" in EXPERIMENT.sentence(whole.result())
+
+    def interrupted(*_: Any) -> Any:
+        raise KeyboardInterrupt
+
+    load = experiments.load
+    stopped = dataclasses.replace(load("taper"), run=interrupted)
+    monkeypatch.setattr(experiments, "load", lambda n: stopped if n == "taper" else load(n))
+    half = EXPERIMENT.run(ReproduceConfig(quick=True), 1, lambda *_: None, lambda row: None)
+    assert half.interrupted
+    assert [row.claim for row in half.rows] == [whole.rows[0].claim]
+
+
+@pytest.mark.slow
+def test_the_quick_run_judges_every_claim(tmp_path: Path) -> None:
+    words = ["reproduce", "--quick", "--out", str(tmp_path / "run"), "--json"]
+    command = [sys.executable, "-m", "antennate", *words]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    result = json.loads(done.stdout)
+    assert len(result["claims"]) == len(CLAIMS)
+    keys = {"claim", "paper", "ours", "verdict", "reason", "command"}
+    assert all(set(row) == keys and row["verdict"] in VERDICTS for row in result["claims"])
+    assert len(list((tmp_path / "run" / "figures").glob("*.png"))) == len(CLAIMS)
+    assert (tmp_path / "run" / "report.html").stat().st_size < 3e6

@@ -1,0 +1,137 @@
+"""Antennae swing as closed forms, the engine's own mass matrix and its ring-down say."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+
+from antennate.antenna.dynamics import LinearChain, cone_ratio, least_damping
+from antennate.cli import main
+from antennate.experiments.ringdown.run import RingdownConfig, run
+from antennate.params import BenchPhysicsParams
+from antennate.robots.antenna import AntennaSpec
+from antennate.sim.bench import compile_bench
+
+QUICK = Path(__file__).parents[1] / "examples" / "quick_antenna.toml"
+RIGID = {"base_stiffness": 1e5, "base_damping": 0.0}
+
+
+@pytest.mark.parametrize(("hinges", "ratio"), [(6, 0.857), (14, 0.978), (40, 0.997)])
+def test_chains_come_near_to_the_first_mode_of_a_cone(hinges: int, ratio: float) -> None:
+    """f1 = 8.7193 / (2 pi L^2) sqrt(E r^2 / 4 rho), and ratios worked out beside this code."""
+    assert cone_ratio(hinges) == pytest.approx(ratio, abs=5e-4)
+
+
+def test_a_hundred_hinges_are_a_cone() -> None:
+    assert cone_ratio(100) == pytest.approx(0.9996, abs=5e-5)
+    assert 1 - cone_ratio(200) == pytest.approx((1 - cone_ratio(100)) / 4, rel=0.2)
+
+
+def test_one_hinge_is_a_pendulum_on_a_spring() -> None:
+    """w^2 = k / (m L^2 / 3 + armature) of a thin rod, damping ratio tau w / 2."""
+    antenna = AntennaSpec(active_coils=(3.0,), radius=1e-5, damping_time=0.004, **RIGID)
+    inertia = antenna.link_mass * antenna.length**2 / 3 + antenna.armature
+    natural = math.sqrt(antenna.hinge_stiffness()[0] / inertia)
+    first = LinearChain.of(antenna).first_mode()
+    assert first.natural_hz == pytest.approx(natural / (2 * math.pi), rel=1e-3)
+    assert first.damping == pytest.approx(antenna.damping_time * natural / 2, rel=1e-3)
+
+
+def test_a_chain_that_creeps_back_has_the_slow_root_of_its_pendulum() -> None:
+    """Overdamped: the slow root of w^2 + 2 z w s + s^2, though the stiff base swings."""
+    antenna = AntennaSpec(active_coils=(3.0,), radius=1e-5, damping_time=0.2, **RIGID)
+    inertia = antenna.link_mass * antenna.length**2 / 3 + antenna.armature
+    natural = math.sqrt(antenna.hinge_stiffness()[0] / inertia)
+    ratio = 0.1 * natural
+    first = LinearChain.of(antenna).first_mode()
+    assert first.swing_hz == 0
+    assert -first.root.real == pytest.approx(natural * (ratio - math.sqrt(ratio**2 - 1)), rel=1e-3)
+
+
+@pytest.mark.parametrize("coils", [(3.0, 6.0, 6.0, 9.0, 9.0, 9.0), (5.0,) * 14])
+def test_the_mass_matrix_is_that_of_the_engine(coils: tuple[float, ...]) -> None:
+    antenna = AntennaSpec(active_coils=coils)
+    model = compile_bench(BenchPhysicsParams(), antenna)
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    rows = []
+    for unit in np.eye(model.nv):  # M times each unit vector
+        row = np.zeros(model.nv)
+        mujoco.mj_mulM(model, data, row, unit)
+        rows.append(row)
+    joints = [model.joint(f"antenna/{name}").dofadr[0] for name in ("base", *antenna.hinge_names)]
+    found = np.array(rows)[np.ix_(joints, joints)]
+    assert LinearChain.of(antenna).mass == pytest.approx(found, rel=1e-6, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {},
+        {"damping_time": 0.005},
+        {"damping_time": 0.1},
+        {"active_coils": (3.0, 6.0, 6.0, 6.0, 9.0, 9.0, 9.0, 9.0, *(12.0,) * 6)},
+        {"active_coils": (6.0, 9.0, 9.0), "length": 0.09},
+    ],
+)
+def test_the_compiled_antenna_swings_as_its_eigenvalues_say(changes: dict[str, object]) -> None:
+    difference = run(RingdownConfig(antenna=AntennaSpec.model_validate(changes))).result()[
+        "difference"
+    ]
+    assert abs(difference["natural_hz"]) < 0.02
+    assert abs(difference["damping"]) < 0.02
+
+
+def test_the_default_antenna_is_damped_like_an_animal_and_much_slower() -> None:
+    """2.59 Hz undamped, 2.45 Hz damped and a ratio of .33 were worked out beside this code."""
+    result = run(RingdownConfig()).result()
+    assert result["chain"]["natural_hz"] == pytest.approx(2.59, abs=0.01)
+    assert result["engine"]["swing_hz"] == pytest.approx(2.44, abs=0.01)
+    assert result["engine"]["damping"] == pytest.approx(0.32, abs=0.01)
+    assert result["rejected_in_animal_cycle"] < 0.5
+
+
+def test_the_damping_that_rejects_nine_tenths_in_a_cycle() -> None:
+    ratio = least_damping(0.1)
+    assert math.exp(-2 * math.pi * ratio / math.sqrt(1 - ratio**2)) == pytest.approx(0.1)
+    assert ratio == pytest.approx(0.34, abs=0.005)
+
+
+def test_the_quick_antenna_recovers_as_a_cockroach_does() -> None:
+    """Mongeau 2014: more than 90 % of a deflection is rejected in a cycle of about 50 ms."""
+    antenna = AntennaSpec.model_validate(tomllib.loads(QUICK.read_text())["antenna"])
+    for timestep in (1e-4, 5e-4):
+        physics = BenchPhysicsParams(timestep=timestep)
+        result = run(RingdownConfig(antenna=antenna, physics=physics)).result()
+        assert result["engine"]["rejected"] > 0.9
+        assert result["engine"]["cycle_s"] == pytest.approx(0.050, rel=0.1)
+
+
+def test_the_command_takes_the_quick_antenna_and_says_how_it_recovers(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["ringdown", "--config", str(QUICK), "--out", str(tmp_path / "out")]) == 0
+    assert "as fast as a cockroach's" in capsys.readouterr().out
+    assert (tmp_path / "out" / "figures" / "ringdown.png").exists()
+    assert main(["ringdown", "--no-figures", "--out", str(tmp_path / "slow")]) == 0
+    assert "8.2 times a cockroach's" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["--antenna.base-angle", "0.5"],
+        ["--antenna.sensor.hysteresis", "0.1"],
+        ["--deflection", "-1"],
+        ["--cone-hinges", "1"],
+        ["--config", "missing.toml"],
+    ],
+)
+def test_bad_input_is_one_line(words: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["ringdown", *words]) == 2
+    assert capsys.readouterr().err.count("\n") == 1
