@@ -26,7 +26,8 @@ from antennate.experiments.gait.run import GaitStudyConfig, walk_flat
 from antennate.experiments.tunnel import run as experiment
 from antennate.experiments.tunnel.monitor import TrialResult
 from antennate.experiments.tunnel.run import TunnelConfig
-from antennate.params import GaitParams, PhysicsParams, TunnelParams
+from antennate.params.control import GaitParams
+from antennate.params.scene import PhysicsParams, TunnelParams
 from antennate.robots.spec import RobotSpec
 from antennate.sim import trial
 from antennate.sim.scenes.scene import SceneInstance

@@ -30,7 +30,7 @@ from antennate.control.gait import Gait
 from antennate.control.loop import run_loop
 from antennate.experiments.tunnel import batch as experiment
 from antennate.experiments.tunnel.run import TunnelConfig
-from antennate.params import TunnelParams
+from antennate.params.scene import TunnelParams
 from antennate.sim.scenes import geometry
 from antennate.sim.scenes.tunnel import Tunnel, TunnelScene
 from antennate.sim.sim_robot import SimRobot

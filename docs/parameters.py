@@ -8,7 +8,7 @@ from pathlib import Path
 from types import ModuleType
 
 from antennate import experiments, params
-from antennate.params.base import meaning
+from antennate.params.base import Params, meaning
 
 PAGE = Path(__file__).with_suffix(".md")
 HEAD = """\
@@ -38,20 +38,20 @@ The top level of each command's flags and configuration file; groups link to the
 """
 
 
-def groups(module: ModuleType) -> list[type[params.Params]]:
+def groups(module: ModuleType) -> list[type[Params]]:
     """Return the parameter classes that a module defines, in the order of the source."""
     return [
         group
         for name, group in vars(module).items()
         if inspect.isclass(group)
-        and issubclass(group, params.Params)
-        and group is not params.Params
+        and issubclass(group, Params)
+        and group is not Params
         and group.__module__ == module.__name__
         and not name.startswith("_")
     ]
 
 
-def commands() -> list[type[params.Params]]:
+def commands() -> list[type[Params]]:
     """Return the classes that hold the top level of a command's parameters."""
     ours = sorted(name for name in experiments.names() if experiments.is_ours(name))
     found = [group for name in ours for group in nested(experiments.load(name).config)]
@@ -59,17 +59,17 @@ def commands() -> list[type[params.Params]]:
     return list(dict.fromkeys(found))
 
 
-def nested(config: type[params.Params]) -> list[type[params.Params]]:
+def nested(config: type[Params]) -> list[type[Params]]:
     """Return a configuration and the groups in it that belong to an experiment alone."""
     found = [config] if "experiments" in config.__module__ else []
     for field in config.model_fields.values():
         default = field.get_default(call_default_factory=True)
-        if isinstance(default, params.Params) and "experiments" in type(default).__module__:
+        if isinstance(default, Params) and "experiments" in type(default).__module__:
             found += nested(type(default))
     return found
 
 
-def table(group: type[params.Params]) -> str:
+def table(group: type[Params]) -> str:
     """Return one section: what the class says of itself, and a row for each number in it."""
     rows = [
         f"## {group.__name__}",
@@ -81,7 +81,7 @@ def table(group: type[params.Params]) -> str:
     ]
     for name, field in group.model_fields.items():
         default = field.get_default(call_default_factory=True)
-        if isinstance(default, params.Params):  # its numbers have a table of their own
+        if isinstance(default, Params):  # its numbers have a table of their own
             kind = type(default).__name__
             rows.append(f"| `{name}` | [{kind}](#{kind.lower()}) | | {meaning(group, name)} | |")
             continue

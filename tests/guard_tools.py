@@ -10,7 +10,7 @@ import pytest
 
 from antennate.hardware.safety.causes import Outputs
 from antennate.hardware.safety.supervisor import Supervisor
-from antennate.params import Params
+from antennate.params.base import Params
 
 Patch = pytest.MonkeyPatch
 Off = Callable[[Patch], None]

@@ -18,7 +18,7 @@ from hardware_rig import PERIOD
 from antennate.hardware.safety import diagnosis, rate, supervisor
 from antennate.hardware.safety.causes import Cause, Outputs, State
 from antennate.hardware.safety.supervisor import Supervisor
-from antennate.params import SupervisorParams
+from antennate.params.safety import SupervisorParams
 from antennate.types import Contact, Maneuver
 
 

@@ -12,11 +12,8 @@ from antennate.control.registry import make_controller
 from antennate.hardware.safety.causes import Inputs, Outputs, State
 from antennate.hardware.safety.diagnosis import Band, ChannelDiagnosis, Finding
 from antennate.hardware.safety.supervisor import Supervisor
-from antennate.params import (
-    ConditioningParams,
-    ControlParams,
-    SupervisorParams,
-)
+from antennate.params.control import ConditioningParams, ControlParams
+from antennate.params.safety import SupervisorParams
 from antennate.types import AntennaFrame, Contact, JointCommand, Maneuver
 
 PERIOD = 0.01

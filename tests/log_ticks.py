@@ -7,7 +7,7 @@ import random
 import struct
 from functools import lru_cache
 
-from antennate.params import ControlParams
+from antennate.params.control import ControlParams
 from antennate.robots.spec import RobotSpec
 from antennate.telemetry.header import Header
 from antennate.telemetry.ticks import Tick

@@ -13,7 +13,8 @@ import numpy as np
 import pytest
 
 from antennate.control.registry import make_controller
-from antennate.params import ControlParams, Params
+from antennate.params.base import Params
+from antennate.params.control import ControlParams
 from antennate.robots.spec import RobotSpec
 from antennate.types import AntennaFrame
 

@@ -16,7 +16,7 @@ from antennate.hardware.esp32.board import Board
 from antennate.hardware.safety.causes import Cause, Inputs, Outputs, State
 from antennate.hardware.safety.diagnosis import ChannelDiagnosis
 from antennate.hardware.safety.supervisor import Supervisor
-from antennate.params import SupervisorParams
+from antennate.params.safety import SupervisorParams
 from antennate.types import Contact, Maneuver
 
 DRIFT = 50e-6

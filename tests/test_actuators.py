@@ -15,7 +15,7 @@ from antennate.hardware.driving.session import Session
 from antennate.hardware.joints import CommandError
 from antennate.hardware.safety.causes import State
 from antennate.hardware.safety.signal_quality import SignalQuality
-from antennate.params import ConditioningParams
+from antennate.params.control import ConditioningParams
 from antennate.robots.spec import RobotSpec
 from antennate.twin.config import TwinConfig
 from antennate.types import JointCommand

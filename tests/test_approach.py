@@ -12,7 +12,7 @@ from antennate.hardware.driving.config import DriveConfig
 from antennate.hardware.driving.drive import drive
 from antennate.hardware.driving.session import Session
 from antennate.hardware.safety.causes import State
-from antennate.params import SupervisorParams
+from antennate.params.safety import SupervisorParams
 from antennate.twin.config import TwinConfig
 
 TICK = 2 * math.pi / 4096

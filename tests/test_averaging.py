@@ -13,7 +13,8 @@ from antennate.control.registry import make_controller
 from antennate.hardware.driving.hardware_robot import HardwareRobot
 from antennate.hardware.esp32.board import Board
 from antennate.hardware.esp32.wire import Sample
-from antennate.params import ControlParams, SupervisorParams
+from antennate.params.control import ControlParams
+from antennate.params.safety import SupervisorParams
 
 WAY = 0.002
 """Of a frame to the host [s]."""

@@ -15,7 +15,7 @@ from antennate.cli import main
 from antennate.errors import AntennateError, CalibrationError, ConfigError
 from antennate.hardware.esp32.wire import require_sensor
 from antennate.hardware.robot import RobotConfig
-from antennate.params import ConditioningParams, ControlParams, RuleParams
+from antennate.params.control import ConditioningParams, ControlParams, RuleParams
 from antennate.twin.config import TwinConfig
 
 GOOD = Calibration(

@@ -19,7 +19,8 @@ from antennate.hardware.driving.config import DriveConfig
 from antennate.hardware.driving.drive import drive
 from antennate.hardware.safety.causes import Active, Cause, State
 from antennate.hardware.tracebacks import Tracebacks
-from antennate.params import ControlParams, SupervisorParams
+from antennate.params.control import ControlParams
+from antennate.params.safety import SupervisorParams
 from antennate.telemetry.ticks import Tick, angles_of
 from antennate.twin.config import TwinConfig
 from antennate.types import JointCommand

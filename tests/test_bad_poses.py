@@ -14,7 +14,7 @@ from twin_rig import rig
 
 from antennate.hardware.safety.causes import Cause, State
 from antennate.hardware.safety.supervisor import Supervisor
-from antennate.params import SupervisorParams
+from antennate.params.safety import SupervisorParams
 from antennate.robots.spec import RobotSpec
 from antennate.telemetry.ticks import Tick
 from antennate.twin.config import TwinConfig

@@ -7,7 +7,7 @@ import pytest
 
 from antennate.antenna.statics import Chain, shape
 from antennate.errors import SimulationError
-from antennate.params import BenchPhysicsParams
+from antennate.params.scene import BenchPhysicsParams
 from antennate.robots.antenna import AntennaSpec
 from antennate.sim.bench import Ball, Bar, Bench, compile_bench
 

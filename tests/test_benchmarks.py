@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from antennate.experiments.tunnel.run import TunnelConfig
-from antennate.params import TunnelParams
+from antennate.params.scene import TunnelParams
 
 FOLDER = Path(__file__).parents[1] / "benchmarks"
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from antennate.control.conditioning import RunningMean, bending_level, flex_fraction
-from antennate.params import ConditioningParams
+from antennate.params.control import ConditioningParams
 
 PLAIN = ConditioningParams(counts_low=0.0, counts_high=1.0, polarity=1)
 PERIOD = 0.01

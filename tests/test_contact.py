@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from antennate.control.contact import ContactState, classify
-from antennate.params import RuleParams
+from antennate.params.control import RuleParams
 from antennate.types import Contact
 
 PARAMS = RuleParams(threshold=0.5, hysteresis=0.1)

@@ -21,7 +21,7 @@ from antennate.control.registry import BUILT_IN
 from antennate.hardware.driving.hardware_robot import HardwareRobot
 from antennate.hardware.esp32.clock import Timed
 from antennate.hardware.esp32.wire import Sample
-from antennate.params import ControlParams
+from antennate.params.control import ControlParams
 from antennate.telemetry.header import Header
 from antennate.telemetry.reader import LogReader
 from antennate.telemetry.replay import recorded_controller, replay

@@ -9,7 +9,7 @@ import pytest
 
 from antennate.control.registry import BUILT_IN, make_controller
 from antennate.errors import ConfigError
-from antennate.params import ControlParams
+from antennate.params.control import ControlParams
 from antennate.types import AntennaFrame, Maneuver
 
 PARAMS = ControlParams()

@@ -16,7 +16,7 @@ from antennate.hardware.doctor.ports import latency_row
 from antennate.hardware.dynamixel.bringup import BringUpError
 from antennate.hardware.dynamixel.packets import StatusError
 from antennate.hardware.ports.errors import OpenError
-from antennate.params import DoctorParams
+from antennate.params.doctor import DoctorParams
 from antennate.twin.registers import Servo
 
 

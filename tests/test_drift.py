@@ -13,7 +13,8 @@ from antennate.hardware.safety.causes import Cause, State
 from antennate.hardware.safety.diagnosis import Finding
 from antennate.hardware.safety.drift import Drift
 from antennate.hardware.safety.signal_quality import SignalQuality
-from antennate.params import ConditioningParams, DriftParams, RuleParams
+from antennate.params.control import ConditioningParams, RuleParams
+from antennate.params.endurance import DriftParams
 from antennate.robots.sensor import SensorParams
 from antennate.types import Contact, Floats
 

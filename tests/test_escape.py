@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from antennate.control.escape import Escape
-from antennate.params import EscapeParams
+from antennate.params.control import EscapeParams
 from antennate.types import Maneuver
 
 PERIOD = 1 / 64

@@ -17,7 +17,7 @@ import pytest
 from antennate.cli.viewer import REQUIRED
 from antennate.errors import LogError
 from antennate.hardware.driving.signals import STOPS
-from antennate.params import ControlParams
+from antennate.params.control import ControlParams
 from antennate.telemetry.feed import Feed, messages
 from antennate.telemetry.header import Header
 from antennate.telemetry.parts import part

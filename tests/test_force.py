@@ -17,7 +17,8 @@ from antennate.errors import SimulationError
 from antennate.experiments import reading
 from antennate.experiments.force import loads, post_traverse
 from antennate.experiments.force import run as force
-from antennate.params import BenchPhysicsParams, ConditioningParams
+from antennate.params.control import ConditioningParams
+from antennate.params.scene import BenchPhysicsParams
 from antennate.robots.antenna import AntennaSpec
 from antennate.robots.sensor import SensorParams
 from antennate.sim.bench import Bench

@@ -8,7 +8,7 @@ from pydantic import ValidationError
 
 from antennate.experiments.gait import run as study
 from antennate.experiments.gait.pace import Walk, measure, rolling_speed
-from antennate.params import GaitParams
+from antennate.params.control import GaitParams
 from antennate.robots.spec import RobotSpec
 from antennate.types import Maneuver
 

@@ -16,7 +16,8 @@ from antennate.control.registry import BUILT_IN, CONTROLLERS, make_controller
 from antennate.errors import ConfigError
 from antennate.experiments.gait.run import GaitStudyConfig, walk_flat
 from antennate.experiments.tunnel.run import TunnelConfig
-from antennate.params import ControlParams, GaitParams, PhysicsParams
+from antennate.params.control import ControlParams, GaitParams
+from antennate.params.scene import PhysicsParams
 from antennate.robots.spec import RobotSpec
 from antennate.sim.scenes.scene import FlatScene
 from antennate.sim.sim_robot import SimRobot

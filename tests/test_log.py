@@ -18,7 +18,7 @@ from log_ticks import HEADER, ODD, tick
 
 import antennate
 from antennate.errors import AntennateError, LogError
-from antennate.params import ControlParams
+from antennate.params.control import ControlParams
 from antennate.telemetry.framing import LONGEST, SCHEMA, framed, opened, pieces
 from antennate.telemetry.header import Header
 from antennate.telemetry.reader import LogReader

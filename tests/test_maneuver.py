@@ -11,7 +11,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from antennate.control.maneuver import Hold, decide
-from antennate.params import RuleParams
+from antennate.params.control import RuleParams
 from antennate.types import Contact, Maneuver
 
 F, C, U = Contact.FREE, Contact.CONTACT, Contact.UNKNOWN

@@ -18,7 +18,7 @@ from antennate.antenna.statics import (
     tip_compliance,
     with_profile,
 )
-from antennate.params import BenchPhysicsParams
+from antennate.params.scene import BenchPhysicsParams
 from antennate.robots.antenna import AntennaSpec
 from antennate.robots.sensor import SensorParams
 from antennate.sim.bench import Bench, compile_bench

@@ -23,7 +23,7 @@ from antennate.hardware.ports.finder import finder
 from antennate.hardware.ports.keys import read_key
 from antennate.hardware.ports.port import Port, PortError
 from antennate.hardware.ports.udp_port import UdpPort
-from antennate.params import NetworkParams
+from antennate.params.network import NetworkParams
 from antennate.robots.spec import RobotSpec
 from antennate.twin.config import TwinConfig
 from antennate.twin.faults import Faults

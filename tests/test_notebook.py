@@ -17,7 +17,8 @@ import pytest
 import antennate
 from antennate import experiments
 from antennate.control.controllers import open_loop
-from antennate.params import ControlParams, SpringParams
+from antennate.params.control import ControlParams
+from antennate.params.spring import SpringParams
 
 SHORT = {"trials": 2, "time_limit": 3.0}
 

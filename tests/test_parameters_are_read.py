@@ -19,7 +19,7 @@ from antennate import experiments
 from antennate.cli import main
 from antennate.control.registry import BUILT_IN, UNREAD
 from antennate.experiments.reproduce import run as reproduce
-from antennate.params import ControlParams
+from antennate.params.control import ControlParams
 from antennate.robots.spec import RobotSpec
 
 RECORDING = "time,counts,bend,trial,speed_m_s\n" + "".join(

@@ -9,15 +9,9 @@ import pytest
 from pydantic import ValidationError
 
 from antennate import experiments
-from antennate.params import (
-    ConditioningParams,
-    ControlParams,
-    GaitParams,
-    Params,
-    PhysicsParams,
-    TunnelParams,
-)
-from antennate.params.base import meaning
+from antennate.params.base import Params, meaning
+from antennate.params.control import ConditioningParams, ControlParams, GaitParams
+from antennate.params.scene import PhysicsParams, TunnelParams
 from antennate.robots.antenna import AntennaSpec
 from antennate.robots.sensor import SensorParams
 from antennate.robots.servos import ServoParams

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -45,3 +47,28 @@ def test_a_worker_that_dies_is_noticed() -> None:
 
 def test_there_is_at_least_one_core() -> None:
     assert core_count() >= 1
+
+
+KILLED = """
+from pool_tasks import tell_and_wait
+from antennate.studies.pool import run_tasks
+
+if __name__ == "__main__":
+    run_tasks(tell_and_wait, [1, 2], 2, print)
+"""
+
+
+@pytest.mark.skipif(not Path("/proc/self").exists(), reason="looks for processes in /proc")
+def test_workers_end_when_the_program_is_killed(tmp_path: Path) -> None:
+    (tmp_path / "killed.py").write_text(KILLED)
+    path = {**os.environ, "PYTHONPATH": str(Path(__file__).parent)}
+    command = [sys.executable, str(tmp_path / "killed.py")]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=path) as program:
+        assert program.stdout is not None
+        workers = [int(program.stdout.readline()) for _ in range(2)]
+        assert all(Path(f"/proc/{worker}").exists() for worker in workers)
+        program.kill()
+    limit = time.monotonic() + 60.0
+    while any(Path(f"/proc/{worker}").exists() for worker in workers):
+        assert time.monotonic() < limit, "workers go on without their program"
+        time.sleep(0.05)

@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 
 from antennate.control.repetition import RepetitionDetector
-from antennate.params import RepetitionParams
+from antennate.params.control import RepetitionParams
 
 PERIOD, FREQUENCY = 0.01, 0.5
 CYCLE = 200

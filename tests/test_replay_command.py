@@ -16,7 +16,7 @@ from worlds import recorded, session, simulated
 from antennate import figures as style
 from antennate.cli import main
 from antennate.errors import LogError
-from antennate.params import ControlParams
+from antennate.params.control import ControlParams
 from antennate.robots.spec import RobotSpec
 from antennate.telemetry.figure import Course
 from antennate.telemetry.figure import replay as draw

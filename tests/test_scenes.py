@@ -11,7 +11,8 @@ import pytest
 
 from antennate.cli import main
 from antennate.errors import AntennateError, ConfigError, SceneError
-from antennate.params import GaitParams, PhysicsParams
+from antennate.params.control import GaitParams
+from antennate.params.scene import PhysicsParams
 from antennate.robots.spec import RobotSpec
 from antennate.sim.scenes.mjcf import MjcfScene
 from antennate.sim.scenes.mjcf_file import require_compiles

@@ -25,7 +25,8 @@ from antennate.hardware.dynamixel.packets import Instruction, StatusError
 from antennate.hardware.dynamixel.parser import Parser
 from antennate.hardware.ports.port import PortError
 from antennate.hardware.safety.causes import Cause, State
-from antennate.params import ControlParams, TouchCheckParams
+from antennate.params.control import ControlParams
+from antennate.params.safety import TouchCheckParams
 from antennate.robots.spec import RobotSpec
 from antennate.telemetry.header import Header
 from antennate.telemetry.replay import replay

@@ -13,7 +13,7 @@ from antennate.hardware.driving.drive import drive
 from antennate.hardware.driving.report import Report
 from antennate.hardware.driving.session import Session
 from antennate.hardware.safety.causes import Cause, State
-from antennate.params import TouchCheckParams
+from antennate.params.safety import TouchCheckParams
 from antennate.robots.antenna import AntennaSpec
 from antennate.twin.config import TwinConfig
 from antennate.twin.touch import TouchStimulus

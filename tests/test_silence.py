@@ -24,7 +24,7 @@ from antennate.hardware.esp32.board import BOARD_BAUD
 from antennate.hardware.esp32.wire import Sample
 from antennate.hardware.host_clock import HostClock
 from antennate.hardware.ports.serial_port import SerialPort
-from antennate.params import SupervisorParams
+from antennate.params.safety import SupervisorParams
 from antennate.twin.bus import ServoBus
 from antennate.twin.serve import Terminal
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from antennate.errors import SceneError
-from antennate.params import PhysicsParams, TunnelParams
+from antennate.params.scene import PhysicsParams, TunnelParams
 from antennate.robots.spec import RobotSpec
 from antennate.sim.scenes import geometry
 from antennate.sim.scenes.tunnel import Tunnel, TunnelScene

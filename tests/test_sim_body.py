@@ -10,7 +10,8 @@ import pytest
 
 from antennate.control.loop import run_loop
 from antennate.control.registry import make_controller
-from antennate.params import ControlParams, PhysicsParams, VariationParams
+from antennate.params.control import ControlParams
+from antennate.params.scene import PhysicsParams, VariationParams
 from antennate.robots.spec import RobotSpec
 from antennate.sim.sim_robot import Disturbance, SimRobot
 from antennate.sim.world import PREFIX, World, compile_world

@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from antennate.params import PhysicsParams
+from antennate.params.scene import PhysicsParams
 from antennate.robots.antenna import AntennaSpec
 from antennate.robots.sensor import SensorParams
 from antennate.robots.spec import RobotSpec

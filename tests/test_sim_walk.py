@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from antennate.control.gait import Gait, targets
-from antennate.params import GaitParams, PhysicsParams, TunnelParams
+from antennate.params.control import GaitParams
+from antennate.params.scene import PhysicsParams, TunnelParams
 from antennate.robots.spec import RobotSpec
 from antennate.sim.scenes.tunnel import TunnelScene
 from antennate.sim.world import World, compile_world

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from antennate.errors import SimulationError
-from antennate.params import PhysicsParams, TunnelParams
+from antennate.params.scene import PhysicsParams, TunnelParams
 from antennate.robots.spec import RobotSpec
 from antennate.sim import world as world_module
 from antennate.sim.scenes.tunnel import TunnelScene

@@ -9,7 +9,7 @@ import pytest
 from antennate.antenna import springs
 from antennate.errors import ConfigError
 from antennate.experiments.springs.experiment import run
-from antennate.params import SpringParams
+from antennate.params.spring import SpringParams
 from antennate.robots.antenna import N_MM_PER_DEG
 
 E = 193e9

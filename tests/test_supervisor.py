@@ -14,7 +14,7 @@ from pydantic import ValidationError
 
 from antennate.hardware.safety.causes import Cause, State
 from antennate.hardware.safety.diagnosis import Finding
-from antennate.params import SupervisorParams
+from antennate.params.safety import SupervisorParams
 from antennate.types import Contact, Maneuver
 
 

@@ -23,7 +23,7 @@ from antennate.hardware.safety.causes import (
     State,
 )
 from antennate.hardware.safety.supervisor import Supervisor
-from antennate.params import SupervisorParams
+from antennate.params.safety import SupervisorParams
 from antennate.types import Contact, Maneuver
 
 

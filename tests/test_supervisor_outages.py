@@ -15,7 +15,7 @@ from antennate.control.registry import make_controller
 from antennate.hardware.esp32.clock import DeviceClock, SampleState
 from antennate.hardware.esp32.wire import Hello, Reset
 from antennate.hardware.safety.causes import Cause, Outputs, State
-from antennate.params import ControlParams
+from antennate.params.control import ControlParams
 from antennate.types import Maneuver
 
 

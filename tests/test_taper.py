@@ -10,7 +10,7 @@ import pytest
 from antennate.antenna import taper
 from antennate.errors import BadInputError, ConfigError
 from antennate.experiments.taper.experiment import TaperConfig, run
-from antennate.params import TaperParams
+from antennate.params.spring import TaperParams
 
 LINEAR = (
     *(1, 0.759, 0.564, 0.410, 0.289, 0.198, 0.130, 0.0809, 0.0474, 0.0256, 0.0123, 0.00506),

@@ -18,7 +18,7 @@ from antennate.hardware.driving.gamepad import Gamepad
 from antennate.hardware.driving.session import Session
 from antennate.hardware.driving.teleop import KeyController
 from antennate.hardware.safety.causes import State
-from antennate.params import ControlParams
+from antennate.params.control import ControlParams
 from antennate.params.setup import TeleopParams
 from antennate.twin.config import TwinConfig
 from antennate.types import AntennaFrame, Maneuver

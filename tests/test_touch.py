@@ -21,7 +21,9 @@ from antennate.experiments.touch.config import TouchConfig, site
 from antennate.experiments.touch.measures import Pool, roc
 from antennate.experiments.touch.sensing import Comparison, match, merged, runs
 from antennate.experiments.touch.traverse import plan
-from antennate.params import BenchPhysicsParams, ConditioningParams, RuleParams, TouchWallsParams
+from antennate.params.control import ConditioningParams, RuleParams
+from antennate.params.scene import BenchPhysicsParams
+from antennate.params.touch import TouchWallsParams
 from antennate.robots.antenna import AntennaSpec
 from antennate.robots.sensor import SensorParams
 from antennate.sim import touch_wall

@@ -13,7 +13,8 @@ from antennate.hardware.safety.causes import Cause
 from antennate.hardware.safety.diagnosis import Band
 from antennate.hardware.safety.signal_quality import SignalQuality
 from antennate.hardware.safety.touch_check import Ask, TouchCheck
-from antennate.params import ConditioningParams, TouchCheckParams
+from antennate.params.control import ConditioningParams
+from antennate.params.safety import TouchCheckParams
 from antennate.types import Contact
 
 RISING = Band(500.0, 2500.0, 1)

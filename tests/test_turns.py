@@ -14,7 +14,7 @@ from antennate.hardware.driving.config import DriveConfig
 from antennate.hardware.driving.drive import drive
 from antennate.hardware.driving.session import Session
 from antennate.hardware.safety.causes import State
-from antennate.params import ControlParams
+from antennate.params.control import ControlParams
 from antennate.telemetry.header import Header
 from antennate.telemetry.replay import replay
 from antennate.telemetry.ticks import Tick

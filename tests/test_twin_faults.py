@@ -17,7 +17,7 @@ from antennate.hardware.dynamixel.parser import Parser
 from antennate.hardware.esp32.decoder import FrameDecoder
 from antennate.hardware.esp32.wire import Sample
 from antennate.hardware.safety.causes import State
-from antennate.params import BatteryParams
+from antennate.params.twin import BatteryParams
 from antennate.robots.spec import RobotSpec
 from antennate.twin.config import TwinConfig, build
 from antennate.twin.faults import Faults, read

@@ -17,7 +17,7 @@ from antennate.control.gait import targets
 from antennate.control.registry import BUILT_IN, make_controller
 from antennate.experiments.tunnel.run import TunnelConfig
 from antennate.hardware.joints import CommandError, Joints
-from antennate.params import ControlParams
+from antennate.params.control import ControlParams
 from antennate.robots.spec import RobotSpec
 from antennate.sim.scenes.tunnel import TunnelScene
 from antennate.sim.world import World

@@ -17,7 +17,7 @@ from antennate.errors import BadInputError
 from antennate.hardware.driving.config import DriveConfig
 from antennate.hardware.driving.drive import drive
 from antennate.hardware.dynamixel import packets
-from antennate.params import TouchCheckParams
+from antennate.params.safety import TouchCheckParams
 from antennate.robots.antenna import AntennaSpec
 from antennate.twin.config import TwinConfig
 from antennate.twin.touch import TouchStimulus

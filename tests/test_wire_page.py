@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 
 from antennate.hardware.esp32 import datagram, frame
-from antennate.params import ControlParams
+from antennate.params.control import ControlParams
 from antennate.telemetry.header import Header
 from antennate.telemetry.ticks import Tick
 from antennate.telemetry.writer import LogWriter

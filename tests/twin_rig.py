@@ -27,7 +27,8 @@ from antennate.hardware.esp32.board import Board
 from antennate.hardware.joints import Joints
 from antennate.hardware.ports.port import Port
 from antennate.hardware.safety.signal_quality import SignalQuality
-from antennate.params import ControlParams, SupervisorParams, TouchCheckParams
+from antennate.params.control import ControlParams
+from antennate.params.safety import SupervisorParams, TouchCheckParams
 from antennate.sim.scenes.registry import make_scene
 from antennate.sim.sim_robot import SimRobot
 from antennate.sim.trial import draw_trial

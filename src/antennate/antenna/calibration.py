@@ -14,7 +14,7 @@ from antennate.antenna.sensor import FULL_SCALE
 from antennate.control.conditioning import bending_level
 from antennate.errors import CalibrationError
 from antennate.files import read_limited, write_whole
-from antennate.params import ConditioningParams, CurveParams
+from antennate.params.control import ConditioningParams, CurveParams
 from antennate.types import Floats
 
 SCHEMA = 1

@@ -14,8 +14,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from antennate.params import SpringParams
-from antennate.params.spring import RATE_FACTOR, STOCK_WIRES_MM, WIRES
+from antennate.params.spring import RATE_FACTOR, STOCK_WIRES_MM, WIRES, SpringParams
 
 
 def spring_stiffness(modulus: float, wire: float, coil: float, coils: float) -> float:

@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from antennate.params import TaperParams
+from antennate.params.spring import TaperParams
 from antennate.types import Floats
 
 

@@ -14,7 +14,7 @@ from antennate.cli.options import option
 from antennate.cli.progress import progress, stop_signals
 from antennate.cli.results import ResultOptions, folder_for, tell
 from antennate.errors import OutputError
-from antennate.params import Params
+from antennate.params.base import Params
 from antennate.studies.experiment import Experiment, Outcome
 from antennate.studies.pool import core_count
 from antennate.studies.run_directory import RunDirectory

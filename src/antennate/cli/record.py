@@ -26,7 +26,7 @@ from antennate.hardware.esp32.clock import Timed
 from antennate.hardware.esp32.recorder import Recorder
 from antennate.hardware.host_clock import HostClock
 from antennate.hardware.robot_file import RobotFile
-from antennate.params import RecordParams
+from antennate.params.record import RecordParams
 
 DESCRIPTION = """\
 Record an antenna at a bench, into a CSV file that `antennate calibrate` takes. With --marks you

@@ -13,7 +13,7 @@ from pydantic.dataclasses import dataclass
 
 from antennate.cli.arguments import FromFile
 from antennate.cli.options import option
-from antennate.params import Params
+from antennate.params.base import Params
 from antennate.studies.formats import to_json
 from antennate.studies.measures import Table
 from antennate.studies.run_directory import RunDirectory

@@ -9,7 +9,7 @@ from typing import Any
 from antennate.cli.arguments import parse
 from antennate.cli.exit_codes import OK
 from antennate.cli.results import ResultOptions, folder_for, tell
-from antennate.params import Params
+from antennate.params.base import Params
 from antennate.robots.parts import bill
 from antennate.robots.servos import EXTENDED_MODE
 from antennate.robots.spec import RobotSpec

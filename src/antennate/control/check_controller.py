@@ -12,7 +12,7 @@ from antennate.control.checked import CheckedController
 from antennate.control.expect import expect
 from antennate.control.registry import ControllerFactory, make_controller
 from antennate.errors import AntennateError
-from antennate.params import ConditioningParams, ControlParams
+from antennate.params.control import ConditioningParams, ControlParams
 from antennate.robots.spec import RobotSpec
 from antennate.types import AntennaFrame, Contact, Floats, JointCommand, Maneuver
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from antennate.params import ConditioningParams, ControlParams, CurveParams
+from antennate.params.control import ConditioningParams, ControlParams, CurveParams
 from antennate.types import Bools, Floats, Ints
 
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from antennate.params import RuleParams
+from antennate.params.control import RuleParams
 from antennate.types import Bools, Contact, Floats, Ints
 
 _FREE, _CONTACT, _UNKNOWN = int(Contact.FREE), int(Contact.CONTACT), int(Contact.UNKNOWN)

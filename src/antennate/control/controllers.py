@@ -19,7 +19,7 @@ from antennate.control.escape import Escape
 from antennate.control.gait import Gait
 from antennate.control.maneuver import Hold, decide
 from antennate.control.repetition import RepetitionDetector
-from antennate.params import ControlParams
+from antennate.params.control import ControlParams
 from antennate.robots.sides import LEFT, RIGHT
 from antennate.robots.spec import RobotSpec
 from antennate.types import AntennaFrame, Bools, Contact, Floats, Ints, JointCommand, Maneuver

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from antennate.params import EscapeParams
+from antennate.params.control import EscapeParams
 from antennate.robots.sides import LEFT, RIGHT
 from antennate.types import Bools, Floats, Ints, Maneuver
 

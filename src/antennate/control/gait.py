@@ -22,7 +22,7 @@ from functools import lru_cache
 import numpy as np
 
 from antennate.errors import ConfigError
-from antennate.params import GaitParams
+from antennate.params.control import GaitParams
 from antennate.robots.spec import RobotSpec
 from antennate.types import Bools, Floats, Ints, JointCommand
 

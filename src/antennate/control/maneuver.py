@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from antennate.params import RuleParams
+from antennate.params.control import RuleParams
 from antennate.robots.sides import LEFT, RIGHT
 from antennate.types import Bools, Contact, Floats, Ints, Maneuver
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from antennate.control import controllers
 from antennate.errors import ConfigError, in_one_line
 from antennate.lookup import Registry
-from antennate.params import ControlParams
+from antennate.params.control import ControlParams
 from antennate.robots.spec import RobotSpec
 from antennate.types import Controller
 

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from antennate.params import RepetitionParams
+from antennate.params.control import RepetitionParams
 from antennate.types import Bools, Floats, Ints
 
 

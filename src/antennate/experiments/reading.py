@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from antennate.antenna import sensor as flex_sensor
-from antennate.params import ConditioningParams
+from antennate.params.control import ConditioningParams
 from antennate.robots.sensor import SensorParams
 from antennate.types import Floats, Ints
 

@@ -12,7 +12,7 @@ from antennate import experiments
 from antennate.control.registry import CONTROLLERS, ControllerFactory
 from antennate.dataframe import from_rows
 from antennate.errors import BadInputError, ConfigError
-from antennate.params import Params
+from antennate.params.base import Params
 from antennate.params.reading import from_values
 from antennate.studies.experiment import Experiment, Outcome
 from antennate.studies.run_directory import RunDirectory

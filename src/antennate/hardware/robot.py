@@ -9,16 +9,11 @@ from antennate.antenna.calibration import Calibration
 from antennate.errors import ConfigError
 from antennate.hardware.esp32.wire import names_board
 from antennate.messages import shown
-from antennate.params import (
-    ConditioningParams,
-    ControlParams,
-    DoctorParams,
-    NetworkParams,
-    Params,
-    SupervisorParams,
-    number,
-)
-from antennate.params.base import paths_of
+from antennate.params.base import Params, number, paths_of
+from antennate.params.control import ConditioningParams, ControlParams
+from antennate.params.doctor import DoctorParams
+from antennate.params.network import NetworkParams
+from antennate.params.safety import SupervisorParams
 from antennate.robots.spec import SIMULATION_ALONE, RobotSpec
 
 

@@ -9,7 +9,8 @@ from antennate.hardware.driving.teleop import TeleopConfig
 from antennate.hardware.esp32.recorder import RecordConfig
 from antennate.hardware.robot import DoctorConfig, RobotConfig
 from antennate.hardware.setup.config import JogConfig, SetupConfig, ZeroConfig
-from antennate.params import DoctorParams, RecordParams
+from antennate.params.doctor import DoctorParams
+from antennate.params.record import RecordParams
 from antennate.params.setup import JogParams, PortsParams, SetupParams, TeleopParams
 
 _Config = TypeVar("_Config", bound=RobotConfig)

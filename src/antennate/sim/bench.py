@@ -16,7 +16,7 @@ import mujoco
 import numpy as np
 
 from antennate.errors import SimulationError
-from antennate.params import PhysicsParams
+from antennate.params.scene import PhysicsParams
 from antennate.robots.antenna import BASE, AntennaSpec
 from antennate.sim import antenna_part, layers
 from antennate.sim.world import new_spec, set_contacts

@@ -10,7 +10,8 @@ import numpy as np
 
 from antennate.control.expect import expect
 from antennate.control.gait import targets
-from antennate.params import GaitParams, PhysicsParams
+from antennate.params.control import GaitParams
+from antennate.params.scene import PhysicsParams
 from antennate.robots.spec import RobotSpec
 from antennate.sim.world import World, compile_world
 from antennate.types import Floats

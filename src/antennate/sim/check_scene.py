@@ -9,7 +9,8 @@ import numpy as np
 
 from antennate.control.expect import expect
 from antennate.errors import AntennateError
-from antennate.params import GaitParams, PhysicsParams
+from antennate.params.control import GaitParams
+from antennate.params.scene import PhysicsParams
 from antennate.robots.spec import RobotSpec
 from antennate.sim.scenes.scene import Scene, SceneInstance
 from antennate.sim.trial import make_world, place_at_start, require_room

@@ -10,7 +10,7 @@ import numpy as np
 
 from antennate.antenna.sensor import SensorChain, reading_noise
 from antennate.errors import ConfigError, SimulationError
-from antennate.params import VariationParams
+from antennate.params.scene import VariationParams
 from antennate.robots.spec import RobotSpec
 from antennate.sim.world import World
 from antennate.types import AntennaFrame, Floats, JointCommand

@@ -12,14 +12,9 @@ from pydantic import field_validator, model_validator
 
 from antennate.control.gait import targets
 from antennate.errors import AntennateError, SceneError, in_one_line
-from antennate.params import (
-    GaitParams,
-    Params,
-    PhysicsParams,
-    TunnelParams,
-    VariationParams,
-    number,
-)
+from antennate.params.base import Params, number
+from antennate.params.control import GaitParams
+from antennate.params.scene import PhysicsParams, TunnelParams, VariationParams
 from antennate.robots.spec import RobotSpec
 from antennate.sim.scenes.registry import TUNNEL, check_name, make_scene
 from antennate.sim.scenes.scene import Scene, SceneInstance

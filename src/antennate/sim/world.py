@@ -13,7 +13,7 @@ import mujoco
 import numpy as np
 
 from antennate.errors import SceneError, SimulationError, in_one_line
-from antennate.params import PhysicsParams
+from antennate.params.scene import PhysicsParams
 from antennate.robots.spec import ANTENNA_PREFIXES, RobotSpec
 from antennate.sim import layers, robot_part
 from antennate.sim.gears import Gears

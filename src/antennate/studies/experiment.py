@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 
-from antennate.params import Params
+from antennate.params.base import Params
 from antennate.studies.measures import Table
 
 if TYPE_CHECKING:

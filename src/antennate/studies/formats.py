@@ -10,8 +10,7 @@ import re
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
-from antennate.params import Params
-from antennate.params.base import meaning
+from antennate.params.base import Params, meaning
 
 _CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f]+")
 _FORMULA = ("=", "+", "-", "@")

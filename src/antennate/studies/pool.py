@@ -189,6 +189,15 @@ def _begin(results: Any, added: dict[str, dict[str, Any]]) -> None:
     for group, objects in added.items():
         ADDED.setdefault(group, {}).update(objects)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    """End this worker once its parent is gone, also if that was killed."""
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)
 
 
 def _work(function: Callable[[Any, Emit], None], task: Any) -> int:

@@ -30,7 +30,7 @@ from typing import IO, Any
 from antennate import __version__
 from antennate.errors import BadInputError, OutputError
 from antennate.files import decoded, read_limited, write_whole
-from antennate.params import Params
+from antennate.params.base import Params
 from antennate.params.reading import Config, read_file
 from antennate.studies.formats import from_csv, strict, to_csv, to_json, to_toml
 from antennate.telemetry.parts import MOST_PARTS, part

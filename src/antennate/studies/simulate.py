@@ -8,7 +8,7 @@ import numpy as np
 
 from antennate.control.loop import run_loop
 from antennate.control.registry import ControllerFactory, make_controller
-from antennate.params import ControlParams
+from antennate.params.control import ControlParams
 from antennate.params.reading import from_values
 from antennate.sim.scenes.registry import make_scene
 from antennate.sim.sim_robot import SimRobot

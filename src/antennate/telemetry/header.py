@@ -8,7 +8,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 
 from antennate import __version__
 from antennate.errors import LogError
-from antennate.params import ControlParams
+from antennate.params.control import ControlParams
 from antennate.params.reading import describe
 from antennate.robots.spec import RobotSpec
 from antennate.telemetry.framing import SCHEMA, Kind

@@ -14,7 +14,7 @@ from antennate.control.loop import run_loop
 from antennate.control.registry import BUILT_IN, CONTROLLERS, make_controller
 from antennate.errors import LogError
 from antennate.hardware.driving.decision import Decision, decision_of, no_command
-from antennate.params import Params, number
+from antennate.params.base import Params, number
 from antennate.robots.spec import RobotSpec
 from antennate.telemetry.header import Header
 from antennate.telemetry.ticks import Tick, angles_of

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Annotated, ClassVar
 
-from antennate.params import GaitParams, Params, number
-from antennate.params.base import GATHERED
+from antennate.params.base import GATHERED, Params, number
+from antennate.params.control import GaitParams
 from antennate.params.twin import BatteryParams
 from antennate.robots.spec import RobotSpec
 from antennate.sim.scenes.registry import make_scene

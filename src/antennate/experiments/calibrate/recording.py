@@ -17,8 +17,7 @@ from antennate.antenna.curves import Samples
 from antennate.csv_files import column, csv_rows, number_of, unit_of
 from antennate.errors import CalibrationError
 from antennate.files import read_limited
-from antennate.params import Params
-from antennate.params.base import number
+from antennate.params.base import Params, number
 from antennate.types import Floats, Ints
 
 TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6}

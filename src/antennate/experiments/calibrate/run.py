@@ -23,8 +23,9 @@ from antennate.antenna.sensor import SensorChain, reading_noise
 from antennate.control.conditioning import bending_level
 from antennate.experiments.calibrate.recording import Recording, RecordingParams, read, write
 from antennate.experiments.reading import mean_since
-from antennate.params import BenchPhysicsParams, BenchVariationParams, Params
-from antennate.params.base import number
+from antennate.params.base import Params, number
+from antennate.params.bench import BenchVariationParams
+from antennate.params.scene import BenchPhysicsParams
 from antennate.robots.antenna import AntennaSpec
 from antennate.sim.bench import Bench, Slider, compile_bench
 from antennate.studies.experiment import OnStep, Outcome, no_step

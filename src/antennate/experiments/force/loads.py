@@ -14,8 +14,9 @@ from antennate.antenna.statics import PROFILES, Chain, Profile, equilibrium, wit
 from antennate.control.conditioning import bending_level
 from antennate.experiments import reading
 from antennate.experiments.force.post_traverse import Traverse
-from antennate.params import BenchPhysicsParams, ConditioningParams, Params, number
-from antennate.params.base import require_different, require_whole_steps
+from antennate.params.base import Params, number, require_different, require_whole_steps
+from antennate.params.control import ConditioningParams
+from antennate.params.scene import BenchPhysicsParams
 from antennate.robots.antenna import AntennaSpec
 from antennate.types import Bools, Floats, Ints
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from antennate.errors import SimulationError
-from antennate.params import BenchPhysicsParams
+from antennate.params.scene import BenchPhysicsParams
 from antennate.robots.antenna import AntennaSpec
 from antennate.sim.bench import Ball, Bench, compile_bench
 from antennate.types import Floats

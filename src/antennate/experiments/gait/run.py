@@ -16,8 +16,9 @@ from pydantic import model_validator
 from antennate.control.gait import Gait
 from antennate.control.loop import run_loop
 from antennate.experiments.gait.pace import Pace, Walk, measure, rolling_speed
-from antennate.params import GaitParams, Params, PhysicsParams, VariationParams, number
-from antennate.params.base import require_whole_steps
+from antennate.params.base import Params, number, require_whole_steps
+from antennate.params.control import GaitParams
+from antennate.params.scene import PhysicsParams, VariationParams
 from antennate.robots.spec import HARDWARE_ALONE, RobotSpec
 from antennate.sim.scenes.scene import FlatScene
 from antennate.sim.sim_robot import Disturbance, SimRobot

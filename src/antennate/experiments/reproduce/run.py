@@ -12,7 +12,7 @@ from antennate import experiments
 from antennate.experiments.reproduce.bench_claims import ANTENNA
 from antennate.experiments.reproduce.robot_claims import ROBOT
 from antennate.experiments.reproduce.verdict import VERDICTS, Claim, Finding, Row
-from antennate.params import Params, number
+from antennate.params.base import Params, number
 from antennate.studies.experiment import OnRow, OnStep, no_row, no_step
 
 CLAIMS: tuple[Claim, ...] = (*ANTENNA, *ROBOT)

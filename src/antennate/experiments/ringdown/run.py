@@ -10,8 +10,8 @@ import numpy as np
 from pydantic import Field
 
 from antennate.antenna.dynamics import LinearChain, Mode, cone_ratio, fitted_mode, least_damping
-from antennate.params import BenchPhysicsParams, Params
-from antennate.params.base import number, paths_of
+from antennate.params.base import Params, number, paths_of
+from antennate.params.scene import BenchPhysicsParams
 from antennate.robots.antenna import MOST_HINGES, AntennaSpec
 from antennate.robots.sensor import SensorParams
 from antennate.sim.bench import Bench, compile_bench

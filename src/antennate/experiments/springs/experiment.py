@@ -10,7 +10,7 @@ from typing import Any
 from antennate.antenna import springs
 from antennate.antenna.springs import Winding
 from antennate.errors import ConfigError
-from antennate.params import SpringParams
+from antennate.params.spring import SpringParams
 from antennate.robots.antenna import N_MM_PER_DEG
 from antennate.studies.experiment import Experiment, Outcome
 from antennate.studies.measures import Measure, Table

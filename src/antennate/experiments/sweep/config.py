@@ -8,16 +8,10 @@ from typing import Annotated, ClassVar
 from pydantic import Field, model_validator
 
 from antennate.antenna.statics import PROFILES, Profile
-from antennate.params import (
-    BenchPhysicsParams,
-    ConditioningParams,
-    EstimateParams,
-    Params,
-    ShapeParams,
-    SweepParams,
-    number,
-)
-from antennate.params.base import require_different, require_whole_steps
+from antennate.params.base import Params, number, require_different, require_whole_steps
+from antennate.params.control import ConditioningParams
+from antennate.params.scene import BenchPhysicsParams
+from antennate.params.sweep import EstimateParams, ShapeParams, SweepParams
 from antennate.robots.antenna import AntennaSpec
 
 

@@ -15,7 +15,8 @@ import numpy as np
 from antennate.antenna.shapes import Shape, classify
 from antennate.errors import SimulationError
 from antennate.experiments.force.post_traverse import speed_at, way
-from antennate.params import BenchPhysicsParams, ShapeParams, SweepParams
+from antennate.params.scene import BenchPhysicsParams
+from antennate.params.sweep import ShapeParams, SweepParams
 from antennate.robots.antenna import AntennaSpec
 from antennate.sim.bench import Bar, Bench, compile_bench
 from antennate.types import Bools, Floats

@@ -13,8 +13,8 @@ from antennate.antenna import taper
 from antennate.csv_files import column, csv_rows, number_of
 from antennate.errors import BadInputError, ConfigError
 from antennate.files import read_limited
-from antennate.params import TaperParams
 from antennate.params.base import number
+from antennate.params.spring import TaperParams
 from antennate.studies.experiment import Experiment, Outcome
 from antennate.studies.measures import Table, shown
 from antennate.types import Floats

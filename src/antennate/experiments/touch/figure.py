@@ -16,7 +16,7 @@ from antennate.experiments.touch.experiment import F1, ONSET, RELEASE
 from antennate.experiments.touch.run import TouchOutcome
 from antennate.experiments.touch.sensing import Comparison
 from antennate.experiments.touch.traverse import Traverse
-from antennate.params import RuleParams
+from antennate.params.control import RuleParams
 
 _TRUE, _SENSED = "#0072B2", "#D55E00"
 _BAR = {"marker": "_", "markersize": 11, "markeredgewidth": 1.8, "capsize": 0}

@@ -17,7 +17,7 @@ from antennate.control.contact import ContactState
 from antennate.experiments import reading
 from antennate.experiments.touch.config import TouchConfig
 from antennate.experiments.touch.traverse import Traverse
-from antennate.params import ConditioningParams, RuleParams
+from antennate.params.control import ConditioningParams, RuleParams
 from antennate.types import Bools, Contact, Floats, Ints
 
 

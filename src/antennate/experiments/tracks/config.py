@@ -7,7 +7,7 @@ from typing import Literal
 
 from pydantic import model_validator
 
-from antennate.params import Params, number
+from antennate.params.base import Params, number
 
 _FORMAT = r"^[^{}]*\{\}[^{}]*$"
 

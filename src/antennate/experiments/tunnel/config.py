@@ -7,8 +7,8 @@ from typing import ClassVar
 from pydantic import field_validator, model_validator
 
 from antennate.control.registry import BUILT_IN, CONTROLLERS, require_read
-from antennate.params import ControlParams, number
-from antennate.params.base import require_different, require_whole_steps
+from antennate.params.base import number, require_different, require_whole_steps
+from antennate.params.control import ControlParams
 from antennate.robots.spec import HARDWARE_ALONE
 from antennate.sim.trial import TrialConfig
 

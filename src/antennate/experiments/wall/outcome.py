@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from antennate.params import WallParams
+from antennate.params.bench import WallParams
 from antennate.types import Floats
 
 Outcome = Literal["success", "jam", "slip", "invalid"]

@@ -20,8 +20,9 @@ from antennate.antenna.statics import PROFILES, Profile, with_profile
 from antennate.errors import SimulationError
 from antennate.experiments.wall import measures
 from antennate.experiments.wall.outcome import SAMPLE_PERIOD, Traverse, WallTrial, classify
-from antennate.params import BenchPhysicsParams, BenchVariationParams, Params, WallParams
-from antennate.params.base import number, require_different
+from antennate.params.base import Params, number, require_different
+from antennate.params.bench import BenchVariationParams, WallParams
+from antennate.params.scene import BenchPhysicsParams
 from antennate.robots.antenna import AntennaSpec
 from antennate.robots.sensor import SensorParams
 from antennate.sim.bench import Ball, Bench, compile_bench

@@ -15,7 +15,7 @@ from antennate.hardware.esp32.wire import Hello, Reset, objections, require_sens
 from antennate.hardware.robot import DoctorConfig
 from antennate.hardware.safety import diagnosis
 from antennate.hardware.safety.diagnosis import Band, ChannelDiagnosis
-from antennate.params import CurveParams
+from antennate.params.control import CurveParams
 
 _LONGEST_TEXT = 60
 _COPY = "copy the three files of firmware/ to the board again"

@@ -17,7 +17,7 @@ from antennate.hardware.dynamixel.tables import RETURN_DELAY_UNIT, XC430_W240, R
 from antennate.hardware.esp32.board import BOARD_BAUD
 from antennate.hardware.esp32.decoder import FrameDecoder
 from antennate.hardware.ports.port import Port
-from antennate.params import DoctorParams
+from antennate.params.doctor import DoctorParams
 from antennate.robots.spec import RobotSpec
 
 _BAUDS = (57_600, 115_200, 1_000_000, 2_000_000, 3_000_000, 4_000_000)

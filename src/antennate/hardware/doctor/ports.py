@@ -13,7 +13,8 @@ from antennate.hardware.ports.errors import OpenError
 from antennate.hardware.ports.finder import finder
 from antennate.hardware.ports.holder import holders
 from antennate.hardware.ports.port import Port
-from antennate.params import DoctorParams, NetworkParams
+from antennate.params.doctor import DoctorParams
+from antennate.params.network import NetworkParams
 
 _TIMERS = Path("/sys/bus/usb-serial/devices")
 _USUAL_NAME = "ttyUSB0"

@@ -10,7 +10,7 @@ from antennate.hardware.dynamixel.answers import Timing, Value
 from antennate.hardware.dynamixel.bringup import BringUpError
 from antennate.hardware.dynamixel.bus import Bus
 from antennate.hardware.ports.port import Port
-from antennate.params import DoctorParams
+from antennate.params.doctor import DoctorParams
 
 _PINGS = 5
 """Number of pings that are timed: two late ones do not move their median (assumed)."""

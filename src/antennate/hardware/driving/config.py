@@ -6,8 +6,10 @@ from pydantic import field_validator
 
 from antennate.control.registry import CONTROLLERS
 from antennate.hardware.robot import RobotConfig
-from antennate.params import DriftParams, TouchCheckParams, number
+from antennate.params.base import number
 from antennate.params.dead_man import DeadManParams
+from antennate.params.endurance import DriftParams
+from antennate.params.safety import TouchCheckParams
 
 
 class DriveConfig(RobotConfig):

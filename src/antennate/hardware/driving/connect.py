@@ -27,7 +27,7 @@ from antennate.hardware.ports.finder import finder
 from antennate.hardware.ports.port import Port, PortError
 from antennate.hardware.ports.reconnecting import Reconnecting
 from antennate.hardware.safety.signal_quality import SignalQuality
-from antennate.params import DoctorParams
+from antennate.params.doctor import DoctorParams
 from antennate.robots.spec import RobotSpec
 from antennate.types import Controller
 

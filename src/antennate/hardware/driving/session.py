@@ -30,7 +30,7 @@ from antennate.hardware.ports.port import PortError
 from antennate.hardware.safety.causes import Cause, Inputs, Outputs, State
 from antennate.hardware.safety.signal_quality import SignalQuality
 from antennate.hardware.safety.supervisor import Supervisor
-from antennate.params import SupervisorParams
+from antennate.params.safety import SupervisorParams
 from antennate.types import AntennaFrame, Clock, Controller, JointCommand
 
 

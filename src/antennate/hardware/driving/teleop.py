@@ -15,8 +15,8 @@ import numpy as np
 
 from antennate.control.controllers import RuleController
 from antennate.hardware.driving.config import DriveConfig
-from antennate.params import ControlParams, EscapeParams, RepetitionParams
 from antennate.params.base import paths_of
+from antennate.params.control import ControlParams, EscapeParams, RepetitionParams
 from antennate.params.dead_man import DeadManParams
 from antennate.params.setup import TeleopParams
 from antennate.robots.spec import SIMULATION_ALONE, RobotSpec

@@ -12,7 +12,9 @@ from typing import TypeAlias
 from antennate.errors import BadInputError
 from antennate.hardware.esp32.board import Board
 from antennate.hardware.esp32.clock import Timed
-from antennate.params import DoctorParams, NetworkParams, RecordParams
+from antennate.params.doctor import DoctorParams
+from antennate.params.network import NetworkParams
+from antennate.params.record import RecordParams
 
 Ask: TypeAlias = Callable[[str], Callable[[], bool]]
 """Tells a person what to do; the function it returns says whether that has been confirmed."""

@@ -19,7 +19,7 @@ from enum import Enum
 from antennate.antenna.calibration import REACH
 from antennate.antenna.sensor import FULL_SCALE
 from antennate.errors import CalibrationError
-from antennate.params import CurveParams
+from antennate.params.control import CurveParams
 
 LOW_RAIL = 5.0
 """Readings up to this are at the lower rail [counts]: two sigma of the noise above 0 (assumed)."""

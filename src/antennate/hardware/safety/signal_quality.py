@@ -12,7 +12,9 @@ from collections.abc import Sequence
 from antennate.hardware.safety.diagnosis import Band, ChannelDiagnosis, Finding
 from antennate.hardware.safety.drift import Drift
 from antennate.hardware.safety.touch_check import Ask, TouchCheck
-from antennate.params import ConditioningParams, CurveParams, DriftParams, TouchCheckParams
+from antennate.params.control import ConditioningParams, CurveParams
+from antennate.params.endurance import DriftParams
+from antennate.params.safety import TouchCheckParams
 from antennate.types import Contact
 
 _SIDES = ("left", "right")

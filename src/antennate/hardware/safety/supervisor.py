@@ -22,7 +22,7 @@ from antennate.hardware.safety.causes import (
     State,
 )
 from antennate.hardware.safety.rate import RateMeter
-from antennate.params import SupervisorParams
+from antennate.params.safety import SupervisorParams
 from antennate.types import Contact, Maneuver
 
 _ACTIONS = frozenset(Maneuver)

@@ -9,7 +9,7 @@ import math
 from enum import Enum
 
 from antennate.hardware.safety.diagnosis import Band
-from antennate.params import TouchCheckParams
+from antennate.params.safety import TouchCheckParams
 
 _NAMES = ("left", "right")
 

@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from antennate.params import TunnelParams
+from antennate.params.scene import TunnelParams
 from antennate.types import Floats
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from antennate.errors import AntennateError, ConfigError, SceneError, in_one_line
 from antennate.lookup import Registry
-from antennate.params import TunnelParams
+from antennate.params.scene import TunnelParams
 from antennate.sim.scenes.mjcf import MjcfScene
 from antennate.sim.scenes.mjcf_file import require_compiles
 from antennate.sim.scenes.scene import FlatScene, Scene

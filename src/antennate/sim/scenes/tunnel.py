@@ -15,7 +15,7 @@ import mujoco
 import numpy as np
 
 from antennate.errors import SceneError
-from antennate.params import CylinderParams, TunnelParams
+from antennate.params.scene import CylinderParams, TunnelParams
 from antennate.robots.spec import RobotSpec
 from antennate.sim import layers
 from antennate.sim.scenes import geometry
