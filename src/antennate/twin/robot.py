@@ -209,7 +209,7 @@ class TwinRobot:
             self._wires[side == "right"] = kind
 
     def order_touch(self, text: str) -> None:
-        """Touch an antenna at once, by an order of `touch`; a robot that has walked is put back first.
+        """Touch an antenna at once; a robot that has walked and has no torque is put back first.
 
         Raises:
             BadInputError: The order has another form.
