@@ -28,7 +28,7 @@ from antennate.hardware.driving.session import Session
 from antennate.hardware.driving.signals import StopOnce
 from antennate.hardware.robot_file import RobotFile
 from antennate.hardware.safety.causes import State
-from antennate.messages import short_names
+from antennate.messages import short_names, typed
 from antennate.studies.measures import Measure, Table
 from antennate.studies.run_directory import LOG
 from antennate.telemetry.feed import Feed
@@ -127,7 +127,7 @@ def _tell(result: Mapping[str, Any], orders: Orders, log: str) -> None:
     """Table and sentences; `log` are the words with which `replay` reads the log."""
     name = result["controller"]
     table = Table.of("Drive", {short_names([name])[name]: result}, MEASURES, _note(result))
-    again = f"What was read and decided: antennate replay {log}"
+    again = f"What was read and decided: {typed('replay')} {log}"
     again = again if result["logs"] else f"No log was kept: {_LOGLESS}"
     tell(result, orders, [table], f"{_sentence(result)}\n{again}")
 
