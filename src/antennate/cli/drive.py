@@ -115,7 +115,8 @@ def walk(
             folder.finish(result, ())
         finally:  # the robot's state is told even if it cannot be kept
             other = "" if controller is None else " --controller open"
-            _tell(result, orders, f"{shlex.quote(str(folder.path / LOG))}{other}")
+            log = folder.path / (result["logs"] or [LOG])[0]
+            _tell(result, orders, f"{shlex.quote(str(log))}{other}")
     fault = result["worst_state"] in (State.FAULT.name, State.OFF.name)
     stays_on = result["torque_off"] is False
     idle = _idle(result)
@@ -160,7 +161,9 @@ def _carry_out(
             unlogged = True
         session.unrecorded = config.record_required and not feed.keeps
 
+    stop = operator.stop
     with feed, urgent() as priority:
+        feed.wait(lambda: stop is not None and stop.received)  # nobody walks unseen
         report = drive(session, config, orders.arm, keep, operator)
     head = {"schema": 1, "command": command, "controller": config.controller, "armed": orders.arm}
     tail = {
