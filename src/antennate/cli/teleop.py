@@ -49,6 +49,7 @@ def command(argv: Sequence[str]) -> int:
             "--hold-to-run: expected none with teleop, which stands without a key, found it"
         )
     require_step(config.robot)
+    drive.require_ports(orders)
     with _keys(orders.gamepad) as keys:
         return drive.walk("teleop", config, orders, argv, _controller(config, keys))
 
