@@ -212,9 +212,8 @@ class World:
         """
         before = self.data.time
         self._steps += count
-        self._gears.load(self.data)
         try:
-            mujoco.mj_step(self.model, self.data, count)
+            self._gears.step(self.data, count)
         except mujoco.FatalError as error:
             raise SimulationError(self._steps, str(error).splitlines()[0]) from error
         self._check(before)
