@@ -64,3 +64,19 @@ class Terminal:
             for line in lines
             for at in range(0, len(line), self.columns)
         ]
+
+
+def read_all(end: int, process: subprocess.Popen[bytes], patience: float = 120.0) -> str:
+    """All that is written to a pseudo-terminal until its process has ended; closes it."""
+    text, limit = b"", time.monotonic() + patience
+    while time.monotonic() < limit:
+        if select.select([end], [], [], 0.1)[0]:
+            try:
+                text += os.read(end, 65536)
+            except OSError:  # the other end is closed
+                break
+        elif process.poll() is not None:
+            break
+    process.wait(patience)
+    os.close(end)
+    return text.decode(errors="replace")

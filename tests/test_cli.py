@@ -556,3 +556,12 @@ def test_reading_stops_at_the_limit():
         pytest.skip("needs /dev/zero")
     with pytest.raises(ConfigError, match="a pipe or a device"):
         read_file(Path("/dev/zero"), TunnelConfig)
+
+
+@pytest.mark.parametrize(("uv", "said"), [("/bin/uv", "uv run antennate"), ("", "antennate")])
+def test_hints_are_typed_as_the_program_was_called(
+    uv: str, said: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("UV", uv)
+    assert main(["zero"]) == 2
+    assert f"found none; `{said} setup` finds it" in capsys.readouterr().err

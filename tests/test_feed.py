@@ -18,7 +18,7 @@ from antennate.cli.viewer import REQUIRED
 from antennate.errors import LogError
 from antennate.hardware.driving.signals import STOPS
 from antennate.params.control import ControlParams
-from antennate.telemetry.feed import Feed, messages
+from antennate.telemetry.feed import KEPT, Feed, messages
 from antennate.telemetry.header import Header
 from antennate.telemetry.parts import part
 from antennate.telemetry.reader import LogReader, count
@@ -151,7 +151,7 @@ def test_G6_a_record_that_is_required_is_given_up_with_its_process(tmp_path: Pat
 
 def test_G6_a_record_that_is_required_is_not_kept_while_its_process_stands_still() -> None:
     """It has said that it keeps what it gets, and then takes nothing more."""
-    stuck = "import os, time; os.write(1, b'b'); time.sleep(60)"
+    stuck = f"import os, time; os.write(1, {KEPT!r}); time.sleep(60)"
     with Feed(script(stuck), b"first") as feed:
         until(lambda: feed.keeps, feed)
         while feed.send(bytes(400)):
@@ -259,3 +259,38 @@ def test_a_signal_does_not_end_the_viewer_before_the_loop(number: int, tmp_path:
 
 def _holds_a_tick(log: Path) -> bool:
     return log.exists() and log.stat().st_size > len(HEADER.pack()) + 100
+
+
+def test_the_loop_can_wait_until_somebody_looks(tmp_path: Path) -> None:
+    go = tmp_path / "go"
+    late = (
+        "import os, sys, time\n"
+        f"while not os.path.exists({str(go)!r}): time.sleep(0.01)\n"
+        f"os.execv(sys.executable, {viewer(tmp_path / 'drive.log')(1)!r})"
+    )
+    with Feed(script(late), HEADER.pack()) as feed:
+        asked = [0]
+
+        def given_up() -> bool:
+            asked[0] += 1
+            return asked[0] > 5
+
+        feed.wait(given_up)
+        assert asked == [6]
+        assert not feed.keeps
+        go.touch()
+        feed.wait()
+        assert feed.keeps
+
+
+def test_nobody_is_waited_for_who_is_gone_for_good() -> None:
+    with Feed(script("pass"), b"first") as feed:
+        feed.wait()
+        assert feed.failed
+
+
+def test_the_other_process_is_not_reached_by_the_terminal(tmp_path: Path) -> None:
+    """Ctrl-C goes to the process group of the terminal; the recorder is in one of its own."""
+    with Feed(viewer(tmp_path / "drive.log"), HEADER.pack()) as feed:
+        assert feed.pid is not None
+        assert os.getpgid(feed.pid) not in (os.getpgrp(), os.getpgid(os.getppid()))

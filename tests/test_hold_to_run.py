@@ -21,6 +21,7 @@ from antennate.hardware.driving.dead_man import DeadMan
 from antennate.hardware.driving.drive import drive
 from antennate.hardware.driving.operator import Operator
 from antennate.hardware.driving.session import Session
+from antennate.messages import typed
 from antennate.params.dead_man import DeadManParams
 from antennate.twin.config import TwinConfig
 
@@ -183,5 +184,5 @@ def test_B19_a_signal_sent_again_and_again_loses_no_report(name: str, tmp_path: 
     assert process.returncode == 0
     assert json.loads((folder / "result.json").read_text())["torque_off"] is True
     assert err.splitlines()[-1] == f"written to {folder}"
-    assert out.splitlines()[-1].startswith("What was read and decided: antennate replay ")
+    assert out.splitlines()[-1].startswith(f"What was read and decided: {typed('replay')} ")
     assert "ended by a signal; torque is off, verified." in out

@@ -63,7 +63,7 @@ def test_B15_servos_that_are_set_otherwise_are_refused_with_the_cure(
 ) -> None:
     made = rig(TwinConfig())
     spoil(made.robot.servos)
-    with pytest.raises(BringUpError, match=rf"{said}; `antennate doctor --fix`"):
+    with pytest.raises(BringUpError, match=rf"{said}; `(uv run )?antennate doctor --fix`"):
         require_servos(made.session.actuators.bus, RobotSpec())
     assert not any(servo.torque for servo in made.robot.servos)
 

@@ -93,6 +93,19 @@ def test_one_twin_serves_many_drives_each_with_its_touches_from_the_same_start()
     assert starts[0] == starts[1]
 
 
+def test_an_order_to_touch_a_robot_that_has_walked_puts_it_back_and_is_read() -> None:
+    made = rig(TwinConfig())
+    before = made.session.board.wait(0.1, made.clock.now)[-1].sample.left
+    drive(made.session, DriveConfig(dry_run=0.5, duration=2.0, touch_check=False), arm=True)
+    told: list[float] = []
+    made.robot.on_return = lambda: told.append(made.clock.now())
+    made.robot.order_touch("left:60deg")
+    made.clock.sleep(1.0)
+    bent = made.session.board.wait(0.1, made.clock.now)[-1].sample.left
+    assert len(told) == 1
+    assert bent == pytest.approx(before + reading(np.pi / 3), abs=1.0)
+
+
 @contextmanager
 def typing_twin(*words: str) -> Iterator[tuple[subprocess.Popen[bytes], str]]:
     """A twin whose standard input takes orders, and the path of its board."""

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import re
+import shlex
 from collections.abc import Iterable
 from difflib import SequenceMatcher, get_close_matches
 from typing import Any
@@ -25,6 +27,15 @@ def shortened(text: str) -> str:
     """The text on one line, cut if it is long; a text of blanks in quotes, so that it is seen."""
     text = one_line(text) or repr(text)
     return text if len(text) <= _LONGEST else text[: _LONGEST - 3] + "..."
+
+
+def typed(*words: str) -> str:
+    """The words that a person types to run a command of this program, as it was called itself.
+
+    `uv run` sets the variable UV for what it runs; there the command is `uv run antennate`.
+    """
+    program = ["uv", "run", "antennate"] if os.environ.get("UV") else ["antennate"]
+    return shlex.join([*program, *words])
 
 
 def short_names(controllers: Iterable[str]) -> dict[str, str]:

@@ -116,6 +116,7 @@ def _known(word: str) -> bool:
 
 def _usage() -> str:
     from antennate.experiments import summaries
+    from antennate.messages import typed
 
     width = max(map(len, commands()))
     return "\n".join(
@@ -126,9 +127,9 @@ def _usage() -> str:
             "",
             *_listed("experiments", summaries(), width),
             *_listed("the robot and its twin", ROBOT_COMMANDS, width),
-            "`antennate COMMAND --help` shows its options, `--help-all` every one;",
-            "`antennate --completion bash` (zsh, fish) prints a script for the shell;",
-            "`antennate --version` prints the version.",
+            f"`{typed('COMMAND', '--help')}` shows its options, `--help-all` every one;",
+            f"`{typed('--completion', 'bash')}` (zsh, fish) prints a script for the shell;",
+            f"`{typed('--version')}` prints the version.",
             "",
         ]
     )

@@ -28,7 +28,7 @@ from antennate.hardware.driving.session import Session
 from antennate.hardware.driving.signals import StopOnce
 from antennate.hardware.robot_file import RobotFile
 from antennate.hardware.safety.causes import State
-from antennate.messages import short_names
+from antennate.messages import short_names, typed
 from antennate.studies.measures import Measure, Table
 from antennate.studies.run_directory import LOG
 from antennate.telemetry.feed import Feed
@@ -115,7 +115,8 @@ def walk(
             folder.finish(result, ())
         finally:  # the robot's state is told even if it cannot be kept
             other = "" if controller is None else " --controller open"
-            _tell(result, orders, f"{shlex.quote(str(folder.path / LOG))}{other}")
+            log = folder.path / (result["logs"] or [LOG])[0]
+            _tell(result, orders, f"{shlex.quote(str(log))}{other}")
     fault = result["worst_state"] in (State.FAULT.name, State.OFF.name)
     stays_on = result["torque_off"] is False
     idle = _idle(result)
@@ -126,7 +127,7 @@ def _tell(result: Mapping[str, Any], orders: Orders, log: str) -> None:
     """Table and sentences; `log` are the words with which `replay` reads the log."""
     name = result["controller"]
     table = Table.of("Drive", {short_names([name])[name]: result}, MEASURES, _note(result))
-    again = f"What was read and decided: antennate replay {log}"
+    again = f"What was read and decided: {typed('replay')} {log}"
     again = again if result["logs"] else f"No log was kept: {_LOGLESS}"
     tell(result, orders, [table], f"{_sentence(result)}\n{again}")
 
@@ -160,7 +161,9 @@ def _carry_out(
             unlogged = True
         session.unrecorded = config.record_required and not feed.keeps
 
+    stop = operator.stop
     with feed, urgent() as priority:
+        feed.wait(lambda: stop is not None and stop.received)  # nobody walks unseen
         report = drive(session, config, orders.arm, keep, operator)
     head = {"schema": 1, "command": command, "controller": config.controller, "armed": orders.arm}
     tail = {
@@ -186,7 +189,10 @@ def _operator(config: DriveConfig, orders: Orders) -> Iterator[Operator]:
             pressed = stack.enter_context(pressed_keys("--hold-to-run"))
         if orders.until is not None:
             if orders.until.exists():
-                raise ConfigError(f"--until: expected no such file yet, found {orders.until}")
+                raise ConfigError(
+                    f"--until: expected no such file yet, found {orders.until} of an earlier "
+                    "drive; remove it"
+                )
             arrived = stack.enter_context(Arrival(orders.until))
         yield Operator(stop, pressed, arrived or (lambda: False))
 

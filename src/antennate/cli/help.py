@@ -9,6 +9,7 @@ from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
 from antennate.cli.options import Option, fields_of, first_line, flag_of
+from antennate.messages import typed
 from antennate.params.base import meaning
 from antennate.params.reading import group_of
 
@@ -45,7 +46,7 @@ def short_page(command: Command) -> str:
     top = sorted(outside, key=lambda option: not option.metavar.startswith("NAME"))
     groups = _groups(command.model, command.parameters)
     head = _head(command, command.description.split("\n\n")[0])
-    tail = [*groups, "", f"`antennate {command.name} --help-all` shows every option."]
+    tail = [*groups, "", f"`{typed(command.name, '--help-all')}` shows every option."]
     lines = list(_section("parameters:", top))
     if (over := len(head) + len(lines) + len(tail) - SHORT_LINES) > 0:
         kept, shown = lines[: 2 if len(lines) > 1 else 0], 0

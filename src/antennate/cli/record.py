@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import select
-import shlex
 import sys
 import termios
 from collections import deque
@@ -26,6 +25,7 @@ from antennate.hardware.esp32.clock import Timed
 from antennate.hardware.esp32.recorder import Recorder
 from antennate.hardware.host_clock import HostClock
 from antennate.hardware.robot_file import RobotFile
+from antennate.messages import typed
 from antennate.params.record import RecordParams
 
 DESCRIPTION = """\
@@ -173,5 +173,5 @@ def _next(params: RecordParams, out: Path) -> str:
     if not params.marks and params.speed is None:
         return "they show rate, noise and drift; calibrate needs --marks or --speed."
     unit = params.unit if params.marks else "m"
-    words = ["antennate", "calibrate", "--recording", str(out), "--columns.bend-unit", unit]
-    return "next: " + shlex.join([*words, "--sensor-id", params.side])
+    words = ["calibrate", "--recording", str(out), "--columns.bend-unit", unit]
+    return "next: " + typed(*words, "--sensor-id", params.side, "--out", params.side)

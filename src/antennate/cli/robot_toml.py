@@ -13,6 +13,7 @@ from antennate.cli.arguments import FromFile
 from antennate.cli.options import option
 from antennate.errors import ConfigError
 from antennate.hardware.robot_file import RobotFile
+from antennate.messages import typed
 from antennate.params.reading import Config
 
 USUAL = Path("robot.toml")
@@ -64,7 +65,7 @@ def require_bus(bus: str) -> None:
         ConfigError: It is.
     """
     if not bus:
-        raise ConfigError("--bus: expected a serial port, found none; `antennate setup` finds it")
+        raise ConfigError(f"--bus: expected a serial port, found none; `{typed('setup')}` finds it")
     refuse_udp(bus)
 
 

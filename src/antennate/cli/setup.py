@@ -25,7 +25,7 @@ from antennate.hardware.setup.person import Quit, confirm
 from antennate.hardware.setup.robot_toml import change
 from antennate.hardware.setup.servos import ServoSetup, model_name
 from antennate.hardware.setup.zeros import by_group
-from antennate.messages import nearest, shortened
+from antennate.messages import nearest, shortened, typed
 from antennate.studies.measures import Table
 
 DESCRIPTION = """\
@@ -63,7 +63,7 @@ def command(argv: Sequence[str]) -> int:
             bus = _ports(person, config, orders, path)
             return _servos(person, config, orders, path, bus)
     except Quit:
-        sys.stderr.write(f"ended; what is done is in {path}, run `antennate setup` to go on\n")
+        sys.stderr.write(f"ended; what is done is in {path}, run `{typed('setup')}` to go on\n")
         return OK
     finally:
         person.close()
@@ -127,7 +127,7 @@ def _servos(
     if missing:
         person.say(f"expected all servos to answer, found none of {', '.join(missing)}")
         return BAD_INPUT
-    person.say(f"all servos answer; {path} is written. Next: antennate zero")
+    person.say(f"all servos answer; {path} is written. Next: {typed('zero')}")
     return OK
 
 

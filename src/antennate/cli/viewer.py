@@ -1,7 +1,7 @@
 """The other process of `antennate drive`: it keeps the log and shows one line.
 
 It reads from its standard input what a `Feed` sends, and nobody waits for it. On its standard
-output it says once that the log has begun.
+output it says once whether the log has begun.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from antennate.cli.status import StatusLine, write
 from antennate.errors import LogError
 from antennate.hardware.driving.signals import STOPS
 from antennate.messages import one_line
-from antennate.telemetry.feed import Message, messages
+from antennate.telemetry.feed import KEPT, NOT_KEPT, Message, messages
 from antennate.telemetry.header import Header
 from antennate.telemetry.ticks import Tick
 from antennate.telemetry.writer import LogWriter
@@ -80,7 +80,7 @@ def main() -> int:
 
     With the word `required` after the log's path it ends with the log, and shows nothing more.
     """
-    for number in STOPS:  # the other end decides when it is over
+    for number in (*STOPS, signal.SIGTTOU):  # the other end decides when it is over
         signal.signal(number, signal.SIG_IGN)
     display = Display()
     kept, required = False, REQUIRED in sys.argv[2:]
@@ -89,9 +89,8 @@ def main() -> int:
         first = next(stream, None)
         log = None if first is None else _begin(Path(sys.argv[1]), first)
         kept = log is not None
-        if kept:
-            with contextlib.suppress(OSError):  # the other end is gone; the ticks tell it
-                os.write(_STDOUT, b"begun\n")
+        with contextlib.suppress(OSError):  # the other end is gone; the ticks tell it
+            os.write(_STDOUT, KEPT if kept else NOT_KEPT)
         for message in stream:
             kept = kept and _keep(log, message.content)
             display.show(message)

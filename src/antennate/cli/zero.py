@@ -25,6 +25,7 @@ from antennate.hardware.setup.config import ZeroConfig
 from antennate.hardware.setup.person import Quit
 from antennate.hardware.setup.robot_toml import change
 from antennate.hardware.setup.zeros import Positions, Zeroing, by_group
+from antennate.messages import typed
 from antennate.robots.spec import RobotSpec
 from antennate.studies.measures import Table
 
@@ -81,7 +82,7 @@ def _measure(person: TerminalPerson, config: ZeroConfig, orders: Orders, path: P
     change(path, by_group(robot, "zeros", zeros) | by_group(robot, "directions", directions))
     person.close()
     _show(robot, zeros, directions)
-    sys.stderr.write(f"{path} is written. Next: antennate doctor --config {path}\n")
+    sys.stderr.write(f"{path} is written. Next: {typed('doctor', '--config', str(path))}\n")
     return OK
 
 

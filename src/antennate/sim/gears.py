@@ -32,8 +32,16 @@ class Gears:
         self._dry: Floats = model.dof_frictionloss[self._dof]
         self._damping: Floats = model.dof_damping[self._dof]
 
-    def load(self, data: mujoco.MjData) -> None:
-        """Set the friction of the coming steps from the torques of the motors in the last one."""
-        if len(self._dof):
+    def step(self, data: mujoco.MjData, count: int) -> None:
+        """Advance by `count` physics steps, each with friction from the torques of the one before.
+
+        Raises:
+            mujoco.FatalError: The engine failed.
+        """
+        if not len(self._dof):
+            mujoco.mj_step(self._model, data, count)
+            return
+        for _ in range(count):
             motor = data.actuator_force[self._drive] - self._damping * data.qvel[self._dof]
             self._model.dof_frictionloss[self._dof] = self._dry + self._share * abs(motor)
+            mujoco.mj_step(self._model, data)

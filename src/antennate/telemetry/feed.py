@@ -36,6 +36,8 @@ _PATIENCE = 5.0
 """Time for the other process to write the last ticks to a slow disk under load [s]; assumed."""
 _STARTING = 30.0
 """Time for it to begin at all, if it has not yet [s]: its imports on a busy machine; assumed."""
+KEPT, NOT_KEPT = b"k", b"n"
+"""What the other process says once it takes messages: whether it keeps them."""
 RESTARTS = 3
 """Processes that may follow the first; a defect that more of them meet is not cured (assumed)."""
 _POLL = 0.02
@@ -57,7 +59,8 @@ class Feed:
 
     Args:
         words: The command line of the n-th process, 1 the first. It reads messages from its
-            standard input, and writes anything to its standard output once it keeps them.
+            standard input, and writes `KEPT` or `NOT_KEPT` to its standard output once it takes
+            them. Signals of the terminal do not reach it.
         first: The content of the first message, of any length.
         restarts: How many processes may follow the first.
 
@@ -83,6 +86,7 @@ class Feed:
         self._keeper = threading.Thread(target=self._look_after, name="recorder", daemon=True)
         self.offered = self.dropped = self.started = 0
         self.failed = self._begun = False
+        self._answered = threading.Event()
         self._waiting = deque[bytes]()
 
     @property
@@ -124,6 +128,17 @@ class Feed:
             self._process.kill()
             self._keeper.join()
 
+    def wait(self, given_up: Callable[[], bool] = lambda: False) -> None:
+        """Wait until the other process takes messages, or is gone for good; half a minute at most.
+
+        Args:
+            given_up: Asked meanwhile; true ends the wait.
+        """
+        end = time.monotonic() + _STARTING
+        while time.monotonic() < end and not (self.failed or given_up()):
+            if self._answered.wait(_POLL):
+                return
+
     def send(self, content: bytes) -> bool:
         """Hand over one record; False if it was dropped."""
         message = _HEAD.pack(len(content), self.dropped) + content
@@ -158,7 +173,10 @@ class Feed:
             if process is None or process.stdout is None:
                 return
             with process.stdout as output:
-                self._begun = bool(output.read(1))
+                answer = output.read(1)
+                self._begun = answer == KEPT
+                if answer:
+                    self._answered.set()
                 while output.read(4096):
                     pass
             died = process.wait() != 0
@@ -187,7 +205,10 @@ class Feed:
                 os.dup2(ours, self._pipe, inheritable=False)  # at once: the loop may be writing
             self.started += 1
             self._process = subprocess.Popen(  # noqa: S603 our own words
-                self._words(self.started), stdin=theirs, stdout=subprocess.PIPE
+                self._words(self.started),
+                stdin=theirs,
+                stdout=subprocess.PIPE,
+                process_group=0,  # Ctrl-C in the terminal is for the loop alone
             )
         finally:
             os.close(theirs)
@@ -210,4 +231,7 @@ def messages(stream: BinaryIO) -> Iterator[Message]:
         if len(content) < length:
             break
         yield Message(content, dropped)
-    raise LogError("expected the end of the drive, found that its process was killed")
+    raise LogError(
+        "expected the end of the drive, found that its process was killed: servos may still have "
+        "torque; switch their supply off, or run `antennate drive` again, which takes it off"
+    )

@@ -45,8 +45,8 @@ ROUNDING = 1e-9
 class TwinRobot:
     """One robot in row 0 of a simulated body, served as bytes.
 
-    When a client begins, no servo has torque and the robot has walked, it is put back to where it
-    stood first, so that one twin serves many drives.
+    When a client begins or an antenna is touched by an order, no servo has torque and the robot has
+    walked, it is put back to where it stood first, so that one twin serves many drives.
 
     Args:
         body: Holds one world.
@@ -111,7 +111,7 @@ class TwinRobot:
         self._zero: Floats = np.array(robot.zeros, float)
         self._pushes = Pushes(pushes, robot.joint_names, self._ticks_at)
         self.plugging = Plugging(self.servos, self._pushes)
-        self._visit = Visit()
+        self._visit, self._touched = Visit(), False
         self._standing, self._start = True, body.world(0).state()
         self._show(self._shafts())
         self._counts = body.read().counts[0]
@@ -139,7 +139,7 @@ class TwinRobot:
         return (self._ticks + 1) * self._period
 
     def begin_tick(self) -> Floats | None:
-        """A tick begins: where the servos pull to [ticks], None before any of them has torque."""
+        """A tick begins: the pulls of the servos, shape (n, 6), None before any has torque."""
         self._ticks += 1
         self.bus.advance(self._ticks * self._period)
         self.t = max(self.t, self._ticks * self._period)
@@ -147,22 +147,28 @@ class TwinRobot:
         if self._pushes.busy:
             self._push()
         torque = any(servo.torque for servo in self.servos)
-        if self._visit.step(self.t, self.servos) and not (torque or self._standing):
+        wanted = self._visit.step(self.t, self.servos) or self._touched
+        if wanted and not (torque or self._standing):
             self._carry_back()
+        self._touched = False
         if self._standing and not torque:
             return None
         self._standing = False
-        end, lead = (self._ticks + 1) * self._period, 0.5 * self._period
-        return np.array([servo.goal(end, lead) for servo in self.servos])
+        end = (self._ticks + 1) * self._period
+        return np.array([servo.pull(end, self._period) for servo in self.servos])
 
-    def move(self, goals: Floats | None) -> Floats | None:
+    def move(self, pulls: Floats | None) -> Floats | None:
         """The physics of a tick: position, speed and drive of the shafts then, shape (3, n).
 
         Touches nothing that the bus does, so that another thread may do it meanwhile.
         """
-        if goals is None:
+        if pulls is None:
             return None
+        goals, gain, push, brake, low, high = pulls.T
         self._body.write(self._joints.command(goals))
+        bounds = np.sort(self._sign * np.stack([low, high]), axis=0)
+        drives = np.vstack([gain, self._sign * push, brake, bounds])
+        self._body.world(0).servo_drives.set(drives)
         self._walked += 1
         self._body.clock.sleep_until(self._walked * self._period)
         self._counts = self._body.read().counts[0]
@@ -205,6 +211,15 @@ class TwinRobot:
         else:
             kind, side = what.split("_")
             self._wires[side == "right"] = kind
+
+    def order_touch(self, text: str) -> None:
+        """Touch an antenna at once; a robot that has walked and has no torque is put back first.
+
+        Raises:
+            BadInputError: The order has another form.
+        """
+        self.touch.order(text)
+        self._touched = True
 
     def hold(self, side: int, counts: float) -> None:
         """Hold the reading of antenna 0 (left) or 1 at a value [counts]; NaN releases it."""

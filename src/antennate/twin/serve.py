@@ -222,7 +222,7 @@ class TwinServer(_Server):
         """Carry out one order: a touch of an antenna, a fault, or plugs and shafts."""
         word, _, rest = text.partition(" ")
         if word == "touch":
-            self._robot.touch.order(rest)
+            self._robot.order_touch(rest)
         elif word == "fault":
             self._faults.order(rest)
         else:

@@ -76,7 +76,7 @@ def _section(claim: Claim, finding: Finding, row: Row) -> str:
     facts = {
         "paper": row.paper,
         "ours": row.ours,
-        "reproduced if": claim.rule,
+        "rule": claim.rule,
         "why": row.reason,
     }
     words = "".join(f"<dt>{name}</dt><dd>{escape(text)}</dd>" for name, text in facts.items())

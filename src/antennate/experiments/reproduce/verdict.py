@@ -13,8 +13,11 @@ VERDICTS: Mapping[Verdict, str] = {
     "not_reproduced": "not reproduced",
 }
 """Verdicts and what people read."""
-Results = Mapping[str, Mapping[str, Any]]
-"""Content of result.json of each experiment, by its name."""
+
+
+def judged(holds: bool, conditionally: bool = False) -> Verdict:
+    """The verdict on a claim that holds, or holds under a condition."""
+    return "reproduced" if holds else "conditional" if conditionally else "not_reproduced"
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +60,8 @@ class Claim:
         name: Short name; file name of its figure.
         claim: What is claimed, in our words.
         paper: The paper's numbers.
-        rule: What has to hold for `reproduced`.
+        rule: What has to hold for which verdict; a condition that we chose allows `conditional` at
+            most.
         experiment: Experiment that tests it.
         unit: Unit of the figure's numbers.
         judge: From the results to a finding.

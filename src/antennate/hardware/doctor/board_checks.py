@@ -15,6 +15,7 @@ from antennate.hardware.esp32.wire import Hello, Reset, objections, require_sens
 from antennate.hardware.robot import DoctorConfig
 from antennate.hardware.safety import diagnosis
 from antennate.hardware.safety.diagnosis import Band, ChannelDiagnosis
+from antennate.messages import typed
 from antennate.params.control import CurveParams
 
 _LONGEST_TEXT = 60
@@ -26,8 +27,8 @@ _CURES = {
     diagnosis.Finding.SHORT_HI: "the wire of this antenna is shorted to the supply",
     diagnosis.Finding.STUCK: "the converter always gives one value: reset the board, check the pin",
     diagnosis.Finding.SATURATED: "let the antenna straighten; then choose another divider resistor",
-    diagnosis.Finding.OUT_OF_CAL: "calibrate this antenna again: `antennate record`, "
-    "`antennate calibrate`",
+    diagnosis.Finding.OUT_OF_CAL: f"calibrate this antenna again: `{typed('record')}`, "
+    f"`{typed('calibrate')}`",
 }
 _DEGRADED = (diagnosis.Finding.OUT_OF_CAL, diagnosis.Finding.SPIKY, diagnosis.Finding.SATURATED)
 
@@ -158,7 +159,7 @@ def _at_rest(config: DoctorConfig, name: str, counts: float) -> tuple[Finding, s
     finding = Finding(
         f"{counts:.0f} counts, b = {level:.2f}",
         "bad" if level >= threshold else "ok" if low <= counts <= high else "warn",
-        "straighten the antenna; if it is straight, `antennate record` and `antennate calibrate`, "
-        "and put the new curve into [control.conditioning]",
+        f"straighten the antenna; if it is straight, `{typed('record')}` and "
+        f"`{typed('calibrate')}`, and put the new curve into [control.conditioning]",
     )
     return finding, f"{name} at rest", f"{low:.0f} to {high:.0f} counts, b below {threshold:g}"

@@ -27,6 +27,7 @@ from antennate.hardware.ports.finder import finder
 from antennate.hardware.ports.port import Port, PortError
 from antennate.hardware.ports.reconnecting import Reconnecting
 from antennate.hardware.safety.signal_quality import SignalQuality
+from antennate.messages import typed
 from antennate.params.doctor import DoctorParams
 from antennate.robots.spec import RobotSpec
 from antennate.types import Controller
@@ -176,7 +177,7 @@ def require_servos(bus: Bus, robot: RobotSpec) -> None:
     except BringUpError as error:
         raise BringUpError(
             f"--bus: {error}; check power, wiring, ids and baud {robot.baud}, or whether --esp32 "
-            "and --bus are swapped; `antennate doctor` tells more, slow adapters too"
+            f"and --bus are swapped; `{typed('doctor')}` tells more, slow adapters too"
         ) from None
     rules = settings.settings(robot)
     known = {
@@ -185,5 +186,5 @@ def require_servos(bus: Bus, robot: RobotSpec) -> None:
     if wrong := settings.wrong(known, robot):
         raise BringUpError(
             f"--bus: expected servos set for this robot, found {'; '.join(wrong)}; "
-            "`antennate doctor --fix` puts it right"
+            f"`{typed('doctor', '--fix')}` puts it right"
         )

@@ -70,12 +70,14 @@ def drive(
         report.refusal = dry.refusal
         report.watch(session)
         on_tick(session, clock.now())
+        over = failed(t)
+        at_end = "a fault" if failed_at < math.inf else "the end of its time"
         reasons = (
             (stop.received, _SIGNAL),
             (key is not None and key.over, "a key that was let go"),
             (operator.arrived(), "arrival"),
-            (t >= dry.end, "a refusal of torque" if dry.refusal else "the end of its time"),
-            (failed(t), "a fault"),
+            (t >= dry.end, "a refusal of torque" if dry.refusal else at_end),
+            (over, "a fault"),
         )
         report.ended = next((text for true, text in reasons if true), "")
         return not report.ended

@@ -12,6 +12,7 @@ from typing import TypeAlias
 from antennate.errors import BadInputError
 from antennate.hardware.esp32.board import Board
 from antennate.hardware.esp32.clock import Timed
+from antennate.messages import typed
 from antennate.params.doctor import DoctorParams
 from antennate.params.network import NetworkParams
 from antennate.params.record import RecordParams
@@ -153,5 +154,5 @@ class Recorder:
         why = self._board.refusals[-1] if self._board.refusals else why
         return (
             f"--esp32: expected readings of an antenna board, found none for {SILENCE:g} s "
-            f"({why}); run `antennate doctor --esp32 PORT`"
+            f"({why}); run `{typed('doctor', '--esp32', 'PORT')}`"
         )
