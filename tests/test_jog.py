@@ -137,9 +137,7 @@ def test_a_joint_that_a_killed_jog_left_weak_has_the_force_of_the_next_one() -> 
         ("velocity_limit", 3, "velocity limit at least .* of yaw1 .*, found 3"),
     ],
 )
-def test_a_servo_that_is_set_otherwise_gets_no_torque(
-    register: str, value: int, told: str
-) -> None:
+def test_a_servo_that_is_set_otherwise_gets_no_torque(register: str, value: int, told: str) -> None:
     """Profile velocity is a speed and Goal PWM a limit in position modes alone (manuals)."""
     ready = Ready()
     ready.servo.set(register, value)
