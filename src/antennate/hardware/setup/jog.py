@@ -1,8 +1,8 @@
 """One joint moved by small steps: slowly, with little force, and only while somebody is there.
 
-A profile and Goal PWM bound speed and force in position modes alone, so a servo that is set otherwise
-gets no torque. It gets a slow profile and a limit of its PWM, and its bus watchdog stops it when the
-program dies. Torque is on that joint alone and goes off at the end.
+A profile and Goal PWM bound speed and force in position modes alone, so a servo that is set
+otherwise gets no torque. It gets a slow profile and a limit of its PWM, and its bus watchdog stops
+it when the program dies. Torque is on that joint alone and goes off at the end.
 """
 
 from __future__ import annotations
