@@ -189,7 +189,10 @@ def _operator(config: DriveConfig, orders: Orders) -> Iterator[Operator]:
             pressed = stack.enter_context(pressed_keys("--hold-to-run"))
         if orders.until is not None:
             if orders.until.exists():
-                raise ConfigError(f"--until: expected no such file yet, found {orders.until}")
+                raise ConfigError(
+                    f"--until: expected no such file yet, found {orders.until} of an earlier "
+                    "drive; remove it"
+                )
             arrived = stack.enter_context(Arrival(orders.until))
         yield Operator(stop, pressed, arrived or (lambda: False))
 

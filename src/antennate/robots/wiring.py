@@ -23,7 +23,8 @@ _HEIGHT = 0.62
 _CONVERTER = -1.9
 """Height of the line of the lower voltage."""
 _LEFT = -4.9
-_DATA, _MAIN, _LOW = style.SERIES[0], style.SERIES[4], style.SERIES[1]
+_DATA, _MAIN, _LOW = style.SERIES[0], "#C80000", "#FF8C00"
+"""Blue, red and orange, as the legend calls them."""
 
 
 @style.styled
@@ -98,6 +99,7 @@ def _feeds(
     main = [name for name in order if servos[name].voltage == power.rails[0].voltage]
     axes.plot([_LEFT, end], [_RAIL, _RAIL], color=_MAIN, linewidth=2.5, zorder=1)
     axes.plot([_LEFT, end], [_GROUND, _GROUND], color=style.INK, linewidth=2.5, zorder=1)
+    _voltage(axes, (_LEFT + 0.1, _RAIL + 0.04), power.rails[0].voltage, _MAIN)
     for name in main[:: power.per_feed]:
         x, y = places[name]
         _feed(axes, (x - 0.64, _RAIL), (x, y + 0.1), _MAIN)
@@ -114,6 +116,12 @@ def _feed(axes: Axes, start: Place, end: Place, colour: str) -> None:
     (at, line), (x, y) = start, end
     axes.plot([at, at, x], [line, y, y], color=colour, linewidth=0.9, zorder=0)
     axes.plot([at], [line], "o", color=colour, markersize=4)
+
+
+def _voltage(axes: Axes, place: Place, voltage: float, colour: str) -> None:
+    """The voltage of a line, written on it."""
+    x, y = place
+    axes.text(x, y, f"{voltage:g} V", color=colour, fontsize=7, weight="bold", va="bottom")
 
 
 def _box(axes: Axes, place: Place, text: str, colour: str, width: float) -> None:
@@ -160,6 +168,7 @@ def _electronics(axes: Axes, power: Supply) -> None:
         _box(axes, (at, _CONVERTER), text, _LOW, 1.3)
         axes.plot([at, at], [_RAIL, _CONVERTER], color=_MAIN, linewidth=1.4, zorder=1)
         axes.plot([at, -2.11], [_CONVERTER, _CONVERTER], color=_LOW, linewidth=1.4, zorder=1)
+        _voltage(axes, (-2.56, _CONVERTER + 0.06), rail.voltage, _LOW)
         axes.plot([at + 0.4] * 2, [_GROUND, _CONVERTER], color=ink, linewidth=0.9, zorder=0)
         axes.plot([at + 0.4], [_GROUND], "o", color=ink, markersize=4)
 
@@ -168,7 +177,9 @@ def _legend(axes: Axes, power: Supply) -> None:
     main, *others = power.rails
     lines = [f"red: {main.voltage:g} V, a feed for each {power.per_feed} servos of the chain"]
     lines += [
-        f"orange: {rail.voltage:g} V; no wire of the supply between the two" for rail in others
+        f"orange: {rail.voltage:g} V; {main.voltage:g} V destroys the servos on it: no wire of the "
+        "supply between the two"
+        for rail in others
     ]
     lines += ["blue: data of the servo bus", "black: ground, common to all"]
     axes.text(_LEFT - 0.8, -3.05, "     ".join(lines), fontsize=7, color=style.MUTED, va="top")
