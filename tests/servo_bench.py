@@ -2,17 +2,29 @@
 
 from __future__ import annotations
 
+import math
+
+import mujoco
+import numpy as np
 from manual_tables import Page
 
 from antennate.hardware.dynamixel import packets
 from antennate.hardware.dynamixel.packets import Status
 from antennate.hardware.dynamixel.parser import Parser
 from antennate.hardware.dynamixel.tables import TABLES
+from antennate.robots.servos import ServoParams, XL330Params
+from antennate.sim.servo_drives import ServoDrives
 from antennate.twin.bus import ServoBus
+from antennate.twin.driven_servo import DrivenServo
 from antennate.twin.registers import Servo
 
 NONE, RESULT_FAIL, INSTRUCTION, CRC, RANGE, LENGTH, LIMIT, ACCESS = range(8)
 """Numbers of the errors of a status packet, from the manual."""
+
+DRIVEN: dict[int, ServoParams] = {1080: ServoParams(), 1200: XL330Params()}
+"""Models that the walking twin has, by number."""
+_TICK = 2 * math.pi / 4096
+_PERIOD = 0.001
 
 
 class Bench:
@@ -22,15 +34,26 @@ class Bench:
         servo: The servo.
         bus: Its wire.
         t: The time [s].
+        divisor: What Position P Gain is divided by, in PWM a pulse.
     """
+
+    divisor = 128.0
 
     def __init__(self, page: Page, position: float = 2048.0, others: int = 0) -> None:
         self.page = page
         table = TABLES[page.model]
-        self.servo = Servo(table, 1, position)
+        self.servo = self.make(1, position)
         more = [Servo(table, 2 + n, position) for n in range(others)]
-        self.bus = ServoBus([self.servo, *more], baud=1_000_000)
+        self.bus = self.wire([self.servo, *more])
         self.t = 0.0
+
+    def make(self, servo: int, position: float) -> Servo:
+        """The servo that is looked at."""
+        return Servo(TABLES[self.page.model], servo, position)
+
+    def wire(self, servos: list[Servo]) -> ServoBus:
+        """What the servos are on."""
+        return ServoBus(servos, baud=1_000_000)
 
     def ask(self, instruction: int, params: bytes = b"", to: int = 1) -> list[Status]:
         """What comes back within 50 ms."""
@@ -66,3 +89,65 @@ class Bench:
         assert self.put("torque_enable", 0) == NONE
         assert self.put("operating_mode", mode) == NONE
         assert self.put("torque_enable", 1) == NONE
+
+
+class DrivenBus(ServoBus):
+    """A wire whose first servo turns one hinge of the physics, as those of the walking twin do.
+
+    The hinge has the inertia of the servo and its torque-speed line; nothing else hangs on it.
+    """
+
+    def __init__(self, servos: list[Servo], kind: ServoParams) -> None:
+        super().__init__(servos, baud=1_000_000)
+        spec = mujoco.MjSpec()
+        spec.compiler.degree = False
+        spec.option.timestep = 0.5 * _PERIOD
+        spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+        body = spec.worldbody.add_body(name="horn", mass=1e-9, inertia=[1e-12] * 3)
+        hinge = mujoco.mjtJoint.mjJNT_HINGE
+        body.add_joint(name="horn", type=hinge, damping=kind.damping, armature=kind.armature)
+        actuator = spec.add_actuator(name="horn", target="horn")
+        actuator.trntype = mujoco.mjtTrn.mjTRN_JOINT
+        actuator.set_to_position(kp=kind.stiffness)
+        actuator.forcelimited = mujoco.mjtLimited.mjLIMITED_TRUE
+        actuator.forcerange = [-kind.stall_torque, kind.stall_torque]
+        self._model = spec.compile()
+        self._data = mujoco.MjData(self._model)
+        self._stall = kind.stall_torque
+        self._drives = ServoDrives(self._model, ["horn"], np.array([kind.stall_torque]))
+        self._now = 0
+
+    def advance(self, t: float) -> None:
+        """Let the physics turn the horn as well."""
+        while (end := (self._now + 1) * _PERIOD) <= t + 1e-9:
+            super().advance(self._now * _PERIOD)
+            self._turn(end)
+            self._now += 1
+        super().advance(t)
+
+    def _turn(self, end: float) -> None:
+        servo, data = self.servos[0], self._data
+        assert isinstance(servo, DrivenServo)
+        if abs(servo.motion.shaft.position * _TICK - data.qpos[0]) > 1e-9:  # somebody turned it
+            data.qpos[0] = servo.motion.shaft.position * _TICK
+        goal, *drive = servo.pull(end, _PERIOD)
+        self._drives.set(np.array(drive)[:, None])
+        data.ctrl[0] = goal * _TICK
+        mujoco.mj_step(self._model, data, 2)
+        done = data.qpos[0] / _TICK, data.qvel[0] / _TICK, data.actuator_force[0] / self._stall
+        servo.shaft(*(float(value) for value in done))
+
+
+class DrivenBench(Bench):
+    """The same for a servo of the walking twin."""
+
+    def make(self, servo: int, position: float) -> Servo:
+        """A servo whose shaft the physics moves."""
+        made = DrivenServo(TABLES[self.page.model], servo, position)
+        made.motion.params = DRIVEN[self.page.model]
+        self.divisor = made.motion.params.gain_divisor
+        return made
+
+    def wire(self, servos: list[Servo]) -> ServoBus:
+        """With the physics behind it."""
+        return DrivenBus(servos, DRIVEN[self.page.model])

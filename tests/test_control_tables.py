@@ -6,6 +6,8 @@ does is in `test_control_effects.py`.
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 from manual_tables import PAGES, Page, Row
 from servo_bench import ACCESS, LENGTH, LIMIT, NONE, RANGE, Bench
@@ -118,3 +120,54 @@ def test_torque_locks_the_eeprom_and_nothing_else(page: Page) -> None:
         value = bench.get(row.name)
         assert bench.put("torque_enable", 1) == NONE
         assert bench.put(row.name, value) == (ACCESS if row.address < 64 else NONE), row.name
+
+
+MODEL_FILES = {
+    1080: ("xc430_w240",),
+    1060: ("xl430_w250",),
+    1200: ("xl330_m288_fw52", "xl330_m288"),
+}
+"""Files of the official SDK by model number."""
+NOT_IN_FILES = {"startup_configuration", "backup_ready"}
+"""Registers of the manual that no file of the SDK has."""
+OLD_FIRMWARE = {230: "Indirect Data Read"}
+"""Where the firmware before 52 of an XL330 has the seventh byte of 28; the manual has 20 bytes."""
+OTHER_NAMES = {"secondary_shadow_id": "secondary_id"}
+
+
+def rows_of_the_sdk(name: str) -> dict[int, tuple[int, str]]:
+    """Size and name by address, as a file of the SDK lists them."""
+    easy = pytest.importorskip("dynamixel_easy_sdk")
+    file = Path(easy.__file__).parent / "control_table" / f"{name}.model"
+    if not file.exists():
+        pytest.skip("this release of the SDK has no such file")
+    lines = file.read_text().partition("[control table]")[2].split("\n")[2:]
+    rows = (line.split("\t") for line in lines if line.strip())
+    return {int(address): (int(size), title.strip()) for address, size, title, *_ in rows}
+
+
+def plain(title: str) -> str:
+    """A title as a name of the manual."""
+    words = "".join(c if c.isalnum() else " " for c in title.lower()).split()
+    name = "_".join(words)
+    return OTHER_NAMES.get(name, name)
+
+
+@pytest.mark.parametrize(
+    ("model", "name"), [(model, name) for model, names in MODEL_FILES.items() for name in names]
+)
+def test_the_files_of_the_official_sdk_have_the_same_addresses_and_sizes(
+    model: int, name: str
+) -> None:
+    theirs = rows_of_the_sdk(name)
+    ours = {row.address: row for row in TABLES[model].registers.values()}
+    assert len(theirs) > 50
+    for address, (size, title) in theirs.items():
+        if name == "xl330_m288" and OLD_FIRMWARE.get(address) == title:
+            continue
+        assert address in ours, title
+        assert ours[address].size == size, title
+        if not title.startswith("Indirect"):  # theirs name the first byte of a group alone
+            assert ours[address].name == plain(title)
+    left = {row.name for row in ours.values() if row.address not in theirs}
+    assert {row for row in left if not row.startswith("indirect")} == NOT_IN_FILES

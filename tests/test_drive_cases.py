@@ -10,6 +10,7 @@ from typing import Any
 
 import pytest
 
+from antennate.errors import BadInputError
 from antennate.studies.run_directory import RunDirectory
 
 FOLDER = Path(__file__).parents[1] / "benchmarks"
@@ -92,3 +93,34 @@ def test_G4_room_for_the_result_is_kept_while_a_robot_is_driven(tmp_path: Path) 
         folder.finish({"schema": 1})
         assert [path.name for path in folder.path.iterdir()] == ["result.json"]
     assert sum(kept) >= 2**16
+
+
+WALKED = {"code": 0, "worst_state": "DEGRADED", "ended": "the end of its time"}
+FAULT = {"code": 2, "worst_state": "FAULT", "ended": "FAULT"}
+OFF: dict[str, Any] = {"torque_off": True, "servos_on": []}
+NAMED: dict[str, Any] = {"torque_off": False, "servos_on": [7]}
+
+
+@pytest.mark.parametrize(
+    ("found", "documented"),
+    [
+        (WALKED | OFF, True),
+        (FAULT | OFF, True),
+        (FAULT | NAMED, True),
+        (WALKED | NAMED, False),
+        (WALKED | OFF | {"ended": "FAULT"}, False),
+        (WALKED | OFF | {"code": 1}, False),
+        (FAULT | OFF | {"code": 0}, False),
+        (FAULT | OFF | {"worst_state": "HOLD"}, False),
+        (FAULT | {"torque_off": None, "servos_on": []}, False),
+    ],
+)
+def test_a_bad_wire_is_walked_on_or_is_a_fault_and_nothing_else(
+    cases: Any, found: dict[str, Any], documented: bool
+) -> None:
+    assert cases.CASES["BER 1e-3"][1](found) is documented
+
+
+def test_a_case_whose_fault_the_twin_does_not_know_is_refused(cases: Any) -> None:
+    with pytest.raises(BadInputError):
+        cases.fault("link=ber:1e-3")

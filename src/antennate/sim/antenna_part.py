@@ -7,7 +7,7 @@ turned half about its own axis, which mirrors it.
 from __future__ import annotations
 
 import math
-from typing import Literal
+from typing import Any, Literal
 
 import mujoco
 
@@ -16,6 +16,8 @@ from antennate.robots.antenna import BASE, AntennaSpec
 from antennate.sim import layers
 
 Side = Literal["left", "right"]
+STOPS: dict[str, Any] = {"limited": mujoco.mjtLimited.mjLIMITED_TRUE, "range": [-math.pi, math.pi]}
+"""Ends of a joint that does not turn without end: half a turn either way (assumed)."""
 
 
 def mounting_quaternion(angle: float, side: Side) -> tuple[float, float, float, float]:
@@ -49,6 +51,7 @@ def build(params: AntennaSpec) -> mujoco.MjSpec:
         axis=[0, 0, 1],
         damping=params.base_damping,
         armature=params.base_armature,
+        **STOPS,
     )
     servo = spec.add_actuator(name=BASE, trntype=mujoco.mjtTrn.mjTRN_JOINT, target=BASE)
     servo.set_to_position(kp=params.base_stiffness)

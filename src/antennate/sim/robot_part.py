@@ -77,11 +77,11 @@ def _add_link_joints(spec: mujoco.MjSpec, link: mujoco.MjsBody, i: int, params: 
     at = [params.link_pitch / 2, 0.0, 0.0]
     yaw, pitch = params.yaw_names[i - 1], params.pitch_names[i - 1]
     servo = params.servos.of(params.yaw.servo)
-    _add_hinge(link, yaw, _YAW, at, servo)
+    _add_hinge(link, yaw, _YAW, at, servo, **antenna.STOPS)
     _add_servo(spec, yaw, servo)
     servo = params.servos.of(params.pitch.servo)
-    spring = {} if params.pitch_count else {"stiffness": params.pitch.stiffness}
-    _add_hinge(link, pitch, _PITCH, at, servo, **spring)
+    more = antenna.STOPS if params.pitch_count else {"stiffness": params.pitch.stiffness}
+    _add_hinge(link, pitch, _PITCH, at, servo, **more)
     if params.pitch_count:
         _add_servo(spec, pitch, servo)
 

@@ -19,6 +19,7 @@ from antennate.sim import layers, robot_part
 from antennate.sim.gears import Gears
 from antennate.sim.outline import outline
 from antennate.sim.scenes.scene import SceneInstance, add_floor
+from antennate.sim.servo_drives import ServoDrives
 from antennate.types import Bools, Floats, Ints
 
 mujoco.set_mju_user_warning(lambda message: None)
@@ -102,6 +103,7 @@ class World:
         model: The compiled model; `data` its state.
         robot: The robot in it.
         head: Position of the head link [m], shape (3,), a view of the state.
+        servo_drives: Gain and limits of the servos' drives.
         t: Time since the world was made [s].
     """
 
@@ -121,6 +123,9 @@ class World:
         self._driven = self._addresses(names)
         self._turning: Ints = np.array([model.joint(n).dofadr[0] for n in names])
         self._gears = Gears(model, robot, PREFIX)
+        kinds = [robot.servos.of(group.servo) for _, group, n in robot.groups for _ in range(n)]
+        stall = np.array([kind.stall_torque for kind in kinds])
+        self.servo_drives = ServoDrives(model, names, stall)
         self._root: int = model.joint(PREFIX + "root").qposadr[0]
         self._links: Ints = np.array([model.body(PREFIX + n).id for n in robot.link_names])
         self._leg_geoms: Ints = np.array([model.geom(PREFIX + n).id for n in robot.leg_names])

@@ -14,13 +14,21 @@ from antennate.hardware.dynamixel.tables import (
 )
 from antennate.robots.servos import TICKS_A_TURN
 from antennate.twin.memory import Memory
-from antennate.twin.motor import FULL, LOOP, RATINGS, STEP, Loops, Motor, Shaft
+from antennate.twin.motor import FRICTION, FULL, LOOP, RATINGS, STEP, Loops, Motor, Shaft
 from antennate.twin.planner import POSITION_MODES, SPEED_UNIT, Planner
 
 _MOST_OFFSET = 1_024
 """Largest homing offset that acts in position mode, from the manuals [ticks]."""
 _STILL = 1.0
 """A slower shaft stands [ticks/s]: it needs a second for a tick."""
+
+
+def steepest(memory: Memory, time: float) -> float:
+    """By how much PWM Slope lets the drive change in a time [s]; infinite without that register."""
+    if "pwm_slope" not in memory.table.registers:
+        return math.inf
+    volts = 0.1 * memory.get("present_input_voltage")
+    return 1.977 * memory.get("pwm_slope") * time / volts if volts else math.inf
 
 
 class Motion:
@@ -124,6 +132,12 @@ class Motion:
         ongoing = self.plan.show(t, position)
         show("moving", int(ongoing or abs(speed) > self.memory.get("moving_threshold")))
 
+    def ahead(self, loops: Loops, t: float, speed: float) -> float:
+        """PWM by the feedforward gains at time t [s] and a speed of the profile [ticks/s]."""
+        if not (loops.first or loops.second):
+            return 0.0
+        return loops.ahead(speed, (self.plan.at(t + LOOP)[1] - speed) / LOOP)
+
     def _make_shaft(self, position: float) -> Shaft:
         return Shaft(position)
 
@@ -196,28 +210,20 @@ class MotorMotion(Motion):
         behind = speed - sign * motor.speed
         if self.mode == VELOCITY_MODE:
             return sign * self._loops.velocity(behind / SPEED_UNIT, dt, self.limit)
-        ahead = self._ahead(speed)
+        ahead = self.ahead(self._loops, self._t, speed)
         duty = sign * self._loops.position(wanted - self.position, behind, dt, self.limit, ahead)
         if self.mode == CURRENT_POSITION_MODE:
             most = abs(get("goal_current")) / 1e3 / motor.rating.stall_current
+            if most <= FRICTION:
+                duty = motor.needed(motor.after_friction(0.0), supply)
+                return max(-self.limit, min(duty, self.limit))
             duty = max(motor.needed(-most, supply), min(duty, motor.needed(most, supply)))
         return duty
 
-    def _ahead(self, speed: float) -> float:
-        """PWM by the feedforward gains at a speed of the profile [ticks/s]."""
-        loops = self._loops
-        if not (loops.first or loops.second):
-            return 0.0
-        return loops.ahead(speed, (self.plan.at(self._t + LOOP)[1] - speed) / LOOP)
-
     def _sloped(self, duty: float, dt: float) -> float:
         """The drive changes no faster than PWM Slope says, where there is one."""
-        if "pwm_slope" not in self.memory.table.registers:
-            return duty
-        volts = 0.1 * self.memory.get("present_input_voltage")
-        steepest = 1.977 * self.memory.get("pwm_slope") * dt / volts
-        before = self.shaft.duty
-        return max(before - steepest, min(duty, before + steepest))
+        most, before = steepest(self.memory, dt), self.shaft.duty
+        return max(before - most, min(duty, before + most))
 
     def _settle(self) -> None:
         """A shaft that has come to rest stays there."""

@@ -23,9 +23,9 @@ STEP = 0.002
 FULL = 885
 """PWM of the full drive."""
 _TICK = 2.0 * math.pi / TICKS_A_TURN
-_FRICTION = 0.1
+FRICTION = 0.1
 """Torque by which the gear stops a shaft without drive, in stall torques (assumed)."""
-_CREEP = 10.0
+CREEP = 10.0
 """Speed below which friction holds a shaft [ticks/s]: a fifth of a degree in a quarter second."""
 
 
@@ -102,7 +102,7 @@ class Motor(Shaft):
         self.rating = rating
         self._fastest = rating.no_load_speed / _TICK
         self._lag = rating.inertia * rating.no_load_speed / rating.stall_torque
-        self._stop = _FRICTION * rating.stall_torque / rating.inertia / _TICK
+        self._stop = FRICTION * rating.stall_torque / rating.inertia / _TICK
         self._faded = math.exp(-STEP / self._lag)
 
     def drive(self, duty: float, dt: float, supply: float) -> None:
@@ -127,9 +127,9 @@ class Motor(Shaft):
 
         A shaft that stands needs more than that to move.
         """
-        turning = abs(self.speed) > _CREEP
-        against = math.copysign(_FRICTION, self.speed if turning else load)
-        if not turning and abs(load) <= _FRICTION:
+        turning = abs(self.speed) > CREEP
+        against = math.copysign(FRICTION, self.speed if turning else load)
+        if not turning and abs(load) <= FRICTION:
             return -self.speed / self._fastest
         return load - against
 

@@ -45,8 +45,8 @@ class Physics:
 
     def begin(self) -> None:
         """Begin the next tick; the bell rings when `end` may be called."""
-        goals = self._robot.begin_tick()
-        self._tick = self._thread.submit(self._robot.move, goals)
+        pulls = self._robot.begin_tick()
+        self._tick = self._thread.submit(self._robot.move, pulls)
         self._tick.add_done_callback(lambda _: os.write(self._ring, b"x"))
 
     def end(self) -> None:

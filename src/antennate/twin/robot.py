@@ -139,7 +139,7 @@ class TwinRobot:
         return (self._ticks + 1) * self._period
 
     def begin_tick(self) -> Floats | None:
-        """A tick begins: where the servos pull to [ticks], None before any of them has torque."""
+        """A tick begins: the pulls of the servos, shape (n, 6), None before any has torque."""
         self._ticks += 1
         self.bus.advance(self._ticks * self._period)
         self.t = max(self.t, self._ticks * self._period)
@@ -154,17 +154,21 @@ class TwinRobot:
         if self._standing and not torque:
             return None
         self._standing = False
-        end, lead = (self._ticks + 1) * self._period, 0.5 * self._period
-        return np.array([servo.goal(end, lead) for servo in self.servos])
+        end = (self._ticks + 1) * self._period
+        return np.array([servo.pull(end, self._period) for servo in self.servos])
 
-    def move(self, goals: Floats | None) -> Floats | None:
+    def move(self, pulls: Floats | None) -> Floats | None:
         """The physics of a tick: position, speed and drive of the shafts then, shape (3, n).
 
         Touches nothing that the bus does, so that another thread may do it meanwhile.
         """
-        if goals is None:
+        if pulls is None:
             return None
+        goals, gain, push, brake, low, high = pulls.T
         self._body.write(self._joints.command(goals))
+        bounds = np.sort(self._sign * np.stack([low, high]), axis=0)
+        drives = np.vstack([gain, self._sign * push, brake, bounds])
+        self._body.world(0).servo_drives.set(drives)
         self._walked += 1
         self._body.clock.sleep_until(self._walked * self._period)
         self._counts = self._body.read().counts[0]

@@ -12,7 +12,7 @@ from antennate.hardware.dynamixel.tables import TABLES
 from antennate.hardware.robot import DoctorConfig
 from antennate.robots.spec import RobotSpec
 
-_STATES = {
+_FOUND_AND_CURE = {
     "collides": (
         "doubled",
         "two servos have this id: give one its own, alone on the bus, with the manufacturer's "
@@ -102,9 +102,11 @@ def _ids(bus: BusSurvey, robot: RobotSpec) -> Finding:
 
 
 def _answers(bus: BusSurvey) -> Finding:
-    states = {state: [i for i, s in bus.here.items() if s.state == state] for state in _STATES}
-    parts = [f"{_STATES[state][0]} {ids_text(ids)}" for state, ids in states.items() if ids]
-    cures = [_STATES[state][1] for state, ids in states.items() if ids]
+    states = {
+        state: [i for i, s in bus.here.items() if s.state == state] for state in _FOUND_AND_CURE
+    }
+    parts = [f"{_FOUND_AND_CURE[state][0]} {ids_text(ids)}" for state, ids in states.items() if ids]
+    cures = [_FOUND_AND_CURE[state][1] for state, ids in states.items() if ids]
     grade: Grade = "bad" if parts else "ok"
     return Finding(", ".join(parts) or "all whole", grade, "; ".join(cures))
 

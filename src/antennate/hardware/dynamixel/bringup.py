@@ -186,10 +186,10 @@ def _fault(present: Present | None, model: int) -> str:
     if present.model not in (None, model):
         name = TABLES[model].name if model in TABLES else str(model)
         return f"expected model {name}, found number {present.model}"
-    return _STATES[present.state]
+    return _REASONS[present.state]
 
 
-_STATES: Mapping[State, str] = {
+_REASONS: Mapping[State, str] = {
     "ok": "",
     "broken": "answers are never whole: two servos with this id, or a bad cable?",
     "collides": "answers collide: two servos with this id?",

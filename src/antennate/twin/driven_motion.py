@@ -1,0 +1,188 @@
+"""The shaft of a servo that the physics moves: from registers to what its actuator does."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from antennate.hardware.dynamixel.tables import (
+    CURRENT_MODE,
+    CURRENT_POSITION_MODE,
+    PWM_MODE,
+    VELOCITY_MODE,
+    VELOCITY_UNIT,
+)
+from antennate.robots.servos import TICKS_A_TURN, ServoParams
+from antennate.twin.memory import Memory
+from antennate.twin.motion import Motion, steepest
+from antennate.twin.motor import CREEP, FRICTION, FULL, LOOP, RATINGS, Loops
+from antennate.twin.planner import SPEED_UNIT
+
+_TICK = 2.0 * math.pi / TICKS_A_TURN
+
+
+class Pull(NamedTuple):
+    """What the actuator of a shaft does for one period.
+
+    Attributes:
+        goal: Where it pulls the shaft to [ticks].
+        gain: By how much stiffer than with the Position P Gain of a new servo.
+        push: Drive besides that of the distance [full drives].
+        brake: Drive against the speed [full drives·s/rad].
+        low: Least drive [full drives].
+        high: Most drive.
+    """
+
+    goal: float
+    gain: float = 1.0
+    push: float = 0.0
+    brake: float = 0.0
+    low: float = -1.0
+    high: float = 1.0
+
+    def within(self, low: float, high: float) -> Pull:
+        """The same within narrower limits; its own limits come first."""
+        low, high = (max(self.low, min(bound, self.high)) for bound in (low, high))
+        return self._replace(low=low, high=high)
+
+    def reversed(self) -> Pull:
+        """The same for a shaft that turns the other way round; the goal stays."""
+        return self._replace(push=-self.push, low=-self.high, high=-self.low)
+
+
+class DrivenMotion(Motion):
+    """The shaft of a servo that the physics moves.
+
+    Attributes:
+        params: Model of the servo in the physics.
+        stands: Where a shaft without drive stays [ticks]; None while it is driven.
+    """
+
+    params = ServoParams()
+    stands: float | None = None
+
+    def __init__(self, memory: Memory, position: float) -> None:
+        self._loops = Loops()
+        super().__init__(memory, position)
+        self._new_gain = memory.table["position_p_gain"].default or 1
+
+    def refresh(self, t: float) -> bool:
+        """Take note of registers that have changed."""
+        if not super().refresh(t):
+            return False
+        self._loops.read(self.memory)
+        return True
+
+    def move(self, t: float) -> bool:
+        """The physics does, and says so in `feel`."""
+        return False
+
+    def turn_to(self, ticks: float) -> None:
+        """Somebody turns the shaft there [ticks]."""
+        super().turn_to(ticks)
+        self.stands = None if self.driven else self.shaft.position
+
+    def pull(self, t: float, period: float) -> Pull:
+        """What the actuator does until t [s], with a goal in whole ticks of the servo.
+
+        A shaft without drive is pulled to where it stood when it was stopped or let go: a gear of
+        245 to 1 does not let a leg sink.
+
+        Args:
+            t: End of the coming period.
+            period: Its length [s].
+        """
+        wanted = self._wanted(t, period) if self.driven else None
+        if wanted is None:
+            if self.stands is None:
+                self.stands = self.shaft.position
+            return Pull(self.stands)
+        self.stands = None
+        wanted = wanted._replace(goal=self.shaft_at(wanted.goal))
+        return wanted if self.sign > 0 else wanted.reversed()
+
+    def feel(self, ticks: float, speed: float, duty: float) -> None:
+        """What the physics did: position [ticks], speed [ticks/s], share of the full drive."""
+        shaft = self.shaft
+        shaft.position, shaft.speed = ticks, speed
+        shaft.duty = shaft.load = 0.0
+        if self.driven:
+            shaft.duty = duty
+            shaft.load = duty - speed * _TICK / self.params.no_load_speed
+
+    def _begin(self) -> None:
+        self._loops.total = 0.0
+
+    def _wanted(self, t: float, period: float) -> Pull | None:
+        """The pull as the servo counts; None if friction holds the shaft."""
+        if self.mode == PWM_MODE:
+            found = Pull(self.position, 0.0, self.memory.get("goal_pwm") / FULL)
+        elif self.mode == CURRENT_MODE:
+            load = self._current()
+            if self._stuck(load, period):
+                return None
+            turning = abs(self._speed) > CREEP
+            against = math.copysign(FRICTION, self._speed if turning else load)
+            found = self._torque(load - against)
+        elif self.mode == VELOCITY_MODE:
+            found = self._to_speed(t, period)
+        else:
+            found = self._to_position(t, period)
+            if self.mode == CURRENT_POSITION_MODE:
+                if self._stuck(self._current(), period):
+                    return None
+                found = self._with_current(found, abs(self._current()), period)
+        if self.mode != PWM_MODE:
+            found = found.within(-self.limit, self.limit)
+        slope, before = steepest(self.memory, period), self.sign * self.shaft.duty
+        return found.within(before - slope, before + slope)
+
+    @property
+    def _speed(self) -> float:
+        """Speed as the servo counts [ticks/s]."""
+        return self.sign * self.shaft.speed
+
+    def _current(self) -> float:
+        """Goal Current as a share of the stall current."""
+        stall = 1e3 * RATINGS[self.memory.table.model].stall_current
+        return self.memory.get("goal_current") / stall
+
+    def _stuck(self, load: float, period: float) -> bool:
+        """Friction holds the shaft against a load, or stops it within the period."""
+        inertia = self.params.armature * abs(self._speed) * _TICK
+        return abs(load) <= FRICTION and inertia <= FRICTION * self.params.stall_torque * period
+
+    def _torque(self, load: float) -> Pull:
+        """A torque [stall torques] at any speed."""
+        return Pull(self.position, 0.0, load, -1.0 / self.params.no_load_speed)
+
+    def _with_current(self, pull: Pull, most: float, period: float) -> Pull:
+        """A pull whose torque stays below a share of the stall torque."""
+        speed = self._speed
+        turning = speed * _TICK / self.params.no_load_speed
+        away = (pull.goal - self.position - 0.5 * period * speed) * _TICK
+        drive = pull.gain * self.params.position_gain * away + pull.push
+        drive -= pull.brake * speed * _TICK
+        load = max(-self.limit, min(drive, self.limit)) - turning
+        if abs(load) > most:
+            return self._torque(math.copysign(most, load))
+        return pull.within(turning - most, turning + most)
+
+    def _to_speed(self, t: float, period: float) -> Pull:
+        """By the loop of velocity mode."""
+        loops, speed = self._loops, self.plan.at(t)[1]
+        loops.velocity((speed - self._speed) / SPEED_UNIT, period, self.limit)
+        gain = loops.vp / 128 / FULL
+        push = gain * speed / SPEED_UNIT + loops.total / FULL
+        return Pull(self.position, 0.0, push, gain / VELOCITY_UNIT)
+
+    def _to_position(self, t: float, period: float) -> Pull:
+        """By the loop of the position modes."""
+        loops, (wanted, speed) = self._loops, self.plan.at(t)
+        goal = float(round(wanted))
+        ahead = self.ahead(loops, t, speed)
+        if loops.i:
+            loops.position(goal - self.position, speed - self._speed, period, self.limit, ahead)
+        brake = loops.d / 16 * LOOP / FULL
+        push = (loops.total + ahead) / FULL + brake * speed
+        return Pull(goal, loops.p / self._new_gain, push, brake / _TICK)

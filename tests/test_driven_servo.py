@@ -1,0 +1,60 @@
+"""Registers of the walking twin's servos where the whole robot hangs on them."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from antennate.twin.config import TwinConfig, build
+from antennate.twin.driven_servo import DrivenServo
+from antennate.twin.robot import TwinRobot
+
+PWM, CURRENT_POSITION = 16, 5
+BIAS = 70
+"""More than a joint of a trial stands off its zero [ticks]: 2 degrees, three times."""
+XL330 = {"robot": {"yaw": {"servo": "xl330_m288"}}}
+
+
+def standing(robot: TwinRobot, mode: int) -> DrivenServo:
+    """The first yaw servo in a mode, with torque."""
+    servo = robot.servos[0]
+    for name, value in (("operating_mode", mode), ("torque_enable", 1)):
+        register = servo.table[name]
+        assert servo.write(register.address, register.encode(value)) == 0
+    return servo
+
+
+def put(servo: DrivenServo, name: str, value: int) -> None:
+    register = servo.table[name]
+    assert servo.write(register.address, register.encode(value)) == 0
+
+
+@pytest.mark.parametrize("drive", [265, -885])
+def test_a_joint_that_is_driven_without_end_meets_a_stop(drive: int) -> None:
+    robot = build(TwinConfig())
+    servo = standing(robot, PWM)
+    put(servo, "goal_pwm", drive)
+    robot.advance(4.0)
+    assert robot.failure is None
+    turned = (servo.position - 2048) * 2 * math.pi / 4096
+    assert abs(turned) == pytest.approx(math.pi, abs=0.1)
+    assert servo.get("present_pwm") == drive, "it stalls there"
+
+
+def test_a_position_needs_a_gain_and_a_current() -> None:
+    """The same for the joint of a robot as for a servo alone: without either it stays."""
+    robot = build(TwinConfig.model_validate(XL330))
+    servo = standing(robot, CURRENT_POSITION)
+    start = servo.position
+    put(servo, "goal_current", 0)
+    put(servo, "goal_position", round(start) + 500)
+    robot.advance(0.5)
+    assert servo.position == pytest.approx(start, abs=BIAS)
+    put(servo, "goal_current", 1000)
+    put(servo, "position_p_gain", 0)
+    robot.advance(1.0)
+    assert servo.position == pytest.approx(start, abs=BIAS)
+    put(servo, "position_p_gain", 400)
+    robot.advance(2.0)
+    assert servo.position == pytest.approx(start + 500, abs=BIAS)
