@@ -67,11 +67,14 @@ def test_what_is_recorded_at_marks_calibrates_to_the_curve_of_the_antenna(tmp_pa
     file = tmp_path / "left.csv"
     file.write_text("\n".join(bench.lines) + "\n")
     columns = RecordingParams(bend_unit="mm", bend_zero=0.0, bend_full=50.0)
-    found = run(CalibrateConfig(recording=str(file), columns=columns, draws=20)).calibration
+    outcome = run(CalibrateConfig(recording=str(file), columns=columns, draws=20))
+    found = outcome.calibration
     assert found.polarity == -1
     assert found.slope == pytest.approx(slope, rel=0.05)
     assert found.midpoint == pytest.approx(midpoint, abs=0.02)
-    assert found.trials == 4
+    assert found.trials == 2  # each of them there and back
+    assert outcome.assessment.hysteresis is not None
+    assert abs(outcome.assessment.hysteresis.mean) < 0.01  # the bench has none
 
 
 def test_every_other_pass_goes_backwards() -> None:

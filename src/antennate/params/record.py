@@ -26,8 +26,8 @@ class RecordParams(Params):
     """Constant speed of a stage that pushes."""
     length: float = number(0.05, "m", "assumed: as the simulated rig", gt=0, le=1)
     """Way of the stage in one push."""
-    passes: int = number(2, "1", "assumed: up and down, so that hysteresis shows", ge=1, le=1000)
-    """Times the marks are gone through, every other time backwards, or pushes."""
+    passes: int = number(4, "1", "assumed: there and back, twice: two trials", ge=1, le=1000)
+    """Times the marks are gone through, every other time backwards, or pushes of a stage."""
     duration: float | None = number(None, "s", "assumed: until Ctrl-C", gt=0)
     """Time to record without marks and speed."""
 

@@ -80,12 +80,12 @@ class Recorder:
     def _marks(self) -> None:
         self._write("trial,time,counts,bend")
         params = self._params
-        for trial in range(params.passes):
-            for mark in params.marks if trial % 2 == 0 else params.marks[::-1]:
+        for number in range(params.passes):
+            for mark in params.marks if number % 2 == 0 else params.marks[::-1]:
                 where = "" if params.unit == "1" else f" {params.unit}"
-                self._wait(f"pass {trial + 1} of {params.passes}: hold at {mark:g}{where}, Enter")
-                for reading, t in self._for(params.hold):
-                    self._row(f"{trial},{t:.6f},{self._counts(reading)},{mark!r}")
+                self._wait(f"pass {number + 1} of {params.passes}: hold at {mark:g}{where}, Enter")
+                for reading, t in self._for(params.hold):  # a trial is there and back
+                    self._row(f"{number // 2},{t:.6f},{self._counts(reading)},{mark!r}")
 
     def _pushes(self, speed: float) -> None:
         self._write("trial,speed_m_s,time,counts,bend")
