@@ -12,6 +12,7 @@ from antennate.errors import BadInputError
 from antennate.hardware.driving.config import DriveConfig
 from antennate.hardware.driving.drive import drive
 from antennate.hardware.driving.session import Session
+from antennate.hardware.dynamixel import packets
 from antennate.hardware.dynamixel.packets import Instruction
 from antennate.hardware.dynamixel.parser import Parser
 from antennate.hardware.esp32.decoder import FrameDecoder
@@ -168,3 +169,15 @@ def test_a_sagging_supply_gives_way_under_load() -> None:
         servo.shaft(2048.0, duty=1.0)
     robot.battery.feed(robot.servos, 1.0)
     assert robot.servos[5].get("present_input_voltage") == round(10 * (11.1 - 1.3))
+
+
+def test_a_fault_of_the_answers_is_taken_back() -> None:
+    robot = build(TwinConfig())
+    robot.advance(1.0)
+    heard: list[bool] = []
+    for what in ("silent", "none"):
+        broken(robot, f"servo:7={what}")
+        robot.bus.receive(robot.t, packets.ping(7))
+        robot.advance(robot.t + 0.1)
+        heard.append(bool(robot.bus.transmit(robot.t)))
+    assert heard == [False, True]

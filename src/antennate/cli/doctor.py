@@ -159,7 +159,9 @@ def show_rows(rows: Sequence[Row]) -> None:
         )
         console.print(line, soft_wrap=True)
     bad = sum(row.grade == "bad" for row in wrong)
-    console.print(Text(_sentence(len(rows), bad, len(wrong) - bad)), soft_wrap=True)
+    console.print(
+        Text(_sentence(len(rows), bad, len(wrong) - bad)), soft_wrap=not console.is_terminal
+    )
 
 
 def _sentence(checks: int, bad: int, warnings: int) -> str:

@@ -52,7 +52,11 @@ def tell(
         return
     for table in tables:
         print_table(table)
-    sys.stdout.write(f"{sentence}\n")
+    from rich.console import Console  # slow to import
+    from rich.text import Text
+
+    console = Console(file=sys.stdout, highlight=False)
+    console.print(Text(sentence), soft_wrap=not console.is_terminal)
 
 
 def print_table(table: Table) -> None:
@@ -84,5 +88,5 @@ def print_table(table: Table) -> None:
             console.print(Text(f"{name}: {', '.join(found)}"))
         console.print()
     if table.note:
-        console.print(Text(table.note), soft_wrap=True)
+        console.print(Text(table.note), soft_wrap=not console.is_terminal)
         console.print()

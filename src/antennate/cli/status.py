@@ -6,6 +6,7 @@ import contextlib
 import math
 import os
 import sys
+from textwrap import fill
 
 from antennate.messages import one_line
 
@@ -45,7 +46,10 @@ class StatusLine:
         write(text if self.terminal else text + "\n")
 
     def say(self, text: str) -> None:
-        """Show something that stays, above the line."""
+        """Show something that stays, above the line; on a terminal broken between words."""
+        if self.terminal:
+            width = self._columns() - 1
+            text = fill(text, width, break_long_words=False, break_on_hyphens=False)
         write(f"{_CLEAR if self._open else ''}{text}\n")
         self._open = False
 

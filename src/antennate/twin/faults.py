@@ -24,10 +24,12 @@ _FORM = re.compile(
 _SERVO = {fault.name.lower(): fault for fault in Fault}
 _HARDWARE = {"voltage": 1, "overheat": 4, "encoder": 8, "shock": 16, "overload": 32}
 """Bits of the register Hardware Error Status, from the manuals of both models."""
+NONE = "none"
+"""Takes back what was wrong; a latched hardware error stays until a reboot."""
 _SIDES = ("left", "right")
 _BOARD = ("silent", "reset", *(f"{kind}_{side}" for kind in ("open", "short") for side in _SIDES))
 _KNOWN = {
-    "servo": (*_SERVO, *_HARDWARE, "reboot"),
+    "servo": (*_SERVO, *_HARDWARE, "reboot", NONE),
     "esp32": (*_BOARD, *_SIDES, "ber"),
     "bus": ("loss", "silent", "latency", "discharge", "ber"),
     "wire": ("loss", "ber"),
@@ -180,7 +182,9 @@ def _break_bus(bus: ServoBus, demand: Demand) -> None:
 
 
 def _break_servo(servo: Servo, demand: Demand, t: float) -> None:
-    if demand.what in _SERVO:
+    if demand.what == NONE:
+        servo.trouble = None
+    elif demand.what in _SERVO:
         servo.trouble = Trouble(_SERVO[demand.what], delay=demand.size)
     elif demand.what == "reboot":
         servo.restart(t)

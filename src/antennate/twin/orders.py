@@ -4,7 +4,7 @@
     only NAME, next            plug in this one alone, or the next one alone
     push NAME=ANGLE            turn a shaft without torque
     touch left:20mm            hold an antenna, or `touch left` for a second; 0mm lets go
-    fault servo:7=silent       let a fault begin
+    fault servo:7=silent       let a fault begin; `fault servo:7=none` takes it back
 
 NAME is a joint, the place of a servo in its list (from 1 on), or `all`.
 """
