@@ -54,6 +54,7 @@ def command(argv: Sequence[str]) -> int:
             "--hold-to-run: expected none with teleop, which stands without a key, found it"
         )
     require_step(config.robot)
+    drive.require_ports(orders)
     with _keys(orders.gamepad, config.teleop.gamepad_silence) as keys:
         return drive.walk("teleop", config, orders, argv, _controller(config, keys))
 
