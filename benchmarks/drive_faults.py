@@ -40,12 +40,13 @@ class Run:
 
     Attributes:
         drive: The process of the drive.
-        folder: Where it writes.
+        place: A folder for everything.
+        folder: Where the drive writes.
         cables: Of board and bus, if they can be pulled.
     """
 
-    def __init__(self, twin: subprocess.Popen[str], paths: dict[str, str], folder: Path) -> None:
-        self._twin, self.folder = twin, folder
+    def __init__(self, twin: subprocess.Popen[str], paths: dict[str, str], place: Path) -> None:
+        self._twin, self.place, self.folder = twin, place, place / "run"
         self.cables: dict[str, Cable] = {}
         self.paths = paths
         self.lines: list[str] = []
@@ -99,12 +100,12 @@ def twin(tcp: bool) -> Iterator[Run]:
             [*ANTENNATE, *words],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
+            stderr=stack.enter_context((Path(place) / "twin").open("w")),
             text=True,
         ) as process,
     ):
         assert process.stdout is not None
-        run = Run(process, json.loads(process.stdout.readline()), Path(place) / "run")
+        run = Run(process, json.loads(process.stdout.readline()), Path(place))
         if tcp:
             for name, address in run.paths.items():
                 run.cables[name] = stack.enter_context(Cable(address))
@@ -242,6 +243,8 @@ def once(case: str, chance: random.Random) -> dict[str, Any]:
         found = run.end()
         if case == "SIGKILL":
             found["next"] = _next(run)
+        said = (run.place / "twin").read_text()
+    assert "not done" not in said, said  # an order that was refused would test nothing
     trace = any("Traceback" in line for line in run.lines)
     complete = "worst_state" in found or case == "SIGKILL"
     keys = ("code", "worst_state", "why", "torque_off", "servos_on", "ended", "refusal", "next")

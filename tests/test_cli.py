@@ -565,3 +565,23 @@ def test_hints_are_typed_as_the_program_was_called(
     monkeypatch.setenv("UV", uv)
     assert main(["zero"]) == 2
     assert f"found none; `{said} setup` finds it" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "words", [["drive"], ["teleop"], ["record", "--marks", "0", "1"], ["doctor"]]
+)
+def test_a_robot_file_in_this_folder_is_hinted_at_where_no_port_is_named(
+    words: list[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    hint = "; robot.toml is here, --config robot.toml takes its ports"
+    assert main(words) == 2
+    assert hint not in capsys.readouterr().err
+    (tmp_path / "robot.toml").touch()
+    assert main(words) == 2
+    said = capsys.readouterr().err
+    assert "found none" in said
+    assert hint in said

@@ -15,6 +15,7 @@ from antennate.cli import main
 from antennate.hardware.driving.config import DriveConfig
 from antennate.hardware.driving.connect import prepare
 from antennate.hardware.driving.drive import drive
+from antennate.hardware.driving.lateness import late_sentence
 from antennate.hardware.driving.report import Report
 from antennate.hardware.driving.session import Session
 from antennate.hardware.safety.causes import Cause, State
@@ -212,3 +213,26 @@ def test_a_drive_without_a_log_says_so(
     result = json.loads((tmp_path / "result.json").read_text())
     assert (result["logs"], result["log_complete"]) == ([], False)
     assert result["unlogged"] == result["pace"]["ticks"] > 0
+
+
+@pytest.mark.parametrize(("pause", "named"), [(0.0, False), (0.012, True)])
+def test_a_computer_that_is_late_is_named(pause: float, named: bool) -> None:
+    """A loop that loses 12 ms in every tenth tick misses one tick or two of eleven or twelve."""
+    made, ticks = rig(TwinConfig()), 0
+
+    def busy(made: Rig, t: float) -> None:
+        nonlocal ticks
+        ticks += 1
+        if ticks % 10 == 0:
+            made.clock.sleep(pause)
+
+    made, report = driven(busy, made)
+    result = report.result(made.session)
+    said = late_sentence(result)
+    assert bool(said) == named
+    if named:
+        share = 100 * result["walking"]["missed_share"]
+        assert 7.0 < share < 18.0
+        assert f"The computer was late: {share:.1f} % of ticks missed while walking" in said[0]
+    faulty = {**result, "why": "FAULT SILENT_SERVO: servos do not answer (servo 1)"}
+    assert any("SILENT_SERVO may come from that" in one for one in late_sentence(faulty)) == named

@@ -32,7 +32,9 @@ class Ready:
         self.joint = joint
 
     def jog(self, **params: float) -> Jog:
-        return Jog(self.bus, ROBOT, self.joint, JogParams(**params))
+        jog = Jog(self.bus, ROBOT, self.joint, JogParams(**params))
+        jog.begin()
+        return jog
 
     def wait(self, jog: Jog, time: float) -> list[float]:
         """Let time pass, looking every 40 ms; speeds [rad/s]."""
@@ -117,3 +119,71 @@ def test_a_joint_that_a_killed_jog_left_weak_has_the_force_of_the_next_one() -> 
     assert ready.servo.get("goal_pwm") == pytest.approx(0.3 * 885, abs=1)
     assert jog.end() == []
     assert ready.servo.get("goal_pwm") == 885
+
+
+@pytest.mark.parametrize(
+    ("register", "value", "told"),
+    [
+        ("operating_mode", 0, "operating mode 3 of yaw1 .*, found 0"),  # current
+        ("operating_mode", 1, "operating mode 3 of yaw1 .*, found 1"),  # velocity
+        ("operating_mode", 4, "operating mode 3 of yaw1 .*, found 4"),  # extended position
+        ("operating_mode", 5, "operating mode 3 of yaw1 .*, found 5"),  # position with current
+        ("operating_mode", 16, "operating mode 3 of yaw1 .*, found 16"),  # PWM
+        ("drive_mode", 1, "drive mode 0 of yaw1 .*, found 1"),  # reversed
+        ("drive_mode", 4, "drive mode 0 of yaw1 .*, found 4"),  # profiles in milliseconds
+        ("drive_mode", 8, "drive mode 0 of yaw1 .*, found 8"),  # a goal brings torque
+        ("homing_offset", 300, "homing offset 0 of yaw1 .*, found 300"),
+        ("min_position_limit", 2000, "min position limit at most 1024 of yaw1 .*, found 2000"),
+        ("velocity_limit", 3, "velocity limit at least .* of yaw1 .*, found 3"),
+    ],
+)
+def test_a_servo_that_is_set_otherwise_gets_no_torque(register: str, value: int, told: str) -> None:
+    """Profile velocity is a speed and Goal PWM a limit in position modes alone (manuals)."""
+    ready = Ready()
+    ready.servo.set(register, value)
+    jog = Jog(ready.bus, ROBOT, YAW1, JogParams())
+    with pytest.raises(SetupError, match=f"expected {told}; `antennate setup --only yaw1`") as info:
+        jog.begin()
+    assert "\n" not in str(info.value)
+    assert not ready.servo.torque
+    stood = ready.servo.position
+    ready.box.wire.sleep(1.0)
+    assert ready.servo.position == stood
+    assert jog.end() == []
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_outside_its_limit_a_joint_goes_inwards_by_single_steps_alone(side: int) -> None:
+    ready = Ready()
+    ready.servo.place(2048.0 + side * 1500)  # 132 degrees; the limit is 90
+    jog = ready.jog(step=0.1)
+    out = jog.look().angle
+    assert abs(out) == pytest.approx(1500 * TICK, abs=2 * TICK)
+    outwards = 1 if out > 0 else -1
+    jog.step(outwards)
+    assert jog.look().goal == pytest.approx(out)
+    for count in range(1, 4):
+        jog.step(-outwards)
+        assert jog.look().goal == pytest.approx(out - outwards * 0.1 * count)
+    jog.step(outwards)
+    assert jog.look().goal == pytest.approx(out - outwards * 0.3)
+    jog.end()
+
+
+def test_what_a_stopped_program_left_is_told_in_words() -> None:
+    """After 0.2 s without a packet the watchdog refuses goals, by the manual."""
+    ready = Ready()
+    jog = ready.jog()
+    ready.box.wire.sleep(1.0)
+    with pytest.raises(SetupError, match=r"found that its watchdog stopped it: .* start jog again"):
+        jog.step(1)
+    assert jog.end() == []
+
+
+def test_a_servo_that_does_not_confirm_stays_slow_and_weak_and_is_named() -> None:
+    ready = Ready()
+    jog = ready.jog()
+    ready.box.plug()
+    assert jog.end() == [1]
+    assert ready.servo.get("goal_pwm") == pytest.approx(0.3 * 885, abs=1)
+    assert ready.servo.get("profile_velocity") > 0

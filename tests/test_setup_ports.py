@@ -58,13 +58,18 @@ def test_none_or_two_are_told_and_asked_for_once_more(tmp_path: Path) -> None:
     script = Script(
         [
             ("unplug", None, ""),
+            ("expected a port that is gone, found none gone", None, None),
+            ("unplug", lambda: ports.unplug("ttyUSB0"), ""),
             ("plug it in", None, ""),
             ("expected a new port within 0.3 s, found none", None, None),
+            ("unplug", lambda: ports.plug("ttyUSB0"), ""),
+            ("found a new one, .*ttyUSB0; now unplug it", None, None),
             ("unplug", lambda: ports.unplug("ttyUSB0"), ""),
             ("plug it in", lambda: ports.plug("ttyUSB0", "ttyACM0"), ""),
             ("expected one new port, found 2: .*ttyACM0, .*ttyUSB0; once more", None, None),
             ("unplug", lambda: ports.unplug("ttyUSB0"), ""),
             ("plug it in", lambda: ports.plug("ttyUSB0"), ""),
+            ("found the adapter at .*ttyUSB0", None, None),
         ]
     )
     assert ports.find(script) == "ttyUSB0"

@@ -124,6 +124,36 @@ def test_a_direction_may_be_kept_and_the_rest_too() -> None:
     assert found == [1, -SIGNS[1]] + [1] * 17
 
 
+def test_only_enter_says_that_the_robot_is_held_straight() -> None:
+    held = Held()
+    person = Script(
+        [
+            ("hold the robot straight", None, "s"),
+            ("expected Enter or q, found 's'", None, "wait"),
+            ("expected Enter or q, found 'wait'", None, ""),
+        ]
+    )
+    assert held.zeroing.zeros(person) == ZEROS
+    assert person.script == []
+
+
+def test_other_words_keep_no_direction() -> None:
+    """Neither Enter nor a word that begins with r; what was kept is known."""
+    held = Held()
+    person = Script(
+        [
+            (": yaw1: ", None, "right"),
+            ("expected s, r or q, found 'right'", None, ""),
+            ("expected s, r or q, found Enter", lambda: held.turn("yaw1", 0.3), None),
+            (": yaw2: ", None, "s"),
+            (": yaw3: ", None, "r"),
+        ]
+    )
+    assert held.zeroing.directions(person) == [SIGNS[0]] + [1] * 18
+    assert person.script == []
+    assert held.zeroing.measured == {"yaw1"}
+
+
 def test_exchanged_servos_are_noticed() -> None:
     held = Held()
     person = Script(

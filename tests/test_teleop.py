@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import os
 import struct
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ import pytest
 from twin_rig import rig
 
 from antennate.cli.keys import keys_of
+from antennate.errors import BadInputError
 from antennate.hardware.driving.config import DriveConfig
 from antennate.hardware.driving.drive import drive
 from antennate.hardware.driving.gamepad import Gamepad
@@ -133,24 +135,93 @@ def test_bytes_of_a_terminal_are_keys() -> None:
     assert keys_of(b"\x1b[Aw\x1bOD q\n\x1b[C") == ["up", "w", "left", " ", "q", "right"]
 
 
-def test_a_gamepad_gives_the_same_keys(tmp_path: Path) -> None:
-    """Events of the kernel's interface: time, value, kind (1 button, 2 axis, 128 first), number."""
-    path = tmp_path / "js0"
-    os.mkfifo(path)
-    reader = Gamepad(path)
-    with path.open("wb", buffering=0) as pad:
-        pad.write(struct.pack("<IhBB", 0, 0, 0x82, 1) + struct.pack("<IhBB", 1, 0, 0x81, 0))
-        assert reader.keys() == []
-        pad.write(struct.pack("<IhBB", 5, -32767, 2, 1))
-        assert reader.keys() == ["up"]
-        assert reader.keys() == ["up"]  # while it is pushed
-        pad.write(struct.pack("<IhBB", 6, 0, 2, 1) + struct.pack("<IhBB", 7, 32767, 2, 6))
-        assert reader.keys() == ["right"]
-        pad.write(struct.pack("<IhBB", 8, 0, 2, 6) + struct.pack("<IhBB", 9, 1, 1, 0)[:5])
-        assert reader.keys() == []
-        pad.write(struct.pack("<IhBB", 9, 1, 1, 0)[5:])
-        assert reader.keys() == ["o"]
-        pad.write(struct.pack("<IhBB", 10, 32767, 2, 0))
-        assert reader.keys() == ["right"]
-    assert reader.keys() == []  # it is unplugged
-    reader.close()
+class Pad:
+    """A pad's device file in a folder, with the clock of its reader; one axis at rest at first."""
+
+    def __init__(self, folder: Path) -> None:
+        self.path, self.t = folder / "js0", 0.0
+        os.mkfifo(self.path)
+        self.ends = [os.open(self.path, os.O_RDWR)]
+        self.event(0x82, 0, 0)
+        self.reader = Gamepad(self.path, lambda: self.t, 2.0)
+
+    def event(self, kind: int, number: int, value: int) -> None:
+        """One event of the kernel: time, value, kind (1 button, 2 axis, 128 state), number."""
+        os.write(self.ends[0], struct.pack("<IhBB", 0, value, kind, number))
+
+    def write(self, data: bytes) -> None:
+        os.write(self.ends[0], data)
+
+    def unplug(self) -> None:
+        os.close(self.ends.pop())
+
+
+@pytest.fixture
+def pad(tmp_path: Path) -> Iterator[Pad]:
+    made = Pad(tmp_path)
+    yield made
+    made.reader.close()
+    while made.ends:
+        made.unplug()
+
+
+def test_a_gamepad_gives_the_same_keys(pad: Pad) -> None:
+    assert pad.reader.keys() == [" "]
+    pad.event(1, 5, 1)
+    pad.event(2, 1, -32767)
+    assert pad.reader.keys() == ["up"]
+    assert pad.reader.keys() == ["up"]  # while it is pushed
+    pad.event(2, 1, 0)
+    pad.event(2, 6, 32767)
+    assert pad.reader.keys() == ["right"]
+    pad.event(2, 6, 0)
+    button = struct.pack("<IhBB", 9, 1, 1, 0)
+    pad.write(button[:5])
+    assert pad.reader.keys() == [" "]
+    pad.write(button[5:])
+    assert pad.reader.keys() == ["o", " "]
+
+
+@pytest.mark.parametrize("button", [4, 5])
+def test_a_stick_without_its_dead_mans_button_stands(button: int, pad: Pad) -> None:
+    pad.event(0x81, button, 1)  # held before: it has to be pressed anew
+    pad.event(2, 1, -32767)
+    assert pad.reader.keys() == [" "]
+    pad.event(1, button, 1)
+    assert pad.reader.keys() == ["up"]
+    pad.event(1, button, 0)
+    assert pad.reader.keys() == [" "]
+
+
+def test_a_pad_that_freezes_walks_for_two_seconds_at_most(pad: Pad) -> None:
+    pad.event(1, 4, 1)
+    pad.event(2, 1, -32767)
+    assert pad.reader.keys() == ["up"]
+    pad.t = 1.9
+    assert pad.reader.keys() == ["up"]
+    pad.t = 2.1
+    assert pad.reader.keys() == [" "]
+    pad.event(2, 1, -32000)
+    assert pad.reader.keys() == ["up"]
+
+
+def test_a_pad_that_is_unplugged_or_sends_nonsense_ends_the_drive(pad: Pad) -> None:
+    pad.event(1, 4, 1)
+    pad.event(2, 1, -32767)
+    assert pad.reader.keys() == ["up"]
+    pad.event(7, 1, -32767)
+    assert pad.reader.keys() == ["end"]
+    pad.unplug()
+    assert pad.reader.keys() == ["end"]
+
+
+def test_what_is_no_joystick_is_refused_at_once(tmp_path: Path) -> None:
+    text = tmp_path / "notes"
+    text.write_text("no joystick at all")
+    silent = tmp_path / "silent"
+    os.mkfifo(silent)
+    for path in (Path("/dev/zero"), Path("/dev/null"), text, silent, tmp_path):
+        with pytest.raises(BadInputError, match=f"--gamepad: expected a joystick .* found {path}"):
+            Gamepad(path, lambda: 0.0, 2.0)
+    with pytest.raises(BadInputError, match="cannot open"):
+        Gamepad(tmp_path / "none", lambda: 0.0, 2.0)

@@ -20,6 +20,9 @@ from antennate.hardware.robot_file import RobotFile
 from antennate.params.reading import Config, read_file
 from antennate.params.setup import PortsParams
 
+USUAL = Path("robot.toml")
+"""The robot's file if --config names no other."""
+
 
 @dataclass(frozen=True)
 class RobotOptions(FromFile):
@@ -110,6 +113,12 @@ def key_of(options: RobotOptions) -> bytes | None:
     red = "\x1b[1;31m{}\x1b[0m" if sys.stderr.isatty() else "{}"
     sys.stderr.write(red.format(warning) + "\n")
     return b""
+
+
+def at_hand(options: FromFile) -> str:
+    """A hint at the robot's file in this folder, empty if there is none or --config names one."""
+    named = options.config is not None or not USUAL.is_file()
+    return "" if named else f"; {USUAL} is here, --config {USUAL} takes its ports"
 
 
 def require_two_ports(options: PortOptions) -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from pydantic.dataclasses import dataclass
 
-from antennate.cli.addresses import PortOptions, key_of, parse_robot, require_two_ports
+from antennate.cli.addresses import PortOptions, at_hand, key_of, parse_robot, require_two_ports
 from antennate.cli.exit_codes import BAD_INPUT, OK
 from antennate.cli.options import option
 from antennate.cli.progress import stop_signals
@@ -69,7 +69,7 @@ def command(argv: Sequence[str]) -> int:
 
 def _check(orders: Orders) -> None:
     if not (orders.esp32 or orders.bus):
-        raise ConfigError("expected --esp32 PORT, --bus PORT or both, found none")
+        raise ConfigError(f"expected --esp32 PORT, --bus PORT or both, found none{at_hand(orders)}")
     require_two_ports(orders)
     if orders.fix and not orders.bus:
         raise ConfigError("--fix: expected --bus PORT with it, found none")

@@ -12,7 +12,7 @@ from typing import Any
 from pydantic.dataclasses import dataclass
 
 from antennate.cli import viewer
-from antennate.cli.addresses import PortOptions, key_of, parse_robot, require_two_ports
+from antennate.cli.addresses import PortOptions, at_hand, key_of, parse_robot, require_two_ports
 from antennate.cli.exit_codes import BAD_INPUT, OK
 from antennate.cli.keyboard import pressed_keys
 from antennate.cli.options import option
@@ -22,6 +22,7 @@ from antennate.hardware.driving.arrival import Arrival
 from antennate.hardware.driving.config import DriveConfig
 from antennate.hardware.driving.connect import connect
 from antennate.hardware.driving.drive import drive
+from antennate.hardware.driving.lateness import late_sentence
 from antennate.hardware.driving.operator import Operator
 from antennate.hardware.driving.priority import Priority, urgent
 from antennate.hardware.driving.session import Session
@@ -74,6 +75,18 @@ def command(argv: Sequence[str]) -> int:
     return walk("drive", config, orders, argv)
 
 
+def require_ports(orders: Orders) -> None:
+    """Require both ports.
+
+    Raises:
+        ConfigError: One is not named, or they cannot be used.
+    """
+    for name in ("esp32", "bus"):
+        if not getattr(orders, name):
+            raise ConfigError(f"--{name}: expected a serial port, found none{at_hand(orders)}")
+    require_two_ports(orders)
+
+
 def walk(
     command: str,
     config: DriveConfig,
@@ -93,10 +106,7 @@ def walk(
     Raises:
         AntennateError: A port, a servo or the board is not what is needed; nothing moved then.
     """
-    for name in ("esp32", "bus"):
-        if not getattr(orders, name):
-            raise ConfigError(f"--{name}: expected a serial port, found none")
-    require_two_ports(orders)
+    require_ports(orders)
     config = config.calibrated()
     key = key_of(orders)
     with (
@@ -129,7 +139,7 @@ def _tell(result: Mapping[str, Any], orders: Orders, log: str) -> None:
     table = Table.of("Drive", {short_names([name])[name]: result}, MEASURES, _note(result))
     again = f"What was read and decided: {typed('replay')} {log}"
     again = again if result["logs"] else f"No log was kept: {_LOGLESS}"
-    tell(result, orders, [table], f"{_sentence(result)}\n{again}")
+    tell(result, orders, [table], "\n".join([_sentence(result), *late_sentence(result), again]))
 
 
 def _carry_out(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import sys
 from collections.abc import Sequence
 
 from pydantic.dataclasses import dataclass
@@ -12,7 +11,7 @@ from antennate.cli.exit_codes import BAD_INPUT, OK
 from antennate.cli.keys import END, ReadKeys, typed_keys
 from antennate.cli.options import option
 from antennate.cli.robot_toml import BusOptions, parse_writer, require_bus
-from antennate.cli.status import StatusLine
+from antennate.cli.status import StatusLine, write
 from antennate.errors import ConfigError
 from antennate.hardware.doctor.bus_survey import master
 from antennate.hardware.doctor.ports import opener_of
@@ -30,7 +29,7 @@ Move one joint by small steps, slowly and with little force: + or the right arro
 positive sense, - or the left arrow back, n and p go to the next and the previous joint, q ends.
 
 Torque is on that joint alone and off at the end, verified. If the program dies, the joint stops
-within 0.2 s by its own watchdog."""
+within 0.2 s by its own watchdog. A servo that is not set up for its joint gets no torque."""
 _PERIOD = 0.04
 """Time between two readings [s]: a fifth of the watchdog's."""
 _REST = 0.3
@@ -61,45 +60,55 @@ def command(argv: Sequence[str]) -> int:
         )
     require_bus(orders.bus)
     at, clock = names.index(orders.joint or names[0]), HostClock()
-    with opener_of(orders.bus, "--bus")(config.robot.baud) as port, typed_keys() as keys:
+    open_bus = opener_of(orders.bus, "--bus")
+    with open_bus(config.robot.baud) as port, typed_keys() as keys, StopOnce(last=True) as stop:
+        stop.within = _move  # no signal keeps the torque from going off
         bus = master(port, config.robot.baud, clock.now)
-        left, last = list[int](), ""
-        while not left and last not in ("q", END):
-            left, last = _move(bus, config, at, keys, clock)
+        off, last = True, ""
+        while off and last not in ("q", END) and not stop.received:
+            off, last = _one_joint(bus, config, at, keys, clock)
             at = (at + _OTHERS.get(last, 0)) % len(names)
-    if left:
-        sys.stderr.write(f"torque is NOT confirmed off: servos {left}; switch their supply off\n")
-        return BAD_INPUT
-    sys.stderr.write("torque is off, verified\n")
-    return OK
+    return OK if off else BAD_INPUT
 
 
-def _move(
+def _one_joint(
     bus: Bus, config: JogConfig, at: int, keys: ReadKeys, clock: HostClock
-) -> tuple[list[int], str]:
-    """One joint until another is wanted: ids that did not confirm torque off, and the last key."""
-    joint, status = joints_of(config.robot)[at], StatusLine()
-    jog, last = None, ""
-    with StopOnce() as stop:
-        try:
-            jog = Jog(bus, config.robot, joint, config.jog)
-            arrives = math.inf
-            while last not in (*_OTHERS, "q") and clock.now() < arrives:
-                last = _carry_out(jog, keys(_PERIOD if last != END else 0.0)) or last
-                now = jog.look()
-                if last != END:
-                    arrives = clock.now() + abs(now.goal - now.angle) / config.jog.speed + _REST
-                else:
-                    clock.sleep_until(clock.now() + _PERIOD)
-                if status.due(clock.now()):
-                    status.show(_line(now, joint.name))
-        except KeyboardInterrupt:
-            last = "q"
-        finally:
-            stop.closed = True
-            left = [] if jog is None else jog.end()
-            status.close()
-    return left, "q" if stop.received else last
+) -> tuple[bool, str]:
+    """One joint until another is wanted: whether its torque is off, and the last key.
+
+    What became of the torque is written in any case, above the error if there is one.
+    """
+    status, last, left = StatusLine(), "q", list[int]()
+    jog = Jog(bus, config.robot, joints_of(config.robot)[at], config.jog)
+    try:
+        last = _move(jog, config.jog.speed, keys, clock, status)
+    except KeyboardInterrupt:
+        pass
+    finally:
+        left = jog.end()
+        status.close()
+        write(
+            f"torque is NOT confirmed off: servos {left}; switch their supply off\n"
+            if left
+            else f"{jog.joint.name}: torque is off, verified\n"
+        )
+    return not left, last
+
+
+def _move(jog: Jog, speed: float, keys: ReadKeys, clock: HostClock, status: StatusLine) -> str:
+    """Torque on, and what the keys ask for: the key that ends it."""
+    last, arrives = "", math.inf
+    jog.begin()
+    while last not in (*_OTHERS, "q") and clock.now() < arrives:
+        last = _carry_out(jog, keys(_PERIOD if last != END else 0.0)) or last
+        now = jog.look()
+        if last != END:
+            arrives = clock.now() + abs(now.goal - now.angle) / speed + _REST
+        else:
+            clock.sleep_until(clock.now() + _PERIOD)
+        if status.due(clock.now()):
+            status.show(_line(now, jog.joint.name))
+    return last
 
 
 def _carry_out(jog: Jog, keys: Sequence[str]) -> str:

@@ -13,7 +13,7 @@ from statistics import fmean, pstdev
 
 from pydantic.dataclasses import dataclass
 
-from antennate.cli.addresses import RobotOptions, key_of, parse_robot
+from antennate.cli.addresses import RobotOptions, at_hand, key_of, parse_robot
 from antennate.cli.exit_codes import OK
 from antennate.cli.options import option
 from antennate.cli.progress import stop_signals
@@ -54,7 +54,7 @@ def command(argv: Sequence[str]) -> int:
     """
     params, orders = parse_robot("record", DESCRIPTION, RobotFile.for_record, argv, Orders)
     if not orders.esp32:
-        raise ConfigError("--esp32: expected a serial port, found none")
+        raise ConfigError(f"--esp32: expected a serial port, found none{at_hand(orders)}")
     if orders.out is None:
         raise ConfigError("--out: expected a CSV file to make, found none")
     key, now = key_of(orders), HostClock().now

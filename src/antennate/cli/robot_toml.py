@@ -8,16 +8,13 @@ from typing import TypeVar
 
 from pydantic.dataclasses import dataclass
 
-from antennate.cli.addresses import parse_robot, refuse_udp
+from antennate.cli.addresses import USUAL, parse_robot, refuse_udp
 from antennate.cli.arguments import FromFile
 from antennate.cli.options import option
 from antennate.errors import ConfigError
 from antennate.hardware.robot_file import RobotFile
 from antennate.messages import typed
 from antennate.params.reading import Config
-
-USUAL = Path("robot.toml")
-"""The file if --config names no other."""
 
 
 @dataclass(frozen=True)

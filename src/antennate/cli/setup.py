@@ -8,7 +8,7 @@ from pathlib import Path
 
 from pydantic.dataclasses import dataclass
 
-from antennate.cli.exit_codes import BAD_INPUT, OK
+from antennate.cli.exit_codes import OK
 from antennate.cli.options import option
 from antennate.cli.person import TerminalPerson
 from antennate.cli.progress import stop_signals
@@ -35,7 +35,8 @@ the robot, whatever its id and speed: it gets the id, speed, mode, limits and re
 joint, each written and read back. Torque never comes on.
 
 What is done is kept in robot.toml (--config names another file), so that you may stop and go on
-later. Two servos on the bus, a servo of another model and one that is done are refused."""
+later. Two servos on the bus and a servo of another model are refused. For one that is done you are
+asked whether it is a spare, to become the servo of this joint."""
 
 
 @dataclass(frozen=True)
@@ -114,21 +115,35 @@ def _servos(
     _show(states)
     try:
         assembly.run(person, states, orders.only)
-        whole = "connect all servos as they are in the robot"
-        if len(assembly.done) < len(states) or not confirm(person, whole):
+        if len(assembly.done) < len(states):
             raise Quit
+        _whole(person, assembly)
     except Quit:
         done = len(assembly.done)
         person.say(f"{done} of {len(states)} servos are set up; this is kept in {path}")
         return OK
-    states = assembly.look()
-    _show(states)
-    missing = [state.joint.name for state in states if state.note != "answers"]
-    if missing:
-        person.say(f"expected all servos to answer, found none of {', '.join(missing)}")
-        return BAD_INPUT
     person.say(f"all servos answer; {path} is written. Next: {typed('zero')}")
     return OK
+
+
+def _whole(person: TerminalPerson, assembly: Assembly) -> None:
+    """Ask for the whole robot until all servos answer.
+
+    Raises:
+        Quit: The person leaves it out, or wants to end.
+        BadInputError: No answer can come.
+    """
+    while confirm(person, "connect all servos as they are in the robot"):
+        states = assembly.look()
+        missing = [state.joint.name for state in states if state.note != "answers"]
+        if not missing:
+            _show(states)
+            return
+        person.say(
+            f"expected all servos to answer, found none of {', '.join(missing)}; check the plugs "
+            "along the chain, and the supply"
+        )
+    raise Quit
 
 
 def _show(states: Sequence[JointState]) -> None:

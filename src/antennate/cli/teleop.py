@@ -18,6 +18,7 @@ from antennate.hardware.driving.config import DriveConfig
 from antennate.hardware.driving.gamepad import Gamepad
 from antennate.hardware.driving.session import Session
 from antennate.hardware.driving.teleop import KeyController, TeleopConfig
+from antennate.hardware.host_clock import HostClock
 from antennate.hardware.robot_file import RobotFile
 
 DESCRIPTION = """\
@@ -26,7 +27,11 @@ and REVERSE, the space bar stands, o lets the antennae oscillate, q ends. All el
 `antennate drive`: the dry run, --arm, the supervisor, the log.
 
 Hold a key: half a second without one and the robot stands. A reading that cannot be used stops it
-too. --gamepad takes the first stick or the cross of a gamepad instead, and any button for o."""
+too.
+
+--gamepad takes the first stick or the cross of a gamepad instead, while a shoulder button (4 or 5,
+L1 or R1) is held, and any other button for o. Without the button, or two seconds without an event
+of the pad (--teleop.gamepad-silence), the robot stands. A pad that is unplugged ends the drive."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +54,8 @@ def command(argv: Sequence[str]) -> int:
             "--hold-to-run: expected none with teleop, which stands without a key, found it"
         )
     require_step(config.robot)
-    with _keys(orders.gamepad) as keys:
+    drive.require_ports(orders)
+    with _keys(orders.gamepad, config.teleop.gamepad_silence) as keys:
         return drive.walk("teleop", config, orders, argv, _controller(config, keys))
 
 
@@ -64,14 +70,16 @@ def _controller(
 
 
 @contextlib.contextmanager
-def _keys(path: Path | None) -> Iterator[Callable[[], list[str]]]:
+def _keys(path: Path | None, silence: float) -> Iterator[Callable[[], list[str]]]:
     """Yield what says, without waiting, which keys have come.
+
+    A gamepad without an event for `silence` [s] counts as released.
 
     Raises:
         BadInputError: None can come.
     """
     if path is not None:
-        with contextlib.closing(Gamepad(path)) as pad:
+        with contextlib.closing(Gamepad(path, HostClock().now, silence)) as pad:
             yield pad.keys
         return
     with typed_keys() as read:

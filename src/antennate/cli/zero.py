@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
 
 from pydantic.dataclasses import dataclass
@@ -81,16 +81,24 @@ def _measure(person: TerminalPerson, config: ZeroConfig, orders: Orders, path: P
         directions = list(robot.directions) if keep else zeroing.directions(person)
     change(path, by_group(robot, "zeros", zeros) | by_group(robot, "directions", directions))
     person.close()
-    _show(robot, zeros, directions)
+    _show(robot, zeros, directions, zeroing.measured)
     sys.stderr.write(f"{path} is written. Next: {typed('doctor', '--config', str(path))}\n")
     return OK
 
 
-def _show(robot: RobotSpec, zeros: Sequence[int], directions: Sequence[int]) -> None:
+def _show(
+    robot: RobotSpec, zeros: Sequence[int], directions: Sequence[int], measured: Collection[str]
+) -> None:
+
+    def note(name: str, turned: bool) -> str:
+        if name not in measured:
+            return "direction not measured"
+        return "reversed" if turned else ""
+
     before = zip(robot.zeros, robot.directions, strict=True)
     after = zip(zeros, directions, strict=True)
     rows = [
-        (name, [str(zero), f"{zero - old:+d}", f"{sign:+d}", "reversed" if sign != kept else ""])
+        (name, [str(zero), f"{zero - old:+d}", f"{sign:+d}", note(name, sign != kept)])
         for name, (old, kept), (zero, sign) in zip(robot.joint_names, before, after, strict=True)
     ]
     print_table(Table("Joints", ["zero", "change", "direction", "note"], rows, ""))

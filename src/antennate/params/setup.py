@@ -67,6 +67,14 @@ class TeleopParams(Params):
         0.5, "s", "assumed: keys that are held repeat every 33 to 92 ms", gt=0, le=2
     )
     """Time without a key after which the robot stands."""
+    gamepad_silence: float = number(
+        2.0,
+        "s",
+        "assumed: a thumb on a stick moves more often; a lost radio is silent",
+        gt=0,
+        le=10,
+    )
+    """Time without an event of the gamepad after which the robot stands until the next one."""
     oscillation_amplitude: float = number(0.35, "rad", "assumed: 20 degrees", ge=0, le=0.7)
     """Amplitude of the antenna bases."""
     oscillation_frequency: float = number(0.5, "Hz", "assumed: that of the gait", gt=0, le=1)

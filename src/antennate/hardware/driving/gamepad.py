@@ -2,14 +2,19 @@
 
 Eight bytes an event: time [ms], value, kind and number, as in
 https://docs.kernel.org/input/joydev/joystick-api.html. The first stick or the cross gives the
-maneuver, any button the oscillation.
+maneuver while a shoulder button is held, any other button the oscillation.
+
+The kernel sends changes only, so a radio pad that lost its radio looks like one that is held still.
+The shoulder button is a dead man's switch for the hand; for the radio there is a longest time
+without any event.
 """
 
 from __future__ import annotations
 
-import contextlib
 import os
+import select
 import struct
+from collections.abc import Callable
 from pathlib import Path
 
 from antennate.errors import BadInputError
@@ -20,6 +25,13 @@ _HALF = 16_384
 """Half of the travel of a stick; beyond it the stick counts as pushed."""
 _CROSS = (6, 7)
 """Axes of the cross of most pads; the first stick has 0 and 1."""
+SHOULDERS = (4, 5)
+"""Buttons of which one has to be held, L1 and R1 of most pads (assumed; `jstest` shows yours)."""
+_CHUNKS = 16
+"""Reads of 64 events in one call: more than a pad sends in a period (assumed)."""
+_GREETING = 0.5
+"""Time for the states that the kernel sends at once [s] (assumed)."""
+STAND, GONE = " ", "end"
 
 
 class Gamepad:
@@ -27,56 +39,104 @@ class Gamepad:
 
     Args:
         path: Its device file, such as /dev/input/js0.
+        clock: Monotonic time [s].
+        silence: Time without an event after which nothing counts as held [s].
 
     Raises:
-        BadInputError: It cannot be opened.
+        BadInputError: It cannot be opened, or is no joystick.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, clock: Callable[[], float], silence: float) -> None:
+        self._axes: dict[int, int] = {}
+        self._held: set[int] = set()
+        self._rest, self._clock, self._silence = b"", clock, silence
+        self._newest = clock()
         try:
             self._handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
         except OSError as error:
             raise BadInputError(f"--gamepad: cannot open {path}: {error.strerror}") from None
-        self._axes: dict[int, int] = {}
-        self._rest = b""
+        if not self._greeted():
+            os.close(self._handle)
+            raise BadInputError(
+                f"--gamepad: expected a joystick device, such as /dev/input/js0, found {path}, "
+                "which does not begin with the state of its buttons and sticks"
+            )
 
     def keys(self) -> list[str]:
-        """What is pushed now: an arrow's name, and `o` for each button that went down."""
+        """What is asked for now.
+
+        An arrow's name while a stick is pushed and a shoulder button is held, else a space (stand);
+        `o` for each other button that went down; `end` alone if the pad is gone.
+        """
         keys: list[str] = []
-        with contextlib.suppress(BlockingIOError):
-            while data := self._read():
-                whole = len(data) - len(data) % _EVENT.size
-                self._rest = data[whole:]
-                for _, value, kind, number in _EVENT.iter_unpack(data[:whole]):
-                    if kind & ~_FIRST == _AXIS:
-                        self._axes[number] = value
-                    elif kind == _BUTTON and value:
-                        keys.append("o")
-        return keys + self._pushed()
+        for _ in range(_CHUNKS):
+            data = self._read()
+            if data is None:
+                return [GONE]
+            if not data:
+                break
+            whole = len(data) - len(data) % _EVENT.size
+            self._rest = data[whole:]
+            for _, value, kind, number in _EVENT.iter_unpack(data[:whole]):
+                if not self._take(value, kind, number, keys):
+                    return [GONE]
+        return [*keys, self._wanted()]
 
     def close(self) -> None:
         """Close it."""
         os.close(self._handle)
 
-    def _read(self) -> bytes:
-        """Read the events that have come; a pad that was unplugged has nothing pushed."""
+    def _greeted(self) -> bool:
+        """Whether the first event is a state, as every joystick sends it when it is opened."""
+        if not select.select([self._handle], [], [], _GREETING)[0]:
+            return False
+        data = self._read() or b""
+        if len(data) < _EVENT.size or len(data) % _EVENT.size:
+            return False
+        events = list(_EVENT.iter_unpack(data))
+        if events[0][2] not in (_FIRST | _BUTTON, _FIRST | _AXIS):
+            return False
+        return all(self._take(value, kind, number, []) for _, value, kind, number in events)
+
+    def _take(self, value: int, kind: int, number: int, keys: list[str]) -> bool:
+        """Take an event; False if it is none of a joystick.
+
+        A button counts as held only if it went down while the pad was open.
+        """
+        if kind & ~_FIRST == _AXIS:
+            self._axes[number] = value
+        elif kind & ~_FIRST != _BUTTON:
+            return False
+        elif number in SHOULDERS:
+            if not value:
+                self._held.discard(number)
+            elif kind == _BUTTON:
+                self._held.add(number)
+        elif value and kind == _BUTTON:
+            keys.append("o")
+        return True
+
+    def _read(self) -> bytes | None:
+        """Bytes that have come, with those of a broken event before; None if the pad is gone."""
         try:
             data = os.read(self._handle, 64 * _EVENT.size)
         except BlockingIOError:
-            raise
-        except OSError:
-            data = b""
-        if not data:
-            self._axes.clear()
             return b""
+        except OSError:
+            return None
+        if not data:
+            return None
+        self._newest = self._clock()
         return self._rest + data
 
-    def _pushed(self) -> list[str]:
-        """The arrow into whose direction a stick is pushed most."""
+    def _wanted(self) -> str:
+        """The arrow into whose direction a stick is pushed most, if a hand is there."""
+        if not self._held or self._clock() - self._newest > self._silence:
+            return STAND
         ways: dict[str, int] = {}
         for across, along in ((0, 1), _CROSS):
             x, y = self._axes.get(across, 0), self._axes.get(along, 0)
             for name, way in (("left", -x), ("right", x), ("up", -y), ("down", y)):
                 ways[name] = max(way, ways.get(name, 0))
         name, way = max(ways.items(), key=lambda item: item[1])
-        return [name] if way > _HALF else []
+        return name if way > _HALF else STAND

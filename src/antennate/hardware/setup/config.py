@@ -37,9 +37,6 @@ class JogConfig(Params):
     """The robot, and how a joint of it is moved by keys."""
 
     shared: ClassVar[bool] = True
-    unread: ClassVar[tuple[str, ...]] = (
-        *_UNREAD,
-        *(f"robot.{name}.fastest" for name in ("yaw", "legs", "antennae", "pitch")),
-    )
+    unread: ClassVar[tuple[str, ...]] = _UNREAD
     robot: RobotSpec = RobotSpec()
     jog: JogParams = JogParams()

@@ -1,7 +1,8 @@
 """One joint moved by small steps: slowly, with little force, and only while somebody is there.
 
-The servo gets a slow profile and a limit of its PWM, and its bus watchdog stops it when the program
-dies. Torque is on that joint alone and goes off at the end.
+A profile and Goal PWM bound speed and force in position modes alone, so a servo that is set
+otherwise gets no torque. It gets a slow profile and a limit of its PWM, and its bus watchdog stops
+it when the program dies. Torque is on that joint alone and goes off at the end.
 """
 
 from __future__ import annotations
@@ -10,8 +11,9 @@ import contextlib
 import math
 from typing import NamedTuple
 
+from antennate.hardware import settings
 from antennate.hardware.dynamixel import bringup
-from antennate.hardware.dynamixel.answers import Span, Value
+from antennate.hardware.dynamixel.answers import Answer, Refused, Span, Value
 from antennate.hardware.dynamixel.bus import Bus
 from antennate.hardware.dynamixel.tables import (
     POSITION_UNIT,
@@ -50,52 +52,74 @@ class JogState(NamedTuple):
 
 
 class Jog:
-    """A joint with torque, until `end`.
+    """A joint that has torque from `begin` to `end`.
 
     Args:
         bus: The bus.
-        robot: The robot, for zeros, directions and limits.
+        robot: The robot, for modes, zeros, directions and limits.
         joint: The joint.
         params: How slowly, how strong, how far.
-
-    Raises:
-        BringUpError: The servo is not fit; it has no torque then.
     """
 
     def __init__(self, bus: Bus, robot: RobotSpec, joint: Joint, params: JogParams) -> None:
         at = robot.joint_names.index(joint.name)
         self.joint, self._bus, self._params = joint, bus, params
         self._table = TABLES[joint.model]
+        self._rules = {
+            name: rules[joint.servo]
+            for name, rules in settings.settings(robot).items()
+            if joint.servo in rules
+        }
         self._sign, self._limit = robot.directions[at], robot.limits[at]
         self._zero, self._lost = float(robot.zeros[at]), 0
-        self._full = self._read("pwm_limit")
-        try:
-            self._goal = self._begin()
-        except BaseException:
-            self.end()
-            raise
-        self._newest = JogState(self._goal, self._goal, 0, 0)
+        self._full = 0
+        self._newest = JogState(0.0, 0.0, 0, 0)
 
-    def _begin(self) -> float:
-        """Slow, weak, watched, and on where it stands [rad]."""
+    def begin(self) -> None:
+        """Torque on where it stands: slow, weak and watched. Call `end` even if this fails.
+
+        Raises:
+            BringUpError: The servo is not fit; it gets no torque then.
+            SetupError: It is not set as the joint needs it, or refused a value; no torque either.
+        """
         servo, bus = self.joint.servo, self._bus
         bringup.require_models(bus, {servo: self.joint.model})
+        self._require_settings()
+        self._full = self._read("pwm_limit")
         bringup.arm_watchdogs(bus, [servo], WATCHDOG_COUNTS)
         bringup.limit_speed(bus, {servo: max(1, round(self._params.speed / VELOCITY_UNIT))})
         self._write("goal_pwm", max(1, round(self._params.pwm * self._full)))
         stands = bringup.enable(bus, [servo])[servo]
         if math.isinf(self._limit):  # a leg counts its turns from where it stands
             self._zero += TICKS_A_TURN * round((stands - self._zero) / TICKS_A_TURN)
-        return self._angle(stands)
+        angle = self._angle(stands)
+        self._newest = JogState(angle, angle, stands, 0)
+
+    def _require_settings(self) -> None:
+        """All that a servo needs before it gets torque, as `drive` and `doctor` know it.
+
+        Raises:
+            SetupError: A register holds something else.
+        """
+        for name, rule in self._rules.items():
+            if not rule.allows(value := self._read(name)):
+                raise SetupError(
+                    f"expected {name.replace('_', ' ')} {rule} of {self.joint}, found {value}; "
+                    f"`antennate setup --only {self.joint.name}` or `antennate doctor --fix` sets "
+                    "it"
+                )
 
     def step(self, steps: int) -> None:
         """Set the goal some steps further, within the limit of the joint.
 
+        A joint that stands outside its limit goes inwards, step by step, and no further out.
+
         Raises:
             SetupError: The servo did not take it.
         """
-        wanted = self._newest.goal + steps * self._params.step
-        goal = min(max(wanted, -self._limit), self._limit)
+        before = self._newest.goal
+        wanted = before + steps * self._params.step
+        goal = min(max(wanted, min(-self._limit, before)), max(self._limit, before))
         self._write("goal_position", round(self._zero + self._sign * goal / POSITION_UNIT))
         self._newest = self._newest._replace(goal=goal)
 
@@ -125,8 +149,13 @@ class Jog:
         return self._newest
 
     def end(self) -> list[int]:
-        """Torque off, verified, and the servo as it was: ids that did not confirm it."""
+        """Torque off, verified, and the servo as it was: ids that did not confirm it.
+
+        A servo that may have torque stays slow and weak.
+        """
         left = bringup.disable(self._bus, [self.joint.servo])
+        if left or not self._full:
+            return left
         with contextlib.suppress(PortError, SetupError, bringup.BringUpError):
             self._write("goal_pwm", self._full)
             bringup.limit_speed(self._bus, {self.joint.servo: 0})
@@ -152,5 +181,15 @@ class Jog:
         reply = self._bus.write(self.joint.servo, register.address, register.encode(value))
         if not isinstance(reply, Value):
             raise SetupError(
-                f"expected {self.joint} to take {name.replace('_', ' ')} {value}, found {reply}"
+                f"expected {self.joint} to take {name.replace('_', ' ')} {value}, found "
+                f"{self._reason(reply)}"
             )
+
+    def _reason(self, reply: Answer) -> str:
+        """Why a servo did not take a value, in words."""
+        if not isinstance(reply, Refused):
+            return "no answer; check its cable and its supply"
+        if self._read("bus_watchdog") < 0:
+            pause = 0.02 * WATCHDOG_COUNTS
+            return f"that its watchdog stopped it: nothing came for {pause:g} s; start jog again"
+        return f"that it refused ({reply.error.name.lower().replace('_', ' ')})"

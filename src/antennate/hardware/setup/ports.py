@@ -52,17 +52,40 @@ def find_port(
     Raises:
         Quit: The person wants to end.
         BadInputError: No answer can come.
+        PortError: The ports cannot be listed.
     """
+    before = listing()
     while True:
         if not confirm(person, f"unplug the {what}, and nothing else"):
             return ""
         try:
             without = _settled(listing, wait)
+            _require_gone(before, without)
             if not confirm(person, "plug it in again"):
                 return ""
-            return _appeared(listing, without, wait, patience)
+            port = _appeared(listing, without, wait, patience)
+            person.say(f"found the {what} at {port}")
+            return port
         except (SetupError, PortError) as error:
             person.say(f"{error}; once more")
+            before = listing()
+
+
+def _require_gone(before: frozenset[str], after: frozenset[str]) -> None:
+    """Require that a port has gone.
+
+    Raises:
+        SetupError: None has.
+    """
+    if before - after:
+        return
+    if new := sorted(after - before):
+        raise SetupError(f"expected a port that is gone, found a new one, {new[0]}; now unplug it")
+    here = ", ".join(sorted(after)) or "none"
+    raise SetupError(
+        f"expected a port that is gone, found none gone (ports here: {here}); if it was not "
+        "plugged in before, plug it in now and press Enter"
+    )
 
 
 def _settled(listing: Listing, wait: Callable[[float], None]) -> frozenset[str]:

@@ -41,6 +41,10 @@ _SENSES: Mapping[GroupName, str] = {
     "pitch": "lift the part behind it",
 }
 _LIFTING = "lift it"
+_QUIT = ("q", "quit")
+_KEEP = {"s": 0, "skip": 0, "r": None, "rest": None}
+"""Answers that keep a direction, and what they give: 0 for this one, None for the rest too."""
+_CHOICE = "s keeps, r keeps the rest, q ends"
 
 
 class HornNote(NamedTuple):
@@ -112,11 +116,15 @@ class Zeroing:
         robot: The robot as it is described so far.
         params: How still, how far.
         positions: The positions of its joints.
+
+    Attributes:
+        measured: Names of the joints whose direction was measured, not kept.
     """
 
     def __init__(self, robot: RobotSpec, params: SetupParams, positions: Positions) -> None:
         self._robot, self._params, self._positions = robot, params, positions
         self._names = robot.joint_names
+        self.measured: set[str] = set()
         self._limited = np.isfinite(robot.limits)
 
     def zeros(self, person: Person) -> list[int]:
@@ -138,10 +146,12 @@ class Zeroing:
     def _wait_for_enter(self, person: Person) -> None:
         for now in self._positions:
             person.show(self._all(now))
-            if (answer := person.answer()) in ("q", "quit"):
+            if (answer := person.answer()) in _QUIT:
                 raise Quit
-            if answer is not None:
+            if answer == "":
                 return
+            if answer is not None:
+                person.say(f"expected Enter or q, found {answer[:20]!r}")
 
     def _taken(self) -> list[int]:
         """The mean of the positions over a while.
@@ -196,7 +206,7 @@ class Zeroing:
         for at, name in enumerate(self._names):
             before = next(iter(self._positions))  # the person may answer at once
             where = f"{at + 1} of {len(found)}: {name}"
-            person.say(f"{where}: {self._sense(at)} by 10 to 40 deg [s keeps, r keeps the rest]")
+            person.say(f"{where}: {self._sense(at)} by 10 to 40 deg [{_CHOICE}]")
             sign = self._direction(person, at, before)
             if sign is None:
                 break
@@ -208,14 +218,17 @@ class Zeroing:
         name, told = self._names[at], at
         for now in self._positions:
             if (answer := person.answer()) is not None:
-                if answer in ("q", "quit"):
+                if answer in _QUIT:
                     raise Quit
-                return None if answer.startswith("r") else 0
+                if answer in _KEEP:
+                    return _KEEP[answer]
+                person.say(f"expected s, r or q, found {repr(answer[:20]) if answer else 'Enter'}")
             moved = (now - before) * _STEP
             person.show(f"{name}: {now[at]} ticks, moved {math.degrees(moved[at]):+6.1f} deg")
             if abs(moved[at]) >= self._params.turn:
                 sign = 1 if moved[at] > 0 else -1
                 person.say(f"  {name}: direction {sign:+d}")
+                self.measured.add(name)
                 return sign
             other = int(abs(moved).argmax())
             if abs(moved[other]) >= 2.0 * self._params.turn and other != told:

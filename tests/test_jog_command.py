@@ -1,0 +1,147 @@
+"""What `jog` says of the torque, however it ends; before twin servos in invented time."""
+
+from __future__ import annotations
+
+import contextlib
+import signal
+from collections.abc import Callable
+
+import pytest
+from setup_rig import ROBOT, Box
+from test_jog import Ready
+
+from antennate.cli import jog, main
+from antennate.hardware.ports.port import PortError
+from antennate.hardware.setup.jog import Jog
+
+Typed = Callable[[], list[str]]
+
+
+class HostTime:
+    """The time of a wire as a host's clock."""
+
+    def __init__(self, box: Box) -> None:
+        self._wire, self.now = box.wire, box.wire.now
+
+    def sleep_until(self, t: float) -> None:
+        self._wire.sleep(t - self._wire.now())
+
+
+class Typist:
+    """`antennate jog` before yaw1, with keys from a function."""
+
+    def __init__(self, patch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+        self.box = Ready().box
+        self.servo = self.box.servos["yaw1"]
+        self._patch, self._capsys = patch, capsys
+        patch.setattr(jog, "opener_of", lambda *_: self.box.opener)
+        patch.setattr(jog, "HostClock", lambda: HostTime(self.box))
+
+    def ran(self, typed: Typed) -> tuple[int, list[str]]:
+        """Exit code and lines of stderr."""
+
+        def keys(wait: float) -> list[str]:
+            self.box.wire.sleep(wait)
+            return typed()
+
+        self._patch.setattr(jog, "typed_keys", lambda: contextlib.nullcontext(keys))
+        code = main(["jog", "--bus", "the bus", "--robot.baud", str(ROBOT.baud)])
+        return code, self._capsys.readouterr().err.strip().splitlines()
+
+
+@pytest.fixture
+def typist(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Typist:
+    return Typist(monkeypatch, capsys)
+
+
+def test_it_ends_with_the_torque_off_and_says_so(typist: Typist) -> None:
+    keys = iter("++q")
+    code, lines = typist.ran(lambda: [next(keys)])
+    assert (code, lines[-1]) == (0, "yaw1: torque is off, verified")
+
+
+def test_a_servo_in_pwm_mode_is_refused_without_torque(typist: Typist) -> None:
+    typist.servo.set("operating_mode", 16)
+    keys = iter("++q")
+    code, lines = typist.ran(lambda: [next(keys)])
+    assert code == 2
+    assert lines[0] == "yaw1: torque is off, verified"
+    assert lines[1].startswith("antennate jog: error: expected operating mode 3 of yaw1 (id 1, ")
+    assert len(lines) == 2
+
+
+def test_a_servo_that_falls_silent_is_named_beside_the_error(typist: Typist) -> None:
+    def typed() -> list[str]:
+        typist.box.plug()
+        return ["+"]
+
+    code, lines = typist.ran(typed)
+    assert code == 2
+    assert "torque is NOT confirmed off: servos [1]; switch their supply off" in lines
+    assert "to take goal position" in lines[-1]
+    assert lines[-1].endswith("found no answer; check its cable and its supply")
+
+
+def test_a_bus_that_is_gone_is_no_torque_that_is_off(
+    typist: Typist, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def gone(*_: object) -> bytes:
+        raise PortError("the bus is gone")
+
+    def typed() -> list[str]:
+        monkeypatch.setattr(typist.box.wire, "write", gone)
+        monkeypatch.setattr(typist.box.wire, "read", gone)
+        return ["+"]
+
+    code, lines = typist.ran(typed)
+    assert code == 2
+    assert lines[-2:] == [
+        "torque is NOT confirmed off: servos [1]; switch their supply off",
+        "antennate jog: error: the bus is gone",
+    ]
+
+
+def test_a_program_that_was_stopped_says_what_the_watchdog_did(typist: Typist) -> None:
+    def typed() -> list[str]:
+        typist.box.wire.sleep(1.0)
+        return ["+"]
+
+    code, lines = typist.ran(typed)
+    assert code == 2
+    assert "yaw1: torque is off, verified" in lines
+    assert "its watchdog stopped it" in lines[-1]
+    assert "Refused" not in lines[-1]
+
+
+@pytest.mark.parametrize("moment", ["begin", "keys"])
+def test_further_signals_do_not_keep_the_torque_on(
+    moment: str, typist: Typist, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begin, end = Jog.begin, Jog.end
+
+    def interrupted_begin(one: Jog) -> None:
+        begin(one)
+        if moment == "begin":
+            signal.raise_signal(signal.SIGINT)
+
+    def interrupted_end(one: Jog) -> list[int]:
+        signal.raise_signal(signal.SIGINT)
+        left = end(one)
+        signal.raise_signal(signal.SIGTERM)
+        return left
+
+    def typed() -> list[str]:
+        assert typist.servo.torque
+        signal.raise_signal(signal.SIGINT)
+        return ["+"]
+
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    monkeypatch.setattr(Jog, "begin", interrupted_begin)
+    monkeypatch.setattr(Jog, "end", interrupted_end)
+    try:
+        code, lines = typist.ran(typed)
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+    assert (code, lines[-1]) == (0, "yaw1: torque is off, verified")
+    assert not typist.servo.torque
