@@ -111,30 +111,31 @@ class DrivenBus(ServoBus):
         actuator.set_to_position(kp=kind.stiffness)
         actuator.forcelimited = mujoco.mjtLimited.mjLIMITED_TRUE
         actuator.forcerange = [-kind.stall_torque, kind.stall_torque]
-        self._model = spec.compile()
-        self._data = mujoco.MjData(self._model)
-        self._stall = kind.stall_torque
-        self._drives = ServoDrives(self._model, ["horn"], np.array([kind.stall_torque]))
-        self._now = 0
+        self.model = spec.compile()
+        self.data = mujoco.MjData(self.model)
+        self.stall = kind.stall_torque
+        self.drives = ServoDrives(self.model, ["horn"], np.array([kind.stall_torque]))
+        self.periods = 0
 
     def advance(self, t: float) -> None:
         """Let the physics turn the horn as well."""
-        while (end := (self._now + 1) * _PERIOD) <= t + 1e-9:
-            super().advance(self._now * _PERIOD)
-            self._turn(end)
-            self._now += 1
+        while (end := (self.periods + 1) * _PERIOD) <= t + 1e-9:
+            super().advance(self.periods * _PERIOD)
+            self.turn(end)
+            self.periods += 1
         super().advance(t)
 
-    def _turn(self, end: float) -> None:
-        servo, data = self.servos[0], self._data
+    def turn(self, end: float) -> None:
+        """One period of the physics."""
+        servo, data = self.servos[0], self.data
         assert isinstance(servo, DrivenServo)
         if abs(servo.motion.shaft.position * _TICK - data.qpos[0]) > 1e-9:  # somebody turned it
             data.qpos[0] = servo.motion.shaft.position * _TICK
         goal, *drive = servo.pull(end, _PERIOD)
-        self._drives.set(np.array(drive)[:, None])
+        self.drives.set(np.array(drive)[:, None])
         data.ctrl[0] = goal * _TICK
-        mujoco.mj_step(self._model, data, 2)
-        done = data.qpos[0] / _TICK, data.qvel[0] / _TICK, data.actuator_force[0] / self._stall
+        mujoco.mj_step(self.model, data, 2)
+        done = data.qpos[0] / _TICK, data.qvel[0] / _TICK, data.actuator_force[0] / self.stall
         servo.shaft(*(float(value) for value in done))
 
 

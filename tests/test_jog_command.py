@@ -113,8 +113,8 @@ def test_a_program_that_was_stopped_says_what_the_watchdog_did(typist: Typist) -
     assert "Refused" not in lines[-1]
 
 
-@pytest.mark.parametrize("moment", ["begin", "keys"])
-def test_further_signals_do_not_keep_the_torque_on(
+@pytest.mark.parametrize("moment", ["begin", "keys", "end"])
+def test_signals_do_not_keep_the_torque_on(
     moment: str, typist: Typist, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     begin, end = Jog.begin, Jog.end
@@ -132,8 +132,9 @@ def test_further_signals_do_not_keep_the_torque_on(
 
     def typed() -> list[str]:
         assert typist.servo.torque
-        signal.raise_signal(signal.SIGINT)
-        return ["+"]
+        if moment == "keys":
+            signal.raise_signal(signal.SIGINT)
+        return ["q"]
 
     before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
     monkeypatch.setattr(Jog, "begin", interrupted_begin)

@@ -84,7 +84,7 @@ def test_a_private_name_is_found(text: str) -> None:
 @pytest.mark.parametrize(
     "text",
     [
-        "import os\nos._exit(0)",
+        "import os\nos._hidden(0)",
         "class Mine:\n    def forget(self):\n        self._hidden = False",
         "feed.__enter__()",
         "site = 'left_hinge' + '_hinge5'",

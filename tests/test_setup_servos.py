@@ -198,3 +198,29 @@ def test_a_refusal_is_told_and_the_same_joint_asked_for_again() -> None:
     assert any("found none at any speed" in text for text in person.said)
     assert "expected Enter, s or q, found 'what'" in person.said
     assert assembly.done == ["yaw1"]
+
+
+def test_a_spare_that_was_set_up_as_another_joint_becomes_this_one_if_the_person_agrees() -> None:
+    box = Box()
+    box.plug("yaw2")
+    setup(box).set_up(YAW2, ())
+    kept: list[tuple[str, ...]] = []
+    assembly = Assembly(setup(box), ("yaw1", "yaw2"), kept.append)
+    person = Script(
+        [
+            ("connect the servo of yaw1", None, ""),
+            ("found that of yaw2", None, None),
+            ("is it a spare", None, ""),
+            ("expected y, n or q, found Enter", None, None),
+            ("is it a spare", None, "n"),
+            ("nothing was changed; connect the servo of yaw1", None, None),
+            ("connect the servo of yaw1", None, ""),
+            ("found that of yaw2", None, None),
+            ("is it a spare", None, "y"),
+            ("yaw2 is not set up", None, None),
+        ]
+    )
+    assembly.run(person, assembly.look(), ["yaw1"])
+    assert person.script == []
+    assert box.found()["yaw2"] == (1, 1_000_000)
+    assert kept[-1] == ("yaw1",)

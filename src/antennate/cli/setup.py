@@ -35,7 +35,8 @@ the robot, whatever its id and speed: it gets the id, speed, mode, limits and re
 joint, each written and read back. Torque never comes on.
 
 What is done is kept in robot.toml (--config names another file), so that you may stop and go on
-later. Two servos on the bus, a servo of another model and one that is done are refused."""
+later. Two servos on the bus and a servo of another model are refused. For one that is done you are
+asked whether it is a spare, to become the servo of this joint."""
 
 
 @dataclass(frozen=True)

@@ -42,6 +42,8 @@ class Pull(NamedTuple):
 
     def within(self, low: float, high: float) -> Pull:
         """The same within narrower limits; its own limits come first."""
+        if low <= self.low and high >= self.high:
+            return self
         low, high = (max(self.low, min(bound, self.high)) for bound in (low, high))
         return self._replace(low=low, high=high)
 
@@ -98,7 +100,6 @@ class DrivenMotion(Motion):
                 self.stands = self.shaft.position
             return Pull(self.stands)
         self.stands = None
-        wanted = wanted._replace(goal=self.shaft_at(wanted.goal))
         return wanted if self.sign > 0 else wanted.reversed()
 
     def feel(self, ticks: float, speed: float, duty: float) -> None:
@@ -114,9 +115,9 @@ class DrivenMotion(Motion):
         self._loops.total = 0.0
 
     def _wanted(self, t: float, period: float) -> Pull | None:
-        """The pull as the servo counts; None if friction holds the shaft."""
+        """Its goal for the shaft, drives as the servo counts; None if friction holds the shaft."""
         if self.mode == PWM_MODE:
-            found = Pull(self.position, 0.0, self.memory.get("goal_pwm") / FULL)
+            found = Pull(self.shaft.position, 0.0, self.memory.get("goal_pwm") / FULL)
         elif self.mode == CURRENT_MODE:
             load = self._current()
             if self._stuck(load, period):
@@ -135,7 +136,7 @@ class DrivenMotion(Motion):
         if self.mode != PWM_MODE:
             found = found.within(-self.limit, self.limit)
         slope, before = steepest(self.memory, period), self.sign * self.shaft.duty
-        return found.within(before - slope, before + slope)
+        return found.within(before - slope, before + slope) if slope < math.inf else found
 
     @property
     def _speed(self) -> float:
@@ -154,14 +155,14 @@ class DrivenMotion(Motion):
 
     def _torque(self, load: float) -> Pull:
         """A torque [stall torques] at any speed."""
-        return Pull(self.position, 0.0, load, -1.0 / self.params.no_load_speed)
+        return Pull(self.shaft.position, 0.0, load, -1.0 / self.params.no_load_speed)
 
     def _with_current(self, pull: Pull, most: float, period: float) -> Pull:
         """A pull whose torque stays below a share of the stall torque."""
         speed = self._speed
         turning = speed * _TICK / self.params.no_load_speed
-        away = (pull.goal - self.position - 0.5 * period * speed) * _TICK
-        drive = pull.gain * self.params.position_gain * away + pull.push
+        away = self.sign * (pull.goal - self.shaft.position) - 0.5 * period * speed
+        drive = pull.gain * self.params.position_gain * away * _TICK + pull.push
         drive -= pull.brake * speed * _TICK
         load = max(-self.limit, min(drive, self.limit)) - turning
         if abs(load) > most:
@@ -174,15 +175,17 @@ class DrivenMotion(Motion):
         loops.velocity((speed - self._speed) / SPEED_UNIT, period, self.limit)
         gain = loops.vp / 128 / FULL
         push = gain * speed / SPEED_UNIT + loops.total / FULL
-        return Pull(self.position, 0.0, push, gain / VELOCITY_UNIT)
+        return Pull(self.shaft.position, 0.0, push, gain / VELOCITY_UNIT)
 
     def _to_position(self, t: float, period: float) -> Pull:
         """By the loop of the position modes."""
         loops, (wanted, speed) = self._loops, self.plan.at(t)
         goal = float(round(wanted))
+        if not (loops.total or loops.i or loops.d or loops.first or loops.second):
+            return Pull(self.shaft_at(goal), loops.p / self._new_gain)
         ahead = self.ahead(loops, t, speed)
         if loops.i:
             loops.position(goal - self.position, speed - self._speed, period, self.limit, ahead)
         brake = loops.d / 16 * LOOP / FULL
         push = (loops.total + ahead) / FULL + brake * speed
-        return Pull(goal, loops.p / self._new_gain, push, brake / _TICK)
+        return Pull(self.shaft_at(goal), loops.p / self._new_gain, push, brake / _TICK)

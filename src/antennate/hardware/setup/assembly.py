@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterable
 from typing import Literal, NamedTuple
 
+from antennate.hardware.doctor.fix import Change
 from antennate.hardware.dynamixel.bringup import BringUpError
 from antennate.hardware.ports.port import PortError
-from antennate.hardware.setup.person import Person, SetupError, confirm
-from antennate.hardware.setup.servos import Joint, ServoSetup
+from antennate.hardware.setup.person import Person, SetupError, agrees, confirm
+from antennate.hardware.setup.servos import Joint, OwnedError, ServoSetup
 
 Keep = Callable[[tuple[str, ...]], None]
 """Keeps the names of the joints that are done."""
@@ -81,7 +82,7 @@ class Assembly:
         """One joint, until it is done or left out."""
         while confirm(person, f"{where}: connect the servo of {joint} alone"):
             try:
-                changes = self._servos.set_up(joint, self.done)
+                changes = self._set_up(person, joint)
             except (SetupError, BringUpError, PortError) as error:
                 person.say(str(error))
                 continue
@@ -90,6 +91,23 @@ class Assembly:
             person.say(f"  {joint.name} is set up, read back" if changes else "  set up before")
             self._add({joint.name})
             return
+
+    def _set_up(self, person: Person, joint: Joint) -> list[Change]:
+        """Set up what is connected; the servo of another joint, a spare, only if the person agrees.
+
+        The other joint is to do again then, until its servo is seen.
+        """
+        try:
+            return self._servos.set_up(joint, self.done)
+        except OwnedError as error:
+            person.say(str(error))
+            other = error.owner.name
+            if not agrees(person, f"is it a spare, to become the servo of {joint.name} instead?"):
+                raise SetupError(f"nothing was changed; connect the servo of {joint}") from None
+            person.say(f"  {other} is not set up, until a servo answers as that of {other}")
+            self.done.remove(other)
+            self._keep(tuple(self.done))
+            return self._servos.set_up(joint, self.done)
 
     def _add(self, names: set[str]) -> None:
         known = {*self.done, *names}

@@ -39,6 +39,22 @@ class Person(Protocol):
         ...
 
 
+def agrees(person: Person, text: str) -> bool:
+    """Ask for y or n.
+
+    Raises:
+        Quit: The answer was q.
+        BadInputError: No answer can come.
+    """
+    while True:
+        answer = person.ask(f"{text} [y, n; q ends]")
+        if answer in ("q", "quit"):
+            raise Quit
+        if answer in ("y", "yes", "n", "no"):
+            return answer.startswith("y")
+        person.say(f"expected y, n or q, found {repr(answer[:20]) if answer else 'Enter'}")
+
+
 def confirm(person: Person, text: str) -> bool:
     """Ask for Enter: True for it, False if the step is to be left out (s).
 

@@ -60,6 +60,21 @@ def model_name(model: int | None) -> str:
     return TABLES[model].name if model in TABLES else f"model {model}"
 
 
+class OwnedError(SetupError):
+    """The servo is that of another joint, which is done; nothing was changed.
+
+    Attributes:
+        owner: The other joint.
+    """
+
+    def __init__(self, joint: Joint, owner: Joint) -> None:
+        super().__init__(
+            f"expected the servo of {joint}, found that of {owner}, which is done; connect the "
+            "next one in its place"
+        )
+        self.owner = owner
+
+
 class ServoSetup:
     """Makes servos fit for the joints of a robot.
 
@@ -99,6 +114,7 @@ class ServoSetup:
 
         Raises:
             SetupError: There is not exactly one servo, or not the right one; nothing was changed.
+            OwnedError: It is that of a joint that is done; nothing was changed.
             BringUpError: It did not take a value.
             PortError: The port is gone or cannot be opened.
         """
@@ -111,10 +127,7 @@ class ServoSetup:
                 f"{servo.servo}); connect one of the right model"
             )
         if other := self._owner(baud, servo.servo, done, joint):
-            raise SetupError(
-                f"expected the servo of {joint}, found that of {other}, which is done; connect the "
-                "next one in its place"
-            )
+            raise OwnedError(joint, other)
         changes = self._plan(baud, servo.servo, joint)
         for change in changes:
             apply(self._opener, change, self._now)
