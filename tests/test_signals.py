@@ -136,3 +136,18 @@ def test_B19_a_signal_that_came_before_the_first_tick_ends_the_drive_with_a_repo
     assert report.ended == "a signal"
     assert report.timing is not None
     assert made.session.tally.sent == 0
+
+
+def test_torque_waits_until_somebody_sees_the_robot() -> None:
+    made, asked = rig(TwinConfig()), [0]
+
+    def watches() -> bool:
+        asked[0] += 1
+        if asked[0] < 300:  # 3 s, the dry run is over after 0.5
+            assert not any(servo.torque for servo in made.robot.servos)
+        return asked[0] >= 300
+
+    config = CONFIG.model_copy(update={"duration": 1.0})
+    report = drive(made.session, config, arm=True, operator=Operator(watches=watches))
+    assert made.session.tally.sent > 50
+    assert (report.ended, report.safe) == ("the end of its time", True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import shlex
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -171,9 +172,8 @@ def _carry_out(
             unlogged = True
         session.unrecorded = config.record_required and not feed.keeps
 
-    stop = operator.stop
+    operator = dataclasses.replace(operator, watches=lambda: feed.watched)
     with feed, urgent() as priority:
-        feed.wait(lambda: stop is not None and stop.received)  # nobody walks unseen
         report = drive(session, config, orders.arm, keep, operator)
     head = {"schema": 1, "command": command, "controller": config.controller, "armed": orders.arm}
     tail = {

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import contextlib
 import fcntl
+import math
 import os
 import select
 import struct
@@ -86,13 +87,18 @@ class Feed:
         self._keeper = threading.Thread(target=self._look_after, name="recorder", daemon=True)
         self.offered = self.dropped = self.started = 0
         self.failed = self._begun = False
-        self._answered = threading.Event()
+        self._answered, self._since = False, math.inf
         self._waiting = deque[bytes]()
 
     @property
     def keeps(self) -> bool:
         """Whether a process runs, has reported that it keeps messages, and took the last one."""
         return self._begun and not self._waiting
+
+    @property
+    def watched(self) -> bool:
+        """Whether a process has taken messages, or none is to be waited for any more."""
+        return self._answered or self.failed or time.monotonic() - self._since > _STARTING
 
     @property
     def pid(self) -> int | None:
@@ -105,6 +111,7 @@ class Feed:
         return self.started == 1 and not (self.failed or self.dropped)
 
     def __enter__(self) -> Feed:
+        self._since = time.monotonic()
         self._start()
         self._keeper.start()
         return self
@@ -127,17 +134,6 @@ class Feed:
         if self._keeper.is_alive() and self._process is not None:
             self._process.kill()
             self._keeper.join()
-
-    def wait(self, given_up: Callable[[], bool] = lambda: False) -> None:
-        """Wait until the other process takes messages, or is gone for good; half a minute at most.
-
-        Args:
-            given_up: Asked meanwhile; true ends the wait.
-        """
-        end = time.monotonic() + _STARTING
-        while time.monotonic() < end and not (self.failed or given_up()):
-            if self._answered.wait(_POLL):
-                return
 
     def send(self, content: bytes) -> bool:
         """Hand over one record; False if it was dropped."""
@@ -175,8 +171,7 @@ class Feed:
             with process.stdout as output:
                 answer = output.read(1)
                 self._begun = answer == KEPT
-                if answer:
-                    self._answered.set()
+                self._answered = self._answered or bool(answer)
                 while output.read(4096):
                     pass
             died = process.wait() != 0

@@ -17,8 +17,10 @@ class Operator:
         pressed: Whether a character of the key that has to be held came since the last call; None
             if no key has to be held.
         arrived: Whether the robot is where it was to go.
+        watches: Whether somebody sees what the robot does; torque waits for that.
     """
 
     stop: StopOnce | None = None
     pressed: Callable[[], bool] | None = None
     arrived: Callable[[], bool] = field(default=lambda: False)
+    watches: Callable[[], bool] = field(default=lambda: True)
