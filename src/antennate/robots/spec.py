@@ -39,7 +39,6 @@ HARDWARE_ALONE = (
         for group in ("yaw", "legs", "antennae", "pitch")
         for name in ("ids", "directions", "zeros", "limit", "fastest")
     ),
-    "robot.antennae.servo",
     "robot.antenna.sensor.rate",
     "robot.baud",
     "robot.release",
