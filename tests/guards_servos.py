@@ -347,7 +347,7 @@ SERVOS = [
             7,
             ("torque_enable",),
         ),
-        by=(StopIteration,),
+        by=(AssertionError,),
     ),
     Guard(
         "watchdog lost while armed",
@@ -357,7 +357,7 @@ SERVOS = [
             7,
             ("bus_watchdog",),
         ),
-        by=(StopIteration,),
+        by=(AssertionError,),
     ),
     Guard(
         "torque taken off on purpose",

@@ -20,6 +20,7 @@ from antennate.hardware.driving.report import Report
 from antennate.hardware.driving.session import Session
 from antennate.hardware.safety.causes import Cause, State
 from antennate.params.safety import TouchCheckParams
+from antennate.telemetry.feed import Feed
 from antennate.twin.config import TwinConfig, build
 from antennate.twin.faults import Faults, read
 from antennate.twin.lockstep import BoardPort, LockstepClock
@@ -142,6 +143,7 @@ def test_L8_a_drive_that_sent_no_pose_ends_with_2_and_says_so(
         yield prepare(config, BoardPort(robot, clock), clock, clock)
 
     monkeypatch.setattr("antennate.cli.drive.connect", in_process)
+    monkeypatch.setattr(Feed, "watched", property(lambda feed: True))  # its time is invented
     argv = ["drive", "--esp32", "board", "--bus", "bus", "--arm", "--no-touch-check"]
     argv += ["--dry-run", "0.5", "--duration", "1", "--touch.patience", "0.5"]
     assert main([*argv, "--out", str(tmp_path), "--overwrite"]) == 2
