@@ -14,7 +14,7 @@ class GaitParams(Params):
     """The serpenoid body wave and the stepping O-legs."""
 
     frequency: float = number(
-        0.5, "Hz", "assumed: legs then turn at 46 % of the servo's no-load speed", gt=0, le=1.0
+        0.6, "Hz", "assumed: legs then turn at 55 % of the servo's no-load speed", gt=0, le=1.0
     )
     """Cycles per second."""
     wave_number: float = number(1.0, "1", "assumed: one wave, as in other robots", gt=0, le=3)

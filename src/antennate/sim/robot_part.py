@@ -124,7 +124,7 @@ def _add_leg(
         priority=1,
         condim=3,
         contype=layers.LEG,
-        conaffinity=layers.FLOOR | layers.OBSTACLE,
+        conaffinity=layers.FLOOR | layers.OBSTACLE | layers.LEG,
     )
     _add_servo(spec, name, servo)
 
