@@ -66,14 +66,21 @@ class AntennaSpec(Params):
     """Friction against obstacles."""
 
     base_stiffness: float = number(
-        2.0, "N·m/rad", "assumed: a hundred times the stiffest spring, so that the base holds", gt=0
+        0.5985,
+        "N·m/rad",
+        "measured: XL330-M288, P gain 400 over 256, at 5 V; docs/science/servo.md",
+        gt=0,
     )
     """Stiffness of the base servo."""
-    base_damping: float = number(0.1, "N·m·s/rad", "assumed: settles within 0.05 s", ge=0)
+    base_damping: float = number(
+        0.0482, "N·m·s/rad", "datasheet: XL330-M288, 0.52 N·m over 103 rpm", ge=0
+    )
     """Damping of the base servo."""
-    base_armature: float = number(1e-4, "kg·m²", "assumed: below the servo's; driven stiffly", ge=0)
+    base_armature: float = number(
+        0.0019, "kg·m²", "fitted: XL330-M288, `antennate servo --fit`; docs/science/servo.md", ge=0
+    )
     """Its inertia."""
-    base_torque: float | None = number(None, "N·m", "assumed: never reached", gt=0)
+    base_torque: float | None = number(0.52, "N·m", "datasheet: XL330-M288, 5 V", gt=0)
     """Largest torque of the base servo's drive; without limit if not given."""
     sensor: SensorParams = SensorParams()
 
