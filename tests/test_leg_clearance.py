@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import mujoco
 import numpy as np
@@ -40,7 +41,7 @@ def gap(model: mujoco.MjModel, robot: RobotSpec, yaw: np.ndarray, leg: np.ndarra
     return min(
         mujoco.mj_geomDistance(model, data, front, rear, 1.0, None)
         for side in sides
-        for front, rear in zip(side, side[1:], strict=False)
+        for front, rear in pairwise(side)
     )
 
 
@@ -75,8 +76,8 @@ def test_the_gait_keeps_within_it(offset: float) -> None:
 
 
 def test_a_limit_at_which_legs_meet_is_refused() -> None:
-    with pytest.raises(ConfigError, match=r"yaw.limit.*expected at most 0.509 rad.*found 1"):
+    with pytest.raises(ConfigError, match=r"yaw\.limit.*expected at most 0\.509 rad.*found 1"):
         from_values(RobotSpec, {"yaw": {"limit": 1.0}})
-    with pytest.raises(ConfigError, match="link_pitch.*legs do not touch"):
+    with pytest.raises(ConfigError, match=r"link_pitch.*legs do not touch"):
         from_values(RobotSpec, {"link_pitch": 0.05})
     assert RobotSpec.model_validate({"yaw": {"limit": 0.3}}).yaw_limit == 0.3

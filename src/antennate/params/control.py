@@ -149,7 +149,7 @@ class EscapeParams(Params):
     )
     """Time to back off."""
     turn_time: float = number(
-        1.3, "s", "fitted: `closed` on 60 tuning tunnels; about 60 deg at turn_offset", gt=0, le=30
+        2.2, "s", "fitted: `closed` on 60 tuning tunnels; about 60 deg at turn_offset", gt=0, le=30
     )
     """Time of the first turn."""
     turn_offset: float = number(0.52, "rad", "assumed: a turn nearly on the spot", gt=0, le=1.0)
@@ -186,7 +186,7 @@ class EscapeParams(Params):
         le=3600,
     )
     """Nothing felt for so long after a turn means that the walls are lost."""
-    return_time: float = number(3.8, "s", "assumed: about 180 deg at the offset above", gt=0, le=60)
+    return_time: float = number(7.5, "s", "assumed: about 180 deg at the offset above", gt=0, le=60)
     """Time to turn round."""
 
 

@@ -38,6 +38,7 @@ HARDWARE_ALONE = (
         f"robot.{group}.{name}"
         for group in ("yaw", "legs", "antennae", "pitch")
         for name in ("ids", "directions", "zeros", "limit", "fastest")
+        if (group, name) != ("yaw", "limit")
     ),
     "robot.antenna.sensor.rate",
     "robot.baud",
@@ -48,11 +49,7 @@ SIMULATION_ALONE = (
     *(
         f"robot.{name}"
         for name in (
-            "link_pitch",
             "mass",
-            "width",
-            "leg_radius",
-            "leg_eccentricity",
             "leg_width",
             "leg_mass",
             "leg_friction",
