@@ -32,7 +32,7 @@ class GaitParams(Params):
     )
     """Lead of the body wave over the legs."""
     turn_offset: float = number(
-        math.radians(20.0), "rad", "assumed: antennate gait measures 66 deg a cycle", ge=0, le=1.0
+        math.radians(20.0), "rad", "assumed: antennate gait measures 35 deg a cycle", ge=0, le=1.0
     )
     """Yaw offset while turning."""
     offset_rate: float = number(1.5, "rad/s", "assumed: half a second for a full change", gt=0)
@@ -101,7 +101,7 @@ class RuleParams(Params):
     """Both sides at this level or above count as strong."""
     similar: float = number(0.15, "1", "assumed: unpublished", ge=0, le=1)
     """Levels that differ by less are similar."""
-    hold_time: float = number(2.0, "s", "assumed: a gait cycle; all turns are alike", gt=0, le=30)
+    hold_time: float = number(2.0, "s", "assumed: over a gait cycle; all turns alike", gt=0, le=30)
     """T_hold, how long a maneuver is kept."""
 
 
@@ -149,7 +149,7 @@ class EscapeParams(Params):
     )
     """Time to back off."""
     turn_time: float = number(
-        2.2, "s", "fitted: `closed` on 60 tuning tunnels; about 60 deg at turn_offset", gt=0, le=30
+        2.2, "s", "fitted: `closed` on 60 tuning tunnels; about 50 deg at turn_offset", gt=0, le=30
     )
     """Time of the first turn."""
     turn_offset: float = number(0.52, "rad", "assumed: a turn nearly on the spot", gt=0, le=1.0)
@@ -166,9 +166,9 @@ class EscapeParams(Params):
         le=5,
     )
     """Length of a turn the other way, in first turns."""
-    retry_time: float = number(12.0, "s", "assumed: six gait cycles", gt=0, le=300)
+    retry_time: float = number(12.0, "s", "assumed: seven gait cycles", gt=0, le=300)
     """Stuck again within this time, it turns the other way."""
-    memory_time: float = number(4.0, "s", "assumed: two gait cycles", gt=0, le=300)
+    memory_time: float = number(4.0, "s", "assumed: over two gait cycles", gt=0, le=300)
     """Time constant of the memory of touch."""
     memory_delay: float = number(
         3.0,
