@@ -22,7 +22,7 @@ from matplotlib.figure import Figure
 
 from antennate.experiments.tunnel.run import TunnelConfig, run
 from antennate.figures import INK, canvas, render, styled
-from antennate.messages import short_name
+from antennate.messages import short_names
 from antennate.studies.pool import core_count
 
 HERE = Path(__file__).parent
@@ -135,7 +135,7 @@ def success_map(cells: Sequence[Mapping[str, Any]], controllers: Sequence[str]) 
     figure = canvas(1.4 + 3.4 * len(controllers), 1.2 + 0.75 * len(angles))
     axes = np.atleast_1d(np.array(figure.subplots(1, len(controllers), sharey=True)))
     scale = ScalarMappable(Normalize(0.0, 1.0), "cividis")
-    for panel, controller in zip(axes, controllers, strict=True):
+    for panel, (controller, label) in zip(axes, short_names(controllers).items(), strict=True):
         share = np.full((len(angles), len(widths)), np.nan)
         for cell in cells:
             row, column = angles.index(cell["turn_deg"]), widths.index(cell["free_width_m"])
@@ -152,7 +152,7 @@ def success_map(cells: Sequence[Mapping[str, Any]], controllers: Sequence[str]) 
                 color="white" if share[row, column] < 0.6 else INK,
             )
         panel.imshow(share, origin="lower", norm=scale.norm, cmap=scale.cmap, aspect="auto")
-        panel.set_title(short_name(controller))
+        panel.set_title(label)
         panel.grid(visible=False)
         panel.set_xticks(range(len(widths)), [f"{w:.2f}" for w in widths])
         panel.set_yticks(range(len(angles)), [f"{a:.0f}" for a in angles])
