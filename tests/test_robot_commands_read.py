@@ -247,6 +247,7 @@ RUNS: dict[str, tuple[type[Params], Callable[..., None], list[dict[str, Any]]]] 
         [
             {
                 **SHORT,
+                "duration": 2.0,
                 "control": {"rate": 25.0},
                 "controller": "open",
                 "drift": {"band": 0.02, "speed": 1.0},

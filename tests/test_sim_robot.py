@@ -115,8 +115,7 @@ def test_the_base_of_an_antenna_is_held_as_its_servo_holds(
 ) -> None:
     """Full drive, 885 counts, at 885 divisor / p_gain of 4096 ticks a turn off the goal."""
     model = compile_world(PhysicsParams(), RobotSpec.model_validate(robot))
-    for side in "lr":
-        name = f"{PREFIX}antenna_{side}_base"
+    for name in (PREFIX + joint for joint in ROBOT.joint_names[-2:]):
         stiffness = stall * p_gain / divisor * 4096 / (2 * math.pi) / 885
         assert model.actuator(name).gainprm[0] == pytest.approx(stiffness)
         damping = stall / (rpm * 2 * math.pi / 60)
