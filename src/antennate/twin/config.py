@@ -7,7 +7,7 @@ from typing import Annotated, ClassVar
 from antennate.params.base import GATHERED, Params, number
 from antennate.params.control import GaitParams
 from antennate.params.twin import BatteryParams
-from antennate.robots.spec import RobotSpec
+from antennate.robots.spec import RobotSpec, require_antennae
 from antennate.sim.scenes.registry import make_scene
 from antennate.sim.sim_robot import SimRobot
 from antennate.sim.trial import TrialConfig, draw_trial
@@ -72,6 +72,7 @@ def build(config: TwinConfig, boot_id: int | None = None) -> TwinRobot:
 
 def watched(config: TwinConfig, boot_id: int | None = None) -> tuple[TwinRobot, Passage]:
     """The same, and how far it comes."""
+    require_antennae(config.robot, "the twin")
     control, period = config.control, config.control.period
     scene = make_scene(config.scene, config.tunnel)
     start = draw_trial(config, scene, config.trial, control.gait, period)
