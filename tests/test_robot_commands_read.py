@@ -53,8 +53,7 @@ FAULTS = {  # by the number of its readings; with 5 the ports are swapped
 REPLACED = {"controller"}  # `teleop` walks by keys in its place
 SHORT = {"dry_run": 0.1, "duration": 0.5, "stand": 0.1}
 DRIFTING = {"control": {"rate": 25.0}, "drift": {"band": 0.02, "speed": 1.0}}
-PITCHING = {"pitch": {"kind": "actuated"}}
-LIFTING = {"legs": {"kind": "lifting"}, **PITCHING}
+LIFTING = {"legs": {"kind": "lifting"}, "pitch": {"kind": "actuated"}}
 
 
 def reach(network: NetworkParams) -> None:
@@ -236,7 +235,7 @@ RUNS: dict[str, tuple[type[Params], Callable[..., None], list[dict[str, Any]]]] 
                 "touch_check": False,
                 "bus_return": 0.1,
                 "fault_time": 0.1,
-                "robot": PITCHING,
+                "robot": LIFTING,
             },
             {**SHORT, "robot": LIFTING, "controller": "test_legs_and_pitch:Lift"},
         ],
@@ -251,7 +250,7 @@ RUNS: dict[str, tuple[type[Params], Callable[..., None], list[dict[str, Any]]]] 
                 "controller": "open",
                 "drift": {"band": 0.02, "speed": 1.0},
             },
-            {**SHORT, "controller": "open", "touch_check": False, "robot": PITCHING},
+            {**SHORT, "controller": "open", "touch_check": False, "robot": LIFTING},
         ],
     ),
     "doctor": (
@@ -286,6 +285,7 @@ RUNS: dict[str, tuple[type[Params], Callable[..., None], list[dict[str, Any]]]] 
                 "scene": "flat",
                 "robot": {
                     **LIFTING,
+                    "pitch": {"kind": "actuated", "servo": "xl430_w250"},
                     "yaw": {"servo": "xl330_m288"},
                     "antenna": {"sensor": {"kind": "fsr"}},
                 },

@@ -58,6 +58,7 @@ def targets(
     phase: Floats,
     offset: Floats,
     sweep: Floats | None = None,
+    lifting: bool = True,
 ) -> JointCommand:
     """Joint targets at a gait phase. Pitch joints stay at 0.
 
@@ -67,13 +68,16 @@ def targets(
         phase: Gait phase P [rad], shape (B,), unwrapped.
         offset: Yaw offset [rad], shape (B,); positive turns right.
         sweep: Phase S of the antenna bases [rad], shape (B,); 0 if absent.
+        lifting: Whether lifting legs step; at 0 all of them stand.
     """
     joints, links = _lags(params.wave_number, params.body_phase, robot.links)
     yaw = params.amplitude * np.sin(joints - phase[:, None]) + offset[:, None]
     if robot.legs.kind == "rolling":
         leg = (phase[:, None] - links)[:, :, None] + _SIDES
-    else:
+    elif lifting:
         leg = _lifting(params.lift, phase, robot.links)
+    else:
+        leg = np.zeros((phase.shape[0], robot.links, len(_SIDES)))
     antenna = np.full((phase.shape[0], robot.antenna_count), params.antenna_mean)
     if sweep is not None:
         antenna += params.antenna_amplitude * np.sin(sweep)[:, None]

@@ -7,9 +7,8 @@ antennae, and the pitch joints where servos move them: ids, angles and goals kee
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, ClassVar, Literal, Self
+from typing import ClassVar, Literal, Self
 
 from pydantic import model_validator
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import Annotated, ClassVar
 
-from antennate.params.base import GATHERED, Params, number
+from antennate.params.base import GATHERED, Params, number, paths_of
 from antennate.params.control import GaitParams
+from antennate.params.gaits import LiftParams
 from antennate.params.twin import BatteryParams
 from antennate.robots.spec import RobotSpec, require_antennae
 from antennate.sim.scenes.registry import make_scene
@@ -44,6 +45,7 @@ class TwinConfig(TrialConfig):
                 "antenna_frequency",
             )
         ),
+        *paths_of(LiftParams, "control.gait.lift"),
         "robot.antenna.sensor.rate",
     )
     trial: int = number(0, "1", "assumed: the first", ge=0)

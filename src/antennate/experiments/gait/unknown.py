@@ -80,10 +80,8 @@ def changed(config: Config, values: Mapping[str, float]) -> Config:
         raise ConfigError(f"unknown: {error}") from None
 
 
-def _numbers(
-    table: dict[str, Any], path: str
-) -> Iterator[tuple[str, tuple[dict[str, Any], str]]]:
-    """The dotted name of every number in nested tables, with the table that holds it and its key."""
+def _numbers(table: dict[str, Any], path: str) -> Iterator[tuple[str, tuple[dict[str, Any], str]]]:
+    """The dotted name of each number in nested tables, and the table and key that hold it."""
     for key, value in table.items():
         if isinstance(value, dict):
             yield from _numbers(cast("dict[str, Any]", value), f"{path}.{key}")
