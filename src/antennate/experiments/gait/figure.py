@@ -135,4 +135,4 @@ def _draw_alone(panel: Axes, result: Mapping[str, Any]) -> None:
     panel.set_yticks(range(len(order)), ticks)
     panel.set_ylim(-0.6, len(order) + 0.5)
     panel.set_title("Each alone; the grey line is the run as configured")
-    panel.legend(loc="upper right", ncols=2)
+    panel.legend(loc="upper right", ncols=2, frameon=True, facecolor="white", edgecolor="none")
