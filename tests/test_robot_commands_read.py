@@ -55,6 +55,8 @@ REPLACED = {"controller"}  # `teleop` walks by keys in its place
 SHORT = {"dry_run": 0.1, "duration": 0.5, "stand": 0.1}
 DRIFTING = {"control": {"rate": 25.0}, "drift": {"band": 0.02, "speed": 1.0}}
 LIFTING = {"legs": {"kind": "lifting"}, "pitch": {"kind": "actuated"}}
+HEXAPOD = RobotSpec.named("hexapod").model_dump()
+"""Without antennae."""
 
 
 def reach(network: NetworkParams) -> None:
@@ -272,10 +274,14 @@ RUNS: dict[str, tuple[type[Params], Callable[..., None], list[dict[str, Any]]]] 
     "setup": (
         SetupConfig,
         run_setup,
-        [{"setup": {"scan": 0.02}}, {"setup": {"scan": 0.02}, "robot": LIFTING}],
+        [
+            {"setup": {"scan": 0.02}},
+            {"setup": {"scan": 0.02}, "robot": LIFTING},
+            {"setup": {"scan": 0.02}, "robot": HEXAPOD},
+        ],
     ),
-    "zero": (ZeroConfig, run_zero, [{}, {"robot": LIFTING}]),
-    "jog": (JogConfig, run_jog, [{}, {"robot": LIFTING}]),
+    "zero": (ZeroConfig, run_zero, [{}, {"robot": LIFTING}, {"robot": HEXAPOD}]),
+    "jog": (JogConfig, run_jog, [{}, {"robot": LIFTING}, {"robot": HEXAPOD}]),
     "replay": (ReplayConfig, run_replay, [{}]),
     "twin": (
         TwinConfig,
