@@ -63,7 +63,7 @@ def test_G6_all_files_of_a_log_are_replayed_as_one(
     log: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """The second one was never begun; the first was cut by a kill, the third was closed."""
-    first, third = tmp_path / "drive.log", tmp_path / "drive-3.log"
+    first, third = tmp_path / "drive.mcap", tmp_path / "drive-3.mcap"
     with LogReader(log) as reader:
         ticks = list(reader)
     cut = LogWriter(first, reader.header)
@@ -73,7 +73,7 @@ def test_G6_all_files_of_a_log_are_replayed_as_one(
         for tick in ticks[120:]:
             writer.write(tick)
     result = said(capsys, str(first))
-    assert result["parts"] == ["drive.log", "drive-3.log"]
+    assert result["parts"] == ["drive.mcap", "drive-3.mcap"]
     assert (result["ticks"], result["different"], result["different_commands"]) == (TICKS, 0, 0)
     assert result["closed"]
     data = third.read_bytes()
@@ -81,7 +81,7 @@ def test_G6_all_files_of_a_log_are_replayed_as_one(
     assert main(["replay", str(first), "--json"]) == 2
     out, err = capsys.readouterr()
     assert (json.loads(out)["missing"], json.loads(out)["damaged"]) == (1, 1)
-    assert "of drive-3.log" in err
+    assert "of drive-3.mcap" in err
 
 
 def test_another_controller_is_compared(log: Path, capsys: pytest.CaptureFixture[str]) -> None:

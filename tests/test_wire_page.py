@@ -139,13 +139,13 @@ def test_a_reader_made_from_the_page_reads_a_log(tmp_path: Path, closed: bool) -
              tuple(float(j) for j in range(len(header.robot.ids))), "WALK", ("one", "two"))
         for n in (1, 2)
     ]  # fmt: skip
-    log = LogWriter(tmp_path / "drive.log", header, least_free=0)
+    log = LogWriter(tmp_path / "drive.mcap", header, least_free=0)
     for tick in ticks:
         log.write(tick)
     if closed:
         log.close()
 
-    records = bodies((tmp_path / "drive.log").read_bytes())
+    records = bodies((tmp_path / "drive.mcap").read_bytes())
     if closed:
         assert read_end(records.pop()) == 2
     schemas = {record[0] for record in records}

@@ -19,27 +19,25 @@ import contextlib
 import itertools
 import json
 import os
-import platform
 import shlex
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict
-from importlib import metadata
 from pathlib import Path
 from typing import IO, Any
 
-from antennate import __version__
 from antennate.errors import BadInputError, OutputError
 from antennate.files import decoded, read_limited, write_whole
 from antennate.params.base import Params
 from antennate.params.reading import Config, read_file
 from antennate.studies.formats import from_csv, strict, to_csv, to_json, to_toml
+from antennate.telemetry.header import versions
 from antennate.telemetry.parts import MOST_PARTS, part
 
 RESULT, TABLE, PARTIAL = "result.json", "trials.csv", "trials.partial.jsonl"
 CONFIG, VERSIONS, COMMAND = "config.toml", "versions.json", "command.txt"
 FIGURES = "figures"
 """Folder of the figures; what it holds as svg and png belongs to the run."""
-CALIBRATION, LOG, REPORT = "calibration.json", "drive.log", "report.html"
+CALIBRATION, LOG, REPORT = "calibration.json", "drive.mcap", "report.html"
 _LARGEST = 10**9
 """No file of a run is longer [bytes]."""
 _LOGS = tuple(part(Path(LOG), number).name for number in range(1, MOST_PARTS + 1))
@@ -166,7 +164,7 @@ class RunDirectory:
             command: Words of the command line, if it was one.
         """
         self.write(CONFIG, to_toml(config))
-        self.write(VERSIONS, to_json(_versions()))
+        self.write(VERSIONS, to_json(versions()))
         if command:
             self.write(COMMAND, shlex.join(command) + "\n")
 
@@ -260,18 +258,6 @@ def _is(folder: Path) -> bool:
 
 def _plain(row: Any) -> Mapping[str, Any]:
     return row if isinstance(row, Mapping) else asdict(row)
-
-
-def _versions() -> dict[str, str]:
-    """What the numbers may depend on."""
-    return {
-        "antennate": __version__,
-        "python": platform.python_version(),
-        "numpy": metadata.version("numpy"),
-        "scipy": metadata.version("scipy"),
-        "mujoco": metadata.version("mujoco-core"),
-        "platform": f"{platform.system()} {platform.machine()}",
-    }
 
 
 def _free(command: str) -> Path:
