@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import zstandard
-from log_ticks import HEADER, ODD, tick
+from log_ticks import CHUNK, HEADER, MAGIC, ODD, chunks, tick, unclosed
 from mcap.exceptions import McapError
 from mcap.reader import NonSeekingReader, make_reader
 from mcap.stream_reader import StreamReader
@@ -34,35 +34,12 @@ from antennate.telemetry.topics import CONFIG, TICK_TOPICS, TOPICS, VERSIONS
 from antennate.telemetry.writer import LogWriter
 
 ROOM = 0.0
-MAGIC = b"\x89MCAP0\r\n"
-CHUNK, DATA_END = 6, 15
-
-
 def written(path: Path, ticks: int) -> bytes:
     """A log with one chunk a tick."""
     with LogWriter(path, HEADER, ROOM, flush=0.0) as log:
         for number in range(1, ticks + 1):
             log.write(tick(number))
     return path.read_bytes()
-
-
-def records(data: bytes) -> Iterator[tuple[int, int, int]]:
-    """Kind, begin and end of each record, by the specification of MCAP."""
-    at = len(MAGIC)
-    while at < len(data) - len(MAGIC):
-        kind, length = struct.unpack_from("<BQ", data, at)
-        yield kind, at, at + 9 + length
-        at += 9 + length
-
-
-def chunks(data: bytes) -> list[tuple[int, int]]:
-    """Begin and end of each chunk: the first is the header's."""
-    return [(begin, end) for kind, begin, end in records(data) if kind == CHUNK]
-
-
-def unclosed(data: bytes) -> bytes:
-    """The log of a killed program: up to the end of its data."""
-    return data[: next(begin for kind, begin, _ in records(data) if kind == DATA_END)]
 
 
 def found(path: Path, data: bytes) -> tuple[list[int], LogReader] | None:

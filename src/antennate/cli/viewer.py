@@ -83,7 +83,8 @@ def main() -> int:
         signal.signal(number, signal.SIG_IGN)
     display = Display()
     kept, required = False, REQUIRED in sys.argv[2:]
-    stream, log = messages(sys.stdin.buffer), None
+    log: LogWriter | None = None
+    stream = messages(sys.stdin.buffer.raw, lambda: _settle(log))  # type: ignore[attr-defined]
     try:
         first = next(stream, None)
         log = None if first is None else _begin(Path(sys.argv[1]), first)
@@ -123,7 +124,16 @@ def _keep(log: LogWriter | None, tick: Tick) -> bool:
             log.write(tick)
     except LogError as error:
         return say(error)
-    return log is not None
+    return log is not None and not log.failure
+
+
+def _settle(log: LogWriter | None) -> None:
+    """Let no tick wait while none follows; a disk that fails is said once."""
+    try:
+        if log is not None:
+            log.settle()
+    except LogError as error:
+        say(error)
 
 
 def say(error: LogError) -> bool:

@@ -83,7 +83,9 @@ def walk(file: BinaryIO) -> Iterator[Chunk | Fault | End]:
         closed = end is None and not isinstance(found, Fault)
         if found is not None:
             yield found
-        at = _next_chunk(file, at + 1) if isinstance(found, Fault) else end
+        if isinstance(found, Fault) and (end is None or _damaged(file, end, size)):
+            end = _next_chunk(file, at + 1)
+        at = end
     summary = _summary(file, size)
     if summary is not None:
         yield summary
@@ -116,18 +118,35 @@ def _record(file: BinaryIO, at: int, size: int) -> tuple[Chunk | Fault | None, i
     return None, None if kind == _DATA_END else end
 
 
+def _damaged(file: BinaryIO, at: int, size: int) -> bool:
+    """Whether what begins at a place is no record."""
+    return at < size and isinstance(_record(file, at, size)[0], Fault)
+
+
 def _next_chunk(file: BinaryIO, at: int) -> int | None:
-    """Where the next thing begins that looks like a chunk, from a place on."""
+    """Where the next chunk begins that says the same length twice, from a place on."""
     at += _BEFORE_MARK
     while True:
         file.seek(at)
         block = file.read(_BLOCK)
         place = block.find(_MARK)
-        if place >= 0:
-            return at + place - _BEFORE_MARK
+        while place >= 0:
+            if _frames_a_chunk(file, at + place - _BEFORE_MARK):
+                return at + place - _BEFORE_MARK
+            place = block.find(_MARK, place + 1)
         if len(block) < _BLOCK:
             return None
         at += _BLOCK - len(_MARK) + 1
+
+
+def _frames_a_chunk(file: BinaryIO, at: int) -> bool:
+    before = _PREFIX.size + len(_ZSTD) + 8
+    file.seek(at)
+    head = file.read(_RECORD.size + before)
+    if len(head) < _RECORD.size + before:
+        return False
+    kind, length = _RECORD.unpack_from(head)
+    return kind == _CHUNK and length - before == int.from_bytes(head[-8:], "little")
 
 
 def _chunk(at: int, content: bytes) -> Chunk | None:

@@ -99,8 +99,7 @@ class LogWriter:
             self.add(topic, stamp, tick.number, data)
         self._state = tick.state
         self.written += 1
-        if time.monotonic() - self._since >= self._flush or self._size >= _CHUNK:
-            self.flush()
+        self.settle()
 
     def add(self, topic: Topic, stamp: int, number: int, data: bytes) -> None:
         """Add a message as it is, of a time [ns] and a tick; it is not counted as a tick."""
@@ -110,6 +109,15 @@ class LogWriter:
         self._size += len(data)
         self._time = max(self._time, stamp)
         self._writer.add_message(self._channels[topic], stamp, data, stamp, number & 0xFFFFFFFF)
+
+    def settle(self) -> None:
+        """Hand over what has waited long enough; to be called where no tick may follow for a while.
+
+        Raises:
+            LogError: The disk is full or gone.
+        """
+        if time.monotonic() - self._since >= self._flush or self._size >= _CHUNK:
+            self.flush()
 
     def flush(self) -> None:
         """Hand over what waits to the operating system.
