@@ -6,7 +6,7 @@ Every float comes back bit by bit, NaN and infinities too.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Container, Iterator, Mapping
 from dataclasses import dataclass
 from operator import attrgetter
 from typing import Any
@@ -29,6 +29,7 @@ from antennate.telemetry.topics import (
 from antennate.types import AntennaFrame, Controller, JointCommand
 
 _LONGEST_CAUSE = 160
+_ONE = dict(zip(JOINTS[1:], ("position", "velocity", "effort"), strict=True))
 _NEITHER = (math.nan, math.nan)
 
 Pair = tuple[float, float]
@@ -128,6 +129,22 @@ class Tick:
         held = (getattr(self, name) for name in _NUMBERS)
         return tuple(n for each in held for n in (each if isinstance(each, tuple) else (each,)))
 
+    def row(self, robot: RobotSpec, measured: Container[str] = ()) -> dict[str, Any]:
+        """It as a row of a table: numbers as they are, so that they come back exactly.
+
+        Args:
+            robot: Gives the names of the joints.
+            measured: Which of positions, velocities and efforts have columns.
+        """
+        found: dict[str, Any] = dict(zip(fields(robot), self.values, strict=False))
+        nothing = (math.nan,) * len(robot.joint_names)
+        for kind in JOINTS[1:]:
+            if kind in measured:
+                columns = (f"{name}_{_ONE[kind]}" for name in robot.joint_names)
+                found |= zip(columns, getattr(self, kind) or nothing, strict=False)
+        texts = {"state": self.state, "note": self.note, "causes": "; ".join(self.causes)}
+        return found | texts
+
     def frame(self) -> AntennaFrame:
         """What the controller got."""
         return AntennaFrame(t=np.array([self.t]), counts=np.array([self.counts]))
@@ -180,8 +197,7 @@ class Tick:
         values["angles"] = JOINT_COMMANDS.type.decode(found[JOINT_COMMANDS])["position"]
         if JOINT_STATES in found:
             state = JOINT_STATES.type.decode(found[JOINT_STATES])
-            measured = (state[name] for name in ("position", "velocity", "effort"))
-            values |= dict(zip(JOINTS[1:], measured, strict=True))
+            values |= {kind: state[name] for kind, name in _ONE.items()}
         return cls(**values)
 
 

@@ -13,6 +13,7 @@ import math
 import os
 import shutil
 import time
+from collections.abc import Iterable
 from pathlib import Path
 
 from antennate import __version__
@@ -22,7 +23,7 @@ from antennate.telemetry.ticks import Tick
 from antennate.telemetry.topics import EVENTS, TOPICS, Topic
 
 LEAST_FREE = 1e9
-"""Room for {hours} hours of ticks at 100 Hz [byte] (assumed)."""
+"""Room for six hours of ticks at 100 Hz [byte] (assumed)."""
 FLUSH = 0.2
 """Time after which a chunk is closed with the next tick [s], so that a tick is at most 0.25 s old."""
 _CHUNK = 1 << 20
@@ -68,7 +69,7 @@ class LogWriter:
         self._writer.start("ros2", f"antennate {__version__}")
         self._channels = self._register()
         for topic, data in header.messages().items():
-            self.add(topic, header.start, 0, data)
+            self.add(topic, 0, header.start, data)
         self.flush()
 
     def _register(self) -> dict[Topic, int]:
@@ -82,8 +83,8 @@ class LogWriter:
             for topic in TOPICS
         }
 
-    def write(self, tick: Tick) -> None:
-        """Add a tick. After a failure or `close` it does nothing.
+    def write(self, tick: Tick, more: Iterable[tuple[Topic, bytes]] = ()) -> None:
+        """Add a tick, with more messages of its time. After a failure or `close` it does nothing.
 
         Raises:
             LogError: A number does not fit; or the disk is full or gone, which is raised once, and
@@ -92,17 +93,17 @@ class LogWriter:
         if self.failure:
             return
         stamp = self._stamp(tick.now)
-        messages = list(tick.messages(self._names, stamp))
+        messages = [*tick.messages(self._names, stamp), *more]
         if tick.state != self._state:
             messages.append((EVENTS, self._event(tick, stamp)))
         for topic, data in messages:
-            self.add(topic, stamp, tick.number, data)
+            self.add(topic, tick.number, stamp, data)
         self._state = tick.state
         self.written += 1
         self.settle()
 
-    def add(self, topic: Topic, stamp: int, number: int, data: bytes) -> None:
-        """Add a message as it is, of a time [ns] and a tick; it is not counted as a tick."""
+    def add(self, topic: Topic, number: int, stamp: int, data: bytes) -> None:
+        """Add a message as it is, of a tick and a time [ns]; it is not counted as a tick."""
         if self.failure:
             return
         self._since = min(self._since, time.monotonic())
