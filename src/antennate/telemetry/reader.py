@@ -16,8 +16,8 @@ from antennate.telemetry.header import Header
 from antennate.telemetry.parts import parts
 from antennate.telemetry.ticks import Tick
 from antennate.telemetry.topics import (
-    COUNTERS,
     HEADER_TOPICS,
+    MANEUVER,
     TICK_TOPICS,
     TOPICS,
     Topic,
@@ -169,7 +169,7 @@ class LogReader:
                         ticks = (
                             count
                             for channel, count in place.counts.items()
-                            if self._channels.get(channel) is COUNTERS
+                            if self._channels.get(channel) is MANEUVER
                         )
                         self.end = self._before + sum(ticks)
                     elif not (self._first and self._repeats(place)):

@@ -19,9 +19,13 @@ from antennate.messages import one_line
 from antennate.robots.spec import RobotSpec
 from antennate.telemetry.cdr import MessageType
 from antennate.telemetry.topics import (
+    ANTENNA,
+    COUNTERS,
     JOINT_COMMANDS,
     JOINT_STATES,
     JOINTS,
+    MANEUVER,
+    SUPERVISOR,
     TICK,
     TICK_TOPICS,
     Topic,
@@ -177,7 +181,9 @@ class Tick:
             LogError: A number does not fit.
         """
         for topic, values in _OWN:
-            yield topic, topic.type.encode(*values(self))
+            found = values(self)
+            if topic in TICK_TOPICS or any(found):
+                yield topic, topic.type.encode(*found)
         time = (*divmod(stamp, 10**9), "", names)
         yield JOINT_COMMANDS, JOINT_COMMANDS.type.encode(*time, self.angles, (), ())
         if self.positions:
@@ -193,7 +199,8 @@ class Tick:
         """
         values: dict[str, Any] = {}
         for topic, _ in _OWN:
-            values |= topic.type.decode(found[topic])
+            if topic in found:
+                values |= topic.type.decode(found[topic])
         values["angles"] = JOINT_COMMANDS.type.decode(found[JOINT_COMMANDS])["position"]
         if JOINT_STATES in found:
             state = JOINT_STATES.type.decode(found[JOINT_STATES])
@@ -206,7 +213,10 @@ def _getter(kind: MessageType) -> Callable[[Tick], tuple[Any, ...]]:
 
 
 _ALL = _getter(TICK)
-_OWN = tuple((topic, _getter(topic.type)) for topic in TICK_TOPICS if topic is not JOINT_COMMANDS)
+_OWN = tuple(
+    (topic, _getter(topic.type)) for topic in (ANTENNA, MANEUVER, COUNTERS, SUPERVISOR)
+)
+"""Topics whose messages are fields of a tick."""
 _NUMBERS = tuple(f.name for f in TICK.fields if f.code and f.name not in JOINTS[1:])
 
 

@@ -1,7 +1,7 @@
 """The topics of a log and the definitions of their messages, in the words of ROS 2.
 
-Every tick has one message in each of `TICK_TOPICS`, all with the tick's number and time. The others
-have messages where there is something to say. docs/log.md lists them.
+Every tick has one message in each of `TICK_TOPICS`, and in others where there is something to say,
+all with the tick's number and time. docs/log.md lists them.
 """
 
 from __future__ import annotations
@@ -27,13 +27,13 @@ int64[2] contact    # 0 FREE, 1 CONTACT, 2 UNKNOWN
 float64 age         # age of the newest sample [s]; NaN in simulation
 """
 _MANEUVER = """\
+uint64 number   # ticks since the controller began, this one included
+float64 now     # time of the loop [s]
 int64 maneuver  # 0 FORWARD, 1 TURN_L, 2 TURN_R, 3 REVERSE, 4 HOLD
 float64 phase   # gait phase [rad]; NaN if the controller has none
 bool asked      # whether the controller was asked; if not, its last command was kept
 """
 _COUNTERS = """\
-uint64 number   # ticks since the controller began, this one included
-float64 now     # time of the loop [s]
 uint64 missed   # ticks left out so far
 uint64 frames   # good frames of the board so far
 uint64 crc      # frames with a wrong CRC so far
@@ -122,9 +122,17 @@ CONFIG = Topic("/config", _STRING)
 CALIBRATION = Topic("/calibration", _STRING)
 VERSIONS = Topic("/versions", _STRING)
 
-TICK_TOPICS = (ANTENNA, MANEUVER, COUNTERS, SUPERVISOR, JOINT_COMMANDS)
+TICK_TOPICS = (ANTENNA, MANEUVER, JOINT_COMMANDS)
 HEADER_TOPICS = (CONFIG, CALIBRATION, VERSIONS)
-TOPICS = (*HEADER_TOPICS, *TICK_TOPICS, JOINT_STATES, CONTACT_FORCES, EVENTS)
+TOPICS = (
+    *HEADER_TOPICS,
+    *TICK_TOPICS,
+    COUNTERS,
+    SUPERVISOR,
+    JOINT_STATES,
+    CONTACT_FORCES,
+    EVENTS,
+)
 """All, in the order of their channels: the first has id 1."""
 
 JOINTS = ("angles", "positions", "velocities", "efforts")

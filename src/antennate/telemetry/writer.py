@@ -13,7 +13,7 @@ import math
 import os
 import shutil
 import time
-from collections.abc import Iterable
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from antennate import __version__
@@ -83,8 +83,8 @@ class LogWriter:
             for topic in TOPICS
         }
 
-    def write(self, tick: Tick, more: Iterable[tuple[Topic, bytes]] = ()) -> None:
-        """Add a tick, with more messages of its time. After a failure or `close` it does nothing.
+    def write(self, tick: Tick) -> None:
+        """Add a tick. After a failure or `close` it does nothing.
 
         Raises:
             LogError: A number does not fit; or the disk is full or gone, which is raised once, and
@@ -93,7 +93,7 @@ class LogWriter:
         if self.failure:
             return
         stamp = self._stamp(tick.now)
-        messages = [*tick.messages(self._names, stamp), *more]
+        messages = list(tick.messages(self._names, stamp))
         if tick.state != self._state:
             messages.append((EVENTS, self._event(tick, stamp)))
         for topic, data in messages:
@@ -101,6 +101,29 @@ class LogWriter:
         self._state = tick.state
         self.written += 1
         self.settle()
+
+    def write_many(
+        self, times: Sequence[float], messages: Mapping[Topic, Sequence[bytes | None]]
+    ) -> None:
+        """Add ticks that follow one another, made elsewhere, and hand them over at once.
+
+        Args:
+            times: Time of each [s].
+            messages: What `Tick.messages` would give, by topic; None where there is nothing.
+
+        Raises:
+            LogError: The disk is full or gone.
+        """
+        if self.failure:
+            return
+        channels = [self._channels[topic] for topic in messages]
+        for now, *each in zip(times, *messages.values(), strict=True):
+            stamp = self._time = self._stamp(now)
+            self.written += 1
+            for channel, data in zip(channels, each, strict=True):
+                if data is not None:
+                    self._writer.add_message(channel, stamp, data, stamp, self.written)
+        self.flush()
 
     def add(self, topic: Topic, number: int, stamp: int, data: bytes) -> None:
         """Add a message as it is, of a tick and a time [ns]; it is not counted as a tick."""
