@@ -34,6 +34,8 @@ from antennate.telemetry.topics import CONFIG, TICK_TOPICS, TOPICS, VERSIONS
 from antennate.telemetry.writer import LogWriter
 
 ROOM = 0.0
+
+
 def written(path: Path, ticks: int) -> bytes:
     """A log with one chunk a tick."""
     with LogWriter(path, HEADER, ROOM, flush=0.0) as log:
@@ -83,7 +85,7 @@ def test_a_header_comes_back_with_every_float(tmp_path: Path) -> None:
 def test_messages_are_the_bytes_of_ros_2() -> None:
     """CDR by its specification: text with a zero, numbers at multiples of their size."""
     text = MessageType("std_msgs/msg/String", "string data\n")
-    assert text.encode("hello").hex() == "00010000" "06000000" "68656c6c6f00"
+    assert text.encode("hello").hex() == "000100000600000068656c6c6f00"
     mixed = MessageType("m", "bool a\nfloat64 b\nstring[] c\nfloat64[] d\nuint8 e\nint64[2] f\n")
     values = (True, 0.5, ("", "ab"), (1.0,), 7, (-1, 2))
     data = mixed.encode(*values)
@@ -327,7 +329,9 @@ def test_rosbags_decodes_what_our_encoder_made(tmp_path: Path) -> None:
         log.write(replace(one, positions=one.angles))
     with rosbags.AnyReader([tmp_path / "log.mcap"]) as reader:
         found = {c.topic: reader.deserialize(data, c.msgtype) for c, _, data in reader.messages()}
-        times = {time for connection, time, _ in reader.messages() if connection.topic == "/antenna"}
+        times = {
+            time for connection, time, _ in reader.messages() if connection.topic == "/antenna"
+        }
     assert times == {1_500_000_000}
     assert found["/joint_commands"].name == list(HEADER.robot.joint_names)
     assert found["/joint_commands"].position.tolist() == list(one.angles)
@@ -342,7 +346,9 @@ def test_rosbags_decodes_what_our_encoder_made(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("kills", [12, pytest.param(200, marks=pytest.mark.slow)])
-def test_G1_a_killed_program_loses_a_quarter_of_a_second_at_most(tmp_path: Path, kills: int) -> None:
+def test_G1_a_killed_program_loses_a_quarter_of_a_second_at_most(
+    tmp_path: Path, kills: int
+) -> None:
     here = Path(__file__).parent
     source = Path(antennate.__file__).resolve().parents[1]
     environment = {

@@ -46,7 +46,9 @@ def test_info_says_what_there_is(log: Path, capsys: pytest.CaptureFixture[str]) 
         summary = make_reader(file).get_summary()
     assert summary is not None
     assert summary.statistics is not None
-    counted = {summary.channels[n].topic: c for n, c in summary.statistics.channel_message_counts.items()}
+    counted = {
+        summary.channels[n].topic: c for n, c in summary.statistics.channel_message_counts.items()
+    }
     header = {"/config", "/versions"}
     assert found["messages"] == {name: c for name, c in counted.items() if name not in header}
     assert found["messages"]["/joint_states"] == TICKS
@@ -132,7 +134,9 @@ def test_export_to_parquet(log: Path, capsys: pytest.CaptureFixture[str]) -> Non
     assert main(["log", "export", str(log), "--out", "a.parquet"]) == 0
     table = pandas.read_parquet("a.parquet")
     with LogReader(log) as reader:
-        assert table["phase"].tolist() == pytest.approx([t.phase for t in reader], abs=0, nan_ok=True)
+        assert table["phase"].tolist() == pytest.approx(
+            [t.phase for t in reader], abs=0, nan_ok=True
+        )
 
 
 def test_plot_draws_it(log: Path) -> None:

@@ -42,9 +42,7 @@ def command(experiment: Experiment[Any, Any], argv: Sequence[str]) -> int:
         AntennateError: As below, or something given cannot be used.
     """
     kind = Options if experiment.logged is None else LogOptions
-    config, options = parse(
-        experiment.name, experiment.description, experiment.config, argv, kind
-    )
+    config, options = parse(experiment.name, experiment.description, experiment.config, argv, kind)
     experiment.check(config)
     return carry_out(experiment, argv, config, options)
 

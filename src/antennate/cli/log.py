@@ -9,11 +9,11 @@ from typing import Any, Literal
 
 from pydantic.dataclasses import dataclass
 
-from antennate.cli.arguments import FromFile, parse
-from antennate.cli.exit_codes import BAD_INPUT, OK
+from antennate.cli.arguments import parse
+from antennate.cli.exit_codes import OK
 from antennate.cli.options import option
 from antennate.cli.replay import complain
-from antennate.cli.results import tell
+from antennate.cli.results import ResultOptions, tell
 from antennate.errors import ConfigError, MissingPackageError, OutputError
 from antennate.files import write_whole
 from antennate.messages import one_line, typed
@@ -42,7 +42,7 @@ class LogConfig(Params):
 
 
 @dataclass(frozen=True)
-class Options(FromFile):
+class Options(ResultOptions):
     """What to do with which log."""
 
     action: Literal["info", "recover", "export", "plot"] = option(

@@ -29,12 +29,12 @@ _COUNT = struct.Struct("<I")
 class Field(NamedTuple):
     """One field: its name, its code for `struct` (empty for a string), how many values it has.
 
-    The count is 0 for a single value and None for a sequence.
+    The number is 0 for a single value and None for a sequence.
     """
 
     name: str
     code: str
-    count: int | None
+    number: int | None
 
 
 class MessageType:
@@ -54,7 +54,7 @@ class MessageType:
     def __init__(self, name: str, fields: str, schema: str = "") -> None:
         self.name, self.schema = name, schema or fields
         self.fields = tuple(map(_field, fields.splitlines()))
-        sizes = [0 if not f.code or f.count is None else max(1, f.count) for f in self.fields]
+        sizes = [0 if not f.code or f.number is None else max(1, f.number) for f in self.fields]
         self._leading = next((i for i, size in enumerate(sizes) if not size), len(sizes))
         layout, at = "<", 0
         for each, size in zip(self.fields[: self._leading], sizes, strict=False):
@@ -71,10 +71,12 @@ class MessageType:
         """
         flat: list[Any] = []
         for each, value in zip(self.fields[: self._leading], values, strict=False):
-            flat += value if each.count else (value,)
+            flat += value if each.number else (value,)
         try:
             body = bytearray(self._first.pack(*flat))
-            for each, value in zip(self.fields[self._leading :], values[self._leading :], strict=True):
+            for each, value in zip(
+                self.fields[self._leading :], values[self._leading :], strict=True
+            ):
                 _put(body, each, value)
         except (struct.error, OverflowError) as error:
             raise LogError(f"expected a {self.name} of numbers that fit, found: {error}") from None
@@ -132,7 +134,7 @@ class MessageType:
             at = self._first.size
             numbers = iter(self._first.unpack_from(body))
             for each in self.fields[: self._leading]:
-                found[each.name] = _several(numbers, each.count) if each.count else next(numbers)
+                found[each.name] = _several(numbers, each.number) if each.number else next(numbers)
             for each in self.fields[self._leading :]:
                 found[each.name], at = _take(body, at, each)
             if at != len(body):
@@ -159,11 +161,11 @@ def _put(body: bytearray, field: Field, value: Any) -> None:
     """Add what has no fixed place; several strings are kept for the next message."""
     if not field.code:
         body += bytes(-len(body) % 4)
-        body += _strings(tuple(value)) if field.count is None else _strings((value,))[4:]
+        body += _strings(tuple(value)) if field.number is None else _strings((value,))[4:]
         return
-    if field.count is None:
+    if field.number is None:
         body += bytes(-len(body) % 4) + _COUNT.pack(len(value))
-    values: Sequence[Any] = value if field.count != 0 else (value,)
+    values: Sequence[Any] = value if field.number != 0 else (value,)
     if values:
         width = struct.calcsize(f"<{field.code}")
         body += bytes(-len(body) % width) + struct.pack(f"<{len(values)}{field.code}", *values)
@@ -181,24 +183,24 @@ def _strings(values: tuple[str, ...]) -> bytes:
 
 def _take(body: bytes, at: int, field: Field) -> tuple[Any, int]:
     """One value and where the next one begins."""
-    count = field.count
+    count = field.number
     if count is None:
         at += -at % 4
         (count,) = _COUNT.unpack_from(body, at)
         at += _COUNT.size
     if not field.code:
         texts: list[str] = []
-        for _ in range(count if field.count is None else 1):
+        for _ in range(count if field.number is None else 1):
             text, at = _text(body, at)
             texts.append(text)
-        return (tuple(texts) if field.count is None else texts[0]), at
+        return (tuple(texts) if field.number is None else texts[0]), at
     width = struct.calcsize(f"<{field.code}")
-    number = count or int(field.count == 0)
+    number = count or int(field.number == 0)
     at += -at % width if number else 0
     if number * width > len(body) - at:
         raise ValueError(f"{number} numbers in {len(body) - at} bytes")
     values = struct.unpack_from(f"<{number}{field.code}", body, at)
-    return (values[0] if field.count == 0 else values), at + number * width
+    return (values[0] if field.number == 0 else values), at + number * width
 
 
 def _text(body: bytes, at: int) -> tuple[str, int]:

@@ -27,8 +27,8 @@ from antennate.errors import LogError
 
 _HEAD = struct.Struct("<II")
 _ROOM = 1 << 20
-"""Bytes that the pipe may hold, whole ticks to each page of 4096: 26 s of ticks of 0.4 kB, 10 s of
-the longest, which have 1 kB with their causes."""
+"""Bytes that the pipe may hold, whole ticks to each page of 4096: 17 s of ticks of 0.55 kB, 7 s of
+the longest, which have 1.2 kB with their causes."""
 _WAITING = 3000
 """Most ticks that wait for room in the pipe: 30 s at 100 Hz, as long as a start may take."""
 _AT_ONCE = 16

@@ -55,7 +55,7 @@ class Header(BaseModel):
     seed: int | None = None
     trial: int | None = None
     phase: float = 0.0
-    start: int = Field(0, ge=0, lt=1 << 62)
+    start: int = Field(default=0, ge=0, lt=1 << 62)
     calibration: str = ""
     versions: Mapping[str, str] = Field(default_factory=versions)
 
@@ -80,7 +80,10 @@ class Header(BaseModel):
     def messages(self) -> dict[Topic, bytes]:
         """Its messages in a log."""
         apart = {"calibration", "versions"}
-        texts = {CONFIG: self.model_dump_json(exclude=apart), VERSIONS: json.dumps(dict(self.versions))}
+        texts = {
+            CONFIG: self.model_dump_json(exclude=apart),
+            VERSIONS: json.dumps(dict(self.versions)),
+        }
         if self.calibration:
             texts[CALIBRATION] = self.calibration
         return {topic: topic.type.encode(text) for topic, text in texts.items()}
@@ -92,7 +95,11 @@ class Header(BaseModel):
         Raises:
             LogError: One is missing or damaged.
         """
-        texts = {topic: topic.type.decode(found[topic])["data"] for topic in HEADER_TOPICS if topic in found}
+        texts = {
+            topic: topic.type.decode(found[topic])["data"]
+            for topic in HEADER_TOPICS
+            if topic in found
+        }
         if CONFIG not in texts:
             raise LogError(f"expected a header of a log, found no {CONFIG.name}")
         try:

@@ -25,7 +25,7 @@ from antennate.telemetry.topics import (
 
 _LISTED = 100
 """Most damaged places that are listed."""
-_OURS = {id: topic for id, topic in enumerate(TOPICS, 1)}
+_OURS = dict(enumerate(TOPICS, 1))
 """Channels of a file whose first chunk is lost."""
 _OLD = re.compile(rb"\x00.[\x01-\x09]\x01", re.S)
 """How a log from before MCAP begins: its schema and the kind of its first record."""

@@ -213,18 +213,16 @@ def _getter(kind: MessageType) -> Callable[[Tick], tuple[Any, ...]]:
 
 
 _ALL = _getter(TICK)
-_OWN = tuple(
-    (topic, _getter(topic.type)) for topic in (ANTENNA, MANEUVER, COUNTERS, SUPERVISOR)
-)
+_OWN = tuple((topic, _getter(topic.type)) for topic in (ANTENNA, MANEUVER, COUNTERS, SUPERVISOR))
 """Topics whose messages are fields of a tick."""
 _NUMBERS = tuple(f.name for f in TICK.fields if f.code and f.name not in JOINTS[1:])
 
 
 def fields(robot: RobotSpec) -> tuple[str, ...]:
     """Names of the numbers of a tick that are in its `values`."""
-    counts = {field.name: field.count for field in TICK.fields}
-    parts = {name: (f"{name}_l", f"{name}_r") for name, count in counts.items() if count == 2}
-    parts["angles"] = robot.joint_names
+    parts: dict[str, tuple[str, ...]] = {"angles": robot.joint_names}
+    pairs = [field.name for field in TICK.fields if field.number == 2]
+    parts |= {name: (f"{name}_l", f"{name}_r") for name in pairs}
     return tuple(field for name in _NUMBERS for field in parts.get(name, (name,)))
 
 

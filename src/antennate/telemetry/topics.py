@@ -139,6 +139,10 @@ JOINTS = ("angles", "positions", "velocities", "efforts")
 """Numbers of a tick for each joint: the commanded, then the measured ones, empty if unknown."""
 TICK = _own(
     "Tick",
-    _ANTENNA + _MANEUVER + _COUNTERS + "".join(f"float64[] {name}\n" for name in JOINTS) + _SUPERVISOR,
+    _ANTENNA
+    + _MANEUVER
+    + _COUNTERS
+    + "".join(f"float64[] {name}\n" for name in JOINTS)
+    + _SUPERVISOR,
 )
 """A whole tick, on its way from the loop to the process that writes the log."""

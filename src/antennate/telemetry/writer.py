@@ -15,6 +15,7 @@ import shutil
 import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from antennate import __version__
 from antennate.errors import LogError
@@ -25,7 +26,7 @@ from antennate.telemetry.topics import EVENTS, TOPICS, Topic
 LEAST_FREE = 1e9
 """Room for six hours of ticks at 100 Hz [byte] (assumed)."""
 FLUSH = 0.2
-"""Time after which a chunk is closed with the next tick [s], so that a tick is at most 0.25 s old."""
+"""Time after which the next tick closes a chunk [s], so that a tick waits 0.25 s at most."""
 _CHUNK = 1 << 20
 """Bytes after which it is closed sooner, as where simulated time runs fast."""
 _LATEST = 1 << 60
@@ -65,7 +66,8 @@ class LogWriter:
         self.failure = ""
         self._require_room(least_free)
         self._file = _NewFile(path)
-        self._writer = Writer(self._file, chunk_size=1 << 40)
+        file: Any = self._file
+        self._writer = Writer(file, chunk_size=1 << 40)
         self._writer.start("ros2", f"antennate {__version__}")
         self._channels = self._register()
         for topic, data in header.messages().items():
