@@ -461,4 +461,4 @@ def test_a_header_of_defaults_says_what_wrote_it(tmp_path: Path) -> None:
     with LogReader(tmp_path / "log") as log:
         assert log.header == header
         assert log.header.version == antennate.__version__
-        assert log.header.params.gait.frequency == 0.5
+        assert log.header.params.gait.frequency == 0.6
