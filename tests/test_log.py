@@ -20,6 +20,7 @@ import zstandard
 from log_ticks import CHUNK, HEADER, MAGIC, ODD, chunks, tick, unclosed
 from mcap.exceptions import McapError
 from mcap.reader import NonSeekingReader, make_reader
+from mcap.records import Chunk
 from mcap.stream_reader import StreamReader
 from mcap.writer import Writer
 
@@ -164,14 +165,18 @@ def test_G2_a_damaged_summary_costs_no_tick(tmp_path: Path) -> None:
 def test_G2_a_damaged_header_is_refused_and_what_follows_counted(tmp_path: Path) -> None:
     data = bytearray(written(tmp_path / "whole", 2))
     begin, end = chunks(data)[0]
+    refused = 0
     for place in range(begin + 60, end, 32):
         spoiled = bytearray(data)
         spoiled[place] ^= 1 << place // 16 % 8
         (tmp_path / "spoiled").write_bytes(spoiled)
-        with pytest.raises(
-            LogError, match=r"no intact header, 2 intact ticks; damaged places: [12]"
-        ):
-            LogReader(tmp_path / "spoiled")
+        try:
+            with LogReader(tmp_path / "spoiled") as log:
+                assert log.header == HEADER  # a bit that zstd does not use
+        except LogError as error:
+            assert "no intact header, 2 intact ticks; damaged places: 1" in str(error)  # noqa: PT017
+            refused += 1
+    assert refused > 30
 
 
 OLD = b"\0\x0b\3\1" + json.dumps({"controller": "open", "version": "0.1.0"}).encode() + b"1234\0"
@@ -307,9 +312,9 @@ def test_the_readers_of_mcap_read_all_of_it(tmp_path: Path) -> None:
         messages = NonSeekingReader(file).iter_messages(log_time_order=False)
         topics = [channel.topic for _, channel, _ in _until_the_end(messages)]
     assert topics.count("/antenna") == 30
-    stream = StreamReader((tmp_path / "log").open("rb"), emit_chunks=True, validate_crcs=True)
-    with stream._stream._stream:
-        crcs = [r.uncompressed_crc for r in stream.records if type(r).__name__ == "Chunk"]
+    with (tmp_path / "log").open("rb") as file:
+        stream = StreamReader(file, emit_chunks=True, validate_crcs=True)
+        crcs = [each.uncompressed_crc for each in stream.records if isinstance(each, Chunk)]
     assert len(crcs) == 31
     assert all(crcs)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import gc
 import json
 import shutil
 from pathlib import Path
@@ -93,12 +94,14 @@ def test_recover_makes_one_file_of_all_parts_that_others_open(
     assert not list(log.parent.glob(".*"))
 
 
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
 def test_rosbags_opens_a_killed_log_once_it_is_recovered(log: Path) -> None:
     rosbags = pytest.importorskip("rosbags.highlevel")
     killed = log.with_name("killed.mcap")
     killed.write_bytes(unclosed(log.read_bytes())[:-100])
-    with pytest.raises(Exception, match=""), rosbags.AnyReader([killed]) as bag:  # noqa: PT011
-        list(bag.messages())
+    with pytest.raises(rosbags.AnyReaderError), rosbags.AnyReader([killed]):
+        pass
+    gc.collect()  # it leaves the file open that it refused
     assert main(["log", "recover", "killed.mcap", "--out", "whole.mcap"]) == 0
     with rosbags.AnyReader([log.with_name("whole.mcap")]) as bag:
         antenna = [each for each in bag.connections if each.topic == "/antenna"]
@@ -143,7 +146,7 @@ def test_plot_draws_it(log: Path) -> None:
     assert main(["log", "plot", str(log)]) == 0
     assert log.with_suffix(".png").read_bytes().startswith(b"\x89PNG")
     assert main(["log", "plot", str(log), "--out", "a.svg"]) == 0
-    assert "recorded" in Path("a.svg").read_text() or Path("a.svg").stat().st_size > 10_000
+    assert Path("a.svg").read_text().count("<path") > 20
 
 
 @pytest.mark.parametrize(
