@@ -33,6 +33,7 @@ from antennate.hardware.driving.signals import StopOnce
 from antennate.hardware.robot_file import RobotFile
 from antennate.hardware.safety.causes import State
 from antennate.messages import short_names, typed
+from antennate.robots.spec import require_antennae
 from antennate.studies.formats import to_json
 from antennate.studies.measures import Measure, Table
 from antennate.studies.run_directory import LOG
@@ -76,6 +77,7 @@ def command(argv: Sequence[str]) -> int:
         AntennateError: A port, a servo or the board is not what is needed; nothing moved then.
     """
     config, orders = parse_robot("drive", DESCRIPTION, RobotFile.for_drive, argv, Orders)
+    require_antennae(config.robot, "drive")
     return walk("drive", config, orders, argv)
 
 

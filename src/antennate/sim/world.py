@@ -111,7 +111,8 @@ class World:
         self.robot = robot
         self.model = model
         self.data = mujoco.MjData(model)
-        hinges = [PREFIX + p + h for p in ANTENNA_PREFIXES for h in robot.antenna.hinge_names]
+        prefixes = ANTENNA_PREFIXES[: robot.antenna_count]
+        hinges = [PREFIX + p + h for p in prefixes for h in robot.antenna.hinge_names]
         bent = self._addresses(hinges)
         self._yaw = self._addresses([PREFIX + n for n in robot.yaw_names])
         self._leg = self._addresses([PREFIX + n for n in robot.leg_names])
@@ -141,7 +142,7 @@ class World:
         self._no_warning = self._warnings.tobytes()
 
     def _addresses(self, joints: list[str]) -> Ints:
-        return np.array([self.model.joint(n).qposadr[0] for n in joints])
+        return np.array([self.model.joint(n).qposadr[0] for n in joints], np.int64)
 
     @property
     def t(self) -> float:
