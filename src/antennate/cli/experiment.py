@@ -17,7 +17,7 @@ from antennate.errors import OutputError
 from antennate.params.base import Params
 from antennate.studies.experiment import Experiment, Outcome
 from antennate.studies.pool import core_count
-from antennate.studies.run_directory import RunDirectory
+from antennate.studies.run_directory import LOGS, RunDirectory
 
 
 @dataclass(frozen=True)
@@ -28,15 +28,21 @@ class Options(ResultOptions):
     no_figures: bool = option(False, "draw no figures")
 
 
+@dataclass(frozen=True)
+class LogOptions(Options):
+    """The same where trials can be logged."""
+
+    log: bool = option(False, "keep the log of every trial, in logs/CONTROLLER-TRIAL.mcap")
+
+
 def command(experiment: Experiment[Any, Any], argv: Sequence[str]) -> int:
     """Run the command of an experiment and return its exit code.
 
     Raises:
         AntennateError: As below, or something given cannot be used.
     """
-    config, options = parse(
-        experiment.name, experiment.description, experiment.config, argv, Options
-    )
+    kind = Options if experiment.logged is None else LogOptions
+    config, options = parse(experiment.name, experiment.description, experiment.config, argv, kind)
     experiment.check(config)
     return carry_out(experiment, argv, config, options)
 
@@ -52,7 +58,11 @@ def carry_out(
     """
     with folder_for(experiment.name, options, config, argv) as run:
         with progress(experiment.parts) as step, stop_signals():
-            outcome = experiment.run(config, options.workers or core_count(), step, run.append)
+            how = (config, options.workers or core_count(), step, run.append)
+            if isinstance(options, LogOptions) and options.log and experiment.logged is not None:
+                outcome = experiment.logged(*how, run.folder(LOGS))
+            else:
+                outcome = experiment.run(*how)
         result = outcome.result()
         interrupted = bool(result.get("interrupted"))
         if interrupted and not outcome.rows:

@@ -286,6 +286,23 @@ class World:
         address = self.data.contact.efc_address[self._on_obstacles()]
         return float(self.data.efc_force[address[address >= 0]].sum())
 
+    def obstacle_contacts(self) -> tuple[list[str], Floats, Floats]:
+        """Where the robot touched obstacles in the last physics step.
+
+        Returns:
+            The part of the robot, the place [m], shape (contacts, 3), and the normal force [N],
+            shape (contacts,), of each contact.
+        """
+        contact = self.data.contact
+        found = np.flatnonzero(self._on_obstacles() & (contact.efc_address >= 0))
+        geoms = contact.geom[found]
+        ours = np.where(self._robot[geoms[:, 0]], geoms[:, 0], geoms[:, 1])
+        names = [
+            self.model.body(self.model.geom_bodyid[geom]).name.removeprefix(PREFIX)
+            for geom in ours.tolist()
+        ]
+        return names, contact.pos[found], self.data.efc_force[contact.efc_address[found]]
+
     def _on_obstacles(self) -> Bools:
         """Contacts between the robot and an obstacle, shape (contacts,)."""
         geoms = self.data.contact.geom

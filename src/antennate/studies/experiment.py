@@ -9,6 +9,7 @@ from __future__ import annotations
 import importlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 
 from antennate.params.base import Params
@@ -65,6 +66,8 @@ class Experiment(Generic[Config, Found]):
         check: Raises if a configuration cannot be run; called before anything is written.
         failed: Whether a result says nothing, so that the command ends with exit code 2.
         parts: What `on_step` counts.
+        logged: Runs as `run` does and keeps the log of each trial in a folder, which is given as
+            well; None if there are no controllers to log.
     """
 
     name: str
@@ -78,6 +81,7 @@ class Experiment(Generic[Config, Found]):
     check: Callable[[Config], None] = lambda config: None
     failed: Callable[[Mapping[str, Any]], bool] = lambda result: False
     parts: str = "trials"
+    logged: Callable[[Config, int, OnStep, OnRow, Path], Found] | None = None
 
     @classmethod
     def of_folder(

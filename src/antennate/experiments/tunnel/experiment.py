@@ -80,4 +80,5 @@ EXPERIMENT = Experiment.of_folder(
     sentence,
     check=tunnel.check,
     failed=lambda result: bool(_none_valid(result)),
+    logged=tunnel.run,
 )
