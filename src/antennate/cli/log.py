@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from importlib import import_module
 from pathlib import Path
 from typing import Any, Literal
 
@@ -129,7 +130,8 @@ def _write_parquet(target: Path, rows: Iterator[Mapping[str, Any]]) -> None:
     """
     try:
         import pandas
-        import pyarrow  # noqa: F401 pandas would say it in four lines
+
+        import_module("pyarrow")  # pandas would say it in four lines
     except ImportError:
         raise MissingPackageError(
             f"{target}: expected pandas and pyarrow, found none; install them with "
