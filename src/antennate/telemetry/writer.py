@@ -222,7 +222,7 @@ class _NewFile(io.BufferedIOBase):
     """A new file that takes what was written to it in one piece, once it is flushed."""
 
     def __init__(self, path: Path) -> None:
-        self._held, self._at = bytearray(), 0
+        self._held, self._at, self._file = bytearray(), 0, -1
         try:
             self._file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o644)
         except FileExistsError:
