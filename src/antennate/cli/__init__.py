@@ -24,6 +24,7 @@ ROBOT_COMMANDS = {
     "drive": "let a controller walk the real robot, or its twin",
     "teleop": "walk the real robot, or its twin, by keys",
     "replay": "let a controller decide again upon the log of a drive",
+    "report": "a run, or two side by side, as one page to read, print and send",
 }
 
 

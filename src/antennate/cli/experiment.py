@@ -13,7 +13,8 @@ from antennate.cli.exit_codes import BAD_INPUT, INTERRUPTED, OK
 from antennate.cli.options import option
 from antennate.cli.progress import progress, stop_signals
 from antennate.cli.results import ResultOptions, folder_for, tell
-from antennate.errors import OutputError
+from antennate.errors import ConfigError, OutputError
+from antennate.experiments.running import keep, require_films, write_films
 from antennate.params.base import Params
 from antennate.studies.experiment import Experiment, Outcome
 from antennate.studies.pool import core_count
@@ -28,6 +29,40 @@ class Options(ResultOptions):
     no_figures: bool = option(False, "draw no figures")
 
 
+@dataclass(frozen=True)
+class FilmOptions(Options):
+    """How to run what can be filmed."""
+
+    video: bool = option(False, "film one trial of each condition, drawn without a display")
+
+
+@dataclass(frozen=True)
+class TrialFilmOptions(FilmOptions):
+    """How to run what can be filmed and has trials."""
+
+    video_trial: int = option(0, "trial that --video films", "INT", ge=0)
+
+
+def _options(experiment: Experiment[Any, Any]) -> type[Options]:
+    if experiment.films is None:
+        return Options
+    return TrialFilmOptions if "trials" in experiment.config.model_fields else FilmOptions
+
+
+def _filmed(options: Options) -> int | None:
+    """The trial to film, None for none.
+
+    Raises:
+        ConfigError: A trial is named, but no film is wanted.
+    """
+    trial = getattr(options, "video_trial", 0)
+    if getattr(options, "video", False):
+        return trial
+    if trial:
+        raise ConfigError("--video-trial: expected --video beside it, found none")
+    return None
+
+
 def command(experiment: Experiment[Any, Any], argv: Sequence[str]) -> int:
     """Run the command of an experiment and return its exit code.
 
@@ -35,9 +70,12 @@ def command(experiment: Experiment[Any, Any], argv: Sequence[str]) -> int:
         AntennateError: As below, or something given cannot be used.
     """
     config, options = parse(
-        experiment.name, experiment.description, experiment.config, argv, Options
+        experiment.name, experiment.description, experiment.config, argv, _options(experiment)
     )
     experiment.check(config)
+    trial = _filmed(options)
+    if trial is not None:
+        require_films(experiment, config, trial)
     return carry_out(experiment, argv, config, options)
 
 
@@ -50,7 +88,7 @@ def carry_out(
         AntennateError: The physics became invalid, a worker died, or a file could not be written;
             what was measured is kept and shown first.
     """
-    with folder_for(experiment.name, options, config, argv) as run:
+    with folder_for(experiment.view, options, config, argv) as run:
         with progress(experiment.parts) as step, stop_signals():
             outcome = experiment.run(config, options.workers or core_count(), step, run.append)
         result = outcome.result()
@@ -61,6 +99,10 @@ def carry_out(
         tell(result, options, experiment.tables(result), experiment.sentence(result))
         if failure is not None:
             raise failure
+        trial = _filmed(options)
+        if trial is not None and not interrupted:
+            with progress("% of the films") as step, stop_signals():
+                write_films(experiment, config, trial, run, step)
         if interrupted:
             sys.stderr.write(
                 f"antennate {experiment.name}: interrupted: kept {len(outcome.rows)} trials, all "
@@ -74,13 +116,9 @@ def carry_out(
 def _keep(
     experiment: Experiment[Any, Any], outcome: Outcome, options: Options, run: RunDirectory
 ) -> OutputError | None:
-    """Write files, rows, result and figures; the error that ended it, if any."""
+    """Write what came out; the error that ended it, if any."""
     try:
-        for name, content in experiment.files(outcome).items():
-            run.write(name, content)
-        run.finish(outcome.result(), outcome.rows)
-        if not options.no_figures:
-            run.write_figures(experiment.figures(outcome))
+        keep(experiment, outcome, run, figures=not options.no_figures)
     except OutputError as error:
         return error
     return None

@@ -13,9 +13,12 @@ from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 
 from antennate.params.base import Params
 from antennate.studies.measures import Table
+from antennate.studies.report import Body, View
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from antennate.telemetry.film import Film
 
 OnStep = Callable[[int, int], None]
 """Takes how many of how many parts are done."""
@@ -65,6 +68,9 @@ class Experiment(Generic[Config, Found]):
         check: Raises if a configuration cannot be run; called before anything is written.
         failed: Whether a result says nothing, so that the command ends with exit code 2.
         parts: What `on_step` counts.
+        films: films(config, trial) -> for each condition, by name, what runs this trial of it once
+            more and records it; None where nothing can be filmed.
+        body: HTML that stands in its report in place of tables and figures.
     """
 
     name: str
@@ -78,6 +84,16 @@ class Experiment(Generic[Config, Found]):
     check: Callable[[Config], None] = lambda config: None
     failed: Callable[[Mapping[str, Any]], bool] = lambda result: False
     parts: str = "trials"
+    films: Callable[[Config, int], Mapping[str, Callable[[], Film]]] | None = None
+    body: Body | None = None
+
+    @property
+    def view(self) -> View:
+        """How its result is shown."""
+        return View(
+            *(self.name, self.description, self.config, self.tables, self.sentence),
+            body=self.body,
+        )
 
     @classmethod
     def of_folder(
@@ -87,15 +103,21 @@ class Experiment(Generic[Config, Found]):
         run: Callable[[Config, int, OnStep, OnRow], Found],
         tables: Callable[[Mapping[str, Any]], Sequence[Table]],
         sentence: Callable[[Mapping[str, Any]], str],
+        filmed: bool = False,
         **more: Any,
     ) -> Experiment[Config, Found]:
         """An experiment with a folder of its own: a package that has its name and describes it.
 
         `module` is the `__name__` of a module in the folder. Figures are those that
         `figures(outcome)` of the module `figure` beside it returns; it is imported when they are
-        drawn, as that takes long.
+        drawn, as that takes long. If it is `filmed`, its films are those of `films(config, trial)`
+        of the module `film`, likewise.
         """
         folder = module.rpartition(".")[0]
+        if filmed:
+            more["films"] = lambda c, trial: importlib.import_module(f"{folder}.film").films(
+                c, trial
+            )
         return cls(
             folder.rpartition(".")[2],
             importlib.import_module(folder).__doc__ or "",

@@ -37,8 +37,8 @@ from antennate.telemetry.parts import MOST_PARTS, part
 
 RESULT, TABLE, PARTIAL = "result.json", "trials.csv", "trials.partial.jsonl"
 CONFIG, VERSIONS, COMMAND = "config.toml", "versions.json", "command.txt"
-FIGURES = "figures"
-"""Folder of the figures; what it holds as svg and png belongs to the run."""
+FIGURES, FILMS = "figures", "films"
+"""Folders of figures (svg and png) and films (mp4); what they hold of these belongs to the run."""
 CALIBRATION, LOG, REPORT = "calibration.json", "drive.log", "report.html"
 _LARGEST = 10**9
 """No file of a run is longer [bytes]."""
@@ -95,8 +95,9 @@ class RunDirectory:
         with _writing(place):
             missing = [p for p in (place, *place.parents) if not p.exists()]
             place.mkdir(parents=True, exist_ok=path is not None)
-            if (place / FIGURES).is_symlink():
-                raise OutputError(f"expected {place / FIGURES} within its run, found a link")
+            for folder in (place / FIGURES, place / FILMS):
+                if folder.is_symlink():
+                    raise OutputError(f"expected {folder} within its run, found a link")
             held = _held(place)
             if held and not overwrite:
                 raise OutputError(
@@ -147,6 +148,42 @@ class RunDirectory:
             BadInputError: It is missing or damaged, or is of another command.
         """
         return read_file(self.path / CONFIG, model)
+
+    def command(self) -> str:
+        """Name of the command that made it.
+
+        Raises:
+            BadInputError: No file tells.
+        """
+        result = self.result() if (self.path / RESULT).exists() else {}
+        words = shlex.split(self.text(COMMAND).partition("\n")[0])
+        name = result.get("command") if isinstance(result, dict) else None
+        name = name or (words[1] if len(words) > 1 else None)
+        if not isinstance(name, str):
+            raise BadInputError(f"{self.path}: expected a run that names its command, found none")
+        return name
+
+    def text(self, name: str) -> str:
+        """The content of one of its text files; empty if there is none.
+
+        Raises:
+            BadInputError: The file is damaged.
+        """
+        return self._decoded(name, str) if (self.path / name).exists() else ""
+
+    def figures(self) -> dict[str, tuple[bytes, bytes]]:
+        """Its figures by name, each as png and svg."""
+        pairs = [(p, p.with_suffix(".svg")) for p in sorted((self.path / FIGURES).glob("*.png"))]
+        return {
+            png.stem: (read_limited(png, _LARGEST), read_limited(svg, _LARGEST))
+            for png, svg in pairs
+            if svg.exists()
+        }
+
+    def films(self) -> dict[str, bytes]:
+        """Its films by name, each as mp4."""
+        found = sorted((self.path / FILMS).glob("*.mp4"))
+        return {path.stem: read_limited(path, _LARGEST) for path in found}
 
     def _decoded(self, name: str, decode: Any) -> Any:
         path = self.path / name
@@ -249,9 +286,14 @@ class RunDirectory:
 
 def _held(place: Path) -> list[Path]:
     """Files of a run that a directory holds."""
-    figures = place / FIGURES
-    drawn = [p for p in figures.iterdir() if p.suffix in (".svg", ".png")] if _is(figures) else []
-    return [place / name for name in _NAMES if os.path.lexists(place / name)] + sorted(drawn)
+    drawn = [
+        path
+        for name, kinds in ((FIGURES, (".svg", ".png")), (FILMS, (".mp4",)))
+        if _is(place / name)
+        for path in sorted((place / name).iterdir())
+        if path.suffix in kinds
+    ]
+    return [place / name for name in _NAMES if os.path.lexists(place / name)] + drawn
 
 
 def _is(folder: Path) -> bool:

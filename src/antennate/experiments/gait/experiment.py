@@ -54,5 +54,6 @@ EXPERIMENT = Experiment.of_folder(
     tables,
     sentence,
     check=lambda config: require_step(config.robot),
+    filmed=True,
     parts="walks",
 )

@@ -7,6 +7,7 @@ its own mirror image half a cycle later, so over whole cycles FORWARD neither ya
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -133,7 +134,17 @@ class _Fixed:
 _Task = tuple[GaitStudyConfig, str, GaitParams, Maneuver]
 
 
-def walk_flat(config: GaitStudyConfig, name: str, gait: GaitParams, maneuver: Maneuver) -> Walk:
+Watch = Callable[[World, AntennaFrame], None]
+"""Takes world and frame after each tick."""
+
+
+def walk_flat(
+    config: GaitStudyConfig,
+    name: str,
+    gait: GaitParams,
+    maneuver: Maneuver,
+    watch: Watch = lambda world, frame: None,
+) -> Walk:
     """Walk one maneuver on the flat floor from a straight start.
 
     Raises:
@@ -152,6 +163,7 @@ def walk_flat(config: GaitStudyConfig, name: str, gait: GaitParams, maneuver: Ma
         failure = body.failure(0)
         if failure is not None:
             raise failure
+        watch(world, frame)
         ticks.append((world.t, world.links(), _positive_power(world)))
         return world.t < end - period / 2
 

@@ -100,6 +100,7 @@ class Comparison:
         metres: Its length [m].
         truth: True state, shape (n,).
         alarm: Sensed state, shape (n,).
+        counts: Readings [counts], shape (n,).
         level: Logit of b, shape (n,).
         flex: Flex of the engine [rad], shape (n,).
         matches: Contacts and alarms.
@@ -112,6 +113,7 @@ class Comparison:
     metres: float
     truth: Bools
     alarm: Bools
+    counts: Floats
     level: Floats
     flex: Floats
     matches: Matches
@@ -185,6 +187,7 @@ def _compare_batch(config: TouchConfig, batch: Sequence[Traverse]) -> list[Compa
                 metres=float(one.x[-1] - one.x[0]),
                 truth=truth,
                 alarm=alarm[:, i],
+                counts=counts[:, i],
                 level=logit[:, i],
                 flex=one.flex,
                 matches=match(truth, alarm[:, i], grace),

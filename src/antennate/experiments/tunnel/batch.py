@@ -15,11 +15,14 @@ from antennate.experiments.tunnel.monitor import Outcome, TrialMonitor, TrialPat
 from antennate.sim.scenes.registry import make_scene
 from antennate.sim.sim_robot import SimRobot
 from antennate.sim.trial import draw_trial
-from antennate.types import AntennaFrame, JointCommand
+from antennate.sim.world import World
+from antennate.types import AntennaFrame, Controller, JointCommand
 
 BATCH = 12
 """Trials of one process stepped in lockstep."""
 Emit = Callable[[tuple[TrialResult, TrialPath]], None]
+Watch = Callable[[World, AntennaFrame, Controller], None]
+"""Takes world, frame and controller of the first row after each tick."""
 
 
 def run_trials(
@@ -28,6 +31,7 @@ def run_trials(
     trials: Sequence[int],
     emit: Emit,
     batch: int = BATCH,
+    watch: Watch | None = None,
 ) -> None:
     """Run trials of one controller; emit each as it ends.
 
@@ -37,7 +41,7 @@ def run_trials(
     batch that has not ended begins again with a controller of its own, and is invalid if that one
     fails too.
     """
-    rows = _Rows(config, controller, trials, emit, min(batch, len(trials)))
+    rows = _Rows(config, controller, trials, emit, min(batch, len(trials)), watch)
     try:
         rows.run()
     except ControllerError as error:
@@ -52,9 +56,16 @@ class _Rows:
     """The trials that run at once; a row takes the next trial when its own has ended."""
 
     def __init__(
-        self, config: TunnelConfig, name: str, trials: Sequence[int], emit: Emit, batch: int
+        self,
+        config: TunnelConfig,
+        name: str,
+        trials: Sequence[int],
+        emit: Emit,
+        batch: int,
+        watch: Watch | None,
     ) -> None:
         self._config, self._name, self._emit, self._batch = config, name, emit, batch
+        self._looks = watch
         self._waiting = list(trials)
         self._scene = make_scene(config.scene, config.tunnel)
         self._monitors: list[TrialMonitor | None] = [None] * batch
@@ -84,6 +95,8 @@ class _Rows:
             control.reset(np.array([row]), phase)
 
         def go_on(frame: AntennaFrame, command: JointCommand) -> bool:
+            if self._looks is not None:
+                self._looks(self._robot.world(0), frame, made)
             for row, monitor in enumerate(self._monitors):
                 if monitor is not None and self._watch(row, monitor, control) and self._waiting:
                     control.reset(np.array([row]), self._place(row))

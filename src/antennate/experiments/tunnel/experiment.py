@@ -79,5 +79,6 @@ EXPERIMENT = Experiment.of_folder(
     tables,
     sentence,
     check=tunnel.check,
+    filmed=True,
     failed=lambda result: bool(_none_valid(result)),
 )
