@@ -99,18 +99,32 @@ def carry_out(
         tell(result, options, experiment.tables(result), experiment.sentence(result))
         if failure is not None:
             raise failure
-        trial = _filmed(options)
-        if trial is not None and not interrupted:
-            with progress("% of the films") as step, stop_signals():
-                write_films(experiment, config, trial, run, step)
         if interrupted:
             sys.stderr.write(
                 f"antennate {experiment.name}: interrupted: kept {len(outcome.rows)} trials, all "
                 "that had ended\n"
             )
+        else:
+            interrupted = not _film(experiment, config, options, run)
     if interrupted:
         return INTERRUPTED
     return BAD_INPUT if experiment.failed(result) else OK
+
+
+def _film(
+    experiment: Experiment[Any, Any], config: Params, options: Options, run: RunDirectory
+) -> bool:
+    """Make the films that are wanted; False if that was interrupted."""
+    trial = _filmed(options)
+    if trial is None:
+        return True
+    try:
+        with progress("% of the films") as step, stop_signals():
+            write_films(experiment, config, trial, run, step)
+    except KeyboardInterrupt:
+        sys.stderr.write(f"antennate {experiment.name}: interrupted: kept all but some films\n")
+        return False
+    return True
 
 
 def _keep(

@@ -16,7 +16,7 @@ from antennate.cli.options import option
 from antennate.errors import BadInputError, ConfigError
 from antennate.files import write_whole
 from antennate.params.base import Params
-from antennate.studies.report import View, compare, report
+from antennate.studies.report import View, command_of, compare, report
 from antennate.studies.run_directory import REPORT, RunDirectory
 
 DESCRIPTION = """\
@@ -75,10 +75,11 @@ def _compared(paths: Sequence[Path]) -> str:
     if len(paths) != 2:
         raise ConfigError(f"--compare: expected 2 runs, found {len(paths)}")
     first, second = map(RunDirectory.open, paths)
-    if first.command() != second.command():
+    names = [command_of(run) for run in (first, second)]
+    if names[0] != names[1]:
         raise BadInputError(
-            f"--compare: expected two runs of one command, found {first.command()} in {first.path} "
-            f"and {second.command()} in {second.path}"
+            f"--compare: expected two runs of one command, found {names[0]} in {first.path} and "
+            f"{names[1]} in {second.path}"
         )
     return _made(first, lambda view: compare([first, second], view))
 
@@ -89,7 +90,7 @@ def _made(run: RunDirectory, make: Callable[[View], str]) -> str:
     Raises:
         BadInputError: The command is unknown, or its result has another form.
     """
-    name = run.command()
+    name = command_of(run)
     if name in _COMMANDS:
         view = importlib.import_module(f"antennate.cli.{name}").VIEW
     elif name in experiments.names():

@@ -19,7 +19,6 @@ from antennate.studies.experiment import Experiment, Outcome
 from antennate.studies.report import write_report
 from antennate.studies.run_directory import FILMS, RunDirectory
 
-
 _PARTS = 100
 """Parts of the making of a film that are told."""
 

@@ -22,7 +22,7 @@ Colour = tuple[float, float, float, float]
 _UNPAINTED = np.array([0.5, 0.5, 0.5, 1.0], dtype=np.float32)
 """The engine's colour of a geom that has none of its own."""
 _FLOOR: Colour = (0.97, 0.97, 0.97, 1.0)
-_OBSTACLE: Colour = (0.88, 0.80, 0.66, 0.75)
+_OBSTACLE: Colour = (0.88, 0.80, 0.66, 0.6)
 _BODY: Colour = (0.22, 0.22, 0.25, 1.0)
 _LEG: Colour = (0.45, 0.47, 0.52, 1.0)
 _LINE: Colour = (0.8, 0.8, 0.8, 1.0)
@@ -46,7 +46,7 @@ class Shot:
     """
 
     distance: float
-    elevation: float = 65.0
+    elevation: float = 70.0
     azimuth: float = 90.0
     flat: bool = False
     grid: float = 0.25
@@ -164,8 +164,7 @@ def _prepare(model: mujoco.MjModel, size: tuple[int, int], sides: tuple[Colour, 
 
 
 def _add_floor(scene: mujoco.MjvScene, shot: Shot, target: Floats) -> None:
-    """Lines on the floor around the target, so that one sees it move, and a floor if there is none.
-    """
+    """A floor if there is none, with lines around the target, so that one sees it move."""
     height = shot.floor or 0.0
     middle = np.round(target[:2] / shot.grid) * shot.grid
     half, width = _GRID * shot.grid, shot.grid / 150

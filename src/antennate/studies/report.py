@@ -7,12 +7,14 @@ command make a page that sets them side by side.
 from __future__ import annotations
 
 import json
+import shlex
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from antennate.errors import BadInputError
+from antennate.files import read_limited
 from antennate.params.base import Params
 from antennate.studies import page
 from antennate.studies.formats import to_toml
@@ -20,6 +22,9 @@ from antennate.studies.measures import NONE, Table
 from antennate.studies.run_directory import (
     COMMAND,
     CONFIG,
+    FIGURES,
+    FILMS,
+    LARGEST,
     PARTIAL,
     REPORT,
     RESULT,
@@ -56,6 +61,21 @@ class View:
     body: Body | None = None
 
 
+def command_of(run: RunDirectory) -> str:
+    """Name of the command that made a run.
+
+    Raises:
+        BadInputError: No file tells, or one is damaged.
+    """
+    result = run.result() if (run.path / RESULT).exists() else {}
+    words = shlex.split(run.text(COMMAND).partition("\n")[0])
+    name = result.get("command") if isinstance(result, dict) else None
+    name = name or (words[1] if len(words) > 1 else None)
+    if not isinstance(name, str):
+        raise BadInputError(f"{run.path}: expected a run that names its command, found none")
+    return name
+
+
 def write_report(run: RunDirectory, view: View) -> None:
     """Write the page of a run into its directory.
 
@@ -77,7 +97,7 @@ def report(run: RunDirectory, view: View) -> str:
     parts.append(page.paragraphs(view.about.split("\n\n")[0], "muted"))
     parts.append(page.paragraphs(_sentence(run, result, view)))
     parts.append(page.block(_command(run, view), wrap=True))
-    parts += [page.captioned(page.film(data), name) for name, data in run.films().items()]
+    parts += [page.captioned(film, name) for name, film in _films(run).items()]
     if result is not None:
         parts.append(_shown(run, result, view))
     parts += [_failures(run), _settings(run, view), _versions(run)]
@@ -95,10 +115,21 @@ def _command(run: RunDirectory, view: View) -> str:
 
 
 def _images(run: RunDirectory) -> dict[str, str]:
+    """The figures by name."""
     return {
-        name: page.picture(png, svg, f"figure {name.replace('_', ' ')}")
-        for name, (png, svg) in run.figures().items()
+        path.stem: page.picture(
+            read_limited(path, LARGEST),
+            read_limited(path.with_suffix(".svg"), LARGEST),
+            f"figure {path.stem.replace('_', ' ')}",
+        )
+        for path in sorted((run.path / FIGURES).glob("*.png"))
     }
+
+
+def _films(run: RunDirectory) -> dict[str, str]:
+    """The films by name."""
+    found = sorted((run.path / FILMS).glob("*.mp4"))
+    return {path.stem: page.film(read_limited(path, LARGEST)) for path in found}
 
 
 def _shown(run: RunDirectory, result: Result, view: View) -> str:
@@ -189,9 +220,8 @@ def compare(runs: Sequence[RunDirectory], view: View) -> str:
     parts.append(_differing("Parameters", names, [_flat(run.text(CONFIG)) for run in runs]))
     parts.append(_differing("Versions", names, [_known_versions(run) for run in runs]))
     parts += map(page.numbers, _side_by_side(names, [view.tables(r) for r in results]))
-    films = [{name: page.film(data) for name, data in run.films().items()} for run in runs]
     parts += [
-        _pairs("Films", names, films, "pair"),
+        _pairs("Films", names, [_films(run) for run in runs], "pair"),
         _pairs("Figures", names, [_images(run) for run in runs]),
     ]
     return page.page(f"antennate {view.name}", "".join(parts))

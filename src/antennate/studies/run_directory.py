@@ -40,7 +40,7 @@ CONFIG, VERSIONS, COMMAND = "config.toml", "versions.json", "command.txt"
 FIGURES, FILMS = "figures", "films"
 """Folders of figures (svg and png) and films (mp4); what they hold of these belongs to the run."""
 CALIBRATION, LOG, REPORT = "calibration.json", "drive.log", "report.html"
-_LARGEST = 10**9
+LARGEST = 10**9
 """No file of a run is longer [bytes]."""
 _LOGS = tuple(part(Path(LOG), number).name for number in range(1, MOST_PARTS + 1))
 _FILES = (
@@ -149,20 +149,6 @@ class RunDirectory:
         """
         return read_file(self.path / CONFIG, model)
 
-    def command(self) -> str:
-        """Name of the command that made it.
-
-        Raises:
-            BadInputError: No file tells.
-        """
-        result = self.result() if (self.path / RESULT).exists() else {}
-        words = shlex.split(self.text(COMMAND).partition("\n")[0])
-        name = result.get("command") if isinstance(result, dict) else None
-        name = name or (words[1] if len(words) > 1 else None)
-        if not isinstance(name, str):
-            raise BadInputError(f"{self.path}: expected a run that names its command, found none")
-        return name
-
     def text(self, name: str) -> str:
         """The content of one of its text files; empty if there is none.
 
@@ -171,23 +157,9 @@ class RunDirectory:
         """
         return self._decoded(name, str) if (self.path / name).exists() else ""
 
-    def figures(self) -> dict[str, tuple[bytes, bytes]]:
-        """Its figures by name, each as png and svg."""
-        pairs = [(p, p.with_suffix(".svg")) for p in sorted((self.path / FIGURES).glob("*.png"))]
-        return {
-            png.stem: (read_limited(png, _LARGEST), read_limited(svg, _LARGEST))
-            for png, svg in pairs
-            if svg.exists()
-        }
-
-    def films(self) -> dict[str, bytes]:
-        """Its films by name, each as mp4."""
-        found = sorted((self.path / FILMS).glob("*.mp4"))
-        return {path.stem: read_limited(path, _LARGEST) for path in found}
-
     def _decoded(self, name: str, decode: Any) -> Any:
         path = self.path / name
-        text = decoded(path, read_limited(path, _LARGEST))
+        text = decoded(path, read_limited(path, LARGEST))
         try:
             return decode(text)
         except ValueError as error:

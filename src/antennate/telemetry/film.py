@@ -193,15 +193,15 @@ def _encoder() -> str:
     return found[0]
 
 
-def pictures(film: Film) -> Iterator[Picture]:
-    """Every picture of a film with its strip, shape (HEIGHT + STRIP, WIDTH, 3).
+def pictures(film: Film, width: int = WIDTH, height: int = HEIGHT) -> Iterator[Picture]:
+    """Every picture of a film with its strip, shape (height + STRIP, width, 3).
 
     Raises:
         AntennateError: Nothing here can draw.
     """
-    strip = Strip(film.title, film.t, film.traces, film.bands, WIDTH, STRIP)
+    strip = Strip(film.title, film.t, film.traces, film.bands, width, STRIP)
     sides = (_colour(SERIES[0]), _colour(SERIES[1]))
-    with Camera(film.model, film.shot, (WIDTH, HEIGHT), sides) as camera:
+    with Camera(film.model, film.shot, (width, height), sides) as camera:
         for i, (position, target) in enumerate(zip(film.positions, film.targets, strict=True)):
             view = camera.picture(position, target)
             yield np.concatenate([view, np.asarray(strip.picture(i))])

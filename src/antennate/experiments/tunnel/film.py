@@ -1,4 +1,4 @@
-"""Films of `antennate tunnel`: one trial of each controller, run once more as it was in the study."""
+"""Films of `antennate tunnel`: one trial of each controller, run once more."""
 
 from __future__ import annotations
 

@@ -35,4 +35,6 @@ def sentence(result: Mapping[str, Any]) -> str:
     return f"Walls passed (95 % interval): {successes(result['profiles'])}."
 
 
-EXPERIMENT = Experiment.of_folder(__name__, wall.WallConfig, wall.run, tables, sentence, filmed=True)
+EXPERIMENT = Experiment.of_folder(
+    __name__, wall.WallConfig, wall.run, tables, sentence, filmed=True
+)
