@@ -23,7 +23,6 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 from unittest import mock
 
-import mujoco
 import numpy as np
 
 from antennate.control.gait import Gait
@@ -31,11 +30,12 @@ from antennate.control.loop import run_loop
 from antennate.experiments.tunnel import batch as experiment
 from antennate.experiments.tunnel.run import TunnelConfig
 from antennate.params.scene import TunnelParams
+from antennate.sim.gears import Gears
 from antennate.sim.scenes import geometry
 from antennate.sim.scenes.tunnel import Tunnel, TunnelScene
 from antennate.sim.sim_robot import SimRobot
 from antennate.sim.trial import Trial, draw_trial, make_world
-from antennate.sim.world import World
+from antennate.sim.world import PREFIX, World
 from antennate.types import AntennaFrame, Floats, Ints, JointCommand, Maneuver
 
 CONTROLLER = "closed"
@@ -106,15 +106,18 @@ def record(config: TunnelConfig, trials: int) -> tuple[list[Tape], list[World]]:
 
 
 def replay(tapes: list[Tape], worlds: list[World]) -> None:
-    """The bare engine: tell fresh worlds what the tapes say, one after the other."""
+    """The bare engine: tell fresh worlds what the tapes say, one after the other.
+
+    The friction of loaded gears, where servos have it, belongs to the engine.
+    """
     for tape, world in zip(tapes, worlds, strict=True):
-        model, data = world.model, world.data
-        ctrl, step = data.ctrl, mujoco.mj_step
+        data = world.data
+        ctrl, step = data.ctrl, Gears(world.model, world.robot, PREFIX).step
         for friction, controls, count in tape.ticks:
             if friction is not None:
                 world.set_leg_friction(friction)
             ctrl[:] = controls
-            step(model, data, count)
+            step(data, count)
 
 
 def check_same(worlds: list[World], others: list[World]) -> None:

@@ -9,6 +9,7 @@ import pytest
 
 from antennate.experiments.tunnel.run import TunnelConfig
 from antennate.params.scene import TunnelParams
+from antennate.robots.spec import RobotSpec
 
 FOLDER = Path(__file__).parents[1] / "benchmarks"
 
@@ -37,8 +38,10 @@ def test_a_drive_that_ended_in_a_fault_says_its_causes():
     assert pace.summary({})["why"] == "no result"
 
 
-def test_replay_ends_on_the_same_bits(trial):
-    config = TunnelConfig(time_limit=1.0)
+@pytest.mark.parametrize("gear", [{}, {"friction": 0.02, "load_friction": 0.3}])
+def test_replay_ends_on_the_same_bits(trial, gear):
+    robot = RobotSpec.model_validate({"servos": {"xc430_w240": gear}})
+    config = TunnelConfig(time_limit=1.0, robot=robot)
     tapes, ended = trial.record(config, 2)
     assert [len(tape.ticks) for tape in tapes] == [100, 100]
     assert tapes[0].ticks[0][0] is not None, "legs draw their friction at the first tick"

@@ -107,7 +107,7 @@ def test_a_bus_where_nobody_answers_says_power_and_wiring() -> None:
         ("servo:12=homing_offset:7", "homing offset", "7 (12)", "bad"),
         ("servo:3=drive_mode:1", "drive mode", "reversed (3)", "bad"),
         ("servo:3=drive_mode:8", "drive mode", "torque by goal (3)", "bad"),
-        ("servo:3=max_position_limit:2500", "position limits", "0 to 2500 (3)", "bad"),
+        ("servo:3=max_position_limit:2300", "position limits", "0 to 2300 (3)", "bad"),
         ("servo:3=velocity_limit:200", "velocity limit", "200 (3)", "bad"),
         ("servo:3=shutdown:0", "shuts itself down at", "not all of these (3)", "warn"),
         ("servo:3=present_input_voltage:105", "supply", "10.5 V (3)", "warn"),
@@ -125,7 +125,7 @@ def test_a_bus_where_nobody_answers_says_power_and_wiring() -> None:
 def test_what_a_servo_says_of_itself_is_judged(
     fault: str, check: str, found: str, grade: str
 ) -> None:
-    """Limits of both models are their manuals'; 2500 ticks are less than 2048 + 1024.
+    """Limits of both models are their manuals'; 2300 ticks are less than 2048 + 332.
 
     4.5 rad/s are 188 counts of 0.229 rev/min, and 235 with a quarter more.
     """

@@ -62,9 +62,19 @@ def test_the_first_left_leg_turns_with_the_phase() -> None:
 
 
 def test_the_offset_adds_to_every_joint_and_to_no_leg() -> None:
-    straight, bent = pose_at(0.4), pose_at(0.4, offset=0.1)
-    assert bent.yaw - straight.yaw == pytest.approx(np.full((1, 5), 0.1))
+    straight, bent = pose_at(0.4), pose_at(0.4, offset=0.07)
+    assert bent.yaw - straight.yaw == pytest.approx(np.full((1, 5), 0.07))
     assert (bent.leg == straight.leg).all()
+
+
+def test_no_joint_bends_so_far_that_legs_meet() -> None:
+    """Legs reach 33 of the 60 mm to the middle between two links, and keep 1 mm, at 100 mm."""
+    bend = 2 * math.atan((60 - 33 - 1) / 100)
+    for offset in (0.52, -0.52):
+        yaw = pose_at(0.4, offset).yaw[0]
+        wanted = np.clip(pose_at(0.4).yaw[0] + offset, -bend, bend)
+        assert yaw == pytest.approx(wanted)
+        assert abs(yaw).max() == pytest.approx(bend)
 
 
 def test_half_a_cycle_and_the_opposite_offset_mirror_the_pose() -> None:

@@ -312,4 +312,4 @@ def test_a_header_of_defaults_names_its_fields() -> None:
     assert said["version"] == antennate.__version__
     assert said["fields"][:5] == ["schema", "kind", "joints", "number", "asked"]
     assert said["fields"][17:19] == ["yaw1", "yaw2"]
-    assert said["params"]["gait"]["frequency"] == 0.5
+    assert said["params"]["gait"]["frequency"] == 0.6

@@ -38,6 +38,7 @@ from antennate.params.network import NetworkParams
 from antennate.params.reading import read_file
 from antennate.robots.spec import RobotSpec
 from antennate.studies.run_directory import RunDirectory
+from antennate.telemetry.feed import Feed
 from antennate.telemetry.replay import ReplayConfig
 from antennate.twin.config import TwinConfig, build
 from antennate.twin.faults import Faults, read
@@ -98,6 +99,7 @@ def driven(patch: Patch, module: Any, config: DriveConfig, out: Path, **of_twin:
     patch.setattr(drive, "Header", lambda **_: HEADER)
     patch.setattr(RunDirectory, "describe", lambda *_: None)
     patch.setattr(drive, "connect", connected(**of_twin))
+    patch.setattr(Feed, "watched", property(lambda feed: True))  # its time is invented
     patch.setattr(drive, "pressed_keys", lambda _: contextlib.nullcontext(lambda: True))
     told(patch, module, config, arm=True, out=out, **PORTS)
     for name in BUILT_IN if module is drive and config.control.rate < 100.0 else ():
@@ -247,6 +249,7 @@ RUNS: dict[str, tuple[type[Params], Callable[..., None], list[dict[str, Any]]]] 
         [
             {
                 **SHORT,
+                "duration": 2.0,
                 "control": {"rate": 25.0},
                 "controller": "open",
                 "drift": {"band": 0.02, "speed": 1.0},

@@ -146,10 +146,10 @@ def test_an_unknown_robot_is_refused_with_the_known_ones() -> None:
 
 
 def test_a_configuration_names_its_robot_and_changes_it(tmp_path: Path) -> None:
-    (tmp_path / "mine.toml").write_text("links = 4\n[yaw]\nlimit = 1.0\n")
+    (tmp_path / "mine.toml").write_text("links = 4\n[yaw]\nlimit = 0.4\n")
     config = tmp_path / "config.toml"
     config.write_text('robot = "mine.toml"\n')
     assert read_file(config, TunnelConfig).robot == RobotSpec.named("mine.toml", tmp_path)
     config.write_text('[robot]\nbase = "mine.toml"\nmass = 1.5\n[robot.yaw]\nfastest = 2.0\n')
     found = read_file(config, TunnelConfig).robot
-    assert (found.links, found.mass, found.yaw.limit, found.yaw.fastest) == (4, 1.5, 1.0, 2.0)
+    assert (found.links, found.mass, found.yaw.limit, found.yaw.fastest) == (4, 1.5, 0.4, 2.0)

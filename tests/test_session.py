@@ -323,17 +323,21 @@ def test_B8_servos_stop_within_120_ms_when_only_the_controller_fails(
 
 
 def test_L9_the_gait_stands_still_during_a_hold_so_that_no_leg_has_to_catch_up() -> None:
-    """Goals move at a limited speed: a gait that had gone on meanwhile would be out of reach."""
+    """Goals move at a limited speed: a gait that had gone on meanwhile would be out of reach.
+
+    Legs at 0.6 Hz leave 0.73 of 4.5 rad/s to catch up after the start. One tick of the gait,
+    0.038 rad, is caught up in 5.2; half a second of it would be in 258.
+    """
     limited: list[int] = []
 
     def act(rig: Rig, t: float) -> None:
-        rig.robot.board_silent = 2.3 <= t < 2.8
-        if t >= 2.3:
+        rig.robot.board_silent = 4.3 <= t < 4.8
+        if t >= 4.3:
             limited.append(rig.session.tally.limited)
 
-    log = walked(act, DriveConfig(dry_run=0.5, duration=3.2))
+    log = walked(act, DriveConfig(dry_run=0.5, duration=5.2))
     assert log.state[-2] <= State.DEGRADED
-    assert (limited[-1] - limited[0]) / 12 < 5
+    assert (limited[-1] - limited[0]) / 12 < 6
 
 
 def test_B8_a_controller_that_fails_does_not_feed_the_watchdogs() -> None:
@@ -369,7 +373,7 @@ def test_G6_a_robot_whose_record_is_required_holds_while_none_is_kept() -> None:
     def lose(made: Rig, t: float) -> None:
         made.session.unrecorded = 2.005 <= t < 2.505
 
-    made = rig(TwinConfig())
+    made = rig(TwinConfig(scene="flat"))
     log = Log(made, lose)
     report = drive(made.session, CONFIG, arm=True, on_tick=log)
     t, states = np.array(log.t), np.array(log.state)
@@ -576,7 +580,7 @@ def test_B11_B9_a_servo_without_torque_or_watchdog_is_a_fault_within_a_second(
 
 
 def test_B11_a_restart_that_answers_at_once_is_a_fault_and_arming_sets_all_of_it_anew() -> None:
-    made = rig(TwinConfig())
+    made = rig(TwinConfig(scene="flat"))
     session, servo = made.session, made.robot.servos[5]
     causes: list[set[Cause]] = []
 
@@ -667,7 +671,7 @@ def test_B10_arming_that_fails_half_way_leaves_no_servo_with_torque(what: str) -
     drive(made.session, config, arm=True, on_tick=both)
     assert max(had_torque) == 0
     assert log.state[-1] >= State.FAULT
-    said = "torque_enable" if what == "servo" else "1.571 rad for servo 3"
+    said = "torque_enable" if what == "servo" else "0.5087 rad for servo 3"
     assert any(said in text for text in log.texts)
 
 
@@ -696,7 +700,7 @@ def test_B13_a_sagging_supply_warns_then_holds_then_switches_off() -> None:
 
 
 def test_B13_below_the_first_level_it_walks_at_half_the_pace_and_replays_alike() -> None:
-    """The published gait turns each leg once in 2 s."""
+    """The gait turns each leg 1.2 times in 2 s."""
     made, ticks = rig(TwinConfig()), list[Tick]()
 
     def on_tick(session: Session, now: float) -> None:
@@ -707,8 +711,8 @@ def test_B13_below_the_first_level_it_walks_at_half_the_pace_and_replays_alike()
     drive(made.session, DriveConfig(dry_run=0.5, duration=7.5), arm=True, on_tick=on_tick)
     legs = {tick.number: np.array(tick.angles)[5:17] for tick in ticks}
     assert {Cause.SUPPLY_WARN} <= {active.cause for active in made.session.outputs.causes}
-    assert legs[450] - legs[250] == pytest.approx(np.full(12, 2 * math.pi), rel=0.03)
-    assert legs[790] - legs[590] == pytest.approx(np.full(12, math.pi), rel=0.03)
+    assert legs[450] - legs[250] == pytest.approx(np.full(12, 2.4 * math.pi), rel=0.03)
+    assert legs[790] - legs[590] == pytest.approx(np.full(12, 1.2 * math.pi), rel=0.03)
     found = replay(
         ticks, make_controller("closed"), Header(controller="closed", params=ControlParams())
     )

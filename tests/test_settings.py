@@ -45,8 +45,8 @@ def set_all(*changes: tuple[int, str, int]) -> Callable[[list[DrivenServo]], Non
         (set_all((19, "drive_mode", 1)), r"drive mode 1 \(expected 0\) in servos \[19\]"),
         (set_all((3, "homing_offset", -5)), r"homing offset -5 \(expected 0\) in servos \[3\]"),
         (
-            set_all((4, "min_position_limit", 1025)),
-            r"min position limit 1025 \(expected at most 1024\) in servos \[4\]",
+            set_all((4, "min_position_limit", 1717)),  # 0.5087 rad are 331.7 ticks
+            r"min position limit 1717 \(expected at most 1716\) in servos \[4\]",
         ),
         (
             set_all((18, "max_position_limit", 3071)),

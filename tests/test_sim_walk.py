@@ -64,13 +64,13 @@ def yaw_per_cycle(track: np.ndarray) -> float:
 def test_without_a_body_wave_the_rings_roll_at_their_longest_radius(floor: mujoco.MjModel) -> None:
     straight = GAIT.model_copy(update={"amplitude": 0.0})
     track, _ = walk(floor, Maneuver.FORWARD, 3 * CYCLE, straight)
-    assert speed(track) == pytest.approx(2 * math.pi * 0.5 * (0.030 + 0.012), rel=0.05)
+    assert speed(track) == pytest.approx(2 * math.pi * 0.5 * (0.025 + 0.008), rel=0.05)
 
 
 def test_forward_goes_forward_faster_with_the_wave_than_without(floor: mujoco.MjModel) -> None:
     track, _ = walk(floor, Maneuver.FORWARD, 3 * CYCLE)
     assert track[-1, 0] > 0.5
-    assert speed(track) > 2 * math.pi * 0.5 * (0.030 + 0.012)
+    assert speed(track) > 2 * math.pi * 0.5 * (0.025 + 0.008)
 
 
 def test_reverse_goes_backwards_at_four_fifths_of_the_forward_speed(floor: mujoco.MjModel) -> None:
@@ -94,7 +94,7 @@ def test_hold_stands_still(floor: mujoco.MjModel) -> None:
 
 def test_legs_sink_less_than_a_millimetre_into_the_floor(floor: mujoco.MjModel) -> None:
     track, _ = walk(floor, Maneuver.HOLD, CYCLE, phase=0.0)
-    assert track[-1, 2] > 0.042 - 0.001
+    assert track[-1, 2] > 0.033 - 0.001
 
 
 @pytest.mark.parametrize(

@@ -26,6 +26,8 @@ from antennate.twin.robot import TwinRobot
 from antennate.types import AntennaFrame, JointCommand, Maneuver
 
 ROBOT = RobotSpec()
+LONG = RobotSpec(link_pitch=0.3)  # its legs stay apart up to a right angle
+CLEAR = 2 * math.atan((60 - 33 - 1) / 100)  # those of ROBOT, by their reach and width in mm
 MIRRORED = RobotSpec.model_validate(
     {
         "yaw": {"ids": (5, 4, 3, 2, 1), "directions": (-1,) * 5, "zeros": (1500,) * 5},
@@ -42,10 +44,11 @@ def command(yaw: float = 0.0, leg: float = 0.0) -> JointCommand:
 
 
 def test_a_quarter_turn_is_1024_ticks_from_the_middle_and_directions_count() -> None:
-    ticks = Joints(ROBOT).ticks(command(yaw=math.pi / 2, leg=4 * math.pi))
+    ticks = Joints(LONG).ticks(command(yaw=math.pi / 2, leg=4 * math.pi))
     assert ticks[:5].tolist() == [3072] * 5
     assert ticks[5:17].tolist() == [2048 + 2 * 4096] * 12
-    assert Joints(MIRRORED).ticks(command(yaw=math.pi / 2))[:5].tolist() == [1500 - 1024] * 5
+    mirrored = MIRRORED.model_copy(update={"link_pitch": LONG.link_pitch})
+    assert Joints(mirrored).ticks(command(yaw=math.pi / 2))[:5].tolist() == [1500 - 1024] * 5
 
 
 @pytest.mark.parametrize(
@@ -77,7 +80,7 @@ def test_a_description_needs_only_what_differs() -> None:
 def test_ticks_and_back_lose_half_a_tick_at_most(robot: RobotSpec) -> None:
     joints, rng = Joints(robot), np.random.default_rng(5)
     sent = JointCommand(
-        yaw=rng.uniform(-1, 1, (1, 5)),
+        yaw=rng.uniform(-0.5, 0.5, (1, 5)),
         leg=rng.uniform(-300, 300, (1, 6, 2)),
         antenna=rng.uniform(-1, 1, (1, 2)),
     )
@@ -104,14 +107,14 @@ def test_B14_a_pose_of_two_robots_is_refused() -> None:
 def test_B14_a_yaw_or_an_antenna_beyond_its_limit_is_refused_as_a_whole() -> None:
     narrow = RobotSpec.model_validate(
         {
-            "yaw": {**ROBOT.yaw.model_dump(), "limit": 1.0},
+            "yaw": {**ROBOT.yaw.model_dump(), "limit": 0.4},
             "antennae": {**ROBOT.antennae.model_dump(), "limit": 0.5},
         }
     )
     joints = Joints(narrow)
-    joints.ticks(command(yaw=-1.0))
-    with pytest.raises(CommandError, match=r"within 1 rad for servo 1, found -1\.001"):
-        joints.ticks(command(yaw=-1.001))
+    joints.ticks(command(yaw=-0.4))
+    with pytest.raises(CommandError, match=r"within 0\.4 rad for servo 1, found -0\.401"):
+        joints.ticks(command(yaw=-0.401))
     sent = command()
     sent.antenna[0, 1] = 0.501
     with pytest.raises(CommandError, match=r"within 0\.5 rad for servo 19, found 0\.501"):
@@ -129,11 +132,12 @@ def test_B14_what_is_not_refused_lies_within_one_turn_but_for_legs(
     one = JointCommand(
         yaw=said[None, :5], leg=said[None, 5:17].reshape(1, 6, 2), antenna=said[None, 17:]
     )
-    fit = all(abs(a) <= math.pi / 2 for i, a in enumerate(angles) if not 5 <= i < 17)
+    limits = (CLEAR,) * 5 + (math.inf,) * 12 + (math.pi / 2,) * 2
+    fit = all(abs(a) <= limit + 1e-9 for a, limit in zip(angles, limits, strict=True))
     try:
         ticks = Joints(robot).ticks(one)
     except CommandError:
-        edge = any(abs(a) > 1.57 for i, a in enumerate(angles) if not 5 <= i < 17)
+        edge = any(abs(a) > limit - 1e-3 for a, limit in zip(angles, limits, strict=True))
         assert edge or not all(abs(a) <= 1600 for a in angles)
         return
     body = np.delete(ticks, range(5, 17))

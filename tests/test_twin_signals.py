@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
 import os
 import signal
@@ -10,9 +9,6 @@ import subprocess
 import sys
 
 import pytest
-
-from antennate.cli.progress import stop_signals
-from antennate.hardware.driving.signals import STOPS
 
 PROGRAM = "import sys; from antennate.cli import main; sys.exit(main())"
 INT, TERM, HUP = signal.SIGINT, signal.SIGTERM, signal.SIGHUP
@@ -46,17 +42,3 @@ def test_a_twin_ends_in_order_however_often_it_is_asked_to(pair: tuple[int, int]
     assert "late" in last
     assert interrupted == "antennate twin: interrupted"
     assert "Traceback" not in said
-
-
-def test_a_stop_that_is_swallowed_is_kept_for_the_loop_to_see() -> None:
-    before = {number: signal.getsignal(number) for number in STOPS}
-    try:
-        with stop_signals(last=True) as stopped:
-            assert not stopped()
-            with contextlib.suppress(KeyboardInterrupt):  # as a destructor or a callback does
-                signal.raise_signal(TERM)
-            assert stopped()
-            signal.raise_signal(TERM)  # ignored: the end has begun
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)

@@ -12,8 +12,10 @@ from pydantic import ValidationError
 from antennate.cli import main
 from antennate.errors import SimulationError
 from antennate.experiments.wall import run as wall
+from antennate.experiments.wall.experiment import EXPERIMENT
 from antennate.experiments.wall.outcome import (
     Traverse,
+    WallTrial,
     classify,
     least_advance,
     longest_gap,
@@ -184,3 +186,26 @@ def test_command_writes_its_run(tmp_path: Path, capsys: pytest.CaptureFixture[st
     ends = (0.2065, 1.0) if arm["successes"] else (0.0, 0.7935)  # Wilson's for one trial
     assert arm["wilson95"] == pytest.approx(ends, abs=1e-4)
     assert (out / "figures" / "wall.png").stat().st_size > 10_000
+    assert (out / "figures" / "sticks.png").stat().st_size > 10_000
+
+
+def test_the_border_of_a_jam_lies_between_the_sticks_beside_it() -> None:
+    """Made trials with sticks of 17, 18 and 24 mm; an invalid one of 20 mm does not count."""
+    sticks = {17.0: "success", 24.0: "jam", 18.0: "slip", 20.0: "invalid"}
+    rows = [
+        WallTrial(1, k, "stiff", outcome, outcome, 0, stick, 0, 0, 0, 0, 0)
+        for k, (stick, outcome) in enumerate(sticks.items())
+    ]
+    outcome = wall.WallOutcome(WallConfig(), rows, {})
+    border = outcome.result()["border"]
+    assert border == pytest.approx({"at_mm": 19.0, "below_mm": 18.0, "above_mm": 24.0})
+    said = EXPERIMENT.sentence(outcome.result())
+    assert "above 19 mm" in said
+    assert "18.0 and 24.0 mm" in said
+
+
+def test_sticks_all_on_one_side_of_the_border_are_said_to_be() -> None:
+    rows = [WallTrial(1, 0, "stiff", "jam", "jam", 0, 30.0, 0, 0, 0, 0, 0)]
+    outcome = wall.WallOutcome(WallConfig(profiles=("stiff",)), rows, {})
+    assert outcome.result()["border"]["below_mm"] is None
+    assert "all above 19 mm" in EXPERIMENT.sentence(outcome.result())

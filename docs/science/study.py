@@ -1,9 +1,9 @@
 """Everything that docs/science/tunnel.md reports, run again: `python docs/science/study.py PART`.
 
-Parts: `evaluation` (three controllers, 100 fresh trials each), `ablation` (one change at a time)
-and `map` (success over corner angle and corridor width). Each writes
-docs/science/PART.json; the figures of the map are drawn from it. Results do not depend on the
-number of workers.
+Parts: `evaluation` (three controllers, 200 fresh trials each), `ablation` (one change at a time),
+`map` (success over corner angle and corridor width) and `scenes` (tunnels and robots on which
+nothing was chosen). Each writes docs/science/PART.json; the figure of the map is drawn from it.
+Results do not depend on the number of workers.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ from matplotlib.figure import Figure
 
 from antennate.experiments.tunnel.run import TunnelConfig, run
 from antennate.figures import INK, canvas, render, styled
-from antennate.messages import short_name
+from antennate.messages import short_names
 from antennate.studies.pool import core_count
 
 HERE = Path(__file__).parent
-EVALUATION_SEED = 20261123
+EVALUATION_SEED = 20261201
 """Never used while anything was chosen."""
 ABLATION_SEED = 4242
 MAP_SEED = 777
@@ -38,7 +38,31 @@ ABLATIONS: dict[str, dict[str, Any]] = {
     "no alternation: every turn is a first turn": {"escape": {"alternate": False}},
     "turns at the gait's own offset": {"escape": {"turn_offset": 0.349}},
 }
-FILM_ONE_WAY = {"robot": {"sensor": {"directions": "one"}}}
+ONE_WAY = {"robot": {"antenna": {"sensor": {"directions": "one"}}}}
+"""A flex sensor that answers to bending in one direction alone."""
+
+SCENES_SEED = 2602
+SCENES: dict[str, dict[str, Any]] = {
+    "default": {},
+    "two corners, 90° and back": {
+        "tunnel": {"segments": (1.0, 1.0, 1.0), "turns_deg": (90.0, -90.0)},
+        "time_limit": 150.0,
+    },
+    "U-turn, 2 × 90° to one side": {
+        "tunnel": {"segments": (1.0, 1.0, 1.0), "turns_deg": (90.0, 90.0)},
+        "time_limit": 150.0,
+    },
+    "corner of 60°": {"tunnel": {"turns_deg": (60.0,)}},
+    "corner of 120°": {"tunnel": {"turns_deg": (120.0,)}},
+    "0.30 m wide": {"tunnel": {"free_width": 0.30}},
+    "0.50 m wide": {"tunnel": {"free_width": 0.50}},
+    "cylinders of 0.3 kg": {"tunnel": {"cylinder": {"mass": 0.3}}},
+    "slippery floor, friction 0.3": {"robot": {"leg_friction": 0.3}},
+    "half the timestep": {"physics": {"timestep": 0.001}},
+    "antenna of 9 cm": {"robot": {"antenna": {"length": 0.09}}},
+    "antenna of 15 cm": {"robot": {"antenna": {"length": 0.15}}},
+}
+"""What differs from the default; a longer tunnel has as much more time."""
 
 ANGLES_DEG = (60.0, 75.0, 90.0, 105.0)
 WIDTHS_M = (0.32, 0.40, 0.50)
@@ -66,13 +90,23 @@ def ablation(trials: int, workers: int) -> dict[str, Any]:
     """The closed controller with one part taken away at a time."""
     out = {}
     for name, change in ABLATIONS.items():
-        config = _config(trials, ABLATION_SEED, ("closed",), controller=change)
+        config = _config(trials, ABLATION_SEED, ("closed",), control=change)
         out[name] = _results(config, workers, name)["controllers"]["closed"]
-    config = _config(trials, ABLATION_SEED, ("paper", "closed"), **FILM_ONE_WAY)
-    one_way = _results(config, workers, "film")["controllers"]
-    out["closed, film that sees one direction"] = one_way["closed"]
-    out["paper, film that sees one direction"] = one_way["paper"]
+    config = _config(trials, ABLATION_SEED, ("paper", "closed"), **ONE_WAY)
+    one_way = _results(config, workers, "sensor of one direction")["controllers"]
+    out["closed, sensor that sees one direction"] = one_way["closed"]
+    out["paper, sensor that sees one direction"] = one_way["paper"]
     return out
+
+
+def scenes(trials: int, workers: int) -> dict[str, Any]:
+    """Open and closed where nothing was ever chosen, the default beside them."""
+    found = {}
+    for name, change in SCENES.items():
+        config = _config(trials, SCENES_SEED, ("open", "closed"), **change)
+        result = _results(config, workers, name)
+        found[name] = {key: result[key] for key in ("time_limit_s", "controllers")}
+    return {"trials": trials, "seed": SCENES_SEED, "scenes": found}
 
 
 def success_grid(trials: int, workers: int) -> dict[str, Any]:
@@ -101,7 +135,7 @@ def success_map(cells: Sequence[Mapping[str, Any]], controllers: Sequence[str]) 
     figure = canvas(1.4 + 3.4 * len(controllers), 1.2 + 0.75 * len(angles))
     axes = np.atleast_1d(np.array(figure.subplots(1, len(controllers), sharey=True)))
     scale = ScalarMappable(Normalize(0.0, 1.0), "cividis")
-    for panel, controller in zip(axes, controllers, strict=True):
+    for panel, (controller, label) in zip(axes, short_names(controllers).items(), strict=True):
         share = np.full((len(angles), len(widths)), np.nan)
         for cell in cells:
             row, column = angles.index(cell["turn_deg"]), widths.index(cell["free_width_m"])
@@ -118,7 +152,7 @@ def success_map(cells: Sequence[Mapping[str, Any]], controllers: Sequence[str]) 
                 color="white" if share[row, column] < 0.6 else INK,
             )
         panel.imshow(share, origin="lower", norm=scale.norm, cmap=scale.cmap, aspect="auto")
-        panel.set_title(short_name(controller))
+        panel.set_title(label)
         panel.grid(visible=False)
         panel.set_xticks(range(len(widths)), [f"{w:.2f}" for w in widths])
         panel.set_yticks(range(len(angles)), [f"{a:.0f}" for a in angles])
@@ -131,14 +165,15 @@ def success_map(cells: Sequence[Mapping[str, Any]], controllers: Sequence[str]) 
 def main() -> None:
     """Run one part and write it beside this file."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("part", choices=("evaluation", "ablation", "map"))
+    parser.add_argument("part", choices=("evaluation", "ablation", "map", "scenes"))
     parser.add_argument("--trials", type=int, default=None)
     parser.add_argument("--workers", type=int, default=core_count())
     options = parser.parse_args()
     function, usual = {
-        "evaluation": (evaluation, 100),
+        "evaluation": (evaluation, 200),
         "ablation": (ablation, 60),
         "map": (success_grid, 20),
+        "scenes": (scenes, 40),
     }[options.part]
     result = function(options.trials or usual, options.workers)
     (HERE / f"{options.part}.json").write_text(json.dumps(result, indent=1) + "\n")

@@ -52,12 +52,13 @@ class LinearChain:
             np.full(count, antenna.link_mass),
             _capsule_inertia(antenna),
         )
-        base = antenna.base_armature + antenna.base_mass * 0.4 * antenna.radius**2
+        drive = antenna.base()
+        base = drive.armature + antenna.base_mass * 0.4 * antenna.radius**2
         springs = np.array(antenna.hinge_stiffness())
         return cls(
             mass + np.diag([base, *[antenna.armature] * count]),
-            np.array([antenna.base_damping, *(antenna.damping_time * springs)]),
-            np.array([antenna.base_stiffness, *springs]),
+            np.array([drive.damping, *(antenna.damping_time * springs)]),
+            np.array([drive.stiffness, *springs]),
             antenna.length - joints,
         )
 

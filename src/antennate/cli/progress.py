@@ -54,17 +54,14 @@ def _plain(what: str) -> Callable[[int, int], None]:
 
 
 @contextlib.contextmanager
-def stop_signals(last: bool = False) -> Iterator[Callable[[], bool]]:
+def stop_signals(last: bool = False) -> Iterator[None]:
     """Let SIGTERM end the block as Ctrl-C does; a signal that is ignored stays so.
-
-    Yields whether one has come: a destructor or a callback may swallow its KeyboardInterrupt, and
-    a loop that asks ends all the same.
 
     Args:
         last: Whether all after the first are ignored, even when the block has ended.
     """
     if threading.current_thread() is not threading.main_thread():
-        yield lambda: False
+        yield
         return
     before = {n: signal.getsignal(n) for n in STOPS if signal.getsignal(n) is not signal.SIG_IGN}
     stopped = False
@@ -78,7 +75,7 @@ def stop_signals(last: bool = False) -> Iterator[Callable[[], bool]]:
     for number in before:
         signal.signal(number, stop)
     try:
-        yield lambda: stopped
+        yield
     finally:
         for number, handler in before.items():
             signal.signal(number, signal.SIG_IGN if stopped and last else handler)

@@ -83,29 +83,23 @@ class Places(FromFile):
     )
 
 
+@stop_signals(last=True)
 def command(argv: Sequence[str]) -> int:
     """Serve until the duration is over, Ctrl-C or SIGTERM.
 
     Raises:
         AntennateError: Something given cannot be used.
     """
-    with stop_signals(last=True) as stopped:
-        return _serve(argv, stopped)
-
-
-def _serve(argv: Sequence[str], stopped: Callable[[], bool]) -> int:
     config, places = parse("twin", DESCRIPTION, TwinConfig, argv, Places)
     if places.key is not None and places.udp is None:
         raise ConfigError("--key: expected --udp beside it, found none")
     orders = None if places.orders is None else Orders(str(places.orders), _say)
     if places.servos is None:
-        return _serve_robot(config, places, orders, stopped)
-    return _serve_servos(config, places, read_list(places.servos), orders, stopped)
+        return _serve_robot(config, places, orders)
+    return _serve_servos(config, places, read_list(places.servos), orders)
 
 
-def _serve_robot(
-    config: TwinConfig, places: Places, orders: Orders | None, stopped: Callable[[], bool]
-) -> int:
+def _serve_robot(config: TwinConfig, places: Places, orders: Orders | None) -> int:
     faults = Faults([read(text) for text in config.fault], config.robot.ids)
     faults.on_begin = lambda demand, t: _say(f"{t:.1f} s after the addresses: {demand}")
     real = places.pace == "real"
@@ -115,7 +109,7 @@ def _serve_robot(
         try:
             with urgent(LEVEL + 1) if real else nullcontext():
                 serve = server.run if real else server.run_lockstep
-                serve(_until(config, server.paths, lambda: robot.failure is None, stopped))
+                serve(_until(config, server.paths, lambda: robot.failure is None))
         finally:
             invalid = f"physics became invalid: {robot.failure}; " if robot.failure else ""
             late = f"its latest tick was {1e3 * server.late:.1f} ms late"
@@ -124,11 +118,7 @@ def _serve_robot(
 
 
 def _serve_servos(
-    config: TwinConfig,
-    places: Places,
-    entries: Sequence[ServoEntry],
-    orders: Orders | None,
-    stopped: Callable[[], bool],
+    config: TwinConfig, places: Places, entries: Sequence[ServoEntry], orders: Orders | None
 ) -> int:
     """Servos without a robot."""
     robot = (places.udp, places.passed, places.pace != "real", config.touch, config.factory)
@@ -142,15 +132,12 @@ def _serve_servos(
     box = ServoBox(entries, config.plugged, config.push)
     bus = TcpEndpoint(*_place("--tcp", places.tcp)) if places.tcp is not None else None
     with ServoServer(box, faults, bus, orders) as server, urgent(LEVEL + 1):
-        server.run(_until(config, server.paths, lambda: True, stopped))
+        server.run(_until(config, server.paths, lambda: True))
     return OK
 
 
 def _until(
-    config: TwinConfig,
-    paths: dict[str, str],
-    sound: Callable[[], bool],
-    stopped: Callable[[], bool],
+    config: TwinConfig, paths: dict[str, str], sound: Callable[[], bool]
 ) -> Callable[[float], bool]:
     """Whether to go on at a time [s]; the first time it also says that the twin is ready.
 
@@ -165,8 +152,6 @@ def _until(
             told = True
             sys.stdout.write(json.dumps(paths) + "\n")
             sys.stdout.flush()
-        if stopped():  # its own KeyboardInterrupt was swallowed
-            raise KeyboardInterrupt
         return t < end and sound()
 
     return go_on

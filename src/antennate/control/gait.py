@@ -76,6 +76,7 @@ def targets(
     """
     joints, links = _lags(params.wave_number, params.body_phase, robot.links)
     yaw = params.amplitude * np.sin(joints - phase[:, None]) + offset[:, None]
+    yaw = np.minimum(np.maximum(yaw, -robot.yaw_limit), robot.yaw_limit)
     leg = (phase[:, None] - links)[:, :, None] + _SIDES
     if robot.legs.kind != "rolling":
         leg = np.zeros_like(leg)

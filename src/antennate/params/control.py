@@ -14,7 +14,7 @@ class GaitParams(Params):
     """The serpenoid body wave and the stepping O-legs."""
 
     frequency: float = number(
-        0.5, "Hz", "assumed: legs then turn at 46 % of the servo's no-load speed", gt=0, le=1.0
+        0.6, "Hz", "assumed: legs then turn at 55 % of the servo's no-load speed", gt=0, le=1.0
     )
     """Cycles per second."""
     wave_number: float = number(1.0, "1", "assumed: one wave, as in other robots", gt=0, le=3)
@@ -32,7 +32,7 @@ class GaitParams(Params):
     )
     """Lead of the body wave over the legs."""
     turn_offset: float = number(
-        math.radians(20.0), "rad", "assumed: antennate gait measures 66 deg a cycle", ge=0, le=1.0
+        math.radians(20.0), "rad", "assumed: antennate gait measures 35 deg a cycle", ge=0, le=1.0
     )
     """Yaw offset while turning."""
     offset_rate: float = number(1.5, "rad/s", "assumed: half a second for a full change", gt=0)
@@ -101,7 +101,7 @@ class RuleParams(Params):
     """Both sides at this level or above count as strong."""
     similar: float = number(0.15, "1", "assumed: unpublished", ge=0, le=1)
     """Levels that differ by less are similar."""
-    hold_time: float = number(2.0, "s", "assumed: a gait cycle; all turns are alike", gt=0, le=30)
+    hold_time: float = number(2.0, "s", "assumed: over a gait cycle; all turns alike", gt=0, le=30)
     """T_hold, how long a maneuver is kept."""
 
 
@@ -149,7 +149,7 @@ class EscapeParams(Params):
     )
     """Time to back off."""
     turn_time: float = number(
-        1.3, "s", "fitted: `closed` on 60 tuning tunnels; about 60 deg at turn_offset", gt=0, le=30
+        2.2, "s", "fitted: `closed` on 60 tuning tunnels; about 50 deg at turn_offset", gt=0, le=30
     )
     """Time of the first turn."""
     turn_offset: float = number(0.52, "rad", "assumed: a turn nearly on the spot", gt=0, le=1.0)
@@ -166,9 +166,9 @@ class EscapeParams(Params):
         le=5,
     )
     """Length of a turn the other way, in first turns."""
-    retry_time: float = number(12.0, "s", "assumed: six gait cycles", gt=0, le=300)
+    retry_time: float = number(12.0, "s", "assumed: seven gait cycles", gt=0, le=300)
     """Stuck again within this time, it turns the other way."""
-    memory_time: float = number(4.0, "s", "assumed: two gait cycles", gt=0, le=300)
+    memory_time: float = number(4.0, "s", "assumed: over two gait cycles", gt=0, le=300)
     """Time constant of the memory of touch."""
     memory_delay: float = number(
         3.0,
@@ -186,7 +186,7 @@ class EscapeParams(Params):
         le=3600,
     )
     """Nothing felt for so long after a turn means that the walls are lost."""
-    return_time: float = number(3.8, "s", "assumed: about 180 deg at the offset above", gt=0, le=60)
+    return_time: float = number(7.5, "s", "assumed: about 180 deg at the offset above", gt=0, le=60)
     """Time to turn round."""
 
 

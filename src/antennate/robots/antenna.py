@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import Annotated
 
 from pydantic import Field, model_validator
 
 from antennate.params.base import Params, number
 from antennate.robots.sensor import SensorParams
+from antennate.robots.servos import ServoParams, XL330Params
 
 _Coils = Annotated[float, Field(gt=0)]
 
@@ -18,6 +20,23 @@ MOST_HINGES = 100
 """More hinges than this are no chain of springs any more."""
 BASE = "base"
 """Name of the joint that the base servo turns."""
+
+
+@dataclass(frozen=True, slots=True)
+class BaseDrive:
+    """How the base of an antenna is held: a position servo on its torque-speed line.
+
+    Attributes:
+        stiffness: Torque per angle off its target [N·m/rad].
+        damping: Torque that speed takes [N·m·s/rad].
+        armature: Inertia of the servo at its output [kg·m²].
+        torque: Largest torque of the drive [N·m].
+    """
+
+    stiffness: float
+    damping: float
+    armature: float
+    torque: float
 
 
 class AntennaSpec(Params):
@@ -65,16 +84,22 @@ class AntennaSpec(Params):
     friction: float = number(0.3, "1", "assumed: printed plastic on paper", ge=0, le=2)
     """Friction against obstacles."""
 
-    base_stiffness: float = number(
-        2.0, "N·m/rad", "assumed: a hundred times the stiffest spring, so that the base holds", gt=0
+    base_stiffness: float | None = number(
+        None, "N·m/rad", "measured: that of its servo; 0.598 with an XL330-M288", gt=0
     )
-    """Stiffness of the base servo."""
-    base_damping: float = number(0.1, "N·m·s/rad", "assumed: settles within 0.05 s", ge=0)
-    """Damping of the base servo."""
-    base_armature: float = number(1e-4, "kg·m²", "assumed: below the servo's; driven stiffly", ge=0)
-    """Its inertia."""
-    base_torque: float | None = number(None, "N·m", "assumed: never reached", gt=0)
-    """Largest torque of the base servo's drive; without limit if not given."""
+    """Stiffness of the base; of the base servo if not given."""
+    base_damping: float | None = number(
+        None, "N·m·s/rad", "datasheet: that of its servo; 0.0482 with an XL330-M288", ge=0
+    )
+    """Damping of the base; of the base servo if not given."""
+    base_armature: float | None = number(
+        None, "kg·m²", "fitted: that of its servo; 0.0019 with an XL330-M288", ge=0
+    )
+    """Inertia of the base servo; of its model if not given."""
+    base_torque: float | None = number(
+        None, "N·m", "datasheet: that of its servo; 0.52 with an XL330-M288", gt=0
+    )
+    """Largest torque of the base servo's drive; of its model if not given."""
     sensor: SensorParams = SensorParams()
 
     @model_validator(mode="after")
@@ -89,6 +114,22 @@ class AntennaSpec(Params):
                 f"{sensed:g} m"
             )
         return self
+
+    def base(self, servo: ServoParams | None = None) -> BaseDrive:
+        """How its base is held.
+
+        The friction of the gear is left out: it exceeds what the springs of an antenna pull.
+
+        Args:
+            servo: Turns the base; an XL330-M288 if absent. Numbers of the antenna come first.
+        """
+        model = XL330Params() if servo is None else servo
+        return BaseDrive(
+            model.stiffness if self.base_stiffness is None else self.base_stiffness,
+            model.damping if self.base_damping is None else self.base_damping,
+            model.armature if self.base_armature is None else self.base_armature,
+            model.stall_torque if self.base_torque is None else self.base_torque,
+        )
 
     @property
     def hinges(self) -> int:

@@ -48,26 +48,33 @@ class JointParams(Params):
 class YawParams(JointParams):
     """The yaw joints between links, head first."""
 
-    limit: float = number(
-        _RIGHT_ANGLE, "rad", "assumed: links nearly meet; gaits need 0.96", gt=0, le=_RIGHT_ANGLE
+    limit: float | None = number(
+        None, "rad", "assumed: as far as neighbouring legs stay apart", gt=0, le=_RIGHT_ANGLE
     )
-    """Largest angle either way."""
+    """Largest angle either way; from the robot's geometry if not given."""
 
     @property
     def largest(self) -> float:
         """Largest angle either way [rad]."""
-        return self.limit
+        return _RIGHT_ANGLE if self.limit is None else self.limit
 
 
-class PitchParams(YawParams):
+class PitchParams(JointParams):
     """The pitch joints between links, head first: held by a stiffness, or moved by servos."""
 
+    limit: float = number(_RIGHT_ANGLE, "rad", "assumed: links nearly meet", gt=0, le=_RIGHT_ANGLE)
+    """Largest angle either way."""
     kind: Literal["locked", "actuated"] = number("locked", "1", "paper: pitch is left unused")
     """Whether servos on the bus move them."""
     stiffness: float = number(
         30.0, "N·m/rad", "assumed: a servo that holds; the paper leaves pitch unused", gt=0
     )
     """Stiffness of a locked pitch joint."""
+
+    @property
+    def largest(self) -> float:
+        """Largest angle either way [rad]."""
+        return self.limit
 
 
 class LegParams(JointParams):
@@ -86,7 +93,7 @@ class LegParams(JointParams):
         return self.limit if self.kind == "lifting" else math.inf
 
 
-class BaseParams(YawParams):
+class BaseParams(JointParams):
     """The bases of both antennae, left before right."""
 
     servo: ServoName = number("xl330_m288", "1", "paper: XL330 at the antennae")
@@ -106,3 +113,8 @@ class BaseParams(YawParams):
         le=_RIGHT_ANGLE,
     )
     """Largest angle either way from the mounting angle."""
+
+    @property
+    def largest(self) -> float:
+        """Largest angle either way [rad]."""
+        return self.limit

@@ -106,8 +106,18 @@ class XL330Params(ServoParams):
         256.0, "1", "measured: drive over position error in a recording; `antennate servo`", gt=0
     )
     """What that gain is divided by: counts of drive per tick of position error."""
-    armature: float = number(0.0014, "kg·m²", "measured: on a recording of one", ge=0)
+    armature: float = number(
+        0.0019, "kg·m²", "fitted: `antennate servo --fit`, with the data sheet's line", ge=0
+    )
     """Inertia at the output."""
+    friction: float = number(
+        0.023, "N·m", "fitted: `antennate servo --fit`, with the data sheet's line", ge=0
+    )
+    """Friction at the output that is always there."""
+    load_friction: float = number(
+        0.35, "1", "fitted: `antennate servo --fit`, with the data sheet's line", ge=0, lt=1
+    )
+    """Friction of the gear as a share of the torque of its motor."""
 
 
 class ServosParams(Params):

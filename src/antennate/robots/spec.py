@@ -38,6 +38,7 @@ HARDWARE_ALONE = (
         f"robot.{group}.{name}"
         for group in ("yaw", "legs", "antennae", "pitch")
         for name in ("ids", "directions", "zeros", "limit", "fastest")
+        if (group, name) != ("yaw", "limit")
     ),
     "robot.antenna.sensor.rate",
     "robot.baud",
@@ -48,11 +49,7 @@ SIMULATION_ALONE = (
     *(
         f"robot.{name}"
         for name in (
-            "link_pitch",
             "mass",
-            "width",
-            "leg_radius",
-            "leg_eccentricity",
             "leg_width",
             "leg_mass",
             "leg_friction",
@@ -65,6 +62,8 @@ SIMULATION_ALONE = (
     *paths_of(AntennaSpec, "robot.antenna"),
 )
 """Parameters that only the simulation, or the twin, reads; the robot's hardware does not."""
+CLEARANCE = 0.002
+"""Gap that neighbouring legs keep at the largest bend [m] (assumed: play of printed parts)."""
 ANTENNA_PREFIXES = tuple(f"antenna_{side}_" for side in SIDES)
 
 
@@ -74,7 +73,9 @@ class RobotSpec(Params):
     choice: ClassVar[str] = f"{', '.join(ROBOTS)} (the default), or a TOML file of your own robot"
     links: int = number(6, "1", "paper: six links", ge=2, le=50)
     """Number of links."""
-    link_pitch: float = number(0.10, "m", "assumed: three servos, 28.5 x 46.5 x 34 mm", gt=0.03)
+    link_pitch: float = number(
+        0.12, "m", "assumed: servos of 46.5 mm for yaw and pitch; legs stay apart", gt=0.03
+    )
     """Joint spacing."""
     mass: float = number(
         2.0,
@@ -86,10 +87,10 @@ class RobotSpec(Params):
     width: float = number(0.20, "m", "paper: a section of 0.40 m is twice as wide", gt=0.08)
     """Width over the legs."""
     leg_radius: float = number(
-        0.030, "m", "assumed: a ring under the 34 mm body; 0.12 m/s within the servo's speed", gt=0
+        0.025, "m", "assumed: 25 to 35 mm; neighbours stay apart up to 29 deg of yaw", gt=0
     )
     """Outer radius of an O-leg."""
-    leg_eccentricity: float = number(0.012, "m", "assumed: as leg_radius", ge=0)
+    leg_eccentricity: float = number(0.008, "m", "assumed: as leg_radius; 8 to 15 mm", ge=0)
     """Distance of the ring's centre from its axle."""
     leg_width: float = number(0.016, "m", "assumed: printed ring with a rubber tread", gt=0)
     """Thickness of an O-leg."""
@@ -241,9 +242,28 @@ class RobotSpec(Params):
         return tuple(z for _, group, n in self.groups for z in group.zeros or (STRAIGHT,) * n)
 
     @property
+    def clear_bend(self) -> float:
+        """Largest angle of a yaw joint at which neighbouring legs stay apart [rad].
+
+        A rolling leg reaches leg_radius + leg_eccentricity fore and aft of its axle, whatever its
+        angle. On the inner side of a bend the outer corners of two neighbours meet in the plane
+        that halves the angle; they keep CLEARANCE there. At most a right angle.
+        """
+        if self.legs.kind != "rolling":
+            return math.pi / 2
+        gap = self.link_pitch / 2 - self.leg_radius - self.leg_eccentricity - CLEARANCE / 2
+        return min(2.0 * math.atan(2.0 * gap / self.width), math.pi / 2)
+
+    @property
+    def yaw_limit(self) -> float:
+        """Largest angle of a yaw joint either way [rad]."""
+        return min(self.yaw.largest, self.clear_bend)
+
+    @property
     def limits(self) -> tuple[float, ...]:
         """Largest angle of each joint either way [rad], inf for rolling legs."""
-        return tuple(group.largest for _, group, count in self.groups for _ in range(count))
+        yaw = (self.yaw_limit,) * self.yaw_count
+        return yaw + tuple(group.largest for _, group, n in self.groups[1:] for _ in range(n))
 
     @property
     def fastest(self) -> tuple[float, ...]:
@@ -284,6 +304,17 @@ class RobotSpec(Params):
                     f"{name}.fastest must be at most {speed:.4g} rad/s, the unloaded speed of "
                     f"{group.servo}, got {group.fastest:g}"
                 )
+        if self.clear_bend <= 0:
+            raise ValueError(
+                f"link_pitch: expected links so far apart that their legs do not touch, found "
+                f"{self.link_pitch:g} m with legs that reach "
+                f"{self.leg_radius + self.leg_eccentricity:g} m"
+            )
+        if self.yaw.limit is not None and self.yaw.limit > self.clear_bend:
+            raise ValueError(
+                f"yaw.limit: expected at most {self.clear_bend:.3g} rad, where the legs of "
+                f"neighbouring links meet, found {self.yaw.limit:g}"
+            )
         if len(set(self.release)) < len(self.release):
             raise ValueError(f"release must name each group once, got {', '.join(self.release)}")
         ids = self.ids

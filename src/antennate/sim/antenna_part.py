@@ -13,6 +13,7 @@ import mujoco
 
 from antennate.errors import ConfigError
 from antennate.robots.antenna import BASE, AntennaSpec
+from antennate.robots.servos import ServoParams
 from antennate.sim import layers
 
 Side = Literal["left", "right"]
@@ -40,24 +41,28 @@ def mounting_quaternion(angle: float, side: Side) -> tuple[float, float, float, 
     return (c, 0.0, 0.0, s) if side == "left" else (0.0, c, -s, 0.0)
 
 
-def build(params: AntennaSpec) -> mujoco.MjSpec:
-    """The part as an uncompiled spec: bodies `base`, `hinge0` and so on, actuator `base`."""
-    spec = mujoco.MjSpec()
+def build(params: AntennaSpec, servo: ServoParams | None = None) -> mujoco.MjSpec:
+    """The part as an uncompiled spec: bodies `base`, `hinge0` and so on, actuator `base`.
+
+    Args:
+        params: The antenna.
+        servo: Model of the servo that turns its base; an XL330-M288 if absent.
+    """
+    spec, drive = mujoco.MjSpec(), params.base(servo)
     spec.compiler.degree = False
     base = spec.worldbody.add_body(name=BASE)
     base.add_joint(
         name=BASE,
         type=mujoco.mjtJoint.mjJNT_HINGE,
         axis=[0, 0, 1],
-        damping=params.base_damping,
-        armature=params.base_armature,
+        damping=drive.damping,
+        armature=drive.armature,
         **STOPS,
     )
-    servo = spec.add_actuator(name=BASE, trntype=mujoco.mjtTrn.mjTRN_JOINT, target=BASE)
-    servo.set_to_position(kp=params.base_stiffness)
-    if params.base_torque is not None:
-        servo.forcelimited = mujoco.mjtLimited.mjLIMITED_TRUE
-        servo.forcerange = [-params.base_torque, params.base_torque]
+    actuator = spec.add_actuator(name=BASE, trntype=mujoco.mjtTrn.mjTRN_JOINT, target=BASE)
+    actuator.set_to_position(kp=drive.stiffness)
+    actuator.forcelimited = mujoco.mjtLimited.mjLIMITED_TRUE
+    actuator.forcerange = [-drive.torque, drive.torque]
 
     parent, where = base, [0.0, 0.0, 0.0]
     for name, k in zip(params.hinge_names, params.hinge_stiffness(), strict=True):

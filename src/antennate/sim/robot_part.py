@@ -124,17 +124,18 @@ def _add_leg(
         priority=1,
         condim=3,
         contype=layers.LEG,
-        conaffinity=layers.FLOOR | layers.OBSTACLE,
+        conaffinity=layers.FLOOR | layers.OBSTACLE | layers.LEG,
     )
     _add_servo(spec, name, servo)
 
 
 def _attach_antennae(spec: mujoco.MjSpec, params: RobotSpec) -> None:
     head = spec.body(params.link_names[0])
+    servo = params.servos.of(params.antennae.servo)
     for prefix, sign in zip(ANTENNA_PREFIXES, SIDE_SIGN, strict=True):
         side = "left" if sign > 0 else "right"
         turn = antenna.mounting_quaternion(params.antenna.base_angle, side)
         frame = head.add_frame(
             pos=[params.link_pitch / 2, sign * params.antenna.base_spacing / 2, 0.0], quat=turn
         )
-        spec.attach(antenna.build(params.antenna), frame=frame, prefix=prefix)
+        spec.attach(antenna.build(params.antenna, servo), frame=frame, prefix=prefix)

@@ -28,7 +28,7 @@ class Walk:
         head: Plan positions of the head [m], shape (n, 2).
         centre: Mean of the links [m], shape (n, 2).
         heading: Direction from the rear three links to the front three [rad], shape (n,).
-        power: Mechanical power of all servos that do positive work [W], shape (n,).
+        work: Positive mechanical work of all servos since the start [J], shape (n,).
         weight: Weight of the robot [N].
         length: Robot length [m].
     """
@@ -39,7 +39,7 @@ class Walk:
     head: Floats
     centre: Floats
     heading: Floats
-    power: Floats
+    work: Floats
     weight: float
     length: float
 
@@ -74,7 +74,7 @@ def measure(walk: Walk, settling_cycles: int, cycles: int) -> Pace:
     moved = [_gain(walk.t, walk.centre[:, k], start, period) for k in range(2)]
     step = float((moved[0] * np.cos(axis) + moved[1] * np.sin(axis)).mean())
     yaw = float(_gain(walk.t, walk.heading, start, period).mean())
-    work = np.interp([first, last], walk.t, _integral(walk.t, walk.power))
+    work = np.interp([first, last], walk.t, walk.work)
     drag = float(work[1] - work[0]) / cycles / walk.weight
     moves = abs(step) > _STANDSTILL * walk.length
     return Pace(

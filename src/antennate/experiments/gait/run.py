@@ -23,14 +23,16 @@ from antennate.params.scene import PhysicsParams, VariationParams
 from antennate.robots.spec import HARDWARE_ALONE, RobotSpec
 from antennate.sim.scenes.scene import FlatScene
 from antennate.sim.sim_robot import Disturbance, SimRobot
-from antennate.sim.trial import make_world, place_at_start
-from antennate.sim.world import World
+from antennate.sim.trial import place_at_start
+from antennate.sim.world import World, compile_world
 from antennate.studies.experiment import OnStep, Outcome, no_step
 from antennate.studies.pool import gather
 from antennate.types import AntennaFrame, Floats, JointCommand, Maneuver
 
 MANEUVERS = (Maneuver.FORWARD, Maneuver.TURN_L, Maneuver.TURN_R, Maneuver.REVERSE)
 WAVE_OFF = "wave_off"
+_TINY = 1e-6
+"""Rounding of times [s]."""
 
 
 class GaitStudyConfig(Params):
@@ -152,7 +154,7 @@ def walk_flat(
     """
     robot, period = config.robot, 1.0 / config.rate
     scene = FlatScene().draw(robot, np.random.default_rng(0))
-    world = make_world(config.physics, robot, scene)
+    world = _MeteredWorld(compile_world(config.physics, robot, scene), robot)
     place_at_start(world, scene, gait)
     body = SimRobot(1, robot, period, config.physics.timestep)
     body.load(0, world, _no_chance(robot, period))
@@ -164,8 +166,8 @@ def walk_flat(
         if failure is not None:
             raise failure
         watch(world, frame)
-        ticks.append((world.t, world.links(), _positive_power(world)))
-        return world.t < end - period / 2
+        ticks.append((world.t, world.links(), world.work))
+        return world.t < end - _TINY
 
     run_loop(body, _Fixed(gait, robot, maneuver, period), period, go_on)
     links = np.array([tick[1] for tick in ticks])
@@ -178,7 +180,7 @@ def walk_flat(
         head=links[:, 0],
         centre=links.mean(axis=1),
         heading=np.unwrap(np.arctan2(axis[:, 1], axis[:, 0])),
-        power=np.array([tick[2] for tick in ticks]),
+        work=np.array([tick[2] for tick in ticks]),
         weight=float(world.model.body_mass.sum() * np.linalg.norm(world.model.opt.gravity)),
         length=robot.length,
     )
@@ -190,12 +192,30 @@ def _no_chance(robot: RobotSpec, period: float) -> Disturbance:
     return Disturbance(np.random.default_rng(0), still, robot, period)
 
 
-def _positive_power(world: World) -> float:
-    """Summed power of the servos that push [W]: torque falls with speed by the joint's damping."""
-    model, data = world.model, world.data
-    slope = model.dof_damping[model.jnt_dofadr[model.actuator_trnid[:, 0]]]
-    speed = data.actuator_velocity
-    return float(np.maximum((data.actuator_force - slope * speed) * speed, 0.0).sum())
+class _MeteredWorld(World):
+    """A world that adds up what its servos do.
+
+    Attributes:
+        work: Positive mechanical work of all servos so far [J].
+    """
+
+    work = 0.0
+
+    def step(self, count: int) -> None:
+        """Advance by `count` physics steps; every one of them counts with its own power."""
+        for _ in range(count):
+            super().step(1)
+            self.work += self._positive_power() * self.model.opt.timestep
+
+    def _positive_power(self) -> float:
+        """Summed power of the servos that push, as the last step began [W].
+
+        Torque falls with speed by the damping of the joint.
+        """
+        model, data = self.model, self.data
+        slope = model.dof_damping[model.jnt_dofadr[model.actuator_trnid[:, 0]]]
+        speed = data.actuator_velocity
+        return float(np.maximum((data.actuator_force - slope * speed) * speed, 0.0).sum())
 
 
 def _tasks(config: GaitStudyConfig) -> list[_Task]:

@@ -1,8 +1,8 @@
-"""Figures of `antennate wall`: outcomes of each profile, and how tips advance."""
+"""Figures of `antennate wall`: outcomes of each profile, sticks, and how tips advance."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from antennate import figures as style
-from antennate.experiments.wall.outcome import Traverse
+from antennate.experiments.wall.outcome import Traverse, WallTrial
 from antennate.experiments.wall.run import WallOutcome
 
 OUTCOME_COLOURS = {
@@ -22,8 +22,9 @@ OUTCOME_COLOURS = {
 
 
 def figures(outcome: WallOutcome) -> dict[str, Figure]:
-    """Both figures of a run; without an example, the first alone."""
-    drawn = {"wall": outcomes(outcome.result())}
+    """All figures of a run; without an example, no passages."""
+    result = outcome.result()
+    drawn = {"wall": outcomes(result), "sticks": sticks(outcome.rows, result["border"]["at_mm"])}
     examples = outcome.examples
     return {**drawn, "passages": passages(examples)} if examples else drawn
 
@@ -65,6 +66,43 @@ def _draw_outcomes(panel: Axes, profiles: Mapping[str, Mapping[str, Any]], title
     panel.set_xticks(places, labels)
     panel.set(title=f"{title}; bars: Wilson 95 % of success", ylim=(0, 1.02))
     panel.grid(axis="x", visible=False)
+
+
+@style.styled
+def sticks(rows: Sequence[WallTrial], border: float) -> Figure:
+    """The longest stick of every valid trial, and what makes one a jam.
+
+    Args:
+        rows: Trials of all profiles.
+        border: Longest stick that is no jam [mm].
+    """
+    figure = style.canvas(6.4, 3.6)
+    panel = figure.subplots()
+    profiles = list(dict.fromkeys(row.profile for row in rows))
+    for place, profile in enumerate(profiles):
+        valid = [r for r in rows if r.profile == profile and r.outcome != "invalid"]
+        apart = place + np.linspace(-0.25, 0.25, len(valid)) if len(valid) > 1 else [place]
+        colour, marker, _ = style.PROFILE_LOOKS[profile]
+        heights = sorted(row.longest_stick_mm for row in valid)
+        panel.plot(apart[: len(valid)], heights, marker, color=colour, markersize=4)
+    panel.axhline(border, color=style.INK, linewidth=1.0)
+    panel.annotate(
+        f"above {border:g} mm: a jam",
+        (len(profiles) - 0.45, border),
+        (0, 3),
+        textcoords="offset points",
+        ha="right",
+        fontsize=8,
+    )
+    style.categories(panel, [name.replace("_", "\n") for name in profiles])
+    panel.set_yscale("log")
+    low, high = panel.get_ylim()
+    ticks = [tick for tick in (1, 2, 5, 10, 20, 50, 100, 200) if low <= tick <= high]
+    panel.set_yticks(ticks, [str(tick) for tick in ticks])
+    panel.yaxis.minorticks_off()
+    panel.set_ylabel("longest stick of a trial [mm]")
+    panel.set_title("The outcome hangs on this border; a mark is a trial")
+    return figure
 
 
 @style.styled

@@ -81,6 +81,21 @@ def paired(reference: str, by_profile: Mapping[str, Sequence[WallTrial]]) -> dic
     return tests
 
 
+def border(jam_travel: float, rows: Sequence[WallTrial]) -> dict[str, Any]:
+    """How near the sticks of valid trials come to the travel [m] that makes one a jam.
+
+    Returns:
+        `at_mm`, that travel; `below_mm` and `above_mm`, the longest stick that is no jam and the
+        shortest that is one, None where there is none. With any travel between the two every trial
+        jams or does not jam as it does now.
+    """
+    at = 1e3 * jam_travel
+    sticks = [row.longest_stick_mm for row in rows if row.outcome != "invalid"]
+    below = max((stick for stick in sticks if stick <= at), default=None)
+    above = min((stick for stick in sticks if stick > at), default=None)
+    return {"at_mm": at, "below_mm": below, "above_mm": above}
+
+
 def _mcnemar(pairs: Sequence[tuple[WallTrial, WallTrial]], column: str) -> dict[str, Any]:
     succeeded = [[getattr(row, column) == "success" for row in pair] for pair in pairs]
     return asdict(statistics.mcnemar(np.array(succeeded)))

@@ -113,6 +113,7 @@ class WallOutcome:
             "gravity": self.config.wall.gravity,
             "start_m": self.config.wall.start,
             "profiles": {p: measures.summary(rows) for p, rows in by_profile.items()},
+            "border": measures.border(self.config.wall.jam_travel, self.rows),
             "paired": measures.paired(REFERENCE, by_profile),
         }
 
