@@ -316,6 +316,7 @@ def test_a_run_leaves_a_folder_that_explains_itself(capsys, tmp_path):
         "figures/summary.svg",
         "figures/trajectories.png",
         "figures/trajectories.svg",
+        "report.html",
         "result.json",
         "trials.csv",
         "versions.json",

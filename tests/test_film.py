@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import antennate
+from antennate import experiments
 from antennate.cli import main
 from antennate.errors import AntennateError, BadInputError
 from antennate.experiments.tunnel.config import TunnelConfig
@@ -174,3 +175,23 @@ def test_a_film_is_written_and_the_study_stays_as_it_is(
     assert "data:video/mp4;base64," in Path("filmed/report.html").read_text()
     assert main([*QUICK, "--out", "filmed", "--overwrite", "--no-figures"]) == 0
     assert not Path("filmed/films/open.mp4").exists()
+
+
+@pytest.mark.parametrize(
+    ("name", "settings", "condition", "traces"),
+    [
+        ("gait", {"cycles": 2, "settling_cycles": 0}, "turn_l", 2),
+        ("wall", {"profiles": ("descending",)}, "descending", 2),
+        ("touch", {"profiles": ("stiff",), "walls": ("flat",), "speeds": (0.1,)}, "stiff", 3),
+    ],
+)
+def test_other_experiments_are_recorded_at_the_pace_of_their_films(
+    name: str, settings: dict[str, Any], condition: str, traces: int
+) -> None:
+    experiment = experiments.load(name)
+    assert experiment.films is not None
+    made = experiment.films(experiment.config(**settings), 0)[condition]()
+    assert np.diff(made.t) == pytest.approx(1.0 / RATE, abs=0.011)
+    assert len(made.traces) == traces
+    for shown in (*(trace.values for trace in made.traces), *(b.states for b in made.bands)):
+        assert len(shown) == len(made.t) == len(made.positions) == len(made.targets)

@@ -30,7 +30,8 @@ td, th { text-align: left; vertical-align: top; padding: .2rem 1.2rem .2rem 0;
   border-bottom: 1px solid var(--line); }
 th { font-weight: 600; } table.numbers td + td, table.numbers th + th { text-align: right; }
 table.numbers { font-variant-numeric: tabular-nums; white-space: nowrap; }
-table.numbers td:first-child { position: sticky; left: 0; background: var(--page); }
+table.numbers td:first-child { position: sticky; left: 0; background: var(--page);
+  box-shadow: inset 0 -1px var(--line); }
 section { border-top: 1px solid var(--line); padding: 1rem 0; display: grid; gap: 0 1.5rem;
   grid-template-columns: 1fr minmax(0, 26rem); break-inside: avoid; }
 section > h2, section > .verdict { grid-column: 1 / -1; margin-top: 0; }

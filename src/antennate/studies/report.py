@@ -97,7 +97,8 @@ def report(run: RunDirectory, view: View) -> str:
     parts.append(page.paragraphs(view.about.split("\n\n")[0], "muted"))
     parts.append(page.paragraphs(_sentence(run, result, view)))
     parts.append(page.block(_command(run, view), wrap=True))
-    parts += [page.captioned(film, name) for name, film in _films(run).items()]
+    films = "".join(page.captioned(film, name) for name, film in _films(run).items())
+    parts.append(f'<div class="pair">{films}</div>' if films else "")
     if result is not None:
         parts.append(_shown(run, result, view))
     parts += [_failures(run), _settings(run, view), _versions(run)]

@@ -10,7 +10,7 @@ import numpy as np
 from antennate.antenna.statics import Profile
 from antennate.errors import BadInputError
 from antennate.experiments.touch.config import TouchConfig
-from antennate.experiments.touch.sensing import compare
+from antennate.experiments.touch.sensing import compare, readings
 from antennate.experiments.touch.traverse import run_traverse
 from antennate.sim.bench import Bench
 from antennate.telemetry import film
@@ -56,7 +56,7 @@ def record(config: TouchConfig, profile: Profile, trial: int) -> Film:
         models[0],
         film.bench_shot(config.antenna),
         [
-            film.counts_trace(column(found.counts)),
+            film.counts_trace(column(readings(config, [traverse])[:, 0])),
             film.level_trace(level, config.rule.threshold),
             film.trace("force [N]", column(traverse.force)),
         ],

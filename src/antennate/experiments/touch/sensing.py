@@ -100,7 +100,6 @@ class Comparison:
         metres: Its length [m].
         truth: True state, shape (n,).
         alarm: Sensed state, shape (n,).
-        counts: Readings [counts], shape (n,).
         level: Logit of b, shape (n,).
         flex: Flex of the engine [rad], shape (n,).
         matches: Contacts and alarms.
@@ -113,7 +112,6 @@ class Comparison:
     metres: float
     truth: Bools
     alarm: Bools
-    counts: Floats
     level: Floats
     flex: Floats
     matches: Matches
@@ -163,17 +161,23 @@ def compare(config: TouchConfig, traverses: Sequence[Traverse]) -> list[Comparis
     return found
 
 
-def _compare_batch(config: TouchConfig, batch: Sequence[Traverse]) -> list[Comparison]:
+def readings(config: TouchConfig, batch: Sequence[Traverse]) -> Floats:
+    """What the sensor reads in B traverses of n ticks each [counts], shape (n, B)."""
     sensor, ticks = config.antenna.sensor, len(batch[0].x)
     noises = {
         trial: reading_noise(sensor, np.random.default_rng([config.seed, trial, 1]), (ticks,))
         for trial in {t.plan.trial for t in batch}
     }
-    counts = reading.recorded(
+    return reading.recorded(
         sensor,
         np.stack([t.flex for t in batch], axis=1),
         np.stack([noises[t.plan.trial] for t in batch], axis=1),
     )
+
+
+def _compare_batch(config: TouchConfig, batch: Sequence[Traverse]) -> list[Comparison]:
+    sensor = config.antenna.sensor
+    counts = readings(config, batch)
     level, alarm = sense(config.conditioning, config.rule, counts, 1.0 / sensor.rate)
     safe = np.clip(level, 1e-15, 1.0 - 1e-15)
     logit = np.log(safe / (1.0 - safe))
@@ -187,7 +191,6 @@ def _compare_batch(config: TouchConfig, batch: Sequence[Traverse]) -> list[Compa
                 metres=float(one.x[-1] - one.x[0]),
                 truth=truth,
                 alarm=alarm[:, i],
-                counts=counts[:, i],
                 level=logit[:, i],
                 flex=one.flex,
                 matches=match(truth, alarm[:, i], grace),
