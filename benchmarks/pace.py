@@ -76,7 +76,7 @@ def walk(
         for _ in range(busy):
             stack.enter_context(running(BUSY))
         for _ in range(viewers):
-            log = str(folder / "run" / "drive.log")
+            log = str(folder / "run" / "drive.mcap")
             stack.enter_context(running([sys.executable, "-c", VIEWER, log]))
         words = [*PROGRAM, "drive", "--esp32", paths["esp32"], "--bus", paths["bus"], "--arm"]
         words += ["--json", "--out", str(folder / "run")]

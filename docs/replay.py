@@ -44,7 +44,7 @@ def log(path: Path) -> None:
 def main() -> int:
     """Write the picture; return the exit status."""
     with tempfile.TemporaryDirectory() as folder:
-        path, out = Path(folder) / "drive.log", Path(folder) / "replayed"
+        path, out = Path(folder) / "drive.mcap", Path(folder) / "replayed"
         log(path)
         status = antennate(["replay", str(path), "--controller", "paper", "--out", str(out)])
         shutil.copyfile(out / "figures" / PICTURE.name, PICTURE)

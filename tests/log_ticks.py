@@ -1,10 +1,11 @@
-"""Ticks for logs: each one follows from its number alone."""
+"""Ticks for logs, each of which follows from its number alone, and the records of their files."""
 
 from __future__ import annotations
 
 import math
 import random
 import struct
+from collections.abc import Iterator
 from functools import lru_cache
 
 from antennate.params.control import ControlParams
@@ -59,3 +60,26 @@ def tick(number: int) -> Tick:
         stale=1,
         sent=number,
     )
+
+
+MAGIC = b"\x89MCAP0\r\n"
+CHUNK, DATA_END = 6, 15
+
+
+def records(data: bytes) -> Iterator[tuple[int, int, int]]:
+    """Kind, begin and end of each record, by the specification of MCAP."""
+    at = len(MAGIC)
+    while at < len(data) - len(MAGIC):
+        kind, length = struct.unpack_from("<BQ", data, at)
+        yield kind, at, at + 9 + length
+        at += 9 + length
+
+
+def chunks(data: bytes) -> list[tuple[int, int]]:
+    """Begin and end of each chunk: the first is the header's."""
+    return [(begin, end) for kind, begin, end in records(data) if kind == CHUNK]
+
+
+def unclosed(data: bytes) -> bytes:
+    """The log of a killed program: up to the end of its data."""
+    return data[: next(begin for kind, begin, _ in records(data) if kind == DATA_END)]

@@ -111,7 +111,7 @@ def test_the_door_opens_without_heavy_imports():
     assert door.returncode == 0, err
 
 
-_HEAVY = ("scipy", "matplotlib", "rich", "pandas", "pyarrow", "serial")
+_HEAVY = ("scipy", "matplotlib", "rich", "pandas", "pyarrow", "serial", "mcap", "zstandard")
 _SIMULATED = tuple(f"antennate.params.{name}" for name in ("bench", "spring", "sweep", "touch"))
 """Groups of numbers that no command of the real robot has."""
 
@@ -128,6 +128,7 @@ _SIMULATED = tuple(f"antennate.params.{name}" for name in ("bench", "spring", "s
         (["setup", "--nonsense"], ("mujoco", *_SIMULATED)),
         (["record", "--marks", "x"], ("mujoco", *_SIMULATED)),
         (["replay", "/nowhere"], ("mujoco", *_SIMULATED)),
+        (["log", "info", "/nowhere"], ("mujoco", *_SIMULATED)),
         (["twin", "--servos=1:nothing"], _SIMULATED),
         (["tunnel", "--trials=x"], _SIMULATED),
         (["touch", "--nonsense"], _SIMULATED[:3]),

@@ -2,36 +2,46 @@
 
 from __future__ import annotations
 
-import io
 import json
 import math
 import os
 import resource
+import struct
 import subprocess
 import sys
+import zlib
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from log_ticks import HEADER, ODD, tick
+import zstandard
+from log_ticks import CHUNK, HEADER, MAGIC, ODD, chunks, tick, unclosed
+from mcap.exceptions import McapError
+from mcap.reader import NonSeekingReader, make_reader
+from mcap.records import Chunk
+from mcap.stream_reader import StreamReader
+from mcap.writer import Writer
 
 import antennate
 from antennate.errors import AntennateError, LogError
 from antennate.params.control import ControlParams
-from antennate.telemetry.framing import LONGEST, SCHEMA, framed, opened, pieces
+from antennate.telemetry.cdr import MessageType
 from antennate.telemetry.header import Header
 from antennate.telemetry.reader import LogReader
 from antennate.telemetry.ticks import Tick
+from antennate.telemetry.topics import CONFIG, TICK_TOPICS, TOPICS, VERSIONS
 from antennate.telemetry.writer import LogWriter
 
 ROOM = 0.0
 
 
 def written(path: Path, ticks: int) -> bytes:
-    with LogWriter(path, HEADER, ROOM) as log:
+    """A log with one chunk a tick."""
+    with LogWriter(path, HEADER, ROOM, flush=0.0) as log:
         for number in range(1, ticks + 1):
-            log.write(tick(number) if number % 2 else tick(number).pack())
+            log.write(tick(number))
     return path.read_bytes()
 
 
@@ -56,6 +66,8 @@ def test_a_tick_comes_back_bit_by_bit() -> None:
         back = Tick.unpack(one.pack())
         assert back.pack() == one.pack()
         assert (back.state, back.causes, back.contact) == (one.state, one.causes, one.contact)
+        names = HEADER.robot.joint_names
+        assert Tick.of_messages(dict(one.messages(names, 0))).pack() == one.pack()
     floats = np.array(ODD)
     pairs = Tick.unpack(replace(tick(1), counts=(ODD[1], ODD[2])).pack()).counts
     assert math.copysign(1.0, pairs[0]) == -1.0
@@ -71,23 +83,31 @@ def test_a_header_comes_back_with_every_float(tmp_path: Path) -> None:
         assert (log.end, log.missing, log.bad) == (0, 0, 0)
 
 
-@pytest.mark.parametrize("size", [0, 1, 248, 249, 250, 251, 252, 508, 509, 1000, 70_000])
-@pytest.mark.parametrize("byte", [0, 1, 255])
-def test_a_record_of_any_length_is_framed_and_opened(size: int, byte: int) -> None:
-    """Around 254 bytes, where COBS begins a new block."""
-    content = b"\x01\x02" + bytes([byte]) * size
-    record = framed(content)
-    assert record[0] == record[-1] == 0
-    assert 0 not in record[1:-1]
-    assert [opened(piece or b"") for _, piece in pieces(io.BytesIO(record))] == [content]
+def test_messages_are_the_bytes_of_ros_2() -> None:
+    """CDR by its specification: text with a zero, numbers at multiples of their size."""
+    text = MessageType("std_msgs/msg/String", "string data\n")
+    assert text.encode("hello").hex() == "000100000600000068656c6c6f00"
+    mixed = MessageType("m", "bool a\nfloat64 b\nstring[] c\nfloat64[] d\nuint8 e\nint64[2] f\n")
+    values = (True, 0.5, ("", "ab"), (1.0,), 7, (-1, 2))
+    data = mixed.encode(*values)
+    assert data.hex(" ", 4) == (
+        "00010000 01000000 00000000 00000000 0000e03f 02000000 01000000 00000000 03000000 "
+        "61620000 01000000 00000000 0000f03f 07000000 00000000 ffffffff ffffffff 02000000 00000000"
+    )
+    assert mixed.decode(data) == dict(zip("abcdef", values, strict=True))
+    for cut in range(len(data)):
+        with pytest.raises(LogError, match="expected a m, found"):
+            mixed.decode(data[:cut])
 
 
-def test_G2_a_log_cut_at_every_byte_gives_a_correct_prefix(tmp_path: Path) -> None:
-    """Of the header at every 16th byte and around its end."""
+@pytest.mark.parametrize("every", [11, pytest.param(1, marks=pytest.mark.slow)])
+def test_G2_a_log_cut_at_every_byte_gives_a_correct_prefix(tmp_path: Path, every: int) -> None:
+    """Of header and summary at some bytes."""
     data = written(tmp_path / "whole", 4)
-    begin = data.index(0, 1)
+    places = chunks(data)
     lengths = []
-    for size in (*range(0, begin - 16, 16), *range(begin - 16, len(data))):
+    inner = range(places[2][0] - 20, places[3][0] + 20)
+    for size in sorted({*range(0, len(data), every), *inner, len(data)}):
         result = found(tmp_path / "cut", data[:size])
         if result is None:
             assert not lengths  # only a cut header is refused
@@ -95,6 +115,7 @@ def test_G2_a_log_cut_at_every_byte_gives_a_correct_prefix(tmp_path: Path) -> No
         numbers, log = result
         assert numbers == list(range(1, len(numbers) + 1))
         assert log.bad <= 1
+        assert log.end == (4 if size == len(data) else None)
         lengths.append(len(numbers))
     assert lengths == sorted(lengths)
     assert (lengths[0], lengths[-1]) == (0, 4)
@@ -102,18 +123,19 @@ def test_G2_a_log_cut_at_every_byte_gives_a_correct_prefix(tmp_path: Path) -> No
 
 @pytest.mark.parametrize(
     ("flips", "logs"),
-    [(1, 1000), (3, 100), (40, 20), pytest.param(1, 10_000, marks=pytest.mark.slow)],
+    [(1, 400), (3, 100), (40, 20), pytest.param(1, 10_000, marks=pytest.mark.slow)],
 )
-def test_G2_flipped_bits_cost_the_records_they_hit_and_no_other(
+def test_G2_flipped_bits_cost_the_chunks_they_hit_and_no_other(
     tmp_path: Path, flips: int, logs: int
 ) -> None:
     data = written(tmp_path / "whole", 12)
-    start = data.index(0, 1) + 1
+    start = chunks(data)[1][0]
+    end = len(unclosed(data))
     rng = np.random.default_rng(flips)
     damaged = 0
     for _ in range(logs):
         spoiled = bytearray(data)
-        places = rng.integers(start, len(data), flips)
+        places = rng.integers(start, end, flips)
         for place in places.tolist():
             spoiled[place] ^= 1 << int(rng.integers(8))
         result = found(tmp_path / "spoiled", bytes(spoiled))
@@ -121,25 +143,43 @@ def test_G2_flipped_bits_cost_the_records_they_hit_and_no_other(
         numbers, log = result
         assert numbers == sorted(set(numbers))
         assert len(numbers) >= 12 - flips
-        lost_end = log.end is None
-        assert log.missing == (max(numbers, default=0) if lost_end else 12) - len(numbers)
+        assert (log.end, log.missing) == (12, 12 - len(numbers))
         if len(numbers) < 12:
             assert log.bad > 0
             assert log.damage[0].offset > 0
             damaged += 1
-    assert damaged > 0.8 * logs
+    assert damaged > 0.5 * logs
+
+
+def test_G2_a_damaged_summary_costs_no_tick(tmp_path: Path) -> None:
+    data = written(tmp_path / "whole", 3)
+    for place in range(len(unclosed(data)) + 13, len(data), 97):
+        spoiled = bytearray(data)
+        spoiled[place] ^= 1 << place % 8
+        result = found(tmp_path / "spoiled", bytes(spoiled))
+        assert result is not None
+        assert (result[0], result[1].end, result[1].missing) == ([1, 2, 3], None, 0)
+        assert [one.reason for one in result[1].damage] == ["damaged summary"]
 
 
 def test_G2_a_damaged_header_is_refused_and_what_follows_counted(tmp_path: Path) -> None:
     data = bytearray(written(tmp_path / "whole", 2))
-    for place in range(1, data.index(0, 1), 16):
+    begin, end = chunks(data)[0]
+    refused = 0
+    for place in range(begin + 60, end, 32):
         spoiled = bytearray(data)
         spoiled[place] ^= 1 << place // 16 % 8
         (tmp_path / "spoiled").write_bytes(spoiled)
-        with pytest.raises(
-            LogError, match=r"no intact header, 2 intact ticks; damaged places: [12]"
-        ):
-            LogReader(tmp_path / "spoiled")
+        try:
+            with LogReader(tmp_path / "spoiled") as log:
+                assert log.header == HEADER  # a bit that zstd does not use
+        except LogError as error:
+            assert "no intact header, 2 intact ticks; damaged places: 1" in str(error)  # noqa: PT017
+            refused += 1
+    assert refused > 30
+
+
+OLD = b"\0\x0b\3\1" + json.dumps({"controller": "open", "version": "0.1.0"}).encode() + b"1234\0"
 
 
 @pytest.mark.parametrize(
@@ -149,14 +189,8 @@ def test_G2_a_damaged_header_is_refused_and_what_follows_counted(tmp_path: Path)
         (b"\0" * 1000, "no intact header, 0 intact ticks"),
         (b"t,left,right\n0.0,1800,1801\n", "no intact header, 0 intact ticks; damaged places: 1"),
         (b"\x7fELF" + bytes(range(256)) * 4000, "no intact header"),
-        (framed(bytes((SCHEMA + 1, 1)) + b"{}"), f"schema {SCHEMA}, found schema {SCHEMA + 1}"),
-        (framed(tick(1).pack()), "expected a header as first record"),
-        (framed(bytes((SCHEMA, 1)) + b"[" * 100_000), "found no JSON"),
-        (framed(bytes((SCHEMA, 1)) + b'{"controller": 3}'), "controller: expected text, found 3"),
-        (
-            framed(HEADER.pack().replace(b'"midpoint"', b'"middle"')),
-            "params.conditioning.middle: expected a known key",
-        ),
+        (MAGIC, "no intact header, 0 intact ticks; damaged places: 0"),
+        (OLD, "found a log of antennate 0.1.0 from before logs were MCAP"),
     ],
 )
 def test_G2_what_is_no_log_is_refused_in_one_line(tmp_path: Path, data: bytes, said: str) -> None:
@@ -167,14 +201,65 @@ def test_G2_what_is_no_log_is_refused_in_one_line(tmp_path: Path, data: bytes, s
     assert "\n" not in str(error.value)
 
 
+def foreign(path: Path, config: str | bytes | None, changed: str = "") -> None:
+    """A log of the right topics by `mcap` alone, one of them `changed` in its definition."""
+    with path.open("wb") as file:
+        writer = Writer(file)
+        writer.start()
+        for topic in TOPICS:
+            schema = topic.type.schema.encode() + b"uint8 more\n" * (topic.name == changed)
+            kind = writer.register_schema(topic.type.name, "ros2msg", schema)
+            channel = writer.register_channel(topic.name, "cdr", kind)
+            if topic is CONFIG and config is not None:
+                data = config if isinstance(config, bytes) else topic.type.encode(config)
+                writer.add_message(channel, 0, data, 0)
+            elif topic is VERSIONS:
+                writer.add_message(channel, 0, topic.type.encode("{}"), 0)
+        writer.finish()
+
+
+@pytest.mark.parametrize(
+    ("config", "said"),
+    [
+        (None, "found no /config"),
+        ("[" * 100_000, "found no JSON"),
+        ("[]", "found no JSON"),
+        (b"", "expected a std_msgs/msg/String, found 0 bytes"),
+        ('{"controller": 3}', "controller: expected text, found 3"),
+        ('{"controller": "open", "params": {"gates": 1}}', "params.gates: expected a known key"),
+    ],
+)
+def test_G2_a_header_that_says_something_else_is_refused(
+    tmp_path: Path, config: str | bytes | None, said: str
+) -> None:
+    foreign(tmp_path / "log", config)
+    with pytest.raises(LogError, match=said) as error:
+        LogReader(tmp_path / "log")
+    assert "\n" not in str(error.value)
+
+
+def test_G2_other_definitions_of_messages_are_refused(tmp_path: Path) -> None:
+    config = '{"controller": "open", "params": {}}'
+    foreign(tmp_path / "log", config)
+    with LogReader(tmp_path / "log") as log:
+        assert list(log) == []
+    foreign(tmp_path / "other", config, changed="/antenna")
+    with pytest.raises(LogError, match="expected antennate_msgs/msg/Antenna as now defined"):
+        LogReader(tmp_path / "other")
+
+
 def test_G2_random_bytes_between_records_hide_none(tmp_path: Path) -> None:
     """Also some that no memory should hold at once."""
     rng = np.random.default_rng(5)
-    parts = [framed(HEADER.pack())]
-    for number in range(1, 40):
-        noise = rng.integers(0, 256, int(rng.integers(0, 900)), np.uint8).tobytes()
-        parts += [noise, framed(tick(number).pack())]
-    parts += [b"\xaa" * (3 * LONGEST), framed(tick(40).pack()), b"\xbb" * (2 * LONGEST)]
+    data = written(tmp_path / "whole", 40)
+    first, *others = chunks(data)
+    parts = [data[: first[1]]]
+    for begin, end in others:
+        noise = rng.integers(0, 256, int(rng.integers(1, 900)), np.uint8).tobytes()
+        parts += [noise, data[begin:end]]
+    begin, end = others[-1]
+    parts.insert(-1, b"\xaa" * 3_000_000)
+    parts.append(b"\xbb" * 2_000_000)
     result = found(tmp_path / "log", b"".join(parts))
     assert result is not None
     assert result[0] == list(range(1, 41))
@@ -182,26 +267,93 @@ def test_G2_random_bytes_between_records_hide_none(tmp_path: Path) -> None:
     assert result[1].bad > 10
 
 
-def test_G2_what_is_too_long_for_a_record_is_not_held() -> None:
-    long, longer = b"\xaa" * (2 * LONGEST), b"\xbb" * (5 * LONGEST)
-    file = io.BytesIO(b"\0one\0" + long + b"\0\0two\0" + longer)
-    places = [1, 5, 5 + len(long) + 2, 5 + len(long) + 6]
-    assert list(pieces(file)) == list(zip(places, [b"one", None, b"two", None], strict=True))
+def test_X10_a_chunk_that_grows_beyond_all_bounds_is_not_unpacked(tmp_path: Path) -> None:
+    """A bomb: it says 1 kB, or 100 MB, and holds 1 GB; and a record that says 2^63 bytes."""
+    data = unclosed(written(tmp_path / "whole", 2))
+    bomb = zstandard.compress(bytes(1 << 30))
+    tail = struct.pack("<Q", len(bomb)) + bomb
+    for size in (1000, 10**8, 1 << 63):
+        head = struct.pack("<QQQII", 0, 0, size, zlib.crc32(b""), 4) + b"zstd"
+        record = struct.pack("<BQ", CHUNK, len(head) + len(tail)) + head + tail
+        second = chunks(data)[1][0]
+        result = found(tmp_path / "log", data[:second] + record + data[second:])
+        assert result is not None
+        assert (result[0], result[1].bad) == ([1, 2], 1)
+    result = found(tmp_path / "log", data + struct.pack("<BQ", CHUNK, 1 << 63))
+    assert result is not None
+    assert (result[0], result[1].bad) == ([1, 2], 1)
 
 
 def test_G2_a_tick_that_came_before_is_not_read_again(tmp_path: Path) -> None:
-    order = [1, 2, 2, 5, 4, 6]
-    data = framed(HEADER.pack()) + b"".join(framed(tick(n).pack()) for n in order)
-    result = found(tmp_path / "log", data)
+    with LogWriter(tmp_path / "whole", HEADER, ROOM, flush=0.0) as log:
+        for number in [1, 2, 2, 5, 4, 6]:
+            log.write(tick(number))
+    result = found(tmp_path / "log", unclosed((tmp_path / "whole").read_bytes()))
     assert result is not None
-    numbers, log = result
+    numbers, reader = result
     assert numbers == [1, 2, 5, 6]
-    assert (log.bad, log.missing) == (2, 2)
-    assert [one.reason for one in log.damage] == ["tick 2 after 2", "tick 4 after 5"]
+    assert (reader.bad, reader.missing) == (2, 2)
+    assert [one.reason for one in reader.damage] == ["tick 2 after 2", "tick 4 after 5"]
 
 
-@pytest.mark.parametrize("kills", [30, pytest.param(200, marks=pytest.mark.slow)])
-def test_G1_a_killed_program_loses_no_tick_that_was_written(tmp_path: Path, kills: int) -> None:
+def test_the_readers_of_mcap_read_all_of_it(tmp_path: Path) -> None:
+    """By topic and time, also what a killed program left; our encoder against another decoder."""
+    data = written(tmp_path / "log", 30)
+    with (tmp_path / "log").open("rb") as file:
+        reader = make_reader(file, validate_crcs=True)
+        summary = reader.get_summary()
+        assert summary is not None
+        assert summary.statistics is not None
+        assert {channel.topic for channel in summary.channels.values()} == {t.name for t in TOPICS}
+        for topic in TICK_TOPICS:
+            assert len(list(reader.iter_messages(topics=[topic.name]))) == 30
+    (tmp_path / "killed").write_bytes(unclosed(data))
+    with (tmp_path / "killed").open("rb") as file:
+        messages = NonSeekingReader(file).iter_messages(log_time_order=False)
+        topics = [channel.topic for _, channel, _ in _until_the_end(messages)]
+    assert topics.count("/antenna") == 30
+    with (tmp_path / "log").open("rb") as file:
+        stream = StreamReader(file, emit_chunks=True, validate_crcs=True)
+        crcs = [each.uncompressed_crc for each in stream.records if isinstance(each, Chunk)]
+    assert len(crcs) == 31
+    assert all(crcs)
+
+
+def _until_the_end(messages: Iterator) -> Iterator:
+    """What `mcap` reads of a file that has no end."""
+    try:
+        yield from messages
+    except (McapError, struct.error):
+        return
+
+
+def test_rosbags_decodes_what_our_encoder_made(tmp_path: Path) -> None:
+    rosbags = pytest.importorskip("rosbags.highlevel")
+    one = replace(tick(3), now=1.5, angles=tuple(0.1 * n for n in range(19)))
+    with LogWriter(tmp_path / "log.mcap", HEADER, ROOM) as log:
+        log.write(replace(one, positions=one.angles))
+    with rosbags.AnyReader([tmp_path / "log.mcap"]) as reader:
+        found = {c.topic: reader.deserialize(data, c.msgtype) for c, _, data in reader.messages()}
+        times = {
+            time for connection, time, _ in reader.messages() if connection.topic == "/antenna"
+        }
+    assert times == {1_500_000_000}
+    assert found["/joint_commands"].name == list(HEADER.robot.joint_names)
+    assert found["/joint_commands"].position.tolist() == list(one.angles)
+    assert found["/joint_states"].position.tolist() == list(one.angles)
+    assert (found["/joint_states"].header.stamp.sec, len(found["/joint_states"].effort)) == (1, 0)
+    np.testing.assert_array_equal(found["/antenna"].counts, one.counts)
+    assert found["/maneuver"].maneuver == one.maneuver
+    assert found["/counters"].frames == one.frames
+    assert tuple(found["/supervisor"].causes) == one.causes
+    assert found["/events"].msg.startswith(one.state)
+    assert json.loads(found["/versions"].data)["antennate"] == antennate.__version__
+
+
+@pytest.mark.parametrize("kills", [12, pytest.param(200, marks=pytest.mark.slow)])
+def test_G1_a_killed_program_loses_a_quarter_of_a_second_at_most(
+    tmp_path: Path, kills: int
+) -> None:
     here = Path(__file__).parent
     source = Path(antennate.__file__).resolve().parents[1]
     environment = {
@@ -211,17 +363,18 @@ def test_G1_a_killed_program_loses_no_tick_that_was_written(tmp_path: Path, kill
     }
     words = [sys.executable, str(here / "log_killed.py"), str(tmp_path), str(kills), "1"]
     done = subprocess.run(
-        words, env=environment, capture_output=True, text=True, timeout=120, check=False
+        words, env=environment, capture_output=True, text=True, timeout=600, check=False
     )
     assert done.returncode == 0, done.stderr
     results = json.loads(done.stdout)
     assert len(results) == kills
-    for returned, read, missing, bad, wrong in results:
-        assert returned <= read <= returned + 1
-        cut = bad == 1 and read == returned  # the one that was being written
+    for given, read, missing, bad, wrong, lost in results:
+        assert read <= given
+        assert lost <= 0.25
         assert (missing, wrong) == (0, 0)
-        assert bad == 0 or cut
-    assert max(returned for returned, *_ in results) > 10
+        assert bad <= 1  # the chunk that was being written
+    assert max(lost for *_, lost in results) > 0.05
+    assert max(given for given, *_ in results) > 30
 
 
 def test_G4_a_full_disk_ends_the_log_with_one_message_and_keeps_what_was_written(
@@ -229,7 +382,7 @@ def test_G4_a_full_disk_ends_the_log_with_one_message_and_keeps_what_was_written
 ) -> None:
     path = tmp_path / "log"
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    log = LogWriter(path, HEADER, ROOM)
+    log = LogWriter(path, HEADER, ROOM, flush=0.0)
     said = []
     try:
         resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, hard))
@@ -242,12 +395,12 @@ def test_G4_a_full_disk_ends_the_log_with_one_message_and_keeps_what_was_written
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
     assert len(said) == 1
-    assert f"the log ends after {log.written} ticks" in said[0]
+    assert f"the log ends after {log.kept} ticks" in said[0]
     result = found(tmp_path / "copy", path.read_bytes())
     assert result is not None
     numbers, reader = result
-    assert numbers == list(range(1, log.written + 1))
-    assert log.written > 20
+    assert numbers == list(range(1, log.kept + 1))
+    assert log.kept > 5
     assert reader.end is None
     assert reader.bad == 1
 
@@ -255,7 +408,7 @@ def test_G4_a_full_disk_ends_the_log_with_one_message_and_keeps_what_was_written
 def test_G4_a_disk_that_takes_nothing_more_is_said_once(tmp_path: Path) -> None:
     path = tmp_path / "log"
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    log = LogWriter(path, HEADER, ROOM)
+    log = LogWriter(path, HEADER, ROOM, flush=0.0)
     log.write(tick(1))
     try:
         resource.setrlimit(resource.RLIMIT_FSIZE, (path.stat().st_size, hard))
@@ -294,7 +447,7 @@ def test_a_tick_of_a_robot_with_other_joints_comes_back_and_a_short_one_is_refus
     other = replace(tick(1), angles=(0.5, -0.25))
     packed = other.pack()
     assert Tick.unpack(packed).angles == (0.5, -0.25)
-    with pytest.raises(LogError, match="expected a tick of 2 joints"):
+    with pytest.raises(LogError, match="expected a antennate_msgs/msg/Tick, found 100 bytes"):
         Tick.unpack(packed[:100])
 
 
@@ -306,10 +459,11 @@ def test_what_is_no_tick_is_refused(content: bytes) -> None:
         Tick.unpack(content)
 
 
-def test_a_header_of_defaults_names_its_fields() -> None:
-    content = Header(controller="open", params=ControlParams()).pack()
-    said = json.loads(content[2:])
-    assert said["version"] == antennate.__version__
-    assert said["fields"][:5] == ["schema", "kind", "joints", "number", "asked"]
-    assert said["fields"][17:19] == ["yaw1", "yaw2"]
-    assert said["params"]["gait"]["frequency"] == 0.6
+def test_a_header_of_defaults_says_what_wrote_it(tmp_path: Path) -> None:
+    header = Header(controller="open", params=ControlParams(), calibration='{"left": {}}')
+    assert Header.unpack(header.pack()) == header
+    LogWriter(tmp_path / "log", header, ROOM).close()
+    with LogReader(tmp_path / "log") as log:
+        assert log.header == header
+        assert log.header.version == antennate.__version__
+        assert log.header.params.gait.frequency == 0.6

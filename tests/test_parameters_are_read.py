@@ -39,7 +39,10 @@ TINY: dict[str, list[dict[str, Any]]] = {
             "trials": 1,
             "time_limit": 0.1,
             "control": {"rate": 25.0},
-            "robot": {"yaw": {"servo": "xl330_m288"}},
+            "robot": {
+                "yaw": {"servo": "xl330_m288"},
+                "legs": {"kind": "lifting", "servo": "xl430_w250"},
+            },
         },
     ],
     "gait": [
@@ -48,9 +51,18 @@ TINY: dict[str, list[dict[str, Any]]] = {
             "settling_cycles": 0,
             "sweep_points": 2,
             "gait": {"frequency": 1.0},
-            "robot": {"yaw": {"servo": servo}, "antenna": {"sensor": sensor}},
+            "robot": {
+                "yaw": {"servo": servo},
+                "antenna": {"sensor": sensor},
+                "legs": {"kind": kind, "servo": "xl430_w250"},
+            },
+            "unknown": ["robot.leg_friction=0.5:0.6"],
+            "draws": 2,
         }
-        for servo, sensor in (("xl330_m288", OTHER_SENSOR), ("xc430_w240", {}))
+        for servo, sensor, kind in (
+            ("xl330_m288", OTHER_SENSOR, "lifting"),
+            ("xc430_w240", {}, "rolling"),
+        )
     ],
     "wall": [
         {
@@ -102,6 +114,7 @@ TINY: dict[str, list[dict[str, Any]]] = {
     "servo": [
         {"recording": ["servo.json"], "fit": True, "draws": 20},
         {"recording": ["servo.json"], "servo": "xc430_w240"},
+        {"recording": ["servo.json"], "servo": "xl430_w250"},
     ],
     "tracks": [
         {"synthetic": {"trials": 1, "frames": 200}},

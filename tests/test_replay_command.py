@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from log_ticks import HEADER
+from log_ticks import HEADER, chunks, unclosed
 from worlds import recorded, session, simulated
 
 from antennate import figures as style
@@ -20,7 +20,6 @@ from antennate.params.control import ControlParams
 from antennate.robots.spec import RobotSpec
 from antennate.telemetry.figure import Course
 from antennate.telemetry.figure import replay as draw
-from antennate.telemetry.framing import framed
 from antennate.telemetry.header import Header
 from antennate.telemetry.reader import LogReader
 from antennate.telemetry.replay import ReplayRobot, recorded_controller, replay
@@ -63,25 +62,27 @@ def test_G6_all_files_of_a_log_are_replayed_as_one(
     log: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """The second one was never begun; the first was cut by a kill, the third was closed."""
-    first, third = tmp_path / "drive.log", tmp_path / "drive-3.log"
+    first, third = tmp_path / "drive.mcap", tmp_path / "drive-3.mcap"
     with LogReader(log) as reader:
         ticks = list(reader)
     cut = LogWriter(first, reader.header)
     for tick in ticks[:120]:
         cut.write(tick)
-    with LogWriter(third, reader.header) as writer:
+    cut.flush()
+    with LogWriter(third, reader.header, flush=0.0) as writer:
         for tick in ticks[120:]:
             writer.write(tick)
     result = said(capsys, str(first))
-    assert result["parts"] == ["drive.log", "drive-3.log"]
+    assert result["parts"] == ["drive.mcap", "drive-3.mcap"]
     assert (result["ticks"], result["different"], result["different_commands"]) == (TICKS, 0, 0)
     assert result["closed"]
-    data = third.read_bytes()
-    third.write_bytes(data[:-200] + bytes([data[-200] ^ 1]) + data[-199:])
+    data = bytearray(third.read_bytes())
+    data[chunks(data)[-1][1] - 1] ^= 1
+    third.write_bytes(data)
     assert main(["replay", str(first), "--json"]) == 2
     out, err = capsys.readouterr()
     assert (json.loads(out)["missing"], json.loads(out)["damaged"]) == (1, 1)
-    assert "of drive-3.log" in err
+    assert "of drive-3.mcap" in err
 
 
 def test_another_controller_is_compared(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -124,9 +125,12 @@ def test_it_leaves_a_table_and_a_figure(tmp_path: Path, capsys: pytest.CaptureFi
 def test_G2_a_damaged_log_is_replayed_as_far_as_it_goes(
     log: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    data = bytearray(log.read_bytes())
-    data[len(data) // 2] ^= 4
     bad = tmp_path / "bad"
+    with LogReader(log) as reader, LogWriter(bad, reader.header, flush=0.0) as writer:
+        for tick in reader:
+            writer.write(tick)
+    data = bytearray(bad.read_bytes())
+    data[chunks(data)[TICKS // 2][1] - 1] ^= 4
     bad.write_bytes(data)
     assert main(["replay", str(bad), "--json"]) == 2
     out, err = capsys.readouterr()
@@ -140,9 +144,8 @@ def test_a_log_that_was_not_closed_is_no_error(
     log: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Its program was killed; nothing that was written is lost."""
-    data = log.read_bytes()
     cut = tmp_path / "cut"
-    cut.write_bytes(data[: data.rindex(b"\0\0") + 1])
+    cut.write_bytes(unclosed(log.read_bytes()))
     result = said(capsys, str(cut))
     assert (result["ticks"], result["closed"]) == (TICKS, False)
 
@@ -163,7 +166,7 @@ def test_what_cannot_be_replayed_is_refused_in_one_line(
 ) -> None:
     (tmp_path / "text").write_text("not a log of anything\n")
     own = Header(controller="this:Class", params=ControlParams())
-    (tmp_path / "own").write_bytes(framed(own.pack()))
+    LogWriter(tmp_path / "own", own).close()
     assert main(["replay", *argv]) == 2
     out, err = capsys.readouterr()
     assert out == ""

@@ -54,8 +54,9 @@ FAULTS = {  # by the number of its readings; with 5 the ports are swapped
 REPLACED = {"controller"}  # `teleop` walks by keys in its place
 SHORT = {"dry_run": 0.1, "duration": 0.5, "stand": 0.1}
 DRIFTING = {"control": {"rate": 25.0}, "drift": {"band": 0.02, "speed": 1.0}}
-PITCHING = {"pitch": {"kind": "actuated"}}
-LIFTING = {"legs": {"kind": "lifting"}, **PITCHING}
+LIFTING = {"legs": {"kind": "lifting"}, "pitch": {"kind": "actuated"}}
+HEXAPOD = RobotSpec.named("hexapod").model_dump()
+"""Without antennae."""
 
 
 def reach(network: NetworkParams) -> None:
@@ -238,7 +239,7 @@ RUNS: dict[str, tuple[type[Params], Callable[..., None], list[dict[str, Any]]]] 
                 "touch_check": False,
                 "bus_return": 0.1,
                 "fault_time": 0.1,
-                "robot": PITCHING,
+                "robot": LIFTING,
             },
             {**SHORT, "robot": LIFTING, "controller": "test_legs_and_pitch:Lift"},
         ],
@@ -254,7 +255,7 @@ RUNS: dict[str, tuple[type[Params], Callable[..., None], list[dict[str, Any]]]] 
                 "controller": "open",
                 "drift": {"band": 0.02, "speed": 1.0},
             },
-            {**SHORT, "controller": "open", "touch_check": False, "robot": PITCHING},
+            {**SHORT, "controller": "open", "touch_check": False, "robot": LIFTING},
         ],
     ),
     "doctor": (
@@ -274,10 +275,14 @@ RUNS: dict[str, tuple[type[Params], Callable[..., None], list[dict[str, Any]]]] 
     "setup": (
         SetupConfig,
         run_setup,
-        [{"setup": {"scan": 0.02}}, {"setup": {"scan": 0.02}, "robot": LIFTING}],
+        [
+            {"setup": {"scan": 0.02}},
+            {"setup": {"scan": 0.02}, "robot": LIFTING},
+            {"setup": {"scan": 0.02}, "robot": HEXAPOD},
+        ],
     ),
-    "zero": (ZeroConfig, run_zero, [{}, {"robot": LIFTING}]),
-    "jog": (JogConfig, run_jog, [{}, {"robot": LIFTING}]),
+    "zero": (ZeroConfig, run_zero, [{}, {"robot": LIFTING}, {"robot": HEXAPOD}]),
+    "jog": (JogConfig, run_jog, [{}, {"robot": LIFTING}, {"robot": HEXAPOD}]),
     "replay": (ReplayConfig, run_replay, [{}]),
     "twin": (
         TwinConfig,
@@ -289,6 +294,7 @@ RUNS: dict[str, tuple[type[Params], Callable[..., None], list[dict[str, Any]]]] 
                 "scene": "flat",
                 "robot": {
                     **LIFTING,
+                    "pitch": {"kind": "actuated", "servo": "xl430_w250"},
                     "yaw": {"servo": "xl330_m288"},
                     "antenna": {"sensor": {"kind": "fsr"}},
                 },

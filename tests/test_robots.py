@@ -119,7 +119,7 @@ BAD = [
     ("links = 1", "links: expected a number of at least 2, found 1"),
     ("links = 'six'", "links: expected a whole number, found 'six'"),
     ("lynks = 8", "lynks: expected a known key (did you mean links?)"),
-    ("[yaw]\nservo = 'ax12'", "yaw.servo: expected one of xc430_w240 or xl330_m288"),
+    ("[yaw]\nservo = 'ax12'", "yaw.servo: expected one of xc430_w240, xl330_m288 or xl430_w250"),
     ("[antennae]\nfastest = 11.0", "antennae.fastest"),
     ("links =", "expected TOML"),
 ]
@@ -140,7 +140,7 @@ def test_a_bad_robot_file_is_refused_in_one_line(
 
 def test_an_unknown_robot_is_refused_with_the_known_ones() -> None:
     with pytest.raises(
-        ConfigError, match=r"expected scuttle or a TOML file .*did you mean scuttle"
+        ConfigError, match=r"expected scuttle, hexapod or a TOML file .*did you mean scuttle"
     ):
         RobotSpec.named("scutle")
 

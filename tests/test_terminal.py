@@ -19,7 +19,7 @@ def test_the_viewer_shows_what_to_do_whatever_the_width(columns: int, tmp_path: 
     source = (
         "import sys; from dataclasses import replace; sys.path.insert(0, sys.argv[1]); "
         "from test_feed import HEADER, tick, viewer; from antennate.telemetry.feed import Feed\n"
-        "with Feed(viewer(__import__('pathlib').Path('drive.log')), HEADER.pack()) as feed:\n"
+        "with Feed(viewer(__import__('pathlib').Path('drive.mcap')), HEADER.pack()) as feed:\n"
         "    for number in range(300):\n"
         "        note = sys.argv[2 + number // 100]\n"
         "        feed.send(replace(tick(number + 1), note=note, state='DISARMED',"

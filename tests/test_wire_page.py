@@ -1,23 +1,16 @@
-"""A reader built from docs/wire.md alone reads what our boards, datagrams and logs hold."""
+"""A reader built from docs/wire.md alone reads what our boards and datagrams hold."""
 
 from __future__ import annotations
 
 import hashlib
 import hmac
-import json
 import re
 import struct
 import zlib
 from pathlib import Path
 from typing import Any
 
-import pytest
-
 from antennate.hardware.esp32 import datagram, frame
-from antennate.params.control import ControlParams
-from antennate.telemetry.header import Header
-from antennate.telemetry.ticks import Tick
-from antennate.telemetry.writer import LogWriter
 
 PAGE = (Path(__file__).parents[1] / "docs" / "wire.md").read_text()
 BOOT = 0x5EED0001
@@ -129,45 +122,3 @@ def test_a_host_made_from_the_page_is_granted_frames_over_udp() -> None:
     signed = board.sign(sample(), 1999)
     assert signed is not None
     assert bytes(signed) == sample() + tag(b"F", nonce, sample())
-
-
-@pytest.mark.parametrize("closed", [True, False])
-def test_a_reader_made_from_the_page_reads_a_log(tmp_path: Path, closed: bool) -> None:
-    header = Header(controller="closed", params=ControlParams(), seed=3)
-    ticks = [
-        Tick(n, 0.01 * n, 0.5, (1650.0, 1640.0), (1.0, 2.0), (0.1, 0.2), (0, 1), 2, 0.7,
-             tuple(float(j) for j in range(len(header.robot.ids))), "WALK", ("one", "two"))
-        for n in (1, 2)
-    ]  # fmt: skip
-    log = LogWriter(tmp_path / "drive.log", header, least_free=0)
-    for tick in ticks:
-        log.write(tick)
-    if closed:
-        log.close()
-
-    records = bodies((tmp_path / "drive.log").read_bytes())
-    if closed:
-        assert read_end(records.pop()) == 2
-    schemas = {record[0] for record in records}
-    assert [record[1] for record in records] == [1, 2, 2]
-    assert f"the schema (u8, {schemas.pop()})" in " ".join(PAGE.split())
-    head = json.loads(records[0][2:])
-    assert head["controller"] == "closed"
-    assert head["seed"] == 3
-    for record, tick in zip(records[1:], ticks, strict=True):
-        size = struct.calcsize(head["record"])
-        *numbers, length = struct.unpack(head["record"], record[:size])
-        found = dict(zip(head["fields"], [*numbers, length], strict=True))
-        assert found["number"] == tick.number
-        assert found["t"] == tick.t
-        assert found["counts_r"] == 1640.0
-        assert found["contact_r"] == 1
-        assert found[header.robot.joint_names[3]] == 3.0
-        assert len(record) == size + length
-        state, note, *causes = record[size:].decode().split("\n")
-        assert (state, note, causes) == ("WALK", "", ["one", "two"])
-
-
-def read_end(content: bytes) -> int:
-    assert content[1] == 3
-    return int.from_bytes(content[2:], "little")

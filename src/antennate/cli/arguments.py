@@ -126,14 +126,30 @@ _Model = TypeVar("_Model")
 def _filled(
     model: type[_Model], base: Mapping[str, Any], values: Mapping[tuple[str, ...], Any]
 ) -> _Model:
-    """The model with these values over those of a file, and both over groups that are named."""
+    """The model with these values over those of a file, and both over groups that are named.
+
+    A group that the file gives whole, as by a name of its own, gives way to the one that is named.
+    """
     named = {path: table for path in values if (table := _table(model, path, values[path]))}
     plain = {path: value for path, value in values.items() if path not in named}
+    for path, table in named.items():
+        if _is_whole(base, path, table):
+            base = merged(base, {path: {}})
     try:
         whole = merged(put_over(merged({}, named), base), plain)
         return TypeAdapter(model).validate_python(whole)
     except ValidationError as error:
         raise ConfigError(describe(error, model, flag_of, found)) from None
+
+
+def _is_whole(base: Any, path: tuple[str, ...], table: Mapping[str, Any]) -> bool:
+    """Whether nested tables hold, at a path, every key that a table has."""
+    for part in path:
+        base = base.get(part) if isinstance(base, dict) else None
+    return isinstance(base, dict) and all(
+        key in base and (not isinstance(value, dict) or _is_whole(base, (key,), value))
+        for key, value in table.items()
+    )
 
 
 def _table(model: Any, path: tuple[str, ...], value: Any) -> dict[str, Any] | None:

@@ -6,12 +6,14 @@ import contextlib
 import dataclasses
 import shlex
 import sys
+import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from pydantic.dataclasses import dataclass
 
+from antennate.antenna.calibration import Calibration
 from antennate.cli import viewer
 from antennate.cli.addresses import PortOptions, at_hand, key_of, parse_robot, require_two_ports
 from antennate.cli.exit_codes import BAD_INPUT, OK
@@ -31,6 +33,8 @@ from antennate.hardware.driving.signals import StopOnce
 from antennate.hardware.robot_file import RobotFile
 from antennate.hardware.safety.causes import State
 from antennate.messages import short_names, typed
+from antennate.robots.spec import require_antennae
+from antennate.studies.formats import to_json
 from antennate.studies.measures import Measure, Table
 from antennate.studies.report import View
 from antennate.studies.run_directory import LOG
@@ -74,7 +78,12 @@ def command(argv: Sequence[str]) -> int:
         AntennateError: A port, a servo or the board is not what is needed; nothing moved then.
     """
     config, orders = parse_robot("drive", DESCRIPTION, RobotFile.for_drive, argv, Orders)
+<<<<<<< HEAD
     return walk(VIEW, config, orders, argv)
+=======
+    require_antennae(config.robot, "drive")
+    return walk("drive", config, orders, argv)
+>>>>>>> main
 
 
 def require_ports(orders: Orders) -> None:
@@ -109,7 +118,7 @@ def walk(
         AntennateError: A port, a servo or the board is not what is needed; nothing moved then.
     """
     require_ports(orders)
-    config = config.calibrated()
+    given, config = config, config.calibrated()
     key = key_of(orders)
     with (
         _operator(config, orders) as operator,
@@ -121,8 +130,21 @@ def walk(
                 operator.stop.closed = True  # until the first tick: from here on there is a result
             if controller is not None:
                 session.control.controller = controller(session, config)
+<<<<<<< HEAD
                 config = config.model_copy(update={"controller": view.name})
             result = _carry_out(view.name, config, session, orders, folder.path / LOG, operator)
+=======
+                config = config.model_copy(update={"controller": command})
+            header = Header(
+                controller=config.controller,
+                params=config.control,
+                robot=config.robot,
+                start=max(0, time.time_ns() - round(1e9 * session.clock.now())),
+                calibration=_calibration(given),
+            )
+            record = _Record(header, folder.path / LOG, config.record_required)
+            result = _carry_out(command, config, session, orders, record, operator)
+>>>>>>> main
         try:
             folder.finish(result, ())
         finally:  # the robot's state is told even if it cannot be kept
@@ -133,6 +155,29 @@ def walk(
     stays_on = result["torque_off"] is False
     idle = _idle(result)
     return BAD_INPUT if fault or stays_on or result["refusal"] or idle else OK
+
+
+@dataclasses.dataclass(frozen=True)
+class _Record:
+    """What the log begins with, its first file, and whether the robot may walk only with it."""
+
+    header: Header
+    log: Path
+    required: bool
+
+    def words(self, number: int) -> list[str]:
+        """The command line of the process that writes the n-th file."""
+        required = [viewer.REQUIRED] if self.required else []
+        return [sys.executable, "-m", viewer.__name__, str(part(self.log, number)), *required]
+
+
+def _calibration(config: DriveConfig) -> str:
+    """The calibration files by side, as one JSON object; empty without one."""
+    left = config.calibration
+    files = {"left": left, "right": config.calibration_right or left} if left else {}
+    found = {side: Calibration.load(Path(file)) for side, file in files.items()}
+    tables = {side: each.model_dump(mode="json") for side, each in found.items()}
+    return to_json(tables) if tables else ""
 
 
 def _tell(result: Mapping[str, Any], orders: Orders, log: str) -> None:
@@ -156,17 +201,11 @@ def _carry_out(
     config: DriveConfig,
     session: Session,
     orders: Orders,
-    log: Path,
+    record: _Record,
     operator: Operator,
 ) -> dict[str, Any]:
     """Drive, with the log and the status line in a process of their own."""
-    header = Header(controller=config.controller, params=config.control, robot=config.robot)
-    required = [viewer.REQUIRED] if config.record_required else []
-
-    def words(number: int) -> list[str]:
-        return [sys.executable, "-m", viewer.__name__, str(part(log, number)), *required]
-
-    feed = Feed(words, header.pack())
+    feed, log = Feed(record.words, record.header.pack()), record.log
     unlogged = False
 
     def keep(session: Session, t: float) -> None:

@@ -18,7 +18,7 @@ from antennate.experiments.running import keep, require_films, write_films
 from antennate.params.base import Params
 from antennate.studies.experiment import Experiment, Outcome
 from antennate.studies.pool import core_count
-from antennate.studies.run_directory import RunDirectory
+from antennate.studies.run_directory import LOGS, RunDirectory
 
 
 @dataclass(frozen=True)
@@ -30,6 +30,7 @@ class Options(ResultOptions):
 
 
 @dataclass(frozen=True)
+<<<<<<< HEAD
 class FilmOptions(Options):
     """How to run what can be filmed."""
 
@@ -61,6 +62,12 @@ def _filmed(options: Options) -> int | None:
     if trial:
         raise ConfigError("--video-trial: expected --video beside it, found none")
     return None
+=======
+class LogOptions(Options):
+    """The same where trials can be logged."""
+
+    log: bool = option(False, "keep the log of every trial, in logs/CONTROLLER-TRIAL.mcap")
+>>>>>>> main
 
 
 def command(experiment: Experiment[Any, Any], argv: Sequence[str]) -> int:
@@ -69,9 +76,14 @@ def command(experiment: Experiment[Any, Any], argv: Sequence[str]) -> int:
     Raises:
         AntennateError: As below, or something given cannot be used.
     """
+<<<<<<< HEAD
     config, options = parse(
         experiment.name, experiment.description, experiment.config, argv, _options(experiment)
     )
+=======
+    kind = Options if experiment.logged is None else LogOptions
+    config, options = parse(experiment.name, experiment.description, experiment.config, argv, kind)
+>>>>>>> main
     experiment.check(config)
     trial = _filmed(options)
     if trial is not None:
@@ -90,7 +102,11 @@ def carry_out(
     """
     with folder_for(experiment.view, options, config, argv) as run:
         with progress(experiment.parts) as step, stop_signals():
-            outcome = experiment.run(config, options.workers or core_count(), step, run.append)
+            how = (config, options.workers or core_count(), step, run.append)
+            if isinstance(options, LogOptions) and options.log and experiment.logged is not None:
+                outcome = experiment.logged(*how, run.folder(LOGS))
+            else:
+                outcome = experiment.run(*how)
         result = outcome.result()
         interrupted = bool(result.get("interrupted"))
         if interrupted and not outcome.rows:

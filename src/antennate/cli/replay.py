@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from itertools import islice
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-import numpy as np
 from pydantic.dataclasses import dataclass
 
 from antennate.cli.arguments import parse
@@ -23,19 +21,13 @@ from antennate.studies.report import View
 from antennate.studies.run_directory import RunDirectory
 from antennate.telemetry.reader import Damage, LogReader
 from antennate.telemetry.replay import ReplayConfig, Replayed, recorded_controller, replay
-from antennate.telemetry.ticks import Tick, fields
 from antennate.types import Maneuver
-
-if TYPE_CHECKING:
-    from antennate.telemetry.figure import Course
 
 DESCRIPTION = """\
 Let the controller of a log decide upon the recorded readings again, or another one in its place,
 and compare. The same code decides the same, bit by bit. Damaged parts of a log are left out and
 named; the exit code is 2 then."""
 TICKS = "ticks.csv"
-_MOST_DRAWN = 5000
-"""Most ticks that a figure shows."""
 COUNTS = (
     Measure("different", "maneuvers that differ", form="d"),
     Measure("different_commands", "commands that differ", form="d"),
@@ -72,13 +64,22 @@ def command(argv: Sequence[str]) -> int:
         with folder_for(VIEW, options, config, argv) as folder:
             _keep(folder, path, found)
             folder.finish(result)
+<<<<<<< HEAD
     tell(result, options, VIEW.tables(result), VIEW.sentence(result))
+=======
+    tell(result, options, [_table(result)], _sentence(result))
+    return complain("replay", log)
+
+
+def complain(command: str, log: LogReader) -> int:
+    """Say on stderr what of a log could not be read: the exit code of the command."""
+>>>>>>> main
     if not log.bad and not log.missing:
         return OK
     place = f"; first at {_place(log.damage[0])}" if log.bad else ""
     sys.stderr.write(
-        f"antennate replay: error: {path}: expected an undamaged log, found {log.bad} damaged "
-        f"places and {log.missing} ticks missing; {log.ticks} ticks were read{place}\n"
+        f"antennate {command}: error: {log.path}: expected an undamaged log, found {log.bad} "
+        f"damaged places and {log.missing} ticks missing; {log.ticks} ticks were read{place}\n"
     )
     return BAD_INPUT
 
@@ -156,44 +157,15 @@ VIEW = View("replay", DESCRIPTION, ReplayConfig, _tables, _sentence)
 
 
 def _keep(folder: RunDirectory, path: Path, found: Replayed) -> None:
-    """Write the table and the figure, in a second pass over the log."""
+    """Write the table and the figure, each in a further pass over the log."""
+    from antennate.telemetry.figure import Course
     from antennate.telemetry.figure import replay as draw
 
     with LogReader(path) as log:
-        names = fields(log.header.robot)
-        folder.write(TICKS, to_csv(_rows(names, log, found.maneuvers)))
+        ticks = zip(log, found.maneuvers, strict=True)
+        rows = (tick.row(log.header.robot) | {"replayed": each} for tick, each in ticks)
+        folder.write(TICKS, to_csv(rows))
     if found.maneuvers:
         with LogReader(path) as log:
-            figure = draw(_course(log, found.maneuvers))
+            figure = draw(Course.of(log, len(found.maneuvers), found.maneuvers))
         folder.write_figures({"replay": figure})
-
-
-def _rows(
-    names: Sequence[str], ticks: Iterable[Tick], replayed: Sequence[int]
-) -> Iterator[dict[str, Any]]:
-    """One row a tick; numbers as they are, so that they come back exactly."""
-    for tick, maneuver in zip(ticks, replayed, strict=True):
-        row = dict(zip(names, tick.values, strict=True))
-        yield row | {
-            "replayed": maneuver,
-            "state": tick.state,
-            "causes": "; ".join(tick.causes),
-        }
-
-
-def _course(ticks: Iterable[Tick], replayed: Sequence[int]) -> Course:
-    """What the figure shows: every tick of a short log, some of a long one."""
-    from antennate.telemetry.figure import Course
-
-    every = -(-len(replayed) // _MOST_DRAWN)
-    kept = [(tick, m) for tick, m in islice(zip(ticks, replayed, strict=True), 0, None, every)]
-    start = kept[0][0].now
-    return Course(
-        t=np.array([tick.now - start for tick, _ in kept]),
-        reading=np.array([tick.reading for tick, _ in kept]),
-        level=np.array([tick.level for tick, _ in kept]),
-        contact=np.array([tick.contact for tick, _ in kept]),
-        recorded=np.array([tick.maneuver for tick, _ in kept]),
-        replayed=np.array([maneuver for _, maneuver in kept]),
-        state=[tick.state for tick, _ in kept],
-    )

@@ -13,7 +13,6 @@ from antennate.cli import drive
 from antennate.cli.addresses import parse_robot
 from antennate.cli.keys import END, typed_keys
 from antennate.cli.options import option
-from antennate.control.gait import require_step
 from antennate.errors import BadInputError, ConfigError
 from antennate.hardware.driving.config import DriveConfig
 from antennate.hardware.driving.gamepad import Gamepad
@@ -21,6 +20,7 @@ from antennate.hardware.driving.session import Session
 from antennate.hardware.driving.teleop import KeyController, TeleopConfig
 from antennate.hardware.host_clock import HostClock
 from antennate.hardware.robot_file import RobotFile
+from antennate.robots.spec import require_antennae
 
 DESCRIPTION = """\
 Walk the real robot, or its twin, by keys: the arrows (or w, a, d, s) are FORWARD, TURN_L, TURN_R
@@ -57,7 +57,7 @@ def command(argv: Sequence[str]) -> int:
         raise ConfigError(
             "--hold-to-run: expected none with teleop, which stands without a key, found it"
         )
-    require_step(config.robot)
+    require_antennae(config.robot, "teleop")
     drive.require_ports(orders)
     with _keys(orders.gamepad, config.teleop.gamepad_silence) as keys:
         return drive.walk(VIEW, config, orders, argv, _controller(config, keys))

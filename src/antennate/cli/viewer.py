@@ -40,16 +40,15 @@ class Display:
         self.status = StatusLine()
         self._asked = ""
 
-    def show(self, message: Message) -> None:
+    def show(self, tick: Tick, dropped: int) -> None:
         """Show a tick, if one is due or if something new is asked."""
-        tick = Tick.unpack(message.content)
         match = _ASKED.search(tick.note)
         asked = match[1] if match else ""
         if asked not in ("", self._asked) and self.status.terminal:
             self.status.say(f"{asked[0].upper()}{asked[1:]}.")
         self._asked = asked
         if self.status.due(tick.now):
-            self.status.show(line(tick, message.dropped))
+            self.status.show(line(tick, dropped))
 
 
 def line(tick: Tick, dropped: int) -> str:
@@ -84,7 +83,8 @@ def main() -> int:
         signal.signal(number, signal.SIG_IGN)
     display = Display()
     kept, required = False, REQUIRED in sys.argv[2:]
-    stream = messages(sys.stdin.buffer)
+    log: LogWriter | None = None
+    stream = messages(sys.stdin.buffer.raw, lambda: _settle(log))  # type: ignore[attr-defined]
     try:
         first = next(stream, None)
         log = None if first is None else _begin(Path(sys.argv[1]), first)
@@ -92,14 +92,18 @@ def main() -> int:
         with contextlib.suppress(OSError):  # the other end is gone; the ticks tell it
             os.write(_STDOUT, KEPT if kept else NOT_KEPT)
         for message in stream:
-            kept = kept and _keep(log, message.content)
-            display.show(message)
+            tick = Tick.unpack(message.content)
+            kept = kept and _keep(log, tick)
+            display.show(tick, message.dropped)
             if required and not kept:
                 break
         if log is not None and kept:
             log.close()
     except LogError as error:
         kept = say(error)
+        if log is not None:  # not closed: so a reader sees that the loop was killed
+            with contextlib.suppress(LogError):
+                log.flush()
     display.status.close()
     return int(not kept)
 
@@ -113,14 +117,23 @@ def _begin(path: Path, first: Message) -> LogWriter | None:
         return None
 
 
-def _keep(log: LogWriter | None, content: bytes) -> bool:
+def _keep(log: LogWriter | None, tick: Tick) -> bool:
     """Write one tick; a disk that fails is said once."""
     try:
         if log is not None:
-            log.write(content)
+            log.write(tick)
     except LogError as error:
         return say(error)
-    return log is not None
+    return log is not None and not log.failure
+
+
+def _settle(log: LogWriter | None) -> None:
+    """Let no tick wait while none follows; a disk that fails is said once."""
+    try:
+        if log is not None:
+            log.settle()
+    except LogError as error:
+        say(error)
 
 
 def say(error: LogError) -> bool:

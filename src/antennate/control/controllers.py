@@ -21,7 +21,7 @@ from antennate.control.maneuver import Hold, decide
 from antennate.control.repetition import RepetitionDetector
 from antennate.params.control import ControlParams
 from antennate.robots.sides import LEFT, RIGHT
-from antennate.robots.spec import RobotSpec
+from antennate.robots.spec import RobotSpec, require_antennae
 from antennate.types import AntennaFrame, Bools, Contact, Floats, Ints, JointCommand, Maneuver
 
 
@@ -117,6 +117,9 @@ class RuleController:
         robot: The robot.
         batch: Number of robots B.
 
+    Raises:
+        ConfigError: The robot has no antennae.
+
     Attributes:
         level: Bending levels b of the last step, shape (B, 2).
         contact: `Contact` of the last step, shape (B, 2).
@@ -125,6 +128,7 @@ class RuleController:
     """
 
     def __init__(self, rule: Rule, control: ControlParams, robot: RobotSpec, batch: int) -> None:
+        require_antennae(robot, "this controller")
         self._curves = curves(control)
         self._mean = RunningMean(control.conditioning, batch, control.period)
         self._contact = ContactState(control.rule, batch)

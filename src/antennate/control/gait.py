@@ -4,7 +4,8 @@ The yaw joints j = 1 .. Y carry the serpenoid wave of the paper,
 alpha_j = A sin(2 pi xi j / Y - P + delta) + offset, with P the gait phase: as P grows the crest
 travels from head to tail and the robot advances. Leg i of L links turns with P - 2 pi xi i / L, the
 right one half a turn later. The lead delta of the body over the legs decides the speed: it is best
-where the feet are down on the side towards which the body bends.
+where the feet are down on the side towards which the body bends. A lifting leg is in the air while
+its own phase, P - begin - lag i, the right one half a turn later, is in the first share of a cycle.
 
 A positive offset bends every joint to the right-hand turn: joint j rotates the rear link against
 the front one, so the head points right of the tail.
@@ -21,8 +22,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from antennate.errors import ConfigError
 from antennate.params.control import GaitParams
+from antennate.params.gaits import LiftParams
 from antennate.robots.spec import RobotSpec
 from antennate.types import Bools, Floats, Ints, JointCommand
 
@@ -44,18 +45,11 @@ def _lags(wave_number: float, body_phase: float, links: int) -> tuple[Floats, Fl
     return joints, lag * np.arange(links) / links
 
 
-def require_step(robot: RobotSpec) -> None:
-    """Check that this gait has a step for the legs of a robot.
-
-    Raises:
-        ConfigError: Its legs do not roll.
-    """
-    if robot.legs.kind != "rolling":
-        raise ConfigError(
-            f"expected rolling legs for the gait of antennate, found {robot.legs.kind} legs; bring "
-            "a controller of your own that moves them (`Gait(..., legs=False)` moves the other "
-            "joints for it), see docs/controllers.md"
-        )
+def _lifting(lift: LiftParams, phase: Floats, links: int) -> Floats:
+    """Angles of lifting legs at a gait phase [rad], shape (B, L, 2)."""
+    own = phase[:, None] - lift.begin - lift.lag * np.arange(links)
+    part = (own[:, :, None] - _SIDES) / (2.0 * math.pi) % 1.0
+    return np.where(part < lift.share, lift.lifted, lift.stance)
 
 
 def targets(
@@ -64,8 +58,9 @@ def targets(
     phase: Floats,
     offset: Floats,
     sweep: Floats | None = None,
+    lifting: bool = True,
 ) -> JointCommand:
-    """Joint targets at a gait phase. Legs that do not roll stay at 0, as do pitch joints.
+    """Joint targets at a gait phase. Pitch joints stay at 0.
 
     Args:
         params: Wave and timing of the gait.
@@ -73,14 +68,18 @@ def targets(
         phase: Gait phase P [rad], shape (B,), unwrapped.
         offset: Yaw offset [rad], shape (B,); positive turns right.
         sweep: Phase S of the antenna bases [rad], shape (B,); 0 if absent.
+        lifting: Whether lifting legs step; at 0 all of them stand.
     """
     joints, links = _lags(params.wave_number, params.body_phase, robot.links)
     yaw = params.amplitude * np.sin(joints - phase[:, None]) + offset[:, None]
     yaw = np.minimum(np.maximum(yaw, -robot.yaw_limit), robot.yaw_limit)
-    leg = (phase[:, None] - links)[:, :, None] + _SIDES
-    if robot.legs.kind != "rolling":
-        leg = np.zeros_like(leg)
-    antenna = np.full((phase.shape[0], 2), params.antenna_mean)
+    if robot.legs.kind == "rolling":
+        leg = (phase[:, None] - links)[:, :, None] + _SIDES
+    elif lifting:
+        leg = _lifting(params.lift, phase, robot.links)
+    else:
+        leg = np.zeros((phase.shape[0], robot.links, len(_SIDES)))
+    antenna = np.full((phase.shape[0], robot.antenna_count), params.antenna_mean)
     if sweep is not None:
         antenna += params.antenna_amplitude * np.sin(sweep)[:, None]
     if not robot.pitch_count:
@@ -99,16 +98,11 @@ class Gait:
         period: Control period [s].
         legs: Whether it moves the legs. False leaves them at 0, for a controller that moves them
             itself and takes the wave of the yaw joints and the antennae alone.
-
-    Raises:
-        ConfigError: It is to move legs that do not roll.
     """
 
     def __init__(
         self, params: GaitParams, robot: RobotSpec, batch: int, period: float, legs: bool = True
     ) -> None:
-        if legs:
-            require_step(robot)
         self.params, self._legs = params, legs
         self._robot = robot
         self.phase: Floats = np.zeros(batch)

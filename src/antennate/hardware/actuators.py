@@ -42,6 +42,8 @@ class ActuatorState:
         watchdogs: Ids stopped by their watchdog.
         disarmed: Ids that have lost their torque or their watchdog while they were to have it.
         supply: Voltage [V], NaN if it is not known.
+        angles: Measured joint angles [rad] in the order of the robot's joints, NaN for one that has
+            not answered yet; empty if they are not read.
         bus_error: What is wrong with the bus as a whole, empty if nothing is.
         tracebacks: Of errors that nobody expected while torque was taken off.
     """
@@ -51,6 +53,7 @@ class ActuatorState:
     watchdogs: tuple[int, ...] = ()
     disarmed: tuple[int, ...] = ()
     supply: float = math.nan
+    angles: tuple[float, ...] = ()
     bus_error: str = ""
     tracebacks: Tracebacks = field(default_factory=Tracebacks)
 

@@ -79,9 +79,13 @@ class Joints:
         """Positions, not rounded [ticks], of joint angles [rad], both of shape (n,)."""
         return np.asarray(self._zero + self._sign * angles / _STEP)
 
+    def angles(self, ticks: Ints | Floats) -> Floats:
+        """Joint angles [rad] at positions [ticks], both of shape (n,)."""
+        return np.asarray((ticks - self._zero) * self._sign * _STEP)
+
     def command(self, ticks: Ints | Floats) -> JointCommand:
         """The command of one robot at these positions [ticks], shape (n,)."""
-        angles: Floats = (ticks - self._zero) * self._sign * _STEP
+        angles = self.angles(ticks)
         parts = np.split(angles, np.cumsum([math.prod(shape) for shape in self._shapes.values()]))
         named = zip(self._shapes.items(), parts, strict=False)
         return JointCommand(**{name: part.reshape(shape) for (name, shape), part in named})

@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 import math
-from typing import Literal
+from pathlib import Path
+from typing import ClassVar, Literal, Self
 
 from pydantic import model_validator
 
+from antennate.errors import ConfigError
+from antennate.messages import nearest, shown
 from antennate.params.base import Params, number
+from antennate.params.gaits import GAITS, LiftParams
+from antennate.params.reading import read_file
 
 
 class GaitParams(Params):
-    """The serpenoid body wave and the stepping O-legs."""
+    """The serpenoid body wave and the stepping legs."""
 
+    choice: ClassVar[str] = f"{', '.join(GAITS)} (the first is the default), or a TOML file"
     frequency: float = number(
         0.6, "Hz", "assumed: legs then turn at 55 % of the servo's no-load speed", gt=0, le=1.0
     )
@@ -43,6 +49,28 @@ class GaitParams(Params):
     """Amplitude of the sweep of the antenna bases."""
     antenna_frequency: float = number(0.5, "Hz", "assumed: within the servos' speed", gt=0, le=1.0)
     """Sweeps of the antenna bases per second."""
+    lift: LiftParams = LiftParams()
+
+    @classmethod
+    def named(cls, text: str | Path, folder: Path = Path()) -> Self:
+        """The gait of a name, or of a TOML file with the keys of this model.
+
+        Args:
+            text: The name, or the path of the file.
+            folder: Where a path that is not absolute starts.
+
+        Raises:
+            ConfigError: There is no such gait, or its file cannot be used.
+        """
+        if (table := GAITS.get(str(text))) is not None:
+            return cls.model_validate(table)
+        path = folder / text
+        if not str(text) or (path.suffix != ".toml" and not path.exists()):
+            raise ConfigError(
+                f"--gait: expected {', '.join(GAITS)} or a TOML file{nearest(str(text), GAITS)}, "
+                f"found {shown(str(text))}"
+            )
+        return read_file(path, cls)
 
 
 class CurveParams(Params):

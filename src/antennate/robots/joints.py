@@ -86,6 +86,10 @@ class LegParams(JointParams):
         _RIGHT_ANGLE, "rad", "assumed: the leg points straight up or down", gt=0, le=_RIGHT_ANGLE
     )
     """Largest angle of a lifting leg either way."""
+    reach: float | None = number(
+        None, "m", "assumed: from the spine's surface to the width over the legs", ge=0, le=0.5
+    )
+    """Distance of a lifting leg's foot from its axis at 0 rad, to the side."""
 
     @property
     def largest(self) -> float:
@@ -96,6 +100,8 @@ class LegParams(JointParams):
 class BaseParams(JointParams):
     """The bases of both antennae, left before right."""
 
+    kind: Literal["pair", "none"] = number("pair", "1", "paper: two antennae")
+    """Whether the robot has antennae."""
     servo: ServoName = number("xl330_m288", "1", "paper: XL330 at the antennae")
     """Model of the group's servos."""
     fastest: float = number(

@@ -56,12 +56,17 @@ def _rating(kind: type[ServoParams]) -> str:
 
 
 def _electronics(robot: RobotSpec) -> list[Part]:
+    adapter = Part(
+        1, "USB adapter for DYNAMIXEL, such as U2D2", "servo bus", f"{robot.baud} bit/s, TTL"
+    )
+    if not robot.antenna_count:
+        return [adapter]
     sensor = robot.antenna.sensor
     length = 1000 * robot.antenna.sensed_hinges * robot.antenna.link_length
     kind = "flex sensor" if sensor.kind == "flex" else "pressure strip"
     ohms = f"{sensor.divider_resistance / 1000:g} kOhm, 1 %"
     return [
-        Part(1, "USB adapter for DYNAMIXEL, such as U2D2", "servo bus", f"{robot.baud} bit/s, TTL"),
+        adapter,
         Part(1, "ESP32 board (WROOM or WROVER)", "antennae", "ADC1 pins 34 and 35, USB"),
         Part(
             2,
@@ -111,12 +116,19 @@ def _power(power: Supply) -> list[Part]:
 
 def _body(robot: RobotSpec) -> list[Part]:
     legs = "O-leg" if robot.legs.kind == "rolling" else "leg"
-    radius, coils = 1000 * robot.leg_radius, Counter(robot.antenna.active_coils)
-    return [
+    radius = 1000 * robot.leg_radius
+    body = [
         Part(
             robot.links, "link frame", "body", f"{1000 * robot.link_pitch:g} mm from joint to joint"
         ),
         Part(robot.leg_count, legs, "one on each leg servo", f"outer radius {radius:g} mm"),
+    ]
+    return body + _antennae(robot) if robot.antenna_count else body
+
+
+def _antennae(robot: RobotSpec) -> list[Part]:
+    coils = Counter(robot.antenna.active_coils)
+    return [
         Part(
             2 * robot.antenna.hinges,
             "link",

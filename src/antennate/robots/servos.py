@@ -8,7 +8,7 @@ from typing import ClassVar, Literal
 from antennate.params.base import Params, number
 
 TICKS_A_TURN = 4096
-"""Datasheet of both models: 4096 pulses a revolution."""
+"""Datasheet of all models: 4096 pulses a revolution."""
 MOST_TICKS = 1_048_575
 """Farthest position in extended mode, 256 turns either way [ticks]."""
 POSITION_MODE = 3
@@ -16,10 +16,10 @@ POSITION_MODE = 3
 EXTENDED_MODE = 4
 """Operating mode: position over many turns."""
 
-ServoName = Literal["xc430_w240", "xl330_m288"]
+ServoName = Literal["xc430_w240", "xl330_m288", "xl430_w250"]
 _RPM = 2.0 * math.pi / 60.0
 FULL_DRIVE = 885
-"""Datasheet of both models: counts of the full drive."""
+"""Datasheet of all models: counts of the full drive."""
 
 
 class ServoParams(Params):
@@ -120,11 +120,32 @@ class XL330Params(ServoParams):
     """Friction of the gear as a share of the torque of its motor."""
 
 
+class XL430Params(ServoParams):
+    """DYNAMIXEL XL430-W250-T at 11.1 V."""
+
+    model_number: ClassVar[int] = 1060
+    voltage: ClassVar[float] = 11.1
+    stall_current: ClassVar[float] = 1.3
+    standby_current: ClassVar[float] = 0.052
+    datasheet: ClassVar[tuple[float, float]] = (1.4, 57.0 * _RPM)
+    product: ClassVar[str] = "XL430-W250-T"
+
+    stall_torque: float = number(1.4, "N·m", "datasheet: XL430-W250, 11.1 V", gt=0)
+    """Torque at standstill."""
+    no_load_speed: float = number(
+        57.0 * _RPM, "rad/s", "datasheet: XL430-W250, 57 rpm at 11.1 V", gt=0
+    )
+    """Speed unloaded."""
+    p_gain: float = number(640.0, "1", "datasheet: Position P Gain of a new one", gt=0)
+    """Gain of the position loop as its register holds it."""
+
+
 class ServosParams(Params):
     """The servo models by name; a joint group names one of them."""
 
     xc430_w240: ServoParams = ServoParams()
     xl330_m288: XL330Params = XL330Params()
+    xl430_w250: XL430Params = XL430Params()
 
     def of(self, name: ServoName) -> ServoParams:
         """The model of a name."""

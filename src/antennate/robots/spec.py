@@ -7,9 +7,8 @@ antennae, and the pitch joints where servos move them: ids, angles and goals kee
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, ClassVar, Literal, Self
+from typing import ClassVar, Literal, Self
 
 from pydantic import model_validator
 
@@ -31,8 +30,8 @@ from antennate.robots.servos import EXTENDED_MODE, POSITION_MODE, TICKS_A_TURN, 
 from antennate.robots.sides import SIDES
 
 GroupName = Literal["yaw", "legs", "antennae", "pitch"]
-ROBOTS: Mapping[str, Mapping[str, Any]] = {"scuttle": {}}
-"""Robots that are known by name: what differs from the defaults."""
+ROBOTS = ("scuttle", "hexapod")
+"""Robots that are known by name; each is a file beside this one."""
 HARDWARE_ALONE = (
     *(
         f"robot.{group}.{name}"
@@ -56,6 +55,7 @@ SIMULATION_ALONE = (
             "body_friction",
             "body_radius",
             "pitch.stiffness",
+            "legs.reach",
         )
     ),
     *paths_of(ServosParams, "robot.servos"),
@@ -128,8 +128,8 @@ class RobotSpec(Params):
         Raises:
             ConfigError: There is no such robot, or its file cannot be used.
         """
-        if (table := ROBOTS.get(str(text))) is not None:
-            return cls.model_validate(table)
+        if str(text) in ROBOTS:
+            return read_file(Path(__file__).with_name(f"{text}.toml"), cls)
         if not str(text):
             raise ConfigError(
                 f"--robot: expected {', '.join(ROBOTS)} or a TOML file, found nothing"
@@ -159,6 +159,18 @@ class RobotSpec(Params):
         return self.links - 1 if self.pitch.kind == "actuated" else 0
 
     @property
+    def antenna_count(self) -> int:
+        """Number of antennae, 0 or 2."""
+        return len(SIDES) if self.antennae.kind == "pair" else 0
+
+    @property
+    def hip(self) -> float:
+        """Distance of a lifting leg's axis from the middle of the robot [m]."""
+        reach = self.legs.reach
+        foot = (self.width - self.leg_width) / 2
+        return self.body_radius if reach is None else foot - reach
+
+    @property
     def length(self) -> float:
         """Robot length without antennae [m]."""
         return self.links * self.link_pitch
@@ -166,7 +178,8 @@ class RobotSpec(Params):
     @property
     def link_mass(self) -> float:
         """Mass of one link without its legs [kg]."""
-        return (self.mass - self.leg_count * self.leg_mass - 2 * self.antenna.mass) / self.links
+        antennae = self.antenna_count * self.antenna.mass
+        return (self.mass - self.leg_count * self.leg_mass - antennae) / self.links
 
     @property
     def link_names(self) -> tuple[str, ...]:
@@ -191,7 +204,7 @@ class RobotSpec(Params):
     @property
     def joint_names(self) -> tuple[str, ...]:
         """Names of all joints that servos move."""
-        bases = tuple(prefix + BASE for prefix in ANTENNA_PREFIXES)
+        bases = tuple(prefix + BASE for prefix in ANTENNA_PREFIXES[: self.antenna_count])
         return self.yaw_names + self.leg_names + bases + self.pitch_names[: self.pitch_count]
 
     @property
@@ -200,7 +213,7 @@ class RobotSpec(Params):
         return (
             ("yaw", self.yaw, self.yaw_count),
             ("legs", self.legs, self.leg_count),
-            ("antennae", self.antennae, len(SIDES)),
+            ("antennae", self.antennae, self.antenna_count),
             ("pitch", self.pitch, self.pitch_count),
         )
 
@@ -218,7 +231,7 @@ class RobotSpec(Params):
         shapes = {
             "yaw": (batch, self.yaw_count),
             "leg": (batch, self.links, len(SIDES)),
-            "antenna": (batch, len(SIDES)),
+            "antenna": (batch, self.antenna_count),
         }
         return shapes | ({"pitch": (batch, self.pitch_count)} if self.pitch_count else {})
 
@@ -327,7 +340,24 @@ class RobotSpec(Params):
                 f"mass must leave more than 10 g a link beside legs and antennae, got {self.mass} "
                 "kg"
             )
+        if self.legs.reach is not None and self.hip < 0:
+            raise ValueError(
+                f"legs.reach: expected at most {self.legs.reach + self.hip:g} m, half the width "
+                f"without the leg, found {self.legs.reach:g}"
+            )
         return self
+
+
+def require_antennae(robot: RobotSpec, what: str) -> None:
+    """Check that a robot has antennae.
+
+    Raises:
+        ConfigError: It has none, so that `what` cannot be done.
+    """
+    if not robot.antenna_count:
+        raise ConfigError(
+            f"expected a robot with antennae for {what}, found one without (antennae.kind)"
+        )
 
 
 def _check_group(name: GroupName, group: JointParams, count: int) -> None:

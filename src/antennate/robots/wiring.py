@@ -48,7 +48,7 @@ def wiring(robot: RobotSpec) -> Figure:
         colour = _MAIN if kind.voltage == power.rails[0].voltage else _LOW
         width = 0.9 if colour == _MAIN else 1.15
         _box(axes, places[name], f"{servo_id}  {name}\n{kind.product}", colour, width)
-    _electronics(axes, power)
+    _electronics(axes, power, bool(robot.antenna_count))
     _legend(axes, power)
     return figure
 
@@ -140,8 +140,8 @@ def _box(axes: Axes, place: Place, text: str, colour: str, width: float) -> None
     axes.text(x, y, text, ha="center", va="center", fontsize=6.5, zorder=3)
 
 
-def _electronics(axes: Axes, power: Supply) -> None:
-    """Battery, fuse, stop, converter, adapter and board, at the left."""
+def _electronics(axes: Axes, power: Supply, antennae: bool) -> None:
+    """Battery, fuse, stop, converter and adapter at the left, and the board of the antennae."""
     main, ink = power.rails[0].voltage, style.INK
     x, mid, right = _LEFT, _LEFT + 0.0, _LEFT + 1.75
     for y, text, colour in (
@@ -155,14 +155,9 @@ def _electronics(axes: Axes, power: Supply) -> None:
     axes.plot([x - 0.8, x - 0.7], [2.4, 2.4], color=ink, linewidth=2.5, zorder=1)
     _box(axes, (right, 0.0), "USB adapter\n(U2D2)", _DATA, 1.2)
     _box(axes, (right, 2.4), "computer", ink, 1.2)
-    _box(axes, (right + 1.8, 2.4), "ESP32 board\n3V3, GPIO34, 35", ink, 1.4)
-    _box(
-        axes, (right + 4.0, 2.4), "two dividers:\nflex sensor above,\nresistor to ground", ink, 1.7
-    )
     axes.plot([right, right], [0.0, 2.4], color=_DATA, linewidth=1.6, zorder=1)
-    axes.plot([right, right + 4.0], [2.4, 2.4], color=ink, linewidth=1.0, zorder=1)
-    axes.plot([right + 0.85, right + 0.85], [2.4, _GROUND], color=ink, linewidth=0.9, zorder=0)
-    axes.plot([right + 0.85], [_GROUND], "o", color=ink, markersize=4)
+    if antennae:
+        _board(axes, right)
     for rail in power.rails[1:]:
         at, text = right - 0.15, f"converter {rail.voltage:g} V\n{rail.stall:.1f} A"
         _box(axes, (at, _CONVERTER), text, _LOW, 1.3)
@@ -171,6 +166,16 @@ def _electronics(axes: Axes, power: Supply) -> None:
         _voltage(axes, (-2.56, _CONVERTER + 0.06), rail.voltage, _LOW)
         axes.plot([at + 0.4] * 2, [_GROUND, _CONVERTER], color=ink, linewidth=0.9, zorder=0)
         axes.plot([at + 0.4], [_GROUND], "o", color=ink, markersize=4)
+
+
+def _board(axes: Axes, x: float) -> None:
+    """The board of the antennae and their dividers, right of the computer at x."""
+    ink = style.INK
+    _box(axes, (x + 1.8, 2.4), "ESP32 board\n3V3, GPIO34, 35", ink, 1.4)
+    _box(axes, (x + 4.0, 2.4), "two dividers:\nflex sensor above,\nresistor to ground", ink, 1.7)
+    axes.plot([x, x + 4.0], [2.4, 2.4], color=ink, linewidth=1.0, zorder=1)
+    axes.plot([x + 0.85, x + 0.85], [2.4, _GROUND], color=ink, linewidth=0.9, zorder=0)
+    axes.plot([x + 0.85], [_GROUND], "o", color=ink, markersize=4)
 
 
 def _legend(axes: Axes, power: Supply) -> None:

@@ -39,7 +39,7 @@ def check_robot(robot: RobotSpec) -> None:
         f"bodies of {robot.mass} kg in all",
         f"{mass} kg",
     )
-    start = targets(GaitParams(amplitude=0.0), robot, np.zeros(1), np.zeros(1))
+    start = targets(GaitParams(amplitude=0.0), robot, np.zeros(1), np.zeros(1), lifting=False)
     rest = np.concatenate([getattr(start, name).ravel() for name in robot.command_shapes()])
     world.place(0.0, 0.0, 0.0, start.yaw[0], start.leg[0])
     _hold(world, rest, _SETTLE)

@@ -39,7 +39,8 @@ def build(params: RobotSpec) -> mujoco.MjSpec:
         for s, sign in enumerate(SIDE_SIGN):
             _add_leg(spec, link, params.leg_names[len(SIDES) * i + s], sign, params)
         parent = link
-    _attach_antennae(spec, params)
+    if params.antenna_count:
+        _attach_antennae(spec, params)
     return spec
 
 
@@ -110,7 +111,7 @@ def _add_leg(
     """A rolling leg turns about its axle; a lifting one about the spine, upwards if positive."""
     lateral = sign * (params.width - params.leg_width) / 2
     lifting = params.legs.kind == "lifting"
-    hip = sign * params.body_radius if lifting else lateral
+    hip = sign * params.hip if lifting else lateral
     servo = params.servos.of(params.legs.servo)
     leg = link.add_body(name=name, pos=[0.0, hip, 0.0])
     _add_hinge(leg, name, [sign, 0.0, 0.0] if lifting else _PITCH, [0.0, 0.0, 0.0], servo)

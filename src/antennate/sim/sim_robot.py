@@ -1,7 +1,7 @@
 """The simulated robot: a batch of worlds stepped in lockstep.
 
-A row holds one world or none. An empty row, and one whose simulation failed, reads NaN, which the
-controller takes for UNKNOWN. Rows never influence one another.
+A row holds one world or none. An empty row, one whose simulation failed, and a robot without
+antennae read NaN, which the controller takes for UNKNOWN. Rows never influence one another.
 """
 
 from __future__ import annotations
@@ -57,7 +57,8 @@ class _Row:
     def __init__(self, world: World, chance: Disturbance) -> None:
         self.world = world
         self.chance = chance
-        self.hinges: Floats = np.zeros((2, world.robot.antenna.sensed_hinges))
+        sensed = world.robot.antenna.sensed_hinges if world.robot.antenna_count else 0
+        self.hinges: Floats = np.zeros((2, sensed))
         self.tick = 0
         self.commanded = False
         self.failure: SimulationError | None = None
@@ -103,7 +104,7 @@ class SimRobot:
         """Put a fresh world into a row."""
         self._rows[row] = _Row(world, chance)
         self._sensors.reset(row)
-        self._missing[row] = False
+        self._missing[row] = not world.robot.antenna_count
 
     def put_back(self, row: int, state: Floats) -> None:
         """Let the world of a row go on from a state of its own; its flex sensors forget."""

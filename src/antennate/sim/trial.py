@@ -156,7 +156,7 @@ def place_at_start(
     lateral: float = 0.0,
     heading: float = 0.0,
 ) -> None:
-    """Put the robot at the start of its scene, in the pose of a gait phase [rad].
+    """Put the robot at the start of its scene, in the pose of a gait phase, on all lifting legs.
 
     Args:
         world: Where it is.
@@ -167,7 +167,7 @@ def place_at_start(
         heading: Turn to the left from the start's heading [rad].
     """
     x, y, ahead = scene.start
-    command = targets(gait, world.robot, np.array([phase]), np.zeros(1))
+    command = targets(gait, world.robot, np.array([phase]), np.zeros(1), lifting=False)
     world.place(
         x - lateral * math.sin(ahead),
         y + lateral * math.cos(ahead),

@@ -111,7 +111,8 @@ class World:
         self.robot = robot
         self.model = model
         self.data = mujoco.MjData(model)
-        hinges = [PREFIX + p + h for p in ANTENNA_PREFIXES for h in robot.antenna.hinge_names]
+        prefixes = ANTENNA_PREFIXES[: robot.antenna_count]
+        hinges = [PREFIX + p + h for p in prefixes for h in robot.antenna.hinge_names]
         bent = self._addresses(hinges)
         self._yaw = self._addresses([PREFIX + n for n in robot.yaw_names])
         self._leg = self._addresses([PREFIX + n for n in robot.leg_names])
@@ -141,7 +142,7 @@ class World:
         self._no_warning = self._warnings.tobytes()
 
     def _addresses(self, joints: list[str]) -> Ints:
-        return np.array([self.model.joint(n).qposadr[0] for n in joints])
+        return np.array([self.model.joint(n).qposadr[0] for n in joints], np.int64)
 
     @property
     def t(self) -> float:
@@ -284,6 +285,23 @@ class World:
         """Sum of the normal forces between robot and obstacles [N] in the last physics step."""
         address = self.data.contact.efc_address[self._on_obstacles()]
         return float(self.data.efc_force[address[address >= 0]].sum())
+
+    def obstacle_contacts(self) -> tuple[list[str], Floats, Floats]:
+        """Where the robot touched obstacles in the last physics step.
+
+        Returns:
+            The part of the robot, the place [m], shape (contacts, 3), and the normal force [N],
+            shape (contacts,), of each contact.
+        """
+        contact = self.data.contact
+        found = np.flatnonzero(self._on_obstacles() & (contact.efc_address >= 0))
+        geoms = contact.geom[found]
+        ours = np.where(self._robot[geoms[:, 0]], geoms[:, 0], geoms[:, 1])
+        names = [
+            self.model.body(self.model.geom_bodyid[geom]).name.removeprefix(PREFIX)
+            for geom in ours.tolist()
+        ]
+        return names, contact.pos[found], self.data.efc_force[contact.efc_address[found]]
 
     def _on_obstacles(self) -> Bools:
         """Contacts between the robot and an obstacle, shape (contacts,)."""

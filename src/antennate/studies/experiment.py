@@ -9,6 +9,7 @@ from __future__ import annotations
 import importlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 
 from antennate.params.base import Params
@@ -68,9 +69,14 @@ class Experiment(Generic[Config, Found]):
         check: Raises if a configuration cannot be run; called before anything is written.
         failed: Whether a result says nothing, so that the command ends with exit code 2.
         parts: What `on_step` counts.
+<<<<<<< HEAD
         films: films(config, trial) -> for each condition, by name, what runs this trial of it once
             more and records it; None where nothing can be filmed.
         body: HTML that stands in its report in place of tables and figures.
+=======
+        logged: Runs as `run` does and keeps the log of each trial in a folder, which is given as
+            well; None if there are no controllers to log.
+>>>>>>> main
     """
 
     name: str
@@ -84,6 +90,7 @@ class Experiment(Generic[Config, Found]):
     check: Callable[[Config], None] = lambda config: None
     failed: Callable[[Mapping[str, Any]], bool] = lambda result: False
     parts: str = "trials"
+<<<<<<< HEAD
     films: Callable[[Config, int], Mapping[str, Callable[[], Film]]] | None = None
     body: Body | None = None
 
@@ -94,6 +101,9 @@ class Experiment(Generic[Config, Found]):
             *(self.name, self.description, self.config, self.tables, self.sentence),
             body=self.body,
         )
+=======
+    logged: Callable[[Config, int, OnStep, OnRow, Path], Found] | None = None
+>>>>>>> main
 
     @classmethod
     def of_folder(

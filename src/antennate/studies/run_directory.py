@@ -19,28 +19,35 @@ import contextlib
 import itertools
 import json
 import os
-import platform
 import shlex
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict
-from importlib import metadata
 from pathlib import Path
 from typing import IO, Any
 
-from antennate import __version__
 from antennate.errors import BadInputError, OutputError
 from antennate.files import decoded, read_limited, write_whole
 from antennate.params.base import Params
 from antennate.params.reading import Config, read_file
 from antennate.studies.formats import from_csv, strict, to_csv, to_json, to_toml
+from antennate.telemetry.header import versions
 from antennate.telemetry.parts import MOST_PARTS, part
 
 RESULT, TABLE, PARTIAL = "result.json", "trials.csv", "trials.partial.jsonl"
 CONFIG, VERSIONS, COMMAND = "config.toml", "versions.json", "command.txt"
+<<<<<<< HEAD
 FIGURES, FILMS = "figures", "films"
 """Folders of figures (svg and png) and films (mp4); what they hold of these belongs to the run."""
 CALIBRATION, LOG, REPORT = "calibration.json", "drive.log", "report.html"
 LARGEST = 10**9
+=======
+FIGURES = "figures"
+"""Folder of the figures; what it holds as svg and png belongs to the run."""
+CALIBRATION, LOG, REPORT = "calibration.json", "drive.mcap", "report.html"
+LOGS = "logs"
+"""Folder of the logs of trials."""
+_LARGEST = 10**9
+>>>>>>> main
 """No file of a run is longer [bytes]."""
 _LOGS = tuple(part(Path(LOG), number).name for number in range(1, MOST_PARTS + 1))
 _FILES = (
@@ -95,9 +102,15 @@ class RunDirectory:
         with _writing(place):
             missing = [p for p in (place, *place.parents) if not p.exists()]
             place.mkdir(parents=True, exist_ok=path is not None)
+<<<<<<< HEAD
             for folder in (place / FIGURES, place / FILMS):
                 if folder.is_symlink():
                     raise OutputError(f"expected {folder} within its run, found a link")
+=======
+            for folder in (FIGURES, LOGS):
+                if (place / folder).is_symlink():
+                    raise OutputError(f"expected {place / folder} within its run, found a link")
+>>>>>>> main
             held = _held(place)
             if held and not overwrite:
                 raise OutputError(
@@ -175,7 +188,7 @@ class RunDirectory:
             command: Words of the command line, if it was one.
         """
         self.write(CONFIG, to_toml(config))
-        self.write(VERSIONS, to_json(_versions()))
+        self.write(VERSIONS, to_json(versions()))
         if command:
             self.write(COMMAND, shlex.join(command) + "\n")
 
@@ -219,6 +232,16 @@ class RunDirectory:
         data = content.encode("utf-8") if isinstance(content, str) else content
         write_whole(path, data, overwrite=True)
 
+    def folder(self, name: str) -> Path:
+        """A folder in the directory for files of the run, made if it is not there.
+
+        Raises:
+            OutputError: It cannot be made.
+        """
+        with _writing(self.path / name):
+            (self.path / name).mkdir(exist_ok=True)
+        return self.path / name
+
     def write_figures(self, figures: Mapping[str, Any]) -> None:
         """Put figures into the directory, each as svg and png, by name."""
         from antennate.figures import render
@@ -258,6 +281,7 @@ class RunDirectory:
 
 def _held(place: Path) -> list[Path]:
     """Files of a run that a directory holds."""
+<<<<<<< HEAD
     drawn = [
         path
         for name, kinds in ((FIGURES, (".svg", ".png")), (FILMS, (".mp4",)))
@@ -266,6 +290,16 @@ def _held(place: Path) -> list[Path]:
         if path.suffix in kinds
     ]
     return [place / name for name in _NAMES if os.path.lexists(place / name)] + drawn
+=======
+    ours = {FIGURES: (".svg", ".png"), LOGS: (".mcap",)}
+    inner = [
+        path
+        for folder, endings in ours.items()
+        for path in (sorted((place / folder).iterdir()) if _is(place / folder) else ())
+        if path.suffix in endings
+    ]
+    return [place / name for name in _NAMES if os.path.lexists(place / name)] + inner
+>>>>>>> main
 
 
 def _is(folder: Path) -> bool:
@@ -274,18 +308,6 @@ def _is(folder: Path) -> bool:
 
 def _plain(row: Any) -> Mapping[str, Any]:
     return row if isinstance(row, Mapping) else asdict(row)
-
-
-def _versions() -> dict[str, str]:
-    """What the numbers may depend on."""
-    return {
-        "antennate": __version__,
-        "python": platform.python_version(),
-        "numpy": metadata.version("numpy"),
-        "scipy": metadata.version("scipy"),
-        "mujoco": metadata.version("mujoco-core"),
-        "platform": f"{platform.system()} {platform.machine()}",
-    }
 
 
 def _free(command: str) -> Path:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,6 +15,8 @@ from antennate.params.reading import from_values
 from antennate.sim.scenes.registry import make_scene
 from antennate.sim.sim_robot import SimRobot
 from antennate.sim.trial import Trial, TrialConfig, draw_trial
+from antennate.telemetry.header import Header
+from antennate.telemetry.simulated import SimulatedLog
 from antennate.telemetry.time_series import TimeSeries, TimeSeriesRecorder
 from antennate.types import AntennaFrame, JointCommand
 
@@ -25,6 +29,7 @@ def simulate(
     trial: int = 0,
     time_limit: float = 100.0,
     control: ControlParams | None = None,
+    log: str | Path | None = None,
     **settings: Any,
 ) -> TimeSeries:
     """Run one trial of one robot and return what was read, decided and commanded at each tick.
@@ -37,6 +42,7 @@ def simulate(
         time_limit: Time after which it ends [s]; it ends earlier at the exit, or when the robot has
             left the scene or the physics failed.
         control: Parameters of the controller, the defaults if not given.
+        log: A file that does not exist yet, for the log of the trial as an MCAP file.
         settings: Fields of the trial: seed, scene, robot, tunnel, variation, physics.
 
     Returns:
@@ -45,6 +51,7 @@ def simulate(
     Raises:
         ConfigError: A setting is unknown or out of bounds, or there is no such controller.
         SceneError: The scene cannot be built.
+        LogError: The log cannot be written.
     """
     config, control = from_values(TrialConfig, settings), control or ControlParams()
     scene = make_scene(config.scene, config.tunnel)
@@ -54,21 +61,37 @@ def simulate(
     robot.load(0, start.world, start.chance)
     controlling.reset(np.array([0]), start.phase)
     recorder = TimeSeriesRecorder(controlling, lambda: start.world.head[:2])
+    name = controller if isinstance(controller, str) else controller.__name__
     ticks, outcome = 0, "timeout"
 
     def go_on(frame: AntennaFrame, command: JointCommand) -> bool:
         nonlocal ticks, outcome
         recorder.take(frame, command)
+        if kept is not None:
+            kept.take(frame, command)
         ticks += 1
         outcome = "invalid" if robot.failure(0) is not None else "timeout"
         if outcome == "timeout" and ticks % _EVERY == 0:
             outcome = _seen(start)
         return outcome == "timeout" and start.world.t < time_limit
 
-    run_loop(robot, controlling, control.period, go_on)
+    with contextlib.ExitStack() as stack:
+        kept = None
+        if log is not None:
+            header = Header(
+                controller=name,
+                params=control,
+                robot=config.robot,
+                seed=config.seed,
+                trial=trial,
+                phase=start.phase,
+            )
+            made = SimulatedLog(Path(log), header, controlling, start.world)
+            kept = stack.enter_context(made)
+        run_loop(robot, controlling, control.period, go_on)
     return recorder.series(
         {
-            "controller": controller if isinstance(controller, str) else controller.__name__,
+            "controller": name,
             "scene": config.scene,
             "seed": config.seed,
             "trial": trial,

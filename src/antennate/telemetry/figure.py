@@ -1,10 +1,10 @@
-"""Figure of `antennate replay`: what was read, felt and decided, over time."""
+"""Figure of a log or its replay: what was read, felt and decided, over time."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from itertools import groupby
+from itertools import groupby, islice
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -12,8 +12,11 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from antennate import figures as style
+from antennate.telemetry.ticks import Tick
 from antennate.types import Contact, Floats, Ints, Maneuver
 
+_MOST_DRAWN = 5000
+"""Most ticks that a figure shows."""
 _SIDES = ("left", "right")
 _STATES = {
     "OK": "#BFE3B4",
@@ -36,7 +39,7 @@ class Course:
         level: Bending levels, shape (n, 2).
         contact: `Contact`, shape (n, 2).
         recorded: `Maneuver` decided then, shape (n,).
-        replayed: `Maneuver` decided now, shape (n,).
+        replayed: `Maneuver` decided now, shape (n,); None without a replay.
         state: The supervisor's, n of them; empty text without one.
     """
 
@@ -45,8 +48,29 @@ class Course:
     level: Floats
     contact: Ints
     recorded: Ints
-    replayed: Ints
+    replayed: Ints | None
     state: Sequence[str]
+
+    @classmethod
+    def of(cls, ticks: Iterable[Tick], count: int, replayed: Sequence[int] | None = None) -> Course:
+        """Every tick of a short log, some of a long one.
+
+        Args:
+            ticks: The log, not empty.
+            count: Ticks in it.
+            replayed: `Maneuver` decided now, one a tick; None without a replay.
+        """
+        every = -(-count // _MOST_DRAWN)
+        kept = list(islice(ticks, 0, None, every))
+        return cls(
+            t=np.array([tick.now - kept[0].now for tick in kept]),
+            reading=np.array([tick.reading for tick in kept]),
+            level=np.array([tick.level for tick in kept]),
+            contact=np.array([tick.contact for tick in kept]),
+            recorded=np.array([tick.maneuver for tick in kept]),
+            replayed=None if replayed is None else np.array(replayed[::every]),
+            state=[tick.state for tick in kept],
+        )
 
 
 @style.styled
@@ -75,18 +99,20 @@ def _draw_contact(panel: Axes, course: Course) -> None:
 
 
 def _draw_decisions(panel: Axes, course: Course) -> None:
-    for height, values in ((2, course.recorded), (1, course.replayed)):
+    rows = {"recorded": course.recorded, "replayed": course.replayed}
+    shown = {name: values for name, values in rows.items() if values is not None}
+    for height, values in enumerate(reversed(shown.values()), 1):
         colours = [_MANEUVERS.get(value) for value in values.tolist()]
         _band(panel, course.t, colours, height)
     _band(panel, course.t, [_STATES.get(state) for state in course.state], 0)
     panel.set(
         xlabel="time [s]",
         title="Maneuver and state",
-        yticks=[2, 1, 0],
-        yticklabels=["recorded", "replayed", "state"],
-        ylim=(-0.6, 2.6),
+        yticks=[*range(len(shown), -1, -1)],
+        yticklabels=[*shown, "state"],
+        ylim=(-0.6, len(shown) + 0.6),
     )
-    seen = set(course.recorded.tolist()) | set(course.replayed.tolist())
+    seen = {value for values in shown.values() for value in values.tolist()}
     key = {style.MANEUVER_NAMES[m]: style.MANEUVER_COLOURS[m] for m in Maneuver if m in seen}
     _legend(panel, key | {name: _STATES[name] for name in _STATES if name in course.state})
 

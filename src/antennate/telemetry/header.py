@@ -1,24 +1,39 @@
-"""The first record of a log: everything that its replay needs besides the readings."""
+"""What a log says before its first tick: everything that its replay needs besides the readings."""
 
 from __future__ import annotations
 
 import json
+import platform
+from collections.abc import Mapping
+from functools import lru_cache
+from importlib import metadata
+from typing import Any
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from antennate import __version__
 from antennate.errors import LogError
 from antennate.params.control import ControlParams
 from antennate.params.reading import describe
 from antennate.robots.spec import RobotSpec
-from antennate.telemetry.framing import SCHEMA, Kind
-from antennate.telemetry.ticks import fields, layout
+from antennate.telemetry.topics import CALIBRATION, CONFIG, HEADER_TOPICS, VERSIONS, Topic
 
-_START = bytes((SCHEMA, Kind.HEADER))
+
+@lru_cache
+def versions() -> Mapping[str, str]:
+    """What numbers may depend on, by name."""
+    return {
+        "antennate": __version__,
+        "python": platform.python_version(),
+        "numpy": metadata.version("numpy"),
+        "scipy": metadata.version("scipy"),
+        "mujoco": metadata.version("mujoco-core"),
+        "platform": f"{platform.system()} {platform.machine()}",
+    }
 
 
 class Header(BaseModel):
-    """Who decided, with which numbers, on which robot. On disk it is JSON.
+    """Who decided, with which numbers, on which robot.
 
     Attributes:
         controller: Name of the controller.
@@ -27,7 +42,9 @@ class Header(BaseModel):
         seed: Seed of the world, None on a robot.
         trial: Trial of that seed.
         phase: Gait phase at the first tick [rad].
-        version: Version of antennate that wrote it.
+        start: Unix time at which the loop's time was 0 [ns]; 0 where time is simulated.
+        calibration: The calibration file of the antennae, as text; empty without one.
+        versions: Versions of what wrote it, by name.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
@@ -38,36 +55,64 @@ class Header(BaseModel):
     seed: int | None = None
     trial: int | None = None
     phase: float = 0.0
-    version: str = __version__
+    start: int = Field(default=0, ge=0, lt=1 << 62)
+    calibration: str = ""
+    versions: Mapping[str, str] = Field(default_factory=versions)
+
+    @property
+    def version(self) -> str:
+        """Version of antennate that wrote it."""
+        return self.versions.get("antennate", "of unknown version")
 
     def pack(self) -> bytes:
-        """The content of its record."""
-        # For other readers: the layout of a tick for `struct`, and the names of its numbers. The
-        # last is the length of the text behind them.
-        names = ("schema", "kind", "joints", *fields(self.robot), "text")
-        record = {"record": layout(len(self.robot.ids)), "fields": names}
-        return _START + json.dumps(self.model_dump() | record).encode()
+        """All of it as bytes, for another process."""
+        return self.model_dump_json().encode()
 
     @classmethod
     def unpack(cls, content: bytes) -> Header:
         """Back from `pack`.
 
         Raises:
-            LogError: The content is of another schema, or not a header.
+            LogError: It is no header.
         """
-        if content[0] != SCHEMA:
-            raise LogError(
-                f"expected a log of schema {SCHEMA}, found schema {content[0]}; read it with the "
-                "version of antennate that wrote it"
-            )
-        if content[:2] != _START:
-            raise LogError("expected a header as first record, found another kind")
+        return _checked(content)
+
+    def messages(self) -> dict[Topic, bytes]:
+        """Its messages in a log."""
+        apart = {"calibration", "versions"}
+        texts = {
+            CONFIG: self.model_dump_json(exclude=apart),
+            VERSIONS: json.dumps(dict(self.versions)),
+        }
+        if self.calibration:
+            texts[CALIBRATION] = self.calibration
+        return {topic: topic.type.encode(text) for topic, text in texts.items()}
+
+    @classmethod
+    def of_messages(cls, found: Mapping[Topic, bytes]) -> Header:
+        """Back from `messages`.
+
+        Raises:
+            LogError: One is missing or damaged.
+        """
+        texts = {
+            topic: topic.type.decode(found[topic])["data"]
+            for topic in HEADER_TOPICS
+            if topic in found
+        }
+        if CONFIG not in texts:
+            raise LogError(f"expected a header of a log, found no {CONFIG.name}")
         try:
-            table = json.loads(content[2:])
-            for name in ("record", "fields"):  # the robot says the same
-                table.pop(name, None)
-            return cls.model_validate(table)
-        except ValidationError as error:
-            raise LogError(f"expected a header of a log: {describe(error, cls)}") from None
-        except (AttributeError, TypeError, ValueError, RecursionError):
+            table: Any = json.loads(texts[CONFIG])
+            table |= {"versions": json.loads(texts.get(VERSIONS, "{}"))}
+        except (TypeError, ValueError, RecursionError):
             raise LogError("expected a header of a log, found no JSON") from None
+        return _checked(table | {"calibration": texts.get(CALIBRATION, "")})
+
+
+def _checked(content: bytes | Mapping[str, Any]) -> Header:
+    try:
+        read = Header.model_validate_json if isinstance(content, bytes) else Header.model_validate
+        return read(content)  # type: ignore[arg-type]
+    except ValidationError as error:
+        raise LogError(f"expected a header of a log: {describe(error, Header)}") from None

@@ -9,7 +9,7 @@ MOST_PARTS = 10
 
 
 def part(path: Path, number: int) -> Path:
-    """The n-th file of a log, 1 the first: `drive.log`, then `drive-2.log` beside it."""
+    """The n-th file of a log, 1 the first: `drive.mcap`, then `drive-2.mcap` beside it."""
     return path if number == 1 else path.with_name(f"{path.stem}-{number}{path.suffix}")
 
 

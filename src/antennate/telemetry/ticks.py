@@ -1,38 +1,39 @@
-"""One tick of a drive, as it is logged: what was read, decided and commanded, and the health.
+"""One tick of a loop, as it is logged: what was read, decided and commanded, and the health.
 
-Packed it is bytes, whose layout follows from the number of joints, and a text after them. Every
-float comes back bit by bit, NaN and infinities too.
+Every float comes back bit by bit, NaN and infinities too.
 """
 
 from __future__ import annotations
 
 import math
-import struct
+from collections.abc import Callable, Container, Iterator, Mapping
 from dataclasses import dataclass
-from itertools import islice
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
 
-from antennate.errors import LogError
 from antennate.hardware.driving.decision import Decision
 from antennate.hardware.driving.session import Session
 from antennate.messages import one_line
 from antennate.robots.spec import RobotSpec
-from antennate.telemetry.framing import SCHEMA, Kind
+from antennate.telemetry.cdr import MessageType
+from antennate.telemetry.topics import (
+    ANTENNA,
+    COUNTERS,
+    JOINT_COMMANDS,
+    JOINT_STATES,
+    JOINTS,
+    MANEUVER,
+    SUPERVISOR,
+    TICK,
+    TICK_TOPICS,
+    Topic,
+)
 from antennate.types import AntennaFrame, Controller, JointCommand
 
-_HEAD = struct.Struct("<BBH")
-"""Schema, kind and number of joints."""
-_CODES = {"number": "Q", "asked": "?", "t": "d", "now": "d"}
-_CODES |= {"counts": "dd", "reading": "dd", "level": "dd"}
-_CODES |= {"contact": "qq", "maneuver": "q", "phase": "d", "angles": "", "age": "d"}
-_CODES |= dict.fromkeys(
-    ("missed", "frames", "crc", "lost", "misses", "stale", "sent", "refused"), "Q"
-)
-"""The numbers of a tick in the order of its record, with their codes for `struct`: two for a pair,
-left and right; `angles` has a `d` for each joint."""
 _LONGEST_CAUSE = 160
+_ONE = dict(zip(JOINTS[1:], ("position", "velocity", "effort"), strict=True))
 _NEITHER = (math.nan, math.nan)
 
 Pair = tuple[float, float]
@@ -66,6 +67,9 @@ class Tick:
         stale: Late answers thrown away so far.
         sent: Commands sent so far.
         refused: Commands refused so far.
+        positions: Measured joint angles [rad], NaN for one that has not answered; empty if unknown.
+        velocities: Measured joint speeds [rad/s], empty if unknown.
+        efforts: Measured joint torques [N·m], empty if unknown.
     """
 
     number: int
@@ -91,6 +95,9 @@ class Tick:
     stale: int = 0
     sent: int = 0
     refused: int = 0
+    positions: tuple[float, ...] = ()
+    velocities: tuple[float, ...] = ()
+    efforts: tuple[float, ...] = ()
 
     @classmethod
     def of(cls, session: Session, t: float) -> Tick:
@@ -117,74 +124,106 @@ class Tick:
             stale=bus.stale,
             sent=session.tally.sent,
             refused=session.control.refused,
+            positions=session.actuators.state.angles,
         )
 
     @property
     def values(self) -> tuple[float, ...]:
-        """All numbers, in the order of `fields`."""
-        held = (getattr(self, name) for name in _CODES)
+        """All numbers but the measured ones of the joints, in the order of `fields`."""
+        held = (getattr(self, name) for name in _NUMBERS)
         return tuple(n for each in held for n in (each if isinstance(each, tuple) else (each,)))
+
+    def row(self, robot: RobotSpec, measured: Container[str] = ()) -> dict[str, Any]:
+        """It as a row of a table: numbers as they are, so that they come back exactly.
+
+        Args:
+            robot: Gives the names of the joints.
+            measured: Which of positions, velocities and efforts have columns.
+        """
+        found: dict[str, Any] = dict(zip(fields(robot), self.values, strict=False))
+        nothing = (math.nan,) * len(robot.joint_names)
+        for kind in JOINTS[1:]:
+            if kind in measured:
+                columns = (f"{name}_{_ONE[kind]}" for name in robot.joint_names)
+                found |= zip(columns, getattr(self, kind) or nothing, strict=False)
+        texts = {"state": self.state, "note": self.note, "causes": "; ".join(self.causes)}
+        return found | texts
 
     def frame(self) -> AntennaFrame:
         """What the controller got."""
         return AntennaFrame(t=np.array([self.t]), counts=np.array([self.counts]))
 
     def pack(self) -> bytes:
-        """The content of its record.
+        """All of it as bytes, for another process.
 
         Raises:
             LogError: A number does not fit.
         """
-        text = "\n".join((self.state, self.note, *self.causes)).encode("utf-8", "backslashreplace")
-        try:
-            joints = len(self.angles)
-            fixed = struct.pack(layout(joints), SCHEMA, Kind.TICK, joints, *self.values, len(text))
-        except struct.error as error:
-            raise LogError(f"expected a tick of numbers that fit, found: {error}") from None
-        return fixed + text
+        return TICK.encode(*_ALL(self))
 
     @classmethod
     def unpack(cls, content: bytes) -> Tick:
         """Back from `pack`.
 
         Raises:
-            LogError: It is no tick of this schema.
+            LogError: It is no tick.
         """
-        if len(content) < _HEAD.size or content[:2] != bytes((SCHEMA, Kind.TICK)):
-            raise LogError(f"expected a tick of schema {SCHEMA}, found {len(content)} other bytes")
-        joints = _HEAD.unpack_from(content)[2]
-        fixed = struct.Struct(layout(joints))
-        if len(content) < fixed.size:
-            raise LogError(f"expected a tick of {joints} joints, found {len(content)} bytes")
-        *numbers, length = fixed.unpack_from(content)
-        if len(content) != fixed.size + length:
-            raise LogError(f"expected a text of {length} bytes, found another length")
-        try:
-            state, note, *causes = content[fixed.size :].decode().split("\n")
-        except ValueError:
-            raise LogError("expected lines in UTF-8 as text of a tick, found others") from None
-        rest = iter(numbers[3:])
-        found: dict[str, Any] = {}
-        for name, code in _codes(joints).items():
-            values = tuple(islice(rest, len(code)))
-            found[name] = values if name == "angles" or len(code) > 1 else values[0]
-        return cls(**found, state=state, note=note, causes=tuple(causes))
+        return cls(**TICK.decode(content))
+
+    def messages(self, names: tuple[str, ...], stamp: int) -> Iterator[tuple[Topic, bytes]]:
+        """Its messages in a log.
+
+        Args:
+            names: Names of the joints.
+            stamp: Time of the messages [ns].
+
+        Raises:
+            LogError: A number does not fit.
+        """
+        for topic, values in _OWN:
+            found = values(self)
+            if topic in TICK_TOPICS or any(found):
+                yield topic, topic.type.encode(*found)
+        time = (*divmod(stamp, 10**9), "", names)
+        yield JOINT_COMMANDS, JOINT_COMMANDS.type.encode(*time, self.angles, (), ())
+        if self.positions:
+            measured = (self.positions, self.velocities, self.efforts)
+            yield JOINT_STATES, JOINT_STATES.type.encode(*time, *measured)
+
+    @classmethod
+    def of_messages(cls, found: Mapping[Topic, bytes]) -> Tick:
+        """Back from `messages`.
+
+        Raises:
+            LogError: One is not of its type.
+        """
+        values: dict[str, Any] = {}
+        for topic, _ in _OWN:
+            if topic in found:
+                values |= topic.type.decode(found[topic])
+        values["angles"] = JOINT_COMMANDS.type.decode(found[JOINT_COMMANDS])["position"]
+        if JOINT_STATES in found:
+            state = JOINT_STATES.type.decode(found[JOINT_STATES])
+            values |= {kind: state[name] for kind, name in _ONE.items()}
+        return cls(**values)
 
 
-def _codes(joints: int) -> dict[str, str]:
-    return _CODES | {"angles": "d" * joints}
+def _getter(kind: MessageType) -> Callable[[Tick], tuple[Any, ...]]:
+    return attrgetter(*(field.name for field in kind.fields))
 
 
-def layout(joints: int) -> str:
-    """For `struct`: a tick of a robot with so many joints; the length of its text comes last."""
-    return "<BBH" + "".join(_codes(joints).values()) + "I"
+_ALL = _getter(TICK)
+_OWN = tuple((topic, _getter(topic.type)) for topic in (ANTENNA, MANEUVER, COUNTERS, SUPERVISOR))
+"""Topics whose messages are fields of a tick."""
+_NUMBERS = tuple(f.name for f in TICK.fields if f.code and f.name not in JOINTS[1:])
 
 
 def fields(robot: RobotSpec) -> tuple[str, ...]:
-    """Names of all numbers of a tick, without schema, kind, number of joints and text."""
-    pairs = {name: (f"{name}_l", f"{name}_r") for name, code in _CODES.items() if len(code) > 1}
-    parts = pairs | {"angles": robot.joint_names}
-    return tuple(field for name in _CODES for field in parts.get(name, (name,)))
+    """Names of the numbers of a tick that are in its `values`."""
+    parts: dict[str, tuple[str, ...]] = {"angles": robot.joint_names}
+    pairs = [field.name for field in TICK.fields if field.number == 2]
+    parts |= {name: (f"{name}_l", f"{name}_r") for name in pairs}
+    return tuple(field for name in _NUMBERS for field in parts.get(name, (name,)))
 
 
 def angles_of(command: JointCommand, joints: int | None = None) -> tuple[float, ...]:

@@ -1,23 +1,38 @@
-"""Writes one log, record by record.
+"""Writes one log: an MCAP file of ROS 2 messages, chunk by chunk.
 
-Each record goes to the operating system at once: a program that is killed loses none that `write`
-has returned from. A power cut may lose what the system still holds.
+A chunk is closed and handed to the operating system, in one piece, `FLUSH` after its first tick. So
+a program that is killed loses the ticks of that time and no other. A power cut may lose what the
+system still holds. Chunks hold whole ticks and are compressed; each has a CRC.
 """
 
 from __future__ import annotations
 
 import contextlib
+import io
+import math
 import os
 import shutil
+import time
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
+from antennate import __version__
 from antennate.errors import LogError
-from antennate.telemetry.framing import SCHEMA, Kind, framed
 from antennate.telemetry.header import Header
 from antennate.telemetry.ticks import Tick
+from antennate.telemetry.topics import EVENTS, TOPICS, Topic
 
 LEAST_FREE = 1e9
-"""Room for seven hours of ticks at 100 Hz [byte], three with many causes (assumed)."""
+"""Room for six hours of ticks at 100 Hz [byte] (assumed)."""
+FLUSH = 0.2
+"""Time after which the next tick closes a chunk [s], so that a tick waits 0.25 s at most."""
+_CHUNK = 1 << 20
+"""Bytes after which it is closed sooner, as where simulated time runs fast."""
+_LATEST = 1 << 60
+"""No message is later [ns]."""
+_LEVELS = {"HOLD": 30, "FAULT": 50, "OFF": 20, "DEGRADED": 30}
+"""Levels of rcl_interfaces/msg/Log: 20 INFO, 30 WARN, 50 FATAL."""
 
 
 class LogWriter:
@@ -27,57 +42,141 @@ class LogWriter:
         path: A file that does not exist yet.
         header: What stands at its beginning.
         least_free: Free space below which it is not begun [byte].
+        flush: Time after which ticks are handed to the operating system [s].
 
     Attributes:
         path: Where it is.
-        written: Ticks written.
+        written: Ticks taken.
+        kept: Those of them that the operating system has.
         failure: Why writing has ended, empty while it goes on.
 
     Raises:
         LogError: The file exists or cannot be written, or the disk is nearly full.
     """
 
-    def __init__(self, path: Path, header: Header, least_free: float = LEAST_FREE) -> None:
-        self.path = path
-        self.written = 0
+    def __init__(
+        self, path: Path, header: Header, least_free: float = LEAST_FREE, flush: float = FLUSH
+    ) -> None:
+        from mcap.writer import Writer  # slow to import
+
+        self.path, self._header, self._flush = path, header, flush
+        self._names = header.robot.joint_names
+        self.written = self.kept = self._size = self._time = 0
+        self._since, self._state = math.inf, ""
         self.failure = ""
         self._require_room(least_free)
-        try:
-            self._file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o644)
-        except FileExistsError:
-            raise LogError(
-                f"expected a log that does not exist yet, found {path}; choose another name"
-            ) from None
-        except OSError as error:
-            raise LogError(f"expected to write {path}, found: {error.strerror}") from None
-        self._put(header.pack())
+        self._file = _NewFile(path)
+        file: Any = self._file
+        self._writer = Writer(file, chunk_size=1 << 40)
+        self._writer.start("ros2", f"antennate {__version__}")
+        self._channels = self._register()
+        for topic, data in header.messages().items():
+            self.add(topic, 0, header.start, data)
+        self.flush()
 
-    def write(self, tick: Tick | bytes) -> None:
-        """Add a tick, packed or not. After a failure or `close` it does nothing.
+    def _register(self) -> dict[Topic, int]:
+        schemas: dict[str, int] = {}
+        for kind in {topic.type.name: topic.type for topic in TOPICS}.values():
+            schemas[kind.name] = self._writer.register_schema(
+                kind.name, "ros2msg", kind.schema.encode()
+            )
+        return {
+            topic: self._writer.register_channel(topic.name, "cdr", schemas[topic.type.name])
+            for topic in TOPICS
+        }
+
+    def write(self, tick: Tick) -> None:
+        """Add a tick. After a failure or `close` it does nothing.
 
         Raises:
-            LogError: The disk is full or gone; raised once; what was written stays readable.
+            LogError: A number does not fit; or the disk is full or gone, which is raised once, and
+                what was written stays readable.
         """
-        if not self.failure:
-            self._put(tick.pack() if isinstance(tick, Tick) else tick)
+        if self.failure:
+            return
+        stamp = self._stamp(tick.now)
+        messages = list(tick.messages(self._names, stamp))
+        if tick.state != self._state:
+            messages.append((EVENTS, self._event(tick, stamp)))
+        for topic, data in messages:
+            self.add(topic, tick.number, stamp, data)
+        self._state = tick.state
+        self.written += 1
+        self.settle()
+
+    def write_many(
+        self, times: Sequence[float], messages: Mapping[Topic, Sequence[bytes | None]]
+    ) -> None:
+        """Add ticks that follow one another, made elsewhere, and hand them over at once.
+
+        Args:
+            times: Time of each [s].
+            messages: What `Tick.messages` would give, by topic; None where there is nothing.
+
+        Raises:
+            LogError: The disk is full or gone.
+        """
+        if self.failure:
+            return
+        channels = [self._channels[topic] for topic in messages]
+        for now, *each in zip(times, *messages.values(), strict=True):
+            stamp = self._time = self._stamp(now)
             self.written += 1
+            for channel, data in zip(channels, each, strict=True):
+                if data is not None:
+                    self._writer.add_message(channel, stamp, data, stamp, self.written)
+        self.flush()
+
+    def add(self, topic: Topic, number: int, stamp: int, data: bytes) -> None:
+        """Add a message as it is, of a tick and a time [ns]; it is not counted as a tick."""
+        if self.failure:
+            return
+        self._since = min(self._since, time.monotonic())
+        self._size += len(data)
+        self._time = max(self._time, stamp)
+        self._writer.add_message(self._channels[topic], stamp, data, stamp, number & 0xFFFFFFFF)
+
+    def settle(self) -> None:
+        """Hand over what has waited long enough; to be called where no tick may follow for a while.
+
+        Raises:
+            LogError: The disk is full or gone.
+        """
+        if time.monotonic() - self._since >= self._flush or self._size >= _CHUNK:
+            self.flush()
+
+    def flush(self) -> None:
+        """Hand over what waits to the operating system.
+
+        Raises:
+            LogError: The disk is full or gone.
+        """
+        if self.failure:
+            return
+        try:
+            self._writer.flush()
+        except OSError as error:
+            self._fail(error)
+        self.kept, self._size = self.written, 0
+        self._since = math.inf
 
     def close(self) -> None:
-        """Say that the log ends here, and wait until the disk has it.
+        """Write the summary, and wait until the disk has all.
 
         Raises:
             LogError: That failed.
         """
         if self.failure:
             return
-        self._put(bytes((SCHEMA, Kind.END)) + self.written.to_bytes(8, "little"))
-        self.failure = "it is closed"
+        self.flush()
         try:
-            os.fsync(self._file)
+            self._writer.finish()
+            self._file.flush()
+            self._file.sync()
         except OSError as error:
-            raise LogError(f"expected to write {self.path}, found: {error.strerror}") from None
-        finally:
-            os.close(self._file)
+            self._fail(error)
+        self.failure = "it is closed"
+        self._file.close()
 
     def __enter__(self) -> LogWriter:
         return self
@@ -85,20 +184,26 @@ class LogWriter:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def _put(self, content: bytes) -> None:
-        data = framed(content)
-        try:
-            if (count := os.write(self._file, data)) == len(data):
-                return
-            self.failure = f"only {count} of {len(data)} bytes were taken; the disk is full"
-        except OSError as error:
-            self.failure = str(error.strerror)
+    def _stamp(self, now: float) -> int:
+        """Time of messages [ns], never before the last one's."""
+        since = round(1e9 * now) if abs(now) < 1e9 else 0
+        return max(self._time, min(max(0, self._header.start + since), _LATEST))
+
+    def _event(self, tick: Tick, stamp: int) -> bytes:
+        before = f" after {self._state}" if self._state else ""
+        words = "; ".join([f"{tick.state or 'no state'}{before}", *tick.causes])
+        level = _LEVELS.get(tick.state, 20)
+        time = divmod(stamp, 10**9)
+        return EVENTS.type.encode(*time, level, "supervisor", words, "", "", 0)
+
+    def _fail(self, error: OSError) -> None:
+        self.failure = str(error.strerror or error)
         with contextlib.suppress(OSError):
-            os.close(self._file)
+            self._file.close()
         raise LogError(
             f"expected to write {self.path}, found: {self.failure}; the log ends after "
-            f"{self.written} ticks"
-        )
+            f"{self.kept} ticks"
+        ) from None
 
     def _require_room(self, least: float) -> None:
         try:
@@ -111,3 +216,52 @@ class LogWriter:
             raise LogError(
                 f"expected {1e-9 * least:g} GB free for {self.path}, found {1e-9 * free:.2g} GB"
             )
+
+
+class _NewFile(io.BufferedIOBase):
+    """A new file that takes what was written to it in one piece, once it is flushed."""
+
+    def __init__(self, path: Path) -> None:
+        self._held, self._at = bytearray(), 0
+        try:
+            self._file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o644)
+        except FileExistsError:
+            raise LogError(
+                f"expected a log that does not exist yet, found {path}; choose another name"
+            ) from None
+        except OSError as error:
+            raise LogError(f"expected to write {path}, found: {error.strerror}") from None
+
+    def write(self, data: bytes) -> int:  # type: ignore[override]
+        """Hold it until the next flush."""
+        self._held += data
+        return len(data)
+
+    def tell(self) -> int:
+        """Where the next byte comes."""
+        return self._at + len(self._held)
+
+    def flush(self) -> None:
+        """Hand over what is held.
+
+        Raises:
+            OSError: It was not taken, or only in part.
+        """
+        held, self._held = self._held, bytearray()
+        if not held:
+            return
+        count = os.write(self._file, held)
+        self._at += count
+        if count < len(held):
+            raise OSError(f"only {count} of {len(held)} bytes were taken; the disk is full")
+
+    def sync(self) -> None:
+        """Wait until the disk has it."""
+        os.fsync(self._file)
+
+    def close(self) -> None:
+        """Close it; what is held is lost."""
+        self._held.clear()
+        if self._file >= 0:
+            file, self._file = self._file, -1
+            os.close(file)

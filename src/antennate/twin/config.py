@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from typing import Annotated, ClassVar
 
-from antennate.params.base import GATHERED, Params, number
+from antennate.params.base import GATHERED, Params, number, paths_of
 from antennate.params.control import GaitParams
+from antennate.params.gaits import LiftParams
 from antennate.params.twin import BatteryParams
-from antennate.robots.spec import RobotSpec
+from antennate.robots.spec import RobotSpec, require_antennae
 from antennate.sim.scenes.registry import make_scene
 from antennate.sim.sim_robot import SimRobot
 from antennate.sim.trial import TrialConfig, draw_trial
@@ -44,6 +45,7 @@ class TwinConfig(TrialConfig):
                 "antenna_frequency",
             )
         ),
+        *paths_of(LiftParams, "control.gait.lift"),
         "robot.antenna.sensor.rate",
     )
     trial: int = number(0, "1", "assumed: the first", ge=0)
@@ -72,6 +74,7 @@ def build(config: TwinConfig, boot_id: int | None = None) -> TwinRobot:
 
 def watched(config: TwinConfig, boot_id: int | None = None) -> tuple[TwinRobot, Passage]:
     """The same, and how far it comes."""
+    require_antennae(config.robot, "the twin")
     control, period = config.control, config.control.period
     scene = make_scene(config.scene, config.tunnel)
     start = draw_trial(config, scene, config.trial, control.gait, period)

@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from antennate.robots.servos import TICKS_A_TURN, ServoParams, XL330Params
+from antennate.robots.servos import TICKS_A_TURN, ServoParams, XL330Params, XL430Params
 from antennate.twin.memory import Memory
 
 LOOP = 0.001
@@ -58,11 +58,10 @@ def _rating(servo: ServoParams) -> Rating:
     )
 
 
-_RPM = 2.0 * math.pi / 60.0
 RATINGS = {
     1080: _rating(ServoParams()),
     1200: _rating(XL330Params()),
-    1060: Rating(11.1, 1.4, 1.3, 57.0 * _RPM, 0.003),
+    1060: _rating(XL430Params()),
 }
 """By model number; datasheets at 11.1, 5.0 and 11.1 V, inertia of the XL430 as of the XC430."""
 

@@ -6,10 +6,9 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from antennate.control.gait import require_step
 from antennate.experiments.gait import run as gait
 from antennate.studies.experiment import Experiment
-from antennate.studies.measures import Measure, Table
+from antennate.studies.measures import Measure, Table, shown
 
 MANEUVER = (
     Measure("speed_m_s", "speed", "m/s", form="+.3f"),
@@ -23,23 +22,67 @@ def tables(result: Mapping[str, Any]) -> Sequence[Table]:
     """The maneuvers, and what the lead of the body wave is worth."""
     cost, off = result["cost_of_phase"], result["wave_off"]
     chosen, best = (math.degrees(result[f"{k}_body_phase_rad"]) for k in ("chosen", "best"))
+    share = "" if off["ratio"] is None else f", {100 * off['ratio']:.0f} % of legs that roll"
     maneuvers = Table.of(
         "Maneuvers",
         result["maneuvers"],
         MANEUVER,
-        f"Robot length {result['body_length_m']:g} m, {result['frequency_hz']:g} cycles a second.\n"
-        f"Without the body wave {off['speed_m_s']:.3f} m/s, {100 * off['ratio']:.0f} % of legs "
-        f"that roll without slip.\n"
+        f"Body length {result['body_length_m']:g} m, {result['frequency_hz']:g} cycles a second.\n"
+        f"Without the body wave {off['speed_m_s']:z.3f} m/s{share and f'{share} without slip'}.\n"
         f"The chosen lead of {chosen:.0f} deg gives {100 * cost['chosen_over_best']:.0f} % of the "
         f"best speed of all leads, at {best:.0f} deg;\n"
         f"the worst lead gives {100 * cost['worst_over_best']:.0f} %.",
     )
-    return (maneuvers,)
+    return (maneuvers, *_unknown(result))
+
+
+def _unknown(result: Mapping[str, Any]) -> Sequence[Table]:
+    """FORWARD with each unknown number at both ends of its range, and with all of them drawn."""
+    if (unknown := result["unknown"]) is None:
+        return ()
+    rows = [
+        (name, [*(f"{end:g}" for end in row["range"]), *_numbers(row["body_lengths_per_cycle"])])
+        for name, row in unknown["parameters"].items()
+    ]
+    one = Table(
+        "FORWARD with one number changed, body lengths a cycle",
+        ("lower end", "upper end", "at the lower", "at the upper"),
+        rows,
+        f"As configured {result['maneuvers']['forward']['body_lengths_per_cycle']:.2f}.",
+    )
+    every = [
+        ("median", [f"{unknown['median']:.2f}"]),
+        ("95 % of the draws", [shown(unknown["interval95"])]),
+        ("all draws", [shown(unknown["range"])]),
+    ]
+    if (measured := result["measured_body_lengths_per_cycle"]) is not None:
+        every += [("measured on a robot", [f"{measured:.2f}"])]
+        every += [("draws below that", [f"{_below(unknown, measured)} of {unknown['draws']}"])]
+    return one, Table("All of them drawn", ("body lengths a cycle",), every)
+
+
+def _numbers(values: Sequence[float]) -> list[str]:
+    return [f"{value:.2f}" for value in values]
+
+
+def _below(unknown: Mapping[str, Any], measured: float) -> int:
+    return sum(value < measured for value in unknown["body_lengths_per_cycle"])
 
 
 def sentence(result: Mapping[str, Any]) -> str:
     """Speed and turn of the gait."""
     forward, left = result["maneuvers"]["forward"], result["maneuvers"]["turn_l"]
+    if (unknown := result["unknown"]) is not None:
+        measured = result["measured_body_lengths_per_cycle"]
+        low, high = unknown["interval95"]
+        place = ""
+        if measured is not None:
+            where = "inside" if low <= measured <= high else "outside"
+            place = f"; the measured {measured:.2f} is {where}"
+        return (
+            f"FORWARD walks {low:.2f} to {high:.2f} body lengths a cycle in 95 % of "
+            f"{unknown['draws']} draws of {len(unknown['parameters'])} unknown numbers{place}."
+        )
     return (
         f"FORWARD walks at {forward['speed_m_s']:.3f} m/s and TURN_L turns by "
         f"{left['yaw_deg_per_cycle']:.0f} deg a cycle in simulation. A walk "
@@ -53,7 +96,11 @@ EXPERIMENT = Experiment.of_folder(
     lambda config, workers, on_step, _: gait.run(config, workers, on_step),
     tables,
     sentence,
+<<<<<<< HEAD
     check=lambda config: require_step(config.robot),
     filmed=True,
+=======
+    check=gait.check,
+>>>>>>> main
     parts="walks",
 )

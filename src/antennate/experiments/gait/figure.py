@@ -17,8 +17,10 @@ from antennate.types import Maneuver
 
 
 def figures(outcome: GaitOutcome) -> dict[str, Figure]:
-    """The figure of a run."""
-    return {"gait": study(outcome.result(), outcome.maneuvers)}
+    """The figures of a run."""
+    result = outcome.result()
+    found = {"gait": study(result, outcome.maneuvers)}
+    return found if result["unknown"] is None else found | {"unknown": unknown(result)}
 
 
 @style.styled
@@ -87,4 +89,50 @@ def _draw_plan(panel: Axes, result: Mapping[str, Any], walks: Mapping[str, Walk]
     panel.set(
         xlabel="x [m]", ylabel="y [m]", title="Centre of the robot from above, square at the start"
     )
-    panel.legend(loc="upper left", fontsize=8)
+    panel.legend(loc="best", fontsize=8)
+
+
+@style.styled
+def unknown(result: Mapping[str, Any]) -> Figure:
+    """FORWARD over all draws of the unknown numbers, and over each of them alone.
+
+    Args:
+        result: The content of result.json.
+    """
+    figure = style.canvas(10.0, 0.36 * len(result["unknown"]["parameters"]) + 2.2)
+    draws, alone = figure.subplots(1, 2, width_ratios=(1, 1.1), sharex=True)
+    _draw_draws(draws, result)
+    _draw_alone(alone, result)
+    measured = result["measured_body_lengths_per_cycle"]
+    for panel in (draws, alone):
+        if measured is not None:
+            panel.axvline(measured, color=style.SERIES[4], linestyle=(0, (4, 2)), label="measured")
+        panel.set_xlabel("body lengths a cycle")
+    draws.legend(loc="upper right", frameon=True, facecolor="white", edgecolor="none")
+    return figure
+
+
+def _draw_draws(panel: Axes, result: Mapping[str, Any]) -> None:
+    found = result["unknown"]
+    panel.hist(found["body_lengths_per_cycle"], bins=20, color=style.SERIES[5], label="draws")
+    low, high = found["interval95"]
+    panel.axvspan(low, high, color=style.FAINT, alpha=0.5, zorder=0, label="95 % of them")
+    panel.set_ylim(0, 1.5 * panel.get_ylim()[1])
+    panel.set(ylabel="draws", title=f"{found['draws']} draws of all unknown numbers")
+
+
+def _draw_alone(panel: Axes, result: Mapping[str, Any]) -> None:
+    rows = result["unknown"]["parameters"]
+    order = sorted(rows, key=lambda name: abs(rows[name]["change"]))
+    for i, name in enumerate(order):
+        low, high = rows[name]["body_lengths_per_cycle"]
+        panel.plot([low, high], [i, i], color=style.INK, linewidth=2.2, zorder=2)
+        panel.plot(low, i, "o", color=style.SERIES[0], zorder=3, label="" if i else "lower end")
+        panel.plot(high, i, "s", color=style.SERIES[1], zorder=3, label="" if i else "upper end")
+    forward = result["maneuvers"]["forward"]["body_lengths_per_cycle"]
+    panel.axvline(forward, color=style.MUTED, linewidth=1.0)
+    ticks = [f"{n}\n{rows[n]['range'][0]:g} to {rows[n]['range'][1]:g}" for n in order]
+    panel.set_yticks(range(len(order)), ticks)
+    panel.set_ylim(-0.6, len(order) + 0.5)
+    panel.set_title("Each alone; the grey line is the run as configured")
+    panel.legend(loc="upper right", ncols=2, frameon=True, facecolor="white", edgecolor="none")

@@ -1,7 +1,8 @@
 """The gait on a flat floor: how far each maneuver goes, what the lead of the body wave is worth.
 
-Every walk runs through the same wall and loop as a trial, without a random part. The gait is
+Every walk runs through the same interface and loop as a trial, without a random part. The gait is
 its own mirror image half a cycle later, so over whole cycles FORWARD neither yaws nor drifts.
+FORWARD is walked again for numbers that are not known, drawn from their ranges.
 """
 
 from __future__ import annotations
@@ -9,18 +10,18 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
-from pydantic import model_validator
 
 from antennate.control.gait import Gait
 from antennate.control.loop import run_loop
+from antennate.experiments.gait.config import GaitStudyConfig
 from antennate.experiments.gait.pace import Pace, Walk, measure, rolling_speed
-from antennate.params.base import Params, number, require_whole_steps
+from antennate.experiments.gait.unknown import drawn
 from antennate.params.control import GaitParams
-from antennate.params.scene import PhysicsParams, VariationParams
-from antennate.robots.spec import HARDWARE_ALONE, RobotSpec
+from antennate.params.scene import VariationParams
+from antennate.robots.spec import RobotSpec
 from antennate.sim.scenes.scene import FlatScene
 from antennate.sim.sim_robot import Disturbance, SimRobot
 from antennate.sim.trial import place_at_start
@@ -35,40 +36,21 @@ _TINY = 1e-6
 """Rounding of times [s]."""
 
 
-class GaitStudyConfig(Params):
-    """Everything that decides the outcome of `antennate gait`."""
-
-    unread: ClassVar[tuple[str, ...]] = HARDWARE_ALONE
-    cycles: int = number(
-        4, "1", "measured: antennate gait, six cycles give the same speeds to 0.3 %", ge=2, le=100
-    )
-    """Gait cycles measured."""
-    settling_cycles: int = number(
-        2, "1", "measured: antennate gait, 1 % from cycle to cycle then", ge=0, le=100
-    )
-    """Gait cycles before measuring."""
-    sweep_points: int = number(24, "1", "assumed: steps of 15 deg", ge=2, le=360)
-    """Leads of the body wave tried, evenly over a full turn."""
-    rate: float = number(100.0, "Hz", "paper: about 100 Hz over serial", gt=0, le=1000)
-    """Control ticks per second."""
-    robot: RobotSpec = RobotSpec()
-    gait: GaitParams = GaitParams()
-    physics: PhysicsParams = PhysicsParams()
-
-    @model_validator(mode="after")
-    def _whole_steps(self) -> GaitStudyConfig:
-        require_whole_steps("rate", self.rate, self.physics.timestep)
-        return self
-
-
 @dataclass(frozen=True, slots=True)
 class GaitOutcome(Outcome):
-    """All walks: four maneuvers by name, one without body wave, and the sweep over its lead."""
+    """All walks: four maneuvers by name, one without body wave, and the sweep over its lead.
+
+    Attributes:
+        drawn: FORWARD for each draw of the unknown numbers.
+        ends: FORWARD with each of them alone at its lower and its upper end.
+    """
 
     config: GaitStudyConfig
     maneuvers: dict[str, Walk]
     wave_off: Walk
     sweep: list[Walk]
+    drawn: list[Walk]
+    ends: dict[str, tuple[Walk, Walk]]
 
     def pace(self, walk: Walk) -> Pace:
         """What a walk of this study comes to."""
@@ -77,7 +59,9 @@ class GaitOutcome(Outcome):
     def result(self) -> dict[str, Any]:
         """The content of result.json."""
         config = self.config
-        rolling = rolling_speed(config.gait, config.robot)
+        rolling = None
+        if config.robot.legs.kind == "rolling":
+            rolling = rolling_speed(config.gait, config.robot)
         straight = self.pace(self.wave_off).speed
         chosen = self.pace(self.maneuvers["forward"]).speed
         swept = [self.pace(walk) for walk in self.sweep]
@@ -86,13 +70,13 @@ class GaitOutcome(Outcome):
         return {
             "schema": 1,
             "command": "gait",
-            "body_length_m": config.robot.length,
+            "body_length_m": config.length,
             "frequency_hz": config.gait.frequency,
             "maneuvers": {name: self._row(walk) for name, walk in self.maneuvers.items()},
             "wave_off": {
                 "speed_m_s": straight,
                 "expected_m_s": rolling,
-                "ratio": straight / rolling,
+                "ratio": None if rolling is None else straight / rolling,
             },
             "phase_sweep": [
                 {
@@ -107,6 +91,29 @@ class GaitOutcome(Outcome):
             "cost_of_phase": {
                 "chosen_over_best": chosen / best,
                 "worst_over_best": min(speeds) / best,
+            },
+            "measured_body_lengths_per_cycle": config.measured,
+            "unknown": self._unknown() if self.drawn else None,
+        }
+
+    def _unknown(self) -> dict[str, Any]:
+        """What the unknown numbers make of FORWARD, in body lengths a cycle."""
+        found = np.array([self.pace(walk).body_lengths for walk in self.drawn])
+        ends = {n: [self.pace(walk).body_lengths for walk in both] for n, both in self.ends.items()}
+        low, median, high = np.percentile(found, [2.5, 50.0, 97.5]).tolist()
+        return {
+            "draws": len(found),
+            "median": median,
+            "interval95": [low, high],
+            "range": [float(found.min()), float(found.max())],
+            "body_lengths_per_cycle": found.tolist(),
+            "parameters": {
+                one.name: {
+                    "range": [one.low, one.high],
+                    "body_lengths_per_cycle": ends[one.name],
+                    "change": ends[one.name][1] - ends[one.name][0],
+                }
+                for one in self.config.unknowns
             },
         }
 
@@ -131,6 +138,15 @@ class _Fixed:
 
     def step(self, frame: AntennaFrame) -> JointCommand:
         return self._gait.step(self._maneuver)
+
+
+def check(config: GaitStudyConfig) -> None:
+    """Find draws that make no robot or gait before anything is run.
+
+    Raises:
+        ConfigError: There is one.
+    """
+    _tasks(config)
 
 
 _Task = tuple[GaitStudyConfig, str, GaitParams, Maneuver]
@@ -182,7 +198,7 @@ def walk_flat(
         heading=np.unwrap(np.arctan2(axis[:, 1], axis[:, 0])),
         work=np.array([tick[2] for tick in ticks]),
         weight=float(world.model.body_mass.sum() * np.linalg.norm(world.model.opt.gravity)),
-        length=robot.length,
+        length=config.length,
     )
 
 
@@ -226,8 +242,23 @@ def _tasks(config: GaitStudyConfig) -> list[_Task]:
         forward[f"sweep{i}"] = _changed(gait, body_phase=lead)
     return [
         *((config, m.name.lower(), gait, m) for m in MANEUVERS),
-        *((config, name, changed, Maneuver.FORWARD) for name, changed in forward.items()),
+        *((config, name, one, Maneuver.FORWARD) for name, one in forward.items()),
+        *((one, name, one.gait, Maneuver.FORWARD) for name, one in _unknown(config).items()),
     ]
+
+
+def _unknown(config: GaitStudyConfig) -> dict[str, GaitStudyConfig]:
+    """What is walked for the unknown numbers: each draw, then each number at its ends."""
+    unknowns, found = config.unknowns, dict[str, GaitStudyConfig]()
+    if not unknowns:
+        return found
+    names = [one.name for one in unknowns]
+    for i, values in enumerate(drawn(unknowns, config.draws, config.seed).tolist()):
+        found[f"draw{i}"] = config.at(dict(zip(names, values, strict=True)))
+    for one in unknowns:
+        found[f"{one.name}:low"] = config.at({one.name: one.low})
+        found[f"{one.name}:high"] = config.at({one.name: one.high})
+    return found
 
 
 def _changed(gait: GaitParams, **values: float) -> GaitParams:
@@ -239,9 +270,10 @@ def run(
     workers: int = 1,
     on_step: OnStep = no_step,
 ) -> GaitOutcome:
-    """Walk all maneuvers, the one without body wave, and the sweep.
+    """Walk all maneuvers, the one without body wave, the sweep, and the unknown numbers.
 
     Raises:
+        ConfigError: A draw of the unknown numbers makes no robot or gait.
         SimulationError: The physics became invalid; from a worker it comes as a WorkerError.
     """
     found = {w.name: w for w in gather(walk_flat, _tasks(config), workers, on_step)}
@@ -250,4 +282,9 @@ def run(
         maneuvers={m.name.lower(): found[m.name.lower()] for m in MANEUVERS},
         wave_off=found[WAVE_OFF],
         sweep=[found[f"sweep{i}"] for i in range(config.sweep_points)],
+        drawn=[found[f"draw{i}"] for i in range(config.draws) if config.unknown],
+        ends={
+            one.name: (found[f"{one.name}:low"], found[f"{one.name}:high"])
+            for one in config.unknowns
+        },
     )

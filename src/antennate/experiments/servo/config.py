@@ -15,7 +15,9 @@ _OF_THE_FIT = ("draws", "seed")
 class ServoConfig(Params):
     """Everything that decides the outcome of `antennate servo`."""
 
-    unread: ClassVar[tuple[str, ...]] = ("servos.xc430_w240.p_gain", "servos.xl330_m288.p_gain")
+    unread: ClassVar[tuple[str, ...]] = tuple(
+        f"servos.{name}.p_gain" for name in ServosParams.model_fields
+    )
     recording: tuple[str, ...] = number((), "1", "assumed: has to be named")
     """Recordings: JSON of Rhoban/bam."""
     servo: ServoName = number("xl330_m288", "1", "assumed: the model with a known recording")

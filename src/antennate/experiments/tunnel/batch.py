@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Sequence
+from pathlib import Path
 
 import numpy as np
 
@@ -15,7 +17,12 @@ from antennate.experiments.tunnel.monitor import Outcome, TrialMonitor, TrialPat
 from antennate.sim.scenes.registry import make_scene
 from antennate.sim.sim_robot import SimRobot
 from antennate.sim.trial import draw_trial
+<<<<<<< HEAD
 from antennate.sim.world import World
+=======
+from antennate.telemetry.header import Header
+from antennate.telemetry.simulated import SimulatedLog
+>>>>>>> main
 from antennate.types import AntennaFrame, Controller, JointCommand
 
 BATCH = 12
@@ -31,9 +38,13 @@ def run_trials(
     trials: Sequence[int],
     emit: Emit,
     batch: int = BATCH,
+<<<<<<< HEAD
     watch: Watch | None = None,
+=======
+    logs: Path | None = None,
+>>>>>>> main
 ) -> None:
-    """Run trials of one controller; emit each as it ends.
+    """Run trials of one controller; emit each as it ends, and keep its log if there is a folder.
 
     A trial in which the controller fails is invalid, and the others go on. Angles that are not
     finite, and a maneuver that does not exist, are faults of one row and end that trial alone. An
@@ -41,7 +52,11 @@ def run_trials(
     batch that has not ended begins again with a controller of its own, and is invalid if that one
     fails too.
     """
+<<<<<<< HEAD
     rows = _Rows(config, controller, trials, emit, min(batch, len(trials)), watch)
+=======
+    rows = _Rows(config, controller, trials, emit, min(batch, len(trials)), logs)
+>>>>>>> main
     try:
         rows.run()
     except ControllerError as error:
@@ -49,7 +64,8 @@ def run_trials(
             rows.end(0, "invalid", f"controller: {error}")
             return
         for trial in rows.unfinished:
-            run_trials(config, controller, [trial], emit)
+            rows.log_of(trial).unlink(missing_ok=True)
+            run_trials(config, controller, [trial], emit, logs=logs)
 
 
 class _Rows:
@@ -62,10 +78,17 @@ class _Rows:
         trials: Sequence[int],
         emit: Emit,
         batch: int,
+<<<<<<< HEAD
         watch: Watch | None,
     ) -> None:
         self._config, self._name, self._emit, self._batch = config, name, emit, batch
         self._looks = watch
+=======
+        logs: Path | None,
+    ) -> None:
+        self._config, self._name, self._emit, self._batch = config, name, emit, batch
+        self._folder, self._logs = logs, dict[int, SimulatedLog]()
+>>>>>>> main
         self._waiting = list(trials)
         self._scene = make_scene(config.scene, config.tunnel)
         self._monitors: list[TrialMonitor | None] = [None] * batch
@@ -93,13 +116,21 @@ class _Rows:
         control = CheckedController(made, config.robot, self._batch)
         for row, phase in enumerate(phases):
             control.reset(np.array([row]), phase)
+            self._log(row, made, phase)
 
         def go_on(frame: AntennaFrame, command: JointCommand) -> bool:
+<<<<<<< HEAD
             if self._looks is not None:
                 self._looks(self._robot.world(0), frame, made)
+=======
+            for log in self._logs.values():
+                log.take(frame, command)
+>>>>>>> main
             for row, monitor in enumerate(self._monitors):
                 if monitor is not None and self._watch(row, monitor, control) and self._waiting:
-                    control.reset(np.array([row]), self._place(row))
+                    phase = self._place(row)
+                    control.reset(np.array([row]), phase)
+                    self._log(row, made, phase)
             return any(monitor is not None for monitor in self._monitors)
 
         run_loop(self._robot, control, config.control.period, go_on)
@@ -116,6 +147,27 @@ class _Rows:
         )
         return start.phase
 
+    def log_of(self, trial: int) -> Path:
+        """The log of a trial."""
+        name = re.sub(r"[^\w.-]", "_", self._name)
+        return (self._folder or Path()) / f"{name}-{trial}.mcap"
+
+    def _log(self, row: int, controller: Controller, phase: float) -> None:
+        """Begin the log of the trial that was put into a row."""
+        config, monitor = self._config, self._monitors[row]
+        if self._folder is None or monitor is None:
+            return
+        header = Header(
+            controller=self._name,
+            params=config.control,
+            robot=config.robot,
+            seed=config.seed,
+            trial=monitor.trial,
+            phase=phase,
+        )
+        world, path = self._robot.world(row), self.log_of(monitor.trial)
+        self._logs[row] = SimulatedLog(path, header, controller, world, row)
+
     def _watch(self, row: int, monitor: TrialMonitor, control: CheckedController) -> bool:
         """Look at a row after a tick; whether its trial has ended."""
         fault = control.faults.get(row)
@@ -131,6 +183,8 @@ class _Rows:
 
     def end(self, row: int, outcome: Outcome, reason: str) -> None:
         """Emit the trial of a row, and empty the row."""
+        if (log := self._logs.pop(row, None)) is not None:
+            log.close()
         monitor, world = self._monitors[row], self._robot.world(row)
         if monitor is not None:
             self._emit((monitor.result(world, outcome, reason), monitor.path(world)))

@@ -81,4 +81,5 @@ EXPERIMENT = Experiment.of_folder(
     check=tunnel.check,
     filmed=True,
     failed=lambda result: bool(_none_valid(result)),
+    logged=tunnel.run,
 )

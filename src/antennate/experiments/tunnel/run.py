@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from antennate.control.registry import make_controller
@@ -66,12 +67,13 @@ def check(config: TunnelConfig) -> None:
             raise ConfigError(f"--controllers: {error}") from error
 
 
-_Task = tuple[TunnelConfig, str, list[int]]
-"""Configuration, name of the controller, trials."""
+_Task = tuple[TunnelConfig, str, list[int], Path | None]
+"""Configuration, name of the controller, trials, folder for their logs."""
 
 
 def _run_task(task: _Task, emit: Callable[[Any], None]) -> None:
-    run_trials(*task, emit)
+    config, name, trials, logs = task
+    run_trials(config, name, trials, emit, logs=logs)
 
 
 def run(
@@ -79,10 +81,12 @@ def run(
     workers: int = 1,
     on_step: OnStep = no_step,
     on_row: OnRow = no_row,
+    logs: Path | None = None,
 ) -> TunnelOutcome:
-    """Run all trials of all controllers.
+    """Run all trials of all controllers, with the log of each in a folder if one is given.
 
     Raises:
+        LogError: A log cannot be written.
         SceneError: A scene cannot be built as described.
         WorkerError: A worker process died.
     """
@@ -92,7 +96,7 @@ def run(
         list(range(first, min(first + size, config.trials)))
         for first in range(0, config.trials, size)
     ]
-    tasks = [(config, name, chunk) for name in config.controllers for chunk in chunks]
+    tasks = [(config, name, chunk, logs) for name in config.controllers for chunk in chunks]
     found: list[tuple[TrialResult, TrialPath]] = []
 
     def take(item: tuple[TrialResult, TrialPath]) -> None:

@@ -48,7 +48,6 @@ class TeleopConfig(DriveConfig):
     unread: ClassVar[tuple[str, ...]] = (
         *SIMULATION_ALONE,
         "controller",
-        "robot.legs.limit",
         *paths_of(DeadManParams, "dead_man"),
         *(f"control.rule.{name}" for name in ("strong", "similar", "hold_time")),
         *paths_of(RepetitionParams, "control.repetition"),

@@ -153,3 +153,5 @@ class DynamixelActuators:
         """Read all positions, and a little more in turn."""
         self.state.loose = self.turns.loose
         self.state.step()
+        ticks = [self.state.positions.get(servo, math.nan) for servo in self.joints.ids]
+        self.state.angles = tuple(self.joints.angles(np.array(ticks)).tolist())

@@ -1,0 +1,223 @@
+"""`antennate log`: what a log holds, and the log in other forms."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from importlib import import_module
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic.dataclasses import dataclass
+
+from antennate.cli.arguments import parse
+from antennate.cli.exit_codes import OK
+from antennate.cli.options import option
+from antennate.cli.replay import complain
+from antennate.cli.results import ResultOptions, tell
+from antennate.errors import ConfigError, MissingPackageError, OutputError
+from antennate.files import write_whole
+from antennate.messages import one_line, typed
+from antennate.params.base import Params
+from antennate.studies.formats import to_csv
+from antennate.studies.measures import Table
+from antennate.telemetry.reader import LogReader, Record
+from antennate.telemetry.recover import recover
+from antennate.telemetry.ticks import JOINTS
+from antennate.telemetry.topics import EVENTS
+
+DESCRIPTION = """\
+Look at the log of a drive or a simulation: `info` says what it holds; `recover` writes the log of a
+killed program, and of all programs that followed it, to one file that other tools open; `export`
+writes a row for each tick as CSV or Parquet; `plot` draws it.
+
+A log is an MCAP file of ROS 2 messages: Foxglove, Lichtblick, PlotJuggler, Rerun and `rosbags` open
+it. The exit code is 2 if it is damaged; what can be read is read."""
+_ENDINGS = {"recover": (".mcap",), "export": (".csv", ".parquet"), "plot": (".png", ".svg")}
+_SHOWN = 10
+"""Most events that `info` prints."""
+
+
+class LogConfig(Params):
+    """A log has no parameters."""
+
+
+@dataclass(frozen=True)
+class Options(ResultOptions):
+    """What to do with which log."""
+
+    action: Literal["info", "recover", "export", "plot"] = option(
+        "info", "what to do", positional=True
+    )
+    log: str = option("", "log of a drive or a simulation", "LOG", positional=True)
+    out: Path | None = option(
+        None, "file to write, .mcap, .csv, .parquet, .png or .svg; else beside the log", "FILE"
+    )
+    overwrite: bool = option(False, "replace that file")
+    json: bool = option(False, "print what `info` finds as JSON")
+
+
+def command(argv: Sequence[str]) -> int:
+    """Look at one log.
+
+    Raises:
+        AntennateError: The log cannot be read, or the file not written.
+    """
+    _, options = parse("log", DESCRIPTION, LogConfig, argv, Options)
+    if not options.log:
+        raise ConfigError("expected the name of a log, found none")
+    path = Path(options.log)
+    if options.action == "info":
+        if options.out is not None:
+            raise ConfigError("--out: expected no file for `info`, found one")
+        return _info(path, options)
+    if options.json:
+        raise ConfigError(f"--json: expected `info` beside it, found {options.action}")
+    target = _target(path, options)
+    if target.exists() and not options.overwrite:
+        raise OutputError(f"expected no such file, found {target}; choose --out or --overwrite")
+    actions: Mapping[str, Callable[[Path, Path], LogReader]] = {
+        "recover": _recover,
+        "export": _export,
+        "plot": _plot,
+    }
+    log = actions[options.action](path, target)
+    tell({}, options, (), f"{log.ticks} ticks were written to {target}.")
+    return OK if options.action == "recover" else complain("log", log)
+
+
+def _target(path: Path, options: Options) -> Path:
+    """The file to write.
+
+    Raises:
+        ConfigError: Its name has another ending, or it is the log itself.
+    """
+    endings = _ENDINGS[options.action]
+    stem = f"{path.stem}-recovered" if options.action == "recover" else path.stem
+    target = options.out or path.with_name(stem + endings[0])
+    if target.suffix not in endings:
+        raise ConfigError(f"--out: expected a name with {' or '.join(endings)}, found {target}")
+    if target.exists() and target.samefile(path):
+        raise ConfigError(f"--out: expected another file than the log, found {target}")
+    return target
+
+
+def _recover(path: Path, target: Path) -> LogReader:
+    fresh = target.with_name(f".{target.name}")
+    fresh.unlink(missing_ok=True)
+    log = recover(path, fresh)
+    fresh.replace(target)
+    return log
+
+
+def _export(path: Path, target: Path) -> LogReader:
+    with LogReader(path) as log:
+        measured = {name for tick in log for name in JOINTS[1:] if getattr(tick, name)}
+    with LogReader(path) as log:
+        rows = (tick.row(log.header.robot, measured) for tick in log)
+        if target.suffix == ".csv":
+            write_whole(target, to_csv(rows).encode(), overwrite=True)
+        else:
+            _write_parquet(target, rows)
+    return log
+
+
+def _write_parquet(target: Path, rows: Iterator[Mapping[str, Any]]) -> None:
+    """A Parquet file with a column for each number.
+
+    Raises:
+        MissingPackageError: pandas or pyarrow is not installed.
+    """
+    try:
+        import pandas
+
+        import_module("pyarrow")  # pandas would say it in four lines
+    except ImportError:
+        raise MissingPackageError(
+            f"{target}: expected pandas and pyarrow, found none; install them with "
+            "`pip install antennate[parquet]`, or write a .csv"
+        ) from None
+    data: Any = pandas.DataFrame(list(rows)).to_parquet(index=False)
+    write_whole(target, data, overwrite=True)
+
+
+def _plot(path: Path, target: Path) -> LogReader:
+    from antennate.figures import render  # slow to import
+    from antennate.telemetry.figure import Course
+    from antennate.telemetry.figure import replay as draw
+
+    with LogReader(path) as log:
+        count = sum(1 for _ in log)
+    if not count:
+        raise ConfigError(f"{path}: expected a log with ticks, found none")
+    with LogReader(path) as log:
+        figure = draw(Course.of(log, count))
+    write_whole(target, render(figure)[target.suffix.removeprefix(".")], overwrite=True)
+    return log
+
+
+def _info(path: Path, options: Options) -> int:
+    messages: Counter[str] = Counter()
+    events: list[dict[str, Any]] = []
+    times: list[int] = []
+    with LogReader(path) as log:
+        for records, _ in log.groups():
+            for record in records:
+                messages[record.topic.name] += 1
+                if record.topic is EVENTS:
+                    events.append(_event(record))
+            times = [*times[:1], records[-1].time]
+    duration = 1e-9 * (times[-1] - times[0]) if times else 0.0
+    result = _result(log, messages, duration, events)
+    tell(result, options, [_table(result, events)], _sentence(result))
+    return complain("log", log)
+
+
+def _event(record: Record) -> dict[str, Any]:
+    return {"time_ns": record.time, "text": EVENTS.type.decode(record.data)["msg"]}
+
+
+def _result(
+    log: LogReader, messages: Counter[str], duration: float, events: list[dict[str, Any]]
+) -> dict[str, Any]:
+    header = log.header
+    return {
+        "schema": 1,
+        "command": "log",
+        "log": str(log.path),
+        "parts": [part.name for part in log.parts],
+        "controller": header.controller,
+        "joints": list(header.robot.joint_names),
+        "seed": header.seed,
+        "trial": header.trial,
+        "start_ns": header.start,
+        "calibrated": bool(header.calibration),
+        "versions": dict(header.versions),
+        "ticks": log.ticks,
+        "duration_s": duration,
+        "messages": dict(messages),
+        "events": events,
+        "missing": log.missing,
+        "damaged": log.bad,
+        "closed": log.end is not None,
+    }
+
+
+def _table(result: Mapping[str, Any], events: Sequence[Mapping[str, Any]]) -> Table:
+    lines = [f"{1e-9 * each['time_ns']:.2f} s {each['text']}" for each in events[:_SHOWN]]
+    if len(events) > _SHOWN:
+        lines.append(f"and {len(events) - _SHOWN} more events")
+    rows = [(name, [str(count)]) for name, count in result["messages"].items()]
+    note = "\n".join(map(one_line, lines))
+    return Table(f"Log of {one_line(result['controller'])}", ["messages"], rows, note)
+
+
+def _sentence(result: Mapping[str, Any]) -> str:
+    """What it holds, in one sentence."""
+    recovering = typed("log", "recover", result["log"])
+    closed = "it is complete" if result["closed"] else f"it was not closed: {recovering}"
+    by = one_line(result["versions"].get("antennate", "of unknown version"))
+    return (
+        f"{result['ticks']} ticks in {result['duration_s']:.2f} s, in "
+        f"{one_line(', '.join(result['parts']))}, by antennate {by}; {closed}."
+    )

@@ -1,0 +1,66 @@
+"""The step of lifting legs, and the gaits that are known by name."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from antennate.params.base import Params, number
+
+
+class LiftParams(Params):
+    """The step of lifting legs; rolling legs do not read it."""
+
+    stance: float = number(0.0, "rad", "assumed: the foot below", ge=-1.6, le=1.6)
+    """Angle of a leg that stands."""
+    lifted: float = number(0.5, "rad", "assumed: a foot 0.07 m out rises by 34 mm", ge=-1.6, le=1.6)
+    """Angle of a leg in the air."""
+    begin: float = number(
+        1.25 * math.pi,
+        "rad",
+        "assumed: as b11bl0",
+        ge=-2 * math.pi,
+        le=2 * math.pi,
+    )
+    """Gait phase at which the front left leg leaves the ground."""
+    lag: float = number(
+        math.pi, "rad", "assumed: neighbours take turns; six legs then stand on three", ge=0, le=6.3
+    )
+    """How much later the legs of each further link lift; the right leg is half a cycle behind."""
+    share: float = number(0.5, "1", "assumed: as long in the air as on the ground", ge=0, le=1)
+    """Share of the cycle in the air."""
+
+
+def _hexapod(ahead: float, lift: float) -> Mapping[str, Any]:
+    """A gait of the hexapod: f = A sin(P - pi/4) in front, b = A sin(P - pi/4 + ahead) behind.
+
+    As ours count, that is A sin(5 pi/4 - P) and A sin(5 pi/4 - ahead - P): a wave over two joints
+    whose phase rises by -ahead from one to the next.
+
+    Args:
+        ahead: Phase of the back joint before the front one [rad].
+        lift: Gait phase at which the front right leg leaves the ground [rad].
+    """
+    rise = -ahead % (2.0 * math.pi)
+    return {
+        "frequency": 0.5,
+        "amplitude": math.radians(48.75),
+        "wave_number": rise / math.pi,
+        "body_phase": 5 * math.pi / 4 - rise,
+        "lift": {"stance": 0.4602, "lifted": 1.1804, "begin": lift + math.pi, "lag": math.pi},
+    }
+
+
+GAITS: Mapping[str, Mapping[str, Any]] = {
+    "serpenoid": {},
+    "b11bl0": _hexapod(11 * math.pi / 8, math.pi / 4),
+    "in_phase": _hexapod(math.pi, math.pi / 2),
+}
+"""Gaits by name: what differs from the defaults.
+
+`b11bl0` and `in_phase` are of the six-legged robot `hexapod`, after a table of its simulated gaits
+(psu-LiBR) with 49 rows a cycle and the columns -b and f. In `b11bl0` the middle left, back right
+and front right legs are in the air in rows 7 to 30, in `in_phase` in rows 13 to 36, the other three
+in the rest. The period is not published; 2 s is assumed.
+"""

@@ -1,0 +1,148 @@
+"""The topics of a log and the definitions of their messages, in the words of ROS 2.
+
+Every tick has one message in each of `TICK_TOPICS`, and in others where there is something to say,
+all with the tick's number and time. docs/log.md lists them.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from antennate.telemetry.cdr import MessageType
+
+
+class Topic(NamedTuple):
+    """A topic: its name and the type of its messages."""
+
+    name: str
+    type: MessageType
+
+
+_ANTENNA = """\
+float64 t           # time of the frame, as the controller got it [s]
+float64[2] counts   # readings that the controller got, left and right [counts]; NaN is UNKNOWN
+float64[2] reading  # readings before the supervisor withheld them [counts]
+float64[2] level    # bending levels, 0 to 1; NaN if the controller has none
+int64[2] contact    # 0 FREE, 1 CONTACT, 2 UNKNOWN
+float64 age         # age of the newest sample [s]; NaN in simulation
+"""
+_MANEUVER = """\
+uint64 number   # ticks since the controller began, this one included
+float64 now     # time of the loop [s]
+int64 maneuver  # 0 FORWARD, 1 TURN_L, 2 TURN_R, 3 REVERSE, 4 HOLD
+float64 phase   # gait phase [rad]; NaN if the controller has none
+bool asked      # whether the controller was asked; if not, its last command was kept
+"""
+_COUNTERS = """\
+uint64 missed   # ticks left out so far
+uint64 frames   # good frames of the board so far
+uint64 crc      # frames with a wrong CRC so far
+uint64 lost     # samples that never came
+uint64 misses   # answers that servos did not give so far
+uint64 stale    # late answers thrown away so far
+uint64 sent     # commands sent so far
+uint64 refused  # commands refused so far
+"""
+_SUPERVISOR = """\
+string state     # OK, DEGRADED, HOLD, FAULT or OFF; empty without a supervisor
+string note      # what the operator should know or do
+string[] causes  # in force, the most severe first
+"""
+_FORCES = """\
+string[] part     # part of the robot that touches an obstacle
+float64[] x       # where [m]
+float64[] y       # [m]
+float64[] z       # [m]
+float64[] normal  # normal force [N]
+"""
+_JOINT_STATE = """\
+int32 sec
+uint32 nanosec
+string frame_id
+string[] name
+float64[] position
+float64[] velocity
+float64[] effort
+"""
+_LOG = """\
+int32 sec
+uint32 nanosec
+uint8 level
+string name
+string msg
+string file
+string function
+uint32 line
+"""
+_RULE = "=" * 80
+_TIME = f"""\
+{_RULE}
+MSG: builtin_interfaces/Time
+int32 sec
+uint32 nanosec
+"""
+_STATE_SCHEMA = f"""\
+std_msgs/Header header
+string[] name
+float64[] position  # [rad]
+float64[] velocity  # [rad/s]; empty where it is not measured
+float64[] effort    # [N m]; empty where it is not measured
+{_RULE}
+MSG: std_msgs/Header
+builtin_interfaces/Time stamp
+string frame_id
+{_TIME}"""
+_LOG_SCHEMA = f"""\
+builtin_interfaces/Time stamp
+uint8 level
+string name
+string msg
+string file
+string function
+uint32 line
+{_TIME}"""
+
+
+def _own(name: str, fields: str) -> MessageType:
+    return MessageType(f"antennate_msgs/msg/{name}", fields)
+
+
+_STATE = MessageType("sensor_msgs/msg/JointState", _JOINT_STATE, _STATE_SCHEMA)
+_STRING = MessageType("std_msgs/msg/String", "string data\n")
+
+ANTENNA = Topic("/antenna", _own("Antenna", _ANTENNA))
+MANEUVER = Topic("/maneuver", _own("Maneuver", _MANEUVER))
+COUNTERS = Topic("/counters", _own("Counters", _COUNTERS))
+SUPERVISOR = Topic("/supervisor", _own("Supervisor", _SUPERVISOR))
+JOINT_COMMANDS = Topic("/joint_commands", _STATE)
+JOINT_STATES = Topic("/joint_states", _STATE)
+CONTACT_FORCES = Topic("/contact_forces", _own("ContactForces", _FORCES))
+EVENTS = Topic("/events", MessageType("rcl_interfaces/msg/Log", _LOG, _LOG_SCHEMA))
+CONFIG = Topic("/config", _STRING)
+CALIBRATION = Topic("/calibration", _STRING)
+VERSIONS = Topic("/versions", _STRING)
+
+TICK_TOPICS = (ANTENNA, MANEUVER, JOINT_COMMANDS)
+HEADER_TOPICS = (CONFIG, CALIBRATION, VERSIONS)
+TOPICS = (
+    *HEADER_TOPICS,
+    *TICK_TOPICS,
+    COUNTERS,
+    SUPERVISOR,
+    JOINT_STATES,
+    CONTACT_FORCES,
+    EVENTS,
+)
+"""All, in the order of their channels: the first has id 1."""
+
+JOINTS = ("angles", "positions", "velocities", "efforts")
+"""Numbers of a tick for each joint: the commanded, then the measured ones, empty if unknown."""
+TICK = _own(
+    "Tick",
+    _ANTENNA
+    + _MANEUVER
+    + _COUNTERS
+    + "".join(f"float64[] {name}\n" for name in JOINTS)
+    + _SUPERVISOR,
+)
+"""A whole tick, on its way from the loop to the process that writes the log."""

@@ -1,0 +1,242 @@
+"""`antennate log`, and the logs of simulations: what other tools read, and when it refuses."""
+
+from __future__ import annotations
+
+import csv
+import gc
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from log_ticks import HEADER, chunks, tick, unclosed
+from mcap.reader import make_reader
+from worlds import recorded, session
+
+from antennate import simulate
+from antennate.cli import main
+from antennate.robots.spec import RobotSpec
+from antennate.telemetry.reader import LogReader
+from antennate.telemetry.writer import LogWriter
+from antennate.types import Maneuver
+
+TICKS = 180
+
+
+@pytest.fixture(scope="module")
+def drive(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The log of a session that is armed and walks."""
+    folder = tmp_path_factory.mktemp("drive")
+    return recorded(session(folder, "closed", 1), folder / "drive.mcap", TICKS)
+
+
+@pytest.fixture
+def log(drive: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A copy of it in an empty folder."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "80")
+    return Path(shutil.copy(drive, tmp_path / "drive.mcap"))
+
+
+def test_info_says_what_there_is(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["log", "info", str(log), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert (found["ticks"], found["closed"], found["damaged"]) == (TICKS, True, 0)
+    with log.open("rb") as file:
+        summary = make_reader(file).get_summary()
+    assert summary is not None
+    assert summary.statistics is not None
+    counted = {
+        summary.channels[n].topic: c for n, c in summary.statistics.channel_message_counts.items()
+    }
+    header = {"/config", "/versions"}
+    assert found["messages"] == {name: c for name, c in counted.items() if name not in header}
+    assert found["messages"]["/joint_states"] == TICKS
+    assert any(event["text"].startswith("OK after") for event in found["events"])
+    assert main(["log", "info", str(log)]) == 0
+    said = capsys.readouterr().out
+    assert "/joint_commands" in said
+    assert f"{TICKS} ticks in" in said
+
+
+def test_recover_makes_one_file_of_all_parts_that_others_open(
+    log: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The first was cut by a kill, in the middle of a chunk; the second was closed."""
+    with LogReader(log) as reader:
+        ticks = list(reader)
+    log.unlink()
+    with LogWriter(log, reader.header, flush=0.0) as out:
+        for one in ticks[:100]:
+            out.write(one)
+    data = unclosed(log.read_bytes())
+    log.write_bytes(data[: chunks(log.read_bytes())[-1][0] + 30])
+    with LogWriter(log.with_name("drive-2.mcap"), reader.header) as out:
+        for one in ticks[110:]:
+            out.write(one)
+    assert main(["log", "recover", str(log)]) == 0
+    assert "169 ticks were written to drive-recovered.mcap" in capsys.readouterr().out.replace(
+        f"{log.parent}/", ""
+    )
+    made = log.with_name("drive-recovered.mcap")
+    with LogReader(made) as read:
+        again = list(read)
+        assert (read.bad, read.end, read.header) == (0, 169, reader.header)
+    assert [one.pack() for one in again] == [one.pack() for one in ticks[:99] + ticks[110:]]
+    with made.open("rb") as file:
+        found = make_reader(file, validate_crcs=True)
+        topics = [channel.topic for _, channel, _ in found.iter_messages()]
+    assert topics.count("/antenna") == 169
+    assert main(["log", "recover", str(log)]) == 2
+    assert "--overwrite" in capsys.readouterr().err
+    assert main(["log", "recover", str(log), "--overwrite"]) == 0
+    assert not list(log.parent.glob(".*"))
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+def test_rosbags_opens_a_killed_log_once_it_is_recovered(log: Path) -> None:
+    rosbags = pytest.importorskip("rosbags.highlevel")
+    killed = log.with_name("killed.mcap")
+    killed.write_bytes(unclosed(log.read_bytes())[:-100])
+    with pytest.raises(rosbags.AnyReaderError), rosbags.AnyReader([killed]):
+        pass
+    gc.collect()  # it leaves the file open that it refused
+    assert main(["log", "recover", "killed.mcap", "--out", "whole.mcap"]) == 0
+    with rosbags.AnyReader([log.with_name("whole.mcap")]) as bag:
+        antenna = [each for each in bag.connections if each.topic == "/antenna"]
+        found = [bag.deserialize(data, c.msgtype) for c, _, data in bag.messages(antenna)]
+    with LogReader(log) as reader:
+        wanted = list(reader)
+    assert len(found) == len(wanted)
+    np.testing.assert_array_equal([f.counts for f in found], [w.counts for w in wanted])
+
+
+def test_export_writes_every_number_to_the_last_digit(log: Path) -> None:
+    assert main(["log", "export", str(log)]) == 0
+    with log.with_suffix(".csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    with LogReader(log) as reader:
+        for row, one in zip(rows, reader, strict=True):
+            assert [float(row[name]) for name in RobotSpec().joint_names] == list(one.angles)
+            np.testing.assert_array_equal(
+                [float(row[f"{name}_position"]) for name in RobotSpec().joint_names], one.positions
+            )
+            assert (int(row["maneuver"]), row["state"]) == (one.maneuver, one.state)
+    assert "yaw1_effort" not in rows[0]
+
+
+def test_export_to_parquet(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    pandas = pytest.importorskip("pandas")
+    try:
+        import pyarrow  # noqa: F401
+    except ImportError:
+        assert main(["log", "export", str(log), "--out", "a.parquet"]) == 2
+        assert "pip install antennate[parquet]" in capsys.readouterr().err
+        return
+    assert main(["log", "export", str(log), "--out", "a.parquet"]) == 0
+    table = pandas.read_parquet("a.parquet")
+    with LogReader(log) as reader:
+        assert table["phase"].tolist() == pytest.approx(
+            [t.phase for t in reader], abs=0, nan_ok=True
+        )
+
+
+def test_plot_draws_it(log: Path) -> None:
+    assert main(["log", "plot", str(log)]) == 0
+    assert log.with_suffix(".png").read_bytes().startswith(b"\x89PNG")
+    assert main(["log", "plot", str(log), "--out", "a.svg"]) == 0
+    assert Path("a.svg").read_text().count("<path") > 20
+
+
+@pytest.mark.parametrize(
+    ("argv", "what"),
+    [
+        ([], "expected the name of a log, found none"),
+        (["show", "drive.mcap"], "expected one of info, recover, export or plot, found show"),
+        (["info", "nothing.mcap"], "nothing.mcap: No such file"),
+        (["info", "text"], "no intact header, 0 intact ticks; damaged places: 1"),
+        (["info", "drive.mcap", "--out", "a"], "--out: expected no file for `info`"),
+        (["export", "drive.mcap", "--json"], "--json: expected `info`"),
+        (["export", "drive.mcap", "--out", "a.xls"], "a name with .csv or .parquet, found a.xls"),
+        (["recover", "drive.mcap", "--out", "drive.mcap"], "expected another file than the log"),
+        (["recover", "text", "--out", "new.mcap"], "no intact header"),
+        (["plot", "empty.mcap"], "expected a log with ticks, found none"),
+        (["export", "drive.mcap", "--out", "nowhere/a.csv"], "nowhere/a.csv: expected to write"),
+    ],
+)
+def test_what_cannot_be_done_is_refused_in_one_line(
+    argv: list[str], what: str, log: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    Path("text").write_text("not a log of anything\n")
+    LogWriter(Path("empty.mcap"), HEADER).close()
+    before = {path.name for path in Path().iterdir()}
+    assert main(["log", *argv]) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert what in err
+    assert err.count("\n") == 1
+    assert {path.name for path in Path().iterdir()} == before
+
+
+def test_a_damaged_log_is_exported_as_far_as_it_goes(
+    log: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with LogWriter(Path("bad.mcap"), HEADER, flush=0.0) as out:
+        for number in (1, 2, 3):
+            out.write(tick(number))
+    data = bytearray(Path("bad.mcap").read_bytes())
+    data[chunks(data)[2][1] - 1] ^= 4
+    Path("bad.mcap").write_bytes(data)
+    assert main(["log", "export", "bad.mcap"]) == 2
+    assert "found 1 damaged places and 1 ticks missing" in capsys.readouterr().err
+    assert Path("bad.csv").read_text().count("\n") == 3
+
+
+def test_G7_logs_of_trials_are_replayed_to_the_bit(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Four trials at once, each with its own log, which other programs read."""
+    words = ["tunnel", "--trials", "2", "--controllers", "paper", "closed", "--time-limit", "3"]
+    more = ["--workers", "1", "--no-figures", "--log", "--out", str(tmp_path / "run")]
+    assert main([*words, *more]) == 0
+    logs = sorted((tmp_path / "run" / "logs").iterdir())
+    assert [p.name for p in logs] == [f"{c}-{n}.mcap" for c in ("closed", "paper") for n in (0, 1)]
+    for path in logs:
+        capsys.readouterr()
+        assert main(["replay", str(path), "--json"]) == 0
+        found = json.loads(capsys.readouterr().out)
+        assert (found["different"], found["different_commands"], found["closed"]) == (0, 0, True)
+        assert found["ticks"] >= 300
+        assert (found["seed"], f"-{found['trial']}.") == (0, path.name[-7:-4].removeprefix("d"))
+    assert main([*words, *more, "--overwrite", "--trials", "1"]) == 0
+    assert len(list((tmp_path / "run" / "logs").iterdir())) == 2
+
+
+def test_the_log_of_a_simulated_trial_is_its_time_series(tmp_path: Path) -> None:
+    """And the physics: joints follow their commands, forces are where the robot touches."""
+    series = simulate("closed", time_limit=4.0, log=tmp_path / "trial.mcap")
+    with LogReader(tmp_path / "trial.mcap") as log:
+        groups = list(log.groups())
+        assert log.header.phase != 0.0
+    ticks = [one for _, one in groups if one is not None]
+    np.testing.assert_array_equal([one.t for one in ticks], series.t)
+    np.testing.assert_array_equal([one.counts for one in ticks], series.counts)
+    np.testing.assert_array_equal([one.level for one in ticks], series.level)
+    np.testing.assert_array_equal([one.contact for one in ticks], series.contact)
+    np.testing.assert_array_equal([one.maneuver for one in ticks], series.maneuver)
+    np.testing.assert_array_equal([one.angles[:5] for one in ticks], series.yaw)
+    assert {one.maneuver for one in ticks} <= set(Maneuver)
+    behind = np.array([one.positions[0] - one.angles[0] for one in ticks[100:]])
+    assert 0.0 < np.abs(behind).max() < 0.3
+    forces = [
+        record.topic.type.decode(record.data)
+        for records, _ in groups
+        for record in records
+        if record.topic.name == "/contact_forces"
+    ]
+    names = set(RobotSpec().link_names)
+    for one in forces:
+        assert len(one["part"]) == len(one["x"]) == len(one["normal"]) > 0
+        assert min(one["normal"]) >= 0.0
+        assert any(part in names or "antenna" in part or "leg" in part for part in one["part"])
