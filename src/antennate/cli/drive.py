@@ -78,12 +78,8 @@ def command(argv: Sequence[str]) -> int:
         AntennateError: A port, a servo or the board is not what is needed; nothing moved then.
     """
     config, orders = parse_robot("drive", DESCRIPTION, RobotFile.for_drive, argv, Orders)
-<<<<<<< HEAD
-    return walk(VIEW, config, orders, argv)
-=======
     require_antennae(config.robot, "drive")
-    return walk("drive", config, orders, argv)
->>>>>>> main
+    return walk(VIEW, config, orders, argv)
 
 
 def require_ports(orders: Orders) -> None:
@@ -130,11 +126,7 @@ def walk(
                 operator.stop.closed = True  # until the first tick: from here on there is a result
             if controller is not None:
                 session.control.controller = controller(session, config)
-<<<<<<< HEAD
                 config = config.model_copy(update={"controller": view.name})
-            result = _carry_out(view.name, config, session, orders, folder.path / LOG, operator)
-=======
-                config = config.model_copy(update={"controller": command})
             header = Header(
                 controller=config.controller,
                 params=config.control,
@@ -143,8 +135,7 @@ def walk(
                 calibration=_calibration(given),
             )
             record = _Record(header, folder.path / LOG, config.record_required)
-            result = _carry_out(command, config, session, orders, record, operator)
->>>>>>> main
+            result = _carry_out(view.name, config, session, orders, record, operator)
         try:
             folder.finish(result, ())
         finally:  # the robot's state is told even if it cannot be kept

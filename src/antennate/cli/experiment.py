@@ -30,24 +30,36 @@ class Options(ResultOptions):
 
 
 @dataclass(frozen=True)
-<<<<<<< HEAD
+class LogOptions(Options):
+    """The same where trials can be logged."""
+
+    log: bool = option(False, "keep the log of every trial, in logs/CONTROLLER-TRIAL.mcap")
+
+
+@dataclass(frozen=True)
 class FilmOptions(Options):
-    """How to run what can be filmed."""
+    """The same where something can be filmed."""
 
     video: bool = option(False, "film one trial of each condition, drawn without a display")
 
 
 @dataclass(frozen=True)
 class TrialFilmOptions(FilmOptions):
-    """How to run what can be filmed and has trials."""
+    """The same where there are trials to film."""
 
     video_trial: int = option(0, "trial that --video films", "INT", ge=0)
 
 
 def _options(experiment: Experiment[Any, Any]) -> type[Options]:
-    if experiment.films is None:
-        return Options
-    return TrialFilmOptions if "trials" in experiment.config.model_fields else FilmOptions
+    """What can be said of an experiment."""
+    kinds: list[type[Options]] = []
+    if experiment.logged is not None:
+        kinds.append(LogOptions)
+    if experiment.films is not None:
+        has_trials = "trials" in experiment.config.model_fields
+        kinds.append(TrialFilmOptions if has_trials else FilmOptions)
+    chosen: Any = type("Chosen", tuple(kinds), {})
+    return dataclass(frozen=True)(chosen) if kinds else Options
 
 
 def _filmed(options: Options) -> int | None:
@@ -57,17 +69,11 @@ def _filmed(options: Options) -> int | None:
         ConfigError: A trial is named, but no film is wanted.
     """
     trial = getattr(options, "video_trial", 0)
-    if getattr(options, "video", False):
+    if isinstance(options, FilmOptions) and options.video:
         return trial
     if trial:
         raise ConfigError("--video-trial: expected --video beside it, found none")
     return None
-=======
-class LogOptions(Options):
-    """The same where trials can be logged."""
-
-    log: bool = option(False, "keep the log of every trial, in logs/CONTROLLER-TRIAL.mcap")
->>>>>>> main
 
 
 def command(experiment: Experiment[Any, Any], argv: Sequence[str]) -> int:
@@ -76,14 +82,9 @@ def command(experiment: Experiment[Any, Any], argv: Sequence[str]) -> int:
     Raises:
         AntennateError: As below, or something given cannot be used.
     """
-<<<<<<< HEAD
     config, options = parse(
         experiment.name, experiment.description, experiment.config, argv, _options(experiment)
     )
-=======
-    kind = Options if experiment.logged is None else LogOptions
-    config, options = parse(experiment.name, experiment.description, experiment.config, argv, kind)
->>>>>>> main
     experiment.check(config)
     trial = _filmed(options)
     if trial is not None:

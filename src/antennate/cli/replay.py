@@ -64,16 +64,12 @@ def command(argv: Sequence[str]) -> int:
         with folder_for(VIEW, options, config, argv) as folder:
             _keep(folder, path, found)
             folder.finish(result)
-<<<<<<< HEAD
     tell(result, options, VIEW.tables(result), VIEW.sentence(result))
-=======
-    tell(result, options, [_table(result)], _sentence(result))
     return complain("replay", log)
 
 
 def complain(command: str, log: LogReader) -> int:
     """Say on stderr what of a log could not be read: the exit code of the command."""
->>>>>>> main
     if not log.bad and not log.missing:
         return OK
     place = f"; first at {_place(log.damage[0])}" if log.bad else ""

@@ -69,14 +69,11 @@ class Experiment(Generic[Config, Found]):
         check: Raises if a configuration cannot be run; called before anything is written.
         failed: Whether a result says nothing, so that the command ends with exit code 2.
         parts: What `on_step` counts.
-<<<<<<< HEAD
+        logged: Runs as `run` does and keeps the log of each trial in a folder, which is given as
+            well; None if there are no controllers to log.
         films: films(config, trial) -> for each condition, by name, what runs this trial of it once
             more and records it; None where nothing can be filmed.
         body: HTML that stands in its report in place of tables and figures.
-=======
-        logged: Runs as `run` does and keeps the log of each trial in a folder, which is given as
-            well; None if there are no controllers to log.
->>>>>>> main
     """
 
     name: str
@@ -90,7 +87,7 @@ class Experiment(Generic[Config, Found]):
     check: Callable[[Config], None] = lambda config: None
     failed: Callable[[Mapping[str, Any]], bool] = lambda result: False
     parts: str = "trials"
-<<<<<<< HEAD
+    logged: Callable[[Config, int, OnStep, OnRow, Path], Found] | None = None
     films: Callable[[Config, int], Mapping[str, Callable[[], Film]]] | None = None
     body: Body | None = None
 
@@ -101,9 +98,6 @@ class Experiment(Generic[Config, Found]):
             *(self.name, self.description, self.config, self.tables, self.sentence),
             body=self.body,
         )
-=======
-    logged: Callable[[Config, int, OnStep, OnRow, Path], Found] | None = None
->>>>>>> main
 
     @classmethod
     def of_folder(

@@ -35,19 +35,11 @@ from antennate.telemetry.parts import MOST_PARTS, part
 
 RESULT, TABLE, PARTIAL = "result.json", "trials.csv", "trials.partial.jsonl"
 CONFIG, VERSIONS, COMMAND = "config.toml", "versions.json", "command.txt"
-<<<<<<< HEAD
-FIGURES, FILMS = "figures", "films"
-"""Folders of figures (svg and png) and films (mp4); what they hold of these belongs to the run."""
-CALIBRATION, LOG, REPORT = "calibration.json", "drive.log", "report.html"
-LARGEST = 10**9
-=======
-FIGURES = "figures"
-"""Folder of the figures; what it holds as svg and png belongs to the run."""
+FIGURES, FILMS, LOGS = "figures", "films", "logs"
+"""Folders of figures (svg, png), films (mp4) and logs of trials (mcap), which belong to the run."""
+_INNER = {FIGURES: (".svg", ".png"), FILMS: (".mp4",), LOGS: (".mcap",)}
 CALIBRATION, LOG, REPORT = "calibration.json", "drive.mcap", "report.html"
-LOGS = "logs"
-"""Folder of the logs of trials."""
-_LARGEST = 10**9
->>>>>>> main
+LARGEST = 10**9
 """No file of a run is longer [bytes]."""
 _LOGS = tuple(part(Path(LOG), number).name for number in range(1, MOST_PARTS + 1))
 _FILES = (
@@ -102,15 +94,9 @@ class RunDirectory:
         with _writing(place):
             missing = [p for p in (place, *place.parents) if not p.exists()]
             place.mkdir(parents=True, exist_ok=path is not None)
-<<<<<<< HEAD
-            for folder in (place / FIGURES, place / FILMS):
-                if folder.is_symlink():
-                    raise OutputError(f"expected {folder} within its run, found a link")
-=======
-            for folder in (FIGURES, LOGS):
+            for folder in _INNER:
                 if (place / folder).is_symlink():
                     raise OutputError(f"expected {place / folder} within its run, found a link")
->>>>>>> main
             held = _held(place)
             if held and not overwrite:
                 raise OutputError(
@@ -281,25 +267,13 @@ class RunDirectory:
 
 def _held(place: Path) -> list[Path]:
     """Files of a run that a directory holds."""
-<<<<<<< HEAD
-    drawn = [
-        path
-        for name, kinds in ((FIGURES, (".svg", ".png")), (FILMS, (".mp4",)))
-        if _is(place / name)
-        for path in sorted((place / name).iterdir())
-        if path.suffix in kinds
-    ]
-    return [place / name for name in _NAMES if os.path.lexists(place / name)] + drawn
-=======
-    ours = {FIGURES: (".svg", ".png"), LOGS: (".mcap",)}
     inner = [
         path
-        for folder, endings in ours.items()
+        for folder, endings in _INNER.items()
         for path in (sorted((place / folder).iterdir()) if _is(place / folder) else ())
         if path.suffix in endings
     ]
     return [place / name for name in _NAMES if os.path.lexists(place / name)] + inner
->>>>>>> main
 
 
 def _is(folder: Path) -> bool:

@@ -96,11 +96,7 @@ EXPERIMENT = Experiment.of_folder(
     lambda config, workers, on_step, _: gait.run(config, workers, on_step),
     tables,
     sentence,
-<<<<<<< HEAD
-    check=lambda config: require_step(config.robot),
-    filmed=True,
-=======
     check=gait.check,
->>>>>>> main
+    filmed=True,
     parts="walks",
 )

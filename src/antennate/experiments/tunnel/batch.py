@@ -17,12 +17,9 @@ from antennate.experiments.tunnel.monitor import Outcome, TrialMonitor, TrialPat
 from antennate.sim.scenes.registry import make_scene
 from antennate.sim.sim_robot import SimRobot
 from antennate.sim.trial import draw_trial
-<<<<<<< HEAD
 from antennate.sim.world import World
-=======
 from antennate.telemetry.header import Header
 from antennate.telemetry.simulated import SimulatedLog
->>>>>>> main
 from antennate.types import AntennaFrame, Controller, JointCommand
 
 BATCH = 12
@@ -38,11 +35,8 @@ def run_trials(
     trials: Sequence[int],
     emit: Emit,
     batch: int = BATCH,
-<<<<<<< HEAD
-    watch: Watch | None = None,
-=======
     logs: Path | None = None,
->>>>>>> main
+    watch: Watch | None = None,
 ) -> None:
     """Run trials of one controller; emit each as it ends, and keep its log if there is a folder.
 
@@ -52,11 +46,7 @@ def run_trials(
     batch that has not ended begins again with a controller of its own, and is invalid if that one
     fails too.
     """
-<<<<<<< HEAD
-    rows = _Rows(config, controller, trials, emit, min(batch, len(trials)), watch)
-=======
-    rows = _Rows(config, controller, trials, emit, min(batch, len(trials)), logs)
->>>>>>> main
+    rows = _Rows(config, controller, trials, emit, min(batch, len(trials)), logs, watch)
     try:
         rows.run()
     except ControllerError as error:
@@ -78,17 +68,11 @@ class _Rows:
         trials: Sequence[int],
         emit: Emit,
         batch: int,
-<<<<<<< HEAD
+        logs: Path | None,
         watch: Watch | None,
     ) -> None:
         self._config, self._name, self._emit, self._batch = config, name, emit, batch
-        self._looks = watch
-=======
-        logs: Path | None,
-    ) -> None:
-        self._config, self._name, self._emit, self._batch = config, name, emit, batch
-        self._folder, self._logs = logs, dict[int, SimulatedLog]()
->>>>>>> main
+        self._folder, self._logs, self._looks = logs, dict[int, SimulatedLog](), watch
         self._waiting = list(trials)
         self._scene = make_scene(config.scene, config.tunnel)
         self._monitors: list[TrialMonitor | None] = [None] * batch
@@ -119,13 +103,10 @@ class _Rows:
             self._log(row, made, phase)
 
         def go_on(frame: AntennaFrame, command: JointCommand) -> bool:
-<<<<<<< HEAD
             if self._looks is not None:
                 self._looks(self._robot.world(0), frame, made)
-=======
             for log in self._logs.values():
                 log.take(frame, command)
->>>>>>> main
             for row, monitor in enumerate(self._monitors):
                 if monitor is not None and self._watch(row, monitor, control) and self._waiting:
                     phase = self._place(row)

@@ -47,7 +47,7 @@ def record(
             maneuver=control.maneuver[0],
         )
 
-    run_trials(config, controller, [trial], lambda found: rows.append(found[0]), 1, watch)
+    run_trials(config, controller, [trial], lambda found: rows.append(found[0]), watch=watch)
     title = f"{label}, trial {trial}: {rows[0].outcome} ({speed:g}×)"
     if not models:
         raise film.nothing(title)
