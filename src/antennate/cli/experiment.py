@@ -58,8 +58,10 @@ def _options(experiment: Experiment[Any, Any]) -> type[Options]:
     if experiment.films is not None:
         has_trials = "trials" in experiment.config.model_fields
         kinds.append(TrialFilmOptions if has_trials else FilmOptions)
-    chosen: Any = type("Chosen", tuple(kinds), {})
-    return dataclass(frozen=True)(chosen) if kinds else Options
+    if not kinds:
+        return Options
+    chosen: Any = dataclass(frozen=True)(type("Chosen", tuple(kinds), {}))
+    return chosen
 
 
 def _filmed(options: Options) -> int | None:
