@@ -1,4 +1,4 @@
-"""`antennate reproduce`: verdicts follow their stated rules, and the page needs nothing else."""
+"""`antennate reproduce`: verdicts follow their stated rules."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ import json
 import shlex
 import subprocess
 import sys
-from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
 
@@ -18,9 +17,8 @@ from antennate.cli.arguments import parse
 from antennate.cli.experiment import Options
 from antennate.experiments.reproduce import run as reproduce
 from antennate.experiments.reproduce.experiment import EXPERIMENT
-from antennate.experiments.reproduce.page import page
-from antennate.experiments.reproduce.run import CLAIMS, ReproduceConfig, ReproduceOutcome
-from antennate.experiments.reproduce.verdict import VERDICTS, Bar, Claim, Finding
+from antennate.experiments.reproduce.run import CLAIMS, ReproduceConfig
+from antennate.experiments.reproduce.verdict import VERDICTS
 
 JUDGES = {claim.name: claim.judge for claim in CLAIMS}
 
@@ -92,31 +90,6 @@ def test_the_command_beside_a_claim_runs_just_that(name: str, quick: bool) -> No
     told = experiments.load(name).config
     parsed, _ = parse(name, "", told, words[2:], Options)
     assert parsed == told.model_validate(reproduce.settings(name, config))
-
-
-class Page(HTMLParser):
-    """What a page refers to, and its headings."""
-
-    def __init__(self, text: str) -> None:
-        super().__init__()
-        self.references: list[str] = []
-        self.tags: list[str] = []
-        self.feed(text)
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        self.tags.append(tag)
-        self.references += [value or "" for name, value in attrs if name in ("src", "href")]
-
-
-def test_the_page_needs_nothing_else_and_shows_text_as_it_is() -> None:
-    claim = Claim("one", "2 < 3 & <b>", "no number", "always", "springs", "N", lambda _: finding)
-    finding = Finding("<script>", "conditional", "why", (Bar("paper", 1.0), Bar("ours", 2.0)))
-    text = page(ReproduceOutcome(ReproduceConfig(), ((claim, finding),), interrupted=False))
-    found = Page(text)
-    assert {ref.split(",")[0] for ref in found.references} == {"#one", "data:image/png;base64"}
-    assert not {"script", "link", "iframe", "b"} & set(found.tags)
-    assert "2 &lt; 3 &amp; &lt;b&gt;" in text
-    assert "prefers-color-scheme: dark" in text
 
 
 def test_claims_of_what_ran_are_kept_and_told(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -118,6 +118,15 @@ def controller_colours(names: Sequence[str]) -> dict[str, str]:
     return {**CONTROLLER_COLOURS, **dict(zip(others, series(len(others)), strict=True))}
 
 
+@functools.cache
+def font(size: int) -> Any:
+    """The letters of our figures for Pillow, of a height [pixels]."""
+    from matplotlib.font_manager import findfont
+    from PIL import ImageFont
+
+    return ImageFont.truetype(findfont(_RC["font.family"]), size)
+
+
 def canvas(width: float, height: float) -> Figure:
     """An empty figure of this size [inches] whose parts keep clear of one another."""
     return Figure(figsize=(width, height), layout="constrained")

@@ -50,7 +50,7 @@ class FromFile:
     config: Path | None = option(None, "TOML file of parameters; flags override it", "FILE")
 
 
-Chosen = TypeVar("Chosen", bound=FromFile)
+Chosen = TypeVar("Chosen")
 
 
 def parse(
@@ -92,7 +92,7 @@ def parse(
     names = fields_of(options)
     chosen = _filled(options, {}, {p: v for p, v in values.items() if p[0] in names})
     base: Mapping[str, Any] = {}
-    if chosen.config is not None:
+    if isinstance(chosen, FromFile) and chosen.config is not None:
         config = read_file(chosen.config, model) if read is None else read(chosen.config)
         base = config.model_dump(exclude_unset=True)
         _refuse_code(chosen.config, base, values)

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import nullcontext
 from pathlib import Path
+from typing import Any
 
 from pydantic.dataclasses import dataclass
 
@@ -24,6 +25,8 @@ from antennate.hardware.robot import DoctorConfig
 from antennate.hardware.robot_file import RobotFile
 from antennate.messages import one_line
 from antennate.studies.formats import to_json
+from antennate.studies.measures import Table
+from antennate.studies.report import View
 
 DESCRIPTION = """\
 Examine the antenna board and the servo bus of a robot at rest, or of its twin: one line for each
@@ -55,7 +58,7 @@ def command(argv: Sequence[str]) -> int:
     _check(orders)
     robot = config.calibrated()
     key = key_of(orders)
-    with folder_for("doctor", orders, config, argv) if orders.out else nullcontext() as folder:
+    with folder_for(VIEW, orders, config, argv) if orders.out else nullcontext() as folder:
         checkup, changes = _examine(robot, orders, key)
         result = checkup.result(changes)
         if folder is not None:
@@ -173,3 +176,18 @@ def _sentence(checks: int, bad: int, warnings: int) -> str:
     if warnings:
         return f"The robot may be driven: no check is bad, {warnings} of {checks} warn."
     return f"The robot may be driven: all {checks} checks are good."
+
+
+def _tables(result: Mapping[str, Any]) -> Sequence[Table]:
+    """A row for each check, with the cure."""
+    columns = ("grade", "expected", "found", "cure")
+    rows = [(f"{r['part']}: {r['check']}", [r[name] for name in columns]) for r in result["rows"]]
+    return (Table("Checks", columns, rows, "\n\n".join(result["changes"])),)
+
+
+def _told(result: Mapping[str, Any]) -> str:
+    grades = [row["grade"] for row in result["rows"]]
+    return _sentence(len(grades), grades.count("bad"), grades.count("warn"))
+
+
+VIEW = View("doctor", DESCRIPTION, DoctorConfig, _tables, _told)

@@ -36,6 +36,7 @@ from antennate.messages import short_names, typed
 from antennate.robots.spec import require_antennae
 from antennate.studies.formats import to_json
 from antennate.studies.measures import Measure, Table
+from antennate.studies.report import View
 from antennate.studies.run_directory import LOG
 from antennate.telemetry.feed import Feed
 from antennate.telemetry.header import Header
@@ -78,7 +79,7 @@ def command(argv: Sequence[str]) -> int:
     """
     config, orders = parse_robot("drive", DESCRIPTION, RobotFile.for_drive, argv, Orders)
     require_antennae(config.robot, "drive")
-    return walk("drive", config, orders, argv)
+    return walk(VIEW, config, orders, argv)
 
 
 def require_ports(orders: Orders) -> None:
@@ -94,7 +95,7 @@ def require_ports(orders: Orders) -> None:
 
 
 def walk(
-    command: str,
+    view: View,
     config: DriveConfig,
     orders: Orders,
     argv: Sequence[str],
@@ -103,7 +104,7 @@ def walk(
     """Drive by the controller that is named, or by another one: the exit code.
 
     Args:
-        command: Name of the command.
+        view: The command, and how its result is shown.
         config: The robot, and for how long.
         orders: Where it is, and whether it moves.
         argv: The words of the command.
@@ -117,7 +118,7 @@ def walk(
     key = key_of(orders)
     with (
         _operator(config, orders) as operator,
-        folder_for(command, orders, config, argv) as folder,
+        folder_for(view, orders, config, argv) as folder,
     ):
         folder.without_trials()
         with connect(config, orders.esp32, orders.bus, key) as session:
@@ -125,7 +126,7 @@ def walk(
                 operator.stop.closed = True  # until the first tick: from here on there is a result
             if controller is not None:
                 session.control.controller = controller(session, config)
-                config = config.model_copy(update={"controller": command})
+                config = config.model_copy(update={"controller": view.name})
             header = Header(
                 controller=config.controller,
                 params=config.control,
@@ -134,7 +135,7 @@ def walk(
                 calibration=_calibration(given),
             )
             record = _Record(header, folder.path / LOG, config.record_required)
-            result = _carry_out(command, config, session, orders, record, operator)
+            result = _carry_out(view.name, config, session, orders, record, operator)
         try:
             folder.finish(result, ())
         finally:  # the robot's state is told even if it cannot be kept
@@ -172,11 +173,18 @@ def _calibration(config: DriveConfig) -> str:
 
 def _tell(result: Mapping[str, Any], orders: Orders, log: str) -> None:
     """Table and sentences; `log` are the words with which `replay` reads the log."""
-    name = result["controller"]
-    table = Table.of("Drive", {short_names([name])[name]: result}, MEASURES, _note(result))
     again = f"What was read and decided: {typed('replay')} {log}"
     again = again if result["logs"] else f"No log was kept: {_LOGLESS}"
-    tell(result, orders, [table], "\n".join([_sentence(result), *late_sentence(result), again]))
+    tell(result, orders, _tables(result), f"{_sentences(result)}\n{again}")
+
+
+def _tables(result: Mapping[str, Any]) -> Sequence[Table]:
+    name = result["controller"]
+    return (Table.of("Drive", {short_names([name])[name]: result}, MEASURES, _note(result)),)
+
+
+def _sentences(result: Mapping[str, Any]) -> str:
+    return "\n".join([_sentence(result), *late_sentence(result)])
 
 
 def _carry_out(
@@ -295,3 +303,5 @@ MEASURES = (
     Measure("commands_refused", "commands refused", form="d"),
     Measure("priority", "priority"),
 )
+
+VIEW = View("drive", DESCRIPTION, DriveConfig, _tables, _sentences)

@@ -17,6 +17,7 @@ from antennate.errors import ConfigError
 from antennate.messages import one_line, short_names
 from antennate.studies.formats import to_csv
 from antennate.studies.measures import Measure, Table
+from antennate.studies.report import View
 from antennate.studies.run_directory import RunDirectory
 from antennate.telemetry.reader import Damage, LogReader
 from antennate.telemetry.replay import ReplayConfig, Replayed, recorded_controller, replay
@@ -60,10 +61,10 @@ def command(argv: Sequence[str]) -> int:
         found = replay(log, controller, log.header)
     result = _result(log, found, config.controller)
     if options.out is not None:
-        with folder_for("replay", options, config, argv) as folder:
+        with folder_for(VIEW, options, config, argv) as folder:
             _keep(folder, path, found)
             folder.finish(result)
-    tell(result, options, [_table(result)], _sentence(result))
+    tell(result, options, VIEW.tables(result), VIEW.sentence(result))
     return complain("replay", log)
 
 
@@ -116,7 +117,7 @@ def _result(log: LogReader, found: Replayed, controller: str | None) -> dict[str
     }
 
 
-def _table(result: Mapping[str, Any]) -> Table:
+def _tables(result: Mapping[str, Any]) -> Sequence[Table]:
     then = {"shares": result["recorded_shares"], "states": result["states"]}
     now = {**result, "states": {}}
     done = [m.name for m in Maneuver if then["shares"][m.name] + now["shares"][m.name]]
@@ -133,7 +134,7 @@ def _table(result: Mapping[str, Any]) -> Table:
     )
     name = one_line(result["controller"])
     columns = {"recorded": then, short_names([name])[name]: now}
-    return Table.of("Replay", columns, (*measures, *COUNTS), note)
+    return (Table.of("Replay", columns, (*measures, *COUNTS), note),)
 
 
 def _sentence(result: Mapping[str, Any]) -> str:
@@ -146,6 +147,9 @@ def _sentence(result: Mapping[str, Any]) -> str:
         f"The controller decided otherwise in {different} of {ticks} ticks, first in tick "
         f"{first['tick']} at {first['time_s']:.2f} s: {first['replayed']} for {first['recorded']}."
     )
+
+
+VIEW = View("replay", DESCRIPTION, ReplayConfig, _tables, _sentence)
 
 
 def _keep(folder: RunDirectory, path: Path, found: Replayed) -> None:

@@ -16,6 +16,7 @@ from antennate.cli.options import option
 from antennate.params.base import Params
 from antennate.studies.formats import to_json
 from antennate.studies.measures import Table
+from antennate.studies.report import View, write_report
 from antennate.studies.run_directory import RunDirectory
 
 
@@ -30,16 +31,19 @@ class ResultOptions(FromFile):
 
 @contextlib.contextmanager
 def folder_for(
-    command: str, options: ResultOptions, config: Params, argv: Sequence[str]
+    view: View, options: ResultOptions, config: Params, argv: Sequence[str]
 ) -> Iterator[RunDirectory]:
-    """A run directory with its configuration; its path is printed when the run is complete.
+    """A run directory with its configuration.
+
+    Its report is written, and its path printed, when the run is complete.
 
     Raises:
         OutputError: It cannot be written, or it holds another run.
     """
-    with RunDirectory.create(command, options.out, options.overwrite) as folder:
-        folder.describe(config, ["antennate", command, *argv])
+    with RunDirectory.create(view.name, options.out, options.overwrite) as folder:
+        folder.describe(config, ["antennate", view.name, *argv])
         yield folder
+        write_report(folder, view)
         sys.stderr.write(f"written to {folder.path}\n")
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
@@ -13,9 +13,10 @@ from antennate.params.base import Params
 from antennate.robots.parts import bill
 from antennate.robots.servos import EXTENDED_MODE
 from antennate.robots.spec import RobotSpec
-from antennate.robots.supply import Supply, servos_of, supply
+from antennate.robots.supply import Rail, Supply, servos_of, supply
 from antennate.studies.formats import to_csv
 from antennate.studies.measures import Measure, Table
+from antennate.studies.report import View
 
 DESCRIPTION = """\
 Say what a robot consists of: joints with their ids and servos, what its supply has to give, a
@@ -45,33 +46,40 @@ def command(argv: Sequence[str]) -> int:
         AntennateError: The robot or the folder cannot be used.
     """
     config, options = parse("robot", DESCRIPTION, RobotConfig, argv, ResultOptions)
-    robot, power = config.robot, supply(config.robot)
-    with folder_for("robot", options, config, argv) as folder:
+    robot = config.robot
+    with folder_for(VIEW, options, config, argv) as folder:
         from antennate.robots.wiring import wiring  # slow to import
 
         folder.without_trials()
         parts = [asdict(part) for part in bill(robot)]
         folder.write("bom.csv", to_csv(parts))
         folder.write_figures({"wiring": wiring(robot)})
-        joints = dict(_joints(robot))
-        supplies = asdict(power)
         result = {
             "schema": 1,
             "command": "robot",
-            "joints": joints,
-            "supply": supplies,
+            "joints": dict(_joints(robot)),
+            "supply": asdict(supply(robot)),
             "bom": parts,
         }
         folder.finish(result)
-        rails = {
-            f"{rail.voltage:g} V": {**asdict(rail), "servos": len(rail.ids)} for rail in power.rails
-        }
-        tables = [
-            Table("Joints", _COLUMNS, _cells(joints)),
-            Table.of("Supply", rails, _RAIL, _note(power)),
-        ]
-        tell(result, options, tables, _sentence(robot, power))
+        tell(result, options, VIEW.tables(result), VIEW.sentence(result))
     return OK
+
+
+def _tables(result: Mapping[str, Any]) -> Sequence[Table]:
+    power = _supply(result)
+    rails = {
+        f"{rail.voltage:g} V": {**asdict(rail), "servos": len(rail.ids)} for rail in power.rails
+    }
+    return (
+        Table("Joints", _COLUMNS, _cells(result["joints"])),
+        Table.of("Supply", rails, _RAIL, _note(power)),
+    )
+
+
+def _supply(result: Mapping[str, Any]) -> Supply:
+    found = result["supply"]
+    return Supply(**{**found, "rails": tuple(Rail(**rail) for rail in found["rails"])})
 
 
 def _joints(robot: RobotSpec) -> Iterator[tuple[str, dict[str, Any]]]:
@@ -95,9 +103,14 @@ def _note(power: Supply) -> str:
     )
 
 
-def _sentence(robot: RobotSpec, power: Supply) -> str:
+def _sentence(result: Mapping[str, Any]) -> str:
+    power = _supply(result)
     drawn = f"{power.walking:.1f} A while walking, at most {power.peak:.1f} A"
     return (
-        f"{len(robot.ids)} servos draw {drawn}, and {power.stall:.1f} A if all of them stall; fuse "
-        f"{power.fuse:g} A; a battery of 2.2 Ah lasts {60 * power.hours(2.2):.0f} min of walking."
+        f"{len(result['joints'])} servos draw {drawn}, and {power.stall:.1f} A if all of them "
+        f"stall; fuse {power.fuse:g} A; a battery of 2.2 Ah lasts {60 * power.hours(2.2):.0f} min "
+        "of walking."
     )
+
+
+VIEW = View("robot", DESCRIPTION, RobotConfig, _tables, _sentence)

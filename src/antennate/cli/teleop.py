@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
@@ -34,6 +35,9 @@ L1 or R1) is held, and any other button for o. Without the button, or two second
 of the pad (--teleop.gamepad-silence), the robot stands. A pad that is unplugged ends the drive."""
 
 
+VIEW = dataclasses.replace(drive.VIEW, name="teleop", about=DESCRIPTION, config=TeleopConfig)
+
+
 @dataclass(frozen=True)
 class Orders(drive.Orders):
     """Whether to move, and by what."""
@@ -56,7 +60,7 @@ def command(argv: Sequence[str]) -> int:
     require_antennae(config.robot, "teleop")
     drive.require_ports(orders)
     with _keys(orders.gamepad, config.teleop.gamepad_silence) as keys:
-        return drive.walk("teleop", config, orders, argv, _controller(config, keys))
+        return drive.walk(VIEW, config, orders, argv, _controller(config, keys))
 
 
 def _controller(

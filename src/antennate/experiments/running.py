@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -15,7 +16,11 @@ from antennate.errors import BadInputError, ConfigError
 from antennate.params.base import Params
 from antennate.params.reading import from_values
 from antennate.studies.experiment import Experiment, Outcome
-from antennate.studies.run_directory import RunDirectory
+from antennate.studies.report import write_report
+from antennate.studies.run_directory import FILMS, RunDirectory
+
+_PARTS = 100
+"""Parts of the making of a film that are told."""
 
 
 @dataclass(frozen=True)
@@ -89,6 +94,7 @@ def run(
     workers: int = 1,
     out: str | Path | None = None,
     overwrite: bool = False,
+    video: int | None = None,
     on_step: Callable[[int, int], None] = lambda done, total: None,
     **settings: Any,
 ) -> Result:
@@ -101,6 +107,7 @@ def run(
         out: A run directory to write: configuration, versions, rows, result and figures; None
             for none.
         overwrite: Replace a run that `out` holds.
+        video: Number of a trial of which `out` gets a film for each condition, None for none.
         on_step: Called with how many of how many parts are done.
         settings: Fields of its configuration where a name was given, with nested groups as objects
             or dictionaries. `controllers` also takes classes.
@@ -112,16 +119,88 @@ def run(
     """
     found, config = _configured(experiment, settings, workers)
     found.check(config)
+    if video is not None:
+        require_films(found, config, video, out)
     if out is None:
         return Result(found, config, found.run(config, workers, on_step, lambda row: None))
     with RunDirectory.create(found.name, out, overwrite) as directory:
         directory.describe(config)
         outcome = found.run(config, workers, on_step, directory.append)
-        for name, content in found.files(outcome).items():
-            directory.write(name, content)
-        directory.finish(outcome.result(), outcome.rows)
-        directory.write_figures(found.figures(outcome))
+        keep(found, outcome, directory)
+        if video is not None:
+            write_films(found, config, video, directory)
+        write_report(directory, found.view)
         return Result(found, config, outcome, directory.path)
+
+
+def keep(
+    experiment: Experiment[Any, Any],
+    outcome: Outcome,
+    directory: RunDirectory,
+    figures: bool = True,
+) -> None:
+    """Write what came out into a run directory: files, rows and result, then figures.
+
+    Raises:
+        OutputError: Something cannot be written; what was written stays.
+    """
+    for name, content in experiment.files(outcome).items():
+        directory.write(name, content)
+    directory.finish(outcome.result(), outcome.rows)
+    if figures:
+        directory.write_figures(experiment.figures(outcome))
+
+
+def require_films(
+    experiment: Experiment[Any, Any], config: Params, trial: int, out: str | Path | None = ""
+) -> None:
+    """Find out before a run whether its films can be made.
+
+    Raises:
+        BadInputError: There is no such trial, no run directory, or nothing here that can draw.
+        MissingPackageError: A package of the extra `video` is missing.
+    """
+    from antennate.telemetry.film import require_video  # slow to import
+
+    trials = getattr(config, "trials", 1)
+    if experiment.films is None or out is None:
+        what = "an experiment that can be filmed" if out is not None else "a run directory, `out`"
+        raise ConfigError(f"video: expected {what}, found {experiment.name} without")
+    if not 0 <= trial < trials:
+        raise ConfigError(f"video: expected a trial of this run, 0 to {trials - 1}, found {trial}")
+    require_video()
+
+
+def write_films(
+    experiment: Experiment[Any, Any],
+    config: Params,
+    trial: int,
+    directory: RunDirectory,
+    on_step: Callable[[int, int], None] = lambda done, total: None,
+) -> None:
+    """Run one trial of each condition once more, and write its film into the run directory.
+
+    Args:
+        experiment: What is filmed.
+        config: Its configuration.
+        trial: Number of the trial.
+        directory: The directory of the run.
+        on_step: Called with how many of how many parts are done, as for `run`.
+
+    Raises:
+        AntennateError: A trial failed, or a film cannot be drawn or written.
+    """
+    from antennate.telemetry.film import encoded
+
+    assert experiment.films is not None  # noqa: S101 `require_films` looked
+    records = experiment.films(config, trial)
+    for done, (name, record) in enumerate(records.items()):
+
+        def step(part: int, total: int, before: int = _PARTS * done) -> None:
+            on_step(before + _PARTS * part // total, _PARTS * len(records))
+
+        data = encoded(record(), step)
+        directory.write(f"{FILMS}/{re.sub(r'[^A-Za-z0-9_.-]+', '_', name)}.mp4", data)
 
 
 def list_experiments() -> dict[str, str]:

@@ -14,9 +14,12 @@ from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 
 from antennate.params.base import Params
 from antennate.studies.measures import Table
+from antennate.studies.report import Body, View
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from antennate.telemetry.film import Film
 
 OnStep = Callable[[int, int], None]
 """Takes how many of how many parts are done."""
@@ -68,6 +71,9 @@ class Experiment(Generic[Config, Found]):
         parts: What `on_step` counts.
         logged: Runs as `run` does and keeps the log of each trial in a folder, which is given as
             well; None if there are no controllers to log.
+        films: films(config, trial) -> for each condition, by name, what runs this trial of it once
+            more and records it; None where nothing can be filmed.
+        body: HTML that stands in its report in place of tables and figures.
     """
 
     name: str
@@ -82,6 +88,16 @@ class Experiment(Generic[Config, Found]):
     failed: Callable[[Mapping[str, Any]], bool] = lambda result: False
     parts: str = "trials"
     logged: Callable[[Config, int, OnStep, OnRow, Path], Found] | None = None
+    films: Callable[[Config, int], Mapping[str, Callable[[], Film]]] | None = None
+    body: Body | None = None
+
+    @property
+    def view(self) -> View:
+        """How its result is shown."""
+        return View(
+            *(self.name, self.description, self.config, self.tables, self.sentence),
+            body=self.body,
+        )
 
     @classmethod
     def of_folder(
@@ -91,15 +107,21 @@ class Experiment(Generic[Config, Found]):
         run: Callable[[Config, int, OnStep, OnRow], Found],
         tables: Callable[[Mapping[str, Any]], Sequence[Table]],
         sentence: Callable[[Mapping[str, Any]], str],
+        filmed: bool = False,
         **more: Any,
     ) -> Experiment[Config, Found]:
         """An experiment with a folder of its own: a package that has its name and describes it.
 
         `module` is the `__name__` of a module in the folder. Figures are those that
         `figures(outcome)` of the module `figure` beside it returns; it is imported when they are
-        drawn, as that takes long.
+        drawn, as that takes long. If it is `filmed`, its films are those of `films(config, trial)`
+        of the module `film`, likewise.
         """
         folder = module.rpartition(".")[0]
+        if filmed:
+            more["films"] = lambda c, trial: importlib.import_module(f"{folder}.film").films(
+                c, trial
+            )
         return cls(
             folder.rpartition(".")[2],
             importlib.import_module(folder).__doc__ or "",

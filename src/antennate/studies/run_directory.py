@@ -35,12 +35,11 @@ from antennate.telemetry.parts import MOST_PARTS, part
 
 RESULT, TABLE, PARTIAL = "result.json", "trials.csv", "trials.partial.jsonl"
 CONFIG, VERSIONS, COMMAND = "config.toml", "versions.json", "command.txt"
-FIGURES = "figures"
-"""Folder of the figures; what it holds as svg and png belongs to the run."""
+FIGURES, FILMS, LOGS = "figures", "films", "logs"
+"""Folders of figures (svg, png), films (mp4) and logs of trials (mcap), which belong to the run."""
+_INNER = {FIGURES: (".svg", ".png"), FILMS: (".mp4",), LOGS: (".mcap",)}
 CALIBRATION, LOG, REPORT = "calibration.json", "drive.mcap", "report.html"
-LOGS = "logs"
-"""Folder of the logs of trials."""
-_LARGEST = 10**9
+LARGEST = 10**9
 """No file of a run is longer [bytes]."""
 _LOGS = tuple(part(Path(LOG), number).name for number in range(1, MOST_PARTS + 1))
 _FILES = (
@@ -95,7 +94,7 @@ class RunDirectory:
         with _writing(place):
             missing = [p for p in (place, *place.parents) if not p.exists()]
             place.mkdir(parents=True, exist_ok=path is not None)
-            for folder in (FIGURES, LOGS):
+            for folder in _INNER:
                 if (place / folder).is_symlink():
                     raise OutputError(f"expected {place / folder} within its run, found a link")
             held = _held(place)
@@ -149,9 +148,17 @@ class RunDirectory:
         """
         return read_file(self.path / CONFIG, model)
 
+    def text(self, name: str) -> str:
+        """The content of one of its text files; empty if there is none.
+
+        Raises:
+            BadInputError: The file is damaged.
+        """
+        return self._decoded(name, str) if (self.path / name).exists() else ""
+
     def _decoded(self, name: str, decode: Any) -> Any:
         path = self.path / name
-        text = decoded(path, read_limited(path, _LARGEST))
+        text = decoded(path, read_limited(path, LARGEST))
         try:
             return decode(text)
         except ValueError as error:
@@ -260,10 +267,9 @@ class RunDirectory:
 
 def _held(place: Path) -> list[Path]:
     """Files of a run that a directory holds."""
-    ours = {FIGURES: (".svg", ".png"), LOGS: (".mcap",)}
     inner = [
         path
-        for folder, endings in ours.items()
+        for folder, endings in _INNER.items()
         for path in (sorted((place / folder).iterdir()) if _is(place / folder) else ())
         if path.suffix in endings
     ]

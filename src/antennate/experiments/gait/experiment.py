@@ -97,5 +97,6 @@ EXPERIMENT = Experiment.of_folder(
     tables,
     sentence,
     check=gait.check,
+    filmed=True,
     parts="walks",
 )

@@ -8,6 +8,7 @@ FORWARD is walked again for numbers that are not known, drawn from their ranges.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -151,7 +152,17 @@ def check(config: GaitStudyConfig) -> None:
 _Task = tuple[GaitStudyConfig, str, GaitParams, Maneuver]
 
 
-def walk_flat(config: GaitStudyConfig, name: str, gait: GaitParams, maneuver: Maneuver) -> Walk:
+Watch = Callable[[World, AntennaFrame], None]
+"""Takes world and frame after each tick."""
+
+
+def walk_flat(
+    config: GaitStudyConfig,
+    name: str,
+    gait: GaitParams,
+    maneuver: Maneuver,
+    watch: Watch = lambda world, frame: None,
+) -> Walk:
     """Walk one maneuver on the flat floor from a straight start.
 
     Raises:
@@ -170,6 +181,7 @@ def walk_flat(config: GaitStudyConfig, name: str, gait: GaitParams, maneuver: Ma
         failure = body.failure(0)
         if failure is not None:
             raise failure
+        watch(world, frame)
         ticks.append((world.t, world.links(), world.work))
         return world.t < end - _TINY
 

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from antennate.experiments.reproduce.run import ReproduceConfig, ReproduceOutcome, run
+from antennate.experiments.reproduce.page import body
+from antennate.experiments.reproduce.run import ReproduceConfig, run
 from antennate.experiments.reproduce.verdict import VERDICTS
 from antennate.studies.experiment import Experiment
 from antennate.studies.measures import Table
@@ -30,11 +30,6 @@ def sentence(result: Mapping[str, Any]) -> str:
     return f"Of {len(result['claims'])} claims: {found}.{few}"
 
 
-def _files(outcome: ReproduceOutcome) -> Mapping[str, str]:
-    page = importlib.import_module("antennate.experiments.reproduce.page").page
-    return {REPORT: page(outcome)}
-
-
 EXPERIMENT = Experiment.of_folder(
-    __name__, ReproduceConfig, run, tables, sentence, files=_files, parts="parts of 9 experiments"
+    __name__, ReproduceConfig, run, tables, sentence, body=body, parts="parts of 9 experiments"
 )

@@ -95,6 +95,11 @@ class TouchConfig(Params):
     wall: TouchWallsParams = TouchWallsParams()
     physics: BenchPhysicsParams = BenchPhysicsParams()
 
+    def example(self) -> tuple[WallKind, float]:
+        """The wall and the speed [m/s] that are shown: a gap if there is one, the middle speed."""
+        wall = "gap" if "gap" in self.walls else self.walls[0]
+        return wall, sorted(self.speeds)[len(self.speeds) // 2]
+
     @property
     def lead(self) -> float:
         """Way of the straight tip ahead of the base [m]."""

@@ -107,5 +107,6 @@ EXPERIMENT = Experiment.of_folder(
     lambda config, workers, on_step, _: touch.run(config, workers, on_step),
     tables,
     sentence,
+    filmed=True,
     parts="traverses",
 )

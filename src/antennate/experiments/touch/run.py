@@ -76,9 +76,8 @@ class TouchOutcome:
     def example(self) -> tuple[Traverse, Comparison] | None:
         """Trial 0 of one traverse: a gap, the middle speed and `descending` where there are."""
         config = self.config
-        wall = "gap" if "gap" in config.walls else config.walls[0]
         profile = "descending" if "descending" in config.profiles else config.profiles[0]
-        wanted = (wall, sorted(config.speeds)[len(config.speeds) // 2], profile, 0)
+        wanted = (*config.example(), profile, 0)
         for one, found in zip(self.traverses, self.comparisons, strict=True):
             if found and (found.wall, found.speed, found.profile, found.trial) == wanted:
                 return one, found

@@ -161,17 +161,23 @@ def compare(config: TouchConfig, traverses: Sequence[Traverse]) -> list[Comparis
     return found
 
 
-def _compare_batch(config: TouchConfig, batch: Sequence[Traverse]) -> list[Comparison]:
+def readings(config: TouchConfig, batch: Sequence[Traverse]) -> Floats:
+    """What the sensor reads in B traverses of n ticks each [counts], shape (n, B)."""
     sensor, ticks = config.antenna.sensor, len(batch[0].x)
     noises = {
         trial: reading_noise(sensor, np.random.default_rng([config.seed, trial, 1]), (ticks,))
         for trial in {t.plan.trial for t in batch}
     }
-    counts = reading.recorded(
+    return reading.recorded(
         sensor,
         np.stack([t.flex for t in batch], axis=1),
         np.stack([noises[t.plan.trial] for t in batch], axis=1),
     )
+
+
+def _compare_batch(config: TouchConfig, batch: Sequence[Traverse]) -> list[Comparison]:
+    sensor = config.antenna.sensor
+    counts = readings(config, batch)
     level, alarm = sense(config.conditioning, config.rule, counts, 1.0 / sensor.rate)
     safe = np.clip(level, 1e-15, 1.0 - 1e-15)
     logit = np.log(safe / (1.0 - safe))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -90,8 +91,17 @@ def plan(config: TouchConfig, wall: WallKind, speed: float, profile: Profile, tr
     )
 
 
+Watch = Callable[[Bench], None]
+"""Takes the bench after each tick."""
+
+
 def run_traverse(
-    config: TouchConfig, wall: WallKind, speed: float, profile: Profile, trial: int
+    config: TouchConfig,
+    wall: WallKind,
+    speed: float,
+    profile: Profile,
+    trial: int,
+    watch: Watch = lambda bench: None,
 ) -> Traverse:
     """Move the antenna along the wall; trouble in the physics ends the traverse early."""
     one = plan(config, wall, speed, profile, trial)
@@ -105,6 +115,7 @@ def run_traverse(
         for tick in range(one.ticks):
             force = _advance(bench, one, (tick - 1) / one.antenna.sensor.rate) if tick else 0.0
             ticks.append((float(bench.carriage.position[0]), bench.flex(), force))
+            watch(bench)
             if trial == 0:
                 joints.append(bench.joints())
     except SimulationError as error:

@@ -17,6 +17,7 @@ from antennate.experiments.tunnel.monitor import Outcome, TrialMonitor, TrialPat
 from antennate.sim.scenes.registry import make_scene
 from antennate.sim.sim_robot import SimRobot
 from antennate.sim.trial import draw_trial
+from antennate.sim.world import World
 from antennate.telemetry.header import Header
 from antennate.telemetry.simulated import SimulatedLog
 from antennate.types import AntennaFrame, Controller, JointCommand
@@ -24,6 +25,8 @@ from antennate.types import AntennaFrame, Controller, JointCommand
 BATCH = 12
 """Trials of one process stepped in lockstep."""
 Emit = Callable[[tuple[TrialResult, TrialPath]], None]
+Watch = Callable[[World, AntennaFrame, Controller], None]
+"""Takes world, frame and controller of the first row after each tick."""
 
 
 def run_trials(
@@ -33,6 +36,7 @@ def run_trials(
     emit: Emit,
     batch: int = BATCH,
     logs: Path | None = None,
+    watch: Watch | None = None,
 ) -> None:
     """Run trials of one controller; emit each as it ends, and keep its log if there is a folder.
 
@@ -42,7 +46,7 @@ def run_trials(
     batch that has not ended begins again with a controller of its own, and is invalid if that one
     fails too.
     """
-    rows = _Rows(config, controller, trials, emit, min(batch, len(trials)), logs)
+    rows = _Rows(config, controller, trials, emit, min(batch, len(trials)), logs, watch)
     try:
         rows.run()
     except ControllerError as error:
@@ -65,9 +69,10 @@ class _Rows:
         emit: Emit,
         batch: int,
         logs: Path | None,
+        watch: Watch | None,
     ) -> None:
         self._config, self._name, self._emit, self._batch = config, name, emit, batch
-        self._folder, self._logs = logs, dict[int, SimulatedLog]()
+        self._folder, self._logs, self._looks = logs, dict[int, SimulatedLog](), watch
         self._waiting = list(trials)
         self._scene = make_scene(config.scene, config.tunnel)
         self._monitors: list[TrialMonitor | None] = [None] * batch
@@ -98,6 +103,8 @@ class _Rows:
             self._log(row, made, phase)
 
         def go_on(frame: AntennaFrame, command: JointCommand) -> bool:
+            if self._looks is not None:
+                self._looks(self._robot.world(0), frame, made)
             for log in self._logs.values():
                 log.take(frame, command)
             for row, monitor in enumerate(self._monitors):

@@ -79,6 +79,7 @@ EXPERIMENT = Experiment.of_folder(
     tables,
     sentence,
     check=tunnel.check,
+    filmed=True,
     failed=lambda result: bool(_none_valid(result)),
     logged=tunnel.run,
 )

@@ -45,4 +45,6 @@ def _hangs(result: Mapping[str, Any]) -> str:
     )
 
 
-EXPERIMENT = Experiment.of_folder(__name__, wall.WallConfig, wall.run, tables, sentence)
+EXPERIMENT = Experiment.of_folder(
+    __name__, wall.WallConfig, wall.run, tables, sentence, filmed=True
+)

@@ -10,6 +10,7 @@ is counted once more without the `start`. A trial that does both counts as a jam
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -117,7 +118,17 @@ class WallOutcome:
         }
 
 
-def passage(config: WallConfig, profile: Profile, trial: int) -> Traverse:
+Watch = Callable[[Bench], None]
+"""Takes the bench after each command to the carriage."""
+
+
+def _unwatched(bench: Bench) -> None:
+    """Look at nothing."""
+
+
+def passage(
+    config: WallConfig, profile: Profile, trial: int, watch: Watch = _unwatched
+) -> Traverse:
     """Move one antenna along the wall.
 
     Raises:
@@ -134,7 +145,7 @@ def passage(config: WallConfig, profile: Profile, trial: int) -> Traverse:
     antenna = antenna.model_copy(update={"friction": min(friction, 2.0)})
     bench = _bench(config, antenna, angle, phase, factors)
     crest = antenna.length * math.sin(angle) + antenna.radius + _CLEAR
-    return _drive(config, bench, math.pi / 2 - angle, overlap + _CLEAR, crest)
+    return _drive(config, bench, math.pi / 2 - angle, overlap + _CLEAR, crest, watch)
 
 
 def _bench(
@@ -156,7 +167,7 @@ def _bench(
 
 
 def _drive(
-    config: WallConfig, bench: Bench, base: float, approach: float, crest: float
+    config: WallConfig, bench: Bench, base: float, approach: float, crest: float, watch: Watch
 ) -> Traverse:
     wall = config.wall
     bench.place(0.0, 0.0, base)
@@ -165,6 +176,7 @@ def _drive(
     for x in _ramp(approach, wall.speed):
         bench.command(x, 0.0, wall.speed, 0.0, base)
         bench.step(substeps)
+        watch(bench)
     begin = bench.tip()[1]
     path = _ramp(wall.travel, wall.speed)
     rows, hinges, shapes = [], [], []
@@ -172,6 +184,7 @@ def _drive(
     for i, y in enumerate(path):
         bench.command(approach, y, 0.0, wall.speed, base)
         bench.step(substeps)
+        watch(bench)
         if i in marks:
             shapes.append(bench.joints())
         if i % _SAMPLES == 0:

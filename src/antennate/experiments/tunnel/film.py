@@ -1,0 +1,66 @@
+"""Films of `antennate tunnel`: one trial of each controller, run once more."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+
+from antennate.experiments.tunnel.batch import run_trials
+from antennate.experiments.tunnel.config import TunnelConfig
+from antennate.experiments.tunnel.monitor import TrialResult
+from antennate.messages import short_names
+from antennate.sim.camera import Shot
+from antennate.sim.world import World
+from antennate.telemetry import film
+from antennate.telemetry.film import Film, FilmRecorder
+from antennate.types import AntennaFrame, Controller
+
+SPEED = 2.0
+"""Films are so many times faster than the robot."""
+
+
+def films(config: TunnelConfig, trial: int) -> dict[str, Callable[[], Film]]:
+    """A film of each controller."""
+    return {
+        label: partial(record, config, name, trial, label)
+        for name, label in short_names(config.controllers).items()
+    }
+
+
+def record(
+    config: TunnelConfig, controller: str, trial: int, label: str, speed: float = SPEED
+) -> Film:
+    """Run one trial and record it.
+
+    Raises:
+        BadInputError: The controller failed at its first tick.
+    """
+    recorder, models, rows = FilmRecorder(speed), [], list[TrialResult]()
+
+    def watch(world: World, frame: AntennaFrame, control: Controller) -> None:
+        models[:] = [world.model]
+        recorder.take(
+            *(world.t, world.data.qpos, world.links().mean(axis=0)),
+            counts=frame.counts[0],
+            level=control.level[0],
+            contact=control.contact[0],
+            maneuver=control.maneuver[0],
+        )
+
+    run_trials(config, controller, [trial], lambda found: rows.append(found[0]), watch=watch)
+    title = f"{label}, trial {trial}: {rows[0].outcome} ({speed:g}×)"
+    if not models:
+        raise film.nothing(title)
+    return recorder.film(
+        title,
+        models[0],
+        Shot(2.8 * config.robot.length),
+        [
+            film.counts_trace(recorder.values("counts")),
+            film.level_trace(recorder.values("level"), config.control.rule.threshold),
+        ],
+        [
+            film.maneuver_band(recorder.values("maneuver")),
+            *film.contact_bands(recorder.values("contact"), ("left", "right")),
+        ],
+    )

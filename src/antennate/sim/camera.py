@@ -1,0 +1,183 @@
+"""Pictures of a simulated world, drawn without a display."""
+
+from __future__ import annotations
+
+import copy
+import importlib
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from antennate.robots.spec import ANTENNA_PREFIXES
+from antennate.sim import gl, layers
+from antennate.types import Floats
+
+Picture = NDArray[np.uint8]
+Colour = tuple[float, float, float, float]
+
+_UNPAINTED = np.array([0.5, 0.5, 0.5, 1.0], dtype=np.float32)
+"""The engine's colour of a geom that has none of its own."""
+_FLOOR: Colour = (0.97, 0.97, 0.97, 1.0)
+_OBSTACLE: Colour = (0.88, 0.80, 0.66, 0.6)
+_BODY: Colour = (0.22, 0.22, 0.25, 1.0)
+_LEG: Colour = (0.45, 0.47, 0.52, 1.0)
+_LINE: Colour = (0.8, 0.8, 0.8, 1.0)
+_SAMPLES = 4
+"""Samples of a pixel: thin antennae would flicker otherwise."""
+_GRID = 16
+"""Grid lines to either side of the middle."""
+
+
+@dataclass(frozen=True, slots=True)
+class Shot:
+    """From where a camera looks.
+
+    Attributes:
+        distance: From what it looks at [m]; of a flat shot half the height of the picture [m].
+        elevation: Below the horizon it looks by so much [deg].
+        azimuth: Its heading [deg]; 90 has x to the right and y to the back.
+        flat: Whether it draws without perspective.
+        grid: Distance of the lines on the floor [m].
+        floor: Height of a floor that is drawn where the model has none [m].
+    """
+
+    distance: float
+    elevation: float = 70.0
+    azimuth: float = 90.0
+    flat: bool = False
+    grid: float = 0.25
+    floor: float | None = None
+
+
+class Camera:
+    """A camera in the world of a model; a context, as it holds memory of the driver.
+
+    Obstacles, links, legs and antennae get colours of their own, left and right apart, unless the
+    model brings its own. The model that is given stays as it is.
+
+    Args:
+        model: The compiled model, of mujoco.
+        shot: From where it looks.
+        size: Width and height [pixels].
+        sides: Colours of the left and the right antenna.
+
+    Raises:
+        MissingPackageError: PyOpenGL is not installed.
+        BadInputError: Nothing here can draw.
+    """
+
+    def __init__(
+        self,
+        model: mujoco.MjModel,
+        shot: Shot,
+        size: tuple[int, int],
+        sides: tuple[Colour, Colour],
+    ) -> None:
+        name = gl.backend()
+        os.environ.setdefault("PYOPENGL_PLATFORM", name)
+        self._model = copy.copy(model)
+        _prepare(self._model, size, sides)
+        self._data = mujoco.MjData(self._model)
+        self._rect = mujoco.MjrRect(0, 0, *size)
+        self._scene = mujoco.MjvScene(self._model, maxgeom=2 * self._model.ngeom + 500)
+        self._option = mujoco.MjvOption()
+        self._shot = shot
+        self._camera = _aimed(shot)
+        if shot.flat:
+            self._model.vis.global_.fovy = 2 * shot.distance
+        self._driver = importlib.import_module(f"mujoco.{name}").GLContext(*size)
+        self._driver.make_current()
+        self._context = mujoco.MjrContext(self._model, mujoco.mjtFontScale.mjFONTSCALE_100.value)
+        mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, self._context)
+
+    def picture(self, position: Floats, target: Floats) -> Picture:
+        """The world with its coordinates at `position`, the camera on `target` [m].
+
+        Args:
+            position: All coordinates of the model, shape (nq,).
+            target: What is in the middle of the picture [m], shape (3,).
+
+        Returns:
+            The picture, shape (height, width, 3).
+        """
+        self._data.qpos[:] = position
+        mujoco.mj_kinematics(self._model, self._data)
+        mujoco.mj_camlight(self._model, self._data)
+        self._camera.lookat = target
+        mujoco.mjv_updateScene(
+            self._model,
+            self._data,
+            self._option,
+            None,
+            self._camera,
+            mujoco.mjtCatBit.mjCAT_ALL.value,
+            self._scene,
+        )
+        _add_floor(self._scene, self._shot, target)
+        self._driver.make_current()
+        mujoco.mjr_render(self._rect, self._scene, self._context)
+        pixels = np.empty((self._rect.height, self._rect.width, 3), dtype=np.uint8)
+        mujoco.mjr_readPixels(pixels, None, self._rect, self._context)
+        return pixels[::-1]
+
+    def __enter__(self) -> Camera:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._driver.make_current()
+        self._context.free()
+        self._driver.free()
+
+
+def _aimed(shot: Shot) -> mujoco.MjvCamera:
+    camera = mujoco.MjvCamera()
+    camera.type = mujoco.mjtCamera.mjCAMERA_FREE
+    camera.distance, camera.azimuth, camera.elevation = shot.distance, shot.azimuth, -shot.elevation
+    camera.orthographic = int(shot.flat)
+    return camera
+
+
+def _prepare(model: mujoco.MjModel, size: tuple[int, int], sides: tuple[Colour, Colour]) -> None:
+    """Light and colours."""
+    visual = model.vis
+    visual.global_.offwidth, visual.global_.offheight = size
+    visual.quality.offsamples = _SAMPLES
+    visual.headlight.ambient = [0.55] * 3
+    visual.headlight.diffuse = [0.45] * 3
+    visual.headlight.specular = [0.0] * 3
+    bare = (model.geom_rgba == _UNPAINTED).all(axis=1) & (model.geom_matid < 0)
+    kind = model.geom_contype
+    for bit, colour in (
+        (layers.FLOOR, _FLOOR),
+        (layers.OBSTACLE, _OBSTACLE),
+        (layers.BODY, _BODY),
+        (layers.LEG, _LEG),
+        (layers.ANTENNA, sides[0]),
+    ):
+        model.geom_rgba[bare & (kind == bit)] = colour
+    right = [ANTENNA_PREFIXES[1] in model.geom(i).name for i in range(model.ngeom)]
+    model.geom_rgba[bare & (kind == layers.ANTENNA) & np.array(right)] = sides[1]
+
+
+def _add_floor(scene: mujoco.MjvScene, shot: Shot, target: Floats) -> None:
+    """A floor if there is none, with lines around the target, so that one sees it move."""
+    height = shot.floor or 0.0
+    middle = np.round(target[:2] / shot.grid) * shot.grid
+    half, width = _GRID * shot.grid, shot.grid / 150
+    if shot.floor is not None:
+        _add_box(scene, [2 * half, 2 * half, width], [*middle, height - 2 * width], _FLOOR)
+    for k in range(-_GRID, _GRID + 1):
+        across = middle + k * shot.grid
+        _add_box(scene, [half, width, width / 10], [middle[0], across[1], height], _LINE)
+        _add_box(scene, [width, half, width / 10], [across[0], middle[1], height], _LINE)
+
+
+def _add_box(scene: mujoco.MjvScene, size: Sequence[float], at: Sequence[float], c: Colour) -> None:
+    geom = scene.geoms[scene.ngeom]
+    box = mujoco.mjtGeom.mjGEOM_BOX
+    mujoco.mjv_initGeom(geom, box, size, at, np.eye(3).ravel(), np.array(c, dtype=np.float32))
+    scene.ngeom += 1

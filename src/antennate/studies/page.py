@@ -1,0 +1,132 @@
+"""Parts of HTML pages that need nothing else: no network, no script; for screens and for paper."""
+
+from __future__ import annotations
+
+import base64
+import struct
+from collections.abc import Iterable, Sequence
+from html import escape
+
+from antennate.studies.measures import Table
+
+_DPI, _CSS_DPI = 200, 96
+"""Pixels an inch of our pictures, and of a page."""
+_LEAST = 0.75
+"""Letters of 9 points become no smaller than this share; a narrow screen scrolls instead."""
+_STYLE = """
+:root { color-scheme: light dark; --ink: #222; --muted: #666; --line: #ddd; --page: #fff;
+  --good: #00704d; --fair: #8a5a00; --bad: #a33a00; }
+@media (prefers-color-scheme: dark) { :root { --ink: #e8e8e8; --muted: #a8a8a8; --line: #444;
+  --page: #161616; --good: #4fc79b; --fair: #e5ae4a; --bad: #ff9460; }
+  img { filter: invert(0.91) hue-rotate(180deg); } }
+body { font: 16px/1.5 system-ui, sans-serif; color: var(--ink); background: var(--page);
+  max-width: 62rem; margin: 0 auto; padding: 1rem; }
+h1 { font-size: 1.6rem; margin-bottom: .3rem; } h2 { font-size: 1.1rem; margin: 1.6rem 0 .3rem; }
+h1, h2, p, figcaption, li { overflow-wrap: anywhere; }
+p { margin: .3rem 0; } .muted, dt, caption, figcaption { color: var(--muted); }
+.scroll { overflow-x: auto; }
+table { border-collapse: collapse; font-size: .9rem; margin: .3rem 0; }
+td, th { text-align: left; vertical-align: top; padding: .2rem 1.2rem .2rem 0;
+  border-bottom: 1px solid var(--line); }
+th { font-weight: 600; } table.numbers td + td, table.numbers th + th { text-align: right; }
+table.numbers { font-variant-numeric: tabular-nums; white-space: nowrap; }
+table.numbers td:first-child { position: sticky; left: 0; background: var(--page);
+  box-shadow: inset 0 -1px var(--line); }
+section { border-top: 1px solid var(--line); padding: 1rem 0; display: grid; gap: 0 1.5rem;
+  grid-template-columns: 1fr minmax(0, 26rem); break-inside: avoid; }
+section > h2, section > .verdict { grid-column: 1 / -1; margin-top: 0; }
+figure { margin: .8rem 0; break-inside: avoid; }
+.pair { display: grid; gap: 0 1.5rem; grid-template-columns: repeat(2, minmax(0, 1fr)); }
+img, video { max-width: 100%; height: auto; display: block; }
+.scroll > img { max-width: none; width: 100%; }
+pre { font-size: .8rem; overflow-x: auto; border: 1px solid var(--line); padding: .6rem; }
+pre.wrap { white-space: pre-wrap; overflow-wrap: anywhere; }
+code { font-size: .85rem; overflow-wrap: anywhere; } a { color: inherit; }
+summary { cursor: pointer; } dl { margin: .4rem 0; } dd { margin: 0 0 .4rem; }
+.good { color: var(--good); } .fair { color: var(--fair); } .bad { color: var(--bad); }
+.good, .fair, .bad { font-weight: 600; }
+@media (max-width: 44rem) { .pair, section { grid-template-columns: minmax(0, 1fr); }
+  .wide { display: none; } }
+@media print { body { max-width: none; padding: 0; font-size: 10pt; } pre { white-space: pre-wrap; }
+  details::details-content { content-visibility: visible; display: block; block-size: auto; }
+  .scroll { overflow: visible; } .scroll > img { min-width: 0 !important; }
+  table.numbers { white-space: normal; } tr { break-inside: avoid; } h2 { break-after: avoid; }
+  details pre { font-size: 6pt; columns: 2; } video { display: none; } }
+"""
+
+
+def page(title: str, body: str) -> str:
+    """A whole page."""
+    return (
+        '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">'
+        f"<title>{escape(title)}</title><style>{_STYLE}</style></head>"
+        f"<body>{body}</body></html>\n"
+    )
+
+
+def paragraphs(text: str, kind: str = "") -> str:
+    """A paragraph for each part of a text that an empty line ends."""
+    head = f'<p class="{kind}">' if kind else "<p>"
+    return "".join(f"{head}{escape(part)}</p>" for part in text.strip().split("\n\n") if part)
+
+
+def grid(columns: Sequence[str], rows: Iterable[Sequence[str]], kind: str = "") -> str:
+    """A table of texts that scrolls where it is too wide; a row is as long as `columns`."""
+    heads = "".join(f"<th>{escape(name)}</th>" for name in columns)
+    lines = "".join(
+        "<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in rows
+    )
+    return (
+        f'<div class="scroll"><table class="{kind}"><thead><tr>{heads}</tr></thead>'
+        f"<tbody>{lines}</tbody></table></div>"
+    )
+
+
+def numbers(table: Table) -> str:
+    """A table of measures, with its title and its note."""
+    columns = ["", *(name.replace("_", " ") for name in table.columns)]
+    rows = [[name, *cells] for name, cells in table.rows]
+    note = paragraphs(table.note, "muted")
+    return f"<h2>{escape(table.title)}</h2>{grid(columns, rows, _kind(table))}{note}"
+
+
+def _kind(table: Table) -> str:
+    """`numbers` for short cells, which stand in columns; texts are left as they flow."""
+    return "numbers" if all(len(c) < 30 for _, cells in table.rows for c in cells) else ""
+
+
+def picture(png: bytes, svg: bytes, described: str) -> str:
+    """A figure as the smaller of both, as large as it was drawn and never too small to read."""
+    kind, data = ("svg+xml", svg) if len(svg) < len(png) else ("png", png)
+    width, height = struct.unpack(">II", png[16:24])
+    width, height = (round(size * _CSS_DPI / _DPI) for size in (width, height))
+    return (
+        f'<div class="scroll"><img alt="{escape(described)}" width="{width}" height="{height}" '
+        f'style="min-width: {round(_LEAST * width)}px; max-width: {width}px" '
+        f'src="data:image/{kind};base64,{base64.b64encode(data).decode()}"></div>'
+    )
+
+
+def film(mp4: bytes) -> str:
+    """A film with its controls; it starts when it is told to."""
+    data = base64.b64encode(mp4).decode()
+    return (
+        '<video controls muted playsinline preload="metadata" '
+        f'src="data:video/mp4;base64,{data}"></video>'
+    )
+
+
+def captioned(content: str, caption: str) -> str:
+    """A figure or a film with its name below."""
+    return f"<figure>{content}<figcaption>{escape(caption)}</figcaption></figure>"
+
+
+def folded(title: str, content: str) -> str:
+    """What a reader opens; on paper it is open."""
+    return f"<details><summary>{escape(title)}</summary>{content}</details>"
+
+
+def block(text: str, wrap: bool = False) -> str:
+    """Text as it was typed."""
+    return f'<pre class="{"wrap" if wrap else ""}">{escape(text.rstrip())}</pre>'

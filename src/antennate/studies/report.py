@@ -1,0 +1,285 @@
+"""The report of a run: one HTML page that needs nothing else, made from its run directory alone.
+
+It says what was run, what came out with its intervals, and shows figures and films. Two runs of one
+command make a page that sets them side by side.
+"""
+
+from __future__ import annotations
+
+import json
+import shlex
+import tomllib
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from antennate.errors import BadInputError
+from antennate.files import read_limited
+from antennate.params.base import Params
+from antennate.studies import page
+from antennate.studies.formats import to_toml
+from antennate.studies.measures import NONE, Table
+from antennate.studies.run_directory import (
+    COMMAND,
+    CONFIG,
+    FIGURES,
+    FILMS,
+    LARGEST,
+    PARTIAL,
+    REPORT,
+    RESULT,
+    TABLE,
+    VERSIONS,
+    RunDirectory,
+)
+
+_MOST_REASONS = 20
+"""Most trials whose failure is quoted."""
+Result = Mapping[str, Any]
+Body = Callable[[Result, Mapping[str, str]], str]
+"""HTML of a result and of its figures, images by name."""
+
+
+@dataclass(frozen=True)
+class View:
+    """How the result of a command is shown.
+
+    Attributes:
+        name: Name of the command.
+        about: What it does; the first paragraph is shown.
+        config: Its configuration.
+        tables: Tables of a result.
+        sentence: What came out, in one sentence.
+        body: HTML in place of tables and figures; None for these.
+    """
+
+    name: str
+    about: str
+    config: type[Params] | None
+    tables: Callable[[Result], Sequence[Table]]
+    sentence: Callable[[Result], str]
+    body: Body | None = None
+
+
+def command_of(run: RunDirectory) -> str:
+    """Name of the command that made a run.
+
+    Raises:
+        BadInputError: No file tells, or one is damaged.
+    """
+    result = run.result() if (run.path / RESULT).exists() else {}
+    words = shlex.split(run.text(COMMAND).partition("\n")[0])
+    name = result.get("command") if isinstance(result, dict) else None
+    name = name or (words[1] if len(words) > 1 else None)
+    if not isinstance(name, str):
+        raise BadInputError(f"{run.path}: expected a run that names its command, found none")
+    return name
+
+
+def write_report(run: RunDirectory, view: View) -> None:
+    """Write the page of a run into its directory.
+
+    Raises:
+        BadInputError: The directory is damaged.
+        OutputError: It cannot be written.
+    """
+    run.write(REPORT, report(run, view))
+
+
+def report(run: RunDirectory, view: View) -> str:
+    """The page of a run.
+
+    Raises:
+        BadInputError: The directory is damaged.
+    """
+    result = run.result() if (run.path / RESULT).exists() else None
+    parts = [f"<h1>antennate {page.escape(view.name)}</h1>"]
+    parts.append(page.paragraphs(view.about.split("\n\n")[0], "muted"))
+    parts.append(page.paragraphs(_sentence(run, result, view)))
+    parts.append(page.block(_command(run, view), wrap=True))
+    films = "".join(page.captioned(film, name) for name, film in _films(run).items())
+    parts.append(f'<div class="pair">{films}</div>' if films else "")
+    if result is not None:
+        parts.append(_shown(run, result, view))
+    parts += [_failures(run), _settings(run, view), _versions(run)]
+    return page.page(f"antennate {view.name}", "".join(parts))
+
+
+def _sentence(run: RunDirectory, result: Result | None, view: View) -> str:
+    if result is None:
+        return f"This run has not ended, or was stopped: {len(run.rows())} trials were kept."
+    return view.sentence(result)
+
+
+def _command(run: RunDirectory, view: View) -> str:
+    return run.text(COMMAND) or f"antennate.run({view.name!r}, ...)  # from Python, with {CONFIG}"
+
+
+def _images(run: RunDirectory) -> dict[str, str]:
+    """The figures by name."""
+    return {
+        path.stem: page.picture(
+            read_limited(path, LARGEST),
+            read_limited(path.with_suffix(".svg"), LARGEST),
+            f"figure {path.stem.replace('_', ' ')}",
+        )
+        for path in sorted((run.path / FIGURES).glob("*.png"))
+    }
+
+
+def _films(run: RunDirectory) -> dict[str, str]:
+    """The films by name."""
+    found = sorted((run.path / FILMS).glob("*.mp4"))
+    return {path.stem: page.film(read_limited(path, LARGEST)) for path in found}
+
+
+def _shown(run: RunDirectory, result: Result, view: View) -> str:
+    """Tables and figures, or what the command shows in their place."""
+    images = _images(run)
+    if view.body is not None:
+        return view.body(result, images)
+    tables = "".join(map(page.numbers, view.tables(result)))
+    figures = "".join(page.captioned(i, n.replace("_", " ")) for n, i in images.items())
+    return tables + ("<h2>Figures</h2>" + figures if figures else "")
+
+
+def _failures(run: RunDirectory) -> str:
+    """Trials that say why they are invalid."""
+    bad = [r for r in run.rows() if r.get("reason") and "invalid" in r.values()]
+    if not bad:
+        return ""
+    columns = [name for name in bad[0] if name in _WHICH]
+    rows = [[str(row.get(name)) for name in columns] for row in bad[:_MOST_REASONS]]
+    more = f" The first {_MOST_REASONS} are shown." if len(bad) > _MOST_REASONS else ""
+    note = page.paragraphs(f"{len(bad)} trials are invalid; they enter no mean.{more}", "muted")
+    return f"<h2>Invalid trials</h2>{page.grid(columns, rows)}{note}"
+
+
+_WHICH = ("seed", "trial", "controller", "profile", "wall", "speed_m_s", "reason")
+
+
+def _settings(run: RunDirectory, view: View) -> str:
+    """What differs from the defaults, and all of it."""
+    text = run.text(CONFIG)
+    if not text:
+        return ""
+    changed = ""
+    if view.config is not None:
+        default, now = _flat(to_toml(view.config())), _flat(text)
+        rows = [[k, v, default.get(k, NONE)] for k, v in now.items() if default.get(k) != v]
+        changed = (
+            page.grid(["parameter", "this run", "default"], rows)
+            if rows
+            else page.paragraphs("All parameters are at their defaults.")
+        )
+    whole = page.folded(f"All parameters ({CONFIG})", page.block(text))
+    return f"<h2>Parameters</h2>{changed}{whole}"
+
+
+def _flat(text: str) -> dict[str, str]:
+    """Every parameter of a TOML file by its dotted path, in words."""
+    found: dict[str, str] = {}
+
+    def walk(table: Mapping[str, Any], before: str) -> None:
+        for key, value in table.items():
+            if isinstance(value, Mapping):
+                walk(value, f"{before}{key}.")
+            else:
+                found[before + key] = value if isinstance(value, str) else json.dumps(value)
+
+    try:
+        walk(tomllib.loads(text), "")
+    except tomllib.TOMLDecodeError as error:
+        raise BadInputError(f"{CONFIG}: expected TOML, found: {error}") from None
+    return found
+
+
+def _known_versions(run: RunDirectory) -> dict[str, str]:
+    return {name: str(value) for name, value in json.loads(run.text(VERSIONS) or "{}").items()}
+
+
+def _versions(run: RunDirectory) -> str:
+    found = ", ".join(f"{name} {value}" for name, value in _known_versions(run).items())
+    rows = len(run.rows())
+    kept = f" {rows} rows in {TABLE if (run.path / TABLE).exists() else PARTIAL}." if rows else ""
+    return f"<h2>Versions</h2>{page.paragraphs(f'{found}.{kept}', 'muted')}" if found else ""
+
+
+def compare(runs: Sequence[RunDirectory], view: View) -> str:
+    """The page of two runs of one command.
+
+    Raises:
+        BadInputError: One has no result, or is damaged.
+    """
+    names = _names(runs)
+    results = [run.result() for run in runs]
+    parts = [f"<h1>antennate {page.escape(view.name)}: {page.escape(' and '.join(names))}</h1>"]
+    parts.append(page.paragraphs(view.about.split("\n\n")[0], "muted"))
+    for name, run, result in zip(names, runs, results, strict=True):
+        parts.append(f"<h2>{page.escape(name)}</h2>{page.paragraphs(view.sentence(result))}")
+        parts.append(page.block(_command(run, view), wrap=True))
+    parts.append(_differing("Parameters", names, [_flat(run.text(CONFIG)) for run in runs]))
+    parts.append(_differing("Versions", names, [_known_versions(run) for run in runs]))
+    parts += map(page.numbers, _side_by_side(names, [view.tables(r) for r in results]))
+    parts += [
+        _pairs("Films", names, [_films(run) for run in runs], "pair"),
+        _pairs("Figures", names, [_images(run) for run in runs]),
+    ]
+    return page.page(f"antennate {view.name}", "".join(parts))
+
+
+def _names(runs: Sequence[RunDirectory]) -> list[str]:
+    """The last part of each path, or all of it where those are the same."""
+    short = [run.path.resolve().name for run in runs]
+    return short if len(set(short)) == len(short) else [str(run.path) for run in runs]
+
+
+def _differing(title: str, names: Sequence[str], values: Sequence[Mapping[str, str]]) -> str:
+    keys = dict.fromkeys(key for found in values for key in found)
+    rows = [[key, *(found.get(key, NONE) for found in values)] for key in keys]
+    rows = [row for row in rows if len(set(row[1:])) > 1]
+    head = f"<h2>{title} that differ</h2>"
+    return head + (page.grid(["", *names], rows) if rows else page.paragraphs("None."))
+
+
+def _side_by_side(names: Sequence[str], found: Sequence[Sequence[Table]]) -> list[Table]:
+    """Tables of the same title as one, the line of each run below that of the other."""
+    by_title = [{table.title: table for table in tables} for tables in found]
+    joined = []
+    for title in dict.fromkeys(title for tables in by_title for title in tables):
+        here = {n: t[title] for n, t in zip(names, by_title, strict=True) if title in t}
+        columns = list(dict.fromkeys(c for table in here.values() for c in table.columns))
+        cells = {name: _cells(table) for name, table in here.items()}
+        rows = [
+            (line[0] if name == names[0] else "", [name, *(found.get(c, NONE) for c in columns)])
+            for line in dict.fromkeys(line for lines in cells.values() for line in lines)
+            for name, found in ((name, cells[name].get(line, {})) for name in here)
+        ]
+        notes = dict.fromkeys(table.note for table in here.values())
+        joined.append(Table(title, ["run", *columns], rows, "\n\n".join(filter(None, notes))))
+    return joined
+
+
+def _cells(table: Table) -> dict[tuple[str, int], dict[str, str]]:
+    """The cells of a table by line and column; a label that comes again is another line."""
+    seen: dict[str, int] = {}
+    found = {}
+    for label, cells in table.rows:
+        seen[label] = seen.get(label, 0) + 1
+        found[label, seen[label]] = dict(zip(table.columns, cells, strict=True))
+    return found
+
+
+def _pairs(
+    title: str, names: Sequence[str], found: Sequence[Mapping[str, str]], kind: str = ""
+) -> str:
+    """Pictures of the same name together: below one another, or side by side as a `pair`."""
+    parts = []
+    for key in dict.fromkeys(key for pictures in found for key in pictures):
+        here = [
+            page.captioned(pictures[key], f"{key.replace('_', ' ')}, {name}")
+            for name, pictures in zip(names, found, strict=True)
+            if key in pictures
+        ]
+        parts.append(f'<div class="{kind}">{"".join(here)}</div>')
+    return f"<h2>{title}</h2>{''.join(parts)}" if parts else ""

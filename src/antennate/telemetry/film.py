@@ -1,0 +1,236 @@
+"""Films: a trial that was recorded while it ran, drawn picture by picture and written as mp4.
+
+Recording costs a copy of the coordinates for each picture. Everything else is done afterwards.
+"""
+
+from __future__ import annotations
+
+import importlib
+import io
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+
+from antennate.errors import BadInputError, MissingPackageError
+from antennate.figures import MANEUVER_COLOURS, MANEUVER_NAMES, SERIES
+from antennate.robots.antenna import AntennaSpec
+from antennate.sim import gl
+from antennate.sim.camera import Camera, Colour, Picture, Shot
+from antennate.telemetry.strip import Band, Strip, Trace
+from antennate.types import Contact, Floats, Ints, Maneuver
+
+RATE = 25
+"""Pictures a second."""
+WIDTH, HEIGHT, STRIP = 880, 496, 150
+"""Size of the picture, and height of the strip below it [pixels]."""
+_QUALITY = 25
+"""Constant rate factor of x264: 18 is said to be lossless to the eye, 28 is poor."""
+_ENCODERS = ("libx264", "libopenh264")
+_ROUNDING = 1e-9
+_CONTACTS = {
+    int(Contact.FREE): ("free", "#DDDDDD"),
+    int(Contact.CONTACT): ("contact", "#222222"),
+    int(Contact.UNKNOWN): ("unknown", "#CC79A7"),
+}
+_MANEUVERS = {int(m): (MANEUVER_NAMES[m], MANEUVER_COLOURS[m]) for m in Maneuver}
+
+
+@dataclass(frozen=True, slots=True)
+class Film:
+    """A recorded trial.
+
+    Attributes:
+        title: What it shows, in a few words.
+        model: The compiled model.
+        shot: From where the camera looks.
+        t: Times of the pictures [s], shape (n,).
+        positions: Coordinates of the model, shape (n, nq).
+        targets: What is in the middle [m], shape (n, 3).
+        traces, bands: What the strip shows, with n entries each.
+    """
+
+    title: str
+    model: Any
+    shot: Shot
+    t: Floats
+    positions: Floats
+    targets: Floats
+    traces: Sequence[Trace]
+    bands: Sequence[Band]
+
+
+class FilmRecorder:
+    """Keeps what a film needs at the times of its pictures.
+
+    Args:
+        speed: How many times faster than real time the film is.
+    """
+
+    def __init__(self, speed: float = 1.0) -> None:
+        self._step = speed / RATE
+        self._kept: list[tuple[float, Floats, Floats]] = []
+        self._values: dict[str, list[Any]] = {}
+
+    def take(self, t: float, position: Floats, target: Sequence[float], **values: Any) -> None:
+        """Offer a moment [s]; it is copied if it is time for a picture.
+
+        Args:
+            t: Time since the trial began [s].
+            position: Coordinates of the model, shape (nq,).
+            target: Where to look [m], 2 or 3 numbers.
+            values: Whatever else is to be shown, numbers or arrays.
+        """
+        if t + _ROUNDING < len(self._kept) * self._step:
+            return
+        where = np.array([*target, 0.0][:3], dtype=float)
+        self._kept.append((t, np.array(position), where))
+        for name, value in values.items():
+            self._values.setdefault(name, []).append(np.array(value))
+
+    def __len__(self) -> int:
+        """Number of pictures."""
+        return len(self._kept)
+
+    @property
+    def t(self) -> Floats:
+        """Times of the pictures [s], shape (n,)."""
+        return np.array([t for t, _, _ in self._kept])
+
+    def values(self, name: str) -> Any:
+        """What was kept under a name, shape (n, ...)."""
+        return np.array(self._values[name])
+
+    def film(
+        self, title: str, model: Any, shot: Shot, traces: Sequence[Trace], bands: Sequence[Band]
+    ) -> Film:
+        """The film of what was kept; the camera follows gently.
+
+        Raises:
+            BadInputError: Nothing was kept.
+        """
+        if not self._kept:
+            raise nothing(title)
+        targets = _smooth(np.array([where for *_, where in self._kept]), RATE)
+        positions = np.array([position for _, position, _ in self._kept])
+        return Film(title, model, shot, self.t, positions, targets, traces, bands)
+
+
+def nothing(title: str) -> BadInputError:
+    """What is raised where there is nothing to see."""
+    return BadInputError(f"video: {title}: expected a trial that begins, found no tick")
+
+
+def _smooth(path: Floats, half: int) -> Floats:
+    """The mean over `half` entries to either side, of a path of shape (n, 3)."""
+    padded = np.concatenate([path[:1].repeat(half, 0), path, path[-1:].repeat(half, 0)])
+    total = np.concatenate([np.zeros((1, 3)), np.cumsum(padded, axis=0)])
+    return (total[2 * half + 1 :] - total[: -2 * half - 1]) / (2 * half + 1)
+
+
+def bench_shot(antenna: AntennaSpec) -> Shot:
+    """The bench from above, with an antenna in most of the picture and lines every 20 mm."""
+    below = -2.0 * antenna.radius
+    return Shot(0.8 * antenna.length, elevation=90.0, flat=True, grid=0.02, floor=below)
+
+
+def trace(label: str, values: Floats, form: str = ".2f") -> Trace:
+    """A chart of shape (n, lines) whose axis is as wide as its values."""
+    known = values[np.isfinite(values)]
+    low, high = (float(known.min()), float(known.max())) if known.size else (0.0, 1.0)
+    margin = 0.05 * (high - low) or 1.0
+    return Trace(label, values, low - margin, high + margin, form)
+
+
+def counts_trace(counts: Floats) -> Trace:
+    """Readings of the antennae, shape (n, sides)."""
+    return trace("reading [counts]", counts, ".0f")
+
+
+def level_trace(level: Floats, threshold: float | None) -> Trace:
+    """Bending levels of shape (n, sides), and theta."""
+    mark = "" if threshold is None else f"θ = {threshold:g}"
+    return Trace("level b", level, 0.0, 1.0, ".2f", threshold, mark)
+
+
+def contact_bands(contact: Ints, names: Sequence[str]) -> list[Band]:
+    """A band for each column of `Contact`, shape (n, bands)."""
+    return [Band(name, contact[:, k], _CONTACTS) for k, name in enumerate(names)]
+
+
+def maneuver_band(maneuver: Ints) -> Band:
+    """`Maneuver`, shape (n,)."""
+    return Band("maneuver", maneuver, _MANEUVERS)
+
+
+def require_video() -> None:
+    """Find out whether films can be made here, before anything is run.
+
+    Raises:
+        MissingPackageError: PyAV or PyOpenGL is not installed.
+        BadInputError: PyAV cannot encode H.264, or nothing here can draw.
+    """
+    _encoder()
+    gl.backend()
+
+
+def _encoder() -> str:
+    try:
+        av = importlib.import_module("av")
+    except ImportError:
+        raise MissingPackageError(
+            "video: expected the package PyAV, found none; install it with "
+            "`pip install 'antennate[video]'`"
+        ) from None
+    found = [name for name in _ENCODERS if name in av.codecs_available]
+    if not found:
+        raise BadInputError(
+            f"video: expected PyAV with an encoder for H.264 ({', '.join(_ENCODERS)}), found none; "
+            "install PyAV from its wheel with `pip install --force-reinstall av`"
+        )
+    return found[0]
+
+
+def pictures(film: Film, width: int = WIDTH, height: int = HEIGHT) -> Iterator[Picture]:
+    """Every picture of a film with its strip, shape (height + STRIP, width, 3).
+
+    Raises:
+        AntennateError: Nothing here can draw.
+    """
+    strip = Strip(film.title, film.t, film.traces, film.bands, width, STRIP)
+    sides = (_colour(SERIES[0]), _colour(SERIES[1]))
+    with Camera(film.model, film.shot, (width, height), sides) as camera:
+        for i, (position, target) in enumerate(zip(film.positions, film.targets, strict=True)):
+            view = camera.picture(position, target)
+            yield np.concatenate([view, np.asarray(strip.picture(i))])
+
+
+def _colour(text: str) -> Colour:
+    red, green, blue = (int(text[i : i + 2], 16) / 255 for i in (1, 3, 5))
+    return red, green, blue, 1.0
+
+
+def encoded(film: Film, on_step: Callable[[int, int], None] = lambda done, total: None) -> bytes:
+    """The film as mp4, H.264.
+
+    Args:
+        film: What to draw.
+        on_step: Called with how many of how many pictures are drawn.
+
+    Raises:
+        AntennateError: As `require_video`.
+    """
+    name, av = _encoder(), importlib.import_module("av")
+    file = io.BytesIO()
+    with av.open(file, "w", format="mp4") as container:
+        stream = container.add_stream(name, rate=Fraction(RATE))
+        stream.width, stream.height, stream.pix_fmt = WIDTH, HEIGHT + STRIP, "yuv420p"
+        stream.options = {"crf": str(_QUALITY), "preset": "medium"}
+        for done, picture in enumerate(pictures(film), start=1):
+            frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(picture), format="rgb24")
+            container.mux(stream.encode(frame))
+            on_step(done, len(film.t))
+        container.mux(stream.encode())
+    return file.getvalue()

@@ -1,0 +1,197 @@
+"""Films: what is kept, what the strip shows, and what is said where none can be made."""
+
+from __future__ import annotations
+
+import io
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import antennate
+from antennate import experiments
+from antennate.cli import main
+from antennate.errors import AntennateError, BadInputError
+from antennate.experiments.tunnel.config import TunnelConfig
+from antennate.experiments.tunnel.film import films
+from antennate.sim import gl
+from antennate.telemetry import film
+from antennate.telemetry.film import HEIGHT, RATE, STRIP, WIDTH, FilmRecorder
+from antennate.telemetry.strip import WINDOW, Band, Strip, Trace
+
+QUICK = ["tunnel", "--trials", "1", "--controllers", "open", "--time-limit", "1", "--workers", "1"]
+
+
+@pytest.fixture(autouse=True)
+def _elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
+    monkeypatch.chdir(tmp_path)
+    gl.backend.cache_clear()
+    yield
+    gl.backend.cache_clear()
+
+
+def require_drawing() -> None:
+    """Skip where the machine has neither EGL nor OSMesa."""
+    pytest.importorskip("av")
+    try:
+        gl.backend()
+    except AntennateError as error:
+        pytest.skip(str(error))
+
+
+@pytest.mark.parametrize("speed", [1.0, 2.0])
+def test_a_picture_is_kept_whenever_it_is_due(speed: float) -> None:
+    recorder = FilmRecorder(speed)
+    for tick in range(201):
+        recorder.take(0.01 * tick, np.array([float(tick)]), (0.0, 0.0), tick=tick)
+    assert len(recorder) == 1 + round(2.0 * RATE / speed)
+    assert recorder.values("tick") == pytest.approx(100 * np.arange(len(recorder)) * speed / RATE)
+
+
+def test_what_is_kept_does_not_change_afterwards() -> None:
+    recorder, position = FilmRecorder(), np.zeros(2)
+    recorder.take(0.0, position, (1.0, 2.0))
+    position += 1.0
+    made = recorder.film("one", None, film.Shot(1.0), [], [])
+    assert made.positions.tolist() == [[0.0, 0.0]]
+    assert made.targets.tolist() == [[1.0, 2.0, 0.0]]
+    with pytest.raises(BadInputError, match="two: expected a trial that begins"):
+        FilmRecorder().film("two", None, film.Shot(1.0), [], [])
+
+
+def test_the_strip_shows_the_newest_state_and_value_at_its_right_end() -> None:
+    """A trace at the top of its axis, a mark in the middle, and a band that turns red."""
+    t = np.arange(0.0, 20.0, 0.1)
+    top = np.ones((len(t), 1))
+    states = (t > 15.0).astype(int)
+    looks = {0: ("calm", "#00FF00"), 1: ("alarm", "#FF0000")}
+    bands = [Band("state", states, looks)]
+    strip = Strip("title", t, [Trace("x", top, 0.0, 1.0, mark=0.5)], bands, 400, 100)
+    pixels = np.asarray(strip.picture(len(t) - 1)).astype(int)
+    assert pixels.shape == (100, 400, 3)
+    red = np.argwhere((pixels == [255, 0, 0]).all(axis=2))
+    green = np.argwhere((pixels == [0, 255, 0]).all(axis=2))
+    assert len(red) > 0
+    assert green[:, 1].max() <= red[:, 1].min()
+    share = np.ptp(red[:, 1]) / (np.ptp(red[:, 1]) + np.ptp(green[:, 1]))
+    assert share == pytest.approx((t[-1] - 15.0) / WINDOW, abs=0.05)
+    blue = (pixels[..., 2] - pixels[..., 0] > 100)[:, :200]
+    line = np.flatnonzero(blue[40:].sum(axis=1) > 100)
+    assert len(line) == 0, "no line but at the top of the chart"
+    assert (blue[25:40].sum(axis=1) > 100).any()
+
+
+def test_values_that_are_missing_leave_a_gap_and_no_error() -> None:
+    t = np.arange(0.0, 1.0, 0.1)
+    values = np.full((len(t), 2), np.nan)
+    strip = Strip("", t, [film.counts_trace(values)], [], 200, 60)
+    assert np.asarray(strip.picture(5)).shape == (60, 200, 3)
+
+
+def refusal(capsys: pytest.CaptureFixture[str], *words: str) -> str:
+    """The one line with which a command refuses, before it has written anything."""
+    assert main([*QUICK, "--out", "run", *words]) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err.count("\n") == 1, err
+    assert not Path("run").exists()
+    return err
+
+
+def test_without_pyav_the_cure_is_told(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "av", None)
+    told = refusal(capsys, "--video")
+    assert "expected the package PyAV, found none" in told
+    assert "antennate[video]" in told
+
+
+def test_without_an_encoder_it_is_told(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "av", SimpleNamespace(codecs_available={"mpeg4"}))
+    assert "expected PyAV with an encoder for H.264" in refusal(capsys, "--video")
+
+
+def test_without_a_driver_the_package_is_named(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("OpenGL")
+    monkeypatch.setitem(sys.modules, "av", SimpleNamespace(codecs_available={"libx264"}))
+    monkeypatch.setenv("MUJOCO_GL", "egl")
+    monkeypatch.setenv("__EGL_VENDOR_LIBRARY_FILENAMES", "/nowhere.json")  # libEGL finds no driver
+    told = refusal(capsys, "--video")
+    assert "expected EGL or OSMesa to draw without a display" in told
+    assert "apt-get install libegl1 libgl1-mesa-dri" in told
+
+
+def test_words_that_do_not_fit_are_one_line(capsys: pytest.CaptureFixture[str]) -> None:
+    assert "--video-trial: expected --video beside it" in refusal(capsys, "--video-trial", "1")
+    told = refusal(capsys, "--video", "--video-trial", "1")
+    assert "expected a trial of this run, 0 to 0, found 1" in told
+    assert main(["springs", "--video"]) == 2
+    assert "expected a known flag" in capsys.readouterr().err
+    with pytest.raises(BadInputError, match="expected an experiment that can be filmed"):
+        antennate.run("springs", out="run", video=0)
+    with pytest.raises(BadInputError, match="expected a run directory"):
+        antennate.run("tunnel", video=0)
+
+
+def test_the_filmed_trial_is_that_of_the_study() -> None:
+    """On the flat floor a robot succeeds; its film ends when its row says."""
+    config = TunnelConfig(scene="flat", trials=1, controllers=("open",), time_limit=60.0, seed=1)
+    row = antennate.run(config).rows[0]
+    made = films(config, 0)["open"]()
+    assert "success" in made.title
+    assert made.t[-1] == pytest.approx(row.time_s, abs=2.0 / RATE)
+    assert len(made.positions) == len(made.t) == len(made.bands[0].states)
+
+
+def test_a_film_is_written_and_the_study_stays_as_it_is(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    require_drawing()
+    import av
+
+    assert main([*QUICK, "--out", "plain", "--no-figures"]) == 0
+    assert main([*QUICK, "--out", "filmed", "--no-figures", "--video"]) == 0
+    for name in ("result.json", "trials.csv"):
+        assert Path("plain", name).read_bytes() == Path("filmed", name).read_bytes()
+    data = Path("filmed/films/open.mp4").read_bytes()
+    with av.open(io.BytesIO(data)) as container:
+        stream = container.streams.video[0]
+        assert stream.codec_context.name == "h264"
+        assert (stream.width, stream.height) == (WIDTH, HEIGHT + STRIP)
+        assert stream.average_rate == RATE
+        frames = [frame.to_ndarray(format="rgb24") for frame in container.decode(stream)]
+    assert len(frames) == pytest.approx(1 + 1.0 * RATE / 2, abs=1), "twice as fast as the robot"
+    view, strip = frames[-1][:HEIGHT], frames[-1][HEIGHT:]
+    assert view.std() > 10, "something is seen"
+    assert (strip > 240).mean() > 0.5
+    assert "data:video/mp4;base64," in Path("filmed/report.html").read_text()
+    assert main([*QUICK, "--out", "filmed", "--overwrite", "--no-figures"]) == 0
+    assert not Path("filmed/films/open.mp4").exists()
+
+
+@pytest.mark.parametrize(
+    ("name", "settings", "condition", "traces"),
+    [
+        ("gait", {"cycles": 2, "settling_cycles": 0}, "turn_l", 2),
+        ("wall", {"profiles": ("descending",)}, "descending", 2),
+        ("touch", {"profiles": ("stiff",), "walls": ("flat",), "speeds": (0.1,)}, "stiff", 3),
+    ],
+)
+def test_other_experiments_are_recorded_at_the_pace_of_their_films(
+    name: str, settings: dict[str, Any], condition: str, traces: int
+) -> None:
+    experiment = experiments.load(name)
+    assert experiment.films is not None
+    made = experiment.films(experiment.config(**settings), 0)[condition]()
+    assert np.diff(made.t) == pytest.approx(1.0 / RATE, abs=0.011)
+    assert len(made.traces) == traces
+    for shown in (*(trace.values for trace in made.traces), *(b.states for b in made.bands)):
+        assert len(shown) == len(made.t) == len(made.positions) == len(made.targets)

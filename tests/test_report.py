@@ -1,0 +1,183 @@
+"""The report of a run: one page that needs nothing else, from the run directory alone."""
+
+from __future__ import annotations
+
+import json
+from html.parser import HTMLParser
+from pathlib import Path
+
+import pytest
+
+import antennate
+from antennate.cli import main
+
+
+class Page(HTMLParser):
+    """What a page refers to, its tags and its visible text."""
+
+    def __init__(self, file: Path) -> None:
+        super().__init__()
+        self.references: list[str] = []
+        self.tags: list[str] = []
+        self.text = ""
+        self.source = file.read_text(encoding="utf-8")
+        self.feed(self.source)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append(tag)
+        self.references += [value or "" for name, value in attrs if name in ("src", "href")]
+
+    def handle_data(self, data: str) -> None:
+        self.text += data
+
+    @property
+    def alone(self) -> bool:
+        """Whether it needs no other file and runs no code."""
+        inside = all(ref.startswith(("data:image/", "data:video/", "#")) for ref in self.references)
+        return inside and not {"script", "link", "iframe", "object"} & set(self.tags)
+
+
+@pytest.fixture(autouse=True)
+def _elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+def refusal(capsys: pytest.CaptureFixture[str], *words: str) -> str:
+    """The one line with which `report` refuses."""
+    capsys.readouterr()
+    assert main(["report", *words]) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err.count("\n") == 1, err
+    return err
+
+
+def test_a_run_leaves_a_page_with_everything(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["springs", "--coil-mm", "4", "--out", "run"]) == 0
+    sentence = capsys.readouterr().out.splitlines()[-1]
+    page = Page(Path("run/report.html"))
+    assert page.alone
+    assert sentence in page.text
+    assert "antennate springs --coil-mm 4 --out run" in page.text
+    assert antennate.__version__ in page.text
+    assert page.tags.count("img") == len(list(Path("run/figures").glob("*.svg"))) == 1
+    assert "prefers-color-scheme: dark" in page.source
+    assert "@media print" in page.source
+    changed = page.text.split("Parameters")[1]
+    assert "coil_mm4.03.77" in changed.replace("\n", ""), "this run, then the default"
+
+
+def test_it_is_written_again_and_elsewhere(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["sensor", "--out", "run"]) == 0
+    first = Path("run/report.html").read_bytes()
+    Path("run/report.html").unlink()
+    assert main(["report", "run"]) == 0
+    assert Path("run/report.html").read_bytes() == first
+    assert main(["report", "run", "--out", "page.html"]) == 0
+    assert Path("page.html").read_bytes() == first
+    assert "expected no such file" in refusal(capsys, "run", "--out", "page.html")
+    assert main(["report", "run", "--out", "page.html", "--overwrite"]) == 0
+
+
+def test_python_and_commands_of_the_robot_leave_one() -> None:
+    antennate.run("taper", out="taper")
+    page = Page(Path("taper/report.html"))
+    assert page.alone
+    assert "antennate.run('taper', ...)" in page.text
+    assert main(["robot", "--out", "robot", "--json"]) == 0
+    page = Page(Path("robot/report.html"))
+    assert page.alone
+    assert "19 servos draw" in page.text
+    assert main(["report", "robot"]) == 0
+
+
+def test_the_claims_of_the_paper_stand_in_theirs(capsys: pytest.CaptureFixture[str]) -> None:
+    claims = [
+        {
+            "claim": "A stiff antenna jams at a wall of boulders",
+            "paper": "<b>",
+            "ours": "2 < 3",
+            "verdict": "conditional",
+            "reason": "why",
+            "command": "antennate wall",
+        }
+    ]
+    counts = {"reproduced": 0, "conditional": 1, "not_reproduced": 0}
+    result = {"command": "reproduce", "quick": True, "seed": 7, "verdicts": counts}
+    Path("run").mkdir()
+    Path("run/result.json").write_text(json.dumps(result | {"claims": claims}))
+    assert main(["report", "run"]) == 0
+    page = Page(Path("run/report.html"))
+    assert page.alone
+    assert "#stiff_jams" in page.references
+    assert "b" not in page.tags
+    assert "2 < 3" in page.text
+    assert "Conditional if most trials jam" in page.text
+
+
+def test_two_runs_stand_side_by_side(capsys: pytest.CaptureFixture[str]) -> None:
+    for coil in ("3.6", "4"):
+        assert main(["springs", "--coil-mm", coil, "--out", f"coil-{coil}"]) == 0
+    assert main(["report", "--compare", "coil-3.6", "coil-4"]) == 0
+    page = Page(Path("comparison.html"))
+    assert page.alone
+    assert "coil_mm3.64.0" in page.text.replace("\n", "")
+    assert page.tags.count("img") == 2
+    stiffness = [
+        json.loads(Path(f"coil-{coil}/result.json").read_text())["springs"][0]
+        for coil in ("3.6", "4")
+    ]
+    for row in stiffness:
+        assert f"{row['stiffness_n_mm_per_deg']:.4f}"[:5] in page.text
+    assert "expected no such file" in refusal(capsys, "--compare", "coil-3.6", "coil-4")
+    main(["taper", "--out", "other"])
+    told = refusal(capsys, "--compare", "coil-4", "other")
+    assert "expected two runs of one command, found springs in coil-4 and taper in other" in told
+
+
+def test_a_run_that_was_stopped_has_a_page() -> None:
+    Path("run").mkdir()
+    Path("run/command.txt").write_text("antennate wall --trials 9\n")
+    Path("run/trials.partial.jsonl").write_text('{"trial": 0}\n{"trial": 1}\n')
+    assert main(["report", "run"]) == 0
+    page = Page(Path("run/report.html"))
+    assert "was stopped: 2 trials were kept" in page.text
+
+
+def test_invalid_trials_and_their_reasons_are_shown() -> None:
+    assert main(["wall", "--trials", "1", "--profiles", "stiff", "--out", "run"]) == 0
+    table = Path("run/trials.csv")
+    head, row = table.read_text().splitlines()
+    bad = row.replace(row.split(",")[3], "invalid") + "time stood <still>"
+    table.write_text(f"{head}\n{bad}\n")
+    assert main(["report", "run"]) == 0
+    page = Page(Path("run/report.html"))
+    assert "time stood <still>" in page.text
+    assert "still" not in page.tags
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "why"),
+    [
+        ("result.json", "{", "expected a whole file of this kind"),
+        ("result.json", "[]", "expected a run that names its command"),
+        ("result.json", '{"command": "dance"}', "a command that is known, found dance"),
+        ("result.json", '{"command": "tunnel"}', "expected a result of this version's tunnel"),
+        ("result.json", '{"command": ["tunnel"]}', "expected a run that names its command"),
+        ("config.toml", "a = ", "expected a run that names its command"),
+        ("other.txt", "", "expected the folder of a run, found no result.json"),
+    ],
+)
+def test_what_cannot_be_shown_is_one_line(
+    capsys: pytest.CaptureFixture[str], name: str, text: str, why: str
+) -> None:
+    Path("run").mkdir()
+    Path("run", name).write_text(text)
+    assert why in refusal(capsys, "run")
+    assert not Path("run/report.html").exists()
+
+
+def test_words_that_do_not_fit_are_one_line(capsys: pytest.CaptureFixture[str]) -> None:
+    assert "expected the folder of a run, or --compare RUN RUN" in refusal(capsys)
+    assert "expected 2 runs, found 1" in refusal(capsys, "--compare", "a")
+    assert "expected no other run beside it" in refusal(capsys, "run", "--compare", "a", "b")
