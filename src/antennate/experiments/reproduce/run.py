@@ -34,6 +34,8 @@ FULL: Mapping[str, Mapping[str, Any]] = {
     "tunnel": {"trials": 100},
 }
 """What it is told otherwise: its defaults, and as many tunnels as on docs/science/tunnel.md."""
+_WITHOUT_CHANCE = {"gait"}
+"""Takes a seed only for draws of what is not known, and draws nothing here."""
 _PARTS = 100
 
 
@@ -80,7 +82,8 @@ def settings(name: str, config: ReproduceConfig) -> dict[str, Any]:
     """What an experiment is told."""
     told = dict((QUICK if config.quick else FULL)[name])
     fields = experiments.load(name).config.model_fields
-    return told | ({"seed": config.seed} if "seed" in fields else {})
+    chance = "seed" in fields and name not in _WITHOUT_CHANCE
+    return told | ({"seed": config.seed} if chance else {})
 
 
 def command(name: str, config: ReproduceConfig) -> str:
