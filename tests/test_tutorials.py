@@ -7,11 +7,13 @@ from pathlib import Path
 
 import pytest
 from first_hour import Command
-from pages import DOCS, Script
+from pages import DOCS, Script, blocks
 
 PAGES = ["first-tunnel.md", *(f"tutorials/{p.name}" for p in (DOCS / "tutorials").glob("*.md"))]
 WITH_A_TWIN = {"tutorials/calibrate.md", "tutorials/drive.md"}
 """Those in real time."""
+WIDEST = 96
+"""Letters of code in a line on a screen of 1280 pixels."""
 
 
 @pytest.mark.parametrize("page", sorted({*PAGES} - WITH_A_TWIN))
@@ -42,3 +44,11 @@ def test_an_antenna_of_the_twin_is_calibrated(tmp_path: Path) -> None:
 def test_the_twin_is_driven(tmp_path: Path) -> None:
     with Script("tutorials/drive.md", tmp_path, {}) as script:
         script.run()
+
+
+@pytest.mark.parametrize("page", sorted(str(p.relative_to(DOCS)) for p in DOCS.rglob("*.md")))
+def test_no_line_of_code_is_wider_than_a_page(page: str) -> None:
+    wide = [
+        line for block in blocks(page) for line in block.text.splitlines() if len(line) > WIDEST
+    ]
+    assert wide == []
