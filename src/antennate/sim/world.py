@@ -277,6 +277,11 @@ class World:
             [polygon for polygon, still in zip(polygons, fixed, strict=True) if not still],
         )
 
+    def parts(self) -> list[Floats]:
+        """Polygons of all parts of the robot in plan [m], each (n, 2), legs and antennae too."""
+        own = np.flatnonzero(self._robot)
+        return [outline(self.model, self.data, geom) for geom in own.tolist()]
+
     def obstacle_overlap(self) -> float:
         """How deep the robot is in obstacles at most [m]; 0 if it touches none."""
         return max(0.0, -float(self.data.contact.dist[self._on_obstacles()].min(initial=0.0)))
