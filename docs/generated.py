@@ -1,7 +1,11 @@
 """What the scripts that write a page share: write it, or with --check only compare it."""
 
+import re
 import sys
+from html import escape
 from pathlib import Path
+
+_BAR = re.compile(r"`([^`]*\|[^`]*)`|\|")
 
 
 def finish(script: str, page: str) -> None:
@@ -19,7 +23,15 @@ def finish(script: str, page: str) -> None:
 
 def row(*cells: object) -> str:
     """A row of a table in Markdown."""
-    return "| " + " | ".join(str(cell).replace("|", "\\|") for cell in cells) + " |"
+    return "| " + " | ".join(_BAR.sub(_without_bar, str(cell)) for cell in cells) + " |"
+
+
+def _without_bar(found: re.Match[str]) -> str:
+    """Code, or a bar alone, without a character that would end the cell."""
+    code = found[1]
+    if code is None:
+        return "&#124;"
+    return f"<code>{escape(code, quote=False).replace('|', '&#124;')}</code>"
 
 
 def heads(*names: str) -> str:

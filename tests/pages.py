@@ -87,7 +87,7 @@ class Script:
     def run(self) -> None:
         """Go through all blocks."""
         for block in self.blocks:
-            self._take(block._replace(text=self._here(block.text)))
+            self._take(Block(block.kind, block.title, self._here(block.text)))
 
     def _take(self, block: Block) -> None:
         words = block.words
