@@ -51,10 +51,12 @@ def line(option: Option) -> str:
     """The row of an option."""
     head = option.metavar if option.positional else option.offered
     if option.metavar and not option.positional:
-        head += f" {option.metavar}{'...' if option.many else ''}"
+        metavar = "NAME" if option.choices else option.metavar
+        head += f" {metavar}{'...' if option.many else ''}"
     default = option.default if option.metavar else ""
     default = default if len(default) <= _SHOWN else f"{default[:_SHOWN]}…"
-    meaning = "; ".join(filter(None, [option.meaning, option.limits]))
+    choices = ", ".join(f"`{choice}`" for choice in option.choices)
+    meaning = "; ".join(filter(None, [option.meaning, option.limits, choices]))
     if option.default and not option.metavar:
         meaning = f"turns off: {meaning}"
     return row(f"`{head}`", f"`{default}`" if default else "", meaning)
