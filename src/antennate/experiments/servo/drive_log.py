@@ -17,7 +17,7 @@ from antennate.robots.spec import RobotSpec
 from antennate.telemetry.parts import parts
 from antennate.telemetry.reader import LogReader
 from antennate.telemetry.ticks import Tick
-from antennate.types import Bools, Floats
+from antennate.types import Bools
 
 _MAGIC = b"\x89MCAP"
 _ARRIVED = 0.1
@@ -49,16 +49,15 @@ def read(path: Path, config: ServoConfig) -> Recording:
     with LogReader(path) as log:
         robot = log.header.robot
         place = _place(path, robot, config)
-        ticks = [tick for tick in log if tick.positions]
-    found = np.array([(tick.positions[place], tick.angles[place]) for tick in ticks]).reshape(-1, 2)
-    known = np.isfinite(found).all(axis=1)
-    if known.sum() < FEWEST:
+        ticks = [tick for tick in log if tick.positions and math.isfinite(_error(tick, place))]
+    if len(ticks) < FEWEST:
         raise BadInputError(
             f"{path}: expected at least {FEWEST} ticks with a measured position of {config.joint}, "
-            f"found {known.sum()}; simulated trials and dry runs have none"
+            f"found {len(ticks)}; simulated trials and dry runs have none"
         )
-    t = np.array([tick.now for tick in ticks])[known]
-    position, goal = found[known].T
+    t = np.array([tick.now for tick in ticks])
+    position = np.array([tick.positions[place] for tick in ticks])
+    goal = np.array([tick.angles[place] for tick in ticks])
     check(path, t, position, goal)
     unknown = np.full(len(t), math.nan)
     return Recording(
@@ -70,11 +69,7 @@ def read(path: Path, config: ServoConfig) -> Recording:
         t=t - t[0],
         position=position,
         goal=goal,
-        torque=_torque(
-            path,
-            [tick for tick, is_known in zip(ticks, known, strict=True) if is_known],
-            found[known],
-        ),
+        torque=_torque(path, ticks, place),
         supply=unknown,
         drive=unknown,
     )
@@ -99,10 +94,15 @@ def _place(path: Path, robot: RobotSpec, config: ServoConfig) -> int:
     return place
 
 
-def _torque(path: Path, ticks: list[Tick], found: Floats) -> Bools:
+def _error(tick: Tick, place: int) -> float:
+    """Goal less position of a joint [rad]."""
+    return tick.angles[place] - tick.positions[place]
+
+
+def _torque(path: Path, ticks: list[Tick], place: int) -> Bools:
     """Whether goals counted, at each tick."""
     driven = np.array([tick.state not in _WITHOUT_TORQUE and tick.sent > 0 for tick in ticks])
-    near = abs(found[:, 0] - found[:, 1]) < _ARRIVED
+    near = np.array([abs(_error(tick, place)) < _ARRIVED for tick in ticks])
     arrived = np.logical_or.accumulate(driven & near)
     if not arrived.any():
         raise BadInputError(
