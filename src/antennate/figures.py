@@ -14,7 +14,9 @@ from matplotlib.figure import Figure
 from matplotlib.layout_engine import PlaceHolderLayoutEngine
 from matplotlib.transforms import Bbox
 
-from antennate.types import Maneuver
+from antennate.colours import MANEUVER_COLOURS as MANEUVER_COLOURS
+from antennate.colours import MANEUVER_NAMES as MANEUVER_NAMES
+from antennate.colours import SERIES as SERIES
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -23,23 +25,6 @@ Keys = tuple[str, str]
 
 INK, MUTED, FAINT = "#222222", "#6E6E6E", "#D5D5D5"
 """Text and robots; secondary lines; things in the background."""
-
-MANEUVER_COLOURS = {
-    Maneuver.FORWARD: "#0072B2",
-    Maneuver.TURN_L: "#009E73",
-    Maneuver.TURN_R: "#E69F00",
-    Maneuver.REVERSE: "#D55E00",
-    Maneuver.HOLD: "#000000",
-}
-"""After Okabe and Ito: apart for every kind of colour vision."""
-
-MANEUVER_NAMES = {
-    Maneuver.FORWARD: "forward",
-    Maneuver.TURN_L: "turn left",
-    Maneuver.TURN_R: "turn right",
-    Maneuver.REVERSE: "reverse",
-    Maneuver.HOLD: "hold",
-}
 
 CONTROLLER_COLOURS = {"open": "#8C8C8C", "paper": "#CC79A7", "closed": "#332288"}
 CONTROLLER_LINES = {"open": (0, (4, 1.5)), "paper": (0, (4, 1.5, 1, 1.5)), "closed": "solid"}
@@ -62,9 +47,6 @@ SHAPE_COLOURS = {
     "free": "#DDDDDD",
 }
 """Shapes of an antenna that touches, and no contact."""
-
-SERIES = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#D55E00", "#56B4E9", "#332288")
-"""For whatever has no colour of its own; after Okabe and Ito."""
 
 ENOUGH_TRIALS = 5
 """Fewest trials for which an interval is drawn: of four, a bootstrap has only 35 different draws,

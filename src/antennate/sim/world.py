@@ -124,8 +124,7 @@ class World:
         self._driven = self._addresses(names)
         self._turning: Ints = np.array([model.joint(n).dofadr[0] for n in names])
         self._gears = Gears(model, robot, PREFIX)
-        kinds = [robot.servos.of(group.servo) for _, group, n in robot.groups for _ in range(n)]
-        stall = np.array([kind.stall_torque for kind in kinds])
+        stall = np.array([robot.servos.of(n).stall_torque for n in robot.servo_names])
         self.servo_drives = ServoDrives(model, names, stall)
         self._root: int = model.joint(PREFIX + "root").qposadr[0]
         self._links: Ints = np.array([model.body(PREFIX + n).id for n in robot.link_names])

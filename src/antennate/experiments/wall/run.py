@@ -10,7 +10,7 @@ is counted once more without the `start`. A trial that does both counts as a jam
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -29,6 +29,8 @@ from antennate.robots.sensor import SensorParams
 from antennate.sim.bench import Ball, Bench, compile_bench
 from antennate.studies.experiment import OnRow, OnStep, no_row, no_step
 from antennate.studies.pool import gather
+from antennate.telemetry.view.pace import Restart
+from antennate.telemetry.view.simulation import SimulationView
 from antennate.types import Floats
 
 REFERENCE: Profile = "descending"
@@ -214,12 +216,15 @@ def _ramp(length: float, speed: float) -> list[float]:
     return (length * np.arange(1, count + 1) / count).tolist()
 
 
+_Task = tuple[WallConfig, Profile, int]
+
+
 def run_trial(
-    config: WallConfig, profile: Profile, trial: int
+    config: WallConfig, profile: Profile, trial: int, watch: Watch = _unwatched
 ) -> tuple[WallTrial, Traverse | None]:
     """One trial, and of the first of a profile its passage."""
     try:
-        seen = passage(config, profile, trial)
+        seen = passage(config, profile, trial, watch)
     except SimulationError as error:
         none = [math.nan] * 7
         row = WallTrial(config.seed, trial, profile, "invalid", "invalid", *none, reason=str(error))
@@ -228,21 +233,50 @@ def run_trial(
     return row, seen if trial == 0 else None
 
 
+def _run_viewed(
+    tasks: Sequence[_Task], on_step: OnStep, on_row: OnRow, view: SimulationView
+) -> Iterator[tuple[WallTrial, Traverse | None]]:
+    """All trials on a page, one after the other; with another seed whenever a person wants that."""
+
+    def watch(bench: Bench) -> None:
+        view.tick(bench.model, bench.data)
+
+    for done, (config, profile, trial) in enumerate(tasks, start=1):
+        seed = config.seed
+        while True:
+            view.begin(f"{profile}, trial {trial}", seed)
+            changed = config.model_copy(update={"seed": seed})
+            try:
+                found = run_trial(changed, profile, trial, watch)
+                break
+            except Restart as wish:
+                seed = wish.seed
+        on_row(found[0])
+        on_step(done, len(tasks))
+        yield found
+
+
 def run(
     config: WallConfig,
     workers: int = 1,
     on_step: OnStep = no_step,
     on_row: OnRow = no_row,
+    view: SimulationView | None = None,
 ) -> WallOutcome:
     """Run all trials of all profiles.
+
+    With a view they run in this process, one after the other, and give the same.
 
     Raises:
         WorkerError: A worker process died.
     """
-    tasks = [
+    tasks: list[_Task] = [
         (config, profile, trial) for trial in range(config.trials) for profile in config.profiles
     ]
-    found = gather(run_trial, tasks, workers, on_step, lambda item: on_row(item[0]))
+    if view is None:
+        found = gather(run_trial, tasks, workers, on_step, lambda item: on_row(item[0]))
+    else:
+        found = list(_run_viewed(tasks, on_step, on_row, view))
     found.sort(key=lambda item: config.profiles.index(item[0].profile))
     examples = {row.profile: seen for row, seen in found if seen is not None}
     return WallOutcome(config, [row for row, _ in found], examples)
