@@ -55,6 +55,10 @@ float64[] y       # [m]
 float64[] z       # [m]
 float64[] normal  # normal force [N]
 """
+_COORDINATES = """\
+uint32 robot        # number of the first coordinate of the robot: place, quaternion, joints
+float64[] position  # coordinates of the simulated world, as MuJoCo has them [m, rad]
+"""
 _JOINT_STATE = """\
 int32 sec
 uint32 nanosec
@@ -117,6 +121,7 @@ SUPERVISOR = Topic("/supervisor", _own("Supervisor", _SUPERVISOR))
 JOINT_COMMANDS = Topic("/joint_commands", _STATE)
 JOINT_STATES = Topic("/joint_states", _STATE)
 CONTACT_FORCES = Topic("/contact_forces", _own("ContactForces", _FORCES))
+COORDINATES = Topic("/coordinates", _own("Coordinates", _COORDINATES))
 EVENTS = Topic("/events", MessageType("rcl_interfaces/msg/Log", _LOG, _LOG_SCHEMA))
 CONFIG = Topic("/config", _STRING)
 CALIBRATION = Topic("/calibration", _STRING)
@@ -132,8 +137,9 @@ TOPICS = (
     JOINT_STATES,
     CONTACT_FORCES,
     EVENTS,
+    COORDINATES,
 )
-"""All, in the order of their channels: the first has id 1."""
+"""All, in the order of their channels: the first has id 1. A new one comes last."""
 
 JOINTS = ("angles", "positions", "velocities", "efforts")
 """Numbers of a tick for each joint: the commanded, then the measured ones, empty if unknown."""
