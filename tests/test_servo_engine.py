@@ -16,13 +16,18 @@ from antennate.robots.servos import XL330Params
 from antennate.types import Floats
 
 RATE = 200.0
-STEPS = 5
+STEPS = 10
 """Steps of the engine a sample."""
 TICK = 2 * math.pi / 4096
 VOLTS = 7.3
 MASS, LENGTH = 0.3, 0.1
 TRUE = XL330Params(
-    gain_divisor=200.0, armature=0.003, friction=0.03, load_friction=0.25, no_load_speed=9.0
+    stall_torque=0.6,
+    no_load_speed=9.0,
+    armature=0.003,
+    friction=0.03,
+    load_friction=0.25,
+    gain_divisor=200,
 )
 
 
@@ -38,7 +43,9 @@ def engine() -> mujoco.MjModel:
         armature=TRUE.armature,
         damping=TRUE.stall_torque / TRUE.no_load_speed,
     )
-    arm.add_geom(type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[1e-3, 0, 0], pos=[0, 0, -LENGTH], mass=MASS)
+    arm.add_geom(
+        type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[1e-3, 0, 0], pos=[0, 0, -LENGTH], mass=MASS
+    )
     return spec.compile()
 
 
@@ -50,7 +57,7 @@ def goals(seconds: float) -> Floats:
     return TICK * np.round(np.where(t < seconds - 2.0, swung, held) / TICK)
 
 
-def recorded(path: Path, p_gain: float, seconds: float = 6.0) -> str:
+def recorded(path: Path, p_gain: float, seconds: float = 5.0) -> str:
     """What the engine does, as a recording; the last half second without torque."""
     model = engine()
     data = mujoco.MjData(model)

@@ -101,19 +101,18 @@ def check_load(path: Path, p_gain: float, weight: float, servo: ServoParams) -> 
         )
 
 
-def check_supply(path: Path, supply: Floats, servo: ServoParams) -> None:
+def check_supply(what: str, supply: Floats, servo: ServoParams) -> None:
     """Refuse a supply [V] that such a servo does not run on; NaN is not known.
 
     Raises:
-        BadInputError: Says where and why.
+        BadInputError: Says of what, and why.
     """
     low, high = (share * servo.voltage for share in _SUPPLIES)
     wrong = np.isfinite(supply) & ~((supply >= low) & (supply <= high))
     if wrong.any():
-        i = int(np.argmax(wrong))
         raise BadInputError(
-            f"{path}: entry {i}: expected a supply of {low:.3g} to {high:.3g} V, found "
-            f"{supply[i]:g}; is it in tenths of a volt or in millivolts?"
+            f"{what}: expected {low:.3g} to {high:.3g} V, found {supply[np.argmax(wrong)]:g}; is "
+            "it in tenths of a volt or in millivolts?"
         )
 
 

@@ -165,7 +165,7 @@ def _read(path: Path, config: ServoConfig) -> Recording:
     else:
         found = read(path, config.given, config.mass, config.length)
     check_load(path, found.p_gain, found.mass * GRAVITY * found.length, config.given)
-    check_supply(path, found.supply, config.given)
+    check_supply(f"{path}: input_volts", found.supply, config.given)
     check_torque(path, found.t, found.torque)
     return found
 
@@ -182,7 +182,7 @@ def _supplied(each: Recording, config: ServoConfig) -> Recording:
                 "in the recording or as --supply, found neither"
             )
         return each
-    check_supply(Path("--supply"), np.array([config.supply]), config.given)
+    check_supply("--supply", np.array([config.supply]), config.given)
     return replace(each, supply=np.where(unknown, config.supply, each.supply))
 
 
