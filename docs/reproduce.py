@@ -55,7 +55,8 @@ for each claim, which needs no network and no program but a browser. `result.jso
 experiments (`--seed`); two runs with one seed give the same numbers.
 
 What stands behind the verdicts is told in full in [Antenna](science/antenna.md) and
-[Tunnel](science/tunnel.md)."""
+[Tunnel](science/tunnel.md).
+"""
 NO_RUN = """\
 ## Verdicts
 
