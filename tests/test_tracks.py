@@ -13,6 +13,8 @@ from tracked import DWELL, POINTS, animal, bent, classified, dwelling, write
 import antennate
 from antennate.antenna.shapes import Shape, held, outline, pointing
 from antennate.cli import main
+from antennate.experiments.tracks.config import TrackWallParams
+from antennate.experiments.tracks.walls import wall_of
 
 ERRORS = (
     Path(__file__).parents[2]

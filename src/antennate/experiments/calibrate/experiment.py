@@ -115,7 +115,7 @@ def _warning(result: Mapping[str, Any]) -> str:
     """What a poor fit comes from."""
     if not result["poor"]:
         return ""
-    if result["hysteretic"]:
+    if result.get("hysteretic"):
         known = result["assessment"]["hysteresis"]
         there, back = known["one_way_r2"]
         return (

@@ -67,7 +67,7 @@ def _draw_animals(panel: Axes, result: Mapping[str, Any]) -> None:
     for row in ours:
         at = row["natural_hz"], row["damping"]
         panel.scatter(*at, color=style.INK, zorder=3)
-        panel.annotate(row["name"], at, (0, -6), textcoords="offset points", ha="center", va="top")
+        panel.annotate(row["name"], at, (6, -1), textcoords="offset points", va="top", fontsize=8)
     panel.axhline(result["animal_damping"], color=style.MUTED, linewidth=0.8)
     panel.set_xscale("log")
     panel.set_xlim(min(1.0, engine["natural_hz"] / 2), 1000)

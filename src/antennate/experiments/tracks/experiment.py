@@ -92,7 +92,7 @@ def sentence(result: Mapping[str, Any]) -> str:
     right = (
         ""
         if correct is None
-        else f" Of frames with {result['synthetic_shapes']} shapes {100 * correct:.1f} % are "
+        else f" Of frames with {result.get('synthetic_shapes', 'known')} shapes {100 * correct:.1f} % are "
         "classified correctly."
     )
     single = " One trial alone gives no interval." * (result["trials_in_contact"] == 1)
