@@ -65,6 +65,7 @@ class SimulationView(Pace):
         self._model: VisibleModel | None = None
         self._data: Any = None
         self._title, self._number = "", 0
+        self._last: tuple[AntennaFrame | None, Controller | None, int] = (None, None, 0)
 
     def begin(self, title: str, seed: int | None = None) -> None:
         """A trial begins; `seed` is the one that it has, None where there is no chance."""
@@ -122,10 +123,10 @@ class SimulationView(Pace):
         if self._seen is not model:
             self._show_model(model)
         self._data, self._number = data, self._number + 1
+        self._last = frame, controller, maneuver
         self.wait(data.time)
         if self.due():
             self.redraw()
-            self.channel.send(TICK, self._tick(data.time, frame, controller, maneuver).pack())
         done, self._fresh = self._fresh, []
         return done
 
@@ -134,6 +135,7 @@ class SimulationView(Pace):
         if self._model is not None and self._data is not None:
             poses, forces = self._model.poses(self._data), self._model.forces(self._data)
             self.channel.send(POSES, Poses(self._data.time, poses, forces).pack())
+            self.channel.send(TICK, self._tick(self._data.time, *self._last).pack())
 
     def _show_model(self, model: Any) -> None:
         self._seen, self._model = model, VisibleModel(model, _SIDES)
