@@ -26,7 +26,6 @@ ROBOT_COMMANDS = {
     "log": "what a log holds; recover it, export it, plot it",
     "replay": "let a controller decide again upon the log of a drive",
     "view": "a log, or that of a run, on a page of this computer",
-    "view": "a log, or that of a run, on a page of this computer",
     "report": "a run, or two side by side, as one page to read, print and send",
 }
 
