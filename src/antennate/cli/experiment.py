@@ -13,7 +13,7 @@ from antennate.cli.exit_codes import BAD_INPUT, INTERRUPTED, OK
 from antennate.cli.options import option
 from antennate.cli.progress import progress, stop_signals
 from antennate.cli.results import ResultOptions, folder_for, tell
-from antennate.cli.view_options import ViewOptions, require_one_worker, tell_by_hand, view_of
+from antennate.cli.view_options import ViewOptions, require_one_worker, say_by_hand, view_of
 from antennate.errors import ConfigError, OutputError
 from antennate.experiments.running import keep, require_films, write_films
 from antennate.params.base import Params
@@ -119,7 +119,7 @@ def carry_out(
     ):
         with progress(experiment.parts) as step, stop_signals():
             outcome = _outcome(experiment, config, options, run, step, view)
-        tell_by_hand(view, run)
+        say_by_hand(() if view is None else view.by_hand, run)
         result = outcome.result()
         interrupted = bool(result.get("interrupted"))
         if interrupted and not outcome.rows:

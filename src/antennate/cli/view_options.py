@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 from pydantic.dataclasses import dataclass
@@ -78,13 +78,10 @@ def require_one_worker(options: Any) -> None:
         )
 
 
-def tell_by_hand(view: SimulationView | None, run: RunDirectory) -> None:
+def say_by_hand(lines: Sequence[str], run: RunDirectory) -> None:
     """Keep what a person changed in the run, and say so."""
-    if view is None or not view.by_hand:
+    if not lines:
         return
-    lines = [
-        "Changed by hand while it ran: this run does not follow from its configuration.",
-        *view.by_hand,
-    ]
-    run.write(BY_HAND, "\n".join(lines) + "\n")
+    head = "Changed by hand while it ran: this run does not follow from its configuration."
+    run.write(BY_HAND, "\n".join([head, *lines]) + "\n")
     sys.stderr.write(f"changed by hand, so not reproducible: {run.path / BY_HAND}\n")

@@ -123,7 +123,7 @@ class Page:
         names = state.get("values", {}).keys(), "seed" in state
         before = self._state.get("values", {}).keys(), "seed" in self._state
         self._state = state
-        if "speed" not in state:
+        if state.get("speed") is None:
             return
         if self._controls is None or names != before:
             if self._controls is not None:
