@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 ANTENNATE = [sys.executable, "-m", "antennate"]
-PATIENCE = 60.0
+PATIENCE = 120.0
 
 
 @dataclass
@@ -34,6 +34,16 @@ class Shown:
             with self._more:
                 self.lines.append(line)
                 self._more.notify_all()
+
+    def said(self, begin: str) -> str:
+        """The first line that begins so, once it has been said."""
+
+        def found() -> list[str]:
+            return [line for line in self.lines if line.startswith(begin)]
+
+        with self._more:
+            assert self._more.wait_for(found, PATIENCE), self.lines
+            return found()[0]
 
     @property
     def link(self) -> str:
