@@ -35,6 +35,11 @@ class Shown:
                 self.lines.append(line)
                 self._more.notify_all()
 
+    def answer(self) -> str:
+        """The first line that it writes on stdout."""
+        assert self.process.stdout is not None
+        return self.process.stdout.readline()
+
     def said(self, begin: str) -> str:
         """The first line that begins so, once it has been said."""
 
@@ -71,7 +76,7 @@ def shown(*words: str, folder: Path) -> Iterator[Shown]:
     """A command with these words, which is ended afterwards."""
     process = subprocess.Popen(
         [*ANTENNATE, *words],
-        stdout=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
         cwd=folder,
@@ -87,6 +92,8 @@ def shown(*words: str, folder: Path) -> Iterator[Shown]:
         reader.join(PATIENCE)
         assert process.stderr is not None
         process.stderr.close()
+        assert process.stdout is not None
+        process.stdout.close()
 
 
 def ask(port: int, path: str = "/", host: str | None = "", **headers: str) -> tuple[int, str]:
