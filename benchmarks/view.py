@@ -1,6 +1,6 @@
 """What a live view and a log cost: a simulated trial, and the pace of `antennate drive`.
 
-- `log`, `view`, `view_and_log`: wall time of trials with them over that without, as fast as it goes,
+- `log`, `view`, `view_and_log`: wall time of trials with them over that without, at full speed,
   interleaved in one process; `cpu` the same of the CPU time of that process. At most 1.05 is asked.
 - `missed_share`, `walking_missed_share`: cycles that a drive against a twin missed, with a page and
   without one, in turn.

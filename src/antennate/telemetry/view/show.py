@@ -105,6 +105,8 @@ class Page:
 
     def draw(self, now: float) -> float:
         """Draw what is due at a time [s]; the time until more may be due [s]."""
+        if not self._server.get_clients():
+            return _SLOW  # nobody looks; what has come is kept
         if self._new and now >= self._due:
             self._due = now + 1.0 / RATE
             self._draw()
