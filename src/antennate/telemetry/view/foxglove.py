@@ -52,7 +52,7 @@ class FoxgloveSink:
         require_foxglove()
         self._sdk = sdk = import_module("foxglove")
         self._messages: Any = import_module("foxglove.messages")
-        context = sdk.Context()
+        self._context = context = sdk.Context()  # channels close with it
         try:
             self._server = sdk.start_server(
                 name="antennate", host=_HOST, port=port, context=context
