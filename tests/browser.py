@@ -23,7 +23,7 @@ _WORDS = (
     "--enable-unsafe-swiftshader --disable-background-networking --no-first-run "
     "--disable-component-update --disable-sync --hide-scrollbars --remote-debugging-port=0"
 )
-_STARTING = 60.0
+_STARTING = 120.0
 
 
 class Tab:

@@ -3,6 +3,7 @@
 import io
 import json
 import re
+import signal
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -182,3 +183,31 @@ def settled(tab: Tab) -> float:
         if seconds(tab) == before:
             return before
     raise AssertionError("time does not stand")
+
+
+def test_a_drive_and_its_twin_are_shown(tab: Tab, keep: Keep, tmp_path: Path) -> None:
+    """The pages of both are read only; charts move while the robot of the twin is driven."""
+    twin = ("twin", "--view", "--view-port", "0", "--duration", "600")
+    with shown(*twin, folder=tmp_path) as served:
+        paths = json.loads(served.answer())
+        words = [*("drive", "--arm", "--no-touch-check", "--duration", "600", "--out", "run")]
+        words += ["--esp32", paths["esp32"], "--bus", paths["bus"], "--view", "--view-port", "0"]
+        with shown(*words, folder=tmp_path) as driven:
+            for view, name in ((driven, "drive"), (served, "twin")):
+                opened(tab, view)
+                before, begin = charts(tab), seconds(tab)
+                if name == "drive":
+                    assert status(tab, "supervisor")
+                    assert "frames" in status(tab, "counters")
+                    tab.until(f"{TIME} > {begin + 1}")
+                    assert charts(tab) != before
+                assert colours(tab) > 50
+                assert not tab.run(
+                    "/pause|one step|restart|θ: level/.test(document.body.innerText)"
+                )
+                keep(tab, name)
+                stays_here(tab, view)
+                tab.requests.clear()
+            driven.process.send_signal(signal.SIGINT)
+            assert driven.process.wait(PATIENCE) is not None
+    assert (tmp_path / "run" / "drive.mcap").exists()

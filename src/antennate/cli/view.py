@@ -13,6 +13,7 @@ from antennate.cli import view_server
 from antennate.cli.arguments import parse
 from antennate.cli.exit_codes import OK
 from antennate.cli.options import option
+from antennate.cli.view_options import FoxgloveOptions, foxglove_of
 from antennate.errors import AntennateError, BadInputError, ConfigError
 from antennate.params.base import Params
 from antennate.sim.scenes.registry import make_scene
@@ -38,7 +39,7 @@ class ViewConfig(Params):
 
 
 @dataclass(frozen=True)
-class Options:
+class Options(FoxgloveOptions):
     """What to show, and where."""
 
     shown: Path | None = option(None, "a log, or the folder of a run", "RUN|LOG", positional=True)
@@ -61,7 +62,7 @@ def command(argv: Sequence[str]) -> int:
     with LogReader(path) as log:
         header = log.header
     with (
-        ViewProcess(options.port, view_server.__name__) as page,
+        ViewProcess(options.port, view_server.__name__, foxglove_of(options)) as page,
         contextlib.suppress(KeyboardInterrupt),  # that is how it ends
     ):
         player = LogPlayer(page.channel, header, str(path), options.speed, arena_of(path, header))
