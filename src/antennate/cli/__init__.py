@@ -26,6 +26,7 @@ ROBOT_COMMANDS = {
     "log": "what a log holds; recover it, export it, plot it",
     "replay": "let a controller decide again upon the log of a drive",
     "report": "a run, or two side by side, as one page to read, print and send",
+    "merge": "the shards of a run as the run that they are parts of",
 }
 
 

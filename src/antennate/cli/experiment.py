@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 from pydantic.dataclasses import dataclass
@@ -13,12 +15,16 @@ from antennate.cli.exit_codes import BAD_INPUT, INTERRUPTED, OK
 from antennate.cli.options import option
 from antennate.cli.progress import progress, stop_signals
 from antennate.cli.results import ResultOptions, folder_for, tell
-from antennate.errors import ConfigError, OutputError
+from antennate.errors import BadInputError, ConfigError, OutputError, WorkerError
 from antennate.experiments.running import keep, require_films, write_films
+from antennate.messages import shortened
 from antennate.params.base import Params
+from antennate.studies.engines import FORMS, LOCAL, make_engine
 from antennate.studies.experiment import Experiment, Outcome
-from antennate.studies.pool import core_count
-from antennate.studies.run_directory import LOGS, RunDirectory
+from antennate.studies.formats import to_json
+from antennate.studies.identity import differences, identity
+from antennate.studies.pool import TIMEOUT, ShardEnd, Workers, core_count
+from antennate.studies.run_directory import LOGS, SHARD, RunDirectory
 
 
 @dataclass(frozen=True)
@@ -27,6 +33,13 @@ class Options(ResultOptions):
 
     workers: int | None = option(None, "processes to use, else one for each core", "INT", ge=1)
     no_figures: bool = option(False, "draw no figures")
+    resume: bool = option(False, "go on with the run that the folder holds")
+    retry: bool = option(False, "run trials again that crashed or hung before")
+    engine: str = option(LOCAL, f"where the workers are: {', '.join(FORMS)}", "ENGINE")
+    shard: str | None = option(None, "run one of N parts, for `antennate merge`", "I/N")
+    trial_timeout: float = option(
+        TIMEOUT, "time after which a trial is given up that has not ended [s]", gt=0
+    )
 
 
 @dataclass(frozen=True)
@@ -50,9 +63,17 @@ class TrialFilmOptions(FilmOptions):
     video_trial: int = option(0, "trial that --video films", "INT", ge=0)
 
 
+@dataclass(frozen=True)
+class StudyOptions(Options):
+    """The same where a file says what is run."""
+
+    config: Path | None = option(None, "TOML file of the study", "FILE", positional=True)
+    trust_code: bool = option(False, "run code of its own that the file names, as FILE.py:NAME")
+
+
 def _options(experiment: Experiment[Any, Any]) -> type[Options]:
     """What can be said of an experiment."""
-    kinds: list[type[Options]] = []
+    kinds: list[type[Options]] = [StudyOptions] if experiment.continued else []
     if experiment.logged is not None:
         kinds.append(LogOptions)
     if experiment.films is not None:
@@ -94,40 +115,114 @@ def command(experiment: Experiment[Any, Any], argv: Sequence[str]) -> int:
     return carry_out(experiment, argv, config, options)
 
 
+@dataclass(frozen=True)
+class Shards:
+    """Trials of all shards: by whom they were run, and their records by key."""
+
+    identity: dict[str, Any]
+    records: dict[str, Any]
+
+
 def carry_out(
-    experiment: Experiment[Any, Any], argv: Sequence[str], config: Params, options: Options
+    experiment: Experiment[Any, Any],
+    argv: Sequence[str],
+    config: Params,
+    options: Options,
+    shards: Shards | None = None,
 ) -> int:
-    """Run what has been parsed.
+    """Run what has been parsed, or put shards together that were run.
 
     Raises:
         AntennateError: The physics became invalid, a worker died, or a file could not be written;
             what was measured is kept and shown first.
     """
-    with folder_for(experiment.view, options, config, argv) as run:
-        with progress(experiment.parts) as step, stop_signals():
-            how = (config, options.workers or core_count(), step, run.append)
-            if isinstance(options, LogOptions) and options.log and experiment.logged is not None:
-                outcome = experiment.logged(*how, run.folder(LOGS))
-            else:
-                outcome = experiment.run(*how)
-        result = outcome.result()
-        interrupted = bool(result.get("interrupted"))
-        if interrupted and not outcome.rows:
-            raise KeyboardInterrupt
-        failure = _keep(experiment, outcome, options, run)
-        tell(result, options, experiment.tables(result), experiment.sentence(result))
-        if failure is not None:
-            raise failure
-        if interrupted:
-            sys.stderr.write(
-                f"antennate {experiment.name}: interrupted: kept {len(outcome.rows)} trials, all "
-                "that had ended\n"
-            )
-        else:
-            interrupted = not _film(experiment, config, options, run)
+    shard, engine = _shard(options.shard), make_engine(options.engine)
+    logs = isinstance(options, LogOptions) and options.log
+    what = identity(f"{experiment.name} --log" if logs else experiment.name, config)
+    resume = options.resume or options.retry or experiment.continued
+    if shards and (changes := differences(shards.identity, what)):
+        raise BadInputError(f"expected shards of this version and code, found {changes}")
+    name = "merge" if shards else experiment.name
+    with folder_for(experiment.view, options, config, argv, what, resume, name) as run:
+        run.keeps_store = experiment.continued
+        if shards and run.store is not None:
+            run.store.take(shards.records)
+        crew = Workers(
+            options.workers or core_count(),
+            engine,
+            run.store,
+            shard=shard,
+            timeout=options.trial_timeout,
+            retry=options.retry,
+            closed=shards is not None,
+            apart=experiment.continued,
+        )
+        try:
+            outcome = _run(experiment, config, crew, run, logs)
+        except WorkerError:
+            if shards:
+                run.discard()
+            raise
+        except ShardEnd as end:
+            told = {"shard": options.shard, "trials": end.count, "of": end.total}
+            run.write(SHARD, to_json(told))
+            sys.stderr.write(f"shard {options.shard}: {end.count} of {end.total} trials\n")
+            return OK
+        return _end(experiment, config, options, run, outcome)
+
+
+def _shard(text: str | None) -> tuple[int, int] | None:
+    """The part that is carried out, and of how many.
+
+    Raises:
+        ConfigError: It is nothing of the kind.
+    """
+    if text is None:
+        return None
+    found = re.fullmatch(r"([0-9]{1,6})/([0-9]{1,6})", text)
+    number, count = (int(found[1]), int(found[2])) if found else (0, 0)
+    if not 1 <= number <= count:
+        raise ConfigError(f"--shard: expected I/N, I from 1 to N, found {shortened(text)}")
+    return number, count
+
+
+def _run(
+    experiment: Experiment[Any, Any],
+    config: Params,
+    crew: Workers,
+    run: RunDirectory,
+    logs: bool = False,
+) -> Outcome:
+    with progress(experiment.parts) as step, stop_signals():
+        if logs and experiment.logged is not None:
+            return experiment.logged(config, crew, step, run.append, run.folder(LOGS))
+        return experiment.run(config, crew, step, run.append)
+
+
+def _end(
+    experiment: Experiment[Any, Any],
+    config: Params,
+    options: Options,
+    run: RunDirectory,
+    outcome: Outcome,
+) -> int:
+    """Keep what came out, tell it, and make the films."""
+    result = outcome.result()
+    interrupted = bool(result.get("interrupted"))
+    if interrupted and not outcome.rows:
+        raise KeyboardInterrupt
+    failure = _keep(experiment, outcome, options, run)
+    tell(result, options, experiment.tables(result), experiment.sentence(result))
+    if failure is not None:
+        raise failure
     if interrupted:
-        return INTERRUPTED
-    return BAD_INPUT if experiment.failed(result) else OK
+        sys.stderr.write(
+            f"antennate {experiment.name}: interrupted: kept {len(outcome.rows)} trials, all "
+            "that had ended; --resume goes on\n"
+        )
+    elif _film(experiment, config, options, run):
+        return BAD_INPUT if experiment.failed(result) else OK
+    return INTERRUPTED
 
 
 def _film(

@@ -31,17 +31,34 @@ class ResultOptions(FromFile):
 
 @contextlib.contextmanager
 def folder_for(
-    view: View, options: ResultOptions, config: Params, argv: Sequence[str]
+    view: View,
+    options: ResultOptions,
+    config: Params,
+    argv: Sequence[str],
+    identity: Mapping[str, Any] | None = None,
+    resume: bool = False,
+    command: str = "",
 ) -> Iterator[RunDirectory]:
     """A run directory with its configuration.
 
     Its report is written, and its path printed, when the run is complete.
 
+    Args:
+        view: How the result is shown.
+        options: Where it goes.
+        config: The configuration.
+        argv: Words of the command.
+        identity: What is run, if it can be resumed.
+        resume: Go on with the run that the folder holds, if there is one.
+        command: Name of the command, if it is not that of the view.
+
     Raises:
+        BadInputError: The run that is to go on is another one.
         OutputError: It cannot be written, or it holds another run.
     """
-    with RunDirectory.create(view.name, options.out, options.overwrite) as folder:
-        folder.describe(config, ["antennate", view.name, *argv])
+    place = (view.name, options.out, options.overwrite, identity, resume)
+    with RunDirectory.create(*place) as folder:
+        folder.describe(config, ["antennate", command or view.name, *argv])
         yield folder
         write_report(folder, view)
         sys.stderr.write(f"written to {folder.path}\n")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import re
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -15,7 +16,10 @@ from antennate.dataframe import from_rows
 from antennate.errors import BadInputError, ConfigError
 from antennate.params.base import Params
 from antennate.params.reading import from_values
+from antennate.studies.engines import LOCAL, make_engine
 from antennate.studies.experiment import Experiment, Outcome
+from antennate.studies.identity import identity
+from antennate.studies.pool import Workers
 from antennate.studies.report import write_report
 from antennate.studies.run_directory import FILMS, RunDirectory
 
@@ -96,6 +100,8 @@ def run(
     overwrite: bool = False,
     video: int | None = None,
     on_step: Callable[[int, int], None] = lambda done, total: None,
+    resume: bool = False,
+    engine: Any = LOCAL,
     **settings: Any,
 ) -> Result:
     """Run an experiment.
@@ -109,6 +115,9 @@ def run(
         overwrite: Replace a run that `out` holds.
         video: Number of a trial of which `out` gets a film for each condition, None for none.
         on_step: Called with how many of how many parts are done.
+        resume: Go on with the run that `out` holds, if there is one.
+        engine: Where the workers are: local, dask, dask://HOST:PORT, slurm, or an object with
+            `submit` as those of concurrent.futures have.
         settings: Fields of its configuration where a name was given, with nested groups as objects
             or dictionaries. `controllers` also takes classes.
 
@@ -121,11 +130,14 @@ def run(
     found.check(config)
     if video is not None:
         require_films(found, config, video, out)
+    crew = functools.partial(Workers, workers, make_engine(engine), apart=found.continued)
     if out is None:
-        return Result(found, config, found.run(config, workers, on_step, lambda row: None))
-    with RunDirectory.create(found.name, out, overwrite) as directory:
+        return Result(found, config, found.run(config, crew(), on_step, lambda row: None))
+    place = (found.name, out, overwrite, identity(found.name, config), resume or found.continued)
+    with RunDirectory.create(*place) as directory:
+        directory.keeps_store = found.continued
         directory.describe(config)
-        outcome = found.run(config, workers, on_step, directory.append)
+        outcome = found.run(config, crew(store=directory.store), on_step, directory.append)
         keep(found, outcome, directory)
         if video is not None:
             write_films(found, config, video, directory)

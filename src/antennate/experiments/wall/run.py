@@ -10,7 +10,7 @@ is counted once more without the `start`. A trial that does both counts as a jam
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -18,7 +18,7 @@ import numpy as np
 from pydantic import model_validator
 
 from antennate.antenna.statics import PROFILES, Profile, with_profile
-from antennate.errors import SimulationError
+from antennate.errors import SimulationError, WorkerError
 from antennate.experiments.wall import measures
 from antennate.experiments.wall.outcome import SAMPLE_PERIOD, Traverse, WallTrial, classify
 from antennate.params.base import Params, number, require_different
@@ -27,8 +27,9 @@ from antennate.params.scene import BenchPhysicsParams
 from antennate.robots.antenna import AntennaSpec
 from antennate.robots.sensor import SensorParams
 from antennate.sim.bench import Ball, Bench, compile_bench
-from antennate.studies.experiment import OnRow, OnStep, no_row, no_step
+from antennate.studies.experiment import OnRow, OnStep, Trial, no_row, no_step
 from antennate.studies.pool import gather
+from antennate.studies.work import Failure
 from antennate.types import Floats
 
 REFERENCE: Profile = "descending"
@@ -126,9 +127,7 @@ def _unwatched(bench: Bench) -> None:
     """Look at nothing."""
 
 
-def passage(
-    config: WallConfig, profile: Profile, trial: int, watch: Watch = _unwatched
-) -> Traverse:
+def passage(config: WallConfig, profile: str, trial: int, watch: Watch = _unwatched) -> Traverse:
     """Move one antenna along the wall.
 
     Raises:
@@ -202,16 +201,31 @@ def _ramp(length: float, speed: float) -> list[float]:
     return (length * np.arange(1, count + 1) / count).tolist()
 
 
-def run_trial(
-    config: WallConfig, profile: Profile, trial: int
+def _invalid(
+    config: WallConfig, profile: str, trial: int, reason: str
 ) -> tuple[WallTrial, Traverse | None]:
+    none = [math.nan] * 7
+    row = WallTrial(config.seed, trial, profile, "invalid", "invalid", *none, reason=reason)
+    return row, None
+
+
+def every(config: WallConfig) -> list[Trial]:
+    """All trials, number by number."""
+    return [(profile, trial) for trial in range(config.trials) for profile in config.profiles]
+
+
+def run_rows(config: WallConfig, trials: Sequence[Trial], emit: Callable[[int, Any], None]) -> None:
+    """Run some trials; emit the index and the row of each."""
+    for i, (profile, trial) in enumerate(trials):
+        emit(i, run_trial(config, profile, trial)[0])
+
+
+def run_trial(config: WallConfig, profile: str, trial: int) -> tuple[WallTrial, Traverse | None]:
     """One trial, and of the first of a profile its passage."""
     try:
         seen = passage(config, profile, trial)
     except SimulationError as error:
-        none = [math.nan] * 7
-        row = WallTrial(config.seed, trial, profile, "invalid", "invalid", *none, reason=str(error))
-        return row, None
+        return _invalid(config, profile, trial, str(error))
     row = classify(config.wall, config.seed, trial, profile, seen)
     return row, seen if trial == 0 else None
 
@@ -225,12 +239,20 @@ def run(
     """Run all trials of all profiles.
 
     Raises:
-        WorkerError: A worker process died.
+        WorkerError: A worker process failed.
     """
-    tasks = [
-        (config, profile, trial) for trial in range(config.trials) for profile in config.profiles
-    ]
-    found = gather(run_trial, tasks, workers, on_step, lambda item: on_row(item[0]))
+    trials = every(config)
+
+    def lost(place: int, failure: Failure) -> tuple[WallTrial, Traverse | None]:
+        if failure.status == "failed":
+            raise failure.error or WorkerError(f"a worker failed: {failure.reason}")
+        return _invalid(config, *trials[place], failure.reason)
+
+    found = gather(
+        *(run_trial, [(config, *trial) for trial in trials], workers, on_step),
+        on_result=lambda item: on_row(item[0]),
+        lost=lost,
+    )
     found.sort(key=lambda item: config.profiles.index(item[0].profile))
     examples = {row.profile: seen for row, seen in found if seen is not None}
     return WallOutcome(config, [row for row, _ in found], examples)
