@@ -14,7 +14,7 @@ from antennate.cli.arguments import parse
 from antennate.cli.exit_codes import BAD_INPUT, INTERRUPTED, OK
 from antennate.cli.options import option
 from antennate.cli.progress import progress, stop_signals
-from antennate.cli.results import ResultOptions, folder_for, tell
+from antennate.cli.results import ResultOptions, drawn_table, folder_for, tell
 from antennate.errors import BadInputError, ConfigError, OutputError, WorkerError
 from antennate.experiments.running import keep, require_films, write_films
 from antennate.messages import shortened
@@ -23,6 +23,7 @@ from antennate.studies.engines import FORMS, LOCAL, make_engine
 from antennate.studies.experiment import Experiment, Outcome
 from antennate.studies.formats import to_json
 from antennate.studies.identity import differences, identity
+from antennate.studies.measures import Interim
 from antennate.studies.pool import TIMEOUT, ShardEnd, Workers, core_count
 from antennate.studies.run_directory import LOGS, SHARD, RunDirectory
 
@@ -37,6 +38,7 @@ class Options(ResultOptions):
     retry: bool = option(False, "run trials again that crashed or hung before")
     engine: str = option(LOCAL, f"where the workers are: {', '.join(FORMS)}", "ENGINE")
     shard: str | None = option(None, "run one of N parts, for `antennate merge`", "I/N")
+    slurm: tuple[str, ...] = option((), "what SLURM is asked for, as timeout_min=60", "NAME=VALUE")
     trial_timeout: float = option(
         TIMEOUT, "time after which a trial is given up that has not ended [s]", gt=0
     )
@@ -136,7 +138,7 @@ def carry_out(
         AntennateError: The physics became invalid, a worker died, or a file could not be written;
             what was measured is kept and shown first.
     """
-    shard, engine = _shard(options.shard), make_engine(options.engine)
+    shard, engine = _shard(options.shard), make_engine(options.engine, options.slurm)
     logs = isinstance(options, LogOptions) and options.log
     what = identity(f"{experiment.name} --log" if logs else experiment.name, config)
     resume = options.resume or options.retry or experiment.continued
@@ -193,10 +195,20 @@ def _run(
     run: RunDirectory,
     logs: bool = False,
 ) -> Outcome:
-    with progress(experiment.parts) as step, stop_signals():
+    interim = Interim()
+
+    def keep(row: Any) -> None:
+        run.append(row)
+        interim.add(row)
+
+    def table() -> Any:
+        found = interim.table()
+        return None if found is None else drawn_table(found)
+
+    with progress(experiment.parts, table) as step, stop_signals():
         if logs and experiment.logged is not None:
-            return experiment.logged(config, crew, step, run.append, run.folder(LOGS))
-        return experiment.run(config, crew, step, run.append)
+            return experiment.logged(config, crew, step, keep, run.folder(LOGS))
+        return experiment.run(config, crew, step, keep)
 
 
 def _end(

@@ -80,14 +80,9 @@ def tell(
     console.print(Text(sentence), soft_wrap=not console.is_terminal)
 
 
-def print_table(table: Table) -> None:
-    """Print a table and its note; as a list where it is too wide for the terminal.
-
-    Underscores of a name are shown as spaces; one with a colon may have a line for each part.
-    """
+def drawn_table(table: Table) -> Any:
+    """A table as rich draws it."""
     from rich.box import SIMPLE_HEAD  # slow to import
-    from rich.console import Console
-    from rich.measure import Measurement
     from rich.table import Table as Drawn
     from rich.text import Text
 
@@ -98,6 +93,19 @@ def print_table(table: Table) -> None:
         drawn.add_column(Text(parts), justify="right", overflow="fold")
     for name, cells in table.rows:
         drawn.add_row(Text(name), *(Text(cell) for cell in cells))
+    return drawn
+
+
+def print_table(table: Table) -> None:
+    """Print a table and its note; as a list where it is too wide for the terminal.
+
+    Underscores of a name are shown as spaces; one with a colon may have a line for each part.
+    """
+    from rich.console import Console  # slow to import
+    from rich.measure import Measurement
+    from rich.text import Text
+
+    drawn = drawn_table(table)
     console = Console(file=sys.stdout, highlight=False)
     unlimited = console.options.update(max_width=sys.maxsize)
     if Measurement.get(console, unlimited, drawn).minimum <= console.width:

@@ -94,7 +94,8 @@ def _elsewhere(summary: Mapping[str, Any]) -> str:
 
 
 def run(
-    experiment: str | Params,
+    name_or_config: str | Params,
+    /,
     workers: int = 1,
     out: str | Path | None = None,
     overwrite: bool = False,
@@ -107,7 +108,7 @@ def run(
     """Run an experiment.
 
     Args:
-        experiment: Its name, one of `list_experiments()`, or its whole configuration.
+        name_or_config: Its name, one of `list_experiments()`, or its whole configuration.
         workers: Processes to use; the result does not depend on it. With more than one, the calling
             script needs `if __name__ == "__main__":`.
         out: A run directory to write: configuration, versions, rows, result and figures; None
@@ -126,11 +127,11 @@ def run(
         OutputError: The directory cannot be written, or holds another run.
         AntennateError: The run failed.
     """
-    found, config = _configured(experiment, settings, workers)
+    found, config = _configured(name_or_config, settings, workers)
     found.check(config)
     if video is not None:
         require_films(found, config, video, out)
-    crew = functools.partial(Workers, workers, make_engine(engine), apart=found.continued)
+    crew = functools.partial(Workers, workers, make_engine(engine))
     if out is None:
         return Result(found, config, found.run(config, crew(), on_step, lambda row: None))
     place = (found.name, out, overwrite, identity(found.name, config), resume or found.continued)
@@ -213,6 +214,38 @@ def write_films(
 
         data = encoded(record(), step)
         directory.write(f"{FILMS}/{re.sub(r'[^A-Za-z0-9_.-]+', '_', name)}.mp4", data)
+
+
+def study(
+    experiment: str | Callable[..., Any],
+    vary: Mapping[str, Any],
+    settings: Mapping[str, Any] | None = None,
+    **more: Any,
+) -> Result:
+    """Run an experiment, or a function of your own, at many points of its parameters.
+
+    Args:
+        experiment: Name of an experiment, or trial(config, seed) -> row: `config` holds the
+            parameters by name, `seed` is 0, 1, 2 and so on, the row is a dictionary or a dataclass.
+        vary: By dotted name a list of values, or {"low": ..., "high": ...} for a range.
+        settings: Parameters that are the same at all points.
+        more: Further fields of a study (plan, points, seed, trials, response, assumed, leave_out),
+            and how to run it, as for `run` (workers, out, engine, on_step). With `out` the study
+            goes on with what the directory holds of it.
+
+    Raises:
+        BadInputError: A name is unknown, a value out of bounds, or the plan is empty.
+        OutputError: The directory cannot be written, or another process works on it.
+        AntennateError: The run failed.
+    """
+    from antennate.experiments.study.subject import FUNCTIONS, plain
+
+    if not isinstance(experiment, str):
+        name, function = experiment.__name__, experiment
+        FUNCTIONS.add(name, function)
+        experiment = name
+    values = {"vary": plain(vary), "settings": plain(settings or {})}
+    return run("study", experiment=experiment, **values, **more)
 
 
 def list_experiments() -> dict[str, str]:

@@ -7,6 +7,7 @@ not see the files of the driver; they do need the same versions and the same cod
 
 from __future__ import annotations
 
+import re
 import time
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import BrokenExecutor
@@ -19,22 +20,36 @@ from antennate.studies.processes import added_objects, take_added
 from antennate.studies.work import Emit, Engine, Fail, Failure, Part, Waiting, Work
 
 LOCAL = "local"
-FORMS = (LOCAL, "dask", "dask://HOST:PORT", "slurm")
-"""How an engine is named."""
+FORMS = (LOCAL, "dask", "dask://HOST:PORT", "slurm", "slurm-local")
+"""How an engine is named; slurm-local starts what would be jobs as processes of this machine."""
 _POLL = 0.02
 """How often the driver looks for parts that have ended [s]."""
 
 
-def make_engine(name: Any) -> Engine | None:
+def make_engine(name: Any, slurm: Sequence[str] = ()) -> Engine | None:
     """The engine of a name or of an object of the user; None is this machine.
 
+    Args:
+        name: One of FORMS, or an executor.
+        slurm: What SLURM is asked for, each as NAME=VALUE.
+
     Raises:
-        ConfigError: There is none.
+        ConfigError: There is none, or SLURM is asked for something and another engine is named.
         MissingPackageError: Its package is not installed.
     """
+    if slurm and name not in ("slurm", "slurm-local"):
+        raise ConfigError("--slurm: expected --engine slurm beside it, found another engine")
     if name == LOCAL:
         return None
     if isinstance(name, str):
+        from antennate.studies import cluster  # needs packages that are optional
+
+        if name in ("slurm", "slurm-local"):
+            return cluster.Slurm("slurm" if name == "slurm" else "local", slurm)
+        if name == "dask":
+            return cluster.Dask()
+        if re.fullmatch(r"dask://[^/\s]+:[0-9]{1,5}", name):
+            return cluster.Dask(name.removeprefix("dask://"))
         raise ConfigError(f"engine: expected one of {', '.join(FORMS)}, found {shown(name)}")
     if not callable(getattr(name, "submit", None)):
         raise ConfigError(
@@ -119,8 +134,7 @@ def carry_out(
     Raises:
         WorkerError: The driver has other versions or other code.
     """
-    if changes := differences(theirs, environment()):
-        raise WorkerError(f"expected workers with the driver's versions and code, found {changes}")
+    require_same(theirs)
     take_added(added)
     answers: list[tuple[int, Any]] = []
 
@@ -129,3 +143,13 @@ def carry_out(
 
     part.carry_out(lambda place, result: answers.append((place, result)), fail)
     return answers
+
+
+def require_same(theirs: Mapping[str, Any]) -> None:
+    """Check that this worker has the versions and the code of its driver.
+
+    Raises:
+        WorkerError: It has others.
+    """
+    if changes := differences(theirs, environment()):
+        raise WorkerError(f"expected workers with the driver's versions and code, found {changes}")

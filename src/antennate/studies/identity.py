@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import hashlib
 import importlib.util
+import inspect
 import json
 import sys
 from collections.abc import Iterator, Mapping
@@ -12,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import antennate
+from antennate.lookup import ADDED
 from antennate.messages import shortened
 from antennate.params.base import Params
 from antennate.telemetry.header import versions
@@ -28,7 +30,7 @@ def identity(command: str, config: Params) -> dict[str, Any]:
         "command": command,
         "config": values,
         "versions": dict(versions()),
-        "code": code() | code_named(values) | _code_of(type(config)),
+        "code": code() | code_named(values) | _code_added(values) | _code_of(type(config)),
     }
 
 
@@ -65,6 +67,20 @@ def code_named(values: Any) -> dict[str, str]:
             found[str(file)] = _checksum(file)
         elif place and name.isidentifier() and all(map(str.isidentifier, place.split("."))):
             found |= _module(place)
+    return found
+
+
+def _code_added(values: Any) -> dict[str, str]:
+    """Checksums of the source of objects that were added to a registry and are named."""
+    named = set(_texts(values))
+    added = [pair for objects in ADDED.values() for pair in objects.items() if pair[0] in named]
+    found = {}
+    for name, each in added:
+        try:
+            source = inspect.getsource(each)
+        except (OSError, TypeError):
+            continue  # typed at a prompt
+        found[name] = hashlib.sha256(source.encode()).hexdigest()[:16]
     return found
 
 
@@ -110,8 +126,12 @@ def differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> str:
 def _told(path: tuple[str, ...], old: Any, new: Any) -> str:
     group, name = path[0], ".".join(path[1:])
     if group == "code":
-        return f"the file {name} {'is new' if old == _NONE else 'changed'}"
+        return f"the file {name} {_changed(old, new)}"
     return f"{name or group} {_short(old)}, now {_short(new)}"
+
+
+def _changed(old: Any, new: Any) -> str:
+    return "is new" if old == _NONE else "is gone" if new == _NONE else "changed"
 
 
 def _short(value: Any) -> str:

@@ -195,7 +195,8 @@ def gather(
         )
     parts = [todo[i : i + chunk] for i in range(0, len(todo), chunk)]
     if parts:
-        work = Work(function, tasks, together, crew.timeout)
+        folder = None if crew.store is None else crew.store.path.parent
+        work = Work(function, tasks, together, crew.timeout, folder)
         crew.engine(len(parts)).run(work, parts, int(crew), call.emit, call.fail)
     if crew.shard is not None:
         raise ShardEnd(sum(map(crew.mine, call.found)), len(tasks))

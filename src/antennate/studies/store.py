@@ -52,11 +52,13 @@ class Store:
             raise OutputError(f"expected to write {path}, found: {error.strerror}") from None
         try:
             fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
+        except BlockingIOError:
             os.close(self._file)
             raise OutputError(
                 f"{path.parent}: expected a run that nobody works on, found another process at it"
             ) from None
+        except OSError:
+            pass  # a file system without locks
         self.records: dict[str, Any] = {}
         self.identity: Mapping[str, Any] | None = None
         self._synced = 0.0

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter, deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any, Literal, Protocol
 
 from antennate.errors import WorkerError, in_one_line
@@ -44,12 +45,14 @@ class Work:
         tasks: Its arguments.
         together: Whether several tasks are carried out at once.
         timeout: Time after which a task that has not ended is given up [s].
+        folder: Run directory that it belongs to, None without.
     """
 
     function: Callable[..., Any]
     tasks: Sequence[tuple[Any, ...]]
     together: bool
     timeout: float
+    folder: Path | None = None
 
     def part(self, places: Sequence[int]) -> Part:
         """Some of it, to be sent to a worker."""

@@ -149,6 +149,11 @@ def _plain(value: Any) -> Any:
     return value.model_dump(mode="json") if isinstance(value, BaseModel) else str(value)
 
 
+def plain(values: Any) -> Any:
+    """Values given in Python as a file would hold them."""
+    return json.loads(json.dumps(values, default=_plain))
+
+
 def _numbers(result: Mapping[str, Any], path: str = "") -> dict[str, Any]:
     """Numbers and texts of a result as one row, by dotted name."""
     found: dict[str, Any] = {}
