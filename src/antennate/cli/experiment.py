@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -14,34 +13,19 @@ from antennate.cli.arguments import parse
 from antennate.cli.exit_codes import BAD_INPUT, INTERRUPTED, OK
 from antennate.cli.options import option
 from antennate.cli.progress import progress, stop_signals
-from antennate.cli.results import ResultOptions, drawn_table, folder_for, tell
+from antennate.cli.results import drawn_table, folder_for, tell
+from antennate.cli.run_options import Options, workers_of
+from antennate.cli.view_options import ViewOptions, require_one_worker, tell_by_hand, view_of
 from antennate.errors import BadInputError, ConfigError, OutputError, WorkerError
 from antennate.experiments.running import keep, require_films, write_films
-from antennate.messages import shortened
 from antennate.params.base import Params
-from antennate.studies.engines import FORMS, LOCAL, make_engine
 from antennate.studies.experiment import Experiment, Outcome
 from antennate.studies.formats import to_json
 from antennate.studies.identity import differences, identity
 from antennate.studies.measures import Interim
-from antennate.studies.pool import TIMEOUT, ShardEnd, Workers, core_count
+from antennate.studies.pool import ShardEnd, Workers
 from antennate.studies.run_directory import LOGS, SHARD, RunDirectory
-
-
-@dataclass(frozen=True)
-class Options(ResultOptions):
-    """How to run; nothing here changes a result."""
-
-    workers: int | None = option(None, "processes to use, else one for each core", "INT", ge=1)
-    no_figures: bool = option(False, "draw no figures")
-    resume: bool = option(False, "go on with the run that the folder holds")
-    retry: bool = option(False, "run trials again that crashed or hung before")
-    engine: str = option(LOCAL, f"where the workers are: {', '.join(FORMS)}", "ENGINE")
-    shard: str | None = option(None, "run one of N parts, for `antennate merge`", "I/N")
-    slurm: tuple[str, ...] = option((), "what SLURM is asked for, as timeout_min=60", "NAME=VALUE")
-    trial_timeout: float = option(
-        TIMEOUT, "time after which a trial is given up that has not ended [s]", gt=0
-    )
+from antennate.telemetry.view.simulation import SimulationView
 
 
 @dataclass(frozen=True)
@@ -49,6 +33,11 @@ class LogOptions(Options):
     """The same where trials can be logged."""
 
     log: bool = option(False, "keep the log of every trial, in logs/CONTROLLER-TRIAL.mcap")
+
+
+@dataclass(frozen=True)
+class ShownOptions(ViewOptions, Options):
+    """The same where it can be watched."""
 
 
 @dataclass(frozen=True)
@@ -78,6 +67,8 @@ def _options(experiment: Experiment[Any, Any]) -> type[Options]:
     kinds: list[type[Options]] = [StudyOptions] if experiment.continued else []
     if experiment.logged is not None:
         kinds.append(LogOptions)
+    if experiment.viewed is not None:
+        kinds.append(ShownOptions)
     if experiment.films is not None:
         has_trials = "trials" in experiment.config.model_fields
         kinds.append(TrialFilmOptions if has_trials else FilmOptions)
@@ -119,7 +110,7 @@ def command(experiment: Experiment[Any, Any], argv: Sequence[str]) -> int:
 
 @dataclass(frozen=True)
 class Shards:
-    """Trials of all shards: by whom they were run, and their records by key."""
+    """Trials of all shards: what was run, and their records by key."""
 
     identity: dict[str, Any]
     records: dict[str, Any]
@@ -138,29 +129,23 @@ def carry_out(
         AntennateError: The physics became invalid, a worker died, or a file could not be written;
             what was measured is kept and shown first.
     """
-    shard, engine = _shard(options.shard), make_engine(options.engine, options.slurm)
+    require_one_worker(options)
+    crew = workers_of(options, closed=shards is not None, apart=experiment.continued)
     logs = isinstance(options, LogOptions) and options.log
     what = identity(f"{experiment.name} --log" if logs else experiment.name, config)
-    resume = options.resume or options.retry or experiment.continued
     if shards and (changes := differences(shards.identity, what)):
         raise BadInputError(f"expected shards of this version and code, found {changes}")
+    resume = options.resume or options.retry or experiment.continued
     name = "merge" if shards else experiment.name
-    with folder_for(experiment.view, options, config, argv, what, resume, name) as run:
-        run.keeps_store = experiment.continued
+    with (
+        view_of(options) as view,
+        folder_for(experiment.view, options, config, argv, what, resume, name) as run,
+    ):
+        run.keeps_store, crew.store = experiment.continued, run.store
         if shards and run.store is not None:
             run.store.take(shards.records)
-        crew = Workers(
-            options.workers or core_count(),
-            engine,
-            run.store,
-            shard=shard,
-            timeout=options.trial_timeout,
-            retry=options.retry,
-            closed=shards is not None,
-            apart=experiment.continued,
-        )
         try:
-            outcome = _run(experiment, config, crew, run, logs)
+            outcome = _outcome(experiment, config, options, crew, run, view)
         except WorkerError:
             if shards:
                 run.discard()
@@ -170,31 +155,22 @@ def carry_out(
             run.write(SHARD, to_json(told))
             sys.stderr.write(f"shard {options.shard}: {end.count} of {end.total} trials\n")
             return OK
+        if options.shard is not None:
+            raise ConfigError(f"--shard: expected trials on workers, found {experiment.name}")
+        tell_by_hand(view, run)
         return _end(experiment, config, options, run, outcome)
 
 
-def _shard(text: str | None) -> tuple[int, int] | None:
-    """The part that is carried out, and of how many.
-
-    Raises:
-        ConfigError: It is nothing of the kind.
-    """
-    if text is None:
-        return None
-    found = re.fullmatch(r"([0-9]{1,6})/([0-9]{1,6})", text)
-    number, count = (int(found[1]), int(found[2])) if found else (0, 0)
-    if not 1 <= number <= count:
-        raise ConfigError(f"--shard: expected I/N, I from 1 to N, found {shortened(text)}")
-    return number, count
-
-
-def _run(
+def _outcome(
     experiment: Experiment[Any, Any],
     config: Params,
+    options: Options,
     crew: Workers,
     run: RunDirectory,
-    logs: bool = False,
+    view: SimulationView | None,
 ) -> Outcome:
+    """Run it: watched, logged, or neither."""
+    logs = run.folder(LOGS) if isinstance(options, LogOptions) and options.log else None
     interim = Interim()
 
     def keep(row: Any) -> None:
@@ -206,8 +182,10 @@ def _run(
         return None if found is None else drawn_table(found)
 
     with progress(experiment.parts, table) as step, stop_signals():
-        if logs and experiment.logged is not None:
-            return experiment.logged(config, crew, step, keep, run.folder(LOGS))
+        if view is not None and experiment.viewed is not None:
+            return experiment.viewed(config, step, keep, view, logs)
+        if logs is not None and experiment.logged is not None:
+            return experiment.logged(config, crew, step, keep, logs)
         return experiment.run(config, crew, step, keep)
 
 

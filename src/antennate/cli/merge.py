@@ -10,8 +10,9 @@ from pydantic.dataclasses import dataclass
 
 from antennate import experiments
 from antennate.cli.arguments import parse
-from antennate.cli.experiment import Options, Shards, carry_out
+from antennate.cli.experiment import Shards, carry_out
 from antennate.cli.options import option
+from antennate.cli.run_options import Options
 from antennate.errors import BadInputError, ConfigError
 from antennate.params.base import Params
 from antennate.studies.identity import differences

@@ -124,8 +124,7 @@ class World:
         self._driven = self._addresses(names)
         self._turning: Ints = np.array([model.joint(n).dofadr[0] for n in names])
         self._gears = Gears(model, robot, PREFIX)
-        kinds = [robot.servos.of(group.servo) for _, group, n in robot.groups for _ in range(n)]
-        stall = np.array([kind.stall_torque for kind in kinds])
+        stall = np.array([robot.servos.of(n).stall_torque for n in robot.servo_names])
         self.servo_drives = ServoDrives(model, names, stall)
         self._root: int = model.joint(PREFIX + "root").qposadr[0]
         self._links: Ints = np.array([model.body(PREFIX + n).id for n in robot.link_names])
@@ -164,6 +163,15 @@ class World:
         found = np.empty(mujoco.mj_stateSize(self.model, kind))
         mujoco.mj_getState(self.model, self.data, found, kind)
         return found
+
+    def coordinates(self) -> tuple[int, list[float]]:
+        """Number of the robot's first coordinate, and all coordinates of the model [m, rad]."""
+        return self._root, self._qpos.tolist()
+
+    def place_all(self, position: Floats) -> None:
+        """Put everything at coordinates of the model [m, rad], shape (nq,), without physics."""
+        self._qpos[:] = position
+        mujoco.mj_kinematics(self.model, self.data)
 
     def restore(self, state: Floats) -> None:
         """Be again as when `state` was called, also in time."""
@@ -276,6 +284,11 @@ class World:
             [polygon for polygon, still in zip(polygons, fixed, strict=True) if still],
             [polygon for polygon, still in zip(polygons, fixed, strict=True) if not still],
         )
+
+    def parts(self) -> list[Floats]:
+        """Polygons of all parts of the robot in plan [m], each (n, 2), legs and antennae too."""
+        own = np.flatnonzero(self._robot)
+        return [outline(self.model, self.data, geom) for geom in own.tolist()]
 
     def obstacle_overlap(self) -> float:
         """How deep the robot is in obstacles at most [m]; 0 if it touches none."""

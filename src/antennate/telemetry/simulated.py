@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ from antennate.telemetry.header import Header
 from antennate.telemetry.topics import (
     ANTENNA,
     CONTACT_FORCES,
+    COORDINATES,
     JOINT_COMMANDS,
     JOINT_STATES,
     MANEUVER,
@@ -46,6 +48,9 @@ class SimulatedLog:
         world: The simulated robot in its scene.
         row: Row of the batch.
 
+    Attributes:
+        path: The file.
+
     Raises:
         LogError: The file exists or cannot be written, or the disk is nearly full.
     """
@@ -53,16 +58,18 @@ class SimulatedLog:
     def __init__(
         self, path: Path, header: Header, controller: Any, world: World, row: int = 0
     ) -> None:
+        self.path = path
         self._out = LogWriter(path, header, _LEAST_FREE)
         self._controller, self._world, self._row = controller, world, row
         self._parts = list(header.robot.command_shapes())
         self._names, self._angles = header.robot.joint_names, len(header.robot.joint_names)
         self._held: Floats = np.empty((_MOST, _HEAD + 4 * self._angles))
         self._forces: list[bytes | None] = []
+        self._coordinates: list[bytes | None] = []
         self._count, self._since = 0, math.inf
 
-    def take(self, frame: AntennaFrame, command: JointCommand) -> None:
-        """Keep one tick.
+    def take(self, frame: AntennaFrame, command: JointCommand, events: Sequence[str] = ()) -> None:
+        """Keep one tick, and what happened at it.
 
         Raises:
             LogError: The disk is full or gone.
@@ -85,8 +92,12 @@ class SimulatedLog:
         self._count += 1
         looked = (self._out.written + self._count) % _FORCES_EVERY == 0
         self._forces.append(self._contacts() if looked else None)
-        if self._count == _MOST or now - self._since >= FLUSH:
+        place = COORDINATES.type.encode(*world.coordinates()) if looked else None
+        self._coordinates.append(place)
+        if self._count == _MOST or now - self._since >= FLUSH or events:
             self._hand_over()
+        for text in events:
+            self._out.event(text)
 
     def close(self) -> None:
         """End it.
@@ -113,6 +124,7 @@ class SimulatedLog:
         """Encode and write what is held."""
         count, self._count, self._since = self._count, 0, math.inf
         forces, self._forces = self._forces, []
+        coordinates, self._coordinates = self._coordinates, []
         if not count:
             return
         rows = self._held[:count]
@@ -152,5 +164,6 @@ class SimulatedLog:
                     time | dict(zip(("position", "velocity", "effort"), joints[1:], strict=True)),
                 ),
                 CONTACT_FORCES: forces,
+                COORDINATES: coordinates,
             },
         )

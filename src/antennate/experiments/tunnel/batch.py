@@ -10,7 +10,7 @@ import numpy as np
 
 from antennate.control.checked import CheckedController
 from antennate.control.loop import run_loop
-from antennate.control.registry import make_controller
+from antennate.control.registry import ControllerMaker, make_controller
 from antennate.errors import ConfigError, ControllerError
 from antennate.experiments.tunnel.config import TunnelConfig
 from antennate.experiments.tunnel.monitor import Outcome, TrialMonitor, TrialPath, TrialResult
@@ -20,13 +20,14 @@ from antennate.sim.trial import draw_trial
 from antennate.sim.world import World
 from antennate.telemetry.header import Header
 from antennate.telemetry.simulated import SimulatedLog
+from antennate.telemetry.view.pace import Restart
 from antennate.types import AntennaFrame, Controller, JointCommand
 
 BATCH = 12
 """Trials of one process stepped in lockstep."""
 Emit = Callable[[tuple[TrialResult, TrialPath]], None]
-Watch = Callable[[World, AntennaFrame, Controller], None]
-"""Takes world, frame and controller of the first row after each tick."""
+Watch = Callable[[World, AntennaFrame, Controller], Sequence[str]]
+"""Takes world, frame and controller of the first row after each tick; returns events to log."""
 
 
 def run_trials(
@@ -37,6 +38,7 @@ def run_trials(
     batch: int = BATCH,
     logs: Path | None = None,
     watch: Watch | None = None,
+    make: ControllerMaker = make_controller,
 ) -> None:
     """Run trials of one controller; emit each as it ends, and keep its log if there is a folder.
 
@@ -48,7 +50,10 @@ def run_trials(
     """
     rows = _Rows(config, controller, trials, emit, min(batch, len(trials)), logs, watch)
     try:
-        rows.run()
+        rows.run(make)
+    except Restart:
+        rows.drop_logs()
+        raise
     except ControllerError as error:
         if len(trials) == 1:
             rows.end(0, "invalid", f"controller: {error}")
@@ -85,8 +90,8 @@ class _Rows:
         running = [monitor.trial for monitor in self._monitors if monitor is not None]
         return sorted(running + self._waiting)
 
-    def run(self) -> None:
-        """Run all trials.
+    def run(self, make: ControllerMaker) -> None:
+        """Run all trials, with the controller that `make` makes.
 
         Raises:
             ControllerError: The controller failed as a whole; unfinished trials are left.
@@ -94,7 +99,7 @@ class _Rows:
         config = self._config
         phases = [self._place(row) for row in range(self._batch)]
         try:
-            made = make_controller(self._name, config.control, config.robot, self._batch)
+            made = make(self._name, config.control, config.robot, self._batch)
         except ConfigError as error:
             raise ControllerError(str(error)) from error
         control = CheckedController(made, config.robot, self._batch)
@@ -103,10 +108,9 @@ class _Rows:
             self._log(row, made, phase)
 
         def go_on(frame: AntennaFrame, command: JointCommand) -> bool:
-            if self._looks is not None:
-                self._looks(self._robot.world(0), frame, made)
+            events = () if self._looks is None else self._looks(self._robot.world(0), frame, made)
             for log in self._logs.values():
-                log.take(frame, command)
+                log.take(frame, command, events)
             for row, monitor in enumerate(self._monitors):
                 if monitor is not None and self._watch(row, monitor, control) and self._waiting:
                     phase = self._place(row)
@@ -148,6 +152,12 @@ class _Rows:
         )
         world, path = self._robot.world(row), self.log_of(monitor.trial)
         self._logs[row] = SimulatedLog(path, header, controller, world, row)
+
+    def drop_logs(self) -> None:
+        """Remove the logs of trials that are given up."""
+        for log in self._logs.values():
+            log.close()
+            log.path.unlink(missing_ok=True)
 
     def _watch(self, row: int, monitor: TrialMonitor, control: CheckedController) -> bool:
         """Look at a row after a tick; whether its trial has ended."""

@@ -84,4 +84,7 @@ EXPERIMENT = Experiment.of_folder(
     failed=lambda result: bool(_none_valid(result)),
     logged=tunnel.run,
     trials=Trials("controller", tunnel.every, tunnel.run_rows, BATCH),
+    viewed=lambda config, on_step, on_row, view, logs: tunnel.run(
+        config, 1, on_step, on_row, logs, view
+    ),
 )

@@ -11,15 +11,18 @@ from typing import Any
 from antennate.control.registry import make_controller
 from antennate.errors import ConfigError, WorkerError
 from antennate.experiments.tunnel import measures
-from antennate.experiments.tunnel.batch import run_trials
+from antennate.experiments.tunnel.batch import Emit, run_trials
 from antennate.experiments.tunnel.config import TunnelConfig
 from antennate.experiments.tunnel.monitor import TrialPath, TrialResult
 from antennate.sim.scenes.registry import TUNNEL
 from antennate.sim.trial import check_start
+from antennate.sim.world import World
 from antennate.studies.experiment import OnRow, OnStep, Trial, no_row, no_step
 from antennate.studies.pool import gather
 from antennate.studies.work import Failure
-from antennate.types import Maneuver
+from antennate.telemetry.view.pace import Restart
+from antennate.telemetry.view.simulation import SimulationView
+from antennate.types import AntennaFrame, Controller, Maneuver
 
 _TASK = 12
 """Most trials handed to a process at once."""
@@ -126,14 +129,35 @@ def _lost(config: TunnelConfig, trial: Trial, failure: Failure) -> _Found:
     return row, None
 
 
+def _run_viewed(
+    config: TunnelConfig, name: str, trial: int, emit: Emit, logs: Path | None, view: SimulationView
+) -> None:
+    """One trial on a page; begun anew with another seed whenever a person wants that."""
+
+    def watch(world: World, frame: AntennaFrame, control: Controller) -> Sequence[str]:
+        return view.tick(world.model, world.data, frame, control)
+
+    while True:
+        view.begin(f"{name}, trial {trial}", config.seed)
+        try:
+            run_trials(config, name, [trial], emit, logs=logs, watch=watch, make=view.controller)
+        except Restart as wish:
+            config = config.model_copy(update={"seed": wish.seed})
+        else:
+            return
+
+
 def run(
     config: TunnelConfig,
     workers: int = 1,
     on_step: OnStep = no_step,
     on_row: OnRow = no_row,
     logs: Path | None = None,
+    view: SimulationView | None = None,
 ) -> TunnelOutcome:
     """Run all trials of all controllers, with the log of each in a folder if one is given.
+
+    With a view they run in this process, one after the other, and give the same.
 
     Raises:
         LogError: A log cannot be written.
@@ -150,12 +174,17 @@ def run(
 
     interrupted = False
     try:
-        gather(
-            *(_run, [(config, *trial, logs) for trial in trials], workers, on_step, take),
-            chunk=size,
-            together=True,
-            lost=lambda place, failure: _lost(config, trials[place], failure),
-        )
+        if view is None:
+            gather(
+                *(_run, [(config, *trial, logs) for trial in trials], workers, on_step, take),
+                chunk=size,
+                together=True,
+                lost=lambda place, failure: _lost(config, trials[place], failure),
+            )
+        else:
+            for done, trial in enumerate(trials, start=1):
+                _run_viewed(config, *trial, take, logs, view)
+                on_step(done, len(trials))
     except KeyboardInterrupt:
         interrupted = True
     order = {name: i for i, name in enumerate(config.controllers)}

@@ -49,4 +49,5 @@ EXPERIMENT = Experiment.of_folder(
     *(__name__, wall.WallConfig, wall.run, tables, sentence),
     filmed=True,
     trials=Trials("profile", wall.every, wall.run_rows),
+    viewed=lambda config, on_step, on_row, view, logs: wall.run(config, 1, on_step, on_row, view),
 )
