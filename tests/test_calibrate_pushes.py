@@ -33,7 +33,7 @@ def loops(pushes: int, gap: float, noise: float = 2.0) -> tuple[Floats, Floats, 
     way = np.tile(np.repeat([1.0, -1.0], POINTS), pushes)
     off = np.random.default_rng(0).normal(0.0, noise, len(bend))
     counts = 1500 + 400 * (bend + gap / 2 * way * np.sin(np.pi * bend)) + off
-    return np.round(counts), bend, 0.01 * np.arange(len(bend))
+    return np.round(counts), bend, np.arange(len(bend)) / 100.0
 
 
 def test_one_long_recording_is_as_many_pushes_everywhere(
