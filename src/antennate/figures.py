@@ -48,6 +48,10 @@ SHAPE_COLOURS = {
 }
 """Shapes of an antenna that touches, and no contact."""
 
+ENOUGH_TRIALS = 5
+"""Fewest trials for which an interval is drawn: of four, a bootstrap has only 35 different draws,
+so that 2.5 % of them are less than one."""
+
 _RC: dict[Any, Any] = {
     "figure.dpi": 100,
     "savefig.dpi": 200,
@@ -121,8 +125,18 @@ def categories(panel: Axes, labels: Sequence[str]) -> None:
     panel.grid(visible=False, axis="x")
 
 
+def interval_note(note: str, trials: int) -> str:
+    """What a title says of intervals, or why there are none."""
+    return note if trials >= ENOUGH_TRIALS else f"no intervals of {trials} trials"
+
+
 def intervals(
-    panel: Axes, x: Sequence[float], rows: Sequence[Mapping[str, Any]], keys: Keys, **look: Any
+    panel: Axes,
+    x: Sequence[float],
+    rows: Sequence[Mapping[str, Any]],
+    keys: Keys,
+    trials: int = ENOUGH_TRIALS,
+    **look: Any,
 ) -> None:
     """Draw a measure of each row at x with its interval; what does not exist is left out.
 
@@ -131,9 +145,11 @@ def intervals(
         x: A place for each row.
         rows: Objects of result.json.
         keys: Names of the measure and of its interval in a row; empty for no interval.
+        trials: Trials behind each row; without `ENOUGH_TRIALS` of them no interval is drawn.
         look: Colour, marker and label, as for `plot`.
     """
     value, interval = keys
+    interval = interval if trials >= ENOUGH_TRIALS else ""
     known = [(a, row.get(value), row.get(interval)) for a, row in zip(x, rows, strict=True)]
     known = [(a, b, ends or (b, b)) for a, b, ends in known if b is not None and b == b]
     middle = np.array([b for _, b, _ in known])

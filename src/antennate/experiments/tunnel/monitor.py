@@ -74,6 +74,7 @@ class TrialPath:
         after: The same at the end.
         exit: Ends of the exit line [m], shape (2, 2).
         links: The robot's links at the end [m], shape (L, 2).
+        parts: All parts of the robot at the end, legs and antennae included, polygons likewise.
     """
 
     t: Floats
@@ -84,6 +85,7 @@ class TrialPath:
     after: list[Floats]
     exit: Floats
     links: Floats
+    parts: list[Floats]
 
 
 @dataclass
@@ -178,4 +180,5 @@ class TrialMonitor:
             after=after,
             exit=self.scene.exit,
             links=world.links().copy(),
+            parts=world.parts(),
         )

@@ -145,22 +145,27 @@ def passage(
     phase = rng.uniform(0.0, 1.0) * wall.sphere_diameter
     antenna = with_profile(config.antenna, profile)
     antenna = antenna.model_copy(update={"friction": min(friction, 2.0)})
-    bench = _bench(config, antenna, angle, phase, factors)
     crest = antenna.length * math.sin(angle) + antenna.radius + _CLEAR
-    return _drive(config, bench, math.pi / 2 - angle, overlap + _CLEAR, crest, watch)
+    balls = _boulders(config.wall, antenna, angle, phase, crest)
+    bench = _bench(config, antenna, balls, factors)
+    return _drive(config, bench, balls, math.pi / 2 - angle, overlap + _CLEAR, crest, watch)
 
 
-def _bench(
-    config: WallConfig, antenna: AntennaSpec, angle: float, phase: float, factors: Floats
-) -> Bench:
-    """Bench with spheres all along the way, their crests clear of the tip at first."""
-    wall, pitch = config.wall, config.wall.sphere_diameter
-    x = antenna.length * math.sin(angle) + antenna.radius + _CLEAR + pitch / 2
+def _boulders(
+    wall: WallParams, antenna: AntennaSpec, angle: float, phase: float, crest: float
+) -> list[Ball]:
+    """Spheres all along the way, their crests clear of the tip at first."""
+    pitch = wall.sphere_diameter
     below = -2 * pitch - max(0.0, -antenna.length * math.cos(angle))
     above = wall.travel + 1.2 * antenna.length
     heights = np.arange(below + phase, above, pitch)
-    balls = [Ball(x, float(y), pitch / 2) for y in heights]
-    pull = {"down": -_GRAVITY, "up": _GRAVITY, "off": 0.0}[wall.gravity]
+    return [Ball(crest + pitch / 2, float(y), pitch / 2) for y in heights]
+
+
+def _bench(
+    config: WallConfig, antenna: AntennaSpec, balls: Sequence[Ball], factors: Floats
+) -> Bench:
+    pull = {"down": -_GRAVITY, "up": _GRAVITY, "off": 0.0}[config.wall.gravity]
     model = compile_bench(config.physics, antenna, balls, (0.0, pull))
     for i, factor in enumerate(factors):
         joint = model.joint(f"antenna/hinge{i}")
@@ -169,7 +174,13 @@ def _bench(
 
 
 def _drive(
-    config: WallConfig, bench: Bench, base: float, approach: float, crest: float, watch: Watch
+    config: WallConfig,
+    bench: Bench,
+    balls: Sequence[Ball],
+    base: float,
+    approach: float,
+    crest: float,
+    watch: Watch,
 ) -> Traverse:
     wall = config.wall
     bench.place(0.0, 0.0, base)
@@ -196,7 +207,8 @@ def _drive(
             hinges.append(bench.hinges().copy())
     base_y, tip_y, touching, forces, flex = np.array(rows, float).T
     from_crest = np.array(shapes) - [crest, 0.0]
-    return Traverse(base_y, tip_y, touching, forces, flex, np.array(hinges), from_crest)
+    boulders = np.array([(ball.x - crest, ball.y, ball.radius) for ball in balls])
+    return Traverse(base_y, tip_y, touching, forces, flex, np.array(hinges), from_crest, boulders)
 
 
 def _ramp(length: float, speed: float) -> list[float]:
