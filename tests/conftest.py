@@ -5,6 +5,10 @@ from __future__ import annotations
 import signal
 
 import pytest
+from hypothesis import settings
+
+settings.register_profile("any machine", deadline=None)  # how long an example takes says nothing
+settings.load_profile("any machine")
 
 # Programs that the tests start inherit what is ignored, and `nohup` or a script that runs the tests
 # in the background ignores these: a test that ends a program by them would wait for ever.

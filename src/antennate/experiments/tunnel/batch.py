@@ -108,9 +108,10 @@ class _Rows:
             self._log(row, made, phase)
 
         def go_on(frame: AntennaFrame, command: JointCommand) -> bool:
-            events = () if self._looks is None else self._looks(self._robot.world(0), frame, made)
             for log in self._logs.values():
-                log.take(frame, command, events)
+                log.take(frame, command)
+            if self._looks is not None:
+                self._note(self._looks(self._robot.world(0), frame, made))
             for row, monitor in enumerate(self._monitors):
                 if monitor is not None and self._watch(row, monitor, control) and self._waiting:
                     phase = self._place(row)
@@ -152,6 +153,12 @@ class _Rows:
         )
         world, path = self._robot.world(row), self.log_of(monitor.trial)
         self._logs[row] = SimulatedLog(path, header, controller, world, row)
+
+    def _note(self, events: Sequence[str]) -> None:
+        """Keep events in the logs."""
+        for log in self._logs.values():
+            for text in events:
+                log.event(text)
 
     def drop_logs(self) -> None:
         """Remove the logs of trials that are given up."""
