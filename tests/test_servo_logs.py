@@ -171,6 +171,7 @@ def test_each_arming_begins_with_a_slow_approach(state: str, tmp_path: Path) -> 
     assert torque_share(ticks, tmp_path) == counted / 500
 
 
+@pytest.mark.slow
 def test_an_approach_does_not_count_in_a_fit(tmp_path: Path) -> None:
     """Nobody knows what the servo was told meanwhile; as a free shaft it would have to coast."""
     file = of_twin(tmp_path / "a.json", 1200, 400, 0.8, 3.0)
