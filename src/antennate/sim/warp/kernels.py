@@ -1,0 +1,49 @@
+"""What runs on the device beside the engine. Imported late: it needs warp."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from antennate.sim.warp.packages import require_warp
+
+wp, _ = require_warp()
+
+
+@wp.kernel
+def load_friction(
+    torque: wp.array2d(dtype=float),  # type: ignore[valid-type]
+    speed: wp.array2d(dtype=float),  # type: ignore[valid-type]
+    drive: wp.array(dtype=int),  # type: ignore[valid-type]
+    dof: wp.array(dtype=int),  # type: ignore[valid-type]
+    share: wp.array(dtype=float),  # type: ignore[valid-type]
+    dry: wp.array(dtype=float),  # type: ignore[valid-type]
+    damping: wp.array(dtype=float),  # type: ignore[valid-type]
+    friction: wp.array2d(dtype=float),  # type: ignore[valid-type]
+):
+    """Friction of gears under load, as `antennate.sim.gears` has it; one thread a joint."""
+    world, i = wp.tid()
+    motor = torque[world, drive[i]] - damping[i] * speed[world, dof[i]]
+    friction[world, dof[i]] = dry[i] + share[i] * wp.abs(motor)
+
+
+@wp.kernel
+def obstacle_forces(
+    count: wp.array(dtype=int),  # type: ignore[valid-type]
+    owner: wp.array(dtype=int),  # type: ignore[valid-type]
+    geoms: wp.array(dtype=wp.vec2i),  # type: ignore[valid-type]
+    address: wp.array2d(dtype=int),  # type: ignore[valid-type]
+    force: wp.array2d(dtype=float),  # type: ignore[valid-type]
+    obstacle: wp.array(dtype=int),  # type: ignore[valid-type]
+    own: wp.array(dtype=int),  # type: ignore[valid-type]
+    total: wp.array(dtype=float),  # type: ignore[valid-type]
+):
+    """Normal forces between robot and obstacles, summed by world; one thread a contact."""
+    contact = wp.tid()
+    if contact >= count[0]:
+        return
+    world, row = owner[contact], address[contact, 0]
+    first, second = geoms[contact][0], geoms[contact][1]
+    if row < 0 or row >= force.shape[1] or obstacle[first] == obstacle[second]:
+        return
+    if own[first] + own[second] > 0:
+        wp.atomic_add(total, world, force[world, row])
