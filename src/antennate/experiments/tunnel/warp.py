@@ -41,7 +41,7 @@ def run_trials_on_warp(
         emit: Takes each as it ends.
         batch: Trials at once.
         limits: Sizes on the device; if not given, two trials on the CPU tell them.
-        device: Name of a device of Warp; its preferred one if not given.
+        device: Name of a device of Warp, as cuda:0 or cpu; a GPU if not given.
 
     Raises:
         ConfigError: Two engines are installed, or Warp cannot hold that model.

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from antennate.sim.warp.packages import require_warp
 
 wp, _ = require_warp()
@@ -11,14 +9,14 @@ wp, _ = require_warp()
 
 @wp.kernel
 def load_friction(
-    torque: wp.array2d(dtype=float),  # type: ignore[valid-type]
-    speed: wp.array2d(dtype=float),  # type: ignore[valid-type]
-    drive: wp.array(dtype=int),  # type: ignore[valid-type]
-    dof: wp.array(dtype=int),  # type: ignore[valid-type]
-    share: wp.array(dtype=float),  # type: ignore[valid-type]
-    dry: wp.array(dtype=float),  # type: ignore[valid-type]
-    damping: wp.array(dtype=float),  # type: ignore[valid-type]
-    friction: wp.array2d(dtype=float),  # type: ignore[valid-type]
+    torque: wp.array2d(dtype=float),
+    speed: wp.array2d(dtype=float),
+    drive: wp.array(dtype=int),
+    dof: wp.array(dtype=int),
+    share: wp.array(dtype=float),
+    dry: wp.array(dtype=float),
+    damping: wp.array(dtype=float),
+    friction: wp.array2d(dtype=float),
 ):
     """Friction of gears under load, as `antennate.sim.gears` has it; one thread a joint."""
     world, i = wp.tid()
@@ -28,14 +26,14 @@ def load_friction(
 
 @wp.kernel
 def obstacle_forces(
-    count: wp.array(dtype=int),  # type: ignore[valid-type]
-    owner: wp.array(dtype=int),  # type: ignore[valid-type]
-    geoms: wp.array(dtype=wp.vec2i),  # type: ignore[valid-type]
-    address: wp.array2d(dtype=int),  # type: ignore[valid-type]
-    force: wp.array2d(dtype=float),  # type: ignore[valid-type]
-    obstacle: wp.array(dtype=int),  # type: ignore[valid-type]
-    own: wp.array(dtype=int),  # type: ignore[valid-type]
-    total: wp.array(dtype=float),  # type: ignore[valid-type]
+    count: wp.array(dtype=int),
+    owner: wp.array(dtype=int),
+    geoms: wp.array(dtype=wp.vec2i),
+    address: wp.array2d(dtype=int),
+    force: wp.array2d(dtype=float),
+    obstacle: wp.array(dtype=int),
+    own: wp.array(dtype=int),
+    total: wp.array(dtype=float),
 ):
     """Normal forces between robot and obstacles, summed by world; one thread a contact."""
     contact = wp.tid()

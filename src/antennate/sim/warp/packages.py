@@ -28,8 +28,8 @@ def require_warp() -> tuple[Any, Any]:
     if len(found) > 1:
         both = " and ".join(f"{name} {version}" for name, version in found.items())
         raise ConfigError(
-            f"--engine warp: expected one engine, found {both}, which write the same files; run "
-            f"pip uninstall -y mujoco mujoco-core, then pip install mujoco-core=={found[_ENGINES[1]]}"
+            f"--engine warp: expected one engine, found {both}, which write the same files; "
+            f"uninstall both, then install mujoco-core {found[_ENGINES[1]]} again"
         )
     missing = [package for module, package in _MODULES.items() if find_spec(module) is None]
     if missing:

@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 
 from antennate.antenna.sensor import SensorChain
-from antennate.errors import SimulationError
+from antennate.errors import SceneError, SimulationError
 from antennate.robots.spec import RobotSpec
 from antennate.sim.bounds import broken, sound
 from antennate.sim.sim_robot import Disturbance
@@ -78,7 +78,7 @@ class WarpRobot:
         period: Control period [s]; a whole number of physics steps.
         timestep: Physics step [s].
         limits: Sizes on the device.
-        device: Name of a device of Warp; its preferred one if not given.
+        device: Name of a device of Warp, as cuda:0 or cpu; a GPU if not given.
 
     Attributes:
         period: Control period [s].
@@ -115,10 +115,19 @@ class WarpRobot:
         return self
 
     def load(self, row: int, world: World, chance: Disturbance) -> None:
-        """Put a fresh world into a row; it reaches the device with its first command."""
+        """Put a fresh world into a row; it reaches the device with its first command.
+
+        Raises:
+            SceneError: It has another number of joints than the first.
+        """
         if not self.positions.size:
             self.positions = np.zeros((self._batch, world.model.nq))
             self._controls = np.zeros((self._batch, world.model.nu))
+        if world.model.nq != self.positions.shape[1]:
+            raise SceneError(
+                f"--engine warp: expected {self.positions.shape[1]} coordinates in every world, "
+                f"found {world.model.nq}"
+            )
         self._rows[row] = WarpRow(self, row, world, chance)
         self._new.add(row)
         self._sensors.reset(row)

@@ -21,6 +21,7 @@ from antennate.types import Floats
 _STATE = ("qpos", "qvel", "ctrl", "qacc_warmstart", "actuator_force")
 _STATIC = ("geom_xpos", "geom_xmat")
 """Of what does not move, Warp computes these for the first world alone."""
+_UNREAD = ("bvh_", "dof_M0")
 _DROPPED = ("NEFC", "NJMAX_NNZ", "BROADPHASE", "NARROWPHASE", "CCD", "HFIELD", "EPA_HORIZON")
 """Overflows of Warp with which contacts are lost."""
 
@@ -45,7 +46,7 @@ class WarpWorlds:
         first: A world whose structure all have.
         batch: Number of worlds B.
         limits: Sizes on the device.
-        device: Name of a device of Warp; its preferred one if not given.
+        device: Name of a device of Warp, as cuda:0 or cpu; a GPU if not given.
 
     Raises:
         ConfigError: There is no such device, or Warp cannot hold that model.
@@ -55,8 +56,8 @@ class WarpWorlds:
     def __init__(self, first: World, batch: int, limits: Limits, device: str | None = None) -> None:
         self._wp, self._mjw = require_warp()
         self._batch, self._first, self._limits = batch, first, limits
+        self._device = _device(self._wp, device)
         try:
-            self._device = self._wp.get_device(device)
             with self._wp.ScopedDevice(self._device):
                 self._make(_plain(first.model))
         except Exception as error:
@@ -122,6 +123,7 @@ class WarpWorlds:
             )
         for name in sorted(differing | self._spread.keys()):
             self._write(self._hold(name), row, values[name])
+        mujoco.mj_kinematics(world.model, world.data)
         for name in (*_STATE, *_STATIC):
             self._write(getattr(self._data, name), row, getattr(world.data, name))
         self._write(self._data.overflow, row, np.zeros(1))
@@ -207,6 +209,24 @@ class WarpWorlds:
         }
 
 
+def _device(warp: Any, name: str | None) -> Any:
+    """The device of a name, or a GPU.
+
+    Raises:
+        ConfigError: There is none.
+    """
+    try:
+        device = warp.get_device(name) if name else warp.get_preferred_device()
+    except Exception as error:
+        raise ConfigError(f"--engine warp: {in_one_line(error)}") from error
+    if name is None and not device.is_cuda:
+        raise ConfigError(
+            "--engine warp: expected a GPU with CUDA, found none; without one the usual engine is "
+            'much faster, and device "cpu" is there for tests'
+        )
+    return device
+
+
 def _plain(model: mujoco.MjModel) -> mujoco.MjModel:
     """The same model without what Warp does not have, or what we do not use there."""
     plain = copy.copy(model)
@@ -216,13 +236,13 @@ def _plain(model: mujoco.MjModel) -> mujoco.MjModel:
 
 
 def _values(model: mujoco.MjModel) -> dict[str, Any]:
-    """All numbers of a model by name, but those for rays alone, which we cast none of."""
+    """All numbers of a model by name, but those that Warp does not read: for rays and muscles."""
     owners = (("", model), ("opt.", model.opt))
     named = ((head + n, getattr(owner, n)) for head, owner in owners for n in _names(owner))
     return {
         n: value
         for n, value in named
-        if isinstance(value, int | float | np.ndarray) and not n.startswith("bvh_")
+        if isinstance(value, int | float | np.ndarray) and not n.startswith(_UNREAD)
     }
 
 
