@@ -35,7 +35,14 @@ def passed(tip_mm: list[float], touching: list[bool]) -> Traverse:
     base = 1e-3 * np.arange(1, n + 1)
     touch = np.array(touching, float)
     return Traverse(
-        base, 1e-3 * np.array(tip_mm), touch, zero, zero, np.zeros((n, 6)), np.zeros((11, 7, 2))
+        base,
+        1e-3 * np.array(tip_mm),
+        touch,
+        zero,
+        zero,
+        np.zeros((n, 6)),
+        np.zeros((11, 7, 2)),
+        np.zeros((3, 3)),
     )
 
 

@@ -15,7 +15,6 @@ from pydantic.dataclasses import dataclass
 
 from antennate.cli.help import Command, long_page, short_page
 from antennate.cli.options import (
-    Option,
     fields_of,
     flag_of,
     found,
@@ -34,13 +33,13 @@ class HelpRequest(Exception):
 
 
 class OptionsRequest(Exception):
-    """The words ask which `options` there are."""
+    """The words ask which options the `command` has."""
 
     WORD = "--complete"
 
-    def __init__(self, options: Sequence[Option]) -> None:
+    def __init__(self, command: Command) -> None:
         super().__init__()
-        self.options = options
+        self.command = command
 
 
 @dataclass(frozen=True)
@@ -78,9 +77,9 @@ def parse(
     every, others = list(options_of(model())), list(options_of(options()))
     unread = {option.flag for option in every if ".".join(option.path) in model.unread}
     parameters = [option for option in every if option.flag not in unread]
-    if list(argv) == [OptionsRequest.WORD]:
-        raise OptionsRequest([*others, *parameters])
     page = Command(command, description, model, parameters, others)
+    if list(argv) == [OptionsRequest.WORD]:
+        raise OptionsRequest(page)
     for word in argv:
         if word in ("-h", "--help"):
             raise HelpRequest(short_page(page))

@@ -13,12 +13,14 @@ from antennate.cli.exit_codes import BAD_INPUT, INTERRUPTED, OK
 from antennate.cli.options import option
 from antennate.cli.progress import progress, stop_signals
 from antennate.cli.results import ResultOptions, folder_for, tell
+from antennate.cli.view_options import ViewOptions, require_one_worker, tell_by_hand, view_of
 from antennate.errors import ConfigError, OutputError
 from antennate.experiments.running import keep, require_films, write_films
 from antennate.params.base import Params
-from antennate.studies.experiment import Experiment, Outcome
+from antennate.studies.experiment import Experiment, OnStep, Outcome
 from antennate.studies.pool import core_count
 from antennate.studies.run_directory import LOGS, RunDirectory
+from antennate.telemetry.view.simulation import SimulationView
 
 
 @dataclass(frozen=True)
@@ -34,6 +36,11 @@ class LogOptions(Options):
     """The same where trials can be logged."""
 
     log: bool = option(False, "keep the log of every trial, in logs/CONTROLLER-TRIAL.mcap")
+
+
+@dataclass(frozen=True)
+class ShownOptions(ViewOptions, Options):
+    """The same where it can be watched."""
 
 
 @dataclass(frozen=True)
@@ -55,6 +62,8 @@ def _options(experiment: Experiment[Any, Any]) -> type[Options]:
     kinds: list[type[Options]] = []
     if experiment.logged is not None:
         kinds.append(LogOptions)
+    if experiment.viewed is not None:
+        kinds.append(ShownOptions)
     if experiment.films is not None:
         has_trials = "trials" in experiment.config.model_fields
         kinds.append(TrialFilmOptions if has_trials else FilmOptions)
@@ -103,13 +112,14 @@ def carry_out(
         AntennateError: The physics became invalid, a worker died, or a file could not be written;
             what was measured is kept and shown first.
     """
-    with folder_for(experiment.view, options, config, argv) as run:
+    require_one_worker(options)
+    with (
+        view_of(options) as view,
+        folder_for(experiment.view, options, config, argv) as run,
+    ):
         with progress(experiment.parts) as step, stop_signals():
-            how = (config, options.workers or core_count(), step, run.append)
-            if isinstance(options, LogOptions) and options.log and experiment.logged is not None:
-                outcome = experiment.logged(*how, run.folder(LOGS))
-            else:
-                outcome = experiment.run(*how)
+            outcome = _outcome(experiment, config, options, run, step, view)
+        tell_by_hand(view, run)
         result = outcome.result()
         interrupted = bool(result.get("interrupted"))
         if interrupted and not outcome.rows:
@@ -128,6 +138,24 @@ def carry_out(
     if interrupted:
         return INTERRUPTED
     return BAD_INPUT if experiment.failed(result) else OK
+
+
+def _outcome(
+    experiment: Experiment[Any, Any],
+    config: Params,
+    options: Options,
+    run: RunDirectory,
+    step: OnStep,
+    view: SimulationView | None,
+) -> Outcome:
+    """Run it: watched, logged, or neither."""
+    logs = run.folder(LOGS) if isinstance(options, LogOptions) and options.log else None
+    if view is not None and experiment.viewed is not None:
+        return experiment.viewed(config, step, run.append, view, logs)
+    how = (config, options.workers or core_count(), step, run.append)
+    if logs is not None and experiment.logged is not None:
+        return experiment.logged(*how, logs)
+    return experiment.run(*how)
 
 
 def _film(

@@ -110,8 +110,7 @@ class World:
         self._flex, self._bounded, self._drive = places.hinges, places.bounded, places.drives
         self.gears = Gears(model, robot, PREFIX)
         names = [PREFIX + n for n in robot.joint_names]
-        kinds = [robot.servos.of(group.servo) for _, group, n in robot.groups for _ in range(n)]
-        stall = np.array([kind.stall_torque for kind in kinds])
+        stall = np.array([robot.servos.of(n).stall_torque for n in robot.servo_names])
         self.servo_drives = ServoDrives(model, names, stall)
         self._root = places.root
         self._steps = 0
@@ -248,6 +247,11 @@ class World:
             [polygon for polygon, still in zip(polygons, fixed, strict=True) if still],
             [polygon for polygon, still in zip(polygons, fixed, strict=True) if not still],
         )
+
+    def parts(self) -> list[Floats]:
+        """Polygons of all parts of the robot in plan [m], each (n, 2), legs and antennae too."""
+        own = np.flatnonzero(self._robot)
+        return [outline(self.model, self.data, geom) for geom in own.tolist()]
 
     def obstacle_overlap(self) -> float:
         """How deep the robot is in obstacles at most [m]; 0 if it touches none."""

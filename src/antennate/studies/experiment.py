@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from antennate.telemetry.film import Film
+    from antennate.telemetry.view.simulation import SimulationView
 
 OnStep = Callable[[int, int], None]
 """Takes how many of how many parts are done."""
@@ -71,6 +72,9 @@ class Experiment(Generic[Config, Found]):
         parts: What `on_step` counts.
         logged: Runs as `run` does and keeps the log of each trial in a folder, which is given as
             well; None if there are no controllers to log.
+        viewed: viewed(config, on_step, on_row, view, logs) runs as `run` does, in this process, and
+            shows each trial on a page; the folder for logs may be None. None where nothing can be
+            shown.
         films: films(config, trial) -> for each condition, by name, what runs this trial of it once
             more and records it; None where nothing can be filmed.
         body: HTML that stands in its report in place of tables and figures.
@@ -88,6 +92,7 @@ class Experiment(Generic[Config, Found]):
     failed: Callable[[Mapping[str, Any]], bool] = lambda result: False
     parts: str = "trials"
     logged: Callable[[Config, int, OnStep, OnRow, Path], Found] | None = None
+    viewed: Callable[[Config, OnStep, OnRow, SimulationView, Path | None], Found] | None = None
     films: Callable[[Config, int], Mapping[str, Callable[[], Film]]] | None = None
     body: Body | None = None
 

@@ -38,11 +38,14 @@ CONFIG, VERSIONS, COMMAND = "config.toml", "versions.json", "command.txt"
 FIGURES, FILMS, LOGS = "figures", "films", "logs"
 """Folders of figures (svg, png), films (mp4) and logs of trials (mcap), which belong to the run."""
 _INNER = {FIGURES: (".svg", ".png"), FILMS: (".mp4",), LOGS: (".mcap",)}
+BY_HAND = "by-hand.txt"
+"""What a person changed while the run went on: it does not follow from its configuration then."""
 CALIBRATION, LOG, REPORT = "calibration.json", "drive.mcap", "report.html"
 LARGEST = 10**9
 """No file of a run is longer [bytes]."""
 _LOGS = tuple(part(Path(LOG), number).name for number in range(1, MOST_PARTS + 1))
 _FILES = (
+    BY_HAND,
     CALIBRATION,
     "conditioning.toml",
     "recording.csv",

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -46,6 +47,9 @@ class SimulatedLog:
         world: The simulated robot in its scene.
         row: Row of the batch.
 
+    Attributes:
+        path: The file.
+
     Raises:
         LogError: The file exists or cannot be written, or the disk is nearly full.
     """
@@ -53,6 +57,7 @@ class SimulatedLog:
     def __init__(
         self, path: Path, header: Header, controller: Any, world: World, row: int = 0
     ) -> None:
+        self.path = path
         self._out = LogWriter(path, header, _LEAST_FREE)
         self._controller, self._world, self._row = controller, world, row
         self._parts = list(header.robot.command_shapes())
@@ -61,8 +66,8 @@ class SimulatedLog:
         self._forces: list[bytes | None] = []
         self._count, self._since = 0, math.inf
 
-    def take(self, frame: AntennaFrame, command: JointCommand) -> None:
-        """Keep one tick.
+    def take(self, frame: AntennaFrame, command: JointCommand, events: Sequence[str] = ()) -> None:
+        """Keep one tick, and what happened at it.
 
         Raises:
             LogError: The disk is full or gone.
@@ -85,8 +90,10 @@ class SimulatedLog:
         self._count += 1
         looked = (self._out.written + self._count) % _FORCES_EVERY == 0
         self._forces.append(self._contacts() if looked else None)
-        if self._count == _MOST or now - self._since >= FLUSH:
+        if self._count == _MOST or now - self._since >= FLUSH or events:
             self._hand_over()
+        for text in events:
+            self._out.event(text)
 
     def close(self) -> None:
         """End it.

@@ -88,7 +88,7 @@ class TwinRobot:
         self._watch = watch
         self._joints = Joints(robot)
         self._sign: Floats = np.array(robot.directions, float)
-        kinds = [robot.servos.of(group.servo) for _, group, n in robot.groups for _ in range(n)]
+        kinds = [robot.servos.of(name) for name in robot.servo_names]
         self._stall: Floats = np.array([kind.stall_torque for kind in kinds])
         self._period = period
         self._encoder = frame.SampleEncoder(boot_id)

@@ -8,7 +8,7 @@ FORWARD is walked again for numbers that are not known, drawn from their ranges.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -28,6 +28,7 @@ from antennate.sim.trial import place_at_start
 from antennate.sim.world import World, compile_world
 from antennate.studies.experiment import OnStep, Outcome, no_step
 from antennate.studies.pool import gather
+from antennate.telemetry.view.simulation import SimulationView
 from antennate.types import AntennaFrame, Floats, JointCommand, Maneuver
 
 MANEUVERS = (Maneuver.FORWARD, Maneuver.TURN_L, Maneuver.TURN_R, Maneuver.REVERSE)
@@ -265,18 +266,38 @@ def _changed(gait: GaitParams, **values: float) -> GaitParams:
     return GaitParams(**{**gait.model_dump(), **values})
 
 
+def _walk_viewed(tasks: Sequence[_Task], on_step: OnStep, view: SimulationView) -> Iterator[Walk]:
+    """All walks on a page, one after the other."""
+    for done, (config, name, gait, maneuver) in enumerate(tasks, start=1):
+
+        def watch(world: World, frame: AntennaFrame, maneuver: Maneuver = maneuver) -> None:
+            view.tick(world.model, world.data, frame, maneuver=int(maneuver))
+
+        view.begin(name.replace("_", " "))
+        yield walk_flat(config, name, gait, maneuver, watch)
+        on_step(done, len(tasks))
+
+
 def run(
     config: GaitStudyConfig,
     workers: int = 1,
     on_step: OnStep = no_step,
+    view: SimulationView | None = None,
 ) -> GaitOutcome:
     """Walk all maneuvers, the one without body wave, the sweep, and the unknown numbers.
+
+    With a view they run in this process, one after the other, and give the same.
 
     Raises:
         ConfigError: A draw of the unknown numbers makes no robot or gait.
         SimulationError: The physics became invalid; from a worker it comes as a WorkerError.
     """
-    found = {w.name: w for w in gather(walk_flat, _tasks(config), workers, on_step)}
+    tasks = _tasks(config)
+    if view is None:
+        walks = gather(walk_flat, tasks, workers, on_step)
+    else:
+        walks = list(_walk_viewed(tasks, on_step, view))
+    found = {walk.name: walk for walk in walks}
     return GaitOutcome(
         config=config,
         maneuvers={m.name.lower(): found[m.name.lower()] for m in MANEUVERS},

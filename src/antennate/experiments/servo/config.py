@@ -19,7 +19,9 @@ class ServoConfig(Params):
         f"servos.{name}.p_gain" for name in ServosParams.model_fields
     )
     recording: tuple[str, ...] = number((), "1", "assumed: has to be named")
-    """Recordings: JSON of Rhoban/bam."""
+    """Recordings: JSON of Rhoban/bam, or logs of `drive` with --joint."""
+    joint: str | None = number(None, "1", "assumed: has to be named if a recording is a log")
+    """Joint of a log."""
     servo: ServoName = number("xl330_m288", "1", "assumed: the model with a known recording")
     """Model of the servo."""
     servos: ServosParams = ServosParams()

@@ -22,7 +22,7 @@ from antennate.types import Bools, Floats
 
 GRAVITY = 9.80665
 _LARGEST_FILE = 100_000_000
-_FEWEST = 50
+FEWEST = 50
 """Fewest samples of a recording."""
 _COARSEST = 0.02
 """Positions of a servo are told in finer steps than this [rad]: 4096 a turn make 0.0015."""
@@ -77,7 +77,7 @@ class Recording:
         size = abs(self.drive)
         useful = self.torque & (size > 0.05 * FULL_DRIVE) & (size < 0.9 * FULL_DRIVE)
         useful &= abs(np.gradient(self.position, self.t)) < _SLOW
-        if useful.sum() < _FEWEST // 2:
+        if useful.sum() < FEWEST // 2:
             return None
         return float(np.median(self.p_gain * error[useful] / self.drive[useful]))
 
@@ -106,12 +106,12 @@ def read(path: Path, mass: float | None, length: float | None) -> Recording:
     if not isinstance(table, dict) or not isinstance(table.get("entries"), list):
         raise BadInputError(f"{path}: expected an object with a list `entries`, found none")
     entries = table["entries"]
-    if len(entries) < _FEWEST:
+    if len(entries) < FEWEST:
         raise BadInputError(
-            f"{path}: entries: expected at least {_FEWEST}, found {len(entries)}; record longer"
+            f"{path}: entries: expected at least {FEWEST}, found {len(entries)}; record longer"
         )
     t, position, goal = (_column(path, entries, name) for name in _NUMBERS)
-    _check(path, t, position, goal)
+    check(path, t, position, goal)
     drive = _column(path, entries, "load", math.nan)
     return Recording(
         path.name,
@@ -175,7 +175,12 @@ def _torque(path: Path, entries: list[Any]) -> Bools:
     return found
 
 
-def _check(path: Path, t: Floats, position: Floats, goal: Floats) -> None:
+def check(path: Path, t: Floats, position: Floats, goal: Floats) -> None:
+    """Refuse times that do not rise or have gaps, and angles that cannot be radians.
+
+    Raises:
+        BadInputError: Says where and why.
+    """
     steps = np.diff(t)
     if (steps <= 0).any():
         i = int(np.argmax(steps <= 0)) + 1

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from antennate.errors import BadInputError
-from antennate.experiments.servo import fitting
+from antennate.experiments.servo import drive_log, fitting
 from antennate.experiments.servo.config import ServoConfig
 from antennate.experiments.servo.fitting import Data
 from antennate.experiments.servo.recording import Recording, data_of, read
@@ -204,7 +204,9 @@ def run(config: ServoConfig, on_step: OnStep = no_step) -> ServoOutcome:
     """
     if not config.recording:
         raise BadInputError("--recording: expected one file or more, found none")
-    recordings = [read(Path(name), config.mass, config.length) for name in config.recording]
+    recordings = [_read(Path(name), config) for name in config.recording]
+    if config.joint is not None and not any(drive_log.is_log(Path(n)) for n in config.recording):
+        raise BadInputError("--joint: expected a log among the recordings, found none")
     data = data_of(recordings, config.given.voltage, config.inertia)
     parts, loaded = data.parts(), any(each.mass * each.length > 0 for each in recordings)
     rows = models(config, told_divisor(recordings), loaded)
@@ -229,6 +231,13 @@ def run(config: ServoConfig, on_step: OnStep = no_step) -> ServoOutcome:
     every = fitting.errors(data, fits[0], _same(parts, len(rows)))
     held_errors = np.array(judged).reshape(len(held), len(rows)).T
     return ServoOutcome(config, recordings, data, rows, fits[0], every, held, held_errors, interval)
+
+
+def _read(path: Path, config: ServoConfig) -> Recording:
+    """A recording of either form."""
+    if drive_log.is_log(path):
+        return drive_log.read(path, config)
+    return read(path, config.mass, config.length)
 
 
 def _same(parts: Bools, count: int) -> Floats:

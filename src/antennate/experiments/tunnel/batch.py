@@ -11,7 +11,7 @@ import numpy as np
 
 from antennate.control.checked import CheckedController
 from antennate.control.loop import run_loop
-from antennate.control.registry import make_controller
+from antennate.control.registry import ControllerMaker, make_controller
 from antennate.errors import ConfigError, ControllerError, SimulationError
 from antennate.experiments.tunnel.config import TunnelConfig
 from antennate.experiments.tunnel.monitor import (
@@ -28,13 +28,14 @@ from antennate.sim.trial import draw_trial
 from antennate.sim.world import World
 from antennate.telemetry.header import Header
 from antennate.telemetry.simulated import SimulatedLog
+from antennate.telemetry.view.pace import Restart
 from antennate.types import AntennaFrame, Controller, JointCommand, Robot
 
 BATCH = 12
 """Trials of one process stepped in lockstep."""
 Emit = Callable[[tuple[TrialResult, TrialPath]], None]
-Watch = Callable[[World, AntennaFrame, Controller], None]
-"""Takes world, frame and controller of the first row after each tick."""
+Watch = Callable[[World, AntennaFrame, Controller], Sequence[str]]
+"""Takes world, frame and controller of the first row after each tick; returns events to log."""
 
 
 class Bodies(Robot, Protocol):
@@ -69,7 +70,8 @@ def run_trials(
     batch: int = BATCH,
     logs: Path | None = None,
     watch: Watch | None = None,
-    make: MakeBodies | None = None,
+    make: ControllerMaker = make_controller,
+    bodies: MakeBodies | None = None,
 ) -> None:
     """Run trials of one controller; emit each as it ends, and keep its log if there is a folder.
 
@@ -79,17 +81,20 @@ def run_trials(
     batch that has not ended begins again with a controller of its own, and is invalid if that one
     fails too. With robots of another kind, there are no logs and nothing to watch.
     """
-    made = (make or cpu_bodies(config))(min(batch, len(trials)))
+    made = (bodies or cpu_bodies(config))(min(batch, len(trials)))
     rows = _Rows(config, controller, trials, emit, min(batch, len(trials)), logs, watch, made)
     try:
-        rows.run()
+        rows.run(make)
+    except Restart:
+        rows.drop_logs()
+        raise
     except ControllerError as error:
         if len(trials) == 1:
             rows.end(0, "invalid", f"controller: {error}")
             return
         for trial in rows.unfinished:
             rows.log_of(trial).unlink(missing_ok=True)
-            run_trials(config, controller, [trial], emit, logs=logs, make=make)
+            run_trials(config, controller, [trial], emit, logs=logs, make=make, bodies=bodies)
 
 
 def cpu_bodies(config: TunnelConfig) -> MakeBodies:
@@ -129,8 +134,8 @@ class _Rows:
         running = [monitor.trial for monitor in self._monitors if monitor is not None]
         return sorted(running + self._waiting)
 
-    def run(self) -> None:
-        """Run all trials.
+    def run(self, make: ControllerMaker) -> None:
+        """Run all trials, with the controller that `make` makes.
 
         Raises:
             ControllerError: The controller failed as a whole; unfinished trials are left.
@@ -138,7 +143,7 @@ class _Rows:
         config = self._config
         phases = [self._place(row) for row in range(self._batch)]
         try:
-            made = make_controller(self._name, config.control, config.robot, self._batch)
+            made = make(self._name, config.control, config.robot, self._batch)
         except ConfigError as error:
             raise ControllerError(str(error)) from error
         control = CheckedController(made, config.robot, self._batch)
@@ -147,11 +152,9 @@ class _Rows:
             self._log(row, made, phase)
 
         def go_on(frame: AntennaFrame, command: JointCommand) -> bool:
-            world = self._robot.world(0) if self._looks is not None else None
-            if self._looks is not None and isinstance(world, World):
-                self._looks(world, frame, made)
+            events = self._look(frame, made)
             for log in self._logs.values():
-                log.take(frame, command)
+                log.take(frame, command, events)
             for row, monitor in enumerate(self._monitors):
                 if monitor is not None and self._watch(row, monitor, control) and self._waiting:
                     phase = self._place(row)
@@ -193,6 +196,19 @@ class _Rows:
         )
         path = self.log_of(monitor.trial)
         self._logs[row] = SimulatedLog(path, header, controller, world, row)
+
+    def _look(self, frame: AntennaFrame, controller: Controller) -> Sequence[str]:
+        """Let somebody look at the first row after a tick; the events to log."""
+        if self._looks is None:
+            return ()
+        world = self._robot.world(0)
+        return self._looks(world, frame, controller) if isinstance(world, World) else ()
+
+    def drop_logs(self) -> None:
+        """Remove the logs of trials that are given up."""
+        for log in self._logs.values():
+            log.close()
+            log.path.unlink(missing_ok=True)
 
     def _watch(self, row: int, monitor: TrialMonitor, control: CheckedController) -> bool:
         """Look at a row after a tick; whether its trial has ended."""

@@ -82,4 +82,7 @@ EXPERIMENT = Experiment.of_folder(
     filmed=True,
     failed=lambda result: bool(_none_valid(result)),
     logged=tunnel.run,
+    viewed=lambda config, on_step, on_row, view, logs: tunnel.run(
+        config, 1, on_step, on_row, logs, view
+    ),
 )

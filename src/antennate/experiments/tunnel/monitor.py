@@ -99,6 +99,7 @@ class TrialPath:
         after: The same at the end.
         exit: Ends of the exit line [m], shape (2, 2).
         links: The robot's links at the end [m], shape (L, 2).
+        parts: All parts of the robot at the end, legs and antennae included, polygons likewise.
     """
 
     t: Floats
@@ -109,6 +110,7 @@ class TrialPath:
     after: list[Floats]
     exit: Floats
     links: Floats
+    parts: list[Floats]
 
 
 @dataclass
@@ -203,4 +205,5 @@ class TrialMonitor:
             after=after,
             exit=self.scene.exit,
             links=world.links().copy(),
+            parts=world.parts(),
         )

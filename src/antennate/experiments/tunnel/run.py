@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,13 +11,17 @@ from typing import Any
 from antennate.control.registry import make_controller
 from antennate.errors import ConfigError
 from antennate.experiments.tunnel import measures
-from antennate.experiments.tunnel.batch import run_trials
+from antennate.experiments.tunnel.batch import Emit, run_trials
 from antennate.experiments.tunnel.config import TunnelConfig
 from antennate.experiments.tunnel.monitor import TrialPath, TrialResult
 from antennate.sim.scenes.registry import TUNNEL
 from antennate.sim.trial import check_start
+from antennate.sim.world import World
 from antennate.studies.experiment import OnRow, OnStep, no_row, no_step
 from antennate.studies.pool import run_tasks
+from antennate.telemetry.view.pace import Restart
+from antennate.telemetry.view.simulation import SimulationView
+from antennate.types import AntennaFrame, Controller
 
 _TASK = 12
 """Most trials handed to a process at once."""
@@ -76,14 +80,35 @@ def _run_task(task: _Task, emit: Callable[[Any], None]) -> None:
     run_trials(config, name, trials, emit, logs=logs)
 
 
+def _run_viewed(
+    config: TunnelConfig, name: str, trial: int, emit: Emit, logs: Path | None, view: SimulationView
+) -> None:
+    """One trial on a page; begun anew with another seed whenever a person wants that."""
+
+    def watch(world: World, frame: AntennaFrame, control: Controller) -> Sequence[str]:
+        return view.tick(world.model, world.data, frame, control)
+
+    while True:
+        view.begin(f"{name}, trial {trial}", config.seed)
+        try:
+            run_trials(config, name, [trial], emit, logs=logs, watch=watch, make=view.controller)
+        except Restart as wish:
+            config = config.model_copy(update={"seed": wish.seed})
+        else:
+            return
+
+
 def run(
     config: TunnelConfig,
     workers: int = 1,
     on_step: OnStep = no_step,
     on_row: OnRow = no_row,
     logs: Path | None = None,
+    view: SimulationView | None = None,
 ) -> TunnelOutcome:
     """Run all trials of all controllers, with the log of each in a folder if one is given.
+
+    With a view they run in this process, one after the other, and give the same.
 
     Raises:
         LogError: A log cannot be written.
@@ -106,7 +131,12 @@ def run(
 
     interrupted = False
     try:
-        run_tasks(_run_task, tasks, workers, take)
+        if view is None:
+            run_tasks(_run_task, tasks, workers, take)
+        else:
+            for name in config.controllers:
+                for trial in range(config.trials):
+                    _run_viewed(config, name, trial, take, logs, view)
     except KeyboardInterrupt:
         interrupted = True
     order = {name: i for i, name in enumerate(config.controllers)}

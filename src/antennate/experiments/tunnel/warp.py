@@ -59,12 +59,17 @@ def run_trials_on_warp(
     def make(rows: int) -> tuple[Scene, WarpRobot]:
         return scene, WarpRobot(rows, config.robot, period, timestep, sizes, device)
 
-    run_trials(config, controller, trials, emit, batch, make=make)
+    run_trials(config, controller, trials, emit, batch, bodies=make)
 
 
 def _counted(config: TunnelConfig, controller: str, trials: Sequence[int], scene: Scene) -> Limits:
     """Sizes with which these trials would lose no contact."""
     period, timestep = config.control.period, config.physics.timestep
-    robot = CountingRobot(len(trials), config.robot, period, timestep)
-    run_trials(config, controller, trials, lambda _: None, make=lambda _: (scene, robot))
-    return robot.limits
+    made: list[CountingRobot] = []
+
+    def make(rows: int) -> tuple[Scene, CountingRobot]:
+        made.append(CountingRobot(rows, config.robot, period, timestep))
+        return scene, made[-1]
+
+    run_trials(config, controller, trials, lambda _: None, bodies=make)
+    return Limits(*(max(sizes) for sizes in zip(*(robot.room for robot in made), strict=True)))

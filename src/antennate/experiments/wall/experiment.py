@@ -46,5 +46,11 @@ def _hangs(result: Mapping[str, Any]) -> str:
 
 
 EXPERIMENT = Experiment.of_folder(
-    __name__, wall.WallConfig, wall.run, tables, sentence, filmed=True
+    __name__,
+    wall.WallConfig,
+    wall.run,
+    tables,
+    sentence,
+    filmed=True,
+    viewed=lambda config, on_step, on_row, view, logs: wall.run(config, 1, on_step, on_row, view),
 )

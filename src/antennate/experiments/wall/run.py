@@ -10,7 +10,7 @@ is counted once more without the `start`. A trial that does both counts as a jam
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -29,6 +29,8 @@ from antennate.robots.sensor import SensorParams
 from antennate.sim.bench import Ball, Bench, compile_bench
 from antennate.studies.experiment import OnRow, OnStep, no_row, no_step
 from antennate.studies.pool import gather
+from antennate.telemetry.view.pace import Restart
+from antennate.telemetry.view.simulation import SimulationView
 from antennate.types import Floats
 
 REFERENCE: Profile = "descending"
@@ -143,22 +145,27 @@ def passage(
     phase = rng.uniform(0.0, 1.0) * wall.sphere_diameter
     antenna = with_profile(config.antenna, profile)
     antenna = antenna.model_copy(update={"friction": min(friction, 2.0)})
-    bench = _bench(config, antenna, angle, phase, factors)
     crest = antenna.length * math.sin(angle) + antenna.radius + _CLEAR
-    return _drive(config, bench, math.pi / 2 - angle, overlap + _CLEAR, crest, watch)
+    balls = _boulders(config.wall, antenna, angle, phase, crest)
+    bench = _bench(config, antenna, balls, factors)
+    return _drive(config, bench, balls, math.pi / 2 - angle, overlap + _CLEAR, crest, watch)
 
 
-def _bench(
-    config: WallConfig, antenna: AntennaSpec, angle: float, phase: float, factors: Floats
-) -> Bench:
-    """Bench with spheres all along the way, their crests clear of the tip at first."""
-    wall, pitch = config.wall, config.wall.sphere_diameter
-    x = antenna.length * math.sin(angle) + antenna.radius + _CLEAR + pitch / 2
+def _boulders(
+    wall: WallParams, antenna: AntennaSpec, angle: float, phase: float, crest: float
+) -> list[Ball]:
+    """Spheres all along the way, their crests clear of the tip at first."""
+    pitch = wall.sphere_diameter
     below = -2 * pitch - max(0.0, -antenna.length * math.cos(angle))
     above = wall.travel + 1.2 * antenna.length
     heights = np.arange(below + phase, above, pitch)
-    balls = [Ball(x, float(y), pitch / 2) for y in heights]
-    pull = {"down": -_GRAVITY, "up": _GRAVITY, "off": 0.0}[wall.gravity]
+    return [Ball(crest + pitch / 2, float(y), pitch / 2) for y in heights]
+
+
+def _bench(
+    config: WallConfig, antenna: AntennaSpec, balls: Sequence[Ball], factors: Floats
+) -> Bench:
+    pull = {"down": -_GRAVITY, "up": _GRAVITY, "off": 0.0}[config.wall.gravity]
     model = compile_bench(config.physics, antenna, balls, (0.0, pull))
     for i, factor in enumerate(factors):
         joint = model.joint(f"antenna/hinge{i}")
@@ -167,7 +174,13 @@ def _bench(
 
 
 def _drive(
-    config: WallConfig, bench: Bench, base: float, approach: float, crest: float, watch: Watch
+    config: WallConfig,
+    bench: Bench,
+    balls: Sequence[Ball],
+    base: float,
+    approach: float,
+    crest: float,
+    watch: Watch,
 ) -> Traverse:
     wall = config.wall
     bench.place(0.0, 0.0, base)
@@ -194,7 +207,8 @@ def _drive(
             hinges.append(bench.hinges().copy())
     base_y, tip_y, touching, forces, flex = np.array(rows, float).T
     from_crest = np.array(shapes) - [crest, 0.0]
-    return Traverse(base_y, tip_y, touching, forces, flex, np.array(hinges), from_crest)
+    boulders = np.array([(ball.x - crest, ball.y, ball.radius) for ball in balls])
+    return Traverse(base_y, tip_y, touching, forces, flex, np.array(hinges), from_crest, boulders)
 
 
 def _ramp(length: float, speed: float) -> list[float]:
@@ -202,12 +216,15 @@ def _ramp(length: float, speed: float) -> list[float]:
     return (length * np.arange(1, count + 1) / count).tolist()
 
 
+_Task = tuple[WallConfig, Profile, int]
+
+
 def run_trial(
-    config: WallConfig, profile: Profile, trial: int
+    config: WallConfig, profile: Profile, trial: int, watch: Watch = _unwatched
 ) -> tuple[WallTrial, Traverse | None]:
     """One trial, and of the first of a profile its passage."""
     try:
-        seen = passage(config, profile, trial)
+        seen = passage(config, profile, trial, watch)
     except SimulationError as error:
         none = [math.nan] * 7
         row = WallTrial(config.seed, trial, profile, "invalid", "invalid", *none, reason=str(error))
@@ -216,21 +233,50 @@ def run_trial(
     return row, seen if trial == 0 else None
 
 
+def _run_viewed(
+    tasks: Sequence[_Task], on_step: OnStep, on_row: OnRow, view: SimulationView
+) -> Iterator[tuple[WallTrial, Traverse | None]]:
+    """All trials on a page, one after the other; with another seed whenever a person wants that."""
+
+    def watch(bench: Bench) -> None:
+        view.tick(bench.model, bench.data)
+
+    for done, (config, profile, trial) in enumerate(tasks, start=1):
+        seed = config.seed
+        while True:
+            view.begin(f"{profile}, trial {trial}", seed)
+            changed = config.model_copy(update={"seed": seed})
+            try:
+                found = run_trial(changed, profile, trial, watch)
+                break
+            except Restart as wish:
+                seed = wish.seed
+        on_row(found[0])
+        on_step(done, len(tasks))
+        yield found
+
+
 def run(
     config: WallConfig,
     workers: int = 1,
     on_step: OnStep = no_step,
     on_row: OnRow = no_row,
+    view: SimulationView | None = None,
 ) -> WallOutcome:
     """Run all trials of all profiles.
+
+    With a view they run in this process, one after the other, and give the same.
 
     Raises:
         WorkerError: A worker process died.
     """
-    tasks = [
+    tasks: list[_Task] = [
         (config, profile, trial) for trial in range(config.trials) for profile in config.profiles
     ]
-    found = gather(run_trial, tasks, workers, on_step, lambda item: on_row(item[0]))
+    if view is None:
+        found = gather(run_trial, tasks, workers, on_step, lambda item: on_row(item[0]))
+    else:
+        found = list(_run_viewed(tasks, on_step, on_row, view))
     found.sort(key=lambda item: config.profiles.index(item[0].profile))
     examples = {row.profile: seen for row, seen in found if seen is not None}
     return WallOutcome(config, [row for row, _ in found], examples)

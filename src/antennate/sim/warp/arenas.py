@@ -12,7 +12,6 @@ from antennate.robots.spec import RobotSpec
 from antennate.sim.scenes.scene import Scene, SceneInstance
 from antennate.sim.scenes.tunnel import Tunnel
 from antennate.sim.sim_robot import Disturbance, SimRobot
-from antennate.sim.warp.worlds import Limits
 from antennate.sim.world import World
 from antennate.types import Floats
 
@@ -22,6 +21,8 @@ _GAP = 0.05
 """Free distance between parked cylinders [m]."""
 _RESERVE = 1.5
 """Room on the device over the largest counts on the CPU."""
+_LEAST = (100, 40)
+"""Rows and contacts: twice what the robot's legs alone have on a floor."""
 
 
 class PaddedTunnels:
@@ -58,16 +59,16 @@ def is_parked(polygon: Floats) -> bool:
 
 
 class CountingRobot(SimRobot):
-    """Robots on the CPU that count contacts and rows of constraints, with nothing asleep.
+    """Robots on the CPU that count rows of constraints and contacts, with nothing asleep.
 
     Attributes:
-        limits: Room for the largest counts so far.
+        room: Rows and contacts a world that would have been enough so far, with a reserve.
     """
 
     def __init__(self, batch: int, robot: RobotSpec, period: float, timestep: float) -> None:
         super().__init__(batch, robot, period, timestep)
         self._counted = dict[int, World]()
-        self.limits = Limits(rows=1, contacts=1)
+        self.room = _LEAST
 
     def load(self, row: int, world: World, chance: Disturbance) -> None:
         """Put a fresh world into a row."""
@@ -79,7 +80,9 @@ class CountingRobot(SimRobot):
         """Advance the physics of every row to time t [s]."""
         super().sleep_until(t)
         for world in self._counted.values():
-            self.limits = Limits(
-                rows=max(self.limits.rows, round(_RESERVE * world.data.nefc)),
-                contacts=max(self.limits.contacts, round(_RESERVE * world.data.ncon)),
+            rows, contacts = self.room
+            data = world.data
+            self.room = (
+                max(rows, round(_RESERVE * data.nefc)),
+                max(contacts, round(_RESERVE * data.ncon)),
             )
