@@ -250,7 +250,7 @@ class World:
 
     def parts(self) -> list[Floats]:
         """Polygons of all parts of the robot in plan [m], each (n, 2), legs and antennae too."""
-        own = np.flatnonzero(self._robot)
+        own = np.flatnonzero(self.places.own)
         return [outline(self.model, self.data, geom) for geom in own.tolist()]
 
     def obstacle_overlap(self) -> float:

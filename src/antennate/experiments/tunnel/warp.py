@@ -53,7 +53,7 @@ def run_trials_on_warp(
         return
     plain = make_scene(config.scene, config.tunnel)
     scene = PaddedTunnels(plain, (draw_scene(config, plain, trial) for trial in trials))
-    sizes = limits or _counted(config, controller, trials[:_COUNTED], scene)
+    sizes = limits or room_for(config, controller, trials[:_COUNTED], scene)
     period, timestep = config.control.period, config.physics.timestep
 
     def make(rows: int) -> tuple[Scene, WarpRobot]:
@@ -62,8 +62,8 @@ def run_trials_on_warp(
     run_trials(config, controller, trials, emit, batch, bodies=make)
 
 
-def _counted(config: TunnelConfig, controller: str, trials: Sequence[int], scene: Scene) -> Limits:
-    """Sizes with which these trials would lose no contact."""
+def room_for(config: TunnelConfig, controller: str, trials: Sequence[int], scene: Scene) -> Limits:
+    """Sizes on the device, with a reserve, from these trials on the CPU."""
     period, timestep = config.control.period, config.physics.timestep
     made: list[CountingRobot] = []
 

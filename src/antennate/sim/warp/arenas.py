@@ -22,7 +22,7 @@ _GAP = 0.05
 _RESERVE = 1.5
 """Room on the device over the largest counts on the CPU."""
 _LEAST = (100, 40)
-"""Rows and contacts: twice what the robot's legs alone have on a floor."""
+"""Rows and contacts: more than twice what our robot's legs alone have on a floor."""
 
 
 class PaddedTunnels:

@@ -1,5 +1,7 @@
 """What runs on the device beside the engine. Imported late: it needs warp."""
 
+# pyright: reportInvalidTypeForm=false
+# Warp reads the types of arguments as expressions.
 from __future__ import annotations
 
 from antennate.sim.warp.packages import require_warp
@@ -9,14 +11,14 @@ wp, _ = require_warp()
 
 @wp.kernel
 def load_friction(
-    torque: wp.array2d(dtype=float),
-    speed: wp.array2d(dtype=float),
-    drive: wp.array(dtype=int),
-    dof: wp.array(dtype=int),
-    share: wp.array(dtype=float),
-    dry: wp.array(dtype=float),
-    damping: wp.array(dtype=float),
-    friction: wp.array2d(dtype=float),
+    torque: wp.array2d[float],
+    speed: wp.array2d[float],
+    drive: wp.array[int],
+    dof: wp.array[int],
+    share: wp.array[float],
+    dry: wp.array[float],
+    damping: wp.array[float],
+    friction: wp.array2d[float],
 ):
     """Friction of gears under load, as `antennate.sim.gears` has it; one thread a joint."""
     world, i = wp.tid()
@@ -26,14 +28,14 @@ def load_friction(
 
 @wp.kernel
 def obstacle_forces(
-    count: wp.array(dtype=int),
-    owner: wp.array(dtype=int),
-    geoms: wp.array(dtype=wp.vec2i),
-    address: wp.array2d(dtype=int),
-    force: wp.array2d(dtype=float),
-    obstacle: wp.array(dtype=int),
-    own: wp.array(dtype=int),
-    total: wp.array(dtype=float),
+    count: wp.array[int],
+    owner: wp.array[int],
+    geoms: wp.array[wp.vec2i],
+    address: wp.array2d[int],
+    force: wp.array2d[float],
+    obstacle: wp.array[int],
+    own: wp.array[int],
+    total: wp.array[float],
 ):
     """Normal forces between robot and obstacles, summed by world; one thread a contact."""
     contact = wp.tid()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 from importlib import metadata
 from importlib.util import find_spec
 from typing import Any
@@ -10,7 +9,8 @@ from typing import Any
 from antennate.errors import ConfigError, MissingPackageError
 
 INSTALL = "pip install --no-deps mujoco-warp==4.0.0 warp-lang==1.19.0 absl-py etils"
-"""What was tried; without --no-deps, `mujoco` 3.17 comes too and overwrites the engine."""
+"""What was tried. Without --no-deps `mujoco` 3.17 comes too and overwrites the engine, so that no
+extra of this package can have it."""
 _MODULES = {"mujoco_warp": "mujoco-warp", "warp": "warp-lang", "absl": "absl-py", "etils": "etils"}
 _SERIES = "4.0"
 """Older ones tell nothing of dropped contacts; newer ones were not tried."""
@@ -40,9 +40,11 @@ def require_warp() -> tuple[Any, Any]:
     version = _version("mujoco-warp")
     if version and not version.startswith(f"{_SERIES}."):
         raise ConfigError(f"--engine warp: expected mujoco-warp {_SERIES}, found {version}")
-    warp = importlib.import_module("warp")
+    import mujoco_warp  # pyright: ignore[reportMissingImports]
+    import warp  # pyright: ignore[reportMissingImports]
+
     warp.config.log_level = warp.LOG_WARNING
-    return warp, importlib.import_module("mujoco_warp")
+    return warp, mujoco_warp
 
 
 def _version(name: str) -> str:

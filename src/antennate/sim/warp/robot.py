@@ -83,6 +83,7 @@ class WarpRobot:
     Attributes:
         period: Control period [s].
         positions: Coordinates of all worlds, shape (B, nq).
+        worlds: The worlds on the device, from the first command on.
     """
 
     def __init__(
@@ -104,7 +105,7 @@ class WarpRobot:
         self._missing = np.ones(batch, dtype=bool)
         self._noise: Floats = np.zeros((batch, 2))
         self._ticks = 0
-        self._worlds: WarpWorlds | None = None
+        self.worlds: WarpWorlds | None = None
         self._forces: Floats | None = None
         self.positions: Floats = np.zeros((batch, 0))
         self._controls: Floats = np.zeros((batch, 0))
@@ -155,7 +156,7 @@ class WarpRobot:
         """Summed normal force on obstacles in the last physics step [N], shape (B,)."""
         if self._forces is None:
             none = np.zeros(self._batch)
-            self._forces = self._worlds.forces() if self._worlds is not None else none
+            self._forces = self.worlds.forces() if self.worlds is not None else none
         return self._forces
 
     def now(self) -> float:
@@ -200,17 +201,17 @@ class WarpRobot:
         """
         if not self._rows:
             return
-        if self._worlds is None:
+        if self.worlds is None:
             first = next(iter(self._rows.values())).world
-            self._worlds = WarpWorlds(first, self._batch, self._limits, self._device)
+            self.worlds = WarpWorlds(first, self._batch, self._limits, self._device)
         for row in sorted(self._new):
-            self._worlds.put(row, self._rows[row].world)
+            self.worlds.put(row, self._rows[row].world)
         for row in sorted(self._ended - self._rows.keys()):
-            self._worlds.rest(row)
+            self.worlds.rest(row)
             self._controls[row] = 0.0
         self._new.clear()
         self._ended.clear()
-        self._worlds.command(self._controls)
+        self.worlds.command(self._controls)
 
     def sleep_until(self, t: float) -> None:
         """Advance the physics of all rows to time t [s]."""
@@ -219,26 +220,26 @@ class WarpRobot:
             moving = {
                 i: row for i, row in self._rows.items() if row.commanded and row.failure is None
             }
-            if self._worlds is None or not moving:
+            if self.worlds is None or not moving:
                 continue
             for i, row in moving.items():
                 friction = row.chance.leg_friction(row.ticks)
                 if friction is not None:
                     row.world.set_leg_friction(friction)
-                    self._worlds.set_friction(i, row.world)
+                    self.worlds.set_friction(i, row.world)
                 row.ticks += 1
-            self._worlds.step(self._substeps)
+            self.worlds.step(self._substeps)
             self._take(moving)
 
     def _take(self, moving: dict[int, WarpRow]) -> None:
         """Take the state of rows from the device, and look for those that are unsound."""
-        if self._worlds is None:
+        if self.worlds is None:
             return
         self._forces = None
-        positions, speeds = self._worlds.state()
+        positions, speeds = self.worlds.state()
         rows = list(moving)
         self.positions[rows] = positions[rows]
-        dropped = self._worlds.overflows()
+        dropped = self.worlds.overflows()
         places = moving[rows[0]].world.places
         bounded = positions[:, places.bounded]
         heads = positions[:, places.root : places.root + 3]
