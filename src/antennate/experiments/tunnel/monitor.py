@@ -46,6 +46,10 @@ class Watched(Protocol):
         """Plan positions of the links, head first [m], shape (L, 2)."""
         ...
 
+    def parts(self) -> list[Floats]:
+        """Polygons of all parts of the robot in plan [m], each (n, 2)."""
+        ...
+
     def outlines(self) -> tuple[list[Floats], list[Floats]]:
         """Polygons of all obstacles in plan [m]: those fixed, those that can move."""
         ...

@@ -57,6 +57,11 @@ class WarpRow:
         self._follow()
         return self.world.links()
 
+    def parts(self) -> list[Floats]:
+        """Polygons of all parts of the robot in plan [m], each (n, 2)."""
+        self._follow()
+        return self.world.parts()
+
     def outlines(self) -> tuple[list[Floats], list[Floats]]:
         """Obstacles in plan, as `World.outlines` has them, without those that fill the counts."""
         self._follow()
