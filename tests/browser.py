@@ -81,6 +81,35 @@ class Tab:
             time.sleep(0.1)
         return value
 
+    def click(self, tag: str, text: str) -> None:
+        """Click the first element of that kind with that text, if there is one."""
+        self.run(
+            f"[...document.querySelectorAll('{tag}')].find(e => e.textContent == {text!r})?.click()"
+        )
+
+    def fill(self, label: str, text: str) -> None:
+        """Type into the field behind a label, in place of what it holds."""
+        script = f"""(() => {{
+            let box = [...document.querySelectorAll('label')].find(e => e.textContent == {label!r});
+            let field = null;
+            while (box && !(field = box.querySelector('input:not([type=hidden])')))
+                box = box.parentElement;
+            if (!field) return false;
+            field.focus(); field.select(); field.click();
+            return true;
+        }})()"""
+        assert self.run(script), label
+        self.call("Input.insertText", text=text)
+        time.sleep(0.2)
+        for kind in ("rawKeyDown", "char", "keyUp"):
+            self.call(
+                "Input.dispatchKeyEvent",
+                type=kind,
+                key="Enter",
+                text="\r",
+                windowsVirtualKeyCode=13,
+            )
+
     def drag(self, *way: tuple[float, float]) -> None:
         """Press the mouse at the first place, move it along the others, and let it go."""
         more: dict[str, Any] = {"button": "left", "clickCount": 1}

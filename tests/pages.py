@@ -123,7 +123,7 @@ class Script:
             cwd=self._folder,
             env=os.environ | own,
         )
-        assert done.returncode == 0, done.stderr
+        assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-2000:]
         self._hear(done.stdout + done.stderr)
 
     def _hear(self, text: str) -> None:

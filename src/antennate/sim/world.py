@@ -142,6 +142,15 @@ class World:
         mujoco.mj_getState(self.model, self.data, found, kind)
         return found
 
+    def coordinates(self) -> tuple[int, list[float]]:
+        """Number of the robot's first coordinate, and all coordinates of the model [m, rad]."""
+        return self._root, self._qpos.tolist()
+
+    def place_all(self, position: Floats) -> None:
+        """Put everything at coordinates of the model [m, rad], shape (nq,), without physics."""
+        self._qpos[:] = position
+        mujoco.mj_kinematics(self.model, self.data)
+
     def restore(self, state: Floats) -> None:
         """Be again as when `state` was called, also in time."""
         mujoco.mj_setState(self.model, self.data, state, mujoco.mjtState.mjSTATE_INTEGRATION)

@@ -19,6 +19,7 @@ from antennate.telemetry.header import Header
 from antennate.telemetry.topics import (
     ANTENNA,
     CONTACT_FORCES,
+    COORDINATES,
     JOINT_COMMANDS,
     JOINT_STATES,
     MANEUVER,
@@ -64,6 +65,7 @@ class SimulatedLog:
         self._names, self._angles = header.robot.joint_names, len(header.robot.joint_names)
         self._held: Floats = np.empty((_MOST, _HEAD + 4 * self._angles))
         self._forces: list[bytes | None] = []
+        self._coordinates: list[bytes | None] = []
         self._count, self._since = 0, math.inf
 
     def take(self, frame: AntennaFrame, command: JointCommand, events: Sequence[str] = ()) -> None:
@@ -90,6 +92,8 @@ class SimulatedLog:
         self._count += 1
         looked = (self._out.written + self._count) % _FORCES_EVERY == 0
         self._forces.append(self._contacts() if looked else None)
+        place = COORDINATES.type.encode(*world.coordinates()) if looked else None
+        self._coordinates.append(place)
         if self._count == _MOST or now - self._since >= FLUSH or events:
             self._hand_over()
         for text in events:
@@ -120,6 +124,7 @@ class SimulatedLog:
         """Encode and write what is held."""
         count, self._count, self._since = self._count, 0, math.inf
         forces, self._forces = self._forces, []
+        coordinates, self._coordinates = self._coordinates, []
         if not count:
             return
         rows = self._held[:count]
@@ -159,5 +164,6 @@ class SimulatedLog:
                     time | dict(zip(("position", "velocity", "effort"), joints[1:], strict=True)),
                 ),
                 CONTACT_FORCES: forces,
+                COORDINATES: coordinates,
             },
         )

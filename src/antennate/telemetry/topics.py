@@ -57,6 +57,10 @@ float64[] y       # [m]
 float64[] z       # [m]
 float64[] normal  # normal force [N]
 """
+_COORDINATES = """\
+uint32 robot        # number of the first coordinate of the robot: place, quaternion, joints
+float64[] position  # coordinates of the simulated world, as MuJoCo has them [m, rad]
+"""
 _JOINT_STATE = """\
 int32 sec
 uint32 nanosec
@@ -127,6 +131,11 @@ CONTACT_FORCES = Topic(
     _own("ContactForces", _FORCES),
     "forces of obstacles on the robot, ten times a second, in simulation",
 )
+COORDINATES = Topic(
+    "/coordinates",
+    _own("Coordinates", _COORDINATES),
+    "state of the engine, ten times a second, in simulation, so that the log can be watched",
+)
 EVENTS = Topic(
     "/events",
     MessageType("rcl_interfaces/msg/Log", _LOG, _LOG_SCHEMA),
@@ -148,8 +157,9 @@ TOPICS = (
     JOINT_STATES,
     CONTACT_FORCES,
     EVENTS,
+    COORDINATES,
 )
-"""All, in the order of their channels: the first has id 1."""
+"""All, in the order of their channels: the first has id 1. A new one comes last."""
 
 JOINTS = ("angles", "positions", "velocities", "efforts")
 """Numbers of a tick for each joint: the commanded, then the measured ones, empty if unknown."""

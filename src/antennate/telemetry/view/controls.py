@@ -39,7 +39,7 @@ class Controls:
     ) -> None:
         self._channel, self._quiet = channel, False
         gui, self._folders = server.gui, list[Any]()
-        with self._folder(gui, "simulation"):
+        with self._folder(gui, "time"):
             self._pause = gui.add_checkbox("pause", bool(state.get("paused")))
             self._pause.on_update(lambda event: self._order(event, "pause", on=self._pause.value))
             step = gui.add_button("one step")
@@ -55,6 +55,9 @@ class Controls:
                 self._seed = gui.add_number("seed", int(state["seed"]), min=0, step=1)
                 restart = gui.add_button("restart with this seed")
                 restart.on_click(self._restart)
+            elif state.get("again"):
+                again = gui.add_button("from the beginning")
+                again.on_click(lambda event: self._order(event, "restart"))
         self._sliders: dict[str, Any] = {}
         values = state.get("values", {})
         if values:

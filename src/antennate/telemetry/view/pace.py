@@ -19,7 +19,7 @@ _LATE = 0.2
 
 
 class Restart(Exception):
-    """A person wants the trial anew, with a seed.
+    """A person wants the trial anew, with a seed; a log from its beginning.
 
     Attributes:
         seed: The seed.

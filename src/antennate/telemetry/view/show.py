@@ -113,6 +113,7 @@ class Page:
         elif kind == STATE:
             self._take_state(read(content))
         elif kind == SCENE:
+            self._robot = None
             self._begin(Shapes.unpack(content))
         elif kind == HEADER:
             self._robot = _Robot(Header.unpack(content).robot)

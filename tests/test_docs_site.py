@@ -1,13 +1,19 @@
-"""The tutorials, run as they stand: each command, each file, each line that they show."""
+"""The docs: tutorials that run as they stand, pages that can be found, lines that fit a page."""
 
 from __future__ import annotations
 
+import re
 import time
+import tomllib
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 from first_hour import Command
 from pages import DOCS, Script, blocks
+
+from antennate.cli import commands
 
 PAGES = ["first-tunnel.md", *(f"tutorials/{p.name}" for p in (DOCS / "tutorials").glob("*.md"))]
 WITH_A_TWIN = {"tutorials/calibrate.md", "tutorials/drive.md"}
@@ -52,3 +58,26 @@ def test_no_line_of_code_is_wider_than_a_page(page: str) -> None:
         line for block in blocks(page) for line in block.text.splitlines() if len(line) > WIDEST
     ]
     assert wide == []
+
+
+def test_every_page_has_its_place_in_the_navigation() -> None:
+    site = tomllib.loads((DOCS.parent / "zensical.toml").read_text())
+
+    def pages(entry: Any) -> Iterator[str]:
+        if isinstance(entry, str):
+            yield entry
+        else:
+            for each in entry.values() if isinstance(entry, dict) else entry:
+                yield from pages(each)
+
+    there = [str(path.relative_to(DOCS)) for path in DOCS.rglob("*.md")]
+    assert sorted(pages(site["project"]["nav"])) == sorted(there)
+
+
+def test_every_command_is_linked_where_the_list_of_commands_begins() -> None:
+    begin, *sections = (DOCS / "commands.md").read_text().split("\n## ")
+    linked = re.findall(r"\[`(\w+)`\]\(#antennate-(\w+)\)", begin)
+    assert [name for name, _ in linked] == [anchor for _, anchor in linked]
+    assert {name for name, _ in linked} == set(commands())
+    assert [f"`antennate {name}`" for name, _ in linked] == [s.splitlines()[0] for s in sections]
+    assert "(commands.md)" in (DOCS / "index.md").read_text()

@@ -1,0 +1,164 @@
+"""A live view in a browser: the scene is there, charts move, and what a person does is done."""
+
+import io
+import json
+import re
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from urllib.parse import urlsplit
+
+import numpy as np
+import pytest
+from browser import CHROMIUM, Tab, browser
+from PIL import Image
+from view_rig import PATIENCE, Shown, shown
+
+from antennate.telemetry.reader import LogReader
+from antennate.telemetry.topics import EVENTS
+from antennate.types import Maneuver
+
+pytestmark = pytest.mark.skipif(
+    CHROMIUM is None, reason="no chromium here; `apt-get install chromium` brings it"
+)
+
+IMAGES = Path(__file__).parent.parent / "docs" / "images"
+KNOWN = "unsafe-eval"
+"""A part of viser that is not used here wants to make code of text, which the page forbids."""
+
+Keep = Callable[[Tab, str], None]
+
+
+@pytest.fixture
+def keep(request: pytest.FixtureRequest) -> Keep:
+    """Keeps a picture of a page for the docs, if that is wanted."""
+
+    def picture(tab: Tab, name: str) -> None:
+        if request.config.getoption("--pictures"):
+            tab.click("button", "✕")
+            data = tab.picture("webp", quality=60)
+            (IMAGES / f"view-{name}.webp").write_bytes(data)
+
+    return picture
+
+
+@pytest.fixture
+def tab(tmp_path: Path) -> Iterator[Tab]:
+    """A tab of a browser."""
+    with browser(tmp_path / "browser") as found:
+        yield found
+
+
+def opened(tab: Tab, view: Shown) -> None:
+    """Open the page; return when its scene and its status are there."""
+    tab.open(view.link)
+    tab.until("!!document.querySelector('canvas')")
+    tab.until("/time\\s+[0-9.]+ s/.test(document.body.innerText)")
+
+
+def status(tab: Tab, name: str) -> str:
+    """A line of the status on the page."""
+    text = str(tab.run("document.getElementById('status').innerText"))
+    found = re.search(rf"^{name}\s+(.*)$", text, re.M)
+    assert found is not None, text
+    return found[1]
+
+
+def seconds(tab: Tab) -> float:
+    """The time that the page shows [s]."""
+    return float(status(tab, "time").split()[0])
+
+
+def charts(tab: Tab) -> str:
+    """What the charts have drawn, as one text."""
+    return str(
+        tab.run("[...document.querySelectorAll('.uplot canvas')].map(c => c.toDataURL()).join()")
+    )
+
+
+def colours(tab: Tab) -> int:
+    """Different colours in the middle of the picture: one of an empty scene has few."""
+    picture = Image.open(io.BytesIO(tab.picture())).convert("RGB")
+    width, height = picture.size
+    middle = picture.crop((width // 3, height // 4, 2 * width // 3, 3 * height // 4))
+    return len(np.unique(np.asarray(middle).reshape(-1, 3), axis=0))
+
+
+def stays_here(tab: Tab, view: Shown) -> None:
+    """Nothing was asked for from elsewhere, and nothing else went wrong."""
+    for address in tab.requests:
+        parts = urlsplit(address)
+        ours = parts.netloc == f"127.0.0.1:{view.port}" and parts.scheme in ("http", "ws")
+        assert ours or parts.scheme in ("data", "blob"), address
+    assert any(urlsplit(address).scheme == "ws" for address in tab.requests)
+    assert [each for each in tab.troubles if KNOWN not in each] == []
+
+
+def test_a_person_changes_what_a_simulation_decides(tab: Tab, keep: Keep, tmp_path: Path) -> None:
+    """At θ = 0.98 nothing is contact and all is FORWARD; at 0.3 the robot turns. That is told."""
+    words = "tunnel --controllers paper --trials 1 --control.rule.threshold 0.98 --time-limit 60"
+    more = ("--log", "--view", "--view-port", "0", "--out", "run", "--control.gait.frequency=1")
+    with shown(*words.split(), *more, folder=tmp_path) as view:
+        opened(tab, view)
+        before, begin = charts(tab), seconds(tab)
+        tab.until(
+            f"parseFloat(document.body.innerText.match(/time\\s+([0-9.]+) s/)[1]) > {begin + 1}"
+        )
+        assert charts(tab) != before
+        tab.until("!!document.querySelector('svg polyline')")
+        assert colours(tab) > 50
+        tab.fill("θ: level that is contact", "0.3")
+        tab.until("document.body.innerText.includes('by hand: control.rule.threshold = 0.3')")
+        tab.until("/maneuver\\s+(TURN|REVERSE)/.test(document.body.innerText)")
+        time.sleep(1.0)
+        keep(tab, "tunnel")
+        tab.fill("speed", "max")
+        assert view.process.wait(PATIENCE) == 0
+        stays_here(tab, view)
+    run = tmp_path / "run"
+    assert "control.rule.threshold = 0.3" in (run / "by-hand.txt").read_text()
+    assert "not follow from its configuration" in (run / "report.html").read_text()
+    changed, before, after = None, set[int](), set[int]()
+    with LogReader(run / "logs" / "paper-0.mcap") as log:
+        for records, tick in log.groups():
+            for record in records:
+                if record.topic is EVENTS and "by hand" in EVENTS.type.decode(record.data)["msg"]:
+                    changed = record.number
+            if tick is not None:
+                (before if changed is None else after).add(tick.maneuver)
+    assert before == {Maneuver.FORWARD}
+    assert after & {Maneuver.TURN_L, Maneuver.TURN_R, Maneuver.REVERSE}
+
+
+def test_a_person_stops_steps_and_begins_anew(tab: Tab, tmp_path: Path) -> None:
+    """A pause stops time, a step is one control period, a restart has the seed that is wanted."""
+    words = "tunnel --controllers open --trials 1 --time-limit 30 --view --view-port 0 --out run"
+    with shown(*words.split(), folder=tmp_path) as view:
+        opened(tab, view)
+        tab.click("label", "pause")
+        stood = settled(tab)
+        tab.click("button", "one step")
+        tab.until(f"!document.body.innerText.includes('{stood:.2f} s')")
+        assert settled(tab) == pytest.approx(stood + 0.01)
+        tab.fill("seed", "7")
+        tab.click("button", "restart with this seed")
+        tab.until("/time\\s+0\\.0[0-9] s/.test(document.body.innerText)")
+        tab.click("label", "pause")
+        tab.fill("speed", "max")
+        assert view.process.wait(PATIENCE) == 0
+    run = tmp_path / "run"
+    assert "begun anew with seed 7" in (run / "by-hand.txt").read_text()
+    rows = (run / "trials.csv").read_text().splitlines()
+    assert dict(zip(rows[0].split(","), rows[1].split(","), strict=True))["seed"] == "7"
+    assert json.loads((run / "result.json").read_text())["seed"] == 0  # that of the configuration
+
+
+def settled(tab: Tab) -> float:
+    """The time that the page shows once it stands [s]."""
+    end = time.monotonic() + PATIENCE
+    while time.monotonic() < end:
+        before = seconds(tab)
+        time.sleep(0.5)
+        if seconds(tab) == before:
+            return before
+    raise AssertionError("time does not stand")
