@@ -79,7 +79,7 @@ def measured(
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--batches", type=int, nargs="+", default=[16, 64, 256, 1024, 4096])
     parser.add_argument("--seconds", type=float, default=5.0, help="simulated time of a trial [s]")
     parser.add_argument("--device", help="device of Warp, as cuda:0 or cpu; a GPU if not given")
