@@ -10,7 +10,7 @@ from antennate.sim.scenes.registry import make_scene
 from antennate.sim.scenes.scene import Scene
 from antennate.sim.trial import draw_scene
 from antennate.sim.warp.arenas import CountingRobot, PaddedTunnels
-from antennate.sim.warp.packages import require_warp
+from antennate.sim.warp.packages import require_device
 from antennate.sim.warp.robot import WarpRobot
 from antennate.sim.warp.worlds import Limits
 
@@ -48,7 +48,7 @@ def run_trials_on_warp(
         MissingPackageError: Warp is not installed.
         SceneError: The scene's instances are not of one structure.
     """
-    require_warp()
+    require_device(device)
     if not trials:
         return
     plain = make_scene(config.scene, config.tunnel)

@@ -6,7 +6,7 @@ from importlib import metadata
 from importlib.util import find_spec
 from typing import Any
 
-from antennate.errors import ConfigError, MissingPackageError
+from antennate.errors import ConfigError, MissingPackageError, in_one_line
 
 INSTALL = "pip install --no-deps mujoco-warp==4.0.0 warp-lang==1.19.0 absl-py etils"
 """What was tried. Without --no-deps `mujoco` 3.17 comes too and overwrites the engine, so that no
@@ -45,6 +45,26 @@ def require_warp() -> tuple[Any, Any]:
 
     warp.config.log_level = warp.LOG_WARNING
     return warp, mujoco_warp
+
+
+def require_device(name: str | None) -> Any:
+    """The device of a name, or a GPU.
+
+    Raises:
+        ConfigError: There is none.
+        MissingPackageError: Warp is not installed.
+    """
+    warp, _ = require_warp()
+    try:
+        device = warp.get_device(name) if name else warp.get_preferred_device()
+    except Exception as error:
+        raise ConfigError(f"--engine warp: {in_one_line(error)}") from error
+    if name is None and not device.is_cuda:
+        raise ConfigError(
+            "--engine warp: expected a GPU with CUDA, found none; without one the usual engine is "
+            'much faster, and device "cpu" is there for tests'
+        )
+    return device
 
 
 def _version(name: str) -> str:

@@ -14,7 +14,7 @@ import mujoco
 import numpy as np
 
 from antennate.errors import ConfigError, SceneError, in_one_line
-from antennate.sim.warp.packages import require_warp
+from antennate.sim.warp.packages import require_device, require_warp
 from antennate.sim.world import World
 from antennate.types import Floats
 
@@ -56,7 +56,7 @@ class WarpWorlds:
     def __init__(self, first: World, batch: int, limits: Limits, device: str | None = None) -> None:
         self._wp, self._mjw = require_warp()
         self._batch, self._first, self._limits = batch, first, limits
-        self._device = _device(self._wp, device)
+        self._device = require_device(device)
         try:
             with self._wp.ScopedDevice(self._device):
                 self._make(_plain(first.model))
@@ -207,24 +207,6 @@ class WarpWorlds:
             f"of {self._limits.rows} rows and {self._limits.contacts} contacts a world"
             for row in np.flatnonzero(bits).tolist()
         }
-
-
-def _device(warp: Any, name: str | None) -> Any:
-    """The device of a name, or a GPU.
-
-    Raises:
-        ConfigError: There is none.
-    """
-    try:
-        device = warp.get_device(name) if name else warp.get_preferred_device()
-    except Exception as error:
-        raise ConfigError(f"--engine warp: {in_one_line(error)}") from error
-    if name is None and not device.is_cuda:
-        raise ConfigError(
-            "--engine warp: expected a GPU with CUDA, found none; without one the usual engine is "
-            'much faster, and device "cpu" is there for tests'
-        )
-    return device
 
 
 def _plain(model: mujoco.MjModel) -> mujoco.MjModel:
