@@ -8,6 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import mujoco
 import numpy as np
 import pytest
 
@@ -22,6 +23,7 @@ from antennate.params.control import ControlParams
 from antennate.params.scene import PhysicsParams, TunnelParams
 from antennate.robots.spec import RobotSpec
 from antennate.sim.scenes.registry import make_scene
+from antennate.sim.scenes.scene import Route
 from antennate.sim.scenes.tunnel import Tunnel
 from antennate.sim.sim_robot import SimRobot
 from antennate.sim.trial import draw_scene, draw_trial
@@ -91,11 +93,31 @@ def flat(physics: PhysicsParams = PHYSICS, **robot: Any) -> TunnelConfig:
     return TunnelConfig(scene="flat", robot=spec, physics=physics)
 
 
-def paths(body: Any, configs: list[TunnelConfig], seconds: float) -> Floats:
+class Wall(Route):
+    """A flat floor with a wall across the way; also the scene that draws it."""
+
+    random = False
+
+    def __init__(self, ahead: float) -> None:
+        super().__init__(np.array([[0.0, 0.0], [2.0, 0.0]]))
+        self.ahead = ahead
+
+    def draw(self, robot: RobotSpec, rng: np.random.Generator) -> Wall:
+        return self
+
+    def build(self, spec: mujoco.MjSpec) -> None:
+        super().build(spec)
+        box = mujoco.mjtGeom.mjGEOM_BOX
+        spec.worldbody.add_geom(type=box, pos=[self.ahead, 0, 0.1], size=[0.02, 0.5, 0.1])
+
+
+def paths(
+    body: Any, configs: list[TunnelConfig], seconds: float, walls: list[Wall] | None = None
+) -> Floats:
     """Heads on a flat floor at each tick [m], shape (ticks, B, 3)."""
     phases = []
     for row, config in enumerate(configs):
-        scene = make_scene(config.scene)
+        scene = walls[row] if walls else make_scene(config.scene)
         start = draw_trial(config, scene, row, CONTROL.gait, CONTROL.period)
         body.load(row, start.world, start.chance)
         phases.append(start.phase)
@@ -111,12 +133,14 @@ def paths(body: Any, configs: list[TunnelConfig], seconds: float) -> Floats:
     return np.array(heads)
 
 
-def on_both(configs: list[TunnelConfig], seconds: float) -> tuple[Floats, Floats]:
+def on_both(
+    configs: list[TunnelConfig], seconds: float, walls: list[Wall] | None = None
+) -> tuple[Floats, Floats]:
     """Heads on the CPU engine and on Warp."""
     how = (len(configs), configs[0].robot, CONTROL.period, PHYSICS.timestep)
     return (
-        paths(SimRobot(*how), configs, seconds),
-        paths(WarpRobot(*how, ROOM, "cpu"), configs, seconds),
+        paths(SimRobot(*how), configs, seconds, walls),
+        paths(WarpRobot(*how, ROOM, "cpu"), configs, seconds, walls),
     )
 
 
@@ -136,6 +160,16 @@ def test_each_world_has_parameters_of_its_own(warp: Any) -> None:
     assert np.abs(gpu - cpu).max() < 1e-4
     same, _ = on_both([flat(), flat()], 0.6)
     assert np.abs(same[-1, 1] - cpu[-1, 1]).max() > 2e-3, "the parameters matter"
+
+
+@pytest.mark.slow
+def test_each_world_has_walls_of_its_own(warp: Any) -> None:
+    near = [Wall(0.6), Wall(0.2)]
+    cpu, gpu = on_both([flat(), flat()], 1.0, near)
+    free, _ = on_both([flat(), flat()], 1.0)
+    assert np.abs(free[-1, 0] - cpu[-1, 0]).max() == 0.0, "the first has not come to its wall"
+    assert free[-1, 1, 0] - cpu[-1, 1, 0] > 0.02, "the second is stopped by its own"
+    assert np.abs(gpu - cpu).max() < 2e-3
 
 
 @pytest.mark.slow
