@@ -27,6 +27,7 @@ ROBOT_COMMANDS = {
     "replay": "let a controller decide again upon the log of a drive",
     "view": "a log, or that of a run, on a page of this computer",
     "report": "a run, or two side by side, as one page to read, print and send",
+    "merge": "the shards of a run as the run that they are parts of",
 }
 
 

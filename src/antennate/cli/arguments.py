@@ -6,7 +6,7 @@ The file must be valid on its own; flags override it. Values are checked once, b
 from __future__ import annotations
 
 import shlex
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -98,8 +98,10 @@ def parse(
     return _filled(model, base, {p: v for p, v in values.items() if p[0] not in names}), chosen
 
 
-_CODE = ("controller", "controllers", "scene")
+_CODE = ("controller", "controllers", "scene", "experiment")
 """Parameters that may name code to run, as MODULE:NAME or FILE.py:NAME."""
+TRUST = "trust_code"
+"""Option of a command whose file may name code in deeper tables."""
 
 
 def _refuse_code(file: Path, base: Mapping[str, Any], flags: Mapping[tuple[str, ...], Any]) -> None:
@@ -108,15 +110,34 @@ def _refuse_code(file: Path, base: Mapping[str, Any], flags: Mapping[tuple[str, 
     Raises:
         ConfigError: The file names code, and no flag does.
     """
-    for name in _CODE:
-        value = base.get(name, ())
-        names = (value,) if isinstance(value, str) else value
-        if (name,) not in flags and any(":" in each for each in names):
-            words = shlex.join([flag_of((name,)), *names])
-            raise ConfigError(
-                f"{file}: {name}: expected no code of its own in a file, found "
-                f"{', '.join(map(shown, names))}; if you trust that code, add {words}"
+    for path, name in () if flags.get((TRUST,)) else _code_in(base, ()):
+        if path not in flags:
+            deeper = len(path) > 1
+            words = (
+                flag_of((TRUST,)) if deeper else shlex.join([flag_of(path), *_names(base, path)])
             )
+            raise ConfigError(
+                f"{file}: {'.'.join(path)}: expected no code of its own in a file, found "
+                f"{shown(name) if deeper else ', '.join(map(shown, _names(base, path)))}; if you "
+                f"trust that code, add {words}"
+            )
+
+
+def _code_in(table: Any, path: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...], str]]:
+    """Path and name of everything in nested tables that names code."""
+    if isinstance(table, Mapping):
+        for key, value in table.items():
+            yield from _code_in(value, (*path, *str(key).split(".")))
+    elif isinstance(table, list | tuple):
+        for item in table:
+            yield from _code_in(item, path)
+    elif isinstance(table, str) and path and path[-1] in _CODE and ":" in table:
+        yield path, table
+
+
+def _names(base: Mapping[str, Any], path: tuple[str, ...]) -> tuple[str, ...]:
+    value = base[path[0]]
+    return (value,) if isinstance(value, str) else tuple(value)
 
 
 _Model = TypeVar("_Model")

@@ -50,7 +50,27 @@ class Outcome(Protocol):
 
 
 Config = TypeVar("Config", bound=Params)
+Trial = tuple[str, int]
+"""A condition, such as a controller or a profile, and the number of a trial."""
 Found = TypeVar("Found", bound=Outcome)
+
+
+@dataclass(frozen=True)
+class Trials(Generic[Config]):
+    """Trials that can be run one by one, in any order, by any process.
+
+    Attributes:
+        condition: Column of a row that tells its condition.
+        every: every(config): all of them, in the order of the table.
+        run: run(config, trials, emit): runs some, and emits the index and the row of each as it
+            ends. The row depends on the configuration and the trial alone.
+        most: How many may be run at once.
+    """
+
+    condition: str
+    every: Callable[[Config], Sequence[Trial]]
+    run: Callable[[Config, Sequence[Trial], Callable[[int, Any], None]], None]
+    most: int = 1
 
 
 @dataclass(frozen=True)
@@ -78,6 +98,8 @@ class Experiment(Generic[Config, Found]):
         films: films(config, trial) -> for each condition, by name, what runs this trial of it once
             more and records it; None where nothing can be filmed.
         body: HTML that stands in its report in place of tables and figures.
+        trials: Its trials one by one, for studies; without them a study runs it as a whole.
+        continued: Whether its folder is continued without being asked, and keeps its trials.
     """
 
     name: str
@@ -95,6 +117,8 @@ class Experiment(Generic[Config, Found]):
     viewed: Callable[[Config, OnStep, OnRow, SimulationView, Path | None], Found] | None = None
     films: Callable[[Config, int], Mapping[str, Callable[[], Film]]] | None = None
     body: Body | None = None
+    trials: Trials[Config] | None = None
+    continued: bool = False
 
     @property
     def view(self) -> View:

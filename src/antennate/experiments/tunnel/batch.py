@@ -152,9 +152,9 @@ class _Rows:
             self._log(row, made, phase)
 
         def go_on(frame: AntennaFrame, command: JointCommand) -> bool:
-            events = self._look(frame, made)
             for log in self._logs.values():
-                log.take(frame, command, events)
+                log.take(frame, command)
+            self._look(frame, made)
             for row, monitor in enumerate(self._monitors):
                 if monitor is not None and self._watch(row, monitor, control) and self._waiting:
                     phase = self._place(row)
@@ -197,12 +197,14 @@ class _Rows:
         path = self.log_of(monitor.trial)
         self._logs[row] = SimulatedLog(path, header, controller, world, row)
 
-    def _look(self, frame: AntennaFrame, controller: Controller) -> Sequence[str]:
-        """Let somebody look at the first row after a tick; the events to log."""
-        if self._looks is None:
-            return ()
-        world = self._robot.world(0)
-        return self._looks(world, frame, controller) if isinstance(world, World) else ()
+    def _look(self, frame: AntennaFrame, controller: Controller) -> None:
+        """Let somebody look at the first row after a tick, and keep the events in the logs."""
+        world = self._robot.world(0) if self._looks is not None else None
+        if self._looks is None or not isinstance(world, World):
+            return
+        for text in self._looks(world, frame, controller):
+            for log in self._logs.values():
+                log.event(text)
 
     def drop_logs(self) -> None:
         """Remove the logs of trials that are given up."""

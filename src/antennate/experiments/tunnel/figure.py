@@ -16,12 +16,10 @@ from matplotlib.ticker import MaxNLocator, PercentFormatter
 
 from antennate import figures as style
 from antennate.experiments.tunnel.monitor import TrialPath, TrialResult
-from antennate.experiments.tunnel.run import TunnelOutcome
+from antennate.experiments.tunnel.run import SHOWN_TRIALS, TunnelOutcome
 from antennate.messages import short_names
 from antennate.types import Floats, Maneuver
 
-SHOWN_TRIALS = 5
-"""Trials drawn in the figure of trajectories."""
 MARGIN = 0.3
 """Shown around the scene and the robots at the end [m]."""
 FARTHEST = 1.0

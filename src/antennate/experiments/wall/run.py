@@ -18,7 +18,7 @@ import numpy as np
 from pydantic import model_validator
 
 from antennate.antenna.statics import PROFILES, Profile, with_profile
-from antennate.errors import SimulationError
+from antennate.errors import SimulationError, WorkerError
 from antennate.experiments.wall import measures
 from antennate.experiments.wall.outcome import SAMPLE_PERIOD, Traverse, WallTrial, classify
 from antennate.params.base import Params, number, require_different
@@ -27,8 +27,9 @@ from antennate.params.scene import BenchPhysicsParams
 from antennate.robots.antenna import AntennaSpec
 from antennate.robots.sensor import SensorParams
 from antennate.sim.bench import Ball, Bench, compile_bench
-from antennate.studies.experiment import OnRow, OnStep, no_row, no_step
+from antennate.studies.experiment import OnRow, OnStep, Trial, no_row, no_step
 from antennate.studies.pool import gather
+from antennate.studies.work import Failure
 from antennate.telemetry.view.pace import Restart
 from antennate.telemetry.view.simulation import SimulationView
 from antennate.types import Floats
@@ -128,9 +129,7 @@ def _unwatched(bench: Bench) -> None:
     """Look at nothing."""
 
 
-def passage(
-    config: WallConfig, profile: Profile, trial: int, watch: Watch = _unwatched
-) -> Traverse:
+def passage(config: WallConfig, profile: str, trial: int, watch: Watch = _unwatched) -> Traverse:
     """Move one antenna along the wall.
 
     Raises:
@@ -216,19 +215,36 @@ def _ramp(length: float, speed: float) -> list[float]:
     return (length * np.arange(1, count + 1) / count).tolist()
 
 
-_Task = tuple[WallConfig, Profile, int]
+_Task = tuple[WallConfig, str, int]
+
+
+def _invalid(
+    config: WallConfig, profile: str, trial: int, reason: str
+) -> tuple[WallTrial, Traverse | None]:
+    none = [math.nan] * 7
+    row = WallTrial(config.seed, trial, profile, "invalid", "invalid", *none, reason=reason)
+    return row, None
+
+
+def every(config: WallConfig) -> list[Trial]:
+    """All trials, number by number."""
+    return [(profile, trial) for trial in range(config.trials) for profile in config.profiles]
+
+
+def run_rows(config: WallConfig, trials: Sequence[Trial], emit: Callable[[int, Any], None]) -> None:
+    """Run some trials; emit the index and the row of each."""
+    for i, (profile, trial) in enumerate(trials):
+        emit(i, run_trial(config, profile, trial)[0])
 
 
 def run_trial(
-    config: WallConfig, profile: Profile, trial: int, watch: Watch = _unwatched
+    config: WallConfig, profile: str, trial: int, watch: Watch = _unwatched
 ) -> tuple[WallTrial, Traverse | None]:
     """One trial, and of the first of a profile its passage."""
     try:
         seen = passage(config, profile, trial, watch)
     except SimulationError as error:
-        none = [math.nan] * 7
-        row = WallTrial(config.seed, trial, profile, "invalid", "invalid", *none, reason=str(error))
-        return row, None
+        return _invalid(config, profile, trial, str(error))
     row = classify(config.wall, config.seed, trial, profile, seen)
     return row, seen if trial == 0 else None
 
@@ -268,13 +284,19 @@ def run(
     With a view they run in this process, one after the other, and give the same.
 
     Raises:
-        WorkerError: A worker process died.
+        WorkerError: A worker process failed.
     """
-    tasks: list[_Task] = [
-        (config, profile, trial) for trial in range(config.trials) for profile in config.profiles
-    ]
+    trials = every(config)
+    tasks: list[_Task] = [(config, *trial) for trial in trials]
+
+    def lost(place: int, failure: Failure) -> tuple[WallTrial, Traverse | None]:
+        if failure.status == "failed":
+            raise failure.error or WorkerError(f"a worker failed: {failure.reason}")
+        return _invalid(config, *trials[place], failure.reason)
+
     if view is None:
-        found = gather(run_trial, tasks, workers, on_step, lambda item: on_row(item[0]))
+        how = {"on_result": lambda item: on_row(item[0]), "lost": lost}
+        found = gather(run_trial, tasks, workers, on_step, **how)
     else:
         found = list(_run_viewed(tasks, on_step, on_row, view))
     found.sort(key=lambda item: config.profiles.index(item[0].profile))
