@@ -12,6 +12,7 @@ import mujoco
 import numpy as np
 import pytest
 
+from antennate.cli import main
 from antennate.control.loop import run_loop
 from antennate.control.registry import make_controller
 from antennate.errors import ConfigError, MissingPackageError, SceneError
@@ -210,3 +211,18 @@ def test_lost_contacts_are_said_and_make_trials_invalid(warp: Any) -> None:
     rows = rows_of(run_trials_on_warp, range(2), batch=2, limits=tight, device="cpu")
     assert [row.outcome for row in rows] == ["invalid"] * 2
     assert all("dropped contacts (NEFC): limits of 20 rows" in row.reason for row in rows)
+
+
+def test_other_experiments_have_no_batches(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    out = str(tmp_path / "run")
+    assert main(["wall", "--engine", "warp", "--trials", "1", "--out", out]) == 2
+    assert "expected tunnel, which alone has batches" in capsys.readouterr().err
+
+
+def test_batches_keep_no_logs(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    out = str(tmp_path / "run")
+    told = ["--engine", "warp:cpu", "--log", "--trials", "1", "--out", out]
+    assert main(["tunnel", *told]) == 2
+    assert "warp, which keeps no logs" in capsys.readouterr().err
