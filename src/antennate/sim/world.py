@@ -36,6 +36,8 @@ _HEIGHT_LIMIT = 0.3
 """A head above or below this left the world [m]."""
 
 _PLANE = int(mujoco.mjtGeom.mjGEOM_PLANE)
+CONTACT_IMPEDANCE = (0.95, 0.99, 0.0005)
+"""Least and largest impedance of contacts, and the depth of the largest [m]: `solimp`."""
 
 
 def new_spec(physics: PhysicsParams) -> mujoco.MjSpec:
@@ -84,7 +86,7 @@ def set_contacts(spec: mujoco.MjSpec, physics: PhysicsParams) -> None:
     """Give all contacts one stiffness, that of `contact_time`."""
     for geom in spec.geoms:
         geom.solref[0] = physics.contact_time
-        geom.solimp[:3] = [0.95, 0.99, 0.0005]
+        geom.solimp[:3] = CONTACT_IMPEDANCE
 
 
 def _meet_robot(spec: mujoco.MjSpec) -> None:
