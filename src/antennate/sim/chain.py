@@ -121,7 +121,7 @@ class ChainBench:
             touch=_softness(physics, (physics.contact_time, *CONTACT_IMPEDANCE)),
             stopping=_softness(physics, _STOP),
             obstacles=np.array(ends, float).reshape(-1, 5),
-            probe_mass=0.0 if probe_radius is None else CARRIAGE_MASS,
+            rod=-1 if probe_radius is None else len(ends) - 1,
         )
         self._q, self._v = np.zeros(antenna.hinges + 5), np.zeros(antenna.hinges + 5)
         self._steps = 0
@@ -212,48 +212,41 @@ def _bodies(antenna: AntennaSpec, factors: Floats) -> dict[str, float | Floats]:
     drive, n, link = antenna.base(), antenna.hinges, antenna.link_length
     length = np.array([0.0, *[link] * n])
     mass = np.array([antenna.base_mass, *[antenna.link_mass] * n])
-    beyond = mass.sum() - np.cumsum(mass)
-    sphere = 0.4 * antenna.base_mass * antenna.radius**2
+    inertia = np.array([0.4 * antenna.base_mass * antenna.radius**2, *link_inertia(antenna)])
+    inertia += mass * length**2 / 4
+    armature = np.array([drive.armature, *[antenna.armature] * n])
     springs = np.array(antenna.hinge_stiffness())
-    found: dict[str, float | Floats] = {
+    return {
         "length": length,
-        "moment": length * (beyond + mass / 2),
-        "inertia": np.array([sphere, *link_inertia(antenna)]) + length**2 * (beyond + mass / 4),
-        "armature": np.array([drive.armature, *[antenna.armature] * n]),
+        "link_mass": mass,
+        "inertia": inertia,
+        "armature": armature,
         "stiffness": np.array([drive.stiffness, *(springs * factors)]),
         "damping": np.array([drive.damping, *(antenna.damping_time * springs)]),
         "stop": np.array([STOPS["range"][1], *[antenna.range] * n]),
-        "mass": CARRIAGE_MASS + mass.sum(),
-        "weight": float(mass.sum()),
+        "mass": CARRIAGE_MASS,
         "torque": drive.torque,
+        **_weights(length, mass, inertia, armature),
     }
-    return found | _weights(found)
 
 
-def _weights(bodies: dict[str, float | Floats]) -> dict[str, Floats]:
+def _weights(length: Floats, mass: Floats, inertia: Floats, armature: Floats) -> dict[str, Floats]:
     """Inverse inertias of the straight chain, from which the engine takes how soft contacts are.
 
     That of a joint belongs to its angle; that of a link is the mean over three directions at its
     middle, the one out of the plane being 0.
     """
-    length, moment, armature = (
-        np.asarray(bodies[name]) for name in ("length", "moment", "armature")
-    )
+    joints = np.cumsum(length) - length
     size = len(length)
-    later = np.maximum.outer(np.arange(size), np.arange(size))
-    earlier = np.minimum.outer(np.arange(size), np.arange(size))
-    links = length[earlier] * moment[later]
-    np.fill_diagonal(links, np.asarray(bodies["inertia"]))
-    mass = np.zeros((size + 1, size + 1))  # y of the carriage, then angles of joints
-    mass[0, 0] = float(bodies["mass"])
-    turned = np.tril(np.ones((size, size)))  # angles of links from those of joints
-    mass[1:, 1:] = turned.T @ links @ turned + np.diag(armature)
-    mass[0, 1:] = mass[1:, 0] = moment @ turned
-    inverse = np.linalg.inv(mass)
-    middles = np.tril(np.broadcast_to(length, (size, size)), -1) + np.diag(length / 2)
-    rows = np.concatenate([np.ones((size, 1)), middles @ turned], axis=1)
+    moves = np.tril(np.ones((size, size)))  # a link turns with the joints up to its own
+    middles = moves * (joints + length / 2 - joints[:, None]).T
+    rows = np.concatenate([np.ones((size, 1)), middles], axis=1)  # y of the carriage, then joints
+    whole = (rows.T * mass) @ rows
+    whole[0, 0] += CARRIAGE_MASS
+    whole[1:, 1:] += (moves.T * (inertia - mass * length**2 / 4)) @ moves + np.diag(armature)
+    inverse = np.linalg.inv(whole)
     across = np.einsum("ij,jk,ik->i", rows, inverse, rows)
     return {
         "stop_weight": np.diag(inverse)[1:].copy(),
-        "touch_weight": (across + 1.0 / mass[0, 0]) / 3.0,
+        "touch_weight": (across + 1.0 / whole[0, 0]) / 3.0,
     }

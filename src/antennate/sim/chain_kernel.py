@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from antennate.types import Floats
+from antennate.types import Floats, Ints
 
 MOST_TOUCHES = 64
 """Contacts and stops at one time; beyond, a trial is invalid."""
@@ -41,29 +41,27 @@ class Model(NamedTuple):
     Attributes:
         timestep: Physics step [s].
         length: Length of each body [m], shape (n + 1,).
-        moment: Mass beyond each body's end and its own half, times its length [kg·m], same shape.
-        inertia: Inertia of each about its joint with all mass beyond at its end [kg·m²].
+        link_mass: Mass of each, at its middle [kg]; `inertia` about its joint [kg·m²].
         armature: Of each joint [kg·m²]; `stiffness` [N·m/rad], `damping` [N·m·s/rad].
         stop: Largest angle of each joint [rad].
         stop_weight: Inverse inertia of each joint when straight [1/(kg·m²)].
         touch_weight: Mean inverse mass at the middle of each body when straight [1/kg].
-        mass: All that the carriage moves, itself included [kg].
-        weight: What gravity pulls on [kg].
+        mass: Mass of the carriage, which has no weight [kg]; of the rod as well.
         gravity: In the plane [m/s²], shape (2,).
         torque: Largest torque of the base servo [N·m].
         servo: Gains of the slides' servos [N/m], [N·s/m], shape (2,).
         radius: Of the antenna [m].
         friction: Against all obstacles.
         impratio: Stiffness of friction over that of the normal.
-        touch: Time constant [s], and least and largest impedance and their width [m] of contacts,
+        touch: Time constant [s], least and largest impedance, and their width [m], of contacts,
             shape (4,); `stopping` of stops.
         obstacles: Ends and radius of each capsule [m], shape (m, 5); a ball's ends are the same.
-        probe_mass: Mass of the rod [kg], which is the last obstacle; 0 without.
+        rod: Which of them is the rod, -1 without one.
     """
 
     timestep: float
     length: Floats
-    moment: Floats
+    link_mass: Floats
     inertia: Floats
     armature: Floats
     stiffness: Floats
@@ -72,7 +70,6 @@ class Model(NamedTuple):
     stop_weight: Floats
     touch_weight: Floats
     mass: float
-    weight: float
     gravity: Floats
     torque: float
     servo: Floats
@@ -82,110 +79,138 @@ class Model(NamedTuple):
     touch: Floats
     stopping: Floats
     obstacles: Floats
-    probe_mass: float
+    rod: int
 
 
 class _Touches(NamedTuple):
     """Contacts and stops of one step; each has two rows, along and across its normal.
 
     Attributes:
-        rows: Jacobian, shape (2 k, n + 5); the last two columns are the rod's.
-        missed: Acceleration wanted, later what misses it without forces, shape (2 k,).
-        hardness: Of both rows, shape (2 k,).
+        link: Link that is touched, or whose joint is stopped, shape (k,).
+        obstacle: Which obstacle it touches, -1 for a stop.
+        place: Where [m], shape (k, 2); `normal` away from the obstacle, zeros for a stop.
+        turn: Direction in which a stop turns its joint, 0 for a contact.
         grip: Friction, 0 for a stop, shape (k,).
-        force: Shape (2 k,) [N or N·m].
-        normal: Of contacts, away from the obstacle, shape (k, 2).
+        hardness: Inverse softness of each row, shape (2 k,).
+        missed: Wanted acceleration, later what misses it without forces, shape (2 k,).
+        force: [N or N·m], shape (2 k,).
     """
 
-    rows: Floats
-    missed: Floats
-    hardness: Floats
-    grip: Floats
-    force: Floats
+    link: Ints
+    obstacle: Ints
+    place: Floats
     normal: Floats
+    turn: Floats
+    grip: Floats
+    hardness: Floats
+    missed: Floats
+    force: Floats
 
 
 @njit(**_RULES)
-def _factor(matrix, size):
-    """Cholesky in place, in the lower half; the diagonal holds inverses."""
-    for j in range(size):
-        for i in range(j, size):
-            rest = matrix[i, j]
-            for k in range(j):
-                rest -= matrix[i, k] * matrix[j, k]
-            matrix[i, j] = 1.0 / math.sqrt(rest) if i == j else rest * matrix[j, j]
+def _smooth(model, q, v, cosine, sine, command, torque, pull):
+    """Torque on each joint and force on the carriage of springs, servos, weight and spin.
 
-
-@njit(**_RULES)
-def _forward(matrix, vector, size):
-    for i in range(size):
-        rest = vector[i]
-        for k in range(i):
-            rest -= matrix[i, k] * vector[k]
-        vector[i] = rest * matrix[i, i]
-
-
-@njit(**_RULES)
-def _backward(matrix, vector, size):
-    for i in range(size - 1, -1, -1):
-        value = vector[i] * matrix[i, i]
-        vector[i] = value
-        for k in range(i):
-            vector[k] -= matrix[i, k] * value
-
-
-@njit(**_RULES)
-def _dynamics(model, q, v, cosine, sine, command, inertia, force):
-    """Inertia, lower half, and force of springs, servos, weight and spin on each coordinate."""
-    count, gravity, servo = len(model.length), model.gravity, model.servo
-    inertia[0, 0] = inertia[1, 1] = model.mass
-    inertia[1, 0] = 0.0
-    for d in range(2):
-        drive = servo[0] * (command[d] - q[d]) + servo[1] * (command[2 + d] - v[d])
-        force[d] = drive + model.weight * gravity[d]
+    Spin and weight are what it takes to keep all joints from speeding up, from the tip inwards.
+    """
+    count, gravity, servo, mass = len(model.length), model.gravity, model.servo, model.link_mass
+    ax, ay = -gravity[0], -gravity[1]
     for i in range(count):
-        c, s, moment, spin = cosine[i], sine[i], model.moment[i], v[2 + i] * v[2 + i]
-        inertia[2 + i, 0] = -moment * s
-        inertia[2 + i, 1] = moment * c
-        force[0] += moment * c * spin
-        force[1] += moment * s * spin
-        pull = moment * (gravity[1] * c - gravity[0] * s)
-        for j in range(i):
-            lever = model.length[j] * moment
-            inertia[2 + i, 2 + j] = lever * (c * cosine[j] + s * sine[j])
-            across = lever * (s * cosine[j] - c * sine[j])
-            pull -= across * v[2 + j] * v[2 + j]
-            force[2 + j] += across * spin
-        inertia[2 + i, 2 + i] = model.inertia[i]
-        force[2 + i] = pull
-    drive = model.stiffness[0] * (command[4] - q[2])
-    force[2] += min(max(drive, -model.torque), model.torque) - model.damping[0] * v[2]
-    inertia[2, 2] += model.armature[0]
-    for i in range(1, count):
-        turn, speed = q[2 + i] - q[1 + i], v[2 + i] - v[1 + i]
-        torque = model.stiffness[i] * turn + model.damping[i] * speed
-        force[2 + i] -= torque
-        force[1 + i] += torque
-        inertia[2 + i, 2 + i] += model.armature[i]
-        inertia[1 + i, 1 + i] += model.armature[i]
-        inertia[2 + i, 1 + i] -= model.armature[i]
+        spin = v[2 + i] * v[2 + i] * model.length[i]
+        pull[i, 0] = mass[i] * (ax - 0.5 * spin * cosine[i])
+        pull[i, 1] = mass[i] * (ay - 0.5 * spin * sine[i])
+        ax -= spin * cosine[i]
+        ay -= spin * sine[i]
+    fx, fy, moment = 0.0, 0.0, 0.0
+    for i in range(count - 1, -1, -1):
+        dx, dy = model.length[i] * cosine[i], model.length[i] * sine[i]
+        moment += dx * (fy + 0.5 * pull[i, 1]) - dy * (fx + 0.5 * pull[i, 0])
+        fx += pull[i, 0]
+        fy += pull[i, 1]
+        before, slow = (q[1 + i], v[1 + i]) if i else (command[4], 0.0)
+        spring = model.stiffness[i] * (before - q[2 + i])
+        if i == 0:
+            spring = min(max(spring, -model.torque), model.torque)
+        torque[2 + i] = spring - model.damping[i] * (v[2 + i] - slow) - moment
+    torque[0] = servo[0] * (command[0] - q[0]) + servo[1] * (command[2] - v[0]) - fx
+    torque[1] = servo[0] * (command[1] - q[1]) + servo[1] * (command[3] - v[1]) - fy
 
 
 @njit(**_RULES)
-def _damped(model, inertia, size, out):
-    """Inertia plus timestep times damping, lower half."""
-    h = model.timestep
-    for i in range(size):
-        for j in range(i + 1):
-            out[i, j] = inertia[i, j]
-    for i in range(2):
-        out[i, i] += h * model.servo[1]
-    out[2, 2] += h * model.damping[0]
-    for i in range(3, size):
-        give = h * model.damping[i - 2]
-        out[i, i] += give
-        out[i - 1, i - 1] += give
-        out[i, i - 1] -= give
+def _fold(model, cosine, sine, ahead, torque, chain):
+    """Fold the chain from its tip onto the carriage: inertia of what hangs on each joint.
+
+    Args:
+        model: The bench.
+        cosine: Of each body's angle; `sine` too.
+        ahead: Time of damping that counts as inertia [s]: the timestep for an implicit step.
+        torque: Shape (n + 3,); replaced by what is left for each joint, and for the carriage.
+        chain: Written. Of each joint the row of its inertia, angle and x and y, shape (n + 1, 3),
+            the inverse of its own, and of the carriage the inverse inertia xx, xy and yy, shape
+            (n + 2, 4).
+    """
+    turning, tx, ty, xx, xy, yy = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    moment, fx, fy = 0.0, 0.0, 0.0
+    for i in range(len(model.length) - 1, -1, -1):
+        dx, dy = model.length[i] * cosine[i], model.length[i] * sine[i]
+        mass = model.link_mass[i]
+        kx, ky = tx - xx * dy + xy * dx, ty - xy * dy + yy * dx
+        turning += dx * (ty + ky) - dy * (tx + kx) + model.inertia[i]
+        tx, ty = kx - 0.5 * mass * dy, ky + 0.5 * mass * dx
+        xx += mass
+        yy += mass
+        moment += dx * fy - dy * fx
+        own = 1.0 / (turning + model.armature[i] + ahead * model.damping[i])
+        left = torque[2 + i] - moment
+        torque[2 + i] = left
+        chain[i, 0], chain[i, 1], chain[i, 2], chain[i, 3] = turning, tx, ty, own
+        share, gx, gy = left * own, tx * own, ty * own
+        moment += turning * share
+        fx += tx * share
+        fy += ty * share
+        xx -= tx * gx
+        xy -= tx * gy
+        yy -= ty * gy
+        tx -= turning * gx
+        ty -= turning * gy
+        turning -= turning * turning * own
+    heavy = model.mass + ahead * model.servo[1]
+    xx, yy = xx + heavy, yy + heavy
+    inverse, last = 1.0 / (xx * yy - xy * xy), len(model.length)
+    chain[last, 0], chain[last, 1], chain[last, 2] = yy * inverse, -xy * inverse, xx * inverse
+    torque[0] -= fx
+    torque[1] -= fy
+
+
+@njit(**_RULES)
+def _unfold(model, cosine, sine, chain, torque):
+    """Accelerations of the carriage and the angles of all bodies, in place of what is left."""
+    last = len(model.length)
+    fx, fy = torque[0], torque[1]
+    ax = chain[last, 0] * fx + chain[last, 1] * fy
+    ay = chain[last, 1] * fx + chain[last, 2] * fy
+    torque[0], torque[1], angle = ax, ay, 0.0
+    for i in range(last):
+        held = chain[i, 0] * angle + chain[i, 1] * ax + chain[i, 2] * ay
+        angle += (torque[2 + i] - held) * chain[i, 3]
+        torque[2 + i] = angle
+        ax -= model.length[i] * sine[i] * angle
+        ay += model.length[i] * cosine[i] * angle
+
+
+@njit(**_RULES)
+def _fold_row(model, cosine, sine, chain, link, turn, moment, fx, fy, out):
+    """Fold a torque on a joint and a force on its link as `_fold` does: what is left of them."""
+    for i in range(link, -1, -1):
+        left = moment + turn
+        turn, out[2 + i], share = 0.0, left, left * chain[i, 3]
+        moment -= chain[i, 0] * share
+        fx -= chain[i, 1] * share
+        fy -= chain[i, 2] * share
+        if i:
+            dx, dy = model.length[i - 1] * cosine[i - 1], model.length[i - 1] * sine[i - 1]
+            moment += dx * fy - dy * fx
+    out[0], out[1] = fx, fy
 
 
 @njit(**_RULES)
@@ -245,22 +270,18 @@ def _hardness(rule, weight, depth):
 def _stops(model, q, v, touches):
     """Joints beyond their stops."""
     count = 0
-    size = len(model.length)
-    for i in range(size):
+    for i in range(len(model.length)):
         turn = q[2 + i] - (q[1 + i] if i else 0.0)
         depth = model.stop[i] - abs(turn)
         if depth < 0.0 and count < MOST_TOUCHES:
-            at, sign = 2 * count, -1.0 if turn > 0.0 else 1.0
-            touches.rows[at : at + 2] = 0.0
-            touches.rows[at, 2 + i] = sign
-            speed = sign * v[2 + i]
-            if i:
-                touches.rows[at, 1 + i] = -sign
-                speed -= sign * v[1 + i]
+            sign = -1.0 if turn > 0.0 else 1.0
+            speed = sign * (v[2 + i] - (v[1 + i] if i else 0.0))
             hard, pull, drag = _hardness(model.stopping, model.stop_weight[i], depth)
-            touches.missed[at], touches.missed[at + 1] = pull - drag * speed, 0.0
-            touches.hardness[at], touches.hardness[at + 1] = hard, 0.0
+            touches.link[count], touches.obstacle[count], touches.turn[count] = i, -1, sign
+            touches.normal[count] = 0.0
             touches.grip[count] = 0.0
+            touches.hardness[2 * count], touches.hardness[2 * count + 1] = hard, 0.0
+            touches.missed[2 * count], touches.missed[2 * count + 1] = pull - drag * speed, 0.0
             count += 1
     return count
 
@@ -268,48 +289,39 @@ def _stops(model, q, v, touches):
 @njit(**_RULES)
 def _contacts(model, v, joints, cosine, sine, pairs, pair_count, first, touches):
     """Pairs that overlap, written behind the first ones; returns how many touches there are."""
-    count, rod = first, len(model.obstacles) - 1 if model.probe_mass > 0.0 else -1
-    size = len(model.length) + 2
+    count, rod = first, len(model.length) + 2
     for p in range(pair_count):
         i, k = pairs[p, 0], pairs[p, 1]
         x, y, c, s = joints[i, 0], joints[i, 1], cosine[i], sine[i]
         share, px, py = _nearest(model.obstacles[k], x, y, c, s, model.length[i])
         way = share * model.length[i]
         nx, ny = x + way * c - px, y + way * s - py
-        apart = math.sqrt(nx * nx + ny * ny)
-        depth = apart - model.radius - model.obstacles[k, 4]
-        if depth >= 0.0 or apart < 1e-12:
+        reach = model.radius + model.obstacles[k, 4]
+        square = nx * nx + ny * ny
+        if square >= reach * reach or square < 1e-24:
             continue
         if count == MOST_TOUCHES:
             return CROWDED
+        apart = math.sqrt(square)
+        depth = apart - reach
         nx, ny = nx / apart, ny / apart
         middle = model.obstacles[k, 4] + 0.5 * depth
         px, py = px + middle * nx, py + middle * ny
-        weight = model.touch_weight[i]
-        for r in range(2):
-            ex, ey = (nx, ny) if r == 0 else (-ny, nx)
-            row = touches.rows[2 * count + r]
-            row[0], row[1] = ex, ey
-            for j in range(i):
-                row[2 + j] = model.length[j] * (ey * cosine[j] - ex * sine[j])
-            row[2 + i] = ey * (px - x) - ex * (py - y)
-            row[3 + i :] = 0.0
-            speed = 0.0
-            for j in range(3 + i):
-                speed += row[j] * v[j]
-            if k == rod:
-                row[size], row[size + 1] = -ex, -ey
-                speed -= ex * v[size] + ey * v[size + 1]
-            touches.missed[2 * count + r] = speed
-        if k == rod:
-            weight += 2.0 / (3.0 * model.probe_mass)
-        hard, pull, drag = _hardness(model.touch, weight, depth)
-        touches.missed[2 * count] = pull - drag * touches.missed[2 * count]
-        touches.missed[2 * count + 1] *= -drag
+        vx, vy, weight = v[0] - (py - y) * v[2 + i], v[1] + (px - x) * v[2 + i], 0.0
+        for j in range(1, i):
+            vx -= (joints[j + 1, 1] - joints[j, 1]) * v[2 + j]
+            vy += (joints[j + 1, 0] - joints[j, 0]) * v[2 + j]
+        if k == model.rod:
+            vx, vy, weight = vx - v[rod], vy - v[rod + 1], 2.0 / (3.0 * model.mass)
+        hard, pull, drag = _hardness(model.touch, model.touch_weight[i] + weight, depth)
+        touches.link[count], touches.obstacle[count], touches.turn[count] = i, k, 0.0
+        touches.place[count, 0], touches.place[count, 1] = px, py
+        touches.normal[count, 0], touches.normal[count, 1] = nx, ny
+        touches.grip[count] = model.friction
         touches.hardness[2 * count] = hard
         touches.hardness[2 * count + 1] = hard * model.impratio
-        touches.grip[count] = model.friction
-        touches.normal[count, 0], touches.normal[count, 1] = nx, ny
+        touches.missed[2 * count] = pull - drag * (nx * vx + ny * vy)
+        touches.missed[2 * count + 1] = -drag * (nx * vy - ny * vx)
         count += 1
     return count
 
@@ -377,7 +389,7 @@ def _eliminate(matrix, vector, size):
 
 
 @njit(**_RULES)
-def _press(count, touches, coupling, miss, system, step, phase, tried):
+def _press(count, touches, coupling, miss, system, step, phase):
     """Forces of all touches by Newton's method, into `touches.force`."""
     size, force = 2 * count, touches.force
     for i in range(size):
@@ -399,7 +411,7 @@ def _press(count, touches, coupling, miss, system, step, phase, tried):
         _eliminate(system, step, size)
         share, before = 1.0, energy
         for i in range(count):
-            tried[count + i] = phase[i]
+            phase[count + i] = phase[i]
         for _ in range(_HALVINGS):
             for i in range(size):
                 force[i] += share * step[i]
@@ -408,7 +420,7 @@ def _press(count, touches, coupling, miss, system, step, phase, tried):
                 for j in range(size):
                     value += coupling[i, j] * force[j]
                 miss[i] = value
-            energy = _energy(count, touches, coupling, miss, force, tried)
+            energy = _energy(count, touches, coupling, miss, force, phase)
             if energy <= before + 1e-12 * abs(before):
                 break
             for i in range(size):
@@ -416,47 +428,58 @@ def _press(count, touches, coupling, miss, system, step, phase, tried):
             share *= 0.5
         same = True
         for i in range(count):
-            same = same and tried[i] == tried[count + i]
-            phase[i] = tried[i]
+            same = same and phase[i] == phase[count + i]
         if same and share == 1.0:
             return
 
 
 @njit(**_RULES)
-def _resist(model, size, count, inertia, touches, work, free, force, rod_force):
-    """Add the forces of touches to those on the coordinates and on the rod.
-
-    The inertia is factored in place; `work` holds L^-1 J', and A = J M^-1 J' its products.
-    """
-    coupling, miss, system, step, phase, tried = work[1:]
-    _factor(inertia, size)
+def _resist(model, joints, cosine, sine, count, touches, work, torque, rod_force):
+    """Add what touches exert to the torques on all joints and the forces on carriage and rod."""
+    chain, free, rows, coupling, miss, system, step, phase = work
+    size, last, held = len(model.length) + 2, len(model.length), 1.0 / model.mass
     for i in range(size):
-        free[i] = force[i]
-    _forward(inertia, free, size)
-    held = 1.0 / model.probe_mass if model.probe_mass > 0.0 else 0.0
+        free[i] = torque[i]
+    _fold(model, cosine, sine, 0.0, free, chain)
     for a in range(2 * count):
-        row, half = touches.rows[a], work[0][a]
-        for i in range(size):
-            half[i] = row[i]
-        _forward(inertia, half, size)
-        value = -touches.missed[a]
-        for i in range(size):
-            value += half[i] * free[i]
-        value += held * (row[size] * rod_force[0] + row[size + 1] * rod_force[1])
+        k, row = a // 2, rows[a]
+        i, nx, ny = touches.link[k], touches.normal[k, 0], touches.normal[k, 1]
+        ex, ey, turn = (nx, ny, touches.turn[k]) if a % 2 == 0 else (-ny, nx, 0.0)
+        dx, dy = touches.place[k, 0] - joints[i, 0], touches.place[k, 1] - joints[i, 1]
+        _fold_row(model, cosine, sine, chain, i, turn, dx * ey - dy * ex, ex, ey, row)
+        bx = chain[last, 0] * row[0] + chain[last, 1] * row[1]
+        by = chain[last, 1] * row[0] + chain[last, 2] * row[1]
+        value = bx * free[0] + by * free[1] - touches.missed[a]
+        for j in range(i + 1):
+            value += row[2 + j] * chain[j, 3] * free[2 + j]
+        on_rod = touches.obstacle[k] == model.rod and touches.turn[k] == 0.0
+        if on_rod:
+            value -= held * (ex * rod_force[0] + ey * rod_force[1])
         touches.missed[a] = value
         for b in range(a + 1):
-            value = held * (
-                row[size] * touches.rows[b, size] + row[size + 1] * touches.rows[b, size + 1]
-            )
-            for i in range(size):
-                value += half[i] * work[0][b, i]
+            value = bx * rows[b, 0] + by * rows[b, 1]
+            for j in range(min(i, touches.link[b // 2]) + 1):
+                value += row[2 + j] * chain[j, 3] * rows[b, 2 + j]
+            if on_rod and touches.obstacle[b // 2] == model.rod and touches.turn[b // 2] == 0.0:
+                ox, oy = touches.normal[b // 2, 0], touches.normal[b // 2, 1]
+                value += held * (ex * ox + ey * oy if b % 2 == 0 else ey * ox - ex * oy)
             coupling[a, b] = coupling[b, a] = value
-    _press(count, touches, coupling, miss, system, step, phase, tried)
-    for a in range(2 * count):
-        for i in range(size):
-            force[i] += touches.rows[a, i] * touches.force[a]
-        for i in range(2):
-            rod_force[i] += touches.rows[a, size + i] * touches.force[a]
+    _press(count, touches, coupling, miss, system, step, phase)
+    for k in range(count):
+        i, along, across = touches.link[k], touches.force[2 * k], touches.force[2 * k + 1]
+        fx = along * touches.normal[k, 0] - across * touches.normal[k, 1]
+        fy = along * touches.normal[k, 1] + across * touches.normal[k, 0]
+        torque[0] += fx
+        torque[1] += fy
+        if touches.turn[k] != 0.0:
+            torque[2 + i] += along * touches.turn[k]
+            continue
+        for j in range(i + 1):
+            dx, dy = touches.place[k, 0] - joints[j, 0], touches.place[k, 1] - joints[j, 1]
+            torque[2 + j] += dx * fy - dy * fx
+        if touches.obstacle[k] == model.rod:
+            rod_force[0] -= fx
+            rod_force[1] -= fy
 
 
 @njit(**_RULES)
@@ -510,28 +533,31 @@ def drive(model, q, v, commands, steps, states, forces, touching):
     Returns:
         `len(commands)`; or CROWDED or BURST, and the number of the command before it.
     """
-    count, h, rod = len(model.length), model.timestep, len(model.obstacles) - 1
+    count, h, rod = len(model.length), model.timestep, model.rod
     size, most = count + 2, 2 * MOST_TOUCHES
-    inertia, damped = np.zeros((size, size)), np.zeros((size, size))
-    force, free, rod_force = np.zeros(size), np.zeros(size), np.zeros(2)
+    chain, torque, pull = np.zeros((count + 1, 4)), np.zeros(size), np.zeros((count, 2))
     cosine, sine, joints = np.cos(q[2:size]), np.sin(q[2:size]), np.zeros((count + 1, 2))
+    rod_force = np.zeros(2)
     touches = _Touches(
-        np.zeros((most, size + 2)),
-        np.zeros(most),
-        np.zeros(most),
+        np.zeros(MOST_TOUCHES, np.int64),
+        np.zeros(MOST_TOUCHES, np.int64),
+        np.zeros((MOST_TOUCHES, 2)),
+        np.zeros((MOST_TOUCHES, 2)),
+        np.zeros(MOST_TOUCHES),
         np.zeros(MOST_TOUCHES),
         np.zeros(most),
-        np.zeros((MOST_TOUCHES, 2)),
+        np.zeros(most),
+        np.zeros(most),
     )
-    phases = np.zeros(MOST_TOUCHES, np.int64)
     work = (
+        np.zeros((count + 1, 4)),
+        np.zeros(size),
         np.zeros((most, size)),
         np.zeros((most, most)),
         np.zeros(most),
         np.zeros((most, most)),
         np.zeros(most),
-        phases,
-        np.zeros(2 * MOST_TOUCHES, np.int64),
+        np.zeros(most, np.int64),
     )
     pairs = np.zeros((count * max(1, len(model.obstacles)), 2), np.int64)
     pair_count, slack = 0, -1.0
@@ -540,16 +566,14 @@ def drive(model, q, v, commands, steps, states, forces, touching):
         for i in range(count):
             cosine[i], sine[i] = math.cos(q[2 + i]), math.sin(q[2 + i])
         for _ in range(steps):
-            if model.probe_mass > 0.0:
-                for d in range(2):
-                    model.obstacles[rod, d] = model.obstacles[rod, 2 + d] = q[size + d]
-                    rod_force[d] = model.servo[0] * (command[5 + d] - q[size + d])
-                    rod_force[d] += model.servo[1] * (command[7 + d] - v[size + d])
+            for d in range(2 if rod >= 0 else 0):
+                model.obstacles[rod, d] = model.obstacles[rod, 2 + d] = q[size + d]
+                rod_force[d] = model.servo[0] * (command[5 + d] - q[size + d])
+                rod_force[d] += model.servo[1] * (command[7 + d] - v[size + d])
             _place(model, q, cosine, sine, joints)
             if slack < 0.0:
                 pair_count, slack = _pairs(model, joints, cosine, sine, _SKIN, pairs), _SKIN
-            _dynamics(model, q, v, cosine, sine, command, inertia, force)
-            _damped(model, inertia, size, damped)
+            _smooth(model, q, v, cosine, sine, command, torque, pull)
             stops = _stops(model, q, v, touches)
             touched = _contacts(
                 model, v, joints, cosine, sine, pairs, pair_count, stops, touches
@@ -557,19 +581,17 @@ def drive(model, q, v, commands, steps, states, forces, touching):
             if touched < 0:
                 return CROWDED, k
             if touched > 0:
-                _resist(model, size, touched, inertia, touches, work, free, force, rod_force)
-            _factor(damped, size)
-            _forward(damped, force, size)
-            _backward(damped, force, size)
+                _resist(model, joints, cosine, sine, touched, touches, work, torque, rod_force)
+            _fold(model, cosine, sine, h, torque, chain)
+            _unfold(model, cosine, sine, chain, torque)
             for i in range(size):
-                v[i] += h * force[i]
+                v[i] += h * torque[i]
                 q[i] += h * v[i]
                 slack -= h * abs(v[i]) * (1.0 if i < 2 else model.length[i - 2])
-            if model.probe_mass > 0.0:
-                for d in range(2):
-                    v[size + d] += h * rod_force[d] / (model.probe_mass + h * model.servo[1])
-                    q[size + d] += h * v[size + d]
-                    slack -= h * abs(v[size + d])
+            for d in range(2 if rod >= 0 else 0):
+                v[size + d] += h * rod_force[d] / (model.mass + h * model.servo[1])
+                q[size + d] += h * v[size + d]
+                slack -= h * abs(v[size + d])
             _turn(count, q, v, h, cosine, sine)
         if not _sound(count, q, v):
             return BURST, k
