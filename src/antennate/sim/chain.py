@@ -51,6 +51,20 @@ def kernel() -> ModuleType:
         ) from error
 
 
+def require_read(solver: str, physics: PhysicsParams) -> None:
+    """Check that a solver reads all numerics that were set.
+
+    Raises:
+        ValueError: It does not.
+    """
+    usual = type(physics).model_fields["sleep_tolerance"].default
+    if solver == "chain" and physics.sleep_tolerance != usual:
+        raise ValueError(
+            f"physics.sleep_tolerance: expected {usual:g}, as nothing sleeps with the solver chain, "
+            f"found {physics.sleep_tolerance:g}"
+        )
+
+
 def warm_up() -> None:
     """Compile the chain, or read it where it was kept, before processes need it.
 

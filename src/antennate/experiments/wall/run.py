@@ -10,9 +10,9 @@ is counted once more without the `start`. A trial that does both counts as a jam
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import model_validator
@@ -26,6 +26,7 @@ from antennate.params.bench import BenchVariationParams, WallParams
 from antennate.params.scene import BenchPhysicsParams
 from antennate.robots.antenna import AntennaSpec
 from antennate.robots.sensor import SensorParams
+from antennate.sim import chain
 from antennate.sim.bench import Ball, Bench, compile_bench
 from antennate.studies.experiment import OnRow, OnStep, no_row, no_step
 from antennate.studies.pool import gather
@@ -60,6 +61,10 @@ class WallConfig(Params):
         tuple(PROFILES), "1", "paper: its three; assumed: two controls it lacks", min_length=1
     )
     """Profiles to run."""
+    solver: Literal["mujoco", "chain"] = number(
+        "mujoco", "1", "assumed: needs no further package; docs/science/chain.md compares them"
+    )
+    """What steps the physics: the engine, or the compiled chain of the extra `fast`."""
     wall: WallParams = WallParams()
     antenna: AntennaSpec = AntennaSpec()
     variation: BenchVariationParams = BenchVariationParams()
@@ -84,6 +89,7 @@ class WallConfig(Params):
             raise ValueError(
                 f"physics.timestep must divide {_COMMAND_PERIOD:g} s, got {self.physics.timestep:g}"
             )
+        chain.require_read(self.solver, self.physics)
         return self
 
 
@@ -131,7 +137,14 @@ def passage(
 ) -> Traverse:
     """Move one antenna along the wall.
 
+    Args:
+        config: What is run.
+        profile: Springs of the antenna.
+        trial: Which of its trials.
+        watch: Looks at the bench of the engine; the chain has none.
+
     Raises:
+        MissingPackageError: The solver needs a package that is not installed.
         SimulationError: The physics became invalid.
     """
     rng = np.random.default_rng([config.seed, trial])
@@ -143,27 +156,27 @@ def passage(
     phase = rng.uniform(0.0, 1.0) * wall.sphere_diameter
     antenna = with_profile(config.antenna, profile)
     antenna = antenna.model_copy(update={"friction": min(friction, 2.0)})
-    bench = _bench(config, antenna, angle, phase, factors)
+    balls = _spheres(config, antenna, angle, phase)
+    pull = (0.0, {"down": -_GRAVITY, "up": _GRAVITY, "off": 0.0}[wall.gravity])
     crest = antenna.length * math.sin(angle) + antenna.radius + _CLEAR
-    return _drive(config, bench, math.pi / 2 - angle, overlap + _CLEAR, crest, watch)
+    way = (math.pi / 2 - angle, overlap + _CLEAR, crest)
+    if config.solver == "chain":
+        fast = chain.ChainBench(config.physics, antenna, balls, pull, factors=factors)
+        return _drive_chain(config, antenna, fast, *way)
+    model = compile_bench(config.physics, antenna, balls, pull)
+    for i, factor in enumerate(factors):
+        joint = model.joint(f"antenna/hinge{i}")
+        joint.stiffness *= factor
+    return _drive(config, Bench(model, antenna), *way, watch)
 
 
-def _bench(
-    config: WallConfig, antenna: AntennaSpec, angle: float, phase: float, factors: Floats
-) -> Bench:
-    """Bench with spheres all along the way, their crests clear of the tip at first."""
+def _spheres(config: WallConfig, antenna: AntennaSpec, angle: float, phase: float) -> list[Ball]:
+    """Spheres all along the way, their crests clear of the tip at first."""
     wall, pitch = config.wall, config.wall.sphere_diameter
     x = antenna.length * math.sin(angle) + antenna.radius + _CLEAR + pitch / 2
     below = -2 * pitch - max(0.0, -antenna.length * math.cos(angle))
     above = wall.travel + 1.2 * antenna.length
-    heights = np.arange(below + phase, above, pitch)
-    balls = [Ball(x, float(y), pitch / 2) for y in heights]
-    pull = {"down": -_GRAVITY, "up": _GRAVITY, "off": 0.0}[wall.gravity]
-    model = compile_bench(config.physics, antenna, balls, (0.0, pull))
-    for i, factor in enumerate(factors):
-        joint = model.joint(f"antenna/hinge{i}")
-        joint.stiffness *= factor
-    return Bench(model, antenna)
+    return [Ball(x, float(y), pitch / 2) for y in np.arange(below + phase, above, pitch)]
 
 
 def _drive(
@@ -180,7 +193,7 @@ def _drive(
     begin = bench.tip()[1]
     path = _ramp(wall.travel, wall.speed)
     rows, hinges, shapes = [], [], []
-    marks = {round(i * (len(path) - 1) / 10) for i in range(11)}
+    marks = _marks(path)
     for i, y in enumerate(path):
         bench.command(approach, y, 0.0, wall.speed, base)
         bench.step(substeps)
@@ -195,6 +208,41 @@ def _drive(
     base_y, tip_y, touching, forces, flex = np.array(rows, float).T
     from_crest = np.array(shapes) - [crest, 0.0]
     return Traverse(base_y, tip_y, touching, forces, flex, np.array(hinges), from_crest)
+
+
+def _drive_chain(
+    config: WallConfig,
+    antenna: AntennaSpec,
+    bench: chain.ChainBench,
+    base: float,
+    approach: float,
+    crest: float,
+) -> Traverse:
+    """As `_drive`, all commands of a way at once."""
+    speed, timestep = config.wall.speed, config.physics.timestep
+    substeps = round(_COMMAND_PERIOD / timestep)
+    bench.place(0.0, 0.0, base)
+    bench.drive(bench.commands(np.zeros((1, 2)), np.zeros(2), base), round(_SETTLE / timestep))
+    ahead, path = np.array(_ramp(approach, speed)), np.array(_ramp(config.wall.travel, speed))
+    there = np.column_stack([ahead, np.zeros_like(ahead)])
+    came = bench.drive(bench.commands(there, np.array([speed, 0.0]), base), substeps)
+    along = np.column_stack([np.full_like(path, approach), path])
+    went = bench.drive(bench.commands(along, np.array([0.0, speed]), base), substeps)
+    at = slice(None, None, _SAMPLES)
+    return Traverse(
+        path[at],
+        went.joints[at, -1, 1] - came.joints[-1, -1, 1],
+        went.touching[at].astype(float),
+        np.hypot(*went.force[at].T),
+        went.hinges[at, : antenna.sensed_hinges].sum(axis=1),
+        went.hinges[at].copy(),
+        went.joints[sorted(_marks(path))] - [crest, 0.0],
+    )
+
+
+def _marks(path: Sequence[float] | Floats) -> set[int]:
+    """Where on a way the antenna's shape is kept: every tenth."""
+    return {round(i * (len(path) - 1) / 10) for i in range(11)}
 
 
 def _ramp(length: float, speed: float) -> list[float]:
@@ -225,8 +273,11 @@ def run(
     """Run all trials of all profiles.
 
     Raises:
+        MissingPackageError: The solver needs a package that is not installed.
         WorkerError: A worker process died.
     """
+    if config.solver == "chain":
+        chain.warm_up()
     tasks = [
         (config, profile, trial) for trial in range(config.trials) for profile in config.profiles
     ]
