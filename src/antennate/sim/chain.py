@@ -77,23 +77,45 @@ def warm_up() -> None:
 
 @dataclass(frozen=True, slots=True)
 class Motion:
-    """What the antenna did, a row after each of k commands.
+    """What the antenna did, a row after each of k commands; `motion[rows]` keeps some of them.
 
     Attributes:
-        joints: Positions of the n hinges and the tip [m], shape (k, n + 1, 2).
-        base: Angle of the base [rad], shape (k,).
-        hinges: Angles of the hinges [rad], shape (k, n).
+        lengths: Of the links [m], shape (n,).
+        states: Place of the carriage [m], angles from the x axis of base and links [rad], place of
+            the rod [m], shape (k, n + 5).
         force: Force of all obstacles on the antenna in the last physics step [N], shape (k, 2).
         touching: Whether any of them pressed then, shape (k,).
-        probe: Place of the rod [m], shape (k, 2); meaningless without one.
     """
 
-    joints: Floats
-    base: Floats
-    hinges: Floats
+    lengths: Floats
+    states: Floats
     force: Floats
     touching: Bools
-    probe: Floats
+
+    def __getitem__(self, rows: slice | Sequence[int]) -> Motion:
+        return Motion(self.lengths, self.states[rows], self.force[rows], self.touching[rows])
+
+    @property
+    def base(self) -> Floats:
+        """Angle of the base [rad], shape (k,)."""
+        return self.states[:, 2]
+
+    @property
+    def hinges(self) -> Floats:
+        """Angles of the hinges [rad], shape (k, n)."""
+        return np.diff(self.states[:, 2:-2], axis=1)
+
+    @property
+    def joints(self) -> Floats:
+        """Positions of the n hinges and the tip [m], shape (k, n + 1, 2)."""
+        angles, start = self.states[:, 3:-2], self.states[:, None, :2]
+        ways = self.lengths[:, None] * np.stack([np.cos(angles), np.sin(angles)], axis=-1)
+        return np.concatenate([start, start + np.cumsum(ways, axis=1)], axis=1)
+
+    @property
+    def probe(self) -> Floats:
+        """Place of the rod [m], shape (k, 2); of no meaning without one."""
+        return self.states[:, -2:]
 
 
 class ChainBench:
@@ -200,14 +222,7 @@ class ChainBench:
             raise SimulationError(
                 self._steps, crowded if made == self._kernel.CROWDED else out
             )
-        angles = states[:, 2:-2]
-        steps_on = self._model.length[1:, None] * np.stack(
-            [np.cos(angles[:, 1:]), np.sin(angles[:, 1:])], axis=-1
-        )
-        start = states[:, None, :2]
-        joints = np.concatenate([start, start + np.cumsum(steps_on, axis=1)], axis=1)
-        base, hinges = angles[:, 0], np.diff(angles, axis=1)
-        return Motion(joints, base, hinges, force, touching, states[:, -2:])
+        return Motion(self._model.length[1:], states, force, touching)
 
 
 def _capsule(obstacle: Ball | Bar) -> tuple[float, float, float, float, float]:

@@ -32,7 +32,12 @@ _SMALL_TURN = 5e-3
 """Turns in a step up to this need five terms of their series only [rad]."""
 _ANGLE_LIMIT, _SPEED_LIMIT = 6.3, 1e4
 """No hinge of a sound bench turns farther [rad]; no coordinate is faster [m/s or rad/s]."""
-_RULES = {"cache": True, "fastmath": {"contract", "nsz", "arcp", "reassoc"}, "error_model": "numpy"}
+_RULES = {
+    "cache": True,
+    "fastmath": {"contract", "nsz", "arcp", "reassoc"},
+    "error_model": "numpy",
+    "forceinline": True,
+}
 
 
 class Model(NamedTuple):
@@ -108,7 +113,7 @@ class _Touches(NamedTuple):
 
 
 @njit(**_RULES)
-def _smooth(model, q, v, cosine, sine, command, torque, pull):
+def _smooth(model, q, v, arms, command, torque, pull):
     """Torque on each joint and force on the carriage of springs, servos, weight and spin.
 
     Spin and weight are what it takes to keep all joints from speeding up, from the tip inwards.
@@ -116,15 +121,14 @@ def _smooth(model, q, v, cosine, sine, command, torque, pull):
     count, gravity, servo, mass = len(model.length), model.gravity, model.servo, model.link_mass
     ax, ay = -gravity[0], -gravity[1]
     for i in range(count):
-        spin = v[2 + i] * v[2 + i] * model.length[i]
-        pull[i, 0] = mass[i] * (ax - 0.5 * spin * cosine[i])
-        pull[i, 1] = mass[i] * (ay - 0.5 * spin * sine[i])
-        ax -= spin * cosine[i]
-        ay -= spin * sine[i]
+        spin = v[2 + i] * v[2 + i]
+        pull[i, 0] = mass[i] * (ax - 0.5 * spin * arms[i, 0])
+        pull[i, 1] = mass[i] * (ay - 0.5 * spin * arms[i, 1])
+        ax -= spin * arms[i, 0]
+        ay -= spin * arms[i, 1]
     fx, fy, moment = 0.0, 0.0, 0.0
     for i in range(count - 1, -1, -1):
-        dx, dy = model.length[i] * cosine[i], model.length[i] * sine[i]
-        moment += dx * (fy + 0.5 * pull[i, 1]) - dy * (fx + 0.5 * pull[i, 0])
+        moment += arms[i, 0] * (fy + 0.5 * pull[i, 1]) - arms[i, 1] * (fx + 0.5 * pull[i, 0])
         fx += pull[i, 0]
         fy += pull[i, 1]
         before, slow = (q[1 + i], v[1 + i]) if i else (command[4], 0.0)
@@ -137,55 +141,58 @@ def _smooth(model, q, v, cosine, sine, command, torque, pull):
 
 
 @njit(**_RULES)
-def _fold(model, cosine, sine, ahead, torque, chain):
-    """Fold the chain from its tip onto the carriage: inertia of what hangs on each joint.
+def _fold(model, arms, ahead, chain):
+    """Inertia of all that hangs on each joint, from the tip inwards.
 
     Args:
         model: The bench.
-        cosine: Of each body's angle; `sine` too.
+        arms: From each joint to the next [m], shape (n + 1, 2).
         ahead: Time of damping that counts as inertia [s]: the timestep for an implicit step.
-        torque: Shape (n + 3,); replaced by what is left for each joint, and for the carriage.
-        chain: Written. Of each joint the row of its inertia, angle and x and y, shape (n + 1, 3),
-            the inverse of its own, and of the carriage the inverse inertia xx, xy and yy, shape
-            (n + 2, 4).
+        chain: Written, shape (n + 2, 4). Of each joint the row of that inertia, angle and x and y,
+            and the inverse of its own; last of the carriage the inverse inertia xx, xy and yy.
     """
     turning, tx, ty, xx, xy, yy = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    moment, fx, fy = 0.0, 0.0, 0.0
-    for i in range(len(model.length) - 1, -1, -1):
-        dx, dy = model.length[i] * cosine[i], model.length[i] * sine[i]
-        mass = model.link_mass[i]
+    last = len(model.length)
+    for i in range(last - 1, -1, -1):
+        dx, dy, mass = arms[i, 0], arms[i, 1], model.link_mass[i]
         kx, ky = tx - xx * dy + xy * dx, ty - xy * dy + yy * dx
         turning += dx * (ty + ky) - dy * (tx + kx) + model.inertia[i]
         tx, ty = kx - 0.5 * mass * dy, ky + 0.5 * mass * dx
-        xx += mass
-        yy += mass
-        moment += dx * fy - dy * fx
         own = 1.0 / (turning + model.armature[i] + ahead * model.damping[i])
-        left = torque[2 + i] - moment
-        torque[2 + i] = left
         chain[i, 0], chain[i, 1], chain[i, 2], chain[i, 3] = turning, tx, ty, own
-        share, gx, gy = left * own, tx * own, ty * own
-        moment += turning * share
-        fx += tx * share
-        fy += ty * share
-        xx -= tx * gx
+        gx, gy = tx * own, ty * own
+        xx += mass - tx * gx
         xy -= tx * gy
-        yy -= ty * gy
+        yy += mass - ty * gy
         tx -= turning * gx
         ty -= turning * gy
         turning -= turning * turning * own
     heavy = model.mass + ahead * model.servo[1]
     xx, yy = xx + heavy, yy + heavy
-    inverse, last = 1.0 / (xx * yy - xy * xy), len(model.length)
+    inverse = 1.0 / (xx * yy - xy * xy)
     chain[last, 0], chain[last, 1], chain[last, 2] = yy * inverse, -xy * inverse, xx * inverse
+
+
+@njit(**_RULES)
+def _inward(arms, chain, link, torque):
+    """What is left of torques up to a link, and of the carriage's force, once joints give way."""
+    moment, fx, fy = 0.0, 0.0, 0.0
+    for i in range(link, -1, -1):
+        moment += arms[i, 0] * fy - arms[i, 1] * fx
+        left = torque[2 + i] - moment
+        torque[2 + i] = left
+        share = left * chain[i, 3]
+        moment += chain[i, 0] * share
+        fx += chain[i, 1] * share
+        fy += chain[i, 2] * share
     torque[0] -= fx
     torque[1] -= fy
 
 
 @njit(**_RULES)
-def _unfold(model, cosine, sine, chain, torque):
+def _outward(arms, chain, torque):
     """Accelerations of the carriage and the angles of all bodies, in place of what is left."""
-    last = len(model.length)
+    last = len(arms)
     fx, fy = torque[0], torque[1]
     ax = chain[last, 0] * fx + chain[last, 1] * fy
     ay = chain[last, 1] * fx + chain[last, 2] * fy
@@ -194,23 +201,8 @@ def _unfold(model, cosine, sine, chain, torque):
         held = chain[i, 0] * angle + chain[i, 1] * ax + chain[i, 2] * ay
         angle += (torque[2 + i] - held) * chain[i, 3]
         torque[2 + i] = angle
-        ax -= model.length[i] * sine[i] * angle
-        ay += model.length[i] * cosine[i] * angle
-
-
-@njit(**_RULES)
-def _fold_row(model, cosine, sine, chain, link, turn, moment, fx, fy, out):
-    """Fold a torque on a joint and a force on its link as `_fold` does: what is left of them."""
-    for i in range(link, -1, -1):
-        left = moment + turn
-        turn, out[2 + i], share = 0.0, left, left * chain[i, 3]
-        moment -= chain[i, 0] * share
-        fx -= chain[i, 1] * share
-        fy -= chain[i, 2] * share
-        if i:
-            dx, dy = model.length[i - 1] * cosine[i - 1], model.length[i - 1] * sine[i - 1]
-            moment += dx * fy - dy * fx
-    out[0], out[1] = fx, fy
+        ax -= arms[i, 1] * angle
+        ay += arms[i, 0] * angle
 
 
 @njit(**_RULES)
@@ -267,6 +259,14 @@ def _hardness(rule, weight, depth):
 
 
 @njit(**_RULES)
+def _begin(touches, at, link, obstacle, turn):
+    """A touch; what lasts begins with the forces of the step before."""
+    if touches.link[at] != link or touches.obstacle[at] != obstacle:
+        touches.force[2 * at] = touches.force[2 * at + 1] = 0.0
+    touches.link[at], touches.obstacle[at], touches.turn[at] = link, obstacle, turn
+
+
+@njit(**_RULES)
 def _stops(model, q, v, touches):
     """Joints beyond their stops."""
     count = 0
@@ -277,7 +277,7 @@ def _stops(model, q, v, touches):
             sign = -1.0 if turn > 0.0 else 1.0
             speed = sign * (v[2 + i] - (v[1 + i] if i else 0.0))
             hard, pull, drag = _hardness(model.stopping, model.stop_weight[i], depth)
-            touches.link[count], touches.obstacle[count], touches.turn[count] = i, -1, sign
+            _begin(touches, count, i, -1, sign)
             touches.normal[count] = 0.0
             touches.grip[count] = 0.0
             touches.hardness[2 * count], touches.hardness[2 * count + 1] = hard, 0.0
@@ -287,7 +287,7 @@ def _stops(model, q, v, touches):
 
 
 @njit(**_RULES)
-def _contacts(model, v, joints, cosine, sine, pairs, pair_count, first, touches):
+def _contacts(model, v, joints, arms, cosine, sine, pairs, pair_count, first, touches):
     """Pairs that overlap, written behind the first ones; returns how many touches there are."""
     count, rod = first, len(model.length) + 2
     for p in range(pair_count):
@@ -309,12 +309,12 @@ def _contacts(model, v, joints, cosine, sine, pairs, pair_count, first, touches)
         px, py = px + middle * nx, py + middle * ny
         vx, vy, weight = v[0] - (py - y) * v[2 + i], v[1] + (px - x) * v[2 + i], 0.0
         for j in range(1, i):
-            vx -= (joints[j + 1, 1] - joints[j, 1]) * v[2 + j]
-            vy += (joints[j + 1, 0] - joints[j, 0]) * v[2 + j]
+            vx -= arms[j, 1] * v[2 + j]
+            vy += arms[j, 0] * v[2 + j]
         if k == model.rod:
             vx, vy, weight = vx - v[rod], vy - v[rod + 1], 2.0 / (3.0 * model.mass)
         hard, pull, drag = _hardness(model.touch, model.touch_weight[i] + weight, depth)
-        touches.link[count], touches.obstacle[count], touches.turn[count] = i, k, 0.0
+        _begin(touches, count, i, k, 0.0)
         touches.place[count, 0], touches.place[count, 1] = px, py
         touches.normal[count, 0], touches.normal[count, 1] = nx, ny
         touches.grip[count] = model.friction
@@ -389,11 +389,20 @@ def _eliminate(matrix, vector, size):
 
 
 @njit(**_RULES)
+def _missed(size, touches, coupling, miss):
+    """What misses the wanted acceleration with the forces as they are."""
+    for i in range(size):
+        value = touches.missed[i]
+        for j in range(size):
+            value += coupling[i, j] * touches.force[j]
+        miss[i] = value
+
+
+@njit(**_RULES)
 def _press(count, touches, coupling, miss, system, step, phase):
     """Forces of all touches by Newton's method, into `touches.force`."""
     size, force = 2 * count, touches.force
-    for i in range(size):
-        force[i], miss[i] = 0.0, touches.missed[i]
+    _missed(size, touches, coupling, miss)
     energy = _energy(count, touches, coupling, miss, force, phase)
     for _ in range(_ITERATIONS):
         for i in range(count):
@@ -415,11 +424,7 @@ def _press(count, touches, coupling, miss, system, step, phase):
         for _ in range(_HALVINGS):
             for i in range(size):
                 force[i] += share * step[i]
-            for i in range(size):
-                value = touches.missed[i]
-                for j in range(size):
-                    value += coupling[i, j] * force[j]
-                miss[i] = value
+            _missed(size, touches, coupling, miss)
             energy = _energy(count, touches, coupling, miss, force, phase)
             if energy <= before + 1e-12 * abs(before):
                 break
@@ -434,34 +439,39 @@ def _press(count, touches, coupling, miss, system, step, phase):
 
 
 @njit(**_RULES)
-def _resist(model, joints, cosine, sine, count, touches, work, torque, rod_force):
+def _resist(model, joints, arms, count, touches, work, torque, rod_force):
     """Add what touches exert to the torques on all joints and the forces on carriage and rod."""
     chain, free, rows, coupling, miss, system, step, phase = work
     size, last, held = len(model.length) + 2, len(model.length), 1.0 / model.mass
     for i in range(size):
         free[i] = torque[i]
-    _fold(model, cosine, sine, 0.0, free, chain)
+    _inward(arms, chain, last - 1, free)
     for a in range(2 * count):
         k, row = a // 2, rows[a]
         i, nx, ny = touches.link[k], touches.normal[k, 0], touches.normal[k, 1]
-        ex, ey, turn = (nx, ny, touches.turn[k]) if a % 2 == 0 else (-ny, nx, 0.0)
-        dx, dy = touches.place[k, 0] - joints[i, 0], touches.place[k, 1] - joints[i, 1]
-        _fold_row(model, cosine, sine, chain, i, turn, dx * ey - dy * ex, ex, ey, row)
+        ex, ey = (nx, ny) if a % 2 == 0 else (-ny, nx)
+        px, py = touches.place[k, 0], touches.place[k, 1]
+        row[0], row[1] = ex, ey
+        for j in range(i + 1):
+            row[2 + j] = (px - joints[j, 0]) * ey - (py - joints[j, 1]) * ex
+        if touches.turn[k] != 0.0:
+            row[2 + i] = touches.turn[k] if a % 2 == 0 else 0.0
+        _inward(arms, chain, i, row)
         bx = chain[last, 0] * row[0] + chain[last, 1] * row[1]
         by = chain[last, 1] * row[0] + chain[last, 2] * row[1]
+        on_rod = model.rod >= 0 and touches.obstacle[k] == model.rod
         value = bx * free[0] + by * free[1] - touches.missed[a]
         for j in range(i + 1):
             value += row[2 + j] * chain[j, 3] * free[2 + j]
-        on_rod = touches.obstacle[k] == model.rod and touches.turn[k] == 0.0
         if on_rod:
             value -= held * (ex * rod_force[0] + ey * rod_force[1])
         touches.missed[a] = value
         for b in range(a + 1):
-            value = bx * rows[b, 0] + by * rows[b, 1]
-            for j in range(min(i, touches.link[b // 2]) + 1):
+            value, other = bx * rows[b, 0] + by * rows[b, 1], b // 2
+            for j in range(min(i, touches.link[other]) + 1):
                 value += row[2 + j] * chain[j, 3] * rows[b, 2 + j]
-            if on_rod and touches.obstacle[b // 2] == model.rod and touches.turn[b // 2] == 0.0:
-                ox, oy = touches.normal[b // 2, 0], touches.normal[b // 2, 1]
+            if on_rod and touches.obstacle[other] == model.rod:
+                ox, oy = touches.normal[other, 0], touches.normal[other, 1]
                 value += held * (ex * ox + ey * oy if b % 2 == 0 else ey * ox - ex * oy)
             coupling[a, b] = coupling[b, a] = value
     _press(count, touches, coupling, miss, system, step, phase)
@@ -496,11 +506,14 @@ def _turn(count, q, v, h, cosine, sine):
 
 
 @njit(**_RULES)
-def _place(model, q, cosine, sine, joints):
-    joints[0, 0], joints[0, 1] = q[0], q[1]
+def _place(model, q, cosine, sine, arms, joints):
+    """Where all joints are, and the way from each to the next."""
+    x, y = q[0], q[1]
     for i in range(len(model.length)):
-        joints[i + 1, 0] = joints[i, 0] + model.length[i] * cosine[i]
-        joints[i + 1, 1] = joints[i, 1] + model.length[i] * sine[i]
+        joints[i, 0], joints[i, 1] = x, y
+        arms[i, 0], arms[i, 1] = model.length[i] * cosine[i], model.length[i] * sine[i]
+        x += arms[i, 0]
+        y += arms[i, 1]
 
 
 @njit(**_RULES)
@@ -536,8 +549,8 @@ def drive(model, q, v, commands, steps, states, forces, touching):
     count, h, rod = len(model.length), model.timestep, model.rod
     size, most = count + 2, 2 * MOST_TOUCHES
     chain, torque, pull = np.zeros((count + 1, 4)), np.zeros(size), np.zeros((count, 2))
-    cosine, sine, joints = np.cos(q[2:size]), np.sin(q[2:size]), np.zeros((count + 1, 2))
-    rod_force = np.zeros(2)
+    cosine, sine, joints = np.cos(q[2:size]), np.sin(q[2:size]), np.zeros((count, 2))
+    arms, rod_force = np.zeros((count, 2)), np.zeros(2)
     touches = _Touches(
         np.zeros(MOST_TOUCHES, np.int64),
         np.zeros(MOST_TOUCHES, np.int64),
@@ -570,20 +583,22 @@ def drive(model, q, v, commands, steps, states, forces, touching):
                 model.obstacles[rod, d] = model.obstacles[rod, 2 + d] = q[size + d]
                 rod_force[d] = model.servo[0] * (command[5 + d] - q[size + d])
                 rod_force[d] += model.servo[1] * (command[7 + d] - v[size + d])
-            _place(model, q, cosine, sine, joints)
+            _place(model, q, cosine, sine, arms, joints)
             if slack < 0.0:
                 pair_count, slack = _pairs(model, joints, cosine, sine, _SKIN, pairs), _SKIN
-            _smooth(model, q, v, cosine, sine, command, torque, pull)
+            _smooth(model, q, v, arms, command, torque, pull)
             stops = _stops(model, q, v, touches)
             touched = _contacts(
-                model, v, joints, cosine, sine, pairs, pair_count, stops, touches
+                model, v, joints, arms, cosine, sine, pairs, pair_count, stops, touches
             )
             if touched < 0:
                 return CROWDED, k
+            _fold(model, arms, h, chain)
             if touched > 0:
-                _resist(model, joints, cosine, sine, touched, touches, work, torque, rod_force)
-            _fold(model, cosine, sine, h, torque, chain)
-            _unfold(model, cosine, sine, chain, torque)
+                _fold(model, arms, 0.0, work[0])
+                _resist(model, joints, arms, touched, touches, work, torque, rod_force)
+            _inward(arms, chain, count - 1, torque)
+            _outward(arms, chain, torque)
             for i in range(size):
                 v[i] += h * torque[i]
                 q[i] += h * v[i]

@@ -228,15 +228,15 @@ def _drive_chain(
     came = bench.drive(bench.commands(there, np.array([speed, 0.0]), base), substeps)
     along = np.column_stack([np.full_like(path, approach), path])
     went = bench.drive(bench.commands(along, np.array([0.0, speed]), base), substeps)
-    at = slice(None, None, _SAMPLES)
+    seen = went[:: _SAMPLES]
     return Traverse(
-        path[at],
-        went.joints[at, -1, 1] - came.joints[-1, -1, 1],
-        went.touching[at].astype(float),
-        np.hypot(*went.force[at].T),
-        went.hinges[at, : antenna.sensed_hinges].sum(axis=1),
-        went.hinges[at].copy(),
-        went.joints[sorted(_marks(path))] - [crest, 0.0],
+        path[::_SAMPLES],
+        seen.joints[:, -1, 1] - came[-1:].joints[-1, -1, 1],
+        seen.touching.astype(float),
+        np.hypot(*seen.force.T),
+        seen.hinges[:, : antenna.sensed_hinges].sum(axis=1),
+        seen.hinges,
+        went[sorted(_marks(path))].joints - [crest, 0.0],
     )
 
 
