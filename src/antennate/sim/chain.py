@@ -154,8 +154,8 @@ class ChainBench:
             radius=antenna.radius,
             friction=max(antenna.friction, _LEAST_FRICTION),
             impratio=physics.impratio,
-            touch=_softness(physics, (physics.contact_time, *CONTACT_IMPEDANCE)),
-            stopping=_softness(physics, _STOP),
+            touch=_softness(physics, physics.contact_time, *CONTACT_IMPEDANCE),
+            stopping=_softness(physics, *_STOP),
             obstacles=np.array(ends, float).reshape(-1, 5),
             rod=-1 if probe_radius is None else len(ends) - 1,
         )
@@ -231,9 +231,20 @@ def _capsule(obstacle: Ball | Bar) -> tuple[float, float, float, float, float]:
     return obstacle.x0, obstacle.y0, obstacle.x1, obstacle.y1, obstacle.radius
 
 
-def _softness(physics: PhysicsParams, rule: tuple[float, ...]) -> Floats:
-    """The rule with the time constant that the engine uses: never below two timesteps."""
-    return np.array([max(rule[0], 2.0 * physics.timestep), *rule[1:]])
+def _softness(
+    physics: PhysicsParams, time: float, least: float, most: float, depth: float
+) -> Floats:
+    """A contact's impedances and its critically damped spring, as the engine takes them.
+
+    Args:
+        physics: Numerics.
+        time: Time constant [s]; below two timesteps the engine takes two.
+        least: Impedance of a touch.
+        most: Impedance at `depth` [m or rad].
+        depth: How deep that is.
+    """
+    rate = 1.0 / (most * max(time, 2.0 * physics.timestep))
+    return np.array([least, most - least, 1.0 / depth, rate**2, 2.0 * rate])
 
 
 def _bodies(antenna: AntennaSpec, factors: Floats) -> dict[str, float | Floats]:

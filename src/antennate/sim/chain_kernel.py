@@ -58,8 +58,8 @@ class Model(NamedTuple):
         radius: Of the antenna [m].
         friction: Against all obstacles.
         impratio: Stiffness of friction over that of the normal.
-        touch: Time constant [s], least and largest impedance, and their width [m], of contacts,
-            shape (4,); `stopping` of stops.
+        touch: Of contacts the least impedance, what the largest adds, the inverse of the depth of
+            the largest [1/m], stiffness [1/s²] and damping [1/s], shape (5,); `stopping` of stops.
         obstacles: Ends and radius of each capsule [m], shape (m, 5); a ball's ends are the same.
         rod: Which of them is the rod, -1 without one.
     """
@@ -207,26 +207,23 @@ def _outward(arms, chain, torque):
 
 @njit(**_RULES)
 def _nearest(obstacle, x, y, c, s, length):
-    """Nearest points of a link from x, y along c, s and an obstacle's axis: share of the link's
-    length, and the point of the obstacle."""
+    """Nearest points of a link from x, y along c, s and of an obstacle's axis: way along the link
+    [m], and the point of the obstacle."""
     ax, ay = obstacle[0], obstacle[1]
     bx, by = obstacle[2] - ax, obstacle[3] - ay
     dx, dy = ax - x, ay - y
-    along = length * length
+    along = dx * c + dy * s
     if bx == 0.0 and by == 0.0:
-        share = (dx * c + dy * s) / length
-        return min(max(share, 0.0), 1.0), ax, ay
-    ux, uy = length * c, length * s
-    square, both = bx * bx + by * by, ux * bx + uy * by
-    du, db = dx * ux + dy * uy, dx * bx + dy * by
-    away = along * square - both * both
-    share = (du * square - db * both) / away if away > 1e-15 else 0.5
-    share = min(max(share, 0.0), 1.0)
-    other = (share * both - db) / square
+        return min(max(along, 0.0), length), ax, ay
+    square, both, across = bx * bx + by * by, c * bx + s * by, dx * bx + dy * by
+    apart = square - both * both
+    way = (along * square - across * both) / apart if apart > 1e-12 * square else 0.5 * length
+    way = min(max(way, 0.0), length)
+    other = (way * both - across) / square
     if other < 0.0 or other > 1.0:
         other = min(max(other, 0.0), 1.0)
-        share = min(max((du + other * both) / along, 0.0), 1.0)
-    return share, ax + other * bx, ay + other * by
+        way = min(max(along + other * both, 0.0), length)
+    return way, ax + other * bx, ay + other * by
 
 
 @njit(**_RULES)
@@ -237,8 +234,7 @@ def _pairs(model, joints, cosine, sine, reach, found):
         x, y, c, s = joints[i, 0], joints[i, 1], cosine[i], sine[i]
         for k in range(len(model.obstacles)):
             obstacle = model.obstacles[k]
-            share, px, py = _nearest(obstacle, x, y, c, s, model.length[i])
-            way = share * model.length[i]
+            way, px, py = _nearest(obstacle, x, y, c, s, model.length[i])
             near = reach + model.radius + obstacle[4]
             if (x + way * c - px) ** 2 + (y + way * s - py) ** 2 < near * near:
                 found[count, 0], found[count, 1] = i, k
@@ -249,13 +245,11 @@ def _pairs(model, joints, cosine, sine, reach, found):
 @njit(**_RULES)
 def _hardness(rule, weight, depth):
     """Inverse of the softness of a contact, its pull back and its damping, as the engine's."""
-    low, high, width = rule[1], rule[2], rule[3]
-    share = min(abs(depth) / width, 1.0)
+    share = min(-depth * rule[2], 1.0)
     bent = 2.0 * share * share if share < 0.5 else 1.0 - 2.0 * (1.0 - share) ** 2
-    impedance = low + bent * (high - low)
+    impedance = rule[0] + bent * rule[1]
     hardness = impedance / ((1.0 - impedance) * weight)
-    pull = -impedance * depth / (high * rule[0]) ** 2
-    return hardness, pull, 2.0 / (high * rule[0])
+    return hardness, -impedance * depth * rule[3], rule[4]
 
 
 @njit(**_RULES)
@@ -293,8 +287,7 @@ def _contacts(model, v, joints, arms, cosine, sine, pairs, pair_count, first, to
     for p in range(pair_count):
         i, k = pairs[p, 0], pairs[p, 1]
         x, y, c, s = joints[i, 0], joints[i, 1], cosine[i], sine[i]
-        share, px, py = _nearest(model.obstacles[k], x, y, c, s, model.length[i])
-        way = share * model.length[i]
+        way, px, py = _nearest(model.obstacles[k], x, y, c, s, model.length[i])
         nx, ny = x + way * c - px, y + way * s - py
         reach = model.radius + model.obstacles[k, 4]
         square = nx * nx + ny * ny
