@@ -27,7 +27,10 @@ CROWDED, BURST = -1, -2
 """What `drive` returns in place of a success: too many contacts, or a state out of bounds."""
 _SKIN = 0.002
 """Pairs of link and obstacle farther apart are left out until the chain may have met them [m]."""
+_PARALLEL = 1e-4
+"""Sine of the angle up to which the engine takes two capsules as parallel."""
 _ITERATIONS, _HALVINGS = 100, 40
+"""Most steps of Newton's method, and halvings of one."""
 _SMALL_TURN = 5e-3
 """Turns in a step up to this need five terms of their series only [rad]."""
 _ANGLE_LIMIT, _SPEED_LIMIT = 6.3, 1e4
@@ -206,16 +209,27 @@ def _outward(arms, chain, torque):
 
 
 @njit(**_RULES)
-def _nearest(obstacle, x, y, c, s, length):
-    """Nearest points of a link from x, y along c, s and of an obstacle's axis: way along the link
-    [m], and the point of the obstacle."""
+def _nearest(obstacle, x, y, c, s, length, second):
+    """Where a link from x, y along c, s and an obstacle's axis are nearest.
+
+    A link along a bar touches it at both ends of what they share.
+
+    Returns:
+        Way along the link [m], and the point of the obstacle; for the `second` of two places a
+        way below 0 where there is one only.
+    """
     ax, ay = obstacle[0], obstacle[1]
     bx, by = obstacle[2] - ax, obstacle[3] - ay
     dx, dy = ax - x, ay - y
     along = dx * c + dy * s
     if bx == 0.0 and by == 0.0:
-        return min(max(along, 0.0), length), ax, ay
+        return -1.0 if second else min(max(along, 0.0), length), ax, ay
     square, both, across = bx * bx + by * by, c * bx + s * by, dx * bx + dy * by
+    low, high = max(0.0, min(along, along + both)), min(length, max(along, along + both))
+    if abs(c * by - s * bx) <= _PARALLEL * math.sqrt(square) and low < high:
+        way = low if second else high
+        other = (way * both - across) / square
+        return way, ax + other * bx, ay + other * by
     apart = square - both * both
     way = (along * square - across * both) / apart if apart > 1e-12 * square else 0.5 * length
     way = min(max(way, 0.0), length)
@@ -223,7 +237,7 @@ def _nearest(obstacle, x, y, c, s, length):
     if other < 0.0 or other > 1.0:
         other = min(max(other, 0.0), 1.0)
         way = min(max(along + other * both, 0.0), length)
-    return way, ax + other * bx, ay + other * by
+    return -1.0 if second else way, ax + other * bx, ay + other * by
 
 
 @njit(**_RULES)
@@ -234,7 +248,7 @@ def _pairs(model, joints, cosine, sine, reach, found):
         x, y, c, s = joints[i, 0], joints[i, 1], cosine[i], sine[i]
         for k in range(len(model.obstacles)):
             obstacle = model.obstacles[k]
-            way, px, py = _nearest(obstacle, x, y, c, s, model.length[i])
+            way, px, py = _nearest(obstacle, x, y, c, s, model.length[i], False)
             near = reach + model.radius + obstacle[4]
             if (x + way * c - px) ** 2 + (y + way * s - py) ** 2 < near * near:
                 found[count, 0], found[count, 1] = i, k
@@ -284,10 +298,12 @@ def _stops(model, q, v, touches):
 def _contacts(model, v, joints, arms, cosine, sine, pairs, pair_count, first, touches):
     """Pairs that overlap, written behind the first ones; returns how many touches there are."""
     count, rod = first, len(model.length) + 2
-    for p in range(pair_count):
-        i, k = pairs[p, 0], pairs[p, 1]
+    for p in range(2 * pair_count):
+        i, k, second = pairs[p // 2, 0], pairs[p // 2, 1], p % 2 == 1
         x, y, c, s = joints[i, 0], joints[i, 1], cosine[i], sine[i]
-        way, px, py = _nearest(model.obstacles[k], x, y, c, s, model.length[i])
+        way, px, py = _nearest(model.obstacles[k], x, y, c, s, model.length[i], second)
+        if way < 0.0:
+            continue
         nx, ny = x + way * c - px, y + way * s - py
         reach = model.radius + model.obstacles[k, 4]
         square = nx * nx + ny * ny
