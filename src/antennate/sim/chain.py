@@ -10,12 +10,13 @@ from __future__ import annotations
 import importlib
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
 from antennate.antenna.dynamics import link_inertia
-from antennate.errors import MissingPackageError, SimulationError
+from antennate.errors import MissingPackageError, OutputError, SimulationError
+from antennate.params.bench import Solver
 from antennate.params.scene import PhysicsParams
 from antennate.robots.antenna import AntennaSpec
 from antennate.sim.antenna_part import STOPS
@@ -39,6 +40,7 @@ def kernel() -> ModuleType:
 
     Raises:
         MissingPackageError: numba is not installed.
+        OutputError: What numba compiles cannot be kept.
     """
     try:
         return importlib.import_module("antennate.sim.chain_kernel")
@@ -46,12 +48,35 @@ def kernel() -> ModuleType:
         if (error.name or "").partition(".")[0] not in ("numba", "llvmlite"):
             raise
         raise MissingPackageError(
-            "solver chain: needs numba, which is not installed; "
-            "`pip install 'antennate[fast]'`, or take the solver mujoco"
-        ) from error
+            "solver: expected the package numba for chain, found none; install it with "
+            "`pip install 'antennate[fast]'`"
+        ) from None
+    except RuntimeError as error:
+        if "cannot cache" not in str(error):
+            raise
+        raise OutputError(
+            "solver: expected a folder to keep the compiled chain in, found none that can be "
+            "written; name one in the variable NUMBA_CACHE_DIR"
+        ) from None
 
 
-def require_read(solver: str, physics: PhysicsParams) -> None:
+class _Solved(Protocol):
+    @property
+    def solver(self) -> Solver: ...
+
+
+def require_solver(config: _Solved) -> None:
+    """Find out before a run whether its solver is there.
+
+    Raises:
+        MissingPackageError: numba is not installed.
+        OutputError: What numba compiles cannot be kept.
+    """
+    if config.solver == "chain":
+        kernel()
+
+
+def require_read(solver: Solver, physics: PhysicsParams) -> None:
     """Check that a solver reads all numerics that were set.
 
     Raises:
@@ -65,14 +90,16 @@ def require_read(solver: str, physics: PhysicsParams) -> None:
         )
 
 
-def warm_up() -> None:
-    """Compile the chain, or read it where it was kept, before processes need it.
+def warm_up(solver: Solver) -> None:
+    """Compile the chain, or read it where it was kept, before several processes need it.
 
     Raises:
         MissingPackageError: numba is not installed.
+        OutputError: What numba compiles cannot be kept.
     """
-    bench = ChainBench(PhysicsParams(), AntennaSpec(), [Ball(1.0, 0.0, 0.1)])
-    bench.drive(bench.commands(np.zeros((1, 2)), np.zeros((1, 2)), 0.0), 1)
+    if solver == "chain":
+        bench = ChainBench(PhysicsParams(), AntennaSpec(), [Ball(1.0, 0.0, 0.1)])
+        bench.drive(bench.commands(np.zeros((1, 2)), np.zeros(2), 0.0), 1)
 
 
 @dataclass(frozen=True, slots=True)

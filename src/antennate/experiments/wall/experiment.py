@@ -7,6 +7,7 @@ from typing import Any
 
 from antennate.experiments.wall import measures
 from antennate.experiments.wall import run as wall
+from antennate.sim.chain import require_solver
 from antennate.studies.experiment import Experiment
 from antennate.studies.measures import Table, successes
 
@@ -46,5 +47,5 @@ def _hangs(result: Mapping[str, Any]) -> str:
 
 
 EXPERIMENT = Experiment.of_folder(
-    __name__, wall.WallConfig, wall.run, tables, sentence, filmed=True
+    __name__, wall.WallConfig, wall.run, tables, sentence, filmed=True, check=require_solver
 )

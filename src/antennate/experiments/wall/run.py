@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar
 
 import numpy as np
 from pydantic import model_validator
@@ -22,7 +22,7 @@ from antennate.errors import SimulationError
 from antennate.experiments.wall import measures
 from antennate.experiments.wall.outcome import SAMPLE_PERIOD, Traverse, WallTrial, classify
 from antennate.params.base import Params, number, require_different
-from antennate.params.bench import BenchVariationParams, WallParams
+from antennate.params.bench import BenchVariationParams, Solver, WallParams, solver
 from antennate.params.scene import BenchPhysicsParams
 from antennate.robots.antenna import AntennaSpec
 from antennate.robots.sensor import SensorParams
@@ -61,10 +61,8 @@ class WallConfig(Params):
         tuple(PROFILES), "1", "paper: its three; assumed: two controls it lacks", min_length=1
     )
     """Profiles to run."""
-    solver: Literal["mujoco", "chain"] = number(
-        "mujoco", "1", "assumed: needs no further package; docs/science/chain.md compares them"
-    )
-    """What steps the physics: the engine, or the compiled chain of the extra `fast`."""
+    solver: Solver = solver()
+    """What steps the physics: the engine, or the compiled chain (extra `fast`; compiles once)."""
     wall: WallParams = WallParams()
     antenna: AntennaSpec = AntennaSpec()
     variation: BenchVariationParams = BenchVariationParams()
@@ -276,8 +274,7 @@ def run(
         MissingPackageError: The solver needs a package that is not installed.
         WorkerError: A worker process died.
     """
-    if config.solver == "chain":
-        chain.warm_up()
+    chain.warm_up(config.solver)
     tasks = [
         (config, profile, trial) for trial in range(config.trials) for profile in config.profiles
     ]
