@@ -35,12 +35,8 @@ _SMALL_TURN = 5e-3
 """Turns in a step up to this need five terms of their series only [rad]."""
 _ANGLE_LIMIT, _SPEED_LIMIT = 6.3, 1e4
 """No hinge of a sound bench turns farther [rad]; no coordinate is faster [m/s or rad/s]."""
-_RULES = {
-    "cache": True,
-    "fastmath": {"contract", "nsz", "arcp", "reassoc"},
-    "error_model": "numpy",
-    "forceinline": True,
-}
+_RULES = {"fastmath": {"contract", "nsz", "arcp", "reassoc"}, "error_model": "numpy"}
+_PART = {**_RULES, "forceinline": True, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 
 
 class Model(NamedTuple):
@@ -115,7 +111,7 @@ class _Touches(NamedTuple):
     force: Floats
 
 
-@njit(**_RULES)
+@njit(**_PART)
 def _smooth(model, q, v, arms, command, torque, pull):
     """Torque on each joint and force on the carriage of springs, servos, weight and spin.
 
@@ -143,7 +139,7 @@ def _smooth(model, q, v, arms, command, torque, pull):
     torque[1] = servo[0] * (command[1] - q[1]) + servo[1] * (command[3] - v[1]) - fy
 
 
-@njit(**_RULES)
+@njit(**_PART)
 def _fold(model, arms, ahead, chain):
     """Inertia of all that hangs on each joint, from the tip inwards.
 
@@ -176,7 +172,7 @@ def _fold(model, arms, ahead, chain):
     chain[last, 0], chain[last, 1], chain[last, 2] = yy * inverse, -xy * inverse, xx * inverse
 
 
-@njit(**_RULES)
+@njit(**_PART)
 def _inward(arms, chain, link, torque):
     """What is left of torques up to a link, and of the carriage's force, once joints give way."""
     moment, fx, fy = 0.0, 0.0, 0.0
@@ -192,7 +188,7 @@ def _inward(arms, chain, link, torque):
     torque[1] -= fy
 
 
-@njit(**_RULES)
+@njit(**_PART)
 def _outward(arms, chain, torque):
     """Accelerations of the carriage and the angles of all bodies, in place of what is left."""
     last = len(arms)
@@ -208,7 +204,7 @@ def _outward(arms, chain, torque):
         ay += arms[i, 0] * angle
 
 
-@njit(**_RULES)
+@njit(**_PART)
 def _nearest(obstacle, x, y, c, s, length, second):
     """Where a link from x, y along c, s and an obstacle's axis are nearest.
 
@@ -240,7 +236,7 @@ def _nearest(obstacle, x, y, c, s, length, second):
     return -1.0 if second else way, ax + other * bx, ay + other * by
 
 
-@njit(**_RULES)
+@njit(**_PART)
 def _pairs(model, joints, cosine, sine, reach, found):
     """Links and obstacles nearer than `reach` [m] to one another."""
     count = 0
@@ -256,7 +252,7 @@ def _pairs(model, joints, cosine, sine, reach, found):
     return count
 
 
-@njit(**_RULES)
+@njit(**_PART)
 def _hardness(rule, weight, depth):
     """Inverse of the softness of a contact, its pull back and its damping, as the engine's."""
     share = min(-depth * rule[2], 1.0)
@@ -266,7 +262,7 @@ def _hardness(rule, weight, depth):
     return hardness, -impedance * depth * rule[3], rule[4]
 
 
-@njit(**_RULES)
+@njit(**_PART)
 def _begin(touches, at, link, obstacle, turn):
     """A touch; what lasts begins with the forces of the step before."""
     if touches.link[at] != link or touches.obstacle[at] != obstacle:
@@ -274,7 +270,7 @@ def _begin(touches, at, link, obstacle, turn):
     touches.link[at], touches.obstacle[at], touches.turn[at] = link, obstacle, turn
 
 
-@njit(**_RULES)
+@njit(**_PART)
 def _stops(model, q, v, touches):
     """Joints beyond their stops."""
     count = 0
@@ -294,7 +290,7 @@ def _stops(model, q, v, touches):
     return count
 
 
-@njit(**_RULES)
+@njit(**_PART)
 def _contacts(model, v, joints, arms, cosine, sine, pairs, pair_count, first, touches):
     """Pairs that overlap, written behind the first ones; returns how many touches there are."""
     count, rod = first, len(model.length) + 2
@@ -335,7 +331,7 @@ def _contacts(model, v, joints, arms, cosine, sine, pairs, pair_count, first, to
     return count
 
 
-@njit(**_RULES)
+@njit(**_PART)
 def _cost(along, across, hard, hard_across, grip):
     """Cost of a miss of one contact and its phase: 0 free, 1 sticking, 2 and 3 sliding."""
     slip = abs(across)
@@ -348,7 +344,7 @@ def _cost(along, across, hard, hard_across, grip):
     return 0.5 * hard / (1.0 + grip * grip * ratio) * short * short, 2 if across > 0.0 else 3
 
 
-@njit(**_RULES)
+@njit(**_PART)
 def _slope(phase, hard, hard_across, grip):
     """Second derivatives of the cost of one contact in a phase: along, both, across."""
     if phase == 0:
@@ -360,7 +356,7 @@ def _slope(phase, hard, hard_across, grip):
     return soft, -sign * soft, sign * sign * soft
 
 
-@njit(**_RULES)
+@njit(**_PART)
 def _energy(count, touches, coupling, miss, force, phase):
     total = 0.0
     for i in range(count):
@@ -374,7 +370,7 @@ def _energy(count, touches, coupling, miss, force, phase):
     return total
 
 
-@njit(**_RULES)
+@njit(**_PART)
 def _eliminate(matrix, vector, size):
     """Solve in place, with pivots."""
     for k in range(size):
@@ -397,7 +393,7 @@ def _eliminate(matrix, vector, size):
         vector[k] /= matrix[k, k]
 
 
-@njit(**_RULES)
+@njit(**_PART)
 def _missed(size, touches, coupling, miss):
     """What misses the wanted acceleration with the forces as they are."""
     for i in range(size):
@@ -407,7 +403,7 @@ def _missed(size, touches, coupling, miss):
         miss[i] = value
 
 
-@njit(**_RULES)
+@njit(**_PART)
 def _press(count, touches, coupling, miss, system, step, phase):
     """Forces of all touches by Newton's method, into `touches.force`."""
     size, force = 2 * count, touches.force
@@ -447,7 +443,7 @@ def _press(count, touches, coupling, miss, system, step, phase):
             return
 
 
-@njit(**_RULES)
+@njit(**_PART)
 def _resist(model, joints, arms, count, touches, work, torque, rod_force):
     """Add what touches exert to the torques on all joints and the forces on carriage and rod."""
     chain, free, rows, coupling, miss, system, step, phase = work
@@ -501,7 +497,7 @@ def _resist(model, joints, arms, count, touches, work, torque, rod_force):
             rod_force[1] -= fy
 
 
-@njit(**_RULES)
+@njit(**_PART)
 def _turn(count, q, v, h, cosine, sine):
     """Sines and cosines of all bodies after a step."""
     for i in range(count):
@@ -514,7 +510,7 @@ def _turn(count, q, v, h, cosine, sine):
             cosine[i], sine[i] = math.cos(q[2 + i]), math.sin(q[2 + i])
 
 
-@njit(**_RULES)
+@njit(**_PART)
 def _place(model, q, cosine, sine, arms, joints):
     """Where all joints are, and the way from each to the next."""
     x, y = q[0], q[1]
@@ -525,7 +521,7 @@ def _place(model, q, cosine, sine, arms, joints):
         y += arms[i, 1]
 
 
-@njit(**_RULES)
+@njit(**_PART)
 def _sound(count, q, v):
     """Whether a state is finite and within bounds."""
     for i in range(count + 4):
@@ -537,7 +533,7 @@ def _sound(count, q, v):
     return True
 
 
-@njit(**_RULES)
+@njit(**_RULES, cache=True)
 def drive(model, q, v, commands, steps, states, forces, touching):
     """Step through commands and write what came of each.
 
