@@ -29,6 +29,8 @@ mujoco.set_mju_user_warning(lambda message: None)
 
 PREFIX = "robot/"
 _PLANE = int(mujoco.mjtGeom.mjGEOM_PLANE)
+CONTACT_IMPEDANCE = (0.95, 0.99, 0.0005)
+"""Least and largest impedance of contacts, and the depth of the largest [m]: `solimp`."""
 
 
 def new_spec(physics: PhysicsParams) -> mujoco.MjSpec:
@@ -77,7 +79,7 @@ def set_contacts(spec: mujoco.MjSpec, physics: PhysicsParams) -> None:
     """Give all contacts one stiffness, that of `contact_time`."""
     for geom in spec.geoms:
         geom.solref[0] = physics.contact_time
-        geom.solimp[:3] = [0.95, 0.99, 0.0005]
+        geom.solimp[:3] = CONTACT_IMPEDANCE
 
 
 def _meet_robot(spec: mujoco.MjSpec) -> None:
