@@ -8,17 +8,17 @@ from pathlib import Path
 _BAR = re.compile(r"`([^`]*\|[^`]*)`|\|")
 
 
-def finish(script: str, page: str) -> None:
-    """Write the page beside a script, of the same name; with --check only look.
+def finish(script: str, page: str, name: str | None = None) -> None:
+    """Write the page beside a script, of the same name or another; with --check only look.
 
     Raises:
         SystemExit: The page is not what the script would write.
     """
-    path = Path(script).with_suffix(".md")
+    path = Path(script).with_name(name or f"{Path(script).stem}.md")
     if "--check" not in sys.argv[1:]:
         path.write_text(page, encoding="utf-8")
     elif not path.exists() or path.read_text(encoding="utf-8") != page:
-        sys.exit(f"docs/{path.name} is out of date: run `python docs/{path.stem}.py`")
+        sys.exit(f"docs/{path.name} is out of date: run `python docs/{Path(script).name}`")
 
 
 def row(*cells: object) -> str:

@@ -23,7 +23,7 @@ _WORDS = (
     "--enable-unsafe-swiftshader --disable-background-networking --no-first-run "
     "--disable-component-update --disable-sync --hide-scrollbars --remote-debugging-port=0"
 )
-_STARTING = 60.0
+_STARTING = 120.0
 
 
 class Tab:
@@ -40,21 +40,36 @@ class Tab:
         self.troubles: list[str] = []
         for each in ("Page", "Network", "Runtime", "Log"):
             self.call(f"{each}.enable")
+        self.call(
+            "Target.setAutoAttach", autoAttach=True, waitForDebuggerOnStart=True, flatten=True
+        )
 
     def call(self, method: str, **params: Any) -> dict[str, Any]:
         """Call a method of the DevTools; its result."""
-        self._count += 1
-        self._connection.send(json.dumps({"id": self._count, "method": method, "params": params}))
+        number = self._send(method, params)
         while True:
             answer = json.loads(self._connection.recv(_STARTING))
-            if answer.get("id") == self._count:
+            if answer.get("id") == number:
                 assert "error" not in answer, (method, answer)
                 return answer["result"]
             self._note(answer.get("method", ""), answer.get("params", {}))
 
+    def _watch(self, session: str) -> None:
+        """Keep what a worker of the page asks for, too."""
+        for method in ("Network.enable", "Runtime.runIfWaitingForDebugger"):
+            self._send(method, {}, sessionId=session)
+
+    def _send(self, method: str, params: dict[str, Any], **more: str) -> int:
+        self._count += 1
+        message = {"id": self._count, "method": method, "params": params, **more}
+        self._connection.send(json.dumps(message))
+        return self._count
+
     def _note(self, event: str, params: dict[str, Any]) -> None:
         if event == "Network.requestWillBeSent":
             self.requests.append(params["request"]["url"][:200])
+        elif event == "Target.attachedToTarget":
+            self._watch(params["sessionId"])
         elif event == "Network.webSocketCreated":
             self.requests.append(params["url"])
         elif event == "Log.entryAdded" and params["entry"]["level"] == "error":
@@ -89,6 +104,17 @@ class Tab:
 
     def fill(self, label: str, text: str) -> None:
         """Type into the field behind a label, in place of what it holds."""
+        self._focus(label)
+        self.call("Input.insertText", text=text)
+        self._enter()
+
+    def choose(self, label: str, text: str) -> None:
+        """Choose an entry of the list behind a label."""
+        self._focus(label)
+        self.until("!!document.querySelector('[role=option]')")
+        self.click("[role=option]", text)
+
+    def _focus(self, label: str) -> None:
         script = f"""(() => {{
             let box = [...document.querySelectorAll('label')].find(e => e.textContent == {label!r});
             let field = null;
@@ -99,16 +125,12 @@ class Tab:
             return true;
         }})()"""
         assert self.run(script), label
-        self.call("Input.insertText", text=text)
-        time.sleep(0.2)
+
+    def _enter(self) -> None:
+        time.sleep(0.2)  # the page takes the text first
+        key: dict[str, Any] = {"key": "Enter", "text": "\r", "windowsVirtualKeyCode": 13}
         for kind in ("rawKeyDown", "char", "keyUp"):
-            self.call(
-                "Input.dispatchKeyEvent",
-                type=kind,
-                key="Enter",
-                text="\r",
-                windowsVirtualKeyCode=13,
-            )
+            self.call("Input.dispatchKeyEvent", type=kind, **key)
 
     def drag(self, *way: tuple[float, float]) -> None:
         """Press the mouse at the first place, move it along the others, and let it go."""
@@ -130,7 +152,7 @@ class Tab:
 
 
 @contextmanager
-def browser(folder: Path, width: int = 1280, height: int = 800) -> Iterator[Tab]:
+def browser(folder: Path, width: int = 1280, height: int = 940) -> Iterator[Tab]:
     """A tab of a browser whose files are in a folder."""
     assert CHROMIUM is not None
     words = [CHROMIUM, *_WORDS.split(), f"--window-size={width},{height}"]
@@ -140,10 +162,11 @@ def browser(folder: Path, width: int = 1280, height: int = 800) -> Iterator[Tab]
         stderr=subprocess.DEVNULL,
     )
     try:
-        with connect(_address(folder), max_size=None, proxy=None) as connection:
+        how: Any = {"max_size": None, "proxy": None, "ping_interval": None, "close_timeout": 0.1}
+        with connect(_address(folder), **how) as connection:
             yield Tab(connection)
     finally:
-        process.terminate()
+        process.kill()
         process.wait(_STARTING)
 
 

@@ -1,5 +1,6 @@
 """What a program does for a page that shows it: send, wait, and carry out what a person wants."""
 
+import socket
 import subprocess
 import sys
 import time
@@ -151,13 +152,34 @@ def test_a_port_that_is_taken_is_told_in_one_line(tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
 
 
-def test_a_missing_package_is_told_in_one_line(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("package", "flags", "extra"),
+    [
+        ("viser", ["--view", "--view-port", "0"], "antennate[view]"),
+        ("foxglove", ["--foxglove", "--foxglove-port", "0"], "antennate[foxglove]"),
+    ],
+)
+def test_a_missing_package_is_told_in_one_line(
+    package: str, flags: list[str], extra: str, tmp_path: Path
+) -> None:
     """The line names what to install."""
-    hidden = "import sys; sys.modules['viser'] = None"
-    code, text = said(*TUNNEL, "--view-port", "0", code=hidden, folder=tmp_path)
+    hidden = f"import sys; sys.modules['{package}'] = None"
+    code, text = said("tunnel", *FLAT, *flags, code=hidden, folder=tmp_path)
     assert code == 2
     assert text.count("\n") == 1
-    assert "antennate[view]" in text
+    assert extra in text
+
+
+def test_a_port_of_foxglove_that_is_taken_is_told_in_one_line(tmp_path: Path) -> None:
+    """Its own server finds that out."""
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = str(taken.getsockname()[1])
+        code, text = said("tunnel", *FLAT, "--foxglove", "--foxglove-port", port, folder=tmp_path)
+    assert code == 2
+    assert text.count("\n") == 1
+    assert "--foxglove-port" in text
 
 
 @pytest.mark.parametrize(
@@ -165,9 +187,11 @@ def test_a_missing_package_is_told_in_one_line(tmp_path: Path) -> None:
     [
         (["tunnel", "--view-port", "1234"], "--view-port"),
         (["tunnel", "--view-speed", "2"], "--view-speed"),
+        (["tunnel", "--view-paused"], "--view-paused"),
         (["tunnel", "--view", "--workers", "2"], "--workers"),
         (["tunnel", "--view", "--view-port", "65536"], "--view-port"),
         (["tunnel", "--view", "--view-speed", "-1"], "--view-speed"),
+        (["tunnel", "--foxglove-port", "1"], "--foxglove-port"),
         (["sensor", "--view"], "--view"),
     ],
 )

@@ -151,10 +151,10 @@ def test_same_table_on_one_and_two_workers() -> None:
 def test_trouble_in_the_physics_is_an_invalid_trial(monkeypatch: pytest.MonkeyPatch) -> None:
     sound = wall.passage
 
-    def burst(config: WallConfig, arm: wall.Profile, trial: int) -> Traverse:
+    def burst(config: WallConfig, arm: wall.Profile, trial: int, *watch: wall.Watch) -> Traverse:
         if trial == 1:
             raise SimulationError(7, "engine warning")
-        return sound(config, arm, trial)
+        return sound(config, arm, trial, *watch)
 
     monkeypatch.setattr(wall, "passage", burst)
     outcome = run(WallConfig.model_validate({**SHORT, "profiles": ["stiff", "descending"]}))

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 ANTENNATE = [sys.executable, "-m", "antennate"]
-PATIENCE = 60.0
+PATIENCE = 120.0
 
 
 @dataclass
@@ -34,6 +34,21 @@ class Shown:
             with self._more:
                 self.lines.append(line)
                 self._more.notify_all()
+
+    def answer(self) -> str:
+        """The first line that it writes on stdout."""
+        assert self.process.stdout is not None
+        return self.process.stdout.readline()
+
+    def said(self, begin: str) -> str:
+        """The first line that begins so, once it has been said."""
+
+        def found() -> list[str]:
+            return [line for line in self.lines if line.startswith(begin)]
+
+        with self._more:
+            assert self._more.wait_for(found, PATIENCE), self.lines
+            return found()[0]
 
     @property
     def link(self) -> str:
@@ -61,7 +76,7 @@ def shown(*words: str, folder: Path) -> Iterator[Shown]:
     """A command with these words, which is ended afterwards."""
     process = subprocess.Popen(
         [*ANTENNATE, *words],
-        stdout=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
         cwd=folder,
@@ -77,6 +92,8 @@ def shown(*words: str, folder: Path) -> Iterator[Shown]:
         reader.join(PATIENCE)
         assert process.stderr is not None
         process.stderr.close()
+        assert process.stdout is not None
+        process.stdout.close()
 
 
 def ask(port: int, path: str = "/", host: str | None = "", **headers: str) -> tuple[int, str]:

@@ -13,7 +13,7 @@ from antennate.cli import view_server
 from antennate.cli.arguments import parse
 from antennate.cli.exit_codes import OK
 from antennate.cli.options import option
-from antennate.cli.replay import complain
+from antennate.cli.view_options import FoxgloveOptions, foxglove_of
 from antennate.errors import AntennateError, BadInputError, ConfigError
 from antennate.params.base import Params
 from antennate.sim.scenes.registry import make_scene
@@ -39,7 +39,7 @@ class ViewConfig(Params):
 
 
 @dataclass(frozen=True)
-class Options:
+class Options(FoxgloveOptions):
     """What to show, and where."""
 
     shown: Path | None = option(None, "a log, or the folder of a run", "RUN|LOG", positional=True)
@@ -62,17 +62,23 @@ def command(argv: Sequence[str]) -> int:
     with LogReader(path) as log:
         header = log.header
     with (
-        ViewProcess(options.port, view_server.__name__) as page,
+        ViewProcess(options.port, view_server.__name__, foxglove_of(options)) as page,
         contextlib.suppress(KeyboardInterrupt),  # that is how it ends
     ):
-        player = LogPlayer(page.channel, header, str(path), options.speed, _arena(path, header))
+        player = LogPlayer(page.channel, header, str(path), options.speed, arena_of(path, header))
         while not page.channel.closed:
             with contextlib.suppress(Restart), LogReader(path) as log:
                 player.begin()
                 player.play(log)
-                complain("view", log)
+                _complain(player, log)
                 player.rest()
     return OK
+
+
+def _complain(player: LogPlayer, log: LogReader) -> None:
+    """Say on the page what of a log could not be read."""
+    if log.bad or log.missing:
+        player.say(f"{log.bad} damaged places, {log.missing} ticks missing in this log")
 
 
 def _log_of(path: Path) -> Path:
@@ -96,7 +102,7 @@ def _log_of(path: Path) -> Path:
     return logs[0]
 
 
-def _arena(path: Path, header: Header) -> World | None:
+def arena_of(path: Path, header: Header) -> World | None:
     """The world of a trial as its run has it, None where no run tells."""
     if header.trial is None or path.parent.name != LOGS:
         return None

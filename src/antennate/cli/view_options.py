@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 from pydantic.dataclasses import dataclass
@@ -13,12 +13,23 @@ from antennate.cli import view_server
 from antennate.cli.options import option
 from antennate.errors import ConfigError
 from antennate.studies.run_directory import BY_HAND, RunDirectory
+from antennate.telemetry.view.foxglove import PORT as FOXGLOVE_PORT
 from antennate.telemetry.view.process import PORT, ViewProcess
 from antennate.telemetry.view.simulation import SimulationView
 
 
 @dataclass(frozen=True)
-class PageOptions:
+class FoxgloveOptions:
+    """Whether other tools may read along."""
+
+    foxglove: bool = option(False, "serve its topics live for Foxglove and Lichtblick, unchecked")
+    foxglove_port: int = option(
+        FOXGLOVE_PORT, "port for these, 0 takes any", "PORT", ge=0, le=65535
+    )
+
+
+@dataclass(frozen=True)
+class PageOptions(FoxgloveOptions):
     """Where the page is."""
 
     view: bool = option(False, "show it on a page of this computer while it runs")
@@ -29,9 +40,21 @@ class PageOptions:
 class ViewOptions(PageOptions):
     """The same where time is simulated."""
 
+    view_paused: bool = option(False, "--view begins paused, so that nothing is missed")
     view_speed: float = option(
         1.0, "times real time at which --view begins, 0 as fast as it goes", "FLOAT", ge=0, le=100
     )
+
+
+def foxglove_of(options: FoxgloveOptions) -> int | None:
+    """The port for Foxglove, None without it.
+
+    Raises:
+        ConfigError: A port is named, but it is not wanted.
+    """
+    if not options.foxglove and options.foxglove_port != FOXGLOVE_PORT:
+        raise ConfigError("--foxglove-port: expected --foxglove beside it, found none")
+    return options.foxglove_port if options.foxglove else None
 
 
 def page_of(options: PageOptions) -> ViewProcess | None:
@@ -41,13 +64,16 @@ def page_of(options: PageOptions) -> ViewProcess | None:
         ConfigError: Something is said of a page that is not wanted.
         AntennateError: It cannot be served.
     """
-    if options.view:
-        return ViewProcess(options.view_port, view_server.__name__)
-    for name, usual in (("view_port", PORT), ("view_speed", 1.0)):
-        if getattr(options, name, usual) != usual:
-            flag = f"--{name.replace('_', '-')}"
-            raise ConfigError(f"{flag}: expected --view beside it, found none")
-    return None
+    foxglove = foxglove_of(options)
+    if not options.view and options.view_port != PORT:
+        raise ConfigError("--view-port: expected --view beside it, found none")
+    if not options.view and getattr(options, "view_paused", False):
+        raise ConfigError("--view-paused: expected --view beside it, found none")
+    if not (options.view or options.foxglove) and getattr(options, "view_speed", 1.0) != 1.0:
+        raise ConfigError("--view-speed: expected --view or --foxglove beside it, found none")
+    if not options.view and foxglove is None:
+        return None
+    return ViewProcess(options.view_port if options.view else None, view_server.__name__, foxglove)
 
 
 @contextlib.contextmanager
@@ -62,7 +88,8 @@ def view_of(options: Any) -> Iterator[SimulationView | None]:
         yield None
         return
     with process:
-        yield SimulationView(process.channel, options.view_speed)
+        speed, paused = options.view_speed, options.view_paused
+        yield SimulationView(process.channel, speed, paused=paused)
 
 
 def require_one_worker(options: Any) -> None:
@@ -72,19 +99,18 @@ def require_one_worker(options: Any) -> None:
         ConfigError: Some are.
     """
     workers = getattr(options, "workers", None)
-    if getattr(options, "view", False) and workers not in (None, 1):
+    shown = getattr(options, "view", False) or getattr(options, "foxglove", False)
+    if shown and workers not in (None, 1):
         raise ConfigError(
-            f"--workers: expected 1 beside --view, which shows one trial at a time, found {workers}"
+            "--workers: expected 1 beside --view or --foxglove, which show one trial at a time, "
+            f"found {workers}"
         )
 
 
-def tell_by_hand(view: SimulationView | None, run: RunDirectory) -> None:
+def say_by_hand(lines: Sequence[str], run: RunDirectory) -> None:
     """Keep what a person changed in the run, and say so."""
-    if view is None or not view.by_hand:
+    if not lines:
         return
-    lines = [
-        "Changed by hand while it ran: this run does not follow from its configuration.",
-        *view.by_hand,
-    ]
-    run.write(BY_HAND, "\n".join(lines) + "\n")
+    head = "Changed by hand while it ran: this run does not follow from its configuration."
+    run.write(BY_HAND, "\n".join([head, *lines]) + "\n")
     sys.stderr.write(f"changed by hand, so not reproducible: {run.path / BY_HAND}\n")

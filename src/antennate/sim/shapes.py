@@ -6,6 +6,7 @@ Another process draws it without the engine.
 from __future__ import annotations
 
 import io
+import zipfile
 from typing import NamedTuple
 
 import mujoco
@@ -83,7 +84,7 @@ class Shapes(NamedTuple):
         try:
             with np.load(io.BytesIO(content[:_LARGEST]), allow_pickle=False) as file:
                 return cls(*(file[name] for name in cls._fields))
-        except (ValueError, KeyError, OSError) as error:
+        except (ValueError, KeyError, OSError, EOFError, zipfile.BadZipFile) as error:
             raise BadInputError(f"expected the shapes of a model, found {error}") from None
 
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -68,8 +67,8 @@ class SimulatedLog:
         self._coordinates: list[bytes | None] = []
         self._count, self._since = 0, math.inf
 
-    def take(self, frame: AntennaFrame, command: JointCommand, events: Sequence[str] = ()) -> None:
-        """Keep one tick, and what happened at it.
+    def take(self, frame: AntennaFrame, command: JointCommand) -> None:
+        """Keep one tick.
 
         Raises:
             LogError: The disk is full or gone.
@@ -94,10 +93,17 @@ class SimulatedLog:
         self._forces.append(self._contacts() if looked else None)
         place = COORDINATES.type.encode(*world.coordinates()) if looked else None
         self._coordinates.append(place)
-        if self._count == _MOST or now - self._since >= FLUSH or events:
+        if self._count == _MOST or now - self._since >= FLUSH:
             self._hand_over()
-        for text in events:
-            self._out.event(text)
+
+    def event(self, text: str) -> None:
+        """Keep what happened after the last tick.
+
+        Raises:
+            LogError: The disk is full or gone.
+        """
+        self._hand_over()
+        self._out.event(text)
 
     def close(self) -> None:
         """End it.

@@ -181,6 +181,16 @@ class TwinRobot:
             self._show(shafts)
         self._sample()
 
+    @property
+    def world(self) -> World:
+        """The world that it is in."""
+        return self._body.world(0)
+
+    @property
+    def counts(self) -> Floats:
+        """Readings of the antennae, before faults of wires [counts], shape (2,)."""
+        return self._counts
+
     def next_time(self) -> float:
         """When something happens next without anybody asking [s]."""
         due = self.bus.next_time()

@@ -17,6 +17,7 @@ import numpy as np
 from antennate.control.gait import Gait
 from antennate.control.loop import run_loop
 from antennate.experiments.gait.config import GaitStudyConfig
+from antennate.experiments.gait.metered import MeteredWorld
 from antennate.experiments.gait.pace import Pace, Walk, measure, rolling_speed
 from antennate.experiments.gait.unknown import drawn
 from antennate.params.control import GaitParams
@@ -171,7 +172,7 @@ def walk_flat(
     """
     robot, period = config.robot, 1.0 / config.rate
     scene = FlatScene().draw(robot, np.random.default_rng(0))
-    world = _MeteredWorld(compile_world(config.physics, robot, scene), robot)
+    world = MeteredWorld(compile_world(config.physics, robot, scene), robot)
     place_at_start(world, scene, gait)
     body = SimRobot(1, robot, period, config.physics.timestep)
     body.load(0, world, _no_chance(robot, period))
@@ -207,32 +208,6 @@ def _no_chance(robot: RobotSpec, period: float) -> Disturbance:
     """A disturbance that disturbs nothing; the control here does not look at sensor noise."""
     still = VariationParams(start_lateral=0, start_heading=0, joint_bias=0, slip_log_sd=0)
     return Disturbance(np.random.default_rng(0), still, robot, period)
-
-
-class _MeteredWorld(World):
-    """A world that adds up what its servos do.
-
-    Attributes:
-        work: Positive mechanical work of all servos so far [J].
-    """
-
-    work = 0.0
-
-    def step(self, count: int) -> None:
-        """Advance by `count` physics steps; every one of them counts with its own power."""
-        for _ in range(count):
-            super().step(1)
-            self.work += self._positive_power() * self.model.opt.timestep
-
-    def _positive_power(self) -> float:
-        """Summed power of the servos that push, as the last step began [W].
-
-        Torque falls with speed by the damping of the joint.
-        """
-        model, data = self.model, self.data
-        slope = model.dof_damping[model.jnt_dofadr[model.actuator_trnid[:, 0]]]
-        speed = data.actuator_velocity
-        return float(np.maximum((data.actuator_force - slope * speed) * speed, 0.0).sum())
 
 
 def _tasks(config: GaitStudyConfig) -> list[_Task]:

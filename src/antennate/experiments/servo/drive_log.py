@@ -9,21 +9,26 @@ from pathlib import Path
 import numpy as np
 
 from antennate.errors import BadInputError
+from antennate.experiments.servo.checks import FEWEST, check_course
 from antennate.experiments.servo.config import ServoConfig
-from antennate.experiments.servo.recording import FEWEST, Recording, check
+from antennate.experiments.servo.recording import Recording
 from antennate.files import open_regular
 from antennate.messages import nearest, shown
 from antennate.robots.spec import RobotSpec
 from antennate.telemetry.parts import parts
 from antennate.telemetry.reader import LogReader
 from antennate.telemetry.ticks import Tick
-from antennate.types import Bools
+from antennate.types import Bools, Floats
 
 _MAGIC = b"\x89MCAP"
 _ARRIVED = 0.1
 """A servo that was this near to its goal once has come from where it stood at first [rad]."""
-_WITHOUT_TORQUE = ("FAULT", "OFF", "")
+_WITHOUT_TORQUE = ("OFF", "")
 """States of the supervisor."""
+_FAULT = "FAULT"
+"""A state in which the last goals are held; it ends by an arm event, as if torque were off."""
+_LOST = ("DISARMED", "WATCHDOG", "SERVO_ERROR")
+"""Causes in whose ticks nobody knows whether a servo holds its goal."""
 
 
 def is_log(path: Path) -> bool:
@@ -38,9 +43,10 @@ def is_log(path: Path) -> bool:
 def read(path: Path, config: ServoConfig) -> Recording:
     """A joint of a log as a recording; the load is what the configuration says, by default none.
 
-    Goals are what the controller decided. The supervisor lets them come near slowly at first, so
-    torque counts from the first tick on that finds the servo at its goal. The log tells neither
-    drive nor supply.
+    A goal is what the controller decided in the last tick whose command was sent. Whenever torque
+    comes on, the supervisor lets goals come near slowly; what it tells the servo meanwhile is not
+    known, so that torque counts from the first tick on that finds the servo at its goal. The log
+    tells neither drive nor supply.
 
     Raises:
         BadInputError: No such joint, another servo, or a log without measured positions.
@@ -49,7 +55,7 @@ def read(path: Path, config: ServoConfig) -> Recording:
     with LogReader(path) as log:
         robot = log.header.robot
         place = _place(path, robot, config)
-        ticks = [tick for tick in log if tick.positions and math.isfinite(_error(tick, place))]
+        ticks = [tick for tick in log if tick.positions and _finite(tick, place)]
     if len(ticks) < FEWEST:
         raise BadInputError(
             f"{path}: expected at least {FEWEST} ticks with a measured position of {config.joint}, "
@@ -57,8 +63,9 @@ def read(path: Path, config: ServoConfig) -> Recording:
         )
     t = np.array([tick.now for tick in ticks])
     position = np.array([tick.positions[place] for tick in ticks])
-    goal = np.array([tick.angles[place] for tick in ticks])
-    check(path, t, position, goal)
+    goal = _goals(ticks, place)
+    check_course(path, t, position, goal, config.given)
+    torque, known = _torque(path, ticks, abs(goal - position) < _ARRIVED)
     unknown = np.full(len(t), math.nan)
     return Recording(
         name=f"{path.name}: {config.joint}",
@@ -69,7 +76,8 @@ def read(path: Path, config: ServoConfig) -> Recording:
         t=t - t[0],
         position=position,
         goal=goal,
-        torque=_torque(path, ticks, place),
+        torque=torque,
+        known=known,
         supply=unknown,
         drive=unknown,
     )
@@ -94,22 +102,41 @@ def _place(path: Path, robot: RobotSpec, config: ServoConfig) -> int:
     return place
 
 
-def _error(tick: Tick, place: int) -> float:
-    """Goal less position of a joint [rad]."""
-    return tick.angles[place] - tick.positions[place]
+def _finite(tick: Tick, place: int) -> bool:
+    """Whether goal and position of a joint are known."""
+    return math.isfinite(tick.angles[place] + tick.positions[place])
 
 
-def _torque(path: Path, ticks: list[Tick], place: int) -> Bools:
-    """Whether goals counted, at each tick."""
-    driven = np.array([tick.state not in _WITHOUT_TORQUE and tick.sent > 0 for tick in ticks])
-    near = np.array([abs(_error(tick, place)) < _ARRIVED for tick in ticks])
-    arrived = np.logical_or.accumulate(driven & near)
-    if not arrived.any():
+def _goals(ticks: list[Tick], place: int) -> Floats:
+    """Goals of a joint [rad], each held while no command is sent, as in HOLD and FAULT."""
+    sent = np.array([tick.sent for tick in ticks])
+    news = np.diff(sent, prepend=0) > 0
+    last = np.maximum.accumulate(np.where(news, np.arange(len(ticks)), 0))
+    return np.array([tick.angles[place] for tick in ticks])[last]
+
+
+def _torque(path: Path, ticks: list[Tick], near: Bools) -> tuple[Bools, Bools]:
+    """Whether goals counted, and whether it is known what the servo was told, at each tick."""
+    on = np.array([tick.state not in _WITHOUT_TORQUE for tick in ticks])
+    lost = np.array([_loses(tick.causes) for tick in ticks])
+    follows, before = np.zeros(len(ticks), bool), 0
+    for i, tick in enumerate(ticks):
+        faulty = tick.state == _FAULT
+        if not on[i] or lost[i] or (i and ticks[i - 1].state == _FAULT and not faulty):
+            before = tick.sent  # torque is off, or comes on in this tick
+        elif tick.sent > before:
+            follows[i] = near[i] or follows[i - 1]
+    if not follows.any():
         raise BadInputError(
             f"{path}: expected a joint that follows its goals, found it within {_ARRIVED:g} rad of "
             "them nowhere while torque was on"
         )
-    return driven & arrived
+    return follows, follows | ~(on | lost)
+
+
+def _loses(causes: tuple[str, ...]) -> bool:
+    """Whether one of the causes, as a tick says them, is that servos may not hold their goals."""
+    return any(cause.partition(":")[0].endswith(_LOST) for cause in causes)
 
 
 def _hash(path: Path) -> str:

@@ -12,7 +12,7 @@ import hmac
 import http
 import secrets
 from collections.abc import Callable
-from urllib.parse import parse_qs, urlsplit
+from urllib.parse import parse_qs
 
 from websockets.asyncio.server import ServerConnection
 from websockets.datastructures import Headers
@@ -69,16 +69,16 @@ class Gate:
             return self._refuse("expected the address of this computer with the port of the view")
         if origins not in [[], *([site] for site in self._sites)] or (live and not origins):
             return self._refuse("expected a request of the page itself")
-        parts = urlsplit(request.path)
+        path, _, query = request.path.partition("?")
         if live:
-            known = parts.path == "/" and self._is_known(headers)
+            known = path == "/" and self._is_known(headers)
             return None if known else self._refuse("expected the cookie of the page")
-        tokens = parse_qs(parts.query).get("token", [])
-        if parts.path == "/" and tokens:
+        tokens = parse_qs(query).get("token", [])
+        if path == "/" and tokens:
             return self._let_in(tokens)
         if not self._is_known(headers):
             return self._refuse("open the link that the terminal shows; each is good for one time")
-        if parts.path == "/":
+        if path == "/":
             return _response(http.HTTPStatus.OK, self._page, Policy=self._policy)
         return _response(http.HTTPStatus.NOT_FOUND, b"not found", plain=True)
 

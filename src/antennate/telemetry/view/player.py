@@ -52,19 +52,14 @@ class LogPlayer(Pace):
         self.tell()
         self.channel.send(HEADER, self._header.pack())
 
-    def show(self, tick: Tick, records: Sequence[Record] = ()) -> None:
+    def show(self, tick: Tick) -> None:
         """Show a tick if a picture is due, once its time has come.
-
-        Args:
-            tick: The tick.
-            records: Its messages; coordinates and forces among them are shown.
 
         Raises:
             Restart: A person wants it from the beginning.
         """
         if self._begin_at is None:
             self._begin_at = tick.now
-        self._take(records)
         self.wait(tick.now - self._begin_at)
         if self.due():
             if self._scene is not None:
@@ -83,7 +78,8 @@ class LogPlayer(Pace):
                 if record.topic is EVENTS:
                     self.say(EVENTS.type.decode(record.data)["msg"])
             if tick is not None:
-                self.show(tick, records)
+                self.keep(tick, records)
+                self.show(tick)
 
     def rest(self) -> None:
         """Wait at the end until the page is gone.
@@ -105,8 +101,8 @@ class LogPlayer(Pace):
         if order.get("do") == "restart":
             raise Restart(0)
 
-    def _take(self, records: Sequence[Record]) -> None:
-        """Keep coordinates and forces; the first coordinates bring the scene."""
+    def keep(self, tick: Tick, records: Sequence[Record]) -> None:
+        """Keep coordinates and forces of a tick; the first coordinates bring the scene."""
         for record in records:
             if record.topic is COORDINATES:
                 found = COORDINATES.type.decode(record.data)
@@ -115,7 +111,7 @@ class LogPlayer(Pace):
                     self._scene = _Scene(self._header, self._arena, len(place))
                     shapes = self._scene.model.shapes().pack()
                     self.channel.send_whole(SCENE, shapes)
-                self._scene.take(1e-9 * record.time, place, found["robot"])
+                self._scene.take(tick.now, place, found["robot"])
             elif record.topic is CONTACT_FORCES and self._scene is not None:
                 self._scene.forces = _bars(CONTACT_FORCES.type.decode(record.data))
 
@@ -141,7 +137,7 @@ class _Scene:
         self._before, self._last = self._last, (t, place)
 
     def poses(self, t: float) -> Poses:
-        """Where all is at a time [s], between two known places, and so a little late."""
+        """Where all is at a time [s]: between the two places that are known, so a little late."""
         (first, before), (last, now) = self._before, self._last
         share = (t - last) / (last - first) if math.isfinite(first) and last > first else 1.0
         place = now if share >= 1.0 else before + max(0.0, share) * (now - before)

@@ -11,6 +11,7 @@ from importlib.util import find_spec
 
 from antennate.errors import BadInputError, MissingPackageError
 from antennate.telemetry.view.channel import END, FAILED, READY, Channel
+from antennate.telemetry.view.foxglove import require_foxglove
 
 HOST = "127.0.0.1"
 PORT = 8777
@@ -24,27 +25,34 @@ class ViewProcess:
     """Serves the page from a process of its own; a context.
 
     Args:
-        port: Port of the page on this computer, 0 for any that is free.
-        module: What that process runs, with the numbers of its two files as words.
+        port: Port of the page on this computer, 0 for any that is free; None without a page.
+        module: What that process runs; its words are the files of the channel and of the page's
+            socket, and the port for Foxglove, a hyphen for what is not wanted.
+        foxglove: Port for Foxglove likewise, None without it.
 
     Attributes:
         channel: To it.
-        port: The port.
+        port: The port of the page, 0 without one.
 
     Raises:
-        MissingPackageError: viser is not installed.
-        BadInputError: The port is taken, or the process cannot serve.
+        MissingPackageError: viser or foxglove-sdk is not installed.
+        BadInputError: A port is taken, or the process cannot serve.
     """
 
-    def __init__(self, port: int, module: str) -> None:
-        require_viser()
-        listener = _listener(port)
-        self.port: int = listener.getsockname()[1]
+    def __init__(self, port: int | None, module: str, foxglove: int | None = None) -> None:
+        if port is not None:
+            require_viser()
+        if foxglove is not None:
+            require_foxglove()
+        listener = socket.socket() if port is None else _listener(port)
+        self.port: int = 0 if port is None else listener.getsockname()[1]
         ours, theirs = Channel.pair()
         with listener, theirs:
-            files = (theirs.fileno(), listener.fileno())
+            files = [theirs.fileno()] + ([] if port is None else [listener.fileno()])
+            words = [*map(str, files), *(["-"] if port is None else [])]
+            words.append("-" if foxglove is None else str(foxglove))
             self._process = subprocess.Popen(  # noqa: S603 our own words
-                [sys.executable, "-m", module, *map(str, files)],
+                [sys.executable, "-m", module, *words],
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL,  # viser prints there
                 pass_fds=files,
@@ -63,8 +71,9 @@ class ViewProcess:
         kind, text = next(self.channel.receive() if ready else iter(()), (b"", b""))
         if kind == READY:
             return
-        why = text.decode() if kind == FAILED else "expected its process to serve, found none"
-        raise BadInputError(f"view: {why}" if not why.startswith("view") else why)
+        if kind == FAILED:
+            raise BadInputError(text.decode())
+        raise BadInputError("view: expected its process to serve, found that it does not")
 
     def close(self) -> None:
         """End it."""

@@ -10,8 +10,8 @@ import math
 import select
 import time
 from collections import deque
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Mapping, Sequence
+from typing import Any, Protocol
 
 import numpy as np
 import viser
@@ -48,12 +48,36 @@ _SIDES = (rgba(SERIES[0]), rgba(SERIES[1]))
 _COUNTERS = ("missed", "frames", "crc", "lost", "misses", "stale", "sent", "refused")
 
 
+class Display(Protocol):
+    """Shows what comes."""
+
+    def take(self, kind: bytes, content: bytes) -> None:
+        """Take a message."""
+        ...
+
+    def draw(self, now: float) -> float:
+        """Draw what is due at a time [s]; the time until more may be due [s]."""
+        ...
+
+
+def run(channel: Channel, displays: Sequence[Display]) -> None:
+    """Show what comes until the program has ended."""
+    while not channel.closed:
+        wait = min(each.draw(time.monotonic()) for each in displays)
+        select.select((channel,), (), (), wait)
+        for kind, content in channel.receive():
+            if kind == END:
+                return
+            for each in displays:
+                each.take(kind, content)
+
+
 class Page:
-    """Shows what comes until that ends.
+    """The page of the browser.
 
     Args:
         server: Where it is shown.
-        channel: Where it comes from.
+        channel: Where orders go.
     """
 
     def __init__(self, server: viser.ViserServer, channel: Channel) -> None:
@@ -66,6 +90,7 @@ class Page:
         self._poses: Poses | None = None
         self._drawn: Poses | None = None
         self._lines = deque[str](maxlen=_LINES)
+        self._due = self._due_slow = 0.0
         gui = server.gui
         gui.main_panel.dock_right()
         self._status = gui.add_html(_status(None, {}, ()))
@@ -78,31 +103,24 @@ class Page:
             self._follow = gui.add_checkbox("follow the robot", True)
             self._arrow = gui.add_slider("arrows [mm for 1 N]", 1, 500, 1, 50)
 
-    def run(self) -> None:
-        """Show what comes; return when the program has ended."""
-        due = slow = 0.0
-        while not self._channel.closed:
-            if self._new:
-                time.sleep(min(max(0.0, due - time.monotonic()), 1.0 / RATE))
-            else:
-                select.select((self._channel,), (), (), _SLOW)
-            for kind, content in self._channel.receive():
-                if kind == END:
-                    return
-                self._take(kind, content)
-            now = time.monotonic()
-            if self._new and now >= due:
-                due = now + 1.0 / RATE
-                self._draw()
-            if now >= slow:
-                slow = now + _SLOW
-                self._draw_slow()
+    def draw(self, now: float) -> float:
+        """Draw what is due at a time [s]; the time until more may be due [s]."""
+        if not self._server.get_clients():
+            return _SLOW  # nobody looks; what has come is kept
+        if self._new and now >= self._due:
+            self._due = now + 1.0 / RATE
+            self._draw()
+        if now >= self._due_slow:
+            self._due_slow = now + _SLOW
+            self._draw_slow()
+        return max(0.0, self._due - now) if self._new else _SLOW
 
     @property
     def _new(self) -> bool:
         return self._poses is not self._drawn and self._scene is not None
 
-    def _take(self, kind: bytes, content: bytes) -> None:
+    def take(self, kind: bytes, content: bytes) -> None:
+        """Take a message."""
         if kind == POSES:
             self._poses = Poses.unpack(content)
             self._note_head()
@@ -123,7 +141,7 @@ class Page:
         names = state.get("values", {}).keys(), "seed" in state
         before = self._state.get("values", {}).keys(), "seed" in self._state
         self._state = state
-        if "speed" not in state:
+        if state.get("speed") is None:
             return
         if self._controls is None or names != before:
             if self._controls is not None:
@@ -194,7 +212,8 @@ def _status(tick: Tick | None, state: Mapping[str, Any], lines: tuple[str, ...])
         rows.append(("shown", title))
     if tick is not None:
         rows.append(("time", f"{tick.now:.2f} s"))
-        rows.append(("maneuver", Maneuver.label(tick.maneuver).replace("_", " ")))
+        if tick.maneuver >= 0:
+            rows.append(("maneuver", Maneuver.label(tick.maneuver).replace("_", " ")))
         if tick.state:
             rows.append(("supervisor", tick.state))
             rows += [("", cause) for cause in tick.causes[:3]]

@@ -11,35 +11,24 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from antennate.colours import SERIES, rgba
-from antennate.control.registry import BUILT_IN, make_controller
-from antennate.control.retunable import Retunable
+from antennate.control.registry import make_controller
 from antennate.errors import ConfigError
 from antennate.hardware.driving.decision import decision_of
 from antennate.messages import one_line
-from antennate.params.base import Params
 from antennate.params.control import ControlParams
 from antennate.robots.spec import RobotSpec
 from antennate.sim.shapes import VisibleModel
 from antennate.telemetry.ticks import Tick, decided
 from antennate.telemetry.view.channel import POSES, SCENE, TICK, Channel, Poses
 from antennate.telemetry.view.pace import Pace, Restart
+from antennate.telemetry.view.tuning import Tuning
 from antennate.types import AntennaFrame, Controller
 
-_PLACES = {
-    "threshold": ("rule", "threshold"),
-    "averaging_time": ("conditioning", "averaging_time"),
-    "hold_time": ("rule", "hold_time"),
-    "turn_offset": ("gait", "turn_offset"),
-}
-"""Where each number that can be changed stands in `ControlParams`."""
-_READ = {
-    "open": ("threshold", "averaging_time"),
-    "closed": ("threshold", "averaging_time", "turn_offset"),
-}
-"""Which of them a controller of ours reads; all others read all."""
 _SIDES = (rgba(SERIES[0]), rgba(SERIES[1]))
 _FARTHEST = 50.0
 """Farthest from the origin that an obstacle is put [m]; a world beyond 100 m is unsound."""
+NONE = -1
+"""Stands for a maneuver where there is none."""
 _NOT_A_NUMBER = (math.nan, math.nan)
 _UNKNOWN = (2, 2)
 
@@ -50,26 +39,34 @@ class SimulationView(Pace):
     Args:
         channel: To the process that shows it.
         speed: Times real time at which it begins; 0 is as fast as it goes.
+        steered: Whether the page has controls; without them it changes nothing.
+        paused: Whether it stands at first.
 
     Attributes:
         by_hand: What was changed by hand, in order.
     """
 
-    def __init__(self, channel: Channel, speed: float = 1.0) -> None:
+    def __init__(
+        self, channel: Channel, speed: float = 1.0, steered: bool = True, paused: bool = False
+    ) -> None:
         super().__init__(channel, speed)
+        self.state["paused"] = paused
+        self._steered = steered
+        if not steered:
+            self.state = {"speed": None, "paused": False}
         self.by_hand: list[str] = []
         self._fresh: list[str] = []
-        self._control: Retunable | None = None
-        self._places: Mapping[str, tuple[str, str]] = {}
+        self._tuning: Tuning | None = None
         self._seen: Any = None
         self._model: VisibleModel | None = None
         self._data: Any = None
         self._title, self._number = "", 0
+        self._last: tuple[AntennaFrame | None, Controller | None, int] = (None, None, NONE)
 
     def begin(self, title: str, seed: int | None = None) -> None:
         """A trial begins; `seed` is the one that it has, None where there is no chance."""
         self._title, self._number, self._seen = title, 0, None
-        self._control, self._places = None, {}
+        self._tuning = None
         self.state |= {"title": title, "values": {}}
         self.state.pop("seed", None)
         if seed is not None:
@@ -87,14 +84,9 @@ class SimulationView(Pace):
         def make(values: ControlParams) -> Controller:
             return make_controller(name, values, robot, batch)
 
-        self._control = Retunable(make, control)
-        names = _READ.get(name, _PLACES) if name in BUILT_IN else _PLACES
-        own = "escape" if name == "closed" else "gait"
-        self._places = {each: _PLACES[each] for each in names}
-        if "turn_offset" in self._places:
-            self._places["turn_offset"] = (own, "turn_offset")
-        self.state["values"] = _values(control, self._places)
-        return self._control
+        self._tuning = Tuning(name, control, make)
+        self.state["values"] = self._tuning.values
+        return self._tuning.controller
 
     def tick(
         self,
@@ -102,7 +94,7 @@ class SimulationView(Pace):
         data: Any,
         frame: AntennaFrame | None = None,
         controller: Controller | None = None,
-        maneuver: int = 0,
+        maneuver: int = NONE,
     ) -> Sequence[str]:
         """Show a tick if a picture is due, and wait until its time has come.
 
@@ -111,7 +103,7 @@ class SimulationView(Pace):
             data: Its state.
             frame: What was read, None without antennae.
             controller: What decided, None without one.
-            maneuver: The `Maneuver` without a controller.
+            maneuver: The `Maneuver` without a controller, if there is one.
 
         Returns:
             What was changed by hand since the last tick, for the log.
@@ -122,10 +114,10 @@ class SimulationView(Pace):
         if self._seen is not model:
             self._show_model(model)
         self._data, self._number = data, self._number + 1
+        self._last = frame, controller, maneuver
         self.wait(data.time)
         if self.due():
             self.redraw()
-            self.channel.send(TICK, self._tick(data.time, frame, controller, maneuver).pack())
         done, self._fresh = self._fresh, []
         return done
 
@@ -134,6 +126,7 @@ class SimulationView(Pace):
         if self._model is not None and self._data is not None:
             poses, forces = self._model.poses(self._data), self._model.forces(self._data)
             self.channel.send(POSES, Poses(self._data.time, poses, forces).pack())
+            self.channel.send(TICK, self._tick(self._data.time, *self._last).pack())
 
     def _show_model(self, model: Any) -> None:
         self._seen, self._model = model, VisibleModel(model, _SIDES)
@@ -151,6 +144,15 @@ class SimulationView(Pace):
             maneuver = choice.maneuver
         more |= {"t": t, "counts": counts, "maneuver": maneuver}
         return Tick(**more, number=self._number, now=t, reading=counts, angles=())
+
+    def look(self) -> None:
+        """Carry out what the page wants, if it may want anything.
+
+        Raises:
+            Restart: A person wants the trial anew, with a seed.
+        """
+        if self._steered:
+            super().look()
 
     def carry_out(self, order: Mapping[str, Any]) -> None:
         """Carry out one order; one that cannot be is left alone, and the page says so.
@@ -171,17 +173,14 @@ class SimulationView(Pace):
                 raise Restart(seed)
 
     def _set(self, name: str, value: Any) -> None:
-        if self._control is None or name not in self._places:
+        if self._tuning is None:
             return
-        group, field = self._places[name]
         try:
-            control = _changed(self._control.control, group, field, value)
-            self._control.retune(control)
+            if done := self._tuning.set(name, value):
+                self._note(done)
         except ConfigError as error:
             self.say(one_line(str(error)))
-        else:
-            self._note(f"control.{group}.{field} = {value:g}")
-        self.state["values"] = _values(self._control.control, self._places)
+        self.state["values"] = self._tuning.values
         self.tell()
 
     def _move(self, order: Mapping[str, Any]) -> None:
@@ -205,22 +204,3 @@ class SimulationView(Pace):
             self.by_hand.pop()
         self.by_hand.append(line)
         self.say(f"by hand: {what}")
-
-
-def _values(control: ControlParams, places: Mapping[str, tuple[str, str]]) -> dict[str, float]:
-    return {
-        name: getattr(getattr(control, group), field) for name, (group, field) in places.items()
-    }
-
-
-def _changed(control: ControlParams, group: str, field: str, value: Any) -> ControlParams:
-    """The numbers with one of them changed.
-
-    Raises:
-        ConfigError: It is out of bounds.
-    """
-    from antennate.params.reading import from_values
-
-    old: Params = getattr(control, group)
-    made = from_values(type(old), old.model_dump() | {field: value})
-    return control.model_copy(update={group: made})
