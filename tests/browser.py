@@ -152,7 +152,7 @@ class Tab:
 
 
 @contextmanager
-def browser(folder: Path, width: int = 1280, height: int = 800) -> Iterator[Tab]:
+def browser(folder: Path, width: int = 1280, height: int = 940) -> Iterator[Tab]:
     """A tab of a browser whose files are in a folder."""
     assert CHROMIUM is not None
     words = [CHROMIUM, *_WORDS.split(), f"--window-size={width},{height}"]

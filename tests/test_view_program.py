@@ -187,6 +187,7 @@ def test_a_port_of_foxglove_that_is_taken_is_told_in_one_line(tmp_path: Path) ->
     [
         (["tunnel", "--view-port", "1234"], "--view-port"),
         (["tunnel", "--view-speed", "2"], "--view-speed"),
+        (["tunnel", "--view-paused"], "--view-paused"),
         (["tunnel", "--view", "--workers", "2"], "--workers"),
         (["tunnel", "--view", "--view-port", "65536"], "--view-port"),
         (["tunnel", "--view", "--view-speed", "-1"], "--view-speed"),

@@ -50,7 +50,7 @@ class LinearChain:
             starts,
             np.full(count, length),
             np.full(count, antenna.link_mass),
-            _capsule_inertia(antenna),
+            link_inertia(antenna),
         )
         drive = antenna.base()
         base = drive.armature + antenna.base_mass * 0.4 * antenna.radius**2
@@ -179,7 +179,7 @@ def _rods(joints: Floats, starts: Floats, lengths: Floats, mass: Floats, inertia
     return (arms * mass) @ arms.T + (moves * inertia) @ moves.T
 
 
-def _capsule_inertia(antenna: AntennaSpec) -> Floats:
+def link_inertia(antenna: AntennaSpec) -> Floats:
     """Moment of inertia of each link about an axis across its middle [kg·m²], shape (n,)."""
     r, length = antenna.radius, antenna.link_length
     ends = antenna.link_mass * (4 * r / 3) / (length + 4 * r / 3)

@@ -19,6 +19,7 @@ from antennate.cli.view_options import ViewOptions, require_one_worker, say_by_h
 from antennate.errors import BadInputError, ConfigError, OutputError, WorkerError
 from antennate.experiments.running import keep, require_films, write_films
 from antennate.params.base import Params
+from antennate.studies.engines import WARP
 from antennate.studies.experiment import Experiment, Outcome
 from antennate.studies.formats import to_json
 from antennate.studies.identity import differences, identity
@@ -132,7 +133,9 @@ def carry_out(
     require_one_worker(options)
     crew = workers_of(options, closed=shards is not None, apart=experiment.continued)
     logs = isinstance(options, LogOptions) and options.log
-    what = identity(f"{experiment.name} --log" if logs else experiment.name, config)
+    kind = f"{experiment.name} --log" if logs else experiment.name
+    kind += " --engine warp" if options.engine.partition(":")[0] == WARP else ""
+    what = identity(kind, config)
     if shards and (changes := differences(shards.identity, what)):
         raise BadInputError(f"expected shards of this version and code, found {changes}")
     resume = options.resume or options.retry or experiment.continued

@@ -88,6 +88,8 @@ def _replayed(
                     *(page.channel, log.header, str(path), options.view_speed),
                     *(arena_of(path, log.header), config.controller),
                 )
+                player.state["paused"] = options.view_paused
+                player.tell()
                 ticks = player.ticks(log)
                 found = replay(ticks, player.controller, log.header, player.decided)
                 return log, found, player.by_hand

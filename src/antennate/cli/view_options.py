@@ -40,6 +40,7 @@ class PageOptions(FoxgloveOptions):
 class ViewOptions(PageOptions):
     """The same where time is simulated."""
 
+    view_paused: bool = option(False, "--view begins paused, so that nothing is missed")
     view_speed: float = option(
         1.0, "times real time at which --view begins, 0 as fast as it goes", "FLOAT", ge=0, le=100
     )
@@ -66,6 +67,8 @@ def page_of(options: PageOptions) -> ViewProcess | None:
     foxglove = foxglove_of(options)
     if not options.view and options.view_port != PORT:
         raise ConfigError("--view-port: expected --view beside it, found none")
+    if not options.view and getattr(options, "view_paused", False):
+        raise ConfigError("--view-paused: expected --view beside it, found none")
     if not (options.view or options.foxglove) and getattr(options, "view_speed", 1.0) != 1.0:
         raise ConfigError("--view-speed: expected --view or --foxglove beside it, found none")
     if not options.view and foxglove is None:
@@ -85,7 +88,8 @@ def view_of(options: Any) -> Iterator[SimulationView | None]:
         yield None
         return
     with process:
-        yield SimulationView(process.channel, options.view_speed)
+        speed, paused = options.view_speed, options.view_paused
+        yield SimulationView(process.channel, speed, paused=paused)
 
 
 def require_one_worker(options: Any) -> None:

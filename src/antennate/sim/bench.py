@@ -23,9 +23,9 @@ from antennate.sim.world import new_spec, set_contacts
 from antennate.types import Floats, Ints
 
 PREFIX = "antenna/"
-_CARRIAGE_MASS = 1.0
+CARRIAGE_MASS = 1.0
 """A thousand antenna links [kg]: what the antenna feels does not move it."""
-_STIFFNESS, _DAMPING = 1e4, 200.0
+SLIDE_STIFFNESS, SLIDE_DAMPING = 1e4, 200.0
 """Gains of the slides' servos [N/m], [N·s/m]: critically damped, 10 micrometres per 0.1 N."""
 _SPEED_LIMIT = 1e4
 """No coordinate of a sound bench moves faster [m/s or rad/s]."""
@@ -109,15 +109,17 @@ def _slider(spec: mujoco.MjSpec, name: str) -> mujoco.MjsBody:
     """A heavy body on two slides with servos, untouched by gravity."""
     body = spec.worldbody.add_body(name=name)
     body.gravcomp = 1.0
-    body.mass = _CARRIAGE_MASS
+    body.mass = CARRIAGE_MASS
     body.inertia = [1e-3, 1e-3, 1e-3]
     body.explicitinertial = True
     for slide, axis in ((f"{name}_x", [1, 0, 0]), (f"{name}_y", [0, 1, 0])):
         body.add_joint(name=slide, type=mujoco.mjtJoint.mjJNT_SLIDE, axis=axis)
         hinge = mujoco.mjtTrn.mjTRN_JOINT
-        spec.add_actuator(name=slide, trntype=hinge, target=slide).set_to_position(kp=_STIFFNESS)
+        spec.add_actuator(name=slide, trntype=hinge, target=slide).set_to_position(
+            kp=SLIDE_STIFFNESS
+        )
         follow = spec.add_actuator(name=f"{slide}_speed", trntype=hinge, target=slide)
-        follow.set_to_velocity(kv=_DAMPING)
+        follow.set_to_velocity(kv=SLIDE_DAMPING)
     return body
 
 

@@ -20,7 +20,8 @@ from antennate.studies.processes import added_objects, take_added
 from antennate.studies.work import Emit, Engine, Fail, Failure, Part, Waiting, Work
 
 LOCAL = "local"
-FORMS = (LOCAL, "dask", "dask://HOST:PORT", "slurm", "slurm-local")
+WARP = "warp"
+FORMS = (LOCAL, "dask", "dask://HOST:PORT", "slurm", "slurm-local", WARP, f"{WARP}:DEVICE")
 """How an engine is named; slurm-local starts what would be jobs as processes of this machine."""
 _POLL = 0.02
 """How often the driver looks for parts that have ended [s]."""
@@ -41,6 +42,8 @@ def make_engine(name: Any, slurm: Sequence[str] = ()) -> Engine | None:
         raise ConfigError("--slurm: expected --engine slurm beside it, found another engine")
     if name == LOCAL:
         return None
+    if isinstance(name, str) and re.fullmatch(rf"{WARP}(:.+)?", name):
+        return Device(name.partition(":")[2] or None)
     if isinstance(name, str):
         from antennate.studies import cluster  # needs packages that are optional
 
@@ -56,6 +59,33 @@ def make_engine(name: Any, slurm: Sequence[str] = ()) -> Engine | None:
             f"engine: expected a name or an object with submit, found {type(name).__name__}"
         )
     return Submitted("executor", name.submit)
+
+
+class Device:
+    """All tasks at once, as one batch on a GPU, in this process.
+
+    Args:
+        device: Name of a device of Warp, as cuda:0 or cpu; a GPU if not given.
+    """
+
+    name = WARP
+
+    def __init__(self, device: str | None = None) -> None:
+        self._device = device
+
+    def run(
+        self, work: Work, parts: Sequence[Sequence[int]], count: int, emit: Emit, fail: Fail
+    ) -> None:
+        """Run the tasks at these places; see `Engine`.
+
+        Raises:
+            ConfigError: This work has no batch.
+        """
+        if work.batched is None:
+            raise ConfigError("--engine warp: expected tunnel, which alone has batches on a GPU")
+        places = [place for part in parts for place in part]
+        tasks = [work.tasks[place] for place in places]
+        work.batched(tasks, lambda i, result: emit(places[i], result), self._device)
 
 
 class Submitted:

@@ -165,6 +165,7 @@ def gather(
     chunk: int = 1,
     together: bool = False,
     lost: Callable[[int, Failure], Any] | None = None,
+    batched: Callable[..., Any] | None = None,
 ) -> list[Any]:
     """What function(*task) returns for every task, in the order of the tasks.
 
@@ -178,6 +179,7 @@ def gather(
         together: Whether the function takes a chunk at once, and emits its results.
         lost: lost(place, failure) -> the result of a task that has none; it may raise. Without it
             the failure is raised.
+        batched: The same for `--engine warp`; see `Work`.
 
     Raises:
         WorkerError: A task failed, or its workers died.
@@ -196,7 +198,7 @@ def gather(
     parts = [todo[i : i + chunk] for i in range(0, len(todo), chunk)]
     if parts:
         folder = None if crew.store is None else crew.store.path.parent
-        work = Work(function, tasks, together, crew.timeout, folder)
+        work = Work(function, tasks, together, crew.timeout, folder, batched)
         crew.engine(len(parts)).run(work, parts, int(crew), call.emit, call.fail)
     if crew.shard is not None:
         raise ShardEnd(sum(map(crew.mine, call.found)), len(tasks))

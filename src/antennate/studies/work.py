@@ -46,6 +46,7 @@ class Work:
         together: Whether several tasks are carried out at once.
         timeout: Time after which a task that has not ended is given up [s].
         folder: Run directory that it belongs to, None without.
+        batched: batched(tasks, emit, device) does the same on a GPU, None if nothing does.
     """
 
     function: Callable[..., Any]
@@ -53,6 +54,7 @@ class Work:
     together: bool
     timeout: float
     folder: Path | None = None
+    batched: Callable[..., Any] | None = None
 
     def part(self, places: Sequence[int]) -> Part:
         """Some of it, to be sent to a worker."""

@@ -8,6 +8,7 @@ from typing import Any
 from antennate.antenna.next_push import RECORDED
 from antennate.experiments.calibrate import recording
 from antennate.experiments.calibrate import run as calibrate
+from antennate.sim.chain import require_solver
 from antennate.studies.experiment import Experiment
 from antennate.studies.measures import Measure, Table, shown
 
@@ -144,5 +145,6 @@ EXPERIMENT = Experiment.of_folder(
     tables,
     sentence,
     files=_files,
+    check=require_solver,
     parts="pushes",
 )

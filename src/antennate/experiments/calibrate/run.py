@@ -10,10 +10,10 @@ import functools
 import hashlib
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Annotated, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import model_validator
 
 from antennate.antenna import fitting
 from antennate.antenna.calibration import Calibration
@@ -22,42 +22,18 @@ from antennate.antenna.next_push import Assessment, Pushes, assess
 from antennate.antenna.sensor import SensorChain, reading_noise
 from antennate.control.conditioning import bending_level
 from antennate.experiments.calibrate.recording import Recording, RecordingParams, read, write
+from antennate.experiments.calibrate.rig import Push, RigParams
 from antennate.experiments.reading import mean_since
 from antennate.params.base import Params, number
-from antennate.params.bench import BenchVariationParams
+from antennate.params.bench import BenchVariationParams, Solver, solver
 from antennate.params.scene import BenchPhysicsParams
 from antennate.robots.antenna import AntennaSpec
-from antennate.sim.bench import Bench, Slider, compile_bench
+from antennate.sim.chain import require_read, warm_up
 from antennate.studies.experiment import OnStep, Outcome, no_step
 from antennate.studies.pool import gather
 from antennate.types import Floats
 
-_Speed = Annotated[float, Field(gt=0, le=1)]
-_COMMAND_PERIOD = 0.001
-
-
-class RigParams(Params):
-    """The simulated rig."""
-
-    speeds: tuple[_Speed, ...] = number(
-        (0.05, 0.10, 0.15), "m/s", "paper: 5, 10 and 15 cm/s", min_length=1
-    )
-    """Pushing speeds."""
-    pushes: int = number(10, "1", "assumed: enough for an interval", ge=1, le=1000)
-    """Pushes at each speed."""
-    place: float = number(0.08, "m", "assumed: two thirds out; the rod stays on", gt=0.01, le=0.4)
-    """Place of the rod."""
-    depth: float = number(0.05, "m", "assumed: bends the antenna to about a right angle", gt=0.002)
-    """Full indentation."""
-    rod_radius: float = number(0.006, "m", "assumed: a dowel", gt=1e-3, le=0.1)
-    """Radius of the rod."""
-    withdraw: bool = number(False, "1", "assumed: the paper pushes only")
-    """Whether the rod also goes back at the same speed, so that hysteresis shows."""
-    start_spread: float = number(0.0005, "m", "assumed: set by hand", ge=0)
-    """Half range of the rod's first distance."""
-
-
-_OF_THE_RIG = ("rig", "antenna", "variation", "physics")
+_OF_THE_RIG = ("rig", "antenna", "variation", "physics", "solver")
 
 
 class CalibrateConfig(Params):
@@ -96,6 +72,8 @@ class CalibrateConfig(Params):
     """A worse fit is refused."""
     good_r2: float = number(0.9, "1", "assumed: our rig reaches 0.98", ge=0, lt=1)
     """A worse fit is warned of."""
+    solver: Solver = solver()
+    """What steps the rig's physics: the engine, or the compiled chain (extra `fast`)."""
     draws: int = number(500, "1", "assumed: usual", ge=20, le=100000)
     """Bootstrap draws."""
     seed: int = number(1, "1", "assumed: any", ge=0)
@@ -125,6 +103,7 @@ class CalibrateConfig(Params):
 
     @model_validator(mode="after")
     def _on_the_antenna(self) -> CalibrateConfig:
+        require_read(self.solver, self.physics)
         if self.rig.place + self.rig.rod_radius > self.antenna.length:
             raise ValueError(
                 f"rig.place must leave room for the rod on the antenna of {self.antenna.length:g} "
@@ -200,29 +179,15 @@ def push(config: CalibrateConfig, trial: int) -> Recording:
     rng = np.random.default_rng([config.seed, trial])
     factors = np.exp(rng.normal(0.0, config.variation.stiffness, config.antenna.hinges))
     gap = 2 * rig.start_spread * rng.uniform(0.0, 1.0)
-    bench = _bench(config, factors)
-    period = 1.0 / config.antenna.sensor.rate
-    touch = config.antenna.radius + rig.rod_radius
-    rate = config.antenna.sensor.rate
     ways = 2 if rig.withdraw else 1
-    ticks = ways * int(np.ceil((gap + rig.depth) / speed * rate)) + 1
+    ticks = ways * int(np.ceil((gap + rig.depth) / speed * config.antenna.sensor.rate)) + 1
     noise = reading_noise(config.antenna.sensor, rng, (ticks,))
-    sensor = SensorChain(config.antenna.sensor, (), period)
-    rod = Slider(bench.model, bench.data, "probe")
-    bench.place(0.0, 0.0, 0.0)
-    rod.place(rig.place, -touch - gap)
-    rows = []
-    for i in range(ticks):
-        at = float(rod.position[1]) + touch
-        counts = float(sensor.step(np.array(bench.flex()), float(noise[i])))
-        rows.append((i * period, counts, at / rig.depth))
-        for k in range(1, round(period / _COMMAND_PERIOD) + 1):
-            way = speed * (i * period + k * _COMMAND_PERIOD)
-            back = rig.withdraw and way > gap + rig.depth
-            y = -touch - gap + (2 * (gap + rig.depth) - way if back else way)
-            rod.command(rig.place, y, 0.0, -speed if back else speed)
-            bench.step(round(_COMMAND_PERIOD / config.physics.timestep))
-    t, counts, bend = np.array(rows).T
+    sensor = SensorChain(config.antenna.sensor, (), 1.0 / config.antenna.sensor.rate)
+    t, flex, way = Push(config.physics, config.antenna, rig, factors, speed, gap).run(
+        ticks, config.solver
+    )
+    counts = np.array([sensor.step(f, float(n)) for f, n in zip(flex, noise, strict=True)])
+    bend = way / rig.depth
     inside = (bend >= 0) & (bend <= 1)
     n = int(inside.sum())
     samples = Samples(
@@ -235,13 +200,6 @@ def push(config: CalibrateConfig, trial: int) -> Recording:
     return Recording(t[inside], samples, "")
 
 
-def _bench(config: CalibrateConfig, factors: Floats) -> Bench:
-    model = compile_bench(config.physics, config.antenna, probe_radius=config.rig.rod_radius)
-    for i, factor in enumerate(factors):
-        model.joint(f"antenna/hinge{i}").stiffness *= factor
-    return Bench(model, config.antenna)
-
-
 def record(
     config: CalibrateConfig,
     workers: int = 1,
@@ -252,6 +210,7 @@ def record(
     Raises:
         SimulationError: The physics became invalid; from a worker it comes as a WorkerError.
     """
+    warm_up(config.solver)
     tasks = [(config, trial) for trial in range(len(config.rig.speeds) * config.rig.pushes)]
     parts = gather(push, tasks, workers, on_step)
     fields = ("counts", "level", "trial", "speed", "row")

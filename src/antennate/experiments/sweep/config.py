@@ -9,10 +9,12 @@ from pydantic import Field, model_validator
 
 from antennate.antenna.statics import PROFILES, Profile
 from antennate.params.base import Params, number, require_different, require_whole_steps
+from antennate.params.bench import Solver, solver
 from antennate.params.control import ConditioningParams
 from antennate.params.scene import BenchPhysicsParams
 from antennate.params.sweep import EstimateParams, ShapeParams, SweepParams
 from antennate.robots.antenna import AntennaSpec
+from antennate.sim.chain import require_read
 
 
 class SweepConfig(Params):
@@ -56,6 +58,8 @@ class SweepConfig(Params):
     """Speed of the base along the wall where it moves."""
     points: bool = number(False, "1", "assumed: a large file that few need")
     """Whether to save the points of the antenna of `profile` in every cell, for `tracks`."""
+    solver: Solver = solver()
+    """What steps the physics: the engine, or the compiled chain (extra `fast`; compiles once)."""
     sweep: SweepParams = SweepParams()
     shape: ShapeParams = ShapeParams()
     estimate: EstimateParams = EstimateParams()
@@ -67,6 +71,7 @@ class SweepConfig(Params):
     def _agree(self) -> SweepConfig:
         require_whole_steps("antenna.sensor.rate", self.antenna.sensor.rate, self.physics.timestep)
         require_different("profiles", self.profiles)
+        require_read(self.solver, self.physics)
         least = self.antenna.radius / self.antenna.length
         for what, values in (
             ("distances", self.distances),

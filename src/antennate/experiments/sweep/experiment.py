@@ -9,6 +9,7 @@ from antennate.experiments.sweep import outlines
 from antennate.experiments.sweep import run as sweep
 from antennate.experiments.sweep.config import SweepConfig
 from antennate.experiments.sweep.reach import CUES
+from antennate.sim.chain import require_solver
 from antennate.studies.experiment import Experiment
 from antennate.studies.measures import Table, shown
 
@@ -76,5 +77,8 @@ def _files(outcome: sweep.SweepOutcome) -> Mapping[str, str]:
 
 
 EXPERIMENT = Experiment.of_folder(
-    __name__, SweepConfig, sweep.run, tables, sentence, files=_files, parts="sweeps"
+    *(__name__, SweepConfig, sweep.run, tables, sentence),
+    files=_files,
+    check=require_solver,
+    parts="sweeps",
 )

@@ -16,6 +16,7 @@ from antennate.experiments.sweep.config import SweepConfig
 from antennate.experiments.sweep.estimates import Trial
 from antennate.experiments.sweep.outlines import Outlines
 from antennate.params.sweep import SweepParams
+from antennate.sim import chain
 from antennate.studies.experiment import OnRow, OnStep, no_row, no_step
 from antennate.studies.pool import gather
 from antennate.studies.statistics import mean95
@@ -149,6 +150,7 @@ def map_cell(
         config.sweeps + 1,
         config.speed if motion == "moving" else 0.0,
         config.shape.gap,
+        config.solver,
     )
     found: dict[str, Any] = {}
     if not trace.reason:
@@ -187,8 +189,10 @@ def run(
     """Sweep in every cell of the map and in every trial of the estimates.
 
     Raises:
+        MissingPackageError: The solver needs a package that is not installed.
         WorkerError: A worker process died.
     """
+    chain.warm_up(config.solver)
     grid = list(product(config.distances, config.centres, config.amplitudes))
     cells = [
         (map_cell, config, profile, motion, number, *cell)

@@ -5,29 +5,61 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 
 from antennate.control.checked import CheckedController
 from antennate.control.loop import run_loop
 from antennate.control.registry import ControllerMaker, make_controller
-from antennate.errors import ConfigError, ControllerError
+from antennate.errors import ConfigError, ControllerError, SimulationError
 from antennate.experiments.tunnel.config import TunnelConfig
-from antennate.experiments.tunnel.monitor import Outcome, TrialMonitor, TrialPath, TrialResult
+from antennate.experiments.tunnel.monitor import (
+    Outcome,
+    TrialMonitor,
+    TrialPath,
+    TrialResult,
+    Watched,
+)
 from antennate.sim.scenes.registry import make_scene
-from antennate.sim.sim_robot import SimRobot
+from antennate.sim.scenes.scene import Scene
+from antennate.sim.sim_robot import Disturbance, SimRobot
 from antennate.sim.trial import draw_trial
 from antennate.sim.world import World
 from antennate.telemetry.header import Header
 from antennate.telemetry.simulated import SimulatedLog
 from antennate.telemetry.view.pace import Restart
-from antennate.types import AntennaFrame, Controller, JointCommand
+from antennate.types import AntennaFrame, Controller, JointCommand, Robot
 
 BATCH = 12
 """Trials of one process stepped in lockstep."""
 Emit = Callable[[tuple[TrialResult, TrialPath]], None]
 Watch = Callable[[World, AntennaFrame, Controller], Sequence[str]]
 """Takes world, frame and controller of the first row after each tick; returns events to log."""
+
+
+class Bodies(Robot, Protocol):
+    """Robots in rows that trials are put into: `SimRobot`, or a batch on a device."""
+
+    def load(self, row: int, world: World, chance: Disturbance) -> None:
+        """Put a fresh world into a row."""
+        ...
+
+    def unload(self, row: int) -> None:
+        """Empty a row."""
+        ...
+
+    def world(self, row: int) -> Watched:
+        """The world in a row."""
+        ...
+
+    def failure(self, row: int) -> SimulationError | None:
+        """What ended the row's simulation, if anything did."""
+        ...
+
+
+MakeBodies = Callable[[int], tuple[Scene, Bodies]]
+"""Takes the number of rows; the scene, drawn so that these robots can be put into it, and them."""
 
 
 def run_trials(
@@ -39,6 +71,7 @@ def run_trials(
     logs: Path | None = None,
     watch: Watch | None = None,
     make: ControllerMaker = make_controller,
+    bodies: MakeBodies | None = None,
 ) -> None:
     """Run trials of one controller; emit each as it ends, and keep its log if there is a folder.
 
@@ -46,9 +79,10 @@ def run_trials(
     finite, and a maneuver that does not exist, are faults of one row and end that trial alone. An
     exception, or an array of another shape, cannot be told apart by rows: then each trial of the
     batch that has not ended begins again with a controller of its own, and is invalid if that one
-    fails too.
+    fails too. With robots of another kind, there are no logs and nothing to watch.
     """
-    rows = _Rows(config, controller, trials, emit, min(batch, len(trials)), logs, watch)
+    made = (bodies or cpu_bodies(config))(min(batch, len(trials)))
+    rows = _Rows(config, controller, trials, emit, min(batch, len(trials)), logs, watch, made)
     try:
         rows.run(make)
     except Restart:
@@ -60,7 +94,18 @@ def run_trials(
             return
         for trial in rows.unfinished:
             rows.log_of(trial).unlink(missing_ok=True)
-            run_trials(config, controller, [trial], emit, logs=logs)
+            run_trials(config, controller, [trial], emit, logs=logs, make=make, bodies=bodies)
+
+
+def cpu_bodies(config: TunnelConfig) -> MakeBodies:
+    """The scene as it is, and robots on the CPU."""
+    robot, period = config.robot, config.control.period
+
+    def make(batch: int) -> tuple[Scene, SimRobot]:
+        scene = make_scene(config.scene, config.tunnel)
+        return scene, SimRobot(batch, robot, period, config.physics.timestep)
+
+    return make
 
 
 class _Rows:
@@ -75,14 +120,13 @@ class _Rows:
         batch: int,
         logs: Path | None,
         watch: Watch | None,
+        made: tuple[Scene, Bodies],
     ) -> None:
         self._config, self._name, self._emit, self._batch = config, name, emit, batch
         self._folder, self._logs, self._looks = logs, dict[int, SimulatedLog](), watch
         self._waiting = list(trials)
-        self._scene = make_scene(config.scene, config.tunnel)
+        self._scene, self._robot = made
         self._monitors: list[TrialMonitor | None] = [None] * batch
-        period = config.control.period
-        self._robot = SimRobot(batch, config.robot, period, config.physics.timestep)
 
     @property
     def unfinished(self) -> list[int]:
@@ -110,8 +154,7 @@ class _Rows:
         def go_on(frame: AntennaFrame, command: JointCommand) -> bool:
             for log in self._logs.values():
                 log.take(frame, command)
-            if self._looks is not None:
-                self._note(self._looks(self._robot.world(0), frame, made))
+            self._look(frame, made)
             for row, monitor in enumerate(self._monitors):
                 if monitor is not None and self._watch(row, monitor, control) and self._waiting:
                     phase = self._place(row)
@@ -127,7 +170,7 @@ class _Rows:
         gait, period = config.control.gait, config.control.period
         start = draw_trial(config, self._scene, trial, gait, period)
         self._robot.load(row, start.world, start.chance)
-        before = start.world.outlines()[1]
+        before = self._robot.world(row).outlines()[1]
         self._monitors[row] = TrialMonitor(
             config.seed, trial, self._name, start.scene, before, config.time_limit
         )
@@ -140,8 +183,8 @@ class _Rows:
 
     def _log(self, row: int, controller: Controller, phase: float) -> None:
         """Begin the log of the trial that was put into a row."""
-        config, monitor = self._config, self._monitors[row]
-        if self._folder is None or monitor is None:
+        config, monitor, world = self._config, self._monitors[row], self._robot.world(row)
+        if self._folder is None or monitor is None or not isinstance(world, World):
             return
         header = Header(
             controller=self._name,
@@ -151,13 +194,16 @@ class _Rows:
             trial=monitor.trial,
             phase=phase,
         )
-        world, path = self._robot.world(row), self.log_of(monitor.trial)
+        path = self.log_of(monitor.trial)
         self._logs[row] = SimulatedLog(path, header, controller, world, row)
 
-    def _note(self, events: Sequence[str]) -> None:
-        """Keep events in the logs."""
-        for log in self._logs.values():
-            for text in events:
+    def _look(self, frame: AntennaFrame, controller: Controller) -> None:
+        """Let somebody look at the first row after a tick, and keep the events in the logs."""
+        world = self._robot.world(0) if self._looks is not None else None
+        if self._looks is None or not isinstance(world, World):
+            return
+        for text in self._looks(world, frame, controller):
+            for log in self._logs.values():
                 log.event(text)
 
     def drop_logs(self) -> None:

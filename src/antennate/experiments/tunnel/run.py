@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -87,11 +88,15 @@ def run_rows(
     _run([(config, *trial, None) for trial in trials], lambda i, found: emit(i, found[0]))
 
 
+RunTrials = Callable[[TunnelConfig, str, Sequence[int], Emit], None]
+"""Runs trials of one controller, and emits each as it ends."""
 _Task = tuple[TunnelConfig, str, int, Path | None]
 """Configuration, name of the controller, trial, folder for its log."""
 
 
-def _run(tasks: Sequence[_Task], emit: Callable[[int, _Found], None]) -> None:
+def _run(
+    tasks: Sequence[_Task], emit: Callable[[int, _Found], None], run: RunTrials | None = None
+) -> None:
     """Run trials, those of one controller in lockstep."""
     places = {(name, trial): i for i, (_, name, trial, _) in enumerate(tasks)}
     config, _, _, logs = tasks[0]
@@ -103,7 +108,25 @@ def _run(tasks: Sequence[_Task], emit: Callable[[int, _Found], None]) -> None:
             shown = path if row.trial < SHOWN_TRIALS else None
             emit(places[row.controller, row.trial], (row, shown))
 
-        run_trials(config, name, numbers, take, logs=logs)
+        if run is None:
+            run_trials(config, name, numbers, take, logs=logs)
+        else:
+            run(config, name, numbers, take)
+
+
+def _run_batched(
+    tasks: Sequence[_Task], emit: Callable[[int, _Found], None], device: str | None
+) -> None:
+    """The same on a GPU.
+
+    Raises:
+        ConfigError: There is none, or logs are wanted.
+    """
+    from antennate.experiments.tunnel.warp import run_trials_on_warp
+
+    if tasks[0][3] is not None:
+        raise ConfigError("--log: expected another engine, found warp, which keeps no logs")
+    _run(tasks, emit, functools.partial(run_trials_on_warp, device=device))
 
 
 def _lost(config: TunnelConfig, trial: Trial, failure: Failure) -> _Found:
@@ -179,6 +202,7 @@ def run(
                 *(_run, [(config, *trial, logs) for trial in trials], workers, on_step, take),
                 chunk=size,
                 together=True,
+                batched=_run_batched,
                 lost=lambda place, failure: _lost(config, trials[place], failure),
             )
         else:

@@ -8,6 +8,7 @@ from typing import Any
 from antennate.experiments.wall import measures
 from antennate.experiments.wall import run as wall
 from antennate.studies.experiment import Experiment, Trials
+from antennate.sim.chain import require_solver
 from antennate.studies.measures import Table, successes
 
 
@@ -50,4 +51,5 @@ EXPERIMENT = Experiment.of_folder(
     filmed=True,
     trials=Trials("profile", wall.every, wall.run_rows),
     viewed=lambda config, on_step, on_row, view, logs: wall.run(config, 1, on_step, on_row, view),
+    check=require_solver,
 )

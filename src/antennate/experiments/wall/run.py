@@ -22,10 +22,11 @@ from antennate.errors import SimulationError, WorkerError
 from antennate.experiments.wall import measures
 from antennate.experiments.wall.outcome import SAMPLE_PERIOD, Traverse, WallTrial, classify
 from antennate.params.base import Params, number, require_different
-from antennate.params.bench import BenchVariationParams, WallParams
+from antennate.params.bench import BenchVariationParams, Solver, WallParams, solver
 from antennate.params.scene import BenchPhysicsParams
 from antennate.robots.antenna import AntennaSpec
 from antennate.robots.sensor import SensorParams
+from antennate.sim import chain
 from antennate.sim.bench import Ball, Bench, compile_bench
 from antennate.studies.experiment import OnRow, OnStep, Trial, no_row, no_step
 from antennate.studies.pool import gather
@@ -63,6 +64,8 @@ class WallConfig(Params):
         tuple(PROFILES), "1", "paper: its three; assumed: two controls it lacks", min_length=1
     )
     """Profiles to run."""
+    solver: Solver = solver()
+    """What steps the physics: the engine, or the compiled chain (extra `fast`; compiles once)."""
     wall: WallParams = WallParams()
     antenna: AntennaSpec = AntennaSpec()
     variation: BenchVariationParams = BenchVariationParams()
@@ -87,6 +90,7 @@ class WallConfig(Params):
             raise ValueError(
                 f"physics.timestep must divide {_COMMAND_PERIOD:g} s, got {self.physics.timestep:g}"
             )
+        chain.require_read(self.solver, self.physics)
         return self
 
 
@@ -132,7 +136,14 @@ def _unwatched(bench: Bench) -> None:
 def passage(config: WallConfig, profile: str, trial: int, watch: Watch = _unwatched) -> Traverse:
     """Move one antenna along the wall.
 
+    Args:
+        config: What is run.
+        profile: Springs of the antenna.
+        trial: Which of its trials.
+        watch: Looks at the bench of the engine; the chain has none.
+
     Raises:
+        MissingPackageError: The solver needs a package that is not installed.
         SimulationError: The physics became invalid.
     """
     rng = np.random.default_rng([config.seed, trial])
@@ -145,9 +156,17 @@ def passage(config: WallConfig, profile: str, trial: int, watch: Watch = _unwatc
     antenna = with_profile(config.antenna, profile)
     antenna = antenna.model_copy(update={"friction": min(friction, 2.0)})
     crest = antenna.length * math.sin(angle) + antenna.radius + _CLEAR
-    balls = _boulders(config.wall, antenna, angle, phase, crest)
-    bench = _bench(config, antenna, balls, factors)
-    return _drive(config, bench, balls, math.pi / 2 - angle, overlap + _CLEAR, crest, watch)
+    balls = _boulders(wall, antenna, angle, phase, crest)
+    pull = (0.0, {"down": -_GRAVITY, "up": _GRAVITY, "off": 0.0}[wall.gravity])
+    way = (math.pi / 2 - angle, overlap + _CLEAR, crest)
+    if config.solver == "chain":
+        fast = chain.ChainBench(config.physics, antenna, balls, pull, factors=factors)
+        return _drive_chain(config, antenna, fast, balls, *way)
+    model = compile_bench(config.physics, antenna, balls, pull)
+    for i, factor in enumerate(factors):
+        joint = model.joint(f"antenna/hinge{i}")
+        joint.stiffness *= factor
+    return _drive(config, Bench(model, antenna), balls, *way, watch)
 
 
 def _boulders(
@@ -159,17 +178,6 @@ def _boulders(
     above = wall.travel + 1.2 * antenna.length
     heights = np.arange(below + phase, above, pitch)
     return [Ball(crest + pitch / 2, float(y), pitch / 2) for y in heights]
-
-
-def _bench(
-    config: WallConfig, antenna: AntennaSpec, balls: Sequence[Ball], factors: Floats
-) -> Bench:
-    pull = {"down": -_GRAVITY, "up": _GRAVITY, "off": 0.0}[config.wall.gravity]
-    model = compile_bench(config.physics, antenna, balls, (0.0, pull))
-    for i, factor in enumerate(factors):
-        joint = model.joint(f"antenna/hinge{i}")
-        joint.stiffness *= factor
-    return Bench(model, antenna)
 
 
 def _drive(
@@ -192,7 +200,7 @@ def _drive(
     begin = bench.tip()[1]
     path = _ramp(wall.travel, wall.speed)
     rows, hinges, shapes = [], [], []
-    marks = {round(i * (len(path) - 1) / 10) for i in range(11)}
+    marks = _marks(path)
     for i, y in enumerate(path):
         bench.command(approach, y, 0.0, wall.speed, base)
         bench.step(substeps)
@@ -206,8 +214,50 @@ def _drive(
             hinges.append(bench.hinges().copy())
     base_y, tip_y, touching, forces, flex = np.array(rows, float).T
     from_crest = np.array(shapes) - [crest, 0.0]
-    boulders = np.array([(ball.x - crest, ball.y, ball.radius) for ball in balls])
-    return Traverse(base_y, tip_y, touching, forces, flex, np.array(hinges), from_crest, boulders)
+    shown = _about(balls, crest)
+    return Traverse(base_y, tip_y, touching, forces, flex, np.array(hinges), from_crest, shown)
+
+
+def _about(balls: Sequence[Ball], crest: float) -> Floats:
+    """Centres of spheres from the crest on, and their radii [m], shape (n, 3)."""
+    return np.array([(ball.x - crest, ball.y, ball.radius) for ball in balls])
+
+
+def _drive_chain(
+    config: WallConfig,
+    antenna: AntennaSpec,
+    bench: chain.ChainBench,
+    balls: Sequence[Ball],
+    base: float,
+    approach: float,
+    crest: float,
+) -> Traverse:
+    """As `_drive`, all commands of a way at once."""
+    speed, timestep = config.wall.speed, config.physics.timestep
+    substeps = round(_COMMAND_PERIOD / timestep)
+    bench.place(0.0, 0.0, base)
+    bench.drive(bench.commands(np.zeros((1, 2)), np.zeros(2), base), round(_SETTLE / timestep))
+    ahead, path = np.array(_ramp(approach, speed)), np.array(_ramp(config.wall.travel, speed))
+    there = np.column_stack([ahead, np.zeros_like(ahead)])
+    came = bench.drive(bench.commands(there, np.array([speed, 0.0]), base), substeps)
+    along = np.column_stack([np.full_like(path, approach), path])
+    went = bench.drive(bench.commands(along, np.array([0.0, speed]), base), substeps)
+    seen = went[::_SAMPLES]
+    return Traverse(
+        path[::_SAMPLES],
+        seen.joints[:, -1, 1] - came[-1:].joints[-1, -1, 1],
+        seen.touching.astype(float),
+        np.hypot(*seen.force.T),
+        seen.hinges[:, : antenna.sensed_hinges].sum(axis=1),
+        seen.hinges,
+        went[sorted(_marks(path))].joints - [crest, 0.0],
+        _about(balls, crest),
+    )
+
+
+def _marks(path: Sequence[float] | Floats) -> set[int]:
+    """Where on a way the antenna's shape is kept: every tenth."""
+    return {round(i * (len(path) - 1) / 10) for i in range(11)}
 
 
 def _ramp(length: float, speed: float) -> list[float]:
@@ -284,8 +334,10 @@ def run(
     With a view they run in this process, one after the other, and give the same.
 
     Raises:
+        MissingPackageError: The solver needs a package that is not installed.
         WorkerError: A worker process failed.
     """
+    chain.warm_up(config.solver)
     trials = every(config)
     tasks: list[_Task] = [(config, *trial) for trial in trials]
 

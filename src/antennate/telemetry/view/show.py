@@ -212,7 +212,8 @@ def _status(tick: Tick | None, state: Mapping[str, Any], lines: tuple[str, ...])
         rows.append(("shown", title))
     if tick is not None:
         rows.append(("time", f"{tick.now:.2f} s"))
-        rows.append(("maneuver", Maneuver.label(tick.maneuver).replace("_", " ")))
+        if tick.maneuver >= 0:
+            rows.append(("maneuver", Maneuver.label(tick.maneuver).replace("_", " ")))
         if tick.state:
             rows.append(("supervisor", tick.state))
             rows += [("", cause) for cause in tick.causes[:3]]

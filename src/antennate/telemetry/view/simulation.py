@@ -27,6 +27,8 @@ from antennate.types import AntennaFrame, Controller
 _SIDES = (rgba(SERIES[0]), rgba(SERIES[1]))
 _FARTHEST = 50.0
 """Farthest from the origin that an obstacle is put [m]; a world beyond 100 m is unsound."""
+NONE = -1
+"""Stands for a maneuver where there is none."""
 _NOT_A_NUMBER = (math.nan, math.nan)
 _UNKNOWN = (2, 2)
 
@@ -38,13 +40,17 @@ class SimulationView(Pace):
         channel: To the process that shows it.
         speed: Times real time at which it begins; 0 is as fast as it goes.
         steered: Whether the page has controls; without them it changes nothing.
+        paused: Whether it stands at first.
 
     Attributes:
         by_hand: What was changed by hand, in order.
     """
 
-    def __init__(self, channel: Channel, speed: float = 1.0, steered: bool = True) -> None:
+    def __init__(
+        self, channel: Channel, speed: float = 1.0, steered: bool = True, paused: bool = False
+    ) -> None:
         super().__init__(channel, speed)
+        self.state["paused"] = paused
         self._steered = steered
         if not steered:
             self.state = {"speed": None, "paused": False}
@@ -55,7 +61,7 @@ class SimulationView(Pace):
         self._model: VisibleModel | None = None
         self._data: Any = None
         self._title, self._number = "", 0
-        self._last: tuple[AntennaFrame | None, Controller | None, int] = (None, None, 0)
+        self._last: tuple[AntennaFrame | None, Controller | None, int] = (None, None, NONE)
 
     def begin(self, title: str, seed: int | None = None) -> None:
         """A trial begins; `seed` is the one that it has, None where there is no chance."""
@@ -88,7 +94,7 @@ class SimulationView(Pace):
         data: Any,
         frame: AntennaFrame | None = None,
         controller: Controller | None = None,
-        maneuver: int = 0,
+        maneuver: int = NONE,
     ) -> Sequence[str]:
         """Show a tick if a picture is due, and wait until its time has come.
 
@@ -97,7 +103,7 @@ class SimulationView(Pace):
             data: Its state.
             frame: What was read, None without antennae.
             controller: What decided, None without one.
-            maneuver: The `Maneuver` without a controller.
+            maneuver: The `Maneuver` without a controller, if there is one.
 
         Returns:
             What was changed by hand since the last tick, for the log.
