@@ -168,6 +168,7 @@ def test_a_person_stops_steps_and_begins_anew(tab: Tab, tmp_path: Path) -> None:
         tab.click("button", "one step")
         tab.until(f"!document.body.innerText.includes('{stood:.2f} s')")
         assert settled(tab) == pytest.approx(stood + 0.01)
+        drag_a_cylinder(tab)
         tab.fill("seed", "7")
         tab.click("button", "restart with this seed")
         tab.until("/time\\s+0\\.0[0-9] s/.test(document.body.innerText)")
@@ -175,10 +176,23 @@ def test_a_person_stops_steps_and_begins_anew(tab: Tab, tmp_path: Path) -> None:
         tab.choose("speed", "max")
         assert view.process.wait(PATIENCE) == 0
     run = tmp_path / "run"
-    assert "begun anew with seed 7" in (run / "by-hand.txt").read_text()
+    lines = (run / "by-hand.txt").read_text()
+    assert "begun anew with seed 7" in lines
+    assert re.search(r"obstacle \d+ moved to x = -?[0-9.]+ m, y = -?[0-9.]+ m", lines)
     rows = (run / "trials.csv").read_text().splitlines()
     assert dict(zip(rows[0].split(","), rows[1].split(","), strict=True))["seed"] == "7"
     assert json.loads((run / "result.json").read_text())["seed"] == 0  # that of the configuration
+
+
+def drag_a_cylinder(tab: Tab) -> None:
+    """Drag from one place of the picture after the other until one of them was on a cylinder."""
+    for y in range(150, 700, 60):
+        for x in range(360, 860, 70):
+            tab.drag((x, y), (x + 10, y), (x + 25, y + 5), (x + 40, y + 10))
+            time.sleep(0.3)
+            if tab.run("document.body.innerText.includes('by hand: obstacle')"):
+                return
+    raise AssertionError("no cylinder was moved")
 
 
 def settled(tab: Tab) -> float:

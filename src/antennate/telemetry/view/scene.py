@@ -19,7 +19,7 @@ from antennate.telemetry.view.channel import Poses
 from antennate.types import Floats, Ints
 
 ROOT = "/world"
-_ARROW = (213, 94, 0)
+_ARROW = (190, 0, 60)
 _FLOOR = 4.0
 """Side of the floor that is drawn [m]; it goes on beyond in the distance."""
 _CELL = 0.1
@@ -46,7 +46,7 @@ class SceneView:
 
     def __init__(self, server: viser.ViserServer, what: Shapes) -> None:
         self._server, self.shapes = server, what
-        self.follow, self.arrow_scale = True, 0.05
+        self.follow, self.arrow_scale = True, 0.1
         self.places = np.zeros((len(what.kind), 3), np.float32)
         self.middle: Floats = np.zeros(3)
         server.scene.reset()
@@ -61,9 +61,9 @@ class SceneView:
             f"{ROOT}/forces",
             np.zeros((0, 2, 3)),
             _ARROW,
-            shaft_radius=0.002,
-            head_radius=0.005,
-            head_length=0.01,
+            shaft_radius=0.004,
+            head_radius=0.009,
+            head_length=0.018,
         )
         self._aimed = False
 

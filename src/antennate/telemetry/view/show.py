@@ -101,7 +101,7 @@ class Page:
         self._map = Map(server)
         with gui.add_folder("picture"):
             self._follow = gui.add_checkbox("follow the robot", True)
-            self._arrow = gui.add_slider("arrows [mm for 1 N]", 1, 500, 1, 50)
+            self._arrow = gui.add_slider("arrows [mm for 1 N]", 1, 500, 1, 100)
 
     def draw(self, now: float) -> float:
         """Draw what is due at a time [s]; the time until more may be due [s]."""
