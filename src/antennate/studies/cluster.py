@@ -23,10 +23,10 @@ from antennate.errors import (
 )
 from antennate.messages import shortened
 from antennate.studies.codec import decoded, encoded
-from antennate.studies.engines import Submitted, carry_out, require_same
 from antennate.studies.identity import environment
 from antennate.studies.processes import added_objects, take_added
 from antennate.studies.store import Store, parsed, read_store
+from antennate.studies.submitted import Submitted, carry_out, require_same
 from antennate.studies.work import Emit, Fail, Failure, Part, Waiting, Work
 
 _CONNECT = 10.0
