@@ -115,7 +115,9 @@ def _slider(spec: mujoco.MjSpec, name: str) -> mujoco.MjsBody:
     for slide, axis in ((f"{name}_x", [1, 0, 0]), (f"{name}_y", [0, 1, 0])):
         body.add_joint(name=slide, type=mujoco.mjtJoint.mjJNT_SLIDE, axis=axis)
         hinge = mujoco.mjtTrn.mjTRN_JOINT
-        spec.add_actuator(name=slide, trntype=hinge, target=slide).set_to_position(kp=SLIDE_STIFFNESS)
+        spec.add_actuator(name=slide, trntype=hinge, target=slide).set_to_position(
+            kp=SLIDE_STIFFNESS
+        )
         follow = spec.add_actuator(name=f"{slide}_speed", trntype=hinge, target=slide)
         follow.set_to_velocity(kv=SLIDE_DAMPING)
     return body

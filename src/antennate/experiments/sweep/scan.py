@@ -153,13 +153,12 @@ def _record_chain(
     after = clock[steps - 1 :: steps]  # summed up as the engine's clock is
     begins = np.append(0.0, after)
     told = [
-        (way(t, speed), speed_at(t, speed), commanded(sweep, t)) for t in begins[begins < end].tolist()
+        (way(t, speed), speed_at(t, speed), commanded(sweep, t))
+        for t in begins[begins < end].tolist()
     ]
     x, speeds, angles = np.array(told).T
     still = np.zeros_like(x)
-    commands = bench.commands(
-        np.column_stack([x, still]), np.column_stack([speeds, still]), angles
-    )
+    commands = bench.commands(np.column_stack([x, still]), np.column_stack([speeds, still]), angles)
     try:
         seen = bench.drive(commands, steps)
     except SimulationError as error:

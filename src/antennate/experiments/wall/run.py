@@ -226,7 +226,7 @@ def _drive_chain(
     came = bench.drive(bench.commands(there, np.array([speed, 0.0]), base), substeps)
     along = np.column_stack([np.full_like(path, approach), path])
     went = bench.drive(bench.commands(along, np.array([0.0, speed]), base), substeps)
-    seen = went[:: _SAMPLES]
+    seen = went[::_SAMPLES]
     return Traverse(
         path[::_SAMPLES],
         seen.joints[:, -1, 1] - came[-1:].joints[-1, -1, 1],
