@@ -308,7 +308,7 @@ def test_a_folder_that_cannot_be_written_is_named(monkeypatch: pytest.MonkeyPatc
 
 def test_what_the_chain_does_not_read_or_draw_is_refused() -> None:
     for config in (WallConfig, CalibrateConfig):
-        with pytest.raises(ValidationError, match="sleep_tolerance: expected 0.001"):
+        with pytest.raises(ValidationError, match="sleep_tolerance: expected"):
             config.model_validate({"solver": "chain", "physics": {"sleep_tolerance": 0.01}})
     wall = experiments.load("wall")
     with pytest.raises(ConfigError, match="video: expected the solver mujoco"):

@@ -7,7 +7,6 @@ from typing import Any, Literal
 
 from antennate.params.base import Params, number
 
-
 Solver = Literal["mujoco", "chain"]
 """What steps the physics of the bench: the engine, or the compiled chain of the extra `fast`."""
 

@@ -85,8 +85,8 @@ def require_read(solver: Solver, physics: PhysicsParams) -> None:
     usual = type(physics).model_fields["sleep_tolerance"].default
     if solver == "chain" and physics.sleep_tolerance != usual:
         raise ValueError(
-            f"physics.sleep_tolerance: expected {usual:g}, as nothing sleeps with the solver chain, "
-            f"found {physics.sleep_tolerance:g}"
+            f"physics.sleep_tolerance: expected {usual:g}, as nothing sleeps with the solver "
+            f"chain, found {physics.sleep_tolerance:g}"
         )
 
 
@@ -238,15 +238,15 @@ class ChainBench:
         count = len(commands)
         states, force = np.zeros((count, len(self._q))), np.zeros((count, 2))
         touching = np.zeros(count, bool)
-        made, last = self._kernel.drive(
+        trouble, done = self._kernel.drive(
             *(self._model, self._q, self._v, commands, steps, states, force, touching)
         )
-        self._steps += (last + (made < 0)) * steps
-        if made < 0:
+        self._steps += done * steps
+        if trouble == self._kernel.CROWDED:
             most = self._kernel.MOST_TOUCHES
-            crowded = f"more than {most} contacts at once"
-            out = "a hinge or a speed left all bounds"
-            raise SimulationError(self._steps, crowded if made == self._kernel.CROWDED else out)
+            raise SimulationError(self._steps, f"more than {most} contacts at once")
+        if trouble:
+            raise SimulationError(self._steps, "a hinge or a speed left all bounds")
         return Motion(self._model.length[1:], states, force, touching)
 
 

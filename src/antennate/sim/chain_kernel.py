@@ -8,7 +8,9 @@ in pieces: forces f of all contacts minimise f A f / 2 + s(j + A f), where A is 
 at the contacts, j what misses the wanted acceleration without forces, and s the cost of a miss.
 Newton's method ends when no contact changes between free, sticking and sliding.
 
-Nothing else imports this file before a chain is made, as numba takes long to import.
+Nothing imports this file before a chain is made, as numba takes long to import. It is one file
+because numba keeps what it compiled as long as the file of `drive` is the same, and looks at no
+other.
 """
 
 from __future__ import annotations
@@ -23,12 +25,14 @@ from antennate.types import Floats, Ints
 
 MOST_TOUCHES = 64
 """Contacts and stops at one time; beyond, a trial is invalid."""
-CROWDED, BURST = -1, -2
-"""What `drive` returns in place of a success: too many contacts, or a state out of bounds."""
+CROWDED, BURST = 1, 2
+"""How `drive` ends if not well: too many touches, or a state out of bounds."""
 _SKIN = 0.002
 """Pairs of link and obstacle farther apart are left out until the chain may have met them [m]."""
 _PARALLEL = 1e-4
 """Sine of the angle up to which the engine takes two capsules as parallel."""
+_NOTHING = -2
+"""What a stop touches; no rod is -1."""
 _ITERATIONS, _HALVINGS = 100, 40
 """Most steps of Newton's method, and halvings of one."""
 _SMALL_TURN = 5e-3
@@ -91,7 +95,7 @@ class _Touches(NamedTuple):
 
     Attributes:
         link: Link that is touched, or whose joint is stopped, shape (k,).
-        obstacle: Which obstacle it touches, -1 for a stop.
+        obstacle: Which obstacle it touches, `_NOTHING` for a stop.
         place: Where [m], shape (k, 2); `normal` away from the obstacle, zeros for a stop.
         turn: Direction in which a stop turns its joint, 0 for a contact.
         grip: Friction, 0 for a stop, shape (k,).
@@ -281,7 +285,7 @@ def _stops(model, q, v, touches):
             sign = -1.0 if turn > 0.0 else 1.0
             speed = sign * (v[2 + i] - (v[1 + i] if i else 0.0))
             hard, pull, drag = _hardness(model.stopping, model.stop_weight[i], depth)
-            _begin(touches, count, i, -1, sign)
+            _begin(touches, count, i, _NOTHING, sign)
             touches.normal[count] = 0.0
             touches.grip[count] = 0.0
             touches.hardness[2 * count], touches.hardness[2 * count + 1] = hard, 0.0
@@ -404,23 +408,29 @@ def _missed(size, touches, coupling, miss):
 
 
 @njit(**_PART)
+def _towards(count, touches, coupling, miss, system, step, phase):
+    """Newton's step from the forces as they are, if no touch changes its phase."""
+    for i in range(count):
+        a, b = 2 * i, 2 * i + 1
+        aa, ab, bb = _slope(phase[i], touches.hardness[a], touches.hardness[b], touches.grip[i])
+        for j in range(2 * count):
+            system[a, j] = aa * coupling[a, j] + ab * coupling[b, j]
+            system[b, j] = ab * coupling[a, j] + bb * coupling[b, j]
+        system[a, a] += 1.0
+        system[b, b] += 1.0
+        step[a] = -(touches.force[a] + aa * miss[a] + ab * miss[b])
+        step[b] = -(touches.force[b] + ab * miss[a] + bb * miss[b])
+    _eliminate(system, step, 2 * count)
+
+
+@njit(**_PART)
 def _press(count, touches, coupling, miss, system, step, phase):
     """Forces of all touches by Newton's method, into `touches.force`."""
     size, force = 2 * count, touches.force
     _missed(size, touches, coupling, miss)
     energy = _energy(count, touches, coupling, miss, force, phase)
     for _ in range(_ITERATIONS):
-        for i in range(count):
-            a, b = 2 * i, 2 * i + 1
-            aa, ab, bb = _slope(phase[i], touches.hardness[a], touches.hardness[b], touches.grip[i])
-            for j in range(size):
-                system[a, j] = aa * coupling[a, j] + ab * coupling[b, j]
-                system[b, j] = ab * coupling[a, j] + bb * coupling[b, j]
-            system[a, a] += 1.0
-            system[b, b] += 1.0
-            step[a] = -(force[a] + aa * miss[a] + ab * miss[b])
-            step[b] = -(force[b] + ab * miss[a] + bb * miss[b])
-        _eliminate(system, step, size)
+        _towards(count, touches, coupling, miss, system, step, phase)
         share, before = 1.0, energy
         for i in range(count):
             phase[count + i] = phase[i]
@@ -434,10 +444,10 @@ def _press(count, touches, coupling, miss, system, step, phase):
             for i in range(size):
                 force[i] -= share * step[i]
             share *= 0.5
-        same = True
+        changed = 0
         for i in range(count):
-            same = same and phase[i] == phase[count + i]
-        if same and share == 1.0:
+            changed += phase[i] != phase[count + i]
+        if changed == 0 and share == 1.0:
             return
 
 
@@ -445,8 +455,8 @@ def _press(count, touches, coupling, miss, system, step, phase):
 def _resist(model, joints, arms, count, touches, work, torque, rod_force):
     """Add what touches exert to the torques on all joints and the forces on carriage and rod."""
     chain, free, rows, coupling, miss, system, step, phase = work
-    size, last, held = len(model.length) + 2, len(model.length), 1.0 / model.mass
-    for i in range(size):
+    last = len(model.length)
+    for i in range(last + 2):
         free[i] = torque[i]
     _inward(arms, chain, last - 1, free)
     for a in range(2 * count):
@@ -457,39 +467,40 @@ def _resist(model, joints, arms, count, touches, work, torque, rod_force):
         row[0], row[1] = ex, ey
         for j in range(i + 1):
             row[2 + j] = (px - joints[j, 0]) * ey - (py - joints[j, 1]) * ex
-        if touches.turn[k] != 0.0:
-            row[2 + i] = touches.turn[k] if a % 2 == 0 else 0.0
+        row[2 + i] += touches.turn[k] if a % 2 == 0 else 0.0
         _inward(arms, chain, i, row)
         bx = chain[last, 0] * row[0] + chain[last, 1] * row[1]
         by = chain[last, 1] * row[0] + chain[last, 2] * row[1]
-        on_rod = model.rod >= 0 and touches.obstacle[k] == model.rod
-        value = bx * free[0] + by * free[1] - touches.missed[a]
+        give = 1.0 / model.mass if touches.obstacle[k] == model.rod and model.rod >= 0 else 0.0
+        value = bx * free[0] + by * free[1] - give * (ex * rod_force[0] + ey * rod_force[1])
         for j in range(i + 1):
             value += row[2 + j] * chain[j, 3] * free[2 + j]
-        if on_rod:
-            value -= held * (ex * rod_force[0] + ey * rod_force[1])
-        touches.missed[a] = value
+        touches.missed[a] = value - touches.missed[a]
         for b in range(a + 1):
             value, other = bx * rows[b, 0] + by * rows[b, 1], b // 2
             for j in range(min(i, touches.link[other]) + 1):
                 value += row[2 + j] * chain[j, 3] * rows[b, 2 + j]
-            if on_rod and touches.obstacle[other] == model.rod:
+            if give > 0.0 and touches.obstacle[other] == model.rod:
                 ox, oy = touches.normal[other, 0], touches.normal[other, 1]
-                value += held * (ex * ox + ey * oy if b % 2 == 0 else ey * ox - ex * oy)
+                value += give * (ex * ox + ey * oy if b % 2 == 0 else ey * ox - ex * oy)
             coupling[a, b] = coupling[b, a] = value
     _press(count, touches, coupling, miss, system, step, phase)
+    _exert(model, joints, count, touches, torque, rod_force)
+
+
+@njit(**_PART)
+def _exert(model, joints, count, touches, torque, rod_force):
+    """Add the forces of all touches."""
     for k in range(count):
         i, along, across = touches.link[k], touches.force[2 * k], touches.force[2 * k + 1]
         fx = along * touches.normal[k, 0] - across * touches.normal[k, 1]
         fy = along * touches.normal[k, 1] + across * touches.normal[k, 0]
         torque[0] += fx
         torque[1] += fy
-        if touches.turn[k] != 0.0:
-            torque[2 + i] += along * touches.turn[k]
-            continue
         for j in range(i + 1):
             dx, dy = touches.place[k, 0] - joints[j, 0], touches.place[k, 1] - joints[j, 1]
             torque[2 + j] += dx * fy - dy * fx
+        torque[2 + i] += along * touches.turn[k]
         if touches.obstacle[k] == model.rod:
             rod_force[0] -= fx
             rod_force[1] -= fy
@@ -522,38 +533,56 @@ def _place(model, q, cosine, sine, arms, joints):
 @njit(**_PART)
 def _sound(count, q, v):
     """Whether a state is finite and within bounds."""
+    wrong = 0
     for i in range(count + 4):
-        if not abs(v[i]) < _SPEED_LIMIT:
-            return False
+        wrong += not abs(v[i]) < _SPEED_LIMIT
     for i in range(count):
-        if not abs(q[2 + i] - (q[1 + i] if i else 0.0)) < _ANGLE_LIMIT:
-            return False
-    return True
+        wrong += not abs(q[2 + i] - (q[1 + i] if i else 0.0)) < _ANGLE_LIMIT
+    return wrong == 0
 
 
-@njit(**_RULES, cache=True)
-def drive(model, q, v, commands, steps, states, forces, touching):
-    """Step through commands and write what came of each.
+@njit(**_PART)
+def _lead_rod(model, q, v, command, rod_force):
+    """Put the rod where it is, and let its servos act."""
+    size, rod = len(model.length) + 2, model.rod
+    for d in range(2):
+        model.obstacles[rod, d] = model.obstacles[rod, 2 + d] = q[size + d]
+        rod_force[d] = model.servo[0] * (command[5 + d] - q[size + d])
+        rod_force[d] += model.servo[1] * (command[7 + d] - v[size + d])
 
-    Args:
-        model: The bench.
-        q: Coordinates and the rod's place, shape (n + 5,); changed.
-        v: Their speeds; changed.
-        commands: Place and speed of the carriage, angle of the base, place and speed of the rod,
-            shape (k, 9).
-        steps: Physics steps of each.
-        states: Coordinates after each, shape (k, n + 5).
-        forces: Force of all obstacles on the antenna in the last step of each [N], shape (k, 2).
-        touching: Whether any pressed in it, shape (k,).
 
-    Returns:
-        `len(commands)`; or CROWDED or BURST, and the number of the command before it.
-    """
-    count, h, rod = len(model.length), model.timestep, model.rod
-    size, most = count + 2, 2 * MOST_TOUCHES
-    chain, torque, pull = np.zeros((count + 1, 4)), np.zeros(size), np.zeros((count, 2))
-    cosine, sine, joints = np.cos(q[2:size]), np.sin(q[2:size]), np.zeros((count, 2))
-    arms, rod_force = np.zeros((count, 2)), np.zeros(2)
+@njit(**_PART)
+def _advance(model, q, v, torque, rod_force):
+    """Step speeds, then coordinates; the most that anything moved towards anything [m]."""
+    h, size, moved = model.timestep, len(model.length) + 2, 0.0
+    for i in range(size):
+        v[i] += h * torque[i]
+        q[i] += h * v[i]
+        moved += h * abs(v[i]) * (1.0 if i < 2 else model.length[i - 2])
+    for d in range(2 if model.rod >= 0 else 0):
+        v[size + d] += h * rod_force[d] / (model.mass + h * model.servo[1])
+        q[size + d] += h * v[size + d]
+        moved += h * abs(v[size + d])
+    return moved
+
+
+@njit(**_PART)
+def _felt(touches, first, count, force):
+    """Force of all contacts on the antenna; whether any presses."""
+    force[:], pressed = 0.0, False
+    for i in range(first, count):
+        along, across = touches.force[2 * i], touches.force[2 * i + 1]
+        nx, ny = touches.normal[i, 0], touches.normal[i, 1]
+        force[0] += along * nx - across * ny
+        force[1] += along * ny + across * nx
+        pressed = pressed or along > 0.0
+    return pressed
+
+
+@njit(**_PART)
+def _room(count):
+    """Arrays for the touches of a step, and for what `_resist` works out."""
+    most, size = 2 * MOST_TOUCHES, count + 2
     touches = _Touches(
         np.zeros(MOST_TOUCHES, np.int64),
         np.zeros(MOST_TOUCHES, np.int64),
@@ -575,50 +604,63 @@ def drive(model, q, v, commands, steps, states, forces, touching):
         np.zeros(most),
         np.zeros(most, np.int64),
     )
+    return touches, work
+
+
+@njit(**_RULES, cache=True)
+def drive(model, q, v, commands, steps, states, forces, touching):
+    """Step through commands and write what came of each.
+
+    Args:
+        model: The bench; where its rod is changes.
+        q: Coordinates and the rod's place, shape (n + 5,); changed.
+        v: Their speeds; changed.
+        commands: Place and speed of the carriage, angle of the base, place and speed of the rod,
+            shape (k, 9).
+        steps: Physics steps of each.
+        states: Written: coordinates after each, shape (k, n + 5).
+        forces: Written: force of all obstacles on the antenna in the last step of each [N], shape
+            (k, 2).
+        touching: Written: whether any pressed in it, shape (k,).
+
+    Returns:
+        0, CROWDED or BURST; and how many commands were carried out.
+    """
+    count = len(model.length)
+    size = count + 2
+    chain, torque, pull = np.zeros((count + 1, 4)), np.zeros(size), np.zeros((count, 2))
+    cosine, sine, joints = np.cos(q[2:size]), np.sin(q[2:size]), np.zeros((count, 2))
+    arms, rod_force = np.zeros((count, 2)), np.zeros(2)
+    touches, work = _room(count)
     pairs = np.zeros((count * max(1, len(model.obstacles)), 2), np.int64)
     pair_count, slack = 0, -1.0
     for k in range(len(commands)):
-        command, stops, touched = commands[k], 0, 0
+        stops, touched = 0, 0
         for i in range(count):
             cosine[i], sine[i] = math.cos(q[2 + i]), math.sin(q[2 + i])
         for _ in range(steps):
-            for d in range(2 if rod >= 0 else 0):
-                model.obstacles[rod, d] = model.obstacles[rod, 2 + d] = q[size + d]
-                rod_force[d] = model.servo[0] * (command[5 + d] - q[size + d])
-                rod_force[d] += model.servo[1] * (command[7 + d] - v[size + d])
+            if model.rod >= 0:
+                _lead_rod(model, q, v, commands[k], rod_force)
             _place(model, q, cosine, sine, arms, joints)
             if slack < 0.0:
                 pair_count, slack = _pairs(model, joints, cosine, sine, _SKIN, pairs), _SKIN
-            _smooth(model, q, v, arms, command, torque, pull)
+            _smooth(model, q, v, arms, commands[k], torque, pull)
             stops = _stops(model, q, v, touches)
             touched = _contacts(
                 model, v, joints, arms, cosine, sine, pairs, pair_count, stops, touches
             )
             if touched < 0:
                 return CROWDED, k
-            _fold(model, arms, h, chain)
+            _fold(model, arms, model.timestep, chain)
             if touched > 0:
                 _fold(model, arms, 0.0, work[0])
                 _resist(model, joints, arms, touched, touches, work, torque, rod_force)
             _inward(arms, chain, count - 1, torque)
             _outward(arms, chain, torque)
-            for i in range(size):
-                v[i] += h * torque[i]
-                q[i] += h * v[i]
-                slack -= h * abs(v[i]) * (1.0 if i < 2 else model.length[i - 2])
-            for d in range(2 if rod >= 0 else 0):
-                v[size + d] += h * rod_force[d] / (model.mass + h * model.servo[1])
-                q[size + d] += h * v[size + d]
-                slack -= h * abs(v[size + d])
-            _turn(count, q, v, h, cosine, sine)
+            slack -= _advance(model, q, v, torque, rod_force)
+            _turn(count, q, v, model.timestep, cosine, sine)
         if not _sound(count, q, v):
             return BURST, k
         states[k] = q
-        forces[k], touching[k] = 0.0, False
-        for i in range(stops, touched):
-            along, across = touches.force[2 * i], touches.force[2 * i + 1]
-            nx, ny = touches.normal[i, 0], touches.normal[i, 1]
-            forces[k, 0] += along * nx - across * ny
-            forces[k, 1] += along * ny + across * nx
-            touching[k] = touching[k] or along > 0.0
-    return len(commands), len(commands)
+        touching[k] = _felt(touches, stops, touched, forces[k])
+    return 0, len(commands)

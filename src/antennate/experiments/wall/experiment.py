@@ -7,8 +7,8 @@ from typing import Any
 
 from antennate.experiments.wall import measures
 from antennate.experiments.wall import run as wall
-from antennate.studies.experiment import Experiment, Trials
 from antennate.sim.chain import require_solver
+from antennate.studies.experiment import Experiment, Trials
 from antennate.studies.measures import Table, successes
 
 
