@@ -13,7 +13,6 @@ import argparse
 import json
 import math
 import time
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 from unittest import mock
@@ -33,7 +32,8 @@ from antennate.sim import trial
 from antennate.sim.scenes.scene import SceneInstance
 from antennate.sim.scenes.tunnel import Tunnel
 from antennate.sim.world import World, compile_world
-from antennate.studies.pool import core_count, run_tasks
+from antennate.studies.experiment import no_step
+from antennate.studies.pool import core_count, gather
 from antennate.types import Floats, Maneuver
 
 _CHOSEN = PhysicsParams()
@@ -168,11 +168,9 @@ def _slide(engine: Engine, direction: float) -> float:
     return float(np.linalg.norm(data.body("cylinder0").xpos[:2] - start))
 
 
-def run_engine(
-    task: tuple[Engine, float, list[int]], emit: Callable[[tuple[str, TrialResult, float]], None]
-) -> None:
+def run_engine(engine: Engine, limit: float, trials: list[int]) -> list[tuple[TrialResult, float]]:
     """Trials of the open loop on one engine, with the CPU time of each."""
-    engine, limit, trials = task
+    found: list[tuple[TrialResult, float]] = []
     config = TunnelConfig(time_limit=limit, physics=engine.physics)
     with mock.patch.object(trial, "compile_world", engine.compile):
         for number in trials:
@@ -181,15 +179,18 @@ def run_engine(
             experiment.run_trials(
                 config, "open", [number], lambda item, to=rows: to.append(item[0])
             )
-            emit((engine.name, rows[0], time.process_time() - before))
+            found.append((rows[0], time.process_time() - before))
+    return found
 
 
 def tunnels(engines: list[Engine], trials: int, limit: float) -> dict[str, dict[str, Any]]:
     """Outcome statistics of the open loop per engine."""
     halves = [list(range(trials))[i::2] for i in range(2)]
     tasks = [(engine, limit, half) for engine in engines for half in halves]
+    parts = gather(run_engine, tasks, min(2, core_count()), no_step)
     rows: dict[str, list[tuple[TrialResult, float]]] = {engine.name: [] for engine in engines}
-    run_tasks(run_engine, tasks, min(2, core_count()), lambda item: rows[item[0]].append(item[1:]))
+    for (engine, *_), part in zip(tasks, parts, strict=True):
+        rows[engine.name] += part
     outcomes = {name: _statistics(found, limit) for name, found in rows.items()}
     for engine in engines:
         if engine.pyramidal:  # a contact's force is then spread over the edges of its cone

@@ -20,7 +20,7 @@ import os
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
@@ -58,9 +58,13 @@ def running(words: list[str], **how: Any) -> Iterator[subprocess.Popen[str]]:
 
 
 def walk(
-    seconds: float, busy: int, viewers: int = 0, trial: tuple[int, int] | None = None
+    seconds: float,
+    busy: int,
+    viewers: int = 0,
+    trial: tuple[int, int] | None = None,
+    more: Sequence[str] = (),
 ) -> dict[str, Any]:
-    """One drive against a twin of its own; the content of its result.json.
+    """One drive against a twin of its own, with more words; the content of its result.json.
 
     With a `trial`, its seed and its number, the drive ends once the head passes the exit.
     """
@@ -80,7 +84,7 @@ def walk(
             stack.enter_context(running([sys.executable, "-c", VIEWER, log]))
         words = [*PROGRAM, "drive", "--esp32", paths["esp32"], "--bus", paths["bus"], "--arm"]
         words += ["--json", "--out", str(folder / "run")]
-        words += ["--dry-run", str(DRY_RUN), "--duration", str(seconds)]
+        words += ["--dry-run", str(DRY_RUN), "--duration", str(seconds), *more]
         words += [] if trial is None else ["--until", until]
         subprocess.run(words, stdout=quiet, stderr=quiet, check=False)
         result = folder / "run" / "result.json"

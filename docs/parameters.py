@@ -3,14 +3,13 @@
 import importlib
 import inspect
 import pkgutil
-import sys
-from pathlib import Path
 from types import ModuleType
+
+from generated import finish, heads, row
 
 from antennate import experiments, params
 from antennate.params.base import Params, meaning
 
-PAGE = Path(__file__).with_suffix(".md")
 HEAD = """\
 # Parameters
 
@@ -76,31 +75,26 @@ def table(group: type[Params]) -> str:
         "",
         inspect.getdoc(group) or "",
         "",
-        "| name | default | unit | meaning | source |",
-        "|---|---|---|---|---|",
+        heads("name", "default", "unit", "meaning", "source"),
     ]
     for name, field in group.model_fields.items():
         default = field.get_default(call_default_factory=True)
         if isinstance(default, Params):  # its numbers have a table of their own
             kind = type(default).__name__
-            rows.append(f"| `{name}` | [{kind}](#{kind.lower()}) | | {meaning(group, name)} | |")
+            rows.append(
+                row(f"`{name}`", f"[{kind}](#{kind.lower()})", "", meaning(group, name), "")
+            )
             continue
         extra = field.json_schema_extra
         assert isinstance(extra, dict), f"{group.__name__}.{name} has no unit and no source"
         value = f"{default:.6g}" if isinstance(default, float) else default
-        cells = [
-            f"`{name}`",
-            f"`{value}`",
-            extra["unit"],
-            meaning(group, name, unit=False),
-            extra["source"],
-        ]
-        rows.append("| " + " | ".join(str(cell).replace("|", "\\|") for cell in cells) + " |")
+        said = meaning(group, name, unit=False)
+        rows.append(row(f"`{name}`", f"`{value}`", extra["unit"], said, extra["source"]))
     return "\n".join(rows) + "\n"
 
 
-def main() -> int:
-    """Write the page, or compare it; return the exit status."""
+def main() -> None:
+    """Write the page, or compare it."""
     numbers = [
         f"antennate.params.{module.name}" for module in pkgutil.iter_modules(params.__path__)
     ]
@@ -108,13 +102,8 @@ def main() -> int:
     modules = map(importlib.import_module, numbers + robots)
     parts = [table(group) for module in modules for group in groups(module)]
     page = "\n".join([HEAD, *parts, COMMANDS, *(table(group) for group in commands())])
-    if "--check" not in sys.argv[1:]:
-        PAGE.write_text(page, encoding="utf-8")
-    elif not PAGE.exists() or PAGE.read_text(encoding="utf-8") != page:
-        print("docs/parameters.md is out of date: run `python docs/parameters.py`", file=sys.stderr)
-        return 1
-    return 0
+    finish(__file__, page)
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

@@ -9,8 +9,9 @@ import tomllib
 from collections import defaultdict
 from pathlib import Path
 
+from generated import finish
+
 ROOT = Path(__file__).parent
-PAGE = ROOT / "reliability.md"
 HEAD = """\
 # Reliability
 
@@ -63,11 +64,7 @@ def page() -> str:
 
 def main() -> None:
     """Write the page, or check it."""
-    text = page()
-    if "--check" not in sys.argv:
-        PAGE.write_text(text)
-    elif PAGE.read_text() != text:
-        sys.exit("docs/reliability.md: expected what docs/reliability.py writes; run it")
+    finish(__file__, page())
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""The first hour as processes: a twin in factory state, and a person who does what is asked."""
+"""Commands as processes: a twin that takes orders, and a person who does what is asked."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def start(words: Sequence[str], folder: Path) -> subprocess.Popen[bytes]:
     return subprocess.Popen([*ANTENNATE, *words], stdin=pipe, stdout=pipe, stderr=pipe, cwd=folder)
 
 
-class FactoryTwin:
+class OrderedTwin:
     """`antennate twin` that takes orders on its standard input.
 
     Args:
@@ -48,7 +48,7 @@ class FactoryTwin:
         assert said == text, said
         return said
 
-    def __enter__(self) -> FactoryTwin:
+    def __enter__(self) -> OrderedTwin:
         return self
 
     def __exit__(

@@ -122,7 +122,7 @@ BAD = {
 
 
 @pytest.mark.parametrize("kind", list(BAD))
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(data=st.data())
 def test_B14_a_bad_pose_is_refused_as_a_whole_and_counted_and_the_goal_held(
     kind: str, data: st.DataObject
@@ -145,7 +145,7 @@ def test_B14_a_bad_pose_is_refused_as_a_whole_and_counted_and_the_goal_held(
 
 
 @given(seed=st.integers(0, 1000))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_B14_a_pose_within_all_limits_is_not_refused(seed: int) -> None:
     angles = sound_angles() + np.random.default_rng(seed).uniform(
         -0.05, 0.05, len(RobotSpec().joint_names)

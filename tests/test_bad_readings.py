@@ -19,7 +19,7 @@ from antennate.robots.sensor import SensorParams
 from antennate.types import AntennaFrame, Contact, Maneuver
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(
     st.lists(
         st.tuples(*[st.sampled_from([FREE, BENT, math.nan, math.inf, -math.inf, None])] * 2),

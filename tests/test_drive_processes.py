@@ -57,9 +57,9 @@ class Drive:
 
 
 @contextmanager
-def twin() -> Iterator[tuple[list[str], Callable[[str], None]]]:
+def twin(*scene: str) -> Iterator[tuple[list[str], Callable[[str], None]]]:
     """A twin: the arguments that lead to it, and what breaks it at once."""
-    words = [sys.executable, str(HERE / "twin_process.py")]
+    words = [sys.executable, str(HERE / "twin_process.py"), *scene]
     pipes: Any = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
     with subprocess.Popen(words, **pipes) as process:
         assert process.stdin is not None

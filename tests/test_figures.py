@@ -9,6 +9,8 @@ from antennate import figures as style
 from antennate.control.registry import BUILT_IN
 from antennate.experiments.gait import figure as gait
 from antennate.experiments.tunnel import figure as tunnel
+from antennate.experiments.wall import figure as wall
+from antennate.experiments.wall.outcome import Traverse
 from antennate.types import Maneuver
 
 LIMIT = 50.0
@@ -32,6 +34,7 @@ class Path:
     after: list[np.ndarray]
     exit: np.ndarray
     links: np.ndarray
+    parts: list[np.ndarray]
 
 
 def path(end: float, samples: int = 40) -> Path:
@@ -47,6 +50,7 @@ def path(end: float, samples: int = 40) -> Path:
         after=[polygon + 0.05 for polygon in stood],
         exit=np.array([wall[-1] for wall in WALLS]),
         links=np.stack([end - 0.1 * np.arange(6), np.zeros(6)], axis=1),
+        parts=[box + np.array([end, 0.0])],
     )
 
 
@@ -163,7 +167,7 @@ def test_every_maneuver_has_its_own_colour_on_the_course():
 
 def test_trials_without_a_course_leave_an_empty_panel():
     nothing = Path(
-        np.zeros((0, 2)), np.zeros(0), list(WALLS), [], [], WALLS[0], np.full((6, 2), np.nan)
+        np.zeros((0, 2)), np.zeros(0), list(WALLS), [], [], WALLS[0], np.full((6, 2), np.nan), []
     )
     figure = tunnel.trajectories(
         {("open", 0): nothing}, ("open",), [Row("open", 0, "invalid", LIMIT)], range(2)
@@ -215,3 +219,41 @@ def test_the_legend_names_only_what_the_scene_has():
     bare = path(2.0)
     bare.fixed, bare.before, bare.after = [], [], []
     assert named(path(2.0)) - named(bare) == {"wall", "obstacle at first", "obstacle at the end"}
+
+
+@pytest.mark.parametrize(("trials", "ends"), [(4, [0.5, 0.5]), (5, [0.15, 0.85])])
+def test_an_interval_is_drawn_where_there_are_enough_trials(trials, ends):
+    one = {**summaries()["open"], "trials": trials, "successes": trials / 2}
+    figure = tunnel.summary({"open": one}, rows(), LIMIT)
+    drawn = np.concatenate([line.get_xdata() for line in figure.axes[0].lines])
+    assert [drawn.min(), drawn.max()] == pytest.approx(ends)
+
+    panel = style.canvas(3.0, 3.0).subplots()
+    found = [{"f": 0.5, "f_95": (0.15, 0.85)}]
+    style.intervals(panel, [0], found, ("f", "f_95"), trials)
+    (segment,) = panel.containers[0][2][0].get_segments()
+    assert segment[:, 1].tolist() == pytest.approx(ends)
+
+
+def test_the_robot_is_drawn_with_all_its_parts():
+    course = path(2.0)
+    course.parts = [course.parts[0] + shift for shift in (0.0, 0.1, 0.2)]
+    figure = tunnel.trajectories(
+        {("open", 0): course}, ("open",), [Row("open", 0, "left", LIMIT)], range(1)
+    )
+    robot = max(figure.axes[0].collections, key=lambda drawn: drawn.get_zorder())
+    shown = [drawn.vertices[:4].tolist() for drawn in robot.get_paths()]
+    assert shown == [part.tolist() for part in course.parts]
+
+
+def test_each_profile_has_its_colour_and_its_boulders_along_the_wall():
+    straight = np.stack([np.linspace(-0.1, 0.0, 7), np.linspace(0.0, 0.1, 7)], axis=1)
+    boulders = np.array([[0.003, y, 0.003] for y in np.arange(-0.2, 0.3, 0.006)])
+    zero = np.zeros(5)
+    seen = Traverse(zero, zero, zero, zero, zero, zero, np.tile(straight, (11, 1, 1)), boulders)
+    figure = wall.passages(dict.fromkeys(("ascending", "stiff"), seen))
+    for profile, panel in zip(("ascending", "stiff"), figure.axes[2:], strict=True):
+        assert {line.get_color() for line in panel.lines} == {style.PROFILE_LOOKS[profile][0]}
+        circles = [patch.get_center() for patch in panel.patches]
+        assert len(circles) == np.sum((boulders[:, 1] > 0.0) & (boulders[:, 1] < 0.1))
+        assert {x for x, _ in circles} == {3.0}  # [mm]: the crests are at 0

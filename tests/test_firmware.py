@@ -268,13 +268,13 @@ def test_E1_each_boot_has_its_own_number(program: Program) -> None:
     assert max(numbers) > 2**24
 
 
-def test_one_copy_of_the_frame_code_and_the_readme_says_where() -> None:
+def test_one_copy_of_the_frame_code_and_the_docs_say_where() -> None:
     source = Path(frame.__file__)
     assert source.read_bytes() == (ROOT / "src/antennate/hardware/esp32/frame.py").read_bytes()
     copies = [path for path in FIRMWARE.glob("*.py") if "COBS" in path.read_text()]
     assert copies == []
-    readme = (FIRMWARE / "README.md").read_text()
-    assert "cp src/antennate/hardware/esp32/frame.py :antenna_frame.py" in readme
+    page = (ROOT / "docs" / "firmware.md").read_text()
+    assert "cp src/antennate/hardware/esp32/frame.py :antenna_frame.py" in page
 
 
 def on_micropython(folder: Path, script: str) -> bytes:

@@ -3,37 +3,28 @@
 from __future__ import annotations
 
 import json
-import re
-import shlex
 import time
 import tomllib
 from pathlib import Path
 
 import pytest
-from first_hour import Command, FactoryTwin, connect_each, move_each, plug_in
+from first_hour import Command, OrderedTwin, connect_each, move_each, plug_in
+from pages import blocks, commands
 
 from antennate.robots.spec import RobotSpec
 
-PAGE = (Path(__file__).parents[1] / "docs" / "first-hour.md").read_text(encoding="utf-8")
+PAGE = "first-hour.md"
 NAMES = RobotSpec().joint_names
-
-
-def commands() -> dict[str, list[str]]:
-    """Words of each command of the page, by its name."""
-    blocks = re.findall(r"```sh\n(.*?)```", PAGE, re.DOTALL)
-    lines = [shlex.split(line) for block in blocks for line in block.splitlines()]
-    assert all(words[:3] == ["uv", "run", "antennate"] for words in lines), lines
-    return {words[3]: words[3:] for words in lines}
 
 
 def assembled(folder: Path) -> dict:
     """The robot as it is built, in the page's file."""
-    (text,) = re.findall(r"```toml\n(.*?)```", PAGE, re.DOTALL)
+    (text,) = (block.text for block in blocks(PAGE) if block.kind == "toml")
     (folder / "assembled.toml").write_text(text)
     return tomllib.loads(text)
 
 
-def links(folder: Path, twin: FactoryTwin) -> dict[str, tuple[Path, str]]:
+def links(folder: Path, twin: OrderedTwin) -> dict[str, tuple[Path, str]]:
     """Links to the twin's ports, as `plug_in` takes them."""
     (folder / "ports").mkdir()
     made = {name: folder / "ports" / name for name in ("bus", "esp32")}
@@ -47,9 +38,10 @@ def links(folder: Path, twin: FactoryTwin) -> dict[str, tuple[Path, str]]:
 
 @pytest.mark.slow
 def test_a_box_of_servos_becomes_a_robot_that_crosses_the_tunnel(tmp_path: Path) -> None:
-    page, truth = commands(), assembled(tmp_path)
+    page = {words[0]: words for words in commands(PAGE)}
+    truth = assembled(tmp_path)
     assert list(page) == ["twin", "setup", "zero", "doctor", "drive", "jog", "teleop"]
-    with FactoryTwin(page["twin"], tmp_path) as twin:
+    with OrderedTwin(page["twin"], tmp_path) as twin:
         setup = Command(page["setup"], tmp_path)
         plug_in(setup, links(tmp_path, twin))
         connect_each(setup, twin.order, NAMES)

@@ -33,6 +33,23 @@ TRACKS = "frame,time,a_x,a_y,b_x,b_y\n" + "".join(
 )
 OTHER_SENSOR = {"kind": "fsr"}
 TINY: dict[str, list[dict[str, Any]]] = {
+    "study": [
+        {
+            "trials": 1,
+            "plan": plan,
+            "points": 2,
+            "settings": {"profiles": ["descending"], "wall": {"travel": 0.03, "start": 0.002}},
+            "experiment": "wall",
+            "vary": {"wall.speed": vary},
+            "assumed": assumed,
+            "leave_out": ["wall", "antenna", "variation", "physics"],
+            "response": "force_mean_n",
+        }
+        for plan, vary, assumed in (
+            ("grid", [0.2], None),
+            ("morris", {"low": 0.2, "high": 0.4}, 0.1),
+        )
+    ],
     "tunnel": [
         {"trials": 1, "time_limit": 0.1, "robot": {"antenna": {"sensor": OTHER_SENSOR}}},
         {

@@ -6,25 +6,69 @@ import os
 import subprocess
 import sys
 import time
+from concurrent.futures import Executor, ProcessPoolExecutor
+from multiprocessing import get_context
 from pathlib import Path
+from typing import Any
 
 import pytest
-from pool_tasks import die, divmod_task
+from pool_tasks import die, halves, trouble, trouble_together
 
 from antennate.errors import WorkerError
-from antennate.studies.pool import core_count, run_tasks
+from antennate.studies.engines import make_engine
+from antennate.studies.pool import Workers, core_count, gather
+from antennate.studies.work import Failure
+
+
+def no_step(done: int, total: int) -> None:
+    pass
 
 
 @pytest.mark.parametrize("workers", [1, 2])
-def test_every_result_arrives_once(workers: int) -> None:
-    found: list[int] = []
-    run_tasks(divmod_task, [(7, 2), (9, 4), (5, 5)], workers, found.append)
-    assert sorted(found) == [0, 1, 1, 1, 2, 3]
+def test_results_come_in_the_order_of_the_tasks(workers: int) -> None:
+    steps: list[tuple[int, int]] = []
+    tasks = [(7, 2), (9, 4), (5, 5)]
+    found = gather(halves, tasks, workers, lambda done, total: steps.append((done, total)))
+    assert found == [(3, 1), (2, 1), (1, 0)]
+    assert steps == [(1, 3), (2, 3), (3, 3)]
 
 
 def test_a_failing_task_is_named() -> None:
     with pytest.raises(WorkerError, match="ZeroDivisionError"):
-        run_tasks(divmod_task, [(1, 0), (2, 0)], 2, lambda result: None)
+        gather(halves, [(1, 0), (2, 0)], 2, no_step)
+    with pytest.raises(ZeroDivisionError):
+        gather(halves, [(1, 0), (2, 0)], 1, no_step)
+
+
+def lost(place: int, failure: Failure) -> Any:
+    return (failure.status, failure.reason)
+
+
+@pytest.mark.parametrize(
+    ("chunk", "function"), [(2, trouble), (4, trouble_together)], ids=["one by one", "together"]
+)
+def test_what_dies_hangs_or_raises_is_found_and_the_others_end(
+    tmp_path: Path, chunk: int, function: Any
+) -> None:
+    """A task that kills its worker has three chances; one that never ends has one alone."""
+    tasks = [(number, str(tmp_path)) for number in range(8)]
+    crew = Workers(2, timeout=2.0)
+    found = gather(
+        function,
+        tasks,
+        crew,
+        no_step,
+        chunk=chunk,
+        together=function is trouble_together,
+        lost=lost,
+    )
+    statuses = [each[0] if isinstance(each, tuple) else each for each in found]
+    assert statuses == [0, 1, 4, "crashed", 16, "hung", "failed", 49]
+    assert "ended with code 9" in found[3][1]
+    assert "2 s" in found[5][1]
+    assert "ValueError: six" in found[6][1]
+    tries = {number: len((tmp_path / str(number)).read_text()) for number in range(8)}
+    assert tries[3] == 3
 
 
 def test_a_script_without_the_main_guard_is_told_of_it(tmp_path: Path) -> None:
@@ -42,19 +86,50 @@ def test_a_script_without_the_main_guard_is_told_of_it(tmp_path: Path) -> None:
 
 def test_a_worker_that_dies_is_noticed() -> None:
     with pytest.raises(WorkerError, match="ended with code 3"):
-        run_tasks(die, [1, 2], 2, lambda result: None)
+        gather(die, [(1,), (2,)], 2, no_step)
 
 
 def test_there_is_at_least_one_core() -> None:
     assert core_count() >= 1
 
 
+def test_any_executor_can_be_the_engine() -> None:
+    with ProcessPoolExecutor(1, get_context("spawn")) as executor:
+        crew = Workers(2, make_engine(executor))
+        assert gather(halves, [(7, 2), (9, 4)], crew, no_step) == [(3, 1), (2, 1)]
+        answer = gather(halves, [(7, 0), (9, 4)], crew, no_step, lost=lost)
+        assert answer[0][0] == "failed"
+        assert answer[1] == (2, 1)
+
+
+class Old(Executor):
+    """An executor whose workers have another version."""
+
+    def submit(self, fn: Any, /, *arguments: Any, **more: Any) -> Any:
+        from concurrent.futures import Future
+
+        part, theirs, added = arguments
+        changed = {**theirs, "versions": {**theirs["versions"], "numpy": "1.0"}}
+        future: Future[Any] = Future()
+        try:
+            future.set_result(fn(part, changed, added))
+        except WorkerError as error:
+            future.set_exception(error)
+        return future
+
+
+def test_workers_of_another_version_are_refused_in_one_line() -> None:
+    with pytest.raises(WorkerError, match=r'numpy "1\.0", now') as error:
+        gather(halves, [(7, 2)], Workers(2, make_engine(Old())), no_step, lost=lost)
+    assert "\n" not in str(error.value)
+
+
 KILLED = """
 from pool_tasks import tell_and_wait
-from antennate.studies.pool import run_tasks
+from antennate.studies.pool import gather
 
 if __name__ == "__main__":
-    run_tasks(tell_and_wait, [1, 2], 2, print)
+    gather(tell_and_wait, [(1,), (2,)], 2, print)
 """
 
 
@@ -62,6 +137,7 @@ if __name__ == "__main__":
 def test_workers_end_when_the_program_is_killed(tmp_path: Path) -> None:
     (tmp_path / "killed.py").write_text(KILLED)
     path = {**os.environ, "PYTHONPATH": str(Path(__file__).parent)}
+    path["PYTHONPATH"] += os.pathsep + os.environ.get("PYTHONPATH", "")
     command = [sys.executable, str(tmp_path / "killed.py")]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=path) as program:
         assert program.stdout is not None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import tomllib
 from pathlib import Path
@@ -122,9 +123,26 @@ def test_the_command_takes_the_quick_antenna_and_says_how_it_recovers(
     assert "8.2 times a cockroach's" in capsys.readouterr().out
 
 
+def test_the_quick_antenna_stands_beside_the_default_one(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Mongeau 2014: 20 Hz and a damping ratio above 0.344, beside one of 2.6 Hz."""
+    words = ["--beside", str(QUICK), "--out", str(tmp_path / "out")]
+    assert main(["ringdown", *words]) == 0
+    assert "chain of quick antenna" in " ".join(capsys.readouterr().out.split())
+    result = json.loads((tmp_path / "out" / "result.json").read_text())
+    (beside,) = result["beside"]
+    assert beside["natural_hz"] == pytest.approx(20.0, rel=0.15)
+    assert beside["damping"] > 0.344
+    drawn = (tmp_path / "out" / "figures" / "ringdown.svg").read_text()
+    assert result["engine"]["natural_hz"] < 3.0
+    assert all(name in drawn for name in ("this antenna", "quick antenna"))
+
+
 @pytest.mark.parametrize(
     "words",
     [
+        ["--beside", "missing.toml"],
         ["--antenna.base-angle", "0.5"],
         ["--antenna.sensor.hysteresis", "0.1"],
         ["--deflection", "-1"],

@@ -15,7 +15,7 @@ from servo_recordings import RATE, of_twin, written
 import antennate
 from antennate.cli import main
 from antennate.robots.servo_model import NAMES, STEP, Course, replay
-from antennate.robots.servos import XL330Params
+from antennate.robots.servos import ServosParams, XL330Params
 from antennate.types import Floats
 
 REAL = Path(__file__).parents[2] / "shared/data/servo_xl330_bam/raw"
@@ -138,7 +138,7 @@ def test_a_replay_of_the_real_servo_shows_that_its_divisor_is_256() -> None:
     assert sheet == pytest.approx(5.2, abs=0.5)
 
 
-def entries(count: int = 100) -> list[dict[str, Any]]:
+def entries(count: int = 300) -> list[dict[str, Any]]:
     """A shaft that creeps after its goal, a tick a sample."""
     step = 2 * math.pi / 4096
     return [
@@ -162,13 +162,19 @@ CHANGES: dict[str, Callable[[int, dict[str, Any]], Any]] = {
     "still": lambda i, entry: entry.update(position=0.5),
     "gap": lambda i, entry: entry.update(timestamp=1000.0 * entry["timestamp"]),
     "short": lambda i, entry: None,
+    "fine degrees": lambda i, entry: entry.update(
+        position=math.degrees(0.3 * math.sin(i / 30)), goal_position=math.degrees(0.3)
+    ),
+    "once": lambda i, entry: entry.update(torque_enable=i == 0),
+    "no supply": lambda i, entry: entry.update(input_volts=0),
+    "tenths": lambda i, entry: entry.update(input_volts=50),
 }
 """What is done to every entry."""
 
 
 def broken(change: str) -> list[dict[str, Any]]:
     """Entries with one fault."""
-    made = entries(10 if change == "short" else 100)
+    made = entries(10 if change == "short" else 300)
     for i, entry in enumerate(made):
         CHANGES[change](i, entry)
     return made
@@ -186,6 +192,10 @@ def broken(change: str) -> list[dict[str, Any]]:
         ("still", "expected a shaft that moves"),
         ("short", "expected at least 50, found 10"),
         ("gap", "are times in seconds?"),
+        ("fine degrees", "are these degrees or ticks?"),
+        ("once", "expected torque for 1 s or longer"),
+        ("no supply", "input_volts: expected 2.5 to 10 V, found 0"),
+        ("tenths", "input_volts: expected 2.5 to 10 V, found 50"),
     ],
 )
 def test_a_recording_that_cannot_be_used_is_refused_in_one_line(
@@ -196,6 +206,50 @@ def test_a_recording_that_cannot_be_used_is_refused_in_one_line(
     err = capsys.readouterr().err
     assert says in err
     assert err.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("kp", "mass", "length", "says"),
+    [
+        (0, 0, 0, "expected a gain kp above 0, found 0"),
+        (400, 490, 0.1, "is the mass in grams or the length in millimetres?"),
+        (400, 0.49, 100, "is the mass in grams or the length in millimetres?"),
+    ],
+)
+def test_a_gain_or_a_weight_that_cannot_be_is_refused_in_one_line(
+    kp: float,
+    mass: float,
+    length: float,
+    says: str,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    path = written(tmp_path / "log.json", entries(), kp, mass=mass, length=length)
+    assert main(["servo", "--recording", str(path)]) == 2
+    err = capsys.readouterr().err
+    assert says in err
+    assert err.count("\n") == 1
+
+
+def test_positions_that_are_finer_than_ticks_are_taken(tmp_path: Path) -> None:
+    """As another encoder tells them, or a filter."""
+    made = entries()
+    for i, entry in enumerate(made):
+        entry.update(position=0.3 * math.sin(i / 30), goal_position=0.3 * math.sin((i + 3) / 30))
+    path = written(tmp_path / "log.json", made, 400)
+    assert antennate.run("servo", recording=[str(path)]).summary["models"][-1]["error_deg"] < 10.0
+
+
+def test_a_fit_does_not_depend_on_the_parameters_that_it_replaces(tmp_path: Path) -> None:
+    """Nor does it leave them out: the model as given stands beside it."""
+    file = str(of_twin(tmp_path / "a.json", 1200, 400, 1.0, 3.0))
+    runs = [
+        antennate.run("servo", recording=[file], servos=servos, fit=True, draws=20).summary
+        for servos in (ServosParams(), ServosParams(xl330_m288=XL330Params(armature=0.02)))
+    ]
+    found = [{model["name"]: model for model in run["models"]} for run in runs]
+    assert found[0]["whole model"] == found[1]["whole model"]
+    assert found[0]["as given"]["error_deg"] != found[1]["as given"]["error_deg"]
 
 
 @pytest.mark.parametrize(

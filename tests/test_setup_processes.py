@@ -12,16 +12,16 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from first_hour import ANTENNATE, FactoryTwin
+from first_hour import ANTENNATE, OrderedTwin
 
 SMALL = ["--robot.links", "2"]
 """Seven servos: one yaw joint, four legs, two antennae."""
 
 
 @pytest.fixture(scope="module")
-def twin(tmp_path_factory: pytest.TempPathFactory) -> Iterator[FactoryTwin]:
+def twin(tmp_path_factory: pytest.TempPathFactory) -> Iterator[OrderedTwin]:
     words = ["twin", *SMALL, "--scene", "flat", "--orders", "-"]
-    with FactoryTwin(words, tmp_path_factory.mktemp("twin")) as made:
+    with OrderedTwin(words, tmp_path_factory.mktemp("twin")) as made:
         yield made
 
 
@@ -34,7 +34,7 @@ def ran(words: list[str], folder: Path, said: str = "") -> subprocess.CompletedP
 
 @pytest.mark.parametrize("command", ["setup", "zero", "teleop"])
 def test_without_input_it_ends_with_one_plain_line(
-    command: str, twin: FactoryTwin, tmp_path: Path
+    command: str, twin: OrderedTwin, tmp_path: Path
 ) -> None:
     ports = ["--bus", twin.paths["bus"]] if command != "setup" else ["--among", "none/*"]
     ports += ["--esp32", twin.paths["esp32"]] if command == "teleop" else []
@@ -48,7 +48,7 @@ def test_without_input_it_ends_with_one_plain_line(
 
 @pytest.mark.slow
 def test_zero_takes_a_script_and_keeps_what_else_is_in_the_file(
-    twin: FactoryTwin, tmp_path: Path
+    twin: OrderedTwin, tmp_path: Path
 ) -> None:
     file = tmp_path / "robot.toml"
     file.write_text(f'# mine\n[ports]\nbus = "{twin.paths["bus"]}"\n[robot]\nlinks = 2\n')
@@ -65,7 +65,7 @@ def test_zero_takes_a_script_and_keeps_what_else_is_in_the_file(
     assert run.stdout.count("direction not measured") == 7
 
 
-def test_jog_takes_keys_from_a_terminal_and_gives_it_back(twin: FactoryTwin) -> None:
+def test_jog_takes_keys_from_a_terminal_and_gives_it_back(twin: OrderedTwin) -> None:
     master, slave = pty.openpty()
     words = ["jog", "--bus", twin.paths["bus"], *SMALL, "--joint", "antenna_l_base"]
     with subprocess.Popen(
@@ -88,7 +88,7 @@ def test_jog_takes_keys_from_a_terminal_and_gives_it_back(twin: FactoryTwin) -> 
 
 @pytest.mark.slow
 def test_jog_takes_a_script_and_refuses_a_joint_that_is_none(
-    twin: FactoryTwin, tmp_path: Path
+    twin: OrderedTwin, tmp_path: Path
 ) -> None:
     bus = ["--bus", twin.paths["bus"], *SMALL]
     run = ran(["jog", *bus, "--joint", "antenna_r_base"], tmp_path, "+++")

@@ -187,5 +187,5 @@ class Ladder(RuleBasedStateMachine):
         assert self.outputs.torque
 
 
-Ladder.TestCase.settings = settings(max_examples=100, stateful_step_count=50, deadline=None)
+Ladder.TestCase.settings = settings(max_examples=100, stateful_step_count=50)
 test_T7_any_events_in_any_order = Ladder.TestCase

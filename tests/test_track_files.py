@@ -309,6 +309,23 @@ def test_bad_csv_is_one_line(
     assert expected in message(capsys, "--files", tmp_path / "a.csv", *FLAGS)
 
 
+@pytest.mark.parametrize(
+    ("last", "expected"),
+    [
+        (300_000_000, "expected frames without large gaps, found 3 rows from frame 0 to 300000000"),
+        (10**18, "expected numbers of frames up to 9.0072e+15, found 1e+18"),
+    ],
+)
+def test_a_wrong_number_of_a_frame_does_not_fill_the_memory(
+    last: int, expected: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    header = "frame," + ",".join(f"{n}_{a}" for n in NAMES for a in "xy")
+    rows = [f"{frame}," + ",".join(["1.5"] * 20) for frame in (0, 1, last)]
+    (tmp_path / "a.csv").write_text("\n".join([header, *rows, ""]))
+    words = ("--files", tmp_path / "a.csv", "--rate", 100, *FLAGS)
+    assert expected in message(capsys, *words)
+
+
 def test_mirrored_coordinates_are_noticed(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -13,6 +13,8 @@ from tracked import DWELL, POINTS, animal, bent, classified, dwelling, write
 import antennate
 from antennate.antenna.shapes import Shape, held, outline, pointing
 from antennate.cli import main
+from antennate.experiments.tracks.config import TrackWallParams
+from antennate.experiments.tracks.walls import wall_of
 
 ERRORS = (
     Path(__file__).parents[2]
@@ -64,6 +66,40 @@ def test_the_synthetic_animal_is_classified_correctly_in_98_of_100_frames() -> N
     assert result.summary["wall"]["synthetic0"]["rms"] < 3.0  # px: the tips' errors
     for name in ("duplicated", "absent", "missing", "swapped", "outliers", "bridged"):
         assert result.summary["handled"][name] > 0
+
+
+def test_continuous_shapes_without_errors_are_what_the_criteria_say() -> None:
+    """What is left is the time until a running median follows a new shape."""
+    clean = {"error": 0.0, "missing": 0.0, "swapped": 0.0, "repeated": 0.0}
+    drawn = {"trials": 2, "frames": 1500, "shapes": "continuous"}
+    for criteria in ({}, {"flex": 0.2, "offset": 0.3, "angle": 1.3}):
+        found = antennate.run("tracks", synthetic=drawn | clean, criteria=criteria).summary
+        assert found["correct"] >= 0.97
+        assert min(shape["share"] for shape in found["shapes"].values()) > 0.05
+
+
+def test_near_the_borders_criteria_matter_and_errors_of_tracking_cost_frames() -> None:
+    summaries = [
+        antennate.run("tracks", synthetic={"trials": 2, "frames": 1500, "shapes": shapes})
+        for shapes in ("separated", "continuous")
+    ]
+    apart, across = (
+        max(row["change"] for row in found.summary["sensitivity"]) for found in summaries
+    )
+    assert across > 0.02 > apart
+    assert summaries[1].summary["correct"] < 0.95
+    assert "frames with continuous shapes" in summaries[1].sentence
+
+
+def test_a_line_is_fitted_to_the_tips_of_a_long_recording() -> None:
+    """A million tips: a matrix of all against all would have 8 TB."""
+    rng = np.random.default_rng(0)
+    x = rng.uniform(0.0, 5000.0, 1_000_000)
+    tips = np.stack([x, 100.0 + 0.1 * x + rng.normal(0.0, 1.0, len(x))], axis=1)
+    wall = wall_of(TrackWallParams(kind="line"), "long.csv", tips, 100.0)
+    x0, y0, x1, y1 = wall.numbers
+    assert (y1 - y0) / (x1 - x0) == pytest.approx(0.1, abs=1e-3)
+    assert wall.rms == pytest.approx(1.0 / np.hypot(1.0, 0.1), rel=0.01)
 
 
 @pytest.mark.skipif(not ERRORS.exists(), reason="recordings are not here")

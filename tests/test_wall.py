@@ -35,7 +35,14 @@ def passed(tip_mm: list[float], touching: list[bool]) -> Traverse:
     base = 1e-3 * np.arange(1, n + 1)
     touch = np.array(touching, float)
     return Traverse(
-        base, 1e-3 * np.array(tip_mm), touch, zero, zero, np.zeros((n, 6)), np.zeros((11, 7, 2))
+        base,
+        1e-3 * np.array(tip_mm),
+        touch,
+        zero,
+        zero,
+        np.zeros((n, 6)),
+        np.zeros((11, 7, 2)),
+        np.zeros((3, 3)),
     )
 
 
@@ -144,10 +151,10 @@ def test_same_table_on_one_and_two_workers() -> None:
 def test_trouble_in_the_physics_is_an_invalid_trial(monkeypatch: pytest.MonkeyPatch) -> None:
     sound = wall.passage
 
-    def burst(config: WallConfig, arm: wall.Profile, trial: int) -> Traverse:
+    def burst(config: WallConfig, arm: wall.Profile, trial: int, *watch: wall.Watch) -> Traverse:
         if trial == 1:
             raise SimulationError(7, "engine warning")
-        return sound(config, arm, trial)
+        return sound(config, arm, trial, *watch)
 
     monkeypatch.setattr(wall, "passage", burst)
     outcome = run(WallConfig.model_validate({**SHORT, "profiles": ["stiff", "descending"]}))

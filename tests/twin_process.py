@@ -1,4 +1,7 @@
-"""A twin in a process of its own: a line on its standard input is a fault that begins now."""
+"""A twin in a process of its own: a line on its standard input is a fault that begins now.
+
+Its scene is the first argument, if there is one.
+"""
 
 from __future__ import annotations
 
@@ -26,7 +29,8 @@ class AskedFaults(Faults):
 
 
 if __name__ == "__main__":
-    with TwinServer(build(TwinConfig()), AskedFaults([], ())) as server, urgent(LEVEL + 1):
+    config = TwinConfig(scene=sys.argv[1]) if sys.argv[1:] else TwinConfig()
+    with TwinServer(build(config), AskedFaults([], ())) as server, urgent(LEVEL + 1):
         sys.stdout.write(json.dumps(server.paths) + "\n")
         sys.stdout.flush()
         server.run(lambda t: True)

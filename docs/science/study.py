@@ -1,8 +1,9 @@
 """Everything that docs/science/tunnel.md reports, run again: `python docs/science/study.py PART`.
 
 Parts: `evaluation` (three controllers, 200 fresh trials each), `ablation` (one change at a time),
-`map` (success over corner angle and corridor width) and `scenes` (tunnels and robots on which
-nothing was chosen). Each writes docs/science/PART.json; the figure of the map is drawn from it.
+`map` (success over corner angle and corridor width), `scenes` (tunnels and robots on which
+nothing was chosen) and `servos` (what is not known of the servos that walk). Each writes
+docs/science/PART.json; the figure of the map is drawn from it.
 Results do not depend on the number of workers.
 """
 
@@ -64,6 +65,14 @@ SCENES: dict[str, dict[str, Any]] = {
 }
 """What differs from the default; a longer tunnel has as much more time."""
 
+SERVOS: dict[str, dict[str, float]] = {
+    "divisor 128, 1.7 N·m (default)": {},
+    "divisor 256": {"gain_divisor": 256.0},
+    "73 % of the stall torque": {"stall_torque": 0.73 * 1.7},
+    "both": {"gain_divisor": 256.0, "stall_torque": 0.73 * 1.7},
+}
+"""The XC430-W240, of which no recording is known."""
+
 ANGLES_DEG = (60.0, 75.0, 90.0, 105.0)
 WIDTHS_M = (0.32, 0.40, 0.50)
 
@@ -107,6 +116,16 @@ def scenes(trials: int, workers: int) -> dict[str, Any]:
         result = _results(config, workers, name)
         found[name] = {key: result[key] for key in ("time_limit_s", "controllers")}
     return {"trials": trials, "seed": SCENES_SEED, "scenes": found}
+
+
+def servos(trials: int, workers: int) -> dict[str, Any]:
+    """Open and closed with what the servos of yaw and legs might be, in the tunnels of `scenes`."""
+    found = {}
+    for name, change in SERVOS.items():
+        robot = {"servos": {"xc430_w240": change}}
+        config = _config(trials, SCENES_SEED, ("open", "closed"), robot=robot)
+        found[name] = _results(config, workers, name)["controllers"]
+    return {"trials": trials, "seed": SCENES_SEED, "servos": found}
 
 
 def success_grid(trials: int, workers: int) -> dict[str, Any]:
@@ -165,7 +184,7 @@ def success_map(cells: Sequence[Mapping[str, Any]], controllers: Sequence[str]) 
 def main() -> None:
     """Run one part and write it beside this file."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("part", choices=("evaluation", "ablation", "map", "scenes"))
+    parser.add_argument("part", choices=("evaluation", "ablation", "map", "scenes", "servos"))
     parser.add_argument("--trials", type=int, default=None)
     parser.add_argument("--workers", type=int, default=core_count())
     options = parser.parse_args()
@@ -174,6 +193,7 @@ def main() -> None:
         "ablation": (ablation, 60),
         "map": (success_grid, 20),
         "scenes": (scenes, 40),
+        "servos": (servos, 40),
     }[options.part]
     result = function(options.trials or usual, options.workers)
     (HERE / f"{options.part}.json").write_text(json.dumps(result, indent=1) + "\n")

@@ -209,14 +209,15 @@ def stick_lines(rows: Sequence[Mapping[str, Any]], limit_mm: float) -> Figure:
     figure = style.canvas(7.0, 4.2)
     panel = figure.subplots()
     profiles = list(dict.fromkeys(row["profile"] for row in rows))
-    for k, (profile, colour) in enumerate(zip(profiles, style.series(len(profiles)), strict=True)):
+    for k, profile in enumerate(profiles):
+        colour, mark, _ = style.PROFILE_LOOKS[profile]
         held = [row for row in rows if row["profile"] == profile]
         middle = np.array([np.median(row["sticks_mm"]) for row in held])
         below = middle - np.array([min(row["sticks_mm"]) for row in held])
         above = np.array([max(row["sticks_mm"]) for row in held]) - middle
         angles = np.array([row["base_angle_deg"] for row in held]) + 0.25 * (k - 2)
         name = profile.replace("_", " ")
-        panel.errorbar(angles, middle, [below, above], marker="o", color=colour, label=name)
+        panel.errorbar(angles, middle, [below, above], marker=mark, color=colour, label=name)
     panel.axhline(limit_mm, color=style.INK, linewidth=1, linestyle=(0, (4, 2)))
     panel.annotate(
         "a jam from here on",

@@ -15,7 +15,7 @@ _PLACES = {
     "antennate.antenna.statics": ("Chain", "equilibrium"),
     "antennate.control.registry": ("make_controller",),
     "antennate.errors": ("AntennateError", "BadInputError"),
-    "antennate.experiments.running": ("Result", "list_experiments", "run"),
+    "antennate.experiments.running": ("Result", "list_experiments", "run", "study"),
     "antennate.hardware.esp32.recording": ("Esp32Recording", "read_esp32"),
     "antennate.robots.antenna": ("AntennaSpec",),
     "antennate.robots.spec": ("RobotSpec",),

@@ -11,6 +11,7 @@ from antennate.errors import BadInputError as BadInputError
 from antennate.experiments.running import Result as Result
 from antennate.experiments.running import list_experiments as list_experiments
 from antennate.experiments.running import run as run
+from antennate.experiments.running import study as study
 from antennate.hardware.esp32.recording import Esp32Recording as Esp32Recording
 from antennate.hardware.esp32.recording import read_esp32 as read_esp32
 from antennate.robots.antenna import AntennaSpec as AntennaSpec

@@ -17,6 +17,8 @@ _SEPARATORS = {";": "semicolons", "\t": "tabs", "|": "bars", " ": "spaces"}
 _DECIMAL_COMMA = re.compile(r"\s*[+-]?\d+,\d+\s*")
 _UNIT = re.compile(r"[\[(]([^\])]*)[\])]\s*[\"']?\s*$")
 """A unit in brackets at the end of a column's name."""
+LARGEST_WHOLE = 2.0**53
+"""Beyond it a number of a file does not tell a whole number from the next one."""
 Row = tuple[int, list[str]]
 """Number of the line in which a row ends, and its cells."""
 

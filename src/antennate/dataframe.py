@@ -25,11 +25,11 @@ def from_columns(columns: Mapping[str, Any]) -> Any:
 
 
 def from_rows(rows: Iterable[Any]) -> Any:
-    """A pandas DataFrame of dataclasses of one kind: a column for each field, in its order.
+    """A pandas DataFrame of dataclasses or mappings of one kind: a column for each field.
 
     Raises:
         MissingPackageError: pandas is not installed.
     """
-    held = [asdict(row) for row in rows]
+    held = [row if isinstance(row, Mapping) else asdict(row) for row in rows]
     names = held[0] if held else ()
     return from_columns({name: [row[name] for row in held] for name in names})

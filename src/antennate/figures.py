@@ -14,7 +14,9 @@ from matplotlib.figure import Figure
 from matplotlib.layout_engine import PlaceHolderLayoutEngine
 from matplotlib.transforms import Bbox
 
-from antennate.types import Maneuver
+from antennate.colours import MANEUVER_COLOURS as MANEUVER_COLOURS
+from antennate.colours import MANEUVER_NAMES as MANEUVER_NAMES
+from antennate.colours import SERIES as SERIES
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -23,23 +25,6 @@ Keys = tuple[str, str]
 
 INK, MUTED, FAINT = "#222222", "#6E6E6E", "#D5D5D5"
 """Text and robots; secondary lines; things in the background."""
-
-MANEUVER_COLOURS = {
-    Maneuver.FORWARD: "#0072B2",
-    Maneuver.TURN_L: "#009E73",
-    Maneuver.TURN_R: "#E69F00",
-    Maneuver.REVERSE: "#D55E00",
-    Maneuver.HOLD: "#000000",
-}
-"""After Okabe and Ito: apart for every kind of colour vision."""
-
-MANEUVER_NAMES = {
-    Maneuver.FORWARD: "forward",
-    Maneuver.TURN_L: "turn left",
-    Maneuver.TURN_R: "turn right",
-    Maneuver.REVERSE: "reverse",
-    Maneuver.HOLD: "hold",
-}
 
 CONTROLLER_COLOURS = {"open": "#8C8C8C", "paper": "#CC79A7", "closed": "#332288"}
 CONTROLLER_LINES = {"open": (0, (4, 1.5)), "paper": (0, (4, 1.5, 1, 1.5)), "closed": "solid"}
@@ -63,8 +48,9 @@ SHAPE_COLOURS = {
 }
 """Shapes of an antenna that touches, and no contact."""
 
-SERIES = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#D55E00", "#56B4E9", "#332288")
-"""For whatever has no colour of its own; after Okabe and Ito."""
+ENOUGH_TRIALS = 5
+"""Fewest trials for which an interval is drawn: of four, a bootstrap has only 35 different draws,
+so that 2.5 % of them are less than one."""
 
 _RC: dict[Any, Any] = {
     "figure.dpi": 100,
@@ -139,8 +125,18 @@ def categories(panel: Axes, labels: Sequence[str]) -> None:
     panel.grid(visible=False, axis="x")
 
 
+def interval_note(note: str, trials: int) -> str:
+    """What a title says of intervals, or why there are none."""
+    return note if trials >= ENOUGH_TRIALS else f"no intervals of {trials} trials"
+
+
 def intervals(
-    panel: Axes, x: Sequence[float], rows: Sequence[Mapping[str, Any]], keys: Keys, **look: Any
+    panel: Axes,
+    x: Sequence[float],
+    rows: Sequence[Mapping[str, Any]],
+    keys: Keys,
+    trials: int = ENOUGH_TRIALS,
+    **look: Any,
 ) -> None:
     """Draw a measure of each row at x with its interval; what does not exist is left out.
 
@@ -149,9 +145,11 @@ def intervals(
         x: A place for each row.
         rows: Objects of result.json.
         keys: Names of the measure and of its interval in a row; empty for no interval.
+        trials: Trials behind each row; without `ENOUGH_TRIALS` of them no interval is drawn.
         look: Colour, marker and label, as for `plot`.
     """
     value, interval = keys
+    interval = interval if trials >= ENOUGH_TRIALS else ""
     known = [(a, row.get(value), row.get(interval)) for a, row in zip(x, rows, strict=True)]
     known = [(a, b, ends or (b, b)) for a, b, ends in known if b is not None and b == b]
     middle = np.array([b for _, b, _ in known])

@@ -83,7 +83,8 @@ class Registry(Generic[T]):
             ConfigError: It is neither a known name nor MODULE:NAME nor FILE.py:NAME.
         """
         place, _, attribute = name.rpartition(":")
-        if name in self.names or (place and attribute):
+        known = name in self._ours or name in self.added or name in self.names
+        if known or (place and attribute):
             return name
         forms = "FILE.xml, MODULE:NAME" if self._kind == "scene" else "MODULE:NAME"
         meant = f" (did you mean {name}:NAME?)" if name.endswith(".py") else ""

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from antennate.antenna.calibration import Calibration
-from antennate.antenna.curves import MODELS, Samples
+from antennate.antenna.curves import MODELS, Samples, polarity, predict
 from antennate.antenna.rivals import (
     OTHER_DIVIDERS,
     Gain,
@@ -96,6 +96,8 @@ class Hysteresis:
         mean_95: 95 % interval of it over pushes, None with fewer than two.
         level: What the curve makes of it: largest gap in b at the same bend.
         pushes: Pushes that have both directions.
+        one_way_r2: Share of the level's variance that a sigmoid of its own explains, of loading
+            and of unloading.
     """
 
     largest: float
@@ -104,6 +106,7 @@ class Hysteresis:
     mean_95: tuple[float, float] | None
     level: float
     pushes: int
+    one_way_r2: tuple[float, float]
 
 
 @dataclass(frozen=True, slots=True)
@@ -253,4 +256,15 @@ def hysteresis(samples: Samples, pushes: Pushes, found: Calibration) -> Hysteres
         interval,
         float(levels[np.argmax(abs(levels))]),
         len(each),
+        (_one_way_r2(samples, pushes.way > 0), _one_way_r2(samples, pushes.way < 0)),
     )
+
+
+def _one_way_r2(samples: Samples, rows: Bools) -> float:
+    """R² of a sigmoid fitted to some of the readings alone."""
+    counts, level = samples.counts[rows], samples.level[rows]
+    if np.ptp(counts) == 0 or np.ptp(level) == 0:
+        return 0.0
+    sign, x = polarity(samples), (counts - counts.min()) / np.ptp(counts)
+    error = predict("sigmoid", x, level, x, sign) - level
+    return float(1.0 - (error**2).mean() / level.var())

@@ -25,7 +25,9 @@ ROBOT_COMMANDS = {
     "teleop": "walk the real robot, or its twin, by keys",
     "log": "what a log holds; recover it, export it, plot it",
     "replay": "let a controller decide again upon the log of a drive",
+    "view": "a log, or that of a run, on a page of this computer",
     "report": "a run, or two side by side, as one page to read, print and send",
+    "merge": "the shards of a run as the run that they are parts of",
 }
 
 

@@ -6,7 +6,7 @@ The file must be valid on its own; flags override it. Values are checked once, b
 from __future__ import annotations
 
 import shlex
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -15,7 +15,6 @@ from pydantic.dataclasses import dataclass
 
 from antennate.cli.help import Command, long_page, short_page
 from antennate.cli.options import (
-    Option,
     fields_of,
     flag_of,
     found,
@@ -34,13 +33,13 @@ class HelpRequest(Exception):
 
 
 class OptionsRequest(Exception):
-    """The words ask which `options` there are."""
+    """The words ask which options the `command` has."""
 
     WORD = "--complete"
 
-    def __init__(self, options: Sequence[Option]) -> None:
+    def __init__(self, command: Command) -> None:
         super().__init__()
-        self.options = options
+        self.command = command
 
 
 @dataclass(frozen=True)
@@ -78,9 +77,9 @@ def parse(
     every, others = list(options_of(model())), list(options_of(options()))
     unread = {option.flag for option in every if ".".join(option.path) in model.unread}
     parameters = [option for option in every if option.flag not in unread]
-    if list(argv) == [OptionsRequest.WORD]:
-        raise OptionsRequest([*others, *parameters])
     page = Command(command, description, model, parameters, others)
+    if list(argv) == [OptionsRequest.WORD]:
+        raise OptionsRequest(page)
     for word in argv:
         if word in ("-h", "--help"):
             raise HelpRequest(short_page(page))
@@ -99,8 +98,10 @@ def parse(
     return _filled(model, base, {p: v for p, v in values.items() if p[0] not in names}), chosen
 
 
-_CODE = ("controller", "controllers", "scene")
+_CODE = ("controller", "controllers", "scene", "experiment")
 """Parameters that may name code to run, as MODULE:NAME or FILE.py:NAME."""
+TRUST = "trust_code"
+"""Option of a command whose file may name code in deeper tables."""
 
 
 def _refuse_code(file: Path, base: Mapping[str, Any], flags: Mapping[tuple[str, ...], Any]) -> None:
@@ -109,15 +110,34 @@ def _refuse_code(file: Path, base: Mapping[str, Any], flags: Mapping[tuple[str, 
     Raises:
         ConfigError: The file names code, and no flag does.
     """
-    for name in _CODE:
-        value = base.get(name, ())
-        names = (value,) if isinstance(value, str) else value
-        if (name,) not in flags and any(":" in each for each in names):
-            words = shlex.join([flag_of((name,)), *names])
-            raise ConfigError(
-                f"{file}: {name}: expected no code of its own in a file, found "
-                f"{', '.join(map(shown, names))}; if you trust that code, add {words}"
+    for path, name in () if flags.get((TRUST,)) else _code_in(base, ()):
+        if path not in flags:
+            deeper = len(path) > 1
+            words = (
+                flag_of((TRUST,)) if deeper else shlex.join([flag_of(path), *_names(base, path)])
             )
+            raise ConfigError(
+                f"{file}: {'.'.join(path)}: expected no code of its own in a file, found "
+                f"{shown(name) if deeper else ', '.join(map(shown, _names(base, path)))}; if you "
+                f"trust that code, add {words}"
+            )
+
+
+def _code_in(table: Any, path: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...], str]]:
+    """Path and name of everything in nested tables that names code."""
+    if isinstance(table, Mapping):
+        for key, value in table.items():
+            yield from _code_in(value, (*path, *str(key).split(".")))
+    elif isinstance(table, list | tuple):
+        for item in table:
+            yield from _code_in(item, path)
+    elif isinstance(table, str) and path and path[-1] in _CODE and ":" in table:
+        yield path, table
+
+
+def _names(base: Mapping[str, Any], path: tuple[str, ...]) -> tuple[str, ...]:
+    value = base[path[0]]
+    return (value,) if isinstance(value, str) else tuple(value)
 
 
 _Model = TypeVar("_Model")

@@ -72,7 +72,7 @@ def _options(command: str, carry_out: Callable[[str, Sequence[str]], int]) -> Se
     try:
         carry_out(command, [OptionsRequest.WORD])
     except OptionsRequest as request:
-        return request.options
+        return [*request.command.others, *request.command.parameters]
     return ()
 
 

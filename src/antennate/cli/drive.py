@@ -20,6 +20,7 @@ from antennate.cli.exit_codes import BAD_INPUT, OK
 from antennate.cli.keyboard import pressed_keys
 from antennate.cli.options import option
 from antennate.cli.results import ResultOptions, folder_for, tell
+from antennate.cli.view_options import PageOptions, page_of
 from antennate.errors import ConfigError, LogError
 from antennate.hardware.driving.arrival import Arrival
 from antennate.hardware.driving.config import DriveConfig
@@ -62,7 +63,7 @@ off, and if it was armed and never walked."""
 
 
 @dataclass(frozen=True)
-class Orders(ResultOptions, PortOptions):
+class Orders(ResultOptions, PortOptions, PageOptions):
     """Whether to move."""
 
     arm: bool = option(False, "torque on after the dry run")
@@ -117,6 +118,7 @@ def walk(
     given, config = config, config.calibrated()
     key = key_of(orders)
     with (
+        page_of(orders) or contextlib.nullcontext() as page,
         _operator(config, orders) as operator,
         folder_for(view, orders, config, argv) as folder,
     ):
@@ -134,7 +136,8 @@ def walk(
                 start=max(0, time.time_ns() - round(1e9 * session.clock.now())),
                 calibration=_calibration(given),
             )
-            record = _Record(header, folder.path / LOG, config.record_required)
+            file = None if page is None else page.channel.fileno()
+            record = _Record(header, folder.path / LOG, config.record_required, file)
             result = _carry_out(view.name, config, session, orders, record, operator)
         try:
             folder.finish(result, ())
@@ -150,16 +153,30 @@ def walk(
 
 @dataclasses.dataclass(frozen=True)
 class _Record:
-    """What the log begins with, its first file, and whether the robot may walk only with it."""
+    """What the log begins with, its first file, whether it is required, and the way to a page.
+
+    Attributes:
+        header: What the log begins with.
+        log: Its first file.
+        required: Whether the robot may walk only with it.
+        page: The file that leads to a live view, None without one.
+    """
 
     header: Header
     log: Path
     required: bool
+    page: int | None
 
     def words(self, number: int) -> list[str]:
         """The command line of the process that writes the n-th file."""
-        required = [viewer.REQUIRED] if self.required else []
-        return [sys.executable, "-m", viewer.__name__, str(part(self.log, number)), *required]
+        more = [viewer.REQUIRED] if self.required else []
+        more += [f"{viewer.PAGE}{file}" for file in self.files]
+        return [sys.executable, "-m", viewer.__name__, str(part(self.log, number)), *more]
+
+    @property
+    def files(self) -> list[int]:
+        """Files that this process needs."""
+        return [] if self.page is None else [self.page]
 
 
 def _calibration(config: DriveConfig) -> str:
@@ -196,7 +213,8 @@ def _carry_out(
     operator: Operator,
 ) -> dict[str, Any]:
     """Drive, with the log and the status line in a process of their own."""
-    feed, log = Feed(record.words, record.header.pack()), record.log
+    feed = Feed(record.words, record.header.pack(), files=record.files)
+    log = record.log
     unlogged = False
 
     def keep(session: Session, t: float) -> None:

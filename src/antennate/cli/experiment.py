@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 from pydantic.dataclasses import dataclass
@@ -12,21 +13,20 @@ from antennate.cli.arguments import parse
 from antennate.cli.exit_codes import BAD_INPUT, INTERRUPTED, OK
 from antennate.cli.options import option
 from antennate.cli.progress import progress, stop_signals
-from antennate.cli.results import ResultOptions, folder_for, tell
-from antennate.errors import ConfigError, OutputError
+from antennate.cli.results import drawn_table, folder_for, tell
+from antennate.cli.run_options import Options, workers_of
+from antennate.cli.view_options import ViewOptions, require_one_worker, say_by_hand, view_of
+from antennate.errors import BadInputError, ConfigError, OutputError, WorkerError
 from antennate.experiments.running import keep, require_films, write_films
 from antennate.params.base import Params
+from antennate.studies.engines import WARP
 from antennate.studies.experiment import Experiment, Outcome
-from antennate.studies.pool import core_count
-from antennate.studies.run_directory import LOGS, RunDirectory
-
-
-@dataclass(frozen=True)
-class Options(ResultOptions):
-    """How to run; nothing here changes a result."""
-
-    workers: int | None = option(None, "processes to use, else one for each core", "INT", ge=1)
-    no_figures: bool = option(False, "draw no figures")
+from antennate.studies.formats import to_json
+from antennate.studies.identity import differences, identity
+from antennate.studies.measures import Interim
+from antennate.studies.pool import ShardEnd, Workers
+from antennate.studies.run_directory import LOGS, SHARD, RunDirectory
+from antennate.telemetry.view.simulation import SimulationView
 
 
 @dataclass(frozen=True)
@@ -34,6 +34,11 @@ class LogOptions(Options):
     """The same where trials can be logged."""
 
     log: bool = option(False, "keep the log of every trial, in logs/CONTROLLER-TRIAL.mcap")
+
+
+@dataclass(frozen=True)
+class ShownOptions(ViewOptions, Options):
+    """The same where it can be watched."""
 
 
 @dataclass(frozen=True)
@@ -50,11 +55,21 @@ class TrialFilmOptions(FilmOptions):
     video_trial: int = option(0, "trial that --video films", "INT", ge=0)
 
 
+@dataclass(frozen=True)
+class StudyOptions(Options):
+    """The same where a file says what is run."""
+
+    config: Path | None = option(None, "TOML file of the study", "FILE", positional=True)
+    trust_code: bool = option(False, "run code of its own that the file names, as FILE.py:NAME")
+
+
 def _options(experiment: Experiment[Any, Any]) -> type[Options]:
     """What can be said of an experiment."""
-    kinds: list[type[Options]] = []
+    kinds: list[type[Options]] = [StudyOptions] if experiment.continued else []
     if experiment.logged is not None:
         kinds.append(LogOptions)
+    if experiment.viewed is not None:
+        kinds.append(ShownOptions)
     if experiment.films is not None:
         has_trials = "trials" in experiment.config.model_fields
         kinds.append(TrialFilmOptions if has_trials else FilmOptions)
@@ -94,40 +109,113 @@ def command(experiment: Experiment[Any, Any], argv: Sequence[str]) -> int:
     return carry_out(experiment, argv, config, options)
 
 
+@dataclass(frozen=True)
+class Shards:
+    """Trials of all shards: what was run, and their records by key."""
+
+    identity: dict[str, Any]
+    records: dict[str, Any]
+
+
 def carry_out(
-    experiment: Experiment[Any, Any], argv: Sequence[str], config: Params, options: Options
+    experiment: Experiment[Any, Any],
+    argv: Sequence[str],
+    config: Params,
+    options: Options,
+    shards: Shards | None = None,
 ) -> int:
-    """Run what has been parsed.
+    """Run what has been parsed, or put shards together that were run.
 
     Raises:
         AntennateError: The physics became invalid, a worker died, or a file could not be written;
             what was measured is kept and shown first.
     """
-    with folder_for(experiment.view, options, config, argv) as run:
-        with progress(experiment.parts) as step, stop_signals():
-            how = (config, options.workers or core_count(), step, run.append)
-            if isinstance(options, LogOptions) and options.log and experiment.logged is not None:
-                outcome = experiment.logged(*how, run.folder(LOGS))
-            else:
-                outcome = experiment.run(*how)
-        result = outcome.result()
-        interrupted = bool(result.get("interrupted"))
-        if interrupted and not outcome.rows:
-            raise KeyboardInterrupt
-        failure = _keep(experiment, outcome, options, run)
-        tell(result, options, experiment.tables(result), experiment.sentence(result))
-        if failure is not None:
-            raise failure
-        if interrupted:
-            sys.stderr.write(
-                f"antennate {experiment.name}: interrupted: kept {len(outcome.rows)} trials, all "
-                "that had ended\n"
-            )
-        else:
-            interrupted = not _film(experiment, config, options, run)
+    require_one_worker(options)
+    crew = workers_of(options, closed=shards is not None, apart=experiment.continued)
+    logs = isinstance(options, LogOptions) and options.log
+    kind = f"{experiment.name} --log" if logs else experiment.name
+    kind += " --engine warp" if options.engine.partition(":")[0] == WARP else ""
+    what = identity(kind, config)
+    if shards and (changes := differences(shards.identity, what)):
+        raise BadInputError(f"expected shards of this version and code, found {changes}")
+    resume = options.resume or options.retry or experiment.continued
+    name = "merge" if shards else experiment.name
+    with (
+        view_of(options) as view,
+        folder_for(experiment.view, options, config, argv, what, resume, name) as run,
+    ):
+        run.keeps_store, crew.store = experiment.continued, run.store
+        if shards and run.store is not None:
+            run.store.take(shards.records)
+        try:
+            outcome = _outcome(experiment, config, options, crew, run, view)
+        except WorkerError:
+            if shards:
+                run.discard()
+            raise
+        except ShardEnd as end:
+            told = {"shard": options.shard, "trials": end.count, "of": end.total}
+            run.write(SHARD, to_json(told))
+            sys.stderr.write(f"shard {options.shard}: {end.count} of {end.total} trials\n")
+            return OK
+        if options.shard is not None:
+            raise ConfigError(f"--shard: expected trials on workers, found {experiment.name}")
+        say_by_hand(() if view is None else view.by_hand, run)
+        return _end(experiment, config, options, run, outcome)
+
+
+def _outcome(
+    experiment: Experiment[Any, Any],
+    config: Params,
+    options: Options,
+    crew: Workers,
+    run: RunDirectory,
+    view: SimulationView | None,
+) -> Outcome:
+    """Run it: watched, logged, or neither."""
+    logs = run.folder(LOGS) if isinstance(options, LogOptions) and options.log else None
+    interim = Interim()
+
+    def keep(row: Any) -> None:
+        run.append(row)
+        interim.add(row)
+
+    def table() -> Any:
+        found = interim.table()
+        return None if found is None else drawn_table(found)
+
+    with progress(experiment.parts, table) as step, stop_signals():
+        if view is not None and experiment.viewed is not None:
+            return experiment.viewed(config, step, keep, view, logs)
+        if logs is not None and experiment.logged is not None:
+            return experiment.logged(config, crew, step, keep, logs)
+        return experiment.run(config, crew, step, keep)
+
+
+def _end(
+    experiment: Experiment[Any, Any],
+    config: Params,
+    options: Options,
+    run: RunDirectory,
+    outcome: Outcome,
+) -> int:
+    """Keep what came out, tell it, and make the films."""
+    result = outcome.result()
+    interrupted = bool(result.get("interrupted"))
+    if interrupted and not outcome.rows:
+        raise KeyboardInterrupt
+    failure = _keep(experiment, outcome, options, run)
+    tell(result, options, experiment.tables(result), experiment.sentence(result))
+    if failure is not None:
+        raise failure
     if interrupted:
-        return INTERRUPTED
-    return BAD_INPUT if experiment.failed(result) else OK
+        sys.stderr.write(
+            f"antennate {experiment.name}: interrupted: kept {len(outcome.rows)} trials, all "
+            "that had ended; --resume goes on\n"
+        )
+    elif _film(experiment, config, options, run):
+        return BAD_INPUT if experiment.failed(result) else OK
+    return INTERRUPTED
 
 
 def _film(

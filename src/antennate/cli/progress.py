@@ -18,12 +18,20 @@ _LINES = 10
 
 
 @contextlib.contextmanager
-def progress(what: str) -> Iterator[Callable[[int, int], None]]:
-    """Yield a function to call after each step with how many of how many are done."""
+def progress(
+    what: str, table: Callable[[], Any] = lambda: None
+) -> Iterator[Callable[[int, int], None]]:
+    """Yield a function to call after each step with how many of how many are done.
+
+    Args:
+        what: What is counted.
+        table: What a terminal shows below the bar, renewed every second; None for nothing.
+    """
     if not sys.stderr.isatty() or os.environ.get("TERM", "dumb") == "dumb":
         yield _plain(what)
         return
-    from rich.console import Console  # slow to import
+    from rich.console import Console, Group  # slow to import
+    from rich.live import Live
     from rich.progress import (
         BarColumn,
         MofNCompleteColumn,
@@ -32,22 +40,59 @@ def progress(what: str) -> Iterator[Callable[[int, int], None]]:
         TimeRemainingColumn,
     )
 
+    pace = _Pace()
+    columns = (
+        TextColumn(what),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TextColumn("{task.fields[rate]}"),
+    )
+    bar = Progress(*columns, TimeRemainingColumn())
+    task = bar.add_task(what, total=None, rate="")
+
+    def drawn() -> Any:
+        below = table()
+        return bar if below is None else Group(bar, below)
+
+    def step(done: int, total: int) -> None:
+        bar.update(task, completed=done, total=total, rate=pace.rate(done))
+
     console = Console(file=sys.stderr)
-    columns = (TextColumn(what), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=console, transient=True) as bar:
-        task = bar.add_task(what, total=None)
-        yield lambda done, total: bar.update(task, completed=done, total=total)
+    with Live(console=console, transient=True, get_renderable=drawn, refresh_per_second=2):
+        yield step
+
+
+class _Pace:
+    """How fast steps come; those that were there at the first call took no time."""
+
+    def __init__(self) -> None:
+        self._start, self._first = time.monotonic(), 0
+
+    def rate(self, done: int) -> str:
+        """Steps a second or a minute, in words."""
+        self._first = self._first or done - 1
+        speed = self._speed(done)
+        return f"{speed:.1f}/s" if speed >= 1.0 else f"{60 * speed:.1f}/min"
+
+    def left(self, done: int, total: int) -> float:
+        """Time until all are done [s]."""
+        return (total - done) / max(self._speed(done), 1e-9)
+
+    def _speed(self, done: int) -> float:
+        return (done - self._first) / max(time.monotonic() - self._start, 1e-9)
 
 
 def _plain(what: str) -> Callable[[int, int], None]:
-    start, shown = time.monotonic(), 0
+    start, shown, pace = time.monotonic(), 0, _Pace()
 
     def step(done: int, total: int) -> None:
         nonlocal shown
+        rate = pace.rate(done)
         if done * _LINES // total > shown:
             shown = done * _LINES // total
             seconds = time.monotonic() - start
-            sys.stderr.write(f"{what}: {done} of {total} after {seconds:.0f} s\n")
+            left = f", {rate}, {pace.left(done, total):.0f} s left" if done < total else ""
+            sys.stderr.write(f"{what}: {done} of {total} after {seconds:.0f} s{left}\n")
             sys.stderr.flush()
 
     return step

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -13,6 +14,8 @@ from antennate.cli.arguments import parse
 from antennate.cli.exit_codes import BAD_INPUT, OK
 from antennate.cli.options import option
 from antennate.cli.results import ResultOptions, folder_for, tell
+from antennate.cli.view import arena_of
+from antennate.cli.view_options import ViewOptions, page_of, say_by_hand
 from antennate.errors import ConfigError
 from antennate.messages import one_line, short_names
 from antennate.studies.formats import to_csv
@@ -21,6 +24,8 @@ from antennate.studies.report import View
 from antennate.studies.run_directory import RunDirectory
 from antennate.telemetry.reader import Damage, LogReader
 from antennate.telemetry.replay import ReplayConfig, Replayed, recorded_controller, replay
+from antennate.telemetry.view.pace import Restart
+from antennate.telemetry.view.replayed import ReplayPlayer
 from antennate.types import Maneuver
 
 DESCRIPTION = """\
@@ -37,7 +42,7 @@ COUNTS = (
 
 
 @dataclass(frozen=True)
-class Options(ResultOptions):
+class Options(ViewOptions, ResultOptions):
     """Which log, and what to leave behind."""
 
     log: str = option("", "log of a drive", "LOG", positional=True)
@@ -56,16 +61,38 @@ def command(argv: Sequence[str]) -> int:
     if not options.log:
         raise ConfigError("expected the log of a drive, found none")
     path = Path(options.log)
-    with LogReader(path) as log:
-        controller = recorded_controller(log.header, config.controller)
-        found = replay(log, controller, log.header)
+    log, found, by_hand = _replayed(path, config, options)
     result = _result(log, found, config.controller)
     if options.out is not None:
         with folder_for(VIEW, options, config, argv) as folder:
             _keep(folder, path, found)
+            say_by_hand(by_hand, folder)
             folder.finish(result)
     tell(result, options, VIEW.tables(result), VIEW.sentence(result))
     return complain("replay", log)
+
+
+def _replayed(
+    path: Path, config: ReplayConfig, options: Options
+) -> tuple[LogReader, Replayed, Sequence[str]]:
+    """The log, what came of its replay, and what was changed by hand on a page."""
+    page = page_of(options)
+    if page is None:
+        with LogReader(path) as log:
+            controller = recorded_controller(log.header, config.controller)
+            return log, replay(log, controller, log.header), ()
+    with page:
+        while True:
+            with contextlib.suppress(Restart), LogReader(path) as log:
+                player = ReplayPlayer(
+                    *(page.channel, log.header, str(path), options.view_speed),
+                    *(arena_of(path, log.header), config.controller),
+                )
+                player.state["paused"] = options.view_paused
+                player.tell()
+                ticks = player.ticks(log)
+                found = replay(ticks, player.controller, log.header, player.decided)
+                return log, found, player.by_hand
 
 
 def complain(command: str, log: LogReader) -> int:

@@ -31,17 +31,34 @@ class ResultOptions(FromFile):
 
 @contextlib.contextmanager
 def folder_for(
-    view: View, options: ResultOptions, config: Params, argv: Sequence[str]
+    view: View,
+    options: ResultOptions,
+    config: Params,
+    argv: Sequence[str],
+    identity: Mapping[str, Any] | None = None,
+    resume: bool = False,
+    command: str = "",
 ) -> Iterator[RunDirectory]:
     """A run directory with its configuration.
 
     Its report is written, and its path printed, when the run is complete.
 
+    Args:
+        view: How the result is shown.
+        options: Where it goes.
+        config: The configuration.
+        argv: Words of the command.
+        identity: What is run, if it can be resumed.
+        resume: Go on with the run that the folder holds, if there is one.
+        command: Name of the command, if it is not that of the view.
+
     Raises:
+        BadInputError: The run that is to go on is another one.
         OutputError: It cannot be written, or it holds another run.
     """
-    with RunDirectory.create(view.name, options.out, options.overwrite) as folder:
-        folder.describe(config, ["antennate", view.name, *argv])
+    place = (view.name, options.out, options.overwrite, identity, resume)
+    with RunDirectory.create(*place) as folder:
+        folder.describe(config, ["antennate", command or view.name, *argv])
         yield folder
         write_report(folder, view)
         sys.stderr.write(f"written to {folder.path}\n")
@@ -63,14 +80,9 @@ def tell(
     console.print(Text(sentence), soft_wrap=not console.is_terminal)
 
 
-def print_table(table: Table) -> None:
-    """Print a table and its note; as a list where it is too wide for the terminal.
-
-    Underscores of a name are shown as spaces; one with a colon may have a line for each part.
-    """
+def drawn_table(table: Table) -> Any:
+    """A table as rich draws it."""
     from rich.box import SIMPLE_HEAD  # slow to import
-    from rich.console import Console
-    from rich.measure import Measurement
     from rich.table import Table as Drawn
     from rich.text import Text
 
@@ -81,6 +93,19 @@ def print_table(table: Table) -> None:
         drawn.add_column(Text(parts), justify="right", overflow="fold")
     for name, cells in table.rows:
         drawn.add_row(Text(name), *(Text(cell) for cell in cells))
+    return drawn
+
+
+def print_table(table: Table) -> None:
+    """Print a table and its note; as a list where it is too wide for the terminal.
+
+    Underscores of a name are shown as spaces; one with a colon may have a line for each part.
+    """
+    from rich.console import Console  # slow to import
+    from rich.measure import Measurement
+    from rich.text import Text
+
+    drawn = drawn_table(table)
     console = Console(file=sys.stdout, highlight=False)
     unlimited = console.options.update(max_width=sys.maxsize)
     if Measurement.get(console, unlimited, drawn).minimum <= console.width:

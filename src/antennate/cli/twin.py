@@ -11,24 +11,31 @@ from contextlib import nullcontext
 from pathlib import Path
 from typing import Literal
 
+import numpy as np
 from pydantic.dataclasses import dataclass
 
 from antennate.cli.arguments import FromFile, parse
 from antennate.cli.exit_codes import OK
 from antennate.cli.options import option
 from antennate.cli.progress import stop_signals
+from antennate.cli.view_options import PageOptions, page_of
 from antennate.errors import ConfigError
 from antennate.hardware.driving.priority import LEVEL, urgent
 from antennate.hardware.ports.keys import read_key
+from antennate.sim.world import World
+from antennate.telemetry.view.process import ViewProcess
+from antennate.telemetry.view.simulation import SimulationView
 from antennate.twin.config import TwinConfig, watched
 from antennate.twin.endpoints import Endpoint
 from antennate.twin.faults import Faults, read
 from antennate.twin.orders import Orders
 from antennate.twin.passage import Passage
+from antennate.twin.robot import TwinRobot
 from antennate.twin.serve import ServoServer, TwinServer
 from antennate.twin.servo_box import ServoBox, ServoEntry, read_list
 from antennate.twin.tcp import TcpEndpoint
 from antennate.twin.udp import UdpEndpoint
+from antennate.types import AntennaFrame
 
 _LAST_PORT = 65_534
 
@@ -59,7 +66,7 @@ wire=ber:SHARE (bits wrong) or loss:SHARE (bytes lost), on both wires both ways.
 
 
 @dataclass(frozen=True)
-class Places(FromFile):
+class Places(FromFile, PageOptions):
     """Where to serve; two pseudo-terminals if no port is given."""
 
     tcp: str | None = option(
@@ -105,7 +112,12 @@ def _serve_robot(config: TwinConfig, places: Places, orders: Orders | None) -> i
     real = places.pace == "real"
     robot, passage = watched(config, boot_id=secrets.randbits(32) if real else None)
     passage.on_pass = lambda: _tell(passage, places.passed)
-    with TwinServer(robot, faults, *_endpoints(places), orders) as server:
+    with (
+        page_of(places) or nullcontext() as page,
+        TwinServer(robot, faults, *_endpoints(places), orders) as server,
+    ):
+        if page is not None:
+            passage.on_tick = _shown(page, robot, config)
         try:
             with urgent(LEVEL + 1) if real else nullcontext():
                 serve = server.run if real else server.run_lockstep
@@ -117,15 +129,28 @@ def _serve_robot(config: TwinConfig, places: Places, orders: Orders | None) -> i
     return OK
 
 
+def _shown(page: ViewProcess, robot: TwinRobot, config: TwinConfig) -> Callable[[World], None]:
+    """What shows the twin after each tick; it serves in real time, so a page cannot stop it."""
+    view = SimulationView(page.channel, steered=False)
+    view.begin(f"twin, trial {config.trial}")
+
+    def show(world: World) -> None:
+        frame = AntennaFrame(t=np.array([world.t]), counts=robot.counts[None])
+        view.tick(world.model, world.data, frame)
+
+    show(robot.world)
+    return show
+
+
 def _serve_servos(
     config: TwinConfig, places: Places, entries: Sequence[ServoEntry], orders: Orders | None
 ) -> int:
     """Servos without a robot."""
-    robot = (places.udp, places.passed, places.pace != "real", config.touch, config.factory)
-    if any(robot):
+    robot = (places.udp, places.passed, places.pace != "real", places.view)
+    if any(robot) or config.touch or config.factory:
         raise ConfigError(
-            "--servos: expected no --udp, --passed, --pace lockstep, --touch or --factory, as they "
-            "are for a robot"
+            "--servos: expected no --udp, --passed, --pace lockstep, --view, --touch or --factory, "
+            "as they are for a robot"
         )
     demands = [read(text) for text in config.fault]
     faults = Faults(demands, [entry.id for entry in entries], alone=True)

@@ -11,7 +11,9 @@ import math
 import os
 import re
 import signal
+import socket
 import sys
+import time
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -22,10 +24,12 @@ from antennate.messages import one_line
 from antennate.telemetry.feed import KEPT, NOT_KEPT, Message, messages
 from antennate.telemetry.header import Header
 from antennate.telemetry.ticks import Tick
+from antennate.telemetry.view.channel import HEADER, STATE, TICK, Channel
+from antennate.telemetry.view.pace import RATE
 from antennate.telemetry.writer import LogWriter
 from antennate.types import Maneuver
 
-REQUIRED = "required"
+REQUIRED, PAGE = "required", "page="
 _STDOUT = 1
 _BEFORE = re.compile(r"(HOLD|FAULT|OFF) (?!NOT_READY|UNKNOWN_CONTACT|UNDECIDED)")
 """A cause that is also shown while the robot is not armed."""
@@ -74,27 +78,66 @@ def _why(state: str, causes: Sequence[str]) -> str:
     return why
 
 
+class _Page:
+    """Sends ticks on to the process of a live view, which is never waited for.
+
+    Args:
+        file: Number of the file that leads there.
+    """
+
+    def __init__(self, file: int) -> None:
+        self._channel = Channel(socket.socket(fileno=file))
+        self._due = -math.inf
+
+    def begin(self, first: Message) -> None:
+        """The header of a log; nothing on the page can change anything."""
+        with contextlib.suppress(LogError):
+            header = Header.unpack(first.content)
+            title = f"{header.controller} on the robot"
+            theta = header.params.rule.threshold
+            self._channel.tell(STATE, title=title, theta=theta)
+            self._channel.send(HEADER, first.content)
+
+    def show(self, message: Message) -> None:
+        """A tick, if a picture is due."""
+        now = time.monotonic()
+        if now >= self._due:
+            self._due = now + 1.0 / RATE
+            self._channel.send(TICK, message.content)
+
+
+def _page_of(words: Sequence[str]) -> _Page | None:
+    files = [word.removeprefix(PAGE) for word in words if word.startswith(PAGE)]
+    return _Page(int(files[0])) if files else None
+
+
 def main() -> int:
     """Keep and show ticks until they end; 0 if all of them are kept.
 
-    With the word `required` after the log's path it ends with the log, and shows nothing more.
+    With the word `required` after the log's path it ends with the log, and shows nothing more. With
+    `page=NUMBER` it sends them on to the file of that number.
     """
     for number in (*STOPS, signal.SIGTTOU):  # the other end decides when it is over
         signal.signal(number, signal.SIG_IGN)
     display = Display()
     kept, required = False, REQUIRED in sys.argv[2:]
+    page = _page_of(sys.argv[2:])
     log: LogWriter | None = None
     stream = messages(sys.stdin.buffer.raw, lambda: _settle(log))  # type: ignore[attr-defined]
     try:
         first = next(stream, None)
         log = None if first is None else _begin(Path(sys.argv[1]), first)
         kept = log is not None
+        if page is not None and first is not None:
+            page.begin(first)
         with contextlib.suppress(OSError):  # the other end is gone; the ticks tell it
             os.write(_STDOUT, KEPT if kept else NOT_KEPT)
         for message in stream:
             tick = Tick.unpack(message.content)
             kept = kept and _keep(log, tick)
             display.show(tick, message.dropped)
+            if page is not None:
+                page.show(message)
             if required and not kept:
                 break
         if log is not None and kept:

@@ -14,6 +14,9 @@ from antennate.types import Controller
 ControllerFactory = Callable[[ControlParams, RobotSpec, int], Controller]
 """Makes a controller of B robots. A class whose `__init__` takes these three is one."""
 
+ControllerMaker = Callable[[str, ControlParams, RobotSpec, int], Controller]
+"""Makes the controller of a name for B robots, as `make_controller` does."""
+
 BUILT_IN: dict[str, ControllerFactory] = {
     "open": controllers.open_loop,
     "paper": controllers.paper,

@@ -11,6 +11,7 @@ import pkgutil
 from typing import TYPE_CHECKING, Any
 
 from antennate.errors import BadInputError
+from antennate.messages import shortened
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
@@ -56,7 +57,7 @@ def load(name: str) -> Experiment[Any, Any]:
         return importlib.import_module(f"{__name__}.{name}.experiment").EXPERIMENT
     entries = _entries()
     if name not in entries:
-        raise BadInputError(f"expected an experiment ({', '.join(summaries())}), found {name}")
+        raise BadInputError(unknown(name))
     try:
         return entries[name].load()
     except Exception as error:
@@ -64,6 +65,11 @@ def load(name: str) -> Experiment[Any, Any]:
             f"{name}: expected an experiment at {entries[name].value}, found: "
             f"{type(error).__name__}: {error}"
         ) from error
+
+
+def unknown(name: str) -> str:
+    """What is said of a name that no experiment has."""
+    return f"expected an experiment ({', '.join(summaries())}), found {shortened(name)}"
 
 
 def _folders() -> list[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import re
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -15,7 +16,10 @@ from antennate.dataframe import from_rows
 from antennate.errors import BadInputError, ConfigError
 from antennate.params.base import Params
 from antennate.params.reading import from_values
+from antennate.studies.engines import LOCAL, make_engine
 from antennate.studies.experiment import Experiment, Outcome
+from antennate.studies.identity import identity
+from antennate.studies.pool import Workers
 from antennate.studies.report import write_report
 from antennate.studies.run_directory import FILMS, RunDirectory
 
@@ -90,18 +94,21 @@ def _elsewhere(summary: Mapping[str, Any]) -> str:
 
 
 def run(
-    experiment: str | Params,
+    name_or_config: str | Params,
+    /,
     workers: int = 1,
     out: str | Path | None = None,
     overwrite: bool = False,
     video: int | None = None,
     on_step: Callable[[int, int], None] = lambda done, total: None,
+    resume: bool = False,
+    engine: Any = LOCAL,
     **settings: Any,
 ) -> Result:
     """Run an experiment.
 
     Args:
-        experiment: Its name, one of `list_experiments()`, or its whole configuration.
+        name_or_config: Its name, one of `list_experiments()`, or its whole configuration.
         workers: Processes to use; the result does not depend on it. With more than one, the calling
             script needs `if __name__ == "__main__":`.
         out: A run directory to write: configuration, versions, rows, result and figures; None
@@ -109,6 +116,9 @@ def run(
         overwrite: Replace a run that `out` holds.
         video: Number of a trial of which `out` gets a film for each condition, None for none.
         on_step: Called with how many of how many parts are done.
+        resume: Go on with the run that `out` holds, if there is one.
+        engine: Where the workers are: local, dask, dask://HOST:PORT, slurm, or an object with
+            `submit` as those of concurrent.futures have.
         settings: Fields of its configuration where a name was given, with nested groups as objects
             or dictionaries. `controllers` also takes classes.
 
@@ -117,15 +127,18 @@ def run(
         OutputError: The directory cannot be written, or holds another run.
         AntennateError: The run failed.
     """
-    found, config = _configured(experiment, settings, workers)
+    found, config = _configured(name_or_config, settings, workers)
     found.check(config)
     if video is not None:
         require_films(found, config, video, out)
+    crew = functools.partial(Workers, workers, make_engine(engine))
     if out is None:
-        return Result(found, config, found.run(config, workers, on_step, lambda row: None))
-    with RunDirectory.create(found.name, out, overwrite) as directory:
+        return Result(found, config, found.run(config, crew(), on_step, lambda row: None))
+    place = (found.name, out, overwrite, identity(found.name, config), resume or found.continued)
+    with RunDirectory.create(*place) as directory:
+        directory.keeps_store = found.continued
         directory.describe(config)
-        outcome = found.run(config, workers, on_step, directory.append)
+        outcome = found.run(config, crew(store=directory.store), on_step, directory.append)
         keep(found, outcome, directory)
         if video is not None:
             write_films(found, config, video, directory)
@@ -203,6 +216,38 @@ def write_films(
 
         data = encoded(record(), step)
         directory.write(f"{FILMS}/{re.sub(r'[^A-Za-z0-9_.-]+', '_', name)}.mp4", data)
+
+
+def study(
+    experiment: str | Callable[..., Any],
+    vary: Mapping[str, Any],
+    settings: Mapping[str, Any] | None = None,
+    **more: Any,
+) -> Result:
+    """Run an experiment, or a function of your own, at many points of its parameters.
+
+    Args:
+        experiment: Name of an experiment, or trial(config, seed) -> row: `config` holds the
+            parameters by name, `seed` is 0, 1, 2 and so on, the row is a dictionary or a dataclass.
+        vary: By dotted name a list of values, or {"low": ..., "high": ...} for a range.
+        settings: Parameters that are the same at all points.
+        more: Further fields of a study (plan, points, seed, trials, response, assumed, leave_out),
+            and how to run it, as for `run` (workers, out, engine, on_step). With `out` the study
+            goes on with what the directory holds of it.
+
+    Raises:
+        BadInputError: A name is unknown, a value out of bounds, or the plan is empty.
+        OutputError: The directory cannot be written, or another process works on it.
+        AntennateError: The run failed.
+    """
+    from antennate.experiments.study.subject import FUNCTIONS, plain
+
+    if not isinstance(experiment, str):
+        name, function = experiment.__name__, experiment
+        FUNCTIONS.add(name, function)
+        experiment = name
+    values = {"vary": plain(vary), "settings": plain(settings or {})}
+    return run("study", experiment=experiment, **values, **more)
 
 
 def list_experiments() -> dict[str, str]:

@@ -14,7 +14,8 @@ from antennate.params.control import ConditioningParams, ControlParams
 from antennate.params.doctor import DoctorParams
 from antennate.params.network import NetworkParams
 from antennate.params.safety import SupervisorParams
-from antennate.robots.spec import SIMULATION_ALONE, RobotSpec
+from antennate.robots.readers import SIMULATION_ALONE
+from antennate.robots.spec import RobotSpec
 
 
 class RobotConfig(Params):

@@ -14,7 +14,7 @@ from pydantic import model_validator
 
 from antennate.errors import ConfigError
 from antennate.messages import nearest, shown
-from antennate.params.base import Params, number, paths_of
+from antennate.params.base import Params, number
 from antennate.params.reading import read_file
 from antennate.robots.antenna import BASE, AntennaSpec
 from antennate.robots.joints import (
@@ -26,42 +26,12 @@ from antennate.robots.joints import (
     PitchParams,
     YawParams,
 )
-from antennate.robots.servos import EXTENDED_MODE, POSITION_MODE, TICKS_A_TURN, ServosParams
+from antennate.robots.servos import EXTENDED_MODE, POSITION_MODE, ServoName, ServosParams
 from antennate.robots.sides import SIDES
 
 GroupName = Literal["yaw", "legs", "antennae", "pitch"]
 ROBOTS = ("scuttle", "hexapod")
 """Robots that are known by name; each is a file beside this one."""
-HARDWARE_ALONE = (
-    *(
-        f"robot.{group}.{name}"
-        for group in ("yaw", "legs", "antennae", "pitch")
-        for name in ("ids", "directions", "zeros", "limit", "fastest")
-        if (group, name) != ("yaw", "limit")
-    ),
-    "robot.antenna.sensor.rate",
-    "robot.baud",
-    "robot.release",
-)
-"""Parameters that only the robot's hardware, or its twin, reads; the simulation alone does not."""
-SIMULATION_ALONE = (
-    *(
-        f"robot.{name}"
-        for name in (
-            "mass",
-            "leg_width",
-            "leg_mass",
-            "leg_friction",
-            "body_friction",
-            "body_radius",
-            "pitch.stiffness",
-            "legs.reach",
-        )
-    ),
-    *paths_of(ServosParams, "robot.servos"),
-    *paths_of(AntennaSpec, "robot.antenna"),
-)
-"""Parameters that only the simulation, or the twin, reads; the robot's hardware does not."""
 CLEARANCE = 0.002
 """Gap that neighbouring legs keep at the largest bend [m] (assumed: play of printed parts)."""
 ANTENNA_PREFIXES = tuple(f"antenna_{side}_" for side in SIDES)
@@ -70,7 +40,7 @@ ANTENNA_PREFIXES = tuple(f"antenna_{side}_" for side in SIDES)
 class RobotSpec(Params):
     """A walking robot: links with a pair of legs each, yaw joints between them, two antennae."""
 
-    choice: ClassVar[str] = f"{', '.join(ROBOTS)} (the default), or a TOML file of your own robot"
+    choice: ClassVar[str] = f"{', '.join(ROBOTS)} or a TOML file of your own; the first by default"
     links: int = number(6, "1", "paper: six links", ge=2, le=50)
     """Number of links."""
     link_pitch: float = number(
@@ -284,13 +254,14 @@ class RobotSpec(Params):
         return tuple(group.fastest for _, group, count in self.groups for _ in range(count))
 
     @property
+    def servo_names(self) -> tuple[ServoName, ...]:
+        """Servo model of each joint."""
+        return tuple(group.servo for _, group, count in self.groups for _ in range(count))
+
+    @property
     def models(self) -> dict[int, int]:
         """Model number of each servo by id."""
-        numbers = [
-            self.servos.of(group.servo).model_number
-            for _, group, n in self.groups
-            for _ in range(n)
-        ]
+        numbers = [self.servos.of(name).model_number for name in self.servo_names]
         return dict(zip(self.ids, numbers, strict=True))
 
     @property
@@ -368,8 +339,8 @@ def _check_group(name: GroupName, group: JointParams, count: int) -> None:
                 f"{name}.{what}: expected one for each of the {count} joints, found {found}"
             )
     for zero in group.zeros if math.isfinite(group.largest) else ():
-        if not QUARTER <= zero <= TICKS_A_TURN - QUARTER:
+        if not QUARTER <= zero <= STRAIGHT + QUARTER:
             raise ValueError(
                 f"{name}.zeros must leave a quarter turn to both sides, {QUARTER} to "
-                f"{TICKS_A_TURN - QUARTER} ticks, got {zero}"
+                f"{STRAIGHT + QUARTER} ticks, got {zero}"
             )

@@ -12,19 +12,11 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from antennate.robots.spec import ANTENNA_PREFIXES
-from antennate.sim import gl, layers
+from antennate.sim import gl
+from antennate.sim.appearance import FLOOR, Colour, colours
 from antennate.types import Floats
 
 Picture = NDArray[np.uint8]
-Colour = tuple[float, float, float, float]
-
-_UNPAINTED = np.array([0.5, 0.5, 0.5, 1.0], dtype=np.float32)
-"""The engine's colour of a geom that has none of its own."""
-_FLOOR: Colour = (0.97, 0.97, 0.97, 1.0)
-_OBSTACLE: Colour = (0.88, 0.80, 0.66, 0.6)
-_BODY: Colour = (0.22, 0.22, 0.25, 1.0)
-_LEG: Colour = (0.45, 0.47, 0.52, 1.0)
 _LINE: Colour = (0.8, 0.8, 0.8, 1.0)
 _SAMPLES = 4
 """Samples of a pixel: thin antennae would flicker otherwise."""
@@ -149,18 +141,7 @@ def _prepare(model: mujoco.MjModel, size: tuple[int, int], sides: tuple[Colour, 
     visual.headlight.ambient = [0.55] * 3
     visual.headlight.diffuse = [0.45] * 3
     visual.headlight.specular = [0.0] * 3
-    bare = (model.geom_rgba == _UNPAINTED).all(axis=1) & (model.geom_matid < 0)
-    kind = model.geom_contype
-    for bit, colour in (
-        (layers.FLOOR, _FLOOR),
-        (layers.OBSTACLE, _OBSTACLE),
-        (layers.BODY, _BODY),
-        (layers.LEG, _LEG),
-        (layers.ANTENNA, sides[0]),
-    ):
-        model.geom_rgba[bare & (kind == bit)] = colour
-    right = [ANTENNA_PREFIXES[1] in model.geom(i).name for i in range(model.ngeom)]
-    model.geom_rgba[bare & (kind == layers.ANTENNA) & np.array(right)] = sides[1]
+    model.geom_rgba[:] = colours(model, sides)
 
 
 def _add_floor(scene: mujoco.MjvScene, shot: Shot, target: Floats) -> None:
@@ -169,7 +150,7 @@ def _add_floor(scene: mujoco.MjvScene, shot: Shot, target: Floats) -> None:
     middle = np.round(target[:2] / shot.grid) * shot.grid
     half, width = _GRID * shot.grid, shot.grid / 150
     if shot.floor is not None:
-        _add_box(scene, [2 * half, 2 * half, width], [*middle, height - 2 * width], _FLOOR)
+        _add_box(scene, [2 * half, 2 * half, width], [*middle, height - 2 * width], FLOOR)
     for k in range(-_GRID, _GRID + 1):
         across = middle + k * shot.grid
         _add_box(scene, [half, width, width / 10], [middle[0], across[1], height], _LINE)

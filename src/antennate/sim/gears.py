@@ -16,6 +16,12 @@ class Gears:
         model: The model, whose joints get that friction.
         robot: The robot.
         prefix: Before its names in the model.
+
+    Attributes:
+        share: Friction as a share of the torque of the motor, of those joints that have it, (n,).
+        drive, dof: Actuators and degrees of freedom of these joints, shape (n,).
+        dry: Their friction without a load [N·m], shape (n,).
+        damping: Their damping [N·m·s/rad], shape (n,).
     """
 
     def __init__(self, model: mujoco.MjModel, robot: RobotSpec, prefix: str) -> None:
@@ -26,11 +32,11 @@ class Gears:
                 loaded = robot.servos.of(joints.servo).load_friction
                 share |= dict.fromkeys(robot.joint_names[robot.places(group)], loaded)
         names = [name for name in share if share[name] > 0.0]
-        self._share: Floats = np.array([share[name] for name in names])
-        self._drive: Ints = np.array([model.actuator(prefix + n).id for n in names], np.int64)
-        self._dof: Ints = np.array([model.joint(prefix + n).dofadr[0] for n in names], np.int64)
-        self._dry: Floats = model.dof_frictionloss[self._dof]
-        self._damping: Floats = model.dof_damping[self._dof]
+        self.share: Floats = np.array([share[name] for name in names])
+        self.drive: Ints = np.array([model.actuator(prefix + n).id for n in names], np.int64)
+        self.dof: Ints = np.array([model.joint(prefix + n).dofadr[0] for n in names], np.int64)
+        self.dry: Floats = model.dof_frictionloss[self.dof]
+        self.damping: Floats = model.dof_damping[self.dof]
 
     def step(self, data: mujoco.MjData, count: int) -> None:
         """Advance by `count` physics steps, each with friction from the torques of the one before.
@@ -38,10 +44,10 @@ class Gears:
         Raises:
             mujoco.FatalError: The engine failed.
         """
-        if not len(self._dof):
+        if not len(self.dof):
             mujoco.mj_step(self._model, data, count)
             return
         for _ in range(count):
-            motor = data.actuator_force[self._drive] - self._damping * data.qvel[self._dof]
-            self._model.dof_frictionloss[self._dof] = self._dry + self._share * abs(motor)
+            motor = data.actuator_force[self.drive] - self.damping * data.qvel[self.dof]
+            self._model.dof_frictionloss[self.dof] = self.dry + self.share * abs(motor)
             mujoco.mj_step(self._model, data)

@@ -54,11 +54,10 @@ class _Row:
 
     __slots__ = ("chance", "commanded", "failure", "hinges", "tick", "world")
 
-    def __init__(self, world: World, chance: Disturbance) -> None:
+    def __init__(self, world: World, chance: Disturbance, hinges: Floats) -> None:
         self.world = world
         self.chance = chance
-        sensed = world.robot.antenna.sensed_hinges if world.robot.antenna_count else 0
-        self.hinges: Floats = np.zeros((2, sensed))
+        self.hinges = hinges
         self.tick = 0
         self.commanded = False
         self.failure: SimulationError | None = None
@@ -91,7 +90,9 @@ class SimRobot:
                 f"got {period:g} s"
             )
         self._ticks = 0
-        self._flex: Floats = np.zeros((batch, 2))
+        sensed = robot.antenna.sensed_hinges if robot.antenna_count else 0
+        self._hinges: Floats = np.zeros((batch, 2, sensed))
+        self._bias: Floats = np.zeros((batch, robot.yaw_count))
         self._noise: Floats = np.zeros((batch, 2))
         self._missing = np.ones(batch, dtype=bool)
 
@@ -102,7 +103,8 @@ class SimRobot:
 
     def load(self, row: int, world: World, chance: Disturbance) -> None:
         """Put a fresh world into a row."""
-        self._rows[row] = _Row(world, chance)
+        self._rows[row] = _Row(world, chance, self._hinges[row])
+        self._bias[row] = chance.joint_bias
         self._sensors.reset(row)
         self._missing[row] = not world.robot.antenna_count
 
@@ -137,9 +139,8 @@ class SimRobot:
         for i, row in self._rows.items():
             t[i] = row.world.data.time
             row.world.read_hinges(row.hinges)
-            row.hinges.sum(axis=1, out=self._flex[i])
             self._noise[i] = row.chance.noise(row.tick)
-        counts = self._sensors.step(self._flex, self._noise)
+        counts = self._sensors.step(self._hinges.sum(axis=2), self._noise)
         counts[self._missing] = np.nan
         return AntennaFrame(t=t, counts=counts)
 
@@ -147,10 +148,10 @@ class SimRobot:
         """Command every row's joints."""
         parts = [getattr(command, name).reshape(self._batch, -1) for name in self._parts]
         drive = np.concatenate(parts, axis=1)
+        drive[:, : self._yaws] += self._bias
         finite = bool(np.isfinite(drive).all())
         for i, row in self._rows.items():
             if row.failure is None:
-                drive[i, : self._yaws] += row.chance.joint_bias
                 row.commanded = True
                 if finite:
                     row.world.command_finite(drive[i])

@@ -102,6 +102,16 @@ def draw_trial(
     return Trial(world, chance, phase, drawn)
 
 
+def draw_scene(config: TrialConfig, scene: Scene, trial: int) -> SceneInstance:
+    """The instance of the scene that `draw_trial` draws.
+
+    Raises:
+        SceneError: There is none.
+    """
+    with _errors_of(config.scene):
+        return scene.draw(config.robot, _generators(config.seed, trial)[0])
+
+
 def check_start(config: TrialConfig) -> None:
     """Find a bad scene before anything is run: draw trial 0, and compile it if it is not ours.
 

@@ -14,27 +14,20 @@ import numpy as np
 
 from antennate.errors import SceneError, SimulationError, in_one_line
 from antennate.params.scene import PhysicsParams
-from antennate.robots.spec import ANTENNA_PREFIXES, RobotSpec
+from antennate.robots.spec import RobotSpec
 from antennate.sim import layers, robot_part
+from antennate.sim.bounds import ANGLE_LIMIT, DISTANCE_LIMIT, HEIGHT_LIMIT, SPEED_LIMIT, broken
 from antennate.sim.gears import Gears
 from antennate.sim.outline import outline
+from antennate.sim.places import Places
 from antennate.sim.scenes.scene import SceneInstance, add_floor
 from antennate.sim.servo_drives import ServoDrives
-from antennate.types import Bools, Floats, Ints
+from antennate.types import Bools, Floats
 
 mujoco.set_mju_user_warning(lambda message: None)
 """The engine prints its warnings and writes them to a file; we read its counters instead."""
 
 PREFIX = "robot/"
-_SPEED_LIMIT = 1e3
-"""No coordinate of a sound world moves faster [m/s or rad/s]."""
-_DISTANCE_LIMIT = 100.0
-"""A head farther than this from the origin left the world [m]."""
-_ANGLE_LIMIT = 6.3
-"""Yaw, pitch and antenna joints cannot turn farther [rad]; legs turn without end."""
-_HEIGHT_LIMIT = 0.3
-"""A head above or below this left the world [m]."""
-
 _PLANE = int(mujoco.mjtGeom.mjGEOM_PLANE)
 CONTACT_IMPEDANCE = (0.95, 0.99, 0.0005)
 """Least and largest impedance of contacts, and the depth of the largest [m]: `solimp`."""
@@ -104,6 +97,8 @@ class World:
     Attributes:
         model: The compiled model; `data` its state.
         robot: The robot in it.
+        places: Where the robot's parts are in the model.
+        gears: Friction of the gears under load.
         head: Position of the head link [m], shape (3,), a view of the state.
         servo_drives: Gain and limits of the servos' drives.
         t: Time since the world was made [s].
@@ -113,28 +108,13 @@ class World:
         self.robot = robot
         self.model = model
         self.data = mujoco.MjData(model)
-        prefixes = ANTENNA_PREFIXES[: robot.antenna_count]
-        hinges = [PREFIX + p + h for p in prefixes for h in robot.antenna.hinge_names]
-        bent = self._addresses(hinges)
-        self._yaw = self._addresses([PREFIX + n for n in robot.yaw_names])
-        self._leg = self._addresses([PREFIX + n for n in robot.leg_names])
-        self._flex = bent.reshape(len(ANTENNA_PREFIXES), -1)[:, : robot.antenna.sensed_hinges]
-        pitch = self._addresses([PREFIX + n for n in robot.pitch_names])
-        self._bounded = np.concatenate([self._yaw, pitch, bent])
+        self.places = places = Places(model, robot, PREFIX)
+        self._flex, self._bounded, self._drive = places.hinges, places.bounded, places.drives
+        self.gears = Gears(model, robot, PREFIX)
         names = [PREFIX + n for n in robot.joint_names]
-        self._drive: Ints = np.array([model.actuator(n).id for n in names])
-        self._driven = self._addresses(names)
-        self._turning: Ints = np.array([model.joint(n).dofadr[0] for n in names])
-        self._gears = Gears(model, robot, PREFIX)
-        kinds = [robot.servos.of(group.servo) for _, group, n in robot.groups for _ in range(n)]
-        stall = np.array([kind.stall_torque for kind in kinds])
+        stall = np.array([robot.servos.of(n).stall_torque for n in robot.servo_names])
         self.servo_drives = ServoDrives(model, names, stall)
-        self._root: int = model.joint(PREFIX + "root").qposadr[0]
-        self._links: Ints = np.array([model.body(PREFIX + n).id for n in robot.link_names])
-        self._leg_geoms: Ints = np.array([model.geom(PREFIX + n).id for n in robot.leg_names])
-        self._obstacle = (model.geom_contype & layers.OBSTACLE) != 0
-        owner = model.body_rootid[model.geom_bodyid]
-        self._robot = owner == model.body(PREFIX + robot.link_names[0]).id
+        self._root = places.root
         self._steps = 0
         data = self.data
         self._qpos, self._qvel, self._ctrl = data.qpos, data.qvel, data.ctrl
@@ -142,9 +122,6 @@ class World:
         self._bent: Floats = np.zeros(len(self._bounded))
         self._warnings = data.warning.number
         self._no_warning = self._warnings.tobytes()
-
-    def _addresses(self, joints: list[str]) -> Ints:
-        return np.array([self.model.joint(n).qposadr[0] for n in joints], np.int64)
 
     @property
     def t(self) -> float:
@@ -156,8 +133,8 @@ class World:
         q = self.data.qpos
         q[self._root : self._root + 2] = x, y
         q[self._root + 3 : self._root + 7] = math.cos(heading / 2), 0.0, 0.0, math.sin(heading / 2)
-        q[self._yaw] = yaw
-        q[self._leg] = leg.ravel()
+        q[self.places.yaw] = yaw
+        q[self.places.legs] = leg.ravel()
         mujoco.mj_forward(self.model, self.data)
 
     def state(self) -> Floats:
@@ -166,6 +143,15 @@ class World:
         found = np.empty(mujoco.mj_stateSize(self.model, kind))
         mujoco.mj_getState(self.model, self.data, found, kind)
         return found
+
+    def coordinates(self) -> tuple[int, list[float]]:
+        """Number of the robot's first coordinate, and all coordinates of the model [m, rad]."""
+        return self._root, self._qpos.tolist()
+
+    def place_all(self, position: Floats) -> None:
+        """Put everything at coordinates of the model [m, rad], shape (nq,), without physics."""
+        self._qpos[:] = position
+        mujoco.mj_kinematics(self.model, self.data)
 
     def restore(self, state: Floats) -> None:
         """Be again as when `state` was called, also in time."""
@@ -192,16 +178,16 @@ class World:
 
     def drives(self) -> Floats:
         """Angles of all driven joints, in the order of `command` [rad], shape (n,)."""
-        return self._qpos[self._driven]
+        return self._qpos[self.places.driven]
 
     def place_drives(self, angles: Floats) -> None:
         """Put all driven joints at angles [rad], shape (n,), without physics."""
-        self._qpos[self._driven] = angles
+        self._qpos[self.places.driven] = angles
         mujoco.mj_forward(self.model, self.data)
 
     def drive_speeds(self) -> Floats:
         """Speeds of all driven joints [rad/s], shape (n,)."""
-        return self._qvel[self._turning]
+        return self._qvel[self.places.turning]
 
     def drive_torques(self) -> Floats:
         """Torques of all actuators, without what their joints' damping takes [N·m], shape (n,)."""
@@ -216,7 +202,7 @@ class World:
         before = self.data.time
         self._steps += count
         try:
-            self._gears.step(self.data, count)
+            self.gears.step(self.data, count)
         except mujoco.FatalError as error:
             raise SimulationError(self._steps, str(error).splitlines()[0]) from error
         self._check(before)
@@ -226,12 +212,12 @@ class World:
         bent, speed = self._bent, self._qvel
         self._qpos.take(self._bounded, out=bent, mode="clip")
         sound = (
-            abs(x) < _DISTANCE_LIMIT
-            and abs(y) < _DISTANCE_LIMIT
-            and 0.0 < height < _HEIGHT_LIMIT
+            abs(x) < DISTANCE_LIMIT
+            and abs(y) < DISTANCE_LIMIT
+            and 0.0 < height < HEIGHT_LIMIT
             and self.data.time > before
-            and bent.dot(bent) < _ANGLE_LIMIT**2  # no entry is larger than the norm
-            and speed.dot(speed) < _SPEED_LIMIT**2
+            and bent.dot(bent) < ANGLE_LIMIT**2  # no entry is larger than the norm
+            and speed.dot(speed) < SPEED_LIMIT**2
             and self._warnings.tobytes() == self._no_warning
         )
         if not sound:
@@ -241,19 +227,13 @@ class World:
         """Look closely at a state that may be unsound."""
         data = self.data
         warned = [n for n, count in zip(_WARNINGS, data.warning.number, strict=True) if count]
-        far, height = float(abs(self.head[:2]).max()), float(self.head[2])
-        angle, speed = (float(abs(v).max()) for v in (data.qpos[self._bounded], data.qvel))
         checks = (
-            (not warned, f"engine warning {', '.join(warned)}"),
-            (far < _DISTANCE_LIMIT, f"the head is {far:.3g} m away"),
-            (angle < _ANGLE_LIMIT, f"a joint is at {angle:.3g} rad"),
-            (data.time > before, f"time stood still at {data.time:.6g} s"),
-            (speed < _SPEED_LIMIT, f"a coordinate moves at {speed:.3g} m/s or rad/s"),
-            (0.0 < height < _HEIGHT_LIMIT, f"the head is at a height of {height:.3g} m"),
+            f"engine warning {', '.join(warned)}" if warned else "",
+            broken(self.head, data.qpos[self._bounded], data.qvel),
+            "" if data.time > before else f"time stood still at {data.time:.6g} s",
         )
-        for sound, found in checks:
-            if not sound:
-                raise SimulationError(self._steps, found)
+        for found in filter(None, checks):
+            raise SimulationError(self._steps, found)
 
     def read_hinges(self, angles: Floats) -> None:
         """Write the angles of all hinges under the flex sensors to `angles` [rad], shape (2, n)."""
@@ -267,17 +247,22 @@ class World:
 
     def links(self) -> Floats:
         """Plan positions of the links, head first [m], shape (L, 2)."""
-        return self.data.xpos[self._links, :2]
+        return self.data.xpos[self.places.links, :2]
 
     def outlines(self) -> tuple[list[Floats], list[Floats]]:
         """Polygons of all obstacles in plan [m], each (n, 2): those fixed, those that can move."""
-        solid = np.flatnonzero(self._obstacle & (self.model.geom_type != _PLANE))
+        solid = np.flatnonzero(self.places.obstacles & (self.model.geom_type != _PLANE))
         fixed = self.model.body_weldid[self.model.geom_bodyid[solid]] == 0
         polygons = [outline(self.model, self.data, geom) for geom in solid.tolist()]
         return (
             [polygon for polygon, still in zip(polygons, fixed, strict=True) if still],
             [polygon for polygon, still in zip(polygons, fixed, strict=True) if not still],
         )
+
+    def parts(self) -> list[Floats]:
+        """Polygons of all parts of the robot in plan [m], each (n, 2), legs and antennae too."""
+        own = np.flatnonzero(self.places.own)
+        return [outline(self.model, self.data, geom) for geom in own.tolist()]
 
     def obstacle_overlap(self) -> float:
         """How deep the robot is in obstacles at most [m]; 0 if it touches none."""
@@ -298,7 +283,7 @@ class World:
         contact = self.data.contact
         found = np.flatnonzero(self._on_obstacles() & (contact.efc_address >= 0))
         geoms = contact.geom[found]
-        ours = np.where(self._robot[geoms[:, 0]], geoms[:, 0], geoms[:, 1])
+        ours = np.where(self.places.own[geoms[:, 0]], geoms[:, 0], geoms[:, 1])
         names = [
             self.model.body(self.model.geom_bodyid[geom]).name.removeprefix(PREFIX)
             for geom in ours.tolist()
@@ -308,12 +293,12 @@ class World:
     def _on_obstacles(self) -> Bools:
         """Contacts between the robot and an obstacle, shape (contacts,)."""
         geoms = self.data.contact.geom
-        kind = self._obstacle[geoms]
-        return (kind[:, 0] != kind[:, 1]) & self._robot[geoms].any(axis=1)
+        kind = self.places.obstacles[geoms]
+        return (kind[:, 0] != kind[:, 1]) & self.places.own[geoms].any(axis=1)
 
     def set_leg_friction(self, friction: Floats) -> None:
         """Give every leg its own sliding friction, shape (2 L,)."""
-        self.model.geom_friction[self._leg_geoms, 0] = friction
+        self.model.geom_friction[self.places.leg_geoms, 0] = friction
 
 
 _WARNINGS = tuple(name.removeprefix("mjWARN_") for name in list(mujoco.mjtWarning.__members__)[:-1])

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from antennate.telemetry.film import Film
+    from antennate.telemetry.view.simulation import SimulationView
 
 OnStep = Callable[[int, int], None]
 """Takes how many of how many parts are done."""
@@ -49,7 +50,27 @@ class Outcome(Protocol):
 
 
 Config = TypeVar("Config", bound=Params)
+Trial = tuple[str, int]
+"""A condition, such as a controller or a profile, and the number of a trial."""
 Found = TypeVar("Found", bound=Outcome)
+
+
+@dataclass(frozen=True)
+class Trials(Generic[Config]):
+    """Trials that can be run one by one, in any order, by any process.
+
+    Attributes:
+        condition: Column of a row that tells its condition.
+        every: every(config): all of them, in the order of the table.
+        run: run(config, trials, emit): runs some, and emits the index and the row of each as it
+            ends. The row depends on the configuration and the trial alone.
+        most: How many may be run at once.
+    """
+
+    condition: str
+    every: Callable[[Config], Sequence[Trial]]
+    run: Callable[[Config, Sequence[Trial], Callable[[int, Any], None]], None]
+    most: int = 1
 
 
 @dataclass(frozen=True)
@@ -71,9 +92,14 @@ class Experiment(Generic[Config, Found]):
         parts: What `on_step` counts.
         logged: Runs as `run` does and keeps the log of each trial in a folder, which is given as
             well; None if there are no controllers to log.
+        viewed: viewed(config, on_step, on_row, view, logs) runs as `run` does, in this process, and
+            shows each trial on a page; the folder for logs may be None. None where nothing can be
+            shown.
         films: films(config, trial) -> for each condition, by name, what runs this trial of it once
             more and records it; None where nothing can be filmed.
         body: HTML that stands in its report in place of tables and figures.
+        trials: Its trials one by one, for studies; without them a study runs it as a whole.
+        continued: Whether its folder is continued without being asked, and keeps its trials.
     """
 
     name: str
@@ -88,8 +114,11 @@ class Experiment(Generic[Config, Found]):
     failed: Callable[[Mapping[str, Any]], bool] = lambda result: False
     parts: str = "trials"
     logged: Callable[[Config, int, OnStep, OnRow, Path], Found] | None = None
+    viewed: Callable[[Config, OnStep, OnRow, SimulationView, Path | None], Found] | None = None
     films: Callable[[Config, int], Mapping[str, Callable[[], Film]]] | None = None
     body: Body | None = None
+    trials: Trials[Config] | None = None
+    continued: bool = False
 
     @property
     def view(self) -> View:

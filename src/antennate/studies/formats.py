@@ -10,6 +10,8 @@ import re
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
+from pydantic import BaseModel
+
 from antennate.params.base import Params, meaning
 
 _CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f]+")
@@ -102,6 +104,11 @@ def _lines(group: Params, path: tuple[str, ...]) -> Iterator[str]:
 
 
 def _toml(value: Any) -> str:
-    if isinstance(value, tuple):
+    if isinstance(value, tuple | list):
         return f"[{', '.join(_toml(item) for item in value)}]"
+    if isinstance(value, BaseModel):
+        value = value.model_dump(exclude_defaults=True)
+    if isinstance(value, Mapping):
+        items = (f"{json.dumps(key)} = {_toml(item)}" for key, item in value.items())
+        return f"{{{', '.join(items)}}}"
     return json.dumps(value) if isinstance(value, str | bool) else repr(value)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -106,6 +107,34 @@ def successes(summaries: Mapping[str, Mapping[str, Any]]) -> str:
         f"{name} {row['successes']} of {row['trials'] - row['invalid']} ({shown(row['wilson95'])})"
         for name, row in summaries.items()
     )
+
+
+class Interim:
+    """How the trials that have ended came out, while others run."""
+
+    def __init__(self) -> None:
+        self._counts: dict[str, Counter[str]] = {}
+
+    def add(self, row: Any) -> None:
+        """Count a row: a dataclass or a mapping with a condition and an outcome."""
+        columns = row if isinstance(row, Mapping) else asdict(row)
+        outcome = columns.get("outcome") or columns.get("status")
+        if outcome is not None:
+            condition = next((str(columns[c]) for c in _CONDITIONS if c in columns), "trials")
+            self._counts.setdefault(condition, Counter())[str(outcome)] += 1
+
+    def table(self) -> Table | None:
+        """A line for each condition; None without any."""
+        outcomes = sorted({outcome for counts in self._counts.values() for outcome in counts})
+        rows = [
+            (name, [str(counts[outcome]) for outcome in outcomes])
+            for name, counts in sorted(self._counts.items())
+        ]
+        return Table("So far", outcomes, rows) if rows else None
+
+
+_CONDITIONS = ("controller", "profile")
+"""Columns that tell a condition."""
 
 
 @dataclass(frozen=True, slots=True)

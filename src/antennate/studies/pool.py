@@ -1,41 +1,38 @@
-"""Tasks over processes: each result at once, and nothing lost when somebody presses Ctrl-C.
+"""Run tasks on workers: what was finished before is taken from the store, the rest is run.
 
-A task gives each result to `emit`; it is sent to the parent at once, beside the executor,
-which returns a task's value only at its end. Processes are started fresh (spawn) and leave Ctrl-C
-to the parent. One worker means this process, without any start-up cost. Results come in no
-particular order; sort them.
+One worker means this process, without any start-up cost. Nothing that was finished is lost when
+somebody presses Ctrl-C, or when a worker or this process is killed.
 """
 
 from __future__ import annotations
 
-import contextlib
-import multiprocessing
+import itertools
 import os
-import pickle
-import queue
-import signal
-import threading
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor
-from concurrent.futures.process import BrokenProcessPool
 from typing import Any, TypeVar
 
-from antennate.errors import WorkerError, in_one_line
-from antennate.lookup import ADDED, NotSent
+from antennate.errors import WorkerError
+from antennate.studies.codec import decoded, encoded
+from antennate.studies.processes import Processes
+from antennate.studies.store import Store
+from antennate.studies.work import Engine, Failure, Here, Work
 
-Task = TypeVar("Task")
 Result = TypeVar("Result")
-Emit = Callable[[Any], None]
-"""Takes one result."""
+TIMEOUT = 3600.0
+"""Time after which a trial that has not ended is given up, unless told otherwise [s]."""
 
-_GUARD = (
-    '; a script that uses several workers needs `if __name__ == "__main__":` around what it runs'
-)
-"""What a worker that ended with code 1 most often lacks: it raised while it imported the script."""
-_POLL = 0.1
-"""How often the parent looks for finished tasks while it waits for results [s]."""
-_results: Any = None
-"""In a worker: the queue to the parent."""
+
+class ShardEnd(Exception):
+    """All tasks of a shard are finished; another command puts the shards together.
+
+    Attributes:
+        count: How many those are.
+        total: How many tasks there are in all shards.
+    """
+
+    def __init__(self, count: int, total: int) -> None:
+        super().__init__(count, total)
+        self.count, self.total = count, total
 
 
 def core_count() -> int:
@@ -45,174 +42,169 @@ def core_count() -> int:
     return os.cpu_count() or 1
 
 
-def run_tasks(
-    function: Callable[[Task, Emit], None],
-    tasks: Sequence[Task],
-    workers: int,
-    on_result: Emit,
-) -> None:
-    """Run function(task, emit) for every task.
+class Workers(int):
+    """How many workers there are, where they are, and what they have finished before.
+
+    It is a number, so that an experiment of another package may use it as one.
 
     Args:
-        function: A module-level function.
-        tasks: Its first arguments, picklable.
-        workers: Number of processes; 1 runs in this one.
-        on_result: Called in this process with everything that was emitted.
-
-    Raises:
-        WorkerError: A worker died, or the function raised there.
-        KeyboardInterrupt: After the results that had arrived by then were given to `on_result`.
+        count: How many.
+        engine: Where they are; processes of this machine if not given.
+        store: Where finished tasks are kept, None to keep none.
+        shard: (i, n): carry out the i-th of n parts of the tasks, from 1, and raise ShardEnd.
+        timeout: Time after which a task that has not ended is given up [s].
+        retry: Whether tasks that failed before are run again.
+        closed: Whether all tasks must have been finished before.
+        apart: Whether even one worker is a process of its own, which may crash or be killed.
     """
-    if workers == 1 or len(tasks) <= 1:
-        for task in tasks:
-            function(task, on_result)
-    else:
-        _run_in_processes(function, tasks, min(workers, len(tasks)), on_result)
+
+    def __new__(
+        cls,
+        count: int,
+        engine: Engine | None = None,
+        store: Store | None = None,
+        shard: tuple[int, int] | None = None,
+        timeout: float = TIMEOUT,
+        retry: bool = False,
+        closed: bool = False,
+        apart: bool = False,
+    ) -> Workers:
+        """As the class says."""
+        self = super().__new__(cls, count)
+        self._engine, self.store, self.shard, self.timeout = engine, store, shard, timeout
+        self.retry, self.closed, self.apart = retry, closed, apart
+        self.calls = itertools.count()
+        return self
+
+    _engine: Engine | None
+    store: Store | None
+    shard: tuple[int, int] | None
+    timeout: float
+    retry: bool
+    closed: bool
+    apart: bool
+    calls: Iterator[int]
+
+    def engine(self, parts: int) -> Engine:
+        """Where so many parts are carried out."""
+        if self._engine is not None:
+            return self._engine
+        return Here() if not self.apart and (self == 1 or parts <= 1) else Processes()
+
+    def mine(self, place: int) -> bool:
+        """Whether a task belongs to this shard."""
+        return self.shard is None or place % self.shard[1] == self.shard[0] - 1
 
 
-def _run_in_processes(
-    function: Callable[[Task, Emit], None], tasks: Sequence[Task], count: int, on_result: Emit
-) -> None:
-    if isinstance(checked := _sendable(tasks), NotSent):
-        raise WorkerError(checked.reason)
-    added = {
-        group: {name: _sendable(each) for name, each in objects.items()}
-        for group, objects in ADDED.items()
-    }
-    context = multiprocessing.get_context("spawn")
-    results = context.Queue()
-    others = set(multiprocessing.active_children())
-    pool = ProcessPoolExecutor(count, context, initializer=_begin, initargs=(results, added))
-    with _deaf():
-        futures = [pool.submit(_work, function, task) for task in tasks]
-    crew = set(multiprocessing.active_children()) - others
-    try:
-        _collect(futures, results, on_result)
-    except BrokenProcessPool:
-        pool.shutdown()  # its thread waits for the processes too: codes are known after that
-        codes = [p.exitcode for p in crew if p.exitcode not in (None, 0, -signal.SIGTERM)]
-        raise WorkerError(
-            f"a worker process ended with code {codes[0] if codes else 'unknown'} in the middle of "
-            f"its work{_GUARD if codes[:1] == [1] else ''}"
-        ) from None
-    except KeyboardInterrupt:
-        with contextlib.suppress(queue.Empty):
-            while True:
-                on_result(pickle.loads(results.get(timeout=_POLL)))  # noqa: S301  (as below)
-        raise
-    finally:
-        if any(not future.done() for future in futures):
-            for process in crew:
-                process.terminate()
-        pool.shutdown(cancel_futures=True)
+class _Call:
+    """One call of `gather`: what is finished, by place, and how it is kept."""
+
+    def __init__(
+        self,
+        crew: Workers,
+        total: int,
+        package: str,
+        take: Callable[[Any], None],
+        on_step: Callable[[int, int], None],
+        lost: Callable[[int, Failure], Any] | None,
+    ) -> None:
+        self._crew, self._number, self._total = crew, next(crew.calls), total
+        self._packages = {"antennate", package}
+        self._take, self._on_step, self._lost = take, on_step, lost
+        self.found: dict[int, Any] = {}
+
+    def emit(self, place: int, result: Any) -> None:
+        """Keep a result."""
+        if self._crew.store is not None:
+            self._crew.store.append(f"{self._number}.{place}", {"result": encoded(result)})
+        self._finish(place, result)
+
+    def fail(self, place: int, failure: Failure) -> None:
+        """Keep a failure, if there is a result that stands for it."""
+        if self._lost is None:
+            raise failure.error or WorkerError(_in_words(failure))
+        result = self._lost(place, failure)
+        if self._crew.store is not None:
+            content = {"failure": [failure.status, failure.reason]}
+            self._crew.store.append(f"{self._number}.{place}", content)
+        self._finish(place, result)
+
+    def _finish(self, place: int, result: Any) -> None:
+        self.found[place] = result
+        self._take(result)
+        self._on_step(len(self.found), self._total)
+
+    def resume(self) -> None:
+        """Take what was finished before."""
+        records = self._crew.store.records if self._crew.store is not None else {}
+        for place in range(self._total) if records else ():
+            record = records.pop(f"{self._number}.{place}", None)
+            if record is None:
+                continue
+            if "failure" in record:
+                if self._lost is None or self._crew.retry:
+                    continue
+                result = self._lost(place, Failure(*record["failure"]))
+            else:
+                try:
+                    result = decoded(record["result"], self._packages)
+                except ValueError:
+                    continue  # of a class that is no more: it is run again
+            self.found[place] = result
+            self._take(result)
+        if self.found:
+            self._on_step(len(self.found), self._total)
 
 
 def gather(
-    function: Callable[..., Result],
+    function: Callable[..., Any],
     tasks: Sequence[tuple[Any, ...]],
     workers: int,
     on_step: Callable[[int, int], None],
-    on_result: Callable[[Result], None] = lambda result: None,
+    on_result: Callable[[Any], None] = lambda result: None,
     chunk: int = 1,
-) -> list[Result]:
+    together: bool = False,
+    lost: Callable[[int, Failure], Any] | None = None,
+    batched: Callable[..., Any] | None = None,
+) -> list[Any]:
     """What function(*task) returns for every task, in the order of the tasks.
 
     Args:
-        function: A module-level function.
+        function: A module-level function; see `Work`.
         tasks: Its arguments, picklable.
-        workers: As above.
+        workers: How many, or `Workers`.
         on_step: Called after each with how many of how many tasks are done.
         on_result: Called with each result as it comes, in no particular order.
-        chunk: Tasks given to a process at once.
+        chunk: Tasks given to a worker at once.
+        together: Whether the function takes a chunk at once, and emits its results.
+        lost: lost(place, failure) -> the result of a task that has none; it may raise. Without it
+            the failure is raised.
+        batched: The same for `--engine warp`; see `Work`.
+
+    Raises:
+        WorkerError: A task failed, or its workers died.
+        ShardEnd: All tasks of this shard are finished.
+        KeyboardInterrupt: After the results that had arrived by then were given to `on_result`.
     """
-    found: dict[int, Result] = {}
-
-    def take(item: tuple[int, Result]) -> None:
-        place, result = item
-        found[place] = result
-        on_result(result)
-        on_step(len(found), len(tasks))
-
-    numbered = list(enumerate(tasks))
-    chunks = [(function, numbered[i : i + chunk]) for i in range(0, len(tasks), chunk)]
-    run_tasks(_call, chunks, workers, take)
-    return [found[place] for place in range(len(tasks))]
-
-
-def _call(task: tuple[Callable[..., Any], list[tuple[int, Any]]], emit: Emit) -> None:
-    function, numbered = task
-    for place, arguments in numbered:
-        emit((place, function(*arguments)))
-
-
-def _collect(futures: Sequence[Future[int]], results: Any, on_result: Emit) -> None:
-    """Hand on results until all tasks have ended and all that they emitted has arrived."""
-    waiting, expected, received = set(futures), 0, 0
-    while waiting or received < expected:
-        with contextlib.suppress(queue.Empty):
-            on_result(pickle.loads(results.get(timeout=_POLL)))  # noqa: S301  (our own worker's)
-            received += 1
-        done = {future for future in waiting if future.done()}
-        waiting -= done
-        for future in done:
-            expected += future.result()
-
-
-@contextlib.contextmanager
-def _deaf() -> Iterator[None]:
-    """Start workers deaf to Ctrl-C, which they inherit, so that none dies half begun."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, before)
-
-
-def _sendable(each: Any) -> Any:
-    """The same object if it can be sent to a worker, else what says why not."""
-    try:
-        pickle.dumps(each)
-    except Exception as error:  # noqa: BLE001  (an object's own code may raise anything)
-        return NotSent(
-            f"expected what can be sent to workers, found {in_one_line(error)}; an object of "
-            "your own has to be defined at the top of a module, or run with one worker"
+    crew = workers if isinstance(workers, Workers) else Workers(workers)
+    package = function.__module__.partition(".")[0]
+    call = _Call(crew, len(tasks), package, on_result, on_step, lost)
+    call.resume()
+    todo = [place for place in range(len(tasks)) if place not in call.found and crew.mine(place)]
+    if todo and crew.closed:
+        raise WorkerError(
+            f"expected {len(tasks)} finished trials, found {len(call.found)}: a shard is missing"
         )
-    return each
+    parts = [todo[i : i + chunk] for i in range(0, len(todo), chunk)]
+    if parts:
+        folder = None if crew.store is None else crew.store.path.parent
+        work = Work(function, tasks, together, crew.timeout, folder, batched)
+        crew.engine(len(parts)).run(work, parts, int(crew), call.emit, call.fail)
+    if crew.shard is not None:
+        raise ShardEnd(sum(map(crew.mine, call.found)), len(tasks))
+    return [call.found[place] for place in range(len(tasks))]
 
 
-def _begin(results: Any, added: dict[str, dict[str, Any]]) -> None:
-    global _results
-    _results = results
-    for group, objects in added.items():
-        ADDED.setdefault(group, {}).update(objects)
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    threading.Thread(target=_end_with_parent, daemon=True).start()
-
-
-def _end_with_parent() -> None:
-    """End this worker once its parent is gone, also if that was killed."""
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        parent.join()
-        os._exit(1)
-
-
-def _work(function: Callable[[Any, Emit], None], task: Any) -> int:
-    """Run one task in a worker; how many results it emitted."""
-    count = 0
-
-    def emit(result: Any) -> None:
-        nonlocal count
-        count += 1
-        _results.put(pickle.dumps(result))  # here, so that what cannot be pickled is an error
-
-    try:
-        function(task, emit)
-    except WorkerError:
-        raise
-    except Exception as error:  # noqa: BLE001  (whatever it is, the parent must hear of it)
-        raise WorkerError(f"a worker failed: {type(error).__name__}: {error}") from None
-    return count
+def _in_words(failure: Failure) -> str:
+    """A failure as the reason why a run ends."""
+    return failure.reason if failure.status != "failed" else f"a worker failed: {failure.reason}"

@@ -20,6 +20,7 @@ from antennate.studies import page
 from antennate.studies.formats import to_toml
 from antennate.studies.measures import NONE, Table
 from antennate.studies.run_directory import (
+    BY_HAND,
     COMMAND,
     CONFIG,
     FIGURES,
@@ -97,6 +98,7 @@ def report(run: RunDirectory, view: View) -> str:
     parts.append(page.paragraphs(view.about.split("\n\n")[0], "muted"))
     parts.append(page.paragraphs(_sentence(run, result, view)))
     parts.append(page.block(_command(run, view), wrap=True))
+    parts.append(page.block(run.text(BY_HAND), wrap=True))
     films = "".join(page.captioned(film, name) for name, film in _films(run).items())
     parts.append(f'<div class="pair">{films}</div>' if films else "")
     if result is not None:

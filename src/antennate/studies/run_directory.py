@@ -1,9 +1,10 @@
 """The run directory: everything about one run in one place, and nothing half written.
 
 Files are written whole. While a run goes on, finished trials are appended to
-`trials.partial.jsonl`. A directory that holds a run is left alone unless told otherwise; then the
-files of that run go first, so that nothing old stands beside the new. Only a calibration stays
-until the next one replaces it, so that a robot is never without.
+`trials.partial.jsonl`, and what a run needs to be resumed to `trials.store.jsonl`. A directory that
+holds a run is left alone unless told otherwise; then the files of that run go first, so that
+nothing old stands beside the new. Only a calibration stays until the next one replaces it, so that
+a robot is never without.
 
 ```python
 with RunDirectory.create("tunnel", "runs/mine") as run:
@@ -30,19 +31,25 @@ from antennate.files import decoded, read_limited, write_whole
 from antennate.params.base import Params
 from antennate.params.reading import Config, read_file
 from antennate.studies.formats import from_csv, strict, to_csv, to_json, to_toml
+from antennate.studies.store import STORE, Store
 from antennate.telemetry.header import versions
 from antennate.telemetry.parts import MOST_PARTS, part
 
 RESULT, TABLE, PARTIAL = "result.json", "trials.csv", "trials.partial.jsonl"
+SHARD = "shard.json"
+"""File of a shard whose trials are all finished."""
 CONFIG, VERSIONS, COMMAND = "config.toml", "versions.json", "command.txt"
 FIGURES, FILMS, LOGS = "figures", "films", "logs"
 """Folders of figures (svg, png), films (mp4) and logs of trials (mcap), which belong to the run."""
 _INNER = {FIGURES: (".svg", ".png"), FILMS: (".mp4",), LOGS: (".mcap",)}
+BY_HAND = "by-hand.txt"
+"""What a person changed while the run went on: it does not follow from its configuration then."""
 CALIBRATION, LOG, REPORT = "calibration.json", "drive.mcap", "report.html"
 LARGEST = 10**9
 """No file of a run is longer [bytes]."""
 _LOGS = tuple(part(Path(LOG), number).name for number in range(1, MOST_PARTS + 1))
 _FILES = (
+    BY_HAND,
     CALIBRATION,
     "conditioning.toml",
     "recording.csv",
@@ -57,7 +64,7 @@ ROOM = ".room"
 """File that keeps room for the result."""
 _KEPT_FREE = 1 << 16
 """Its size [bytes]: eight times the result of a drive."""
-_NAMES = (RESULT, PARTIAL, TABLE, CONFIG, VERSIONS, COMMAND, ROOM, *_FILES)
+_NAMES = (RESULT, PARTIAL, STORE, SHARD, TABLE, CONFIG, VERSIONS, COMMAND, ROOM, *_FILES)
 """Every file that a run may write beside its figures."""
 
 
@@ -66,17 +73,30 @@ class RunDirectory:
 
     Attributes:
         path: Where it is.
+        store: Its finished trials if it can be resumed, None otherwise.
+        keeps_store: Whether they stay when the run is complete.
     """
 
-    def __init__(self, path: Path, created: Sequence[Path] = (), partial: IO[str] | None = None):
-        self.path = path
+    def __init__(
+        self,
+        path: Path,
+        created: Sequence[Path] = (),
+        partial: IO[str] | None = None,
+        store: Store | None = None,
+    ):
+        self.path, self.store, self.keeps_store = path, store, False
         self._created = created
         self._partial = partial
         self._kept = partial is None
 
     @classmethod
     def create(
-        cls, command: str, path: str | Path | None = None, overwrite: bool = False
+        cls,
+        command: str,
+        path: str | Path | None = None,
+        overwrite: bool = False,
+        identity: Mapping[str, Any] | None = None,
+        resume: bool = False,
     ) -> RunDirectory:
         """Claim a directory for a run of `command`.
 
@@ -84,9 +104,13 @@ class RunDirectory:
             command: Name of the experiment or command.
             path: The directory; the next free `runs/COMMAND-N` if not given.
             overwrite: Remove the run that it holds.
+            identity: What is run, by `antennate.studies.identity`, for a run that can be resumed.
+            resume: Go on with the run that it holds, if there is one.
 
         Raises:
-            OutputError: It cannot be made or written to, or it holds another run.
+            BadInputError: The run that is to go on is another one.
+            OutputError: It cannot be made or written to, it holds another run, or another process
+                works on it.
         """
         if path == "":
             raise OutputError("expected the name of a folder, found an empty one")
@@ -98,15 +122,25 @@ class RunDirectory:
                 if (place / folder).is_symlink():
                     raise OutputError(f"expected {place / folder} within its run, found a link")
             held = _held(place)
-            if held and not overwrite:
+            goes_on = resume and not overwrite and (place / STORE) in held
+            if held and not overwrite and not goes_on:
+                found = "a finished one" if resume else held[0]
                 raise OutputError(
-                    f"expected a folder without a run, found {held[0]}; "
-                    "choose another or give --overwrite"
+                    f"expected {'an unfinished run' if resume else 'a folder without a run'}, "
+                    f"found {found}; choose another or give --overwrite"
+                    + (" or --resume" if place / STORE in held and not resume else "")
                 )
+            try:
+                store = _store(place, identity, overwrite)
+            except BaseException:
+                for path in missing:
+                    path.rmdir()
+                raise
             for file in held:
-                if (command, file.name) != ("calibrate", CALIBRATION):
+                kept = (LOGS in file.parts and goes_on) or file.name == STORE
+                if not kept and (command, file.name) != ("calibrate", CALIBRATION):
                     file.unlink()
-            return cls(place, missing, (place / PARTIAL).open("x", encoding="utf-8"))
+            return cls(place, missing, (place / PARTIAL).open("x", encoding="utf-8"), store)
 
     @classmethod
     def open(cls, path: str | Path) -> RunDirectory:
@@ -205,6 +239,14 @@ class RunDirectory:
         self.write(RESULT, to_json(result))
         self._kept = True
         self._drop_partial()
+        if not result.get("interrupted"):
+            self._close_store(remove=not self.keeps_store)
+
+    def discard(self) -> None:
+        """Let nothing that was kept so far stay when the run ends."""
+        self._kept = False
+        if self.store is not None:
+            self.store.holds_trials = False
 
     def write(self, name: str, content: str | bytes) -> None:
         """Put one file into the directory, whole or not at all.
@@ -243,6 +285,11 @@ class RunDirectory:
             self._partial.close()
             (self.path / PARTIAL).unlink(missing_ok=True)
 
+    def _close_store(self, remove: bool = False) -> None:
+        if self.store is not None:
+            self.store.close(remove)
+            self.store = None
+
     def _give_room(self) -> None:
         with _writing(self.path / ROOM):
             (self.path / ROOM).unlink(missing_ok=True)
@@ -251,7 +298,9 @@ class RunDirectory:
         return self
 
     def __exit__(self, *_: object) -> None:
-        if self._kept:
+        kept = self._kept or (self.store is not None and self.store.holds_trials)
+        self._close_store(remove=not kept)
+        if kept:
             if self._partial is not None:
                 with contextlib.suppress(OSError):
                     self._partial.close()
@@ -263,6 +312,22 @@ class RunDirectory:
                 (self.path / name).unlink(missing_ok=True)
             for path in self._created:
                 path.rmdir()
+
+
+def _store(place: Path, identity: Mapping[str, Any] | None, overwrite: bool) -> Store | None:
+    """The finished trials of a run that can be resumed; nobody else may work on them."""
+    if identity is None:
+        (place / STORE).unlink(missing_ok=True)
+        return None
+    store = Store(place / STORE)
+    try:
+        if overwrite:
+            store.clear()
+        store.begin(identity)
+    except BaseException:
+        store.close(remove=store.identity is None)
+        raise
+    return store
 
 
 def _held(place: Path) -> list[Path]:

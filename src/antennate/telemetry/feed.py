@@ -66,6 +66,7 @@ class Feed:
             them. Signals of the terminal do not reach it.
         first: The content of the first message, of any length.
         restarts: How many processes may follow the first.
+        files: Open files that each process gets, beside its standard streams.
 
     Attributes:
         offered: Ticks that were to be sent.
@@ -79,8 +80,9 @@ class Feed:
         words: Callable[[int], Sequence[str]],
         first: bytes,
         restarts: int = RESTARTS,
+        files: Sequence[int] = (),
     ) -> None:
-        self._words, self._first = words, first
+        self._words, self._first, self._files = words, first, files
         self._most = 1 + restarts
         self._process: subprocess.Popen[bytes] | None = None
         self._pipe = -1
@@ -205,6 +207,7 @@ class Feed:
                 self._words(self.started),
                 stdin=theirs,
                 stdout=subprocess.PIPE,
+                pass_fds=self._files,
                 process_group=0,  # Ctrl-C in the terminal is for the loop alone
             )
         finally:

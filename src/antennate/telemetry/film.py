@@ -14,11 +14,11 @@ from typing import Any
 
 import numpy as np
 
+from antennate.colours import MANEUVER_COLOURS, MANEUVER_NAMES, SERIES, rgba
 from antennate.errors import BadInputError, MissingPackageError
-from antennate.figures import MANEUVER_COLOURS, MANEUVER_NAMES, SERIES
 from antennate.robots.antenna import AntennaSpec
 from antennate.sim import gl
-from antennate.sim.camera import Camera, Colour, Picture, Shot
+from antennate.sim.camera import Camera, Picture, Shot
 from antennate.telemetry.strip import Band, Strip, Trace
 from antennate.types import Contact, Floats, Ints, Maneuver
 
@@ -200,16 +200,11 @@ def pictures(film: Film, width: int = WIDTH, height: int = HEIGHT) -> Iterator[P
         AntennateError: Nothing here can draw.
     """
     strip = Strip(film.title, film.t, film.traces, film.bands, width, STRIP)
-    sides = (_colour(SERIES[0]), _colour(SERIES[1]))
+    sides = (rgba(SERIES[0]), rgba(SERIES[1]))
     with Camera(film.model, film.shot, (width, height), sides) as camera:
         for i, (position, target) in enumerate(zip(film.positions, film.targets, strict=True)):
             view = camera.picture(position, target)
             yield np.concatenate([view, np.asarray(strip.picture(i))])
-
-
-def _colour(text: str) -> Colour:
-    red, green, blue = (int(text[i : i + 2], 16) / 255 for i in (1, 3, 5))
-    return red, green, blue, 1.0
 
 
 def encoded(film: Film, on_step: Callable[[int, int], None] = lambda done, total: None) -> bytes:

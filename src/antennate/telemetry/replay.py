@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -173,13 +173,23 @@ class Replayed:
             self.first = self.first or Difference(tick.number, tick.now, tick.maneuver, maneuver)
 
 
-def replay(ticks: Iterable[Tick], controller: Controller, header: Header) -> Replayed:
+def _unseen(tick: Tick, decision: Decision) -> None:
+    """Show nothing."""
+
+
+def replay(
+    ticks: Iterable[Tick],
+    controller: Controller,
+    header: Header,
+    on_tick: Callable[[Tick, Decision], None] = _unseen,
+) -> Replayed:
     """Let a controller that has just begun decide upon all ticks of a log.
 
     Args:
         ticks: The log, in order.
         controller: The controller.
         header: The header of the log: its period and its robot.
+        on_tick: Called with each tick and what was decided now.
     """
     log, found = ReplayRobot(ticks), Replayed()
     control = _Guarded(controller, log, header.robot)
@@ -187,6 +197,7 @@ def replay(ticks: Iterable[Tick], controller: Controller, header: Header) -> Rep
     def go_on(frame: AntennaFrame, command: JointCommand) -> bool:
         if log.tick is not None:
             found.note(log.tick, control.decision.maneuver, command)
+            on_tick(log.tick, control.decision)
         return log.more
 
     if log.tick is not None:

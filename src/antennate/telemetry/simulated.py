@@ -18,6 +18,7 @@ from antennate.telemetry.header import Header
 from antennate.telemetry.topics import (
     ANTENNA,
     CONTACT_FORCES,
+    COORDINATES,
     JOINT_COMMANDS,
     JOINT_STATES,
     MANEUVER,
@@ -46,6 +47,9 @@ class SimulatedLog:
         world: The simulated robot in its scene.
         row: Row of the batch.
 
+    Attributes:
+        path: The file.
+
     Raises:
         LogError: The file exists or cannot be written, or the disk is nearly full.
     """
@@ -53,12 +57,14 @@ class SimulatedLog:
     def __init__(
         self, path: Path, header: Header, controller: Any, world: World, row: int = 0
     ) -> None:
+        self.path = path
         self._out = LogWriter(path, header, _LEAST_FREE)
         self._controller, self._world, self._row = controller, world, row
         self._parts = list(header.robot.command_shapes())
         self._names, self._angles = header.robot.joint_names, len(header.robot.joint_names)
         self._held: Floats = np.empty((_MOST, _HEAD + 4 * self._angles))
         self._forces: list[bytes | None] = []
+        self._coordinates: list[bytes | None] = []
         self._count, self._since = 0, math.inf
 
     def take(self, frame: AntennaFrame, command: JointCommand) -> None:
@@ -85,8 +91,19 @@ class SimulatedLog:
         self._count += 1
         looked = (self._out.written + self._count) % _FORCES_EVERY == 0
         self._forces.append(self._contacts() if looked else None)
+        place = COORDINATES.type.encode(*world.coordinates()) if looked else None
+        self._coordinates.append(place)
         if self._count == _MOST or now - self._since >= FLUSH:
             self._hand_over()
+
+    def event(self, text: str) -> None:
+        """Keep what happened after the last tick.
+
+        Raises:
+            LogError: The disk is full or gone.
+        """
+        self._hand_over()
+        self._out.event(text)
 
     def close(self) -> None:
         """End it.
@@ -113,6 +130,7 @@ class SimulatedLog:
         """Encode and write what is held."""
         count, self._count, self._since = self._count, 0, math.inf
         forces, self._forces = self._forces, []
+        coordinates, self._coordinates = self._coordinates, []
         if not count:
             return
         rows = self._held[:count]
@@ -152,5 +170,6 @@ class SimulatedLog:
                     time | dict(zip(("position", "velocity", "effort"), joints[1:], strict=True)),
                 ),
                 CONTACT_FORCES: forces,
+                COORDINATES: coordinates,
             },
         )

@@ -1,7 +1,8 @@
 """The topics of a log and the definitions of their messages, in the words of ROS 2.
 
 Every tick has one message in each of `TICK_TOPICS`, and in others where there is something to say,
-all with the tick's number and time. docs/log.md lists them.
+all with the tick's number and time. docs/topics.md is
+written from here.
 """
 
 from __future__ import annotations
@@ -12,10 +13,11 @@ from antennate.telemetry.cdr import MessageType
 
 
 class Topic(NamedTuple):
-    """A topic: its name and the type of its messages."""
+    """A topic: its name, the type of its messages, and what they say."""
 
     name: str
     type: MessageType
+    meaning: str
 
 
 _ANTENNA = """\
@@ -54,6 +56,10 @@ float64[] x       # where [m]
 float64[] y       # [m]
 float64[] z       # [m]
 float64[] normal  # normal force [N]
+"""
+_COORDINATES = """\
+uint32 robot        # number of the first coordinate of the robot: place, quaternion, joints
+float64[] position  # coordinates of the simulated world, as MuJoCo has them [m, rad]
 """
 _JOINT_STATE = """\
 int32 sec
@@ -110,17 +116,36 @@ def _own(name: str, fields: str) -> MessageType:
 _STATE = MessageType("sensor_msgs/msg/JointState", _JOINT_STATE, _STATE_SCHEMA)
 _STRING = MessageType("std_msgs/msg/String", "string data\n")
 
-ANTENNA = Topic("/antenna", _own("Antenna", _ANTENNA))
-MANEUVER = Topic("/maneuver", _own("Maneuver", _MANEUVER))
-COUNTERS = Topic("/counters", _own("Counters", _COUNTERS))
-SUPERVISOR = Topic("/supervisor", _own("Supervisor", _SUPERVISOR))
-JOINT_COMMANDS = Topic("/joint_commands", _STATE)
-JOINT_STATES = Topic("/joint_states", _STATE)
-CONTACT_FORCES = Topic("/contact_forces", _own("ContactForces", _FORCES))
-EVENTS = Topic("/events", MessageType("rcl_interfaces/msg/Log", _LOG, _LOG_SCHEMA))
-CONFIG = Topic("/config", _STRING)
-CALIBRATION = Topic("/calibration", _STRING)
-VERSIONS = Topic("/versions", _STRING)
+ANTENNA = Topic("/antenna", _own("Antenna", _ANTENNA), "readings, and what was made of them")
+MANEUVER = Topic("/maneuver", _own("Maneuver", _MANEUVER), "what the controller decided")
+COUNTERS = Topic("/counters", _own("Counters", _COUNTERS), "what went wrong so far, on a robot")
+SUPERVISOR = Topic(
+    "/supervisor", _own("Supervisor", _SUPERVISOR), "state of a robot's supervisor, and why"
+)
+JOINT_COMMANDS = Topic("/joint_commands", _STATE, "angles commanded, by names of joints")
+JOINT_STATES = Topic(
+    "/joint_states", _STATE, "angles measured; speed and torque as well in simulation"
+)
+CONTACT_FORCES = Topic(
+    "/contact_forces",
+    _own("ContactForces", _FORCES),
+    "forces of obstacles on the robot, ten times a second, in simulation",
+)
+COORDINATES = Topic(
+    "/coordinates",
+    _own("Coordinates", _COORDINATES),
+    "state of the engine, ten times a second, in simulation, so that the log can be watched",
+)
+EVENTS = Topic(
+    "/events",
+    MessageType("rcl_interfaces/msg/Log", _LOG, _LOG_SCHEMA),
+    "each change of the supervisor's state, and a recovery",
+)
+CONFIG = Topic(
+    "/config", _STRING, "JSON: the controller with all its numbers, the robot, seed and trial"
+)
+CALIBRATION = Topic("/calibration", _STRING, "JSON: the calibration file of each antenna, if any")
+VERSIONS = Topic("/versions", _STRING, "JSON: versions of antennate, Python, NumPy and MuJoCo")
 
 TICK_TOPICS = (ANTENNA, MANEUVER, JOINT_COMMANDS)
 HEADER_TOPICS = (CONFIG, CALIBRATION, VERSIONS)
@@ -132,8 +157,9 @@ TOPICS = (
     JOINT_STATES,
     CONTACT_FORCES,
     EVENTS,
+    COORDINATES,
 )
-"""All, in the order of their channels: the first has id 1."""
+"""All, in the order of their channels: the first has id 1. A new one comes last."""
 
 JOINTS = ("angles", "positions", "velocities", "efforts")
 """Numbers of a tick for each joint: the commanded, then the measured ones, empty if unknown."""

@@ -136,6 +136,12 @@ class LogWriter:
         self._time = max(self._time, stamp)
         self._writer.add_message(self._channels[topic], stamp, data, stamp, number & 0xFFFFFFFF)
 
+    def event(self, text: str, source: str = "antennate") -> None:
+        """Add an event at the time of the last tick."""
+        time = divmod(self._time, 10**9)
+        data = EVENTS.type.encode(*time, _LEVELS["DEGRADED"], source, text, "", "", 0)
+        self.add(EVENTS, self.written, self._time, data)
+
     def settle(self) -> None:
         """Hand over what has waited long enough; to be called where no tick may follow for a while.
 

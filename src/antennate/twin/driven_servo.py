@@ -54,7 +54,7 @@ class DrivenServo(Servo):
 
 def servos_of(robot: RobotSpec) -> list[DrivenServo]:
     """The servos as the robot needs them: of its models, in its operating modes."""
-    kinds = [robot.servos.of(group.servo) for _, group, count in robot.groups for _ in range(count)]
+    kinds = [robot.servos.of(name) for name in robot.servo_names]
     return [
         _servo(servo, kind, robot.modes[servo], robot.baud)
         for servo, kind in zip(robot.ids, kinds, strict=True)

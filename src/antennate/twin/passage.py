@@ -22,11 +22,13 @@ class Passage:
         progress: How far the head has come [m].
         passed: Time of walking at which the head passed the exit [s], inf before.
         on_pass: Called when it does.
+        on_tick: Called with the world after every tick.
     """
 
     def __init__(self, scene: SceneInstance) -> None:
         self._scene = scene
         self.on_pass: Callable[[], None] = lambda: None
+        self.on_tick: Callable[[World], None] = lambda world: None
         self.reset()
 
     def reset(self) -> None:
@@ -37,6 +39,7 @@ class Passage:
 
     def watch(self, world: World) -> None:
         """Look at the world after a tick."""
+        self.on_tick(world)
         self._ticks += 1
         if self._ticks % _EVERY:
             return

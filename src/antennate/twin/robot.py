@@ -88,7 +88,7 @@ class TwinRobot:
         self._watch = watch
         self._joints = Joints(robot)
         self._sign: Floats = np.array(robot.directions, float)
-        kinds = [robot.servos.of(group.servo) for _, group, n in robot.groups for _ in range(n)]
+        kinds = [robot.servos.of(name) for name in robot.servo_names]
         self._stall: Floats = np.array([kind.stall_torque for kind in kinds])
         self._period = period
         self._encoder = frame.SampleEncoder(boot_id)
@@ -180,6 +180,16 @@ class TwinRobot:
         if shafts is not None:
             self._show(shafts)
         self._sample()
+
+    @property
+    def world(self) -> World:
+        """The world that it is in."""
+        return self._body.world(0)
+
+    @property
+    def counts(self) -> Floats:
+        """Readings of the antennae, before faults of wires [counts], shape (2,)."""
+        return self._counts
 
     def next_time(self) -> float:
         """When something happens next without anybody asking [s]."""

@@ -98,12 +98,6 @@ def sentence(result: Mapping[str, Any]) -> str:
     """How well one curve serves all pushes."""
     found = result["calibration"]
     slope = Measure("slope_95", form=".1f").cell(found)
-    warning = (
-        "; look at the figure: perhaps marks and readings do not match, or the flex sensor "
-        "slipped; record again before a robot relies on it"
-        if result["poor"]
-        else ""
-    )
     following = result["assessment"]["new_push"]
     errors = Measure("error_95", form="+.2f").cell(following) if following else ""
     ahead = (
@@ -111,9 +105,28 @@ def sentence(result: Mapping[str, Any]) -> str:
         if following
         else "nothing is known about the next push"
     )
+    pushes = "1 push" if found["trials"] == 1 else f"{found['trials']} pushes"
     return (
-        f"One sigmoid explains R² {found['r2']:.2f} of {found['trials']} pushes, with a slope of "
-        f"{found['slope']:.1f} (95 % interval {slope}); {ahead}{warning}."
+        f"One sigmoid explains R² {found['r2']:.2f} of {pushes}, with a slope of "
+        f"{found['slope']:.1f} (95 % interval {slope}); {ahead}{_warning(result)}."
+    )
+
+
+def _warning(result: Mapping[str, Any]) -> str:
+    """What a poor fit comes from."""
+    if not result["poor"]:
+        return ""
+    if result.get("hysteretic"):
+        known = result["assessment"]["hysteresis"]
+        there, back = known["one_way_r2"]
+        return (
+            f"; the rest is hysteresis, {100 * abs(known['mean']):.0f} % of the span: loading "
+            f"alone fits with R² {there:.2f}, unloading alone with {back:.2f}, and one curve "
+            "cannot follow both"
+        )
+    return (
+        "; look at the figure: perhaps marks and readings do not match, or the flex sensor "
+        "slipped; record again before a robot relies on it"
     )
 
 

@@ -14,7 +14,7 @@ from typing import Literal
 import numpy as np
 
 from antennate.antenna.curves import Samples
-from antennate.csv_files import column, csv_rows, number_of, unit_of
+from antennate.csv_files import LARGEST_WHOLE, column, csv_rows, number_of, unit_of
 from antennate.errors import CalibrationError
 from antennate.files import read_limited
 from antennate.params.base import Params, number
@@ -25,8 +25,8 @@ BEND_UNITS = {"1": 1.0, "rad": 1.0, "deg": math.pi / 180.0, "m": 1.0, "mm": 1e-3
 _LARGEST_BEND = {"1": 1.05, "rad": 2 * math.pi, "deg": 360.0, "m": 1.0, "mm": 1000.0}
 """Beyond these a value was hardly meant in its unit."""
 _LARGEST_FILE = 50_000_000
-_LONGEST_PERIOD = 10.0
-"""Readings lie closer together in time [s]."""
+_LONGEST_PERIOD = 1.0
+"""Readings lie closer together in time [s]; 100 Hz in ms that is declared as s lies 10 s apart."""
 COLUMNS = ("trial", "speed_m_s", "time", "counts", "bend")
 
 
@@ -86,7 +86,7 @@ def read(path: Path, params: RecordingParams, rate: float | None = None) -> Reco
     table = np.array([values for _, values in rows])
     lines = np.array([line for line, _ in rows], dtype=np.int64)
     trial, speed, t, counts, raw = table.T
-    trial = np.where(np.isnan(trial), 0, trial).astype(np.int64)
+    trial = _numbered(path, trial, lines, params.trial_column)
     if rate is None:
         t = t * TIME_UNITS[params.time_unit]
         _check_time(path, t, trial, lines, params)
@@ -96,6 +96,19 @@ def read(path: Path, params: RecordingParams, rate: float | None = None) -> Reco
     bend = _normalised(path, raw, lines, params)
     samples = Samples(counts, bend, trial, speed, lines)
     return Recording(t, samples, hashlib.sha256(data).hexdigest())
+
+
+def _numbered(path: Path, trial: Floats, lines: Ints, name: str) -> Ints:
+    """Numbers of pushes as whole numbers, 0 without such a column, shape (n,)."""
+    whole = np.where(np.isnan(trial), 0.0, trial)
+    bad = (whole != np.round(whole)) | (abs(whole) > LARGEST_WHOLE)
+    if bad.any():
+        i = int(np.argmax(bad))
+        raise CalibrationError(
+            f"{path}: row {lines[i]}: expected a whole number up to {LARGEST_WHOLE:g} in {name}, "
+            f"found {whole[i]:g}; number the pushes 0, 1, 2"
+        )
+    return whole.astype(np.int64)
 
 
 def _counted(trial: Ints) -> Ints:

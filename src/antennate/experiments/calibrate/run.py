@@ -18,7 +18,7 @@ from pydantic import model_validator
 from antennate.antenna import fitting
 from antennate.antenna.calibration import Calibration
 from antennate.antenna.curves import Samples
-from antennate.antenna.next_push import Assessment, assess
+from antennate.antenna.next_push import Assessment, Pushes, assess
 from antennate.antenna.sensor import SensorChain, reading_noise
 from antennate.control.conditioning import bending_level
 from antennate.experiments.calibrate.recording import Recording, RecordingParams, read, write
@@ -123,7 +123,7 @@ class CalibrateOutcome(Outcome):
 
     Attributes:
         config: What was asked.
-        recording: The data, averaged as asked.
+        recording: The data, averaged as asked, with each push as a trial of its own.
         raw: The same before averaging.
         calibration: The curve.
     """
@@ -146,9 +146,15 @@ class CalibrateOutcome(Outcome):
             "seed": self.config.seed,
             "source": "rig" if self.config.recording is None else "recording",
             "poor": self.calibration.r2 < self.config.good_r2,
+            "hysteretic": self._hysteretic(),
             "calibration": self.calibration.model_dump(mode="json"),
             "assessment": asdict(self.assessment),
         }
+
+    def _hysteretic(self) -> bool:
+        """Whether the fit is poor although loading and unloading each are fitted well."""
+        found, good = self.assessment.hysteresis, self.config.good_r2
+        return self.calibration.r2 < good and found is not None and min(found.one_way_r2) >= good
 
     def levels(self) -> Floats:
         """Bending levels that the calibration gives its own data, shape (n,)."""
@@ -243,6 +249,8 @@ def run(
     else:
         raw = read(Path(config.recording), config.columns, config.rate)
     used = averaged(raw, config.averaging_time)
+    pushes = Pushes.of(used.samples)
+    used = replace(used, samples=replace(used.samples, trial=pushes.number))
     found = fitting.fit(
         used.samples,
         config.sensor_id or ("unnamed" if config.recording else "simulated"),

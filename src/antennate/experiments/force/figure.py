@@ -87,8 +87,9 @@ def _draw_ranges(panel: Axes, result: Mapping[str, Any]) -> None:
 
 def _draw_shares(panel: Axes, result: Mapping[str, Any]) -> None:
     profiles = result["profiles"]
-    parts = (("at rest", style.INK), ("dragged", "#D55E00"))
+    parts = (("at rest", style.INK), ("dragged", style.SERIES[5]))
     places = (("known", "o"), ("unknown", "s"))
+    trials = min(row["traverses"]["trials"] for row in profiles.values())
     for k, ((part, colour), (place, marker)) in enumerate(product(parts, places)):
         known = Measure(f"{PARTS[part]}.{place}.flex", f"{part}, place {place}")
         style.intervals(
@@ -96,13 +97,17 @@ def _draw_shares(panel: Axes, result: Mapping[str, Any]) -> None:
             [i + 0.18 * (k - 1.5) for i in range(len(profiles))],
             [known.value(row) for row in profiles.values()],
             ("r2", "r2_95"),
+            trials,
             marker=marker,
             color=colour,
             label=known.label,
             markerfacecolor=colour if place == "known" else "white",
         )
     style.categories(panel, [name.replace("_", "\n") for name in profiles])
-    panel.set(ylabel="R² of force", title="Share of force that flex explains (95 %)")
+    panel.set(
+        ylabel="R² of force",
+        title=f"Share of force that flex explains ({style.interval_note('95 %', trials)})",
+    )
     bottom, top = panel.get_ylim()
     panel.set_ylim(min(bottom, 0.0), top + 0.35)
     panel.set_yticks([0.2 * step for step in range(6)])

@@ -12,7 +12,8 @@ from antennate.experiments.gait.unknown import Unknown, changed
 from antennate.params.base import GATHERED, Params, number, require_different, require_whole_steps
 from antennate.params.control import GaitParams
 from antennate.params.scene import PhysicsParams
-from antennate.robots.spec import HARDWARE_ALONE, RobotSpec
+from antennate.robots.readers import HARDWARE_ALONE
+from antennate.robots.spec import RobotSpec
 
 _OF_UNKNOWN = ("draws", "seed")
 

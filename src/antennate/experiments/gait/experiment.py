@@ -99,4 +99,5 @@ EXPERIMENT = Experiment.of_folder(
     check=gait.check,
     filmed=True,
     parts="walks",
+    viewed=lambda config, on_step, on_row, view, logs: gait.run(config, 1, on_step, view),
 )

@@ -8,7 +8,7 @@ FORWARD is walked again for numbers that are not known, drawn from their ranges.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,6 +17,7 @@ import numpy as np
 from antennate.control.gait import Gait
 from antennate.control.loop import run_loop
 from antennate.experiments.gait.config import GaitStudyConfig
+from antennate.experiments.gait.metered import MeteredWorld
 from antennate.experiments.gait.pace import Pace, Walk, measure, rolling_speed
 from antennate.experiments.gait.unknown import drawn
 from antennate.params.control import GaitParams
@@ -28,6 +29,7 @@ from antennate.sim.trial import place_at_start
 from antennate.sim.world import World, compile_world
 from antennate.studies.experiment import OnStep, Outcome, no_step
 from antennate.studies.pool import gather
+from antennate.telemetry.view.simulation import SimulationView
 from antennate.types import AntennaFrame, Floats, JointCommand, Maneuver
 
 MANEUVERS = (Maneuver.FORWARD, Maneuver.TURN_L, Maneuver.TURN_R, Maneuver.REVERSE)
@@ -170,7 +172,7 @@ def walk_flat(
     """
     robot, period = config.robot, 1.0 / config.rate
     scene = FlatScene().draw(robot, np.random.default_rng(0))
-    world = _MeteredWorld(compile_world(config.physics, robot, scene), robot)
+    world = MeteredWorld(compile_world(config.physics, robot, scene), robot)
     place_at_start(world, scene, gait)
     body = SimRobot(1, robot, period, config.physics.timestep)
     body.load(0, world, _no_chance(robot, period))
@@ -208,32 +210,6 @@ def _no_chance(robot: RobotSpec, period: float) -> Disturbance:
     return Disturbance(np.random.default_rng(0), still, robot, period)
 
 
-class _MeteredWorld(World):
-    """A world that adds up what its servos do.
-
-    Attributes:
-        work: Positive mechanical work of all servos so far [J].
-    """
-
-    work = 0.0
-
-    def step(self, count: int) -> None:
-        """Advance by `count` physics steps; every one of them counts with its own power."""
-        for _ in range(count):
-            super().step(1)
-            self.work += self._positive_power() * self.model.opt.timestep
-
-    def _positive_power(self) -> float:
-        """Summed power of the servos that push, as the last step began [W].
-
-        Torque falls with speed by the damping of the joint.
-        """
-        model, data = self.model, self.data
-        slope = model.dof_damping[model.jnt_dofadr[model.actuator_trnid[:, 0]]]
-        speed = data.actuator_velocity
-        return float(np.maximum((data.actuator_force - slope * speed) * speed, 0.0).sum())
-
-
 def _tasks(config: GaitStudyConfig) -> list[_Task]:
     gait = config.gait
     forward = {WAVE_OFF: _changed(gait, amplitude=0.0)}
@@ -265,18 +241,38 @@ def _changed(gait: GaitParams, **values: float) -> GaitParams:
     return GaitParams(**{**gait.model_dump(), **values})
 
 
+def _walk_viewed(tasks: Sequence[_Task], on_step: OnStep, view: SimulationView) -> Iterator[Walk]:
+    """All walks on a page, one after the other."""
+    for done, (config, name, gait, maneuver) in enumerate(tasks, start=1):
+
+        def watch(world: World, frame: AntennaFrame, maneuver: Maneuver = maneuver) -> None:
+            view.tick(world.model, world.data, frame, maneuver=int(maneuver))
+
+        view.begin(name.replace("_", " "))
+        yield walk_flat(config, name, gait, maneuver, watch)
+        on_step(done, len(tasks))
+
+
 def run(
     config: GaitStudyConfig,
     workers: int = 1,
     on_step: OnStep = no_step,
+    view: SimulationView | None = None,
 ) -> GaitOutcome:
     """Walk all maneuvers, the one without body wave, the sweep, and the unknown numbers.
+
+    With a view they run in this process, one after the other, and give the same.
 
     Raises:
         ConfigError: A draw of the unknown numbers makes no robot or gait.
         SimulationError: The physics became invalid; from a worker it comes as a WorkerError.
     """
-    found = {w.name: w for w in gather(walk_flat, _tasks(config), workers, on_step)}
+    tasks = _tasks(config)
+    if view is None:
+        walks = gather(walk_flat, tasks, workers, on_step)
+    else:
+        walks = list(_walk_viewed(tasks, on_step, view))
+    found = {walk.name: walk for walk in walks}
     return GaitOutcome(
         config=config,
         maneuvers={m.name.lower(): found[m.name.lower()] for m in MANEUVERS},

@@ -25,7 +25,9 @@ def tables(result: Mapping[str, Any]) -> Sequence[Table]:
 
 def sentence(result: Mapping[str, Any]) -> str:
     """How many claims hold."""
-    found = ", ".join(f"{result['verdicts'][name]} {text}" for name, text in VERDICTS.items())
+    found = ", ".join(
+        f"{result['verdicts'].get(name, 0)} {text}" for name, text in VERDICTS.items()
+    )
     few = " With --quick the intervals are wide." if result["quick"] else ""
     return f"Of {len(result['claims'])} claims: {found}.{few}"
 

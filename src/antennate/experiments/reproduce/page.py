@@ -9,13 +9,13 @@ from typing import Any
 from antennate.experiments.reproduce.run import CLAIMS
 from antennate.experiments.reproduce.verdict import VERDICTS
 
-_LOOK = {"reproduced": "good", "conditional": "fair", "not_reproduced": "bad"}
+_LOOK = {"reproduced": "good", "conditional": "fair", "not_reproduced": "bad", "undecided": "muted"}
 
 
 def body(result: Mapping[str, Any], figures: Mapping[str, str]) -> str:
     """HTML of a result, with the figure of each claim by its name."""
     counts = result["verdicts"]
-    summary = ", ".join(f"{counts[name]} {text}" for name, text in VERDICTS.items())
+    summary = ", ".join(f"{counts.get(name, 0)} {text}" for name, text in VERDICTS.items())
     how = "few trials (--quick)" if result["quick"] else "all trials"
     names = {claim.claim: claim for claim in CLAIMS}
     rows = [(row, names.get(row["claim"])) for row in result["claims"]]

@@ -6,11 +6,12 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
-Verdict = Literal["reproduced", "conditional", "not_reproduced"]
+Verdict = Literal["reproduced", "conditional", "not_reproduced", "undecided"]
 VERDICTS: Mapping[Verdict, str] = {
     "reproduced": "reproduced",
     "conditional": "conditional",
     "not_reproduced": "not reproduced",
+    "undecided": "undecided",
 }
 """Verdicts and what people read."""
 
@@ -18,6 +19,24 @@ VERDICTS: Mapping[Verdict, str] = {
 def judged(holds: bool, conditionally: bool = False) -> Verdict:
     """The verdict on a claim that holds, or holds under a condition."""
     return "reproduced" if holds else "conditional" if conditionally else "not_reproduced"
+
+
+def agrees(value: float, interval: tuple[float, float], paper: float, tolerance: float) -> Verdict:
+    """The verdict on a number that we could have chosen to meet: `conditional` at most.
+
+    Undecided if its interval reaches the paper's number and is wider than what is tolerated to
+    both sides: few trials then decide nothing, for or against the claim.
+
+    Args:
+        value: Our number.
+        interval: Its 95 % interval.
+        paper: The paper's number.
+        tolerance: Distance from the paper's number that still agrees.
+    """
+    low, high = interval
+    if high - low > 2 * tolerance and low <= paper + tolerance and high >= paper - tolerance:
+        return "undecided"
+    return judged(False, abs(value - paper) <= tolerance)
 
 
 @dataclass(frozen=True, slots=True)

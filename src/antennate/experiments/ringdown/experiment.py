@@ -26,6 +26,7 @@ def tables(result: Mapping[str, Any]) -> Sequence[Table]:
     """The first mode twice, chains beside a cone, and animals."""
     difference = result["difference"]
     swings = {"engine": result["engine"], "chain": result["chain"]}
+    swings |= {f"chain of {row['name']}": row for row in result.get("beside", ())}
     note = (
         f"Engine over chain: frequency {100 * difference['natural_hz']:+.2f} %, damping "
         f"{100 * difference['damping']:+.2f} %.\nRejected within the {1e3 * ANIMAL_CYCLE:.0f} ms "

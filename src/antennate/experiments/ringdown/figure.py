@@ -63,16 +63,17 @@ def _draw_animals(panel: Axes, result: Mapping[str, Any]) -> None:
         panel.plot([centre, centre], [low, high], **bars)
         panel.text(right * 1.15, middle, row["name"].split()[0], va="center", fontsize=8)
     engine = result["engine"]
-    panel.scatter(
-        engine["natural_hz"], engine["damping"], color=style.INK, label="this antenna", zorder=3
-    )
+    ours = [{"name": "this antenna", **engine}, *result["beside"]]
+    for row in ours:
+        at = row["natural_hz"], row["damping"]
+        panel.scatter(*at, color=style.INK, zorder=3)
+        panel.annotate(row["name"], at, (6, -1), textcoords="offset points", va="top", fontsize=8)
     panel.axhline(result["animal_damping"], color=style.MUTED, linewidth=0.8)
     panel.set_xscale("log")
     panel.set_xlim(min(1.0, engine["natural_hz"] / 2), 1000)
     panel.set_ylim(0, 1.05)
     panel.set(xlabel="frequency [Hz]", ylabel="damping ratio")
     panel.set_title("Animals; above the line 90 % are\nrejected in one cycle")
-    panel.legend(loc="lower left")
 
 
 def _draw_cones(panel: Axes, result: Mapping[str, Any]) -> None:

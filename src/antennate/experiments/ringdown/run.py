@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
@@ -11,9 +12,11 @@ from pydantic import Field
 
 from antennate.antenna.dynamics import LinearChain, Mode, cone_ratio, fitted_mode, least_damping
 from antennate.params.base import Params, number, paths_of
+from antennate.params.reading import read_file
 from antennate.params.scene import BenchPhysicsParams
 from antennate.robots.antenna import MOST_HINGES, AntennaSpec
 from antennate.robots.sensor import SensorParams
+from antennate.robots.spec import RobotSpec
 from antennate.sim.bench import Bench, compile_bench
 from antennate.studies.experiment import Outcome
 from antennate.types import Floats
@@ -98,6 +101,8 @@ class RingdownConfig(Params):
         (6, 14, 40, MOST_HINGES), "1", "assumed: the robot's, the animal model's, and more"
     )
     """Hinges of the chains that stand for a cone."""
+    beside: tuple[str, ...] = number((), "1", "assumed: none")
+    """Files of robots whose antennae stand beside this one, by the first mode of their chains."""
     antenna: AntennaSpec = AntennaSpec()
     physics: BenchPhysicsParams = BenchPhysicsParams()
 
@@ -113,6 +118,7 @@ class RingdownOutcome(Outcome):
         engine: First mode fitted to the engine's ring-down.
         first: The same of the chain.
         modes: All modes of the chain, the slowest first.
+        beside: First modes of the chains of other antennae, by the names of their files.
     """
 
     config: RingdownConfig
@@ -121,6 +127,7 @@ class RingdownOutcome(Outcome):
     engine: Mode
     first: Mode
     modes: list[Mode]
+    beside: dict[str, Mode]
 
     def result(self) -> dict[str, Any]:
         """The content of result.json."""
@@ -137,6 +144,7 @@ class RingdownOutcome(Outcome):
             "rejected_in_animal_cycle": self.rejected(ANIMAL_CYCLE),
             "animal_damping": least_damping(1 - REJECTED),
             "modes": [_mode(mode) for mode in self.modes],
+            "beside": [{"name": name, **_mode(mode)} for name, mode in self.beside.items()],
             "cones": [{"hinges": n, "ratio": cone_ratio(n)} for n in self.config.cone_hinges],
             "animals": [asdict(animal) for animal in ANIMALS],
         }
@@ -159,8 +167,13 @@ def run(config: RingdownConfig) -> RingdownOutcome:
     """Bend the compiled antenna as a load on its tip does, let it go and record it.
 
     Raises:
+        ConfigError: A file of another antenna cannot be used.
         SimulationError: The physics became invalid.
     """
+    others = {
+        Path(name).stem.replace("_", " "): read_file(Path(name), RobotSpec).antenna
+        for name in config.beside
+    }
     antenna, timestep = config.antenna, config.physics.timestep
     chain = LinearChain.of(antenna)
     mode = chain.first_mode()
@@ -174,6 +187,7 @@ def run(config: RingdownConfig) -> RingdownOutcome:
         angles[tick], speeds[tick] = bench.chain()
         tip[tick] = bench.tip()[1]
         bench.step(1)
+    beside = {name: LinearChain.of(other).first_mode() for name, other in others.items()}
     t = np.linspace(0.0, ticks * timestep, ticks + 1)
     engine = fitted_mode(mode, t, angles, speeds)
-    return RingdownOutcome(config, t, tip / tip[0], engine, mode, chain.modes())
+    return RingdownOutcome(config, t, tip / tip[0], engine, mode, chain.modes(), beside)

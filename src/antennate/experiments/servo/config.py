@@ -19,7 +19,9 @@ class ServoConfig(Params):
         f"servos.{name}.p_gain" for name in ServosParams.model_fields
     )
     recording: tuple[str, ...] = number((), "1", "assumed: has to be named")
-    """Recordings: JSON of Rhoban/bam."""
+    """Recordings: JSON of Rhoban/bam, or logs of `drive` with --joint."""
+    joint: str | None = number(None, "1", "assumed: has to be named if a recording is a log")
+    """Joint of a log."""
     servo: ServoName = number("xl330_m288", "1", "assumed: the model with a known recording")
     """Model of the servo."""
     servos: ServosParams = ServosParams()
@@ -29,6 +31,8 @@ class ServoConfig(Params):
     """Length of the arm, which hangs down at 0 rad; as the recording says if not given."""
     inertia: float = number(0.0, "kg·m²", "assumed: only the mass and the servo", ge=0)
     """Inertia of the load beside that of the mass."""
+    supply: float | None = number(None, "V", "assumed: as the recording says", gt=0)
+    """Supply where a recording tells none, as no log does; nominal in a replay if not given."""
     fit: bool = number(False, "1", "assumed: a replay alone")
     """Identify the model from the recordings."""
     draws: int = number(100, "1", "assumed: enough for an interval", ge=20, le=2000)

@@ -23,7 +23,7 @@ ERROR = Measure("error_deg", "mean error", "deg")
 
 
 def tables(result: Mapping[str, Any]) -> Sequence[Table]:
-    """The error of every model, and the parameters of the last one beside the data sheet."""
+    """The error of every model, and the parameters of the last ones beside the data sheet."""
     whole = result["models"][-1]
     left = [f"{name} left out" for name in whole["held_out_deg"]]
     rows = [
@@ -32,10 +32,15 @@ def tables(result: Mapping[str, Any]) -> Sequence[Table]:
     ]
     title = f"Models of {result['servo']}: {ERROR.title}"
     compared = Table(title, ["all", *left], rows, _note(result))
-    columns = {result["models"][0]["name"]: result["models"][0], whole["name"]: whole}
+    sheet = result["models"][0]
+    columns: dict[str, Any] = {sheet["name"]: sheet}
     if not result["fitted"]:
+        columns[whole["name"]] = whole
         return compared, Table.of("Parameters", columns, PARAMETERS)
-    columns["95 %"] = {name: result["interval_95"].get(name) for name in NAMES}
+    for model in result["models"][-2:]:
+        columns[model["name"]] = model
+        ends = {name: model["interval_95"].get(name) for name in NAMES}
+        columns[f"{model['name']}, 95 %"] = ends
     note = f"Intervals are bootstrapped over {result['interval_over']}."
     return compared, Table.of("Parameters", columns, PARAMETERS, note)
 
@@ -47,7 +52,9 @@ def _note(result: Mapping[str, Any]) -> str:
         if told
         else "No recording tells the drive at rest: the divisor of the gain is the one given."
     )
-    return f"{len(result['recordings'])} recordings; means while torque is on.\n{drive}"
+    unknown = any(row["supply_v"] is None for row in result["recordings"])
+    supply = "\nNo supply is told: taken as nominal; --supply says it." if unknown else ""
+    return f"{len(result['recordings'])} recordings; means while torque is on.\n{drive}{supply}"
 
 
 def sentence(result: Mapping[str, Any]) -> str:

@@ -23,7 +23,7 @@ def figures(outcome: ServoOutcome) -> dict[str, Figure]:
 
 @style.styled
 def servo(outcome: ServoOutcome) -> Figure:
-    """Each recording with the simplest and the whole model; dotted where torque is off."""
+    """Each recording with two models, the simplest and that of the simulation or of its form."""
     count = min(_MOST, len(outcome.recordings))
     columns = min(_COLUMNS, count)
     rows = -(-count // columns)
@@ -48,7 +48,7 @@ def _draw(panel: Axes, outcome: ServoOutcome, place: int, traces: Floats) -> Non
     inside = t <= recording.t[-1]
     panel.plot(recording.t, np.degrees(recording.goal), color=style.FAINT, label="goal")
     panel.plot(recording.t, np.degrees(recording.position), color=style.INK, label="measured")
-    for row, colour in ((0, style.SERIES[4]), (-1, style.SERIES[0])):
+    for row, colour in ((0, style.SERIES[4]), (outcome.shown, style.SERIES[0])):
         drawn = traces[inside, row]
         panel.plot(t[inside], drawn, color=colour, linewidth=1.1, label=names[row])
     off = ~recording.torque

@@ -24,10 +24,12 @@ _LOG = np.array([name not in ("friction", "load_friction") for name in NAMES])
 _LOW = np.where(_LOG, np.log([10.0, 0.01, 0.5, 1e-6, 1.0, 1.0]), 0.0)
 _HIGH = np.where(_LOG, np.log([3000.0, 20.0, 200.0, 0.2, 1.0, 1.0]), (0, 0, 0, 0, 2.0, 0.95))
 _NUDGE = np.where(_LOG, 1e-3, (0, 0, 0, 0, 2e-4, 2e-3))
-_ROUNDS = 40
-_ENOUGH = 1e-4
-"""A fit is done when a round improves it by less than this share."""
-_STUCK = 100.0
+_ROUNDS = 100
+_ENOUGH = 1e-6
+"""A fit is done when a round that is hardly damped improves it by less than this share."""
+_HARDLY = 0.1
+"""A step of less damping is hardly shortened."""
+_STUCK = 1e4
 """It is done, too, when no shorter step than that of this damping improves it."""
 _CHUNK = 24
 """Fits that are simulated together; more would need more memory."""
@@ -98,17 +100,18 @@ def _fit(data: Data, start: Floats, free: Bools, parts: Floats) -> Floats:
     cost, slope, bend = _normal(data, x, free, weight)
     done = np.zeros(len(x), bool)
     for _ in range(_ROUNDS):
-        step = _step(x, slope, bend, damping)
-        trial = np.where(free, np.clip(x - step, _LOW, _HIGH), x)
-        new_cost, new_slope, new_bend = _normal(data, trial, free, weight)
-        better = new_cost < cost
-        done |= np.where(better, cost - new_cost < _ENOUGH * cost, damping > _STUCK)
-        x, cost = np.where(better[:, None], trial, x), np.where(better, new_cost, cost)
-        slope = np.where(better[:, None], new_slope, slope)
-        bend = np.where(better[:, None, None], new_bend, bend)
-        damping = np.clip(np.where(better, damping / 5, damping * 5), 1e-6, 1e6)
-        if done.all():
+        on = np.flatnonzero(~done)
+        if not len(on):
             break
+        step = _step(x[on], slope[on], bend[on], damping[on])
+        trial = np.where(free[on], np.clip(x[on] - step, _LOW, _HIGH), x[on])
+        new_cost, new_slope, new_bend = _normal(data, trial, free[on], weight[:, on])
+        better, small = new_cost < cost[on], cost[on] - new_cost < _ENOUGH * cost[on]
+        done[on] = np.where(better, small & (damping[on] < _HARDLY), damping[on] > _STUCK)
+        found = on[better]
+        x[found], cost[found] = trial[better], new_cost[better]
+        slope[found], bend[found] = new_slope[better], new_bend[better]
+        damping[on] = np.clip(np.where(better, damping[on] / 5, damping[on] * 5), 1e-6, 1e6)
     return _plain(x, start, free)
 
 

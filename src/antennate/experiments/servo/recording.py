@@ -13,21 +13,15 @@ from typing import Any
 import numpy as np
 
 from antennate.errors import BadInputError
+from antennate.experiments.servo.checks import FEWEST, GRAVITY, check_course
 from antennate.experiments.servo.fitting import Data
 from antennate.files import decoded, read_limited
 from antennate.messages import shown
 from antennate.robots.servo_model import STEP, Course
-from antennate.robots.servos import FULL_DRIVE, TICKS_A_TURN
+from antennate.robots.servos import FULL_DRIVE, TICKS_A_TURN, ServoParams
 from antennate.types import Bools, Floats
 
-GRAVITY = 9.80665
 _LARGEST_FILE = 100_000_000
-_FEWEST = 50
-"""Fewest samples of a recording."""
-_COARSEST = 0.02
-"""Positions of a servo are told in finer steps than this [rad]: 4096 a turn make 0.0015."""
-_LARGEST_GAP = 0.5
-"""Samples lie closer together in time [s]."""
 _SLOW = 0.05
 """A slower shaft rests [rad/s]."""
 _SMOOTHING = 0.05
@@ -51,6 +45,7 @@ class Recording:
         t: Times [s], shape (n,), from 0.
         position: Positions [rad], shape (n,), `goal` the goals.
         torque: Whether torque was on, shape (n,).
+        known: Whether it is known what the servo was told, shape (n,).
         supply: Supply [V], NaN where it is not known, shape (n,).
         drive: Drive [counts], NaN where it is not known, shape (n,).
     """
@@ -64,6 +59,7 @@ class Recording:
     position: Floats
     goal: Floats
     torque: Bools
+    known: Bools
     supply: Floats
     drive: Floats
 
@@ -77,16 +73,19 @@ class Recording:
         size = abs(self.drive)
         useful = self.torque & (size > 0.05 * FULL_DRIVE) & (size < 0.9 * FULL_DRIVE)
         useful &= abs(np.gradient(self.position, self.t)) < _SLOW
-        if useful.sum() < _FEWEST // 2:
+        if useful.sum() < FEWEST // 2:
             return None
         return float(np.median(self.p_gain * error[useful] / self.drive[useful]))
 
 
-def read(path: Path, mass: float | None, length: float | None) -> Recording:
+def read(
+    path: Path, servo: ServoParams, mass: float | None = None, length: float | None = None
+) -> Recording:
     """Read a recording.
 
     Args:
         path: The file.
+        servo: The servo that it is taken for.
         mass: Mass at the end of the arm [kg]; None for what the file says.
         length: Length of the arm [m]; None for what the file says.
 
@@ -106,12 +105,12 @@ def read(path: Path, mass: float | None, length: float | None) -> Recording:
     if not isinstance(table, dict) or not isinstance(table.get("entries"), list):
         raise BadInputError(f"{path}: expected an object with a list `entries`, found none")
     entries = table["entries"]
-    if len(entries) < _FEWEST:
+    if len(entries) < FEWEST:
         raise BadInputError(
-            f"{path}: entries: expected at least {_FEWEST}, found {len(entries)}; record longer"
+            f"{path}: entries: expected at least {FEWEST}, found {len(entries)}; record longer"
         )
     t, position, goal = (_column(path, entries, name) for name in _NUMBERS)
-    _check(path, t, position, goal)
+    check_course(path, t, position, goal, servo)
     drive = _column(path, entries, "load", math.nan)
     return Recording(
         path.name,
@@ -123,6 +122,7 @@ def read(path: Path, mass: float | None, length: float | None) -> Recording:
         position,
         goal,
         _torque(path, entries),
+        np.ones(len(t), bool),
         _column(path, entries, "input_volts", math.nan),
         np.where(drive >= _UNUSABLE / 2, drive - _UNUSABLE, drive),
     )
@@ -175,37 +175,6 @@ def _torque(path: Path, entries: list[Any]) -> Bools:
     return found
 
 
-def _check(path: Path, t: Floats, position: Floats, goal: Floats) -> None:
-    steps = np.diff(t)
-    if (steps <= 0).any():
-        i = int(np.argmax(steps <= 0)) + 1
-        raise BadInputError(
-            f"{path}: entry {i}: expected timestamp to rise, found {t[i]:g} after {t[i - 1]:g}; "
-            "sort the entries"
-        )
-    if steps.max() > _LARGEST_GAP:
-        i = int(np.argmax(steps)) + 1
-        raise BadInputError(
-            f"{path}: entry {i}: expected samples less than {_LARGEST_GAP:g} s apart, found "
-            f"{steps[i - 1]:g}; are times in seconds?"
-        )
-    distances = np.diff(np.unique(position))
-    if not len(distances):
-        raise BadInputError(f"{path}: expected a shaft that moves, found it at {position[0]:g}")
-    if distances.min() > _COARSEST:
-        raise BadInputError(
-            f"{path}: expected positions in radians, whose smallest step is "
-            f"{2 * math.pi / TICKS_A_TURN:.4f}, found steps of {distances.min():.4g}; are these "
-            "degrees or ticks?"
-        )
-    away = abs(goal - position)
-    if np.median(away) > 2 * math.pi:
-        raise BadInputError(
-            f"{path}: expected goal_position in radians within a turn of position, found "
-            f"{np.median(away):.4g} between them; are goals in degrees or ticks?"
-        )
-
-
 def data_of(recordings: list[Recording], voltage: float, inertia: float) -> Data:
     """All recordings as one course, each ends in times that do not count.
 
@@ -231,7 +200,7 @@ def data_of(recordings: list[Recording], voltage: float, inertia: float) -> Data
         inertia=np.array([r.mass * r.length**2 + inertia for r in recordings]),
         gravity=np.array([r.mass * GRAVITY * r.length for r in recordings]),
     )
-    return Data(course, np.array([grid <= r.t[-1] for r in recordings]).T)
+    return Data(course, np.array([r.known[i] & (grid <= r.t[-1]) for r, i in pairs]).T)
 
 
 def _speed(position: Floats) -> Floats:

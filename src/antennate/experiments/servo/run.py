@@ -2,61 +2,28 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from antennate.errors import BadInputError
-from antennate.experiments.servo import fitting
+from antennate.experiments.servo import drive_log, fitting
+from antennate.experiments.servo.checks import GRAVITY, check_load, check_supply, check_torque
 from antennate.experiments.servo.config import ServoConfig
 from antennate.experiments.servo.fitting import Data
+from antennate.experiments.servo.models import Held, Model, models, splits, told_divisor, with_told
 from antennate.experiments.servo.recording import Recording, data_of, read
 from antennate.robots import servo_model
-from antennate.robots.servo_model import NAMES, values_of
+from antennate.robots.servo_model import NAMES
 from antennate.studies.experiment import OnStep, Outcome, no_step
 from antennate.types import Bools, Floats
 
-_MANUAL = 128.0
-"""Divisor of the gain in the block diagram of the manual of X servos."""
-_LINE = ("stall_torque", "no_load_speed")
-_FRICTION = ("friction", "load_friction")
+_JUDGED = 2
+"""The last models of a fit, with both frictions, get intervals; the first of them is shown."""
 SHOWN = 10
 """A figure shows every so many times of the replay."""
-
-
-@dataclass(frozen=True)
-class Model:
-    """A servo model: where its parameters begin, and which of them are fitted.
-
-    Attributes:
-        name: What it is called.
-        values: Parameters, shape (6,).
-        free: Names of those that are fitted.
-    """
-
-    name: str
-    values: Floats
-    free: tuple[str, ...] = ()
-
-    @property
-    def mask(self) -> Bools:
-        """Which parameters are fitted, shape (6,)."""
-        return np.array([name in self.free for name in NAMES])
-
-
-@dataclass(frozen=True)
-class Held:
-    """A part that a fit did not see.
-
-    Attributes:
-        name: What was left out.
-        parts: Its pieces, shape (F, K).
-    """
-
-    name: str
-    parts: Bools
 
 
 @dataclass(frozen=True)
@@ -72,7 +39,7 @@ class ServoOutcome(Outcome):
         errors: Mean error of each on all [rad], shape (M,).
         held: What was left out in turn.
         held_errors: Error of each on what its fit did not see [rad], shape (M, H).
-        interval: Ends of the 95 % intervals of the whole model, shape (2, 6); NaN without a fit.
+        interval: Ends of their 95 % intervals, shape (M, 2, 6); NaN where there is none.
     """
 
     config: ServoConfig
@@ -83,7 +50,12 @@ class ServoOutcome(Outcome):
     errors: Floats
     held: list[Held]
     held_errors: Floats
-    interval: Floats = field(default_factory=lambda: np.full((2, len(NAMES)), np.nan))
+    interval: Floats
+
+    @property
+    def shown(self) -> int:
+        """Place of the model of a figure: as given, or with the data sheet's line."""
+        return len(self.models) - (_JUDGED if self.config.fit else 1)
 
     def result(self) -> dict[str, Any]:
         """The content of result.json."""
@@ -108,14 +80,14 @@ class ServoOutcome(Outcome):
                             strict=True,
                         )
                     ),
+                    "interval_95": {
+                        name: self.interval[i, :, k].tolist()
+                        for k, name in enumerate(NAMES)
+                        if name in model.free and np.isfinite(self.interval[i, :, k]).all()
+                    },
                 }
                 for i, model in enumerate(self.models)
             ],
-            "interval_95": {
-                name: self.interval[:, i].tolist()
-                for i, name in enumerate(NAMES)
-                if np.isfinite(self.interval[:, i]).all()
-            },
         }
 
     def traces(self) -> Floats:
@@ -141,61 +113,6 @@ def _by_file(recordings: list[Recording]) -> bool:
     return len(recordings) >= 5
 
 
-def told_divisor(recordings: list[Recording]) -> float | None:
-    """Divisor of the gain as the drive of recordings tells it; None if none does."""
-    found = [d for each in recordings if (d := each.divisor()) is not None]
-    return float(np.median(found)) if found else None
-
-
-def models(config: ServoConfig, told: float | None, loaded: bool) -> list[Model]:
-    """Models of a table, simple ones first; the last is the whole one.
-
-    Args:
-        config: What was asked.
-        told: Divisor of the gain as the recordings tell it; if they do not, it is fitted.
-        loaded: Whether a known weight hangs on the servo. Without one only the inertia in
-            proportion to the stall torque shows, so that this stays as in the data sheet.
-    """
-    given = values_of(config.given)
-    divisor = told if config.fit and told is not None else config.given.gain_divisor
-    sheet = np.array([divisor, *config.given.datasheet, config.given.armature, 0.0, 0.0])
-    manual = np.array([_MANUAL, *sheet[1:]])
-    rows = [Model("data sheet, /128", manual)] if abs(divisor / _MANUAL - 1.0) > 0.02 else []
-    rows.append(Model(f"data sheet, /{divisor:.0f}", sheet))
-    if not config.fit:
-        bare = np.array([*given[:4], 0.0, 0.0])
-        return [*rows, Model("as given, no friction", bare), Model("as given", given)]
-    gain = ("gain_divisor",) if told is None else ()
-    line = (*gain, *(_LINE if loaded else _LINE[1:]), "armature")
-    dry, whole = np.array([*sheet[:4], 0.01, 0.0]), np.array([*sheet[:4], 0.01, 0.2])
-    return [
-        *rows,
-        Model("line fitted", sheet, line),
-        Model("+ constant friction", dry, (*line, "friction")),
-        Model("data sheet + friction", whole, (*gain, "armature", *_FRICTION)),
-        Model("whole model", whole, (*line, *_FRICTION)),
-    ]
-
-
-def splits(recordings: list[Recording], parts: Bools) -> list[Held]:
-    """What to leave out in turn: each gain, else each recording, else each half of the only one.
-
-    Nothing if that lasts no longer than a piece.
-    """
-    gains = np.array([each.p_gain for each in recordings])
-    if len(np.unique(gains)) > 1:
-        return [
-            Held(f"gain {gain:g}", parts & (gains == gain)[:, None]) for gain in np.unique(gains)
-        ]
-    if len(recordings) > 1:
-        own = np.eye(len(recordings), dtype=bool)
-        return [Held(each.name, parts & own[i][:, None]) for i, each in enumerate(recordings)]
-    if parts.sum() < 2:
-        return []
-    late = np.arange(parts.shape[1]) >= parts.sum() / 2
-    return [Held("first half", parts & ~late), Held("second half", parts & late)]
-
-
 def run(config: ServoConfig, on_step: OnStep = no_step) -> ServoOutcome:
     """Replay, and fit if asked.
 
@@ -204,7 +121,12 @@ def run(config: ServoConfig, on_step: OnStep = no_step) -> ServoOutcome:
     """
     if not config.recording:
         raise BadInputError("--recording: expected one file or more, found none")
-    recordings = [read(Path(name), config.mass, config.length) for name in config.recording]
+    recordings = [_read(Path(name), config) for name in config.recording]
+    if config.joint is not None and not any(drive_log.is_log(Path(n)) for n in config.recording):
+        raise BadInputError("--joint: expected a log among the recordings, found none")
+    if config.supply is not None and all(np.isfinite(each.supply).all() for each in recordings):
+        raise BadInputError("--supply: expected a recording that tells none, found that all do")
+    recordings = [_supplied(each, config) for each in recordings]
     data = data_of(recordings, config.given.voltage, config.inertia)
     parts, loaded = data.parts(), any(each.mass * each.length > 0 for each in recordings)
     rows = models(config, told_divisor(recordings), loaded)
@@ -216,11 +138,12 @@ def run(config: ServoConfig, on_step: OnStep = no_step) -> ServoOutcome:
         on_step(done, total)
         known = [recordings[i] for i in np.flatnonzero(part.any(axis=1))]
         told = told_divisor(known)
-        fits.append(_fitted(data, [_with(row, told) for row in rows], part))
-    interval = np.full((2, len(NAMES)), np.nan)
+        fits.append(_fitted(data, [with_told(row, told) for row in rows], part))
+    interval = np.full((len(rows), 2, len(NAMES)), np.nan)
     if config.fit:
         on_step(len(seen), total)
-        interval = _interval(config, recordings, data, fits[0][-1], rows[-1])
+        last = slice(-_JUDGED, None)
+        interval[last] = _intervals(config, recordings, data, fits[0][last], rows[last])
     on_step(total, total)
     judged = [
         fitting.errors(data, fits[i + 1], _same(each.parts, len(rows)))
@@ -231,15 +154,40 @@ def run(config: ServoConfig, on_step: OnStep = no_step) -> ServoOutcome:
     return ServoOutcome(config, recordings, data, rows, fits[0], every, held, held_errors, interval)
 
 
+def _read(path: Path, config: ServoConfig) -> Recording:
+    """A recording of either form that can serve.
+
+    Raises:
+        BadInputError: It cannot.
+    """
+    if drive_log.is_log(path):
+        found = drive_log.read(path, config)
+    else:
+        found = read(path, config.given, config.mass, config.length)
+    check_load(path, found.p_gain, found.mass * GRAVITY * found.length, config.given)
+    check_supply(f"{path}: input_volts", found.supply, config.given)
+    check_torque(path, found.t, found.torque)
+    return found
+
+
+def _supplied(each: Recording, config: ServoConfig) -> Recording:
+    """A recording with the supply that the configuration gives where it tells none."""
+    unknown = ~np.isfinite(each.supply)
+    if not unknown.any():
+        return each
+    if config.supply is None:
+        if config.fit:
+            raise BadInputError(
+                f"{each.name}: a fit needs the supply, as torque and speed follow it: expected it "
+                "in the recording or as --supply, found neither"
+            )
+        return each
+    check_supply("--supply", np.array([config.supply]), config.given)
+    return replace(each, supply=np.where(unknown, config.supply, each.supply))
+
+
 def _same(parts: Bools, count: int) -> Floats:
     return np.repeat(parts[None].astype(float), count, axis=0)
-
-
-def _with(row: Model, told: float | None) -> Model:
-    """A model with the divisor that a part of the recordings tells."""
-    if not row.free or told is None:
-        return row
-    return replace(row, values=np.array([told, *row.values[1:]]))
 
 
 def _fitted(data: Data, rows: list[Model], parts: Bools) -> Floats:
@@ -252,13 +200,15 @@ def _fitted(data: Data, rows: list[Model], parts: Bools) -> Floats:
     return found
 
 
-def _interval(
-    config: ServoConfig, recordings: list[Recording], data: Data, best: Floats, model: Model
+def _intervals(
+    config: ServoConfig, recordings: list[Recording], data: Data, best: Floats, rows: list[Model]
 ) -> Floats:
-    """Ends of the 95 % bootstrap intervals, shape (2, 6); NaN for what is not fitted."""
+    """Ends of the 95 % bootstrap intervals, shape (M, 2, 6); NaN for what is not fitted."""
     rng = np.random.default_rng(config.seed)
     weights = fitting.draws(data.parts(), config.draws, rng, _by_file(recordings))
-    start = np.repeat(best[None], config.draws, axis=0)
-    found = fitting.fit(data, start, np.repeat(model.mask[None], config.draws, axis=0), weights)
-    ends = np.percentile(found, [2.5, 97.5], axis=0)
-    return np.where(model.mask, ends, np.nan)
+    mask = np.array([row.mask for row in rows])
+    start = np.repeat(best, config.draws, axis=0)
+    free = np.repeat(mask, config.draws, axis=0)
+    found = fitting.fit(data, start, free, np.concatenate([weights] * len(rows)))
+    ends = np.percentile(found.reshape(len(rows), config.draws, -1), [2.5, 97.5], axis=1)
+    return np.where(mask[:, None], np.moveaxis(ends, 0, 1), np.nan)

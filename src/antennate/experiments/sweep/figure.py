@@ -122,6 +122,7 @@ def _draw_errors(panel: Axes, estimates: Mapping[str, Any], quantity: str) -> No
             [i + 0.13 * (k - 2) for i in range(len(found))],
             [cues.get(cue, {}) for cues in found],
             ("mape_percent", "mape_95"),
+            min((cues[cue]["n"] for cues in found if cue in cues), default=0),
             marker=marker,
             color=colour,
             label=_CUE_NAMES[cue],

@@ -18,7 +18,8 @@ from antennate.experiments.touch.sensing import Comparison
 from antennate.experiments.touch.traverse import Traverse
 from antennate.params.control import RuleParams
 
-_TRUE, _SENSED = "#0072B2", "#D55E00"
+_TRUE, _SENSED = style.SERIES[5], style.INK
+"""Colours that no profile has."""
 _BAR = {"marker": "_", "markersize": 11, "markeredgewidth": 1.8, "capsize": 0}
 _SHAPES = 14
 """Shapes of the antenna drawn along a wall."""
@@ -42,19 +43,22 @@ def measures(result: Mapping[str, Any]) -> Figure:
     (by_speed, by_wall), latencies = figure.subplots(2, 2)
     speeds, walls = result["by_speed"], result["by_wall"]
     for panel, rows, part in ((by_speed, speeds, "speed_m_s"), (by_wall, walls, "wall")):
-        _draw(panel, rows, part, rows, (F1.name, "f1_95"))
+        _draw(panel, rows, part, rows, (F1.name, "f1_95"), trials=result["trials"])
         low, high = (end(row["traverses"] for row in rows) for end in (min, max))
         over = "walls" if part == "speed_m_s" else "speeds"
         count = f"{low}" if low == high else f"{low} to {high}"
-        panel.set_title(f"All {over}, n = {count} traverses a point, 95 %")
+        note = style.interval_note("95 %", result["trials"])
+        panel.set_title(f"All {over}, n = {count} traverses a point, {note}")
         panel.set(ylim=(-0.03, 1.02), ylabel=f"{F1.label} of contact, 0 to 1")
     for panel, measure in zip(latencies, (ONSET, RELEASE), strict=True):
         key = measure.name.partition(".")[0]
         found = [row[key] for row in speeds]
-        _draw(panel, speeds, "speed_m_s", found, ("median_ms", "median_95_ms"))
+        median = ("median_ms", "median_95_ms")
+        _draw(panel, speeds, "speed_m_s", found, median, trials=result["trials"])
         _draw(panel, speeds, "speed_m_s", found, ("p90_ms", ""), **_BAR)
         low, high = (end(row["n"] for row in found) for end in (min, max))
-        panel.set_title(f"Median, 95 %, and 90th percentile (bar), n = {low} to {high} contacts")
+        note = style.interval_note("95 %", result["trials"])
+        panel.set_title(f"Median, {note}, 90th percentile (bar), n = {low} to {high} contacts")
         panel.set_ylabel(measure.title)
         bottom, top = panel.get_ylim()
         panel.set_ylim(min(0.0, bottom), max(1.05 * top, 10.0))
@@ -69,6 +73,7 @@ def _draw(
     part: str,
     found: Sequence[Mapping[str, Any]],
     keys: style.Keys,
+    trials: int = 0,
     **look: Any,
 ) -> None:
     """A measure of what was found in each cell, over speeds or walls, the profiles side by side."""
@@ -81,7 +86,8 @@ def _draw(
         mine = [k for k, cell in enumerate(cells) if cell["profile"] == name]
         x = [values.index(cells[k][part]) + aside for k in mine]
         own_look = look or {"marker": own, "label": name}
-        style.intervals(panel, x, [found[k] for k in mine], keys, color=colour, **own_look)
+        here = [found[k] for k in mine]
+        style.intervals(panel, x, here, keys, trials, color=colour, **own_look)
     style.categories(panel, [f"{v:g}" if isinstance(v, float) else v for v in values])
     panel.set_xlabel("speed of the traverse [m/s]" if part == "speed_m_s" else "wall")
 
@@ -172,7 +178,7 @@ def trace(one: Traverse, found: Comparison) -> Figure:
             *(t, 0, 1),
             where=found.truth.tolist(),
             color=_TRUE,
-            alpha=0.08,
+            alpha=0.15,
             transform=panel.get_xaxis_transform(),
             linewidth=0,
             step="mid",

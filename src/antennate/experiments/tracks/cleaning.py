@@ -27,6 +27,8 @@ antennae, and with one, which may swing across the body axis."""
 _CLEARLY = 0.3
 """Sine of the angle by which a single antenna points across the body axis."""
 _FRAMES_TO_JUDGE = 10
+_MOST_ABSENT, _SHORT = 20, 100_000
+"""Frames from first to last over the rows of a track, and a number that is never too many."""
 
 
 @dataclass
@@ -60,9 +62,11 @@ def clean(config: TracksConfig, track: Track, rate: float, y_down: bool) -> Ante
     """The antennae of a track.
 
     Raises:
-        BadInputError: Left and right are exchanged throughout.
+        BadInputError: Left and right are exchanged throughout, or frames are numbered so far apart
+            that nearly all are absent.
     """
     params, names = config.cleaning, config.points
+    _refuse_far_apart(track)
     counts: dict[str, int] = dict.fromkeys(COUNTED, 0)
     points = _each_frame_once(params, track, counts)
     width, longest = frames_of(params.smoothing, rate), round(params.longest_gap * rate)
@@ -90,6 +94,16 @@ def clean(config: TracksConfig, track: Track, rate: float, y_down: bool) -> Ante
     outwards = {s: v * (1.0, 1.0 if s == "left" else -1.0) for s, v in body.items()}
     contact = {side: _whole(track, values) for side, values in track.contact.items()}
     return Antennae(track, rate, outwards, places, contact, counts)
+
+
+def _refuse_far_apart(track: Track) -> None:
+    """Every frame from first to last has a row, so one wrong number would fill the memory."""
+    first, last, rows = int(track.frames[0]), int(track.frames[-1]), len(track.frames)
+    if last - first >= max(_SHORT, _MOST_ABSENT * rows):
+        raise BadInputError(
+            f"{track.file}: expected frames without large gaps, found {rows} rows from frame "
+            f"{first} to {last}; are these numbers of frames, and not times or labels?"
+        )
 
 
 def _whole(track: Track, values: Floats) -> Floats:

@@ -147,6 +147,10 @@ class CriteriaParams(Params):
 class SyntheticParams(Params):
     """The synthetic animal: five points along each antenna, a straight wall, known shapes."""
 
+    shapes: Literal["separated", "continuous"] = number(
+        "separated", "1", "assumed: known by their drawing, whatever the criteria are"
+    )
+    """`separated`: four shapes far from all borders; `continuous`: bends across the borders."""
     trials: int = number(6, "1", "assumed: enough for an interval", ge=1, le=1000)
     """Recordings."""
     frames: int = number(2000, "1", "assumed: 20 s", ge=200, le=1000000)

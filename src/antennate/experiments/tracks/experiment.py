@@ -89,8 +89,11 @@ def sentence(result: Mapping[str, Any]) -> str:
     )
     most = max(result["sensitivity"], key=lambda row: row["change"])
     correct = result["correct"]
+    drawn = result.get("synthetic_shapes", "known")
     right = (
-        "" if correct is None else f" {100 * correct:.1f} % of the frames are classified correctly."
+        ""
+        if correct is None
+        else f" Of frames with {drawn} shapes {100 * correct:.1f} % are classified correctly."
     )
     single = " One trial alone gives no interval." * (result["trials_in_contact"] == 1)
     where = "With no wall given" if _free_air(result) else "In contact"

@@ -92,6 +92,7 @@ class TracksOutcome:
             "command": "tracks",
             "seed": config.seed,
             "source": "files" if config.files else "synthetic",
+            "synthetic_shapes": None if config.files else config.synthetic.shapes,
             "classified_by": "bend" if config.points.count > 2 else "direction",
             "wall": {
                 name: {"kind": w.kind, "numbers": w.numbers, "fitted": w.fitted, "rms": w.rms}
@@ -158,7 +159,7 @@ def run(
         if config.files:
             rows = made.add(name, _read(config, Path(name)))
         else:
-            track, truth = synthetic.animal(config.synthetic, config.seed, number)
+            track, truth = synthetic.animal(config.synthetic, config.criteria, config.seed, number)
             rows = made.add(name, [track], truth)
         for row in rows:
             on_row(row)

@@ -9,6 +9,7 @@ from typing import NoReturn
 
 import numpy as np
 
+from antennate.csv_files import LARGEST_WHOLE
 from antennate.errors import BadInputError
 from antennate.messages import nearest, shortened
 from antennate.types import Floats, Ints
@@ -92,6 +93,11 @@ def numbered(path: Path, frames: Floats) -> Ints:
     """
     if not np.isfinite(frames).all() or (frames != np.round(frames)).any():
         raise BadInputError(f"{path}: expected whole numbers of frames, found others")
+    if abs(frames).max(initial=0.0) > LARGEST_WHOLE:
+        raise BadInputError(
+            f"{path}: expected numbers of frames up to {LARGEST_WHOLE:g}, found "
+            f"{frames[abs(frames).argmax()]:g}"
+        )
     whole = frames.astype(np.int64)
     falling = np.flatnonzero(np.diff(whole) < 0)
     if len(falling):

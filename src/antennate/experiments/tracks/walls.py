@@ -129,7 +129,7 @@ def _circle_through(points: Floats) -> tuple[float, ...] | None:
 def _line_through(points: Floats) -> tuple[float, ...] | None:
     """Line nearest to points (n, 2), by two of its points; None if all are the same."""
     middle = points.mean(axis=0)
-    _, sizes, (along, _) = np.linalg.svd(points - middle)
+    _, sizes, (along, _) = np.linalg.svd(points - middle, full_matrices=False)
     if sizes[0] == 0:
         return None
     way = (points - middle) @ along

@@ -5,28 +5,61 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 
 from antennate.control.checked import CheckedController
 from antennate.control.loop import run_loop
-from antennate.control.registry import make_controller
-from antennate.errors import ConfigError, ControllerError
+from antennate.control.registry import ControllerMaker, make_controller
+from antennate.errors import ConfigError, ControllerError, SimulationError
 from antennate.experiments.tunnel.config import TunnelConfig
-from antennate.experiments.tunnel.monitor import Outcome, TrialMonitor, TrialPath, TrialResult
+from antennate.experiments.tunnel.monitor import (
+    Outcome,
+    TrialMonitor,
+    TrialPath,
+    TrialResult,
+    Watched,
+)
 from antennate.sim.scenes.registry import make_scene
-from antennate.sim.sim_robot import SimRobot
+from antennate.sim.scenes.scene import Scene
+from antennate.sim.sim_robot import Disturbance, SimRobot
 from antennate.sim.trial import draw_trial
 from antennate.sim.world import World
 from antennate.telemetry.header import Header
 from antennate.telemetry.simulated import SimulatedLog
-from antennate.types import AntennaFrame, Controller, JointCommand
+from antennate.telemetry.view.pace import Restart
+from antennate.types import AntennaFrame, Controller, JointCommand, Robot
 
 BATCH = 12
 """Trials of one process stepped in lockstep."""
 Emit = Callable[[tuple[TrialResult, TrialPath]], None]
-Watch = Callable[[World, AntennaFrame, Controller], None]
-"""Takes world, frame and controller of the first row after each tick."""
+Watch = Callable[[World, AntennaFrame, Controller], Sequence[str]]
+"""Takes world, frame and controller of the first row after each tick; returns events to log."""
+
+
+class Bodies(Robot, Protocol):
+    """Robots in rows that trials are put into: `SimRobot`, or a batch on a device."""
+
+    def load(self, row: int, world: World, chance: Disturbance) -> None:
+        """Put a fresh world into a row."""
+        ...
+
+    def unload(self, row: int) -> None:
+        """Empty a row."""
+        ...
+
+    def world(self, row: int) -> Watched:
+        """The world in a row."""
+        ...
+
+    def failure(self, row: int) -> SimulationError | None:
+        """What ended the row's simulation, if anything did."""
+        ...
+
+
+MakeBodies = Callable[[int], tuple[Scene, Bodies]]
+"""Takes the number of rows; the scene, drawn so that these robots can be put into it, and them."""
 
 
 def run_trials(
@@ -37,6 +70,8 @@ def run_trials(
     batch: int = BATCH,
     logs: Path | None = None,
     watch: Watch | None = None,
+    make: ControllerMaker = make_controller,
+    bodies: MakeBodies | None = None,
 ) -> None:
     """Run trials of one controller; emit each as it ends, and keep its log if there is a folder.
 
@@ -44,18 +79,33 @@ def run_trials(
     finite, and a maneuver that does not exist, are faults of one row and end that trial alone. An
     exception, or an array of another shape, cannot be told apart by rows: then each trial of the
     batch that has not ended begins again with a controller of its own, and is invalid if that one
-    fails too.
+    fails too. With robots of another kind, there are no logs and nothing to watch.
     """
-    rows = _Rows(config, controller, trials, emit, min(batch, len(trials)), logs, watch)
+    made = (bodies or cpu_bodies(config))(min(batch, len(trials)))
+    rows = _Rows(config, controller, trials, emit, min(batch, len(trials)), logs, watch, made)
     try:
-        rows.run()
+        rows.run(make)
+    except Restart:
+        rows.drop_logs()
+        raise
     except ControllerError as error:
         if len(trials) == 1:
             rows.end(0, "invalid", f"controller: {error}")
             return
         for trial in rows.unfinished:
             rows.log_of(trial).unlink(missing_ok=True)
-            run_trials(config, controller, [trial], emit, logs=logs)
+            run_trials(config, controller, [trial], emit, logs=logs, make=make, bodies=bodies)
+
+
+def cpu_bodies(config: TunnelConfig) -> MakeBodies:
+    """The scene as it is, and robots on the CPU."""
+    robot, period = config.robot, config.control.period
+
+    def make(batch: int) -> tuple[Scene, SimRobot]:
+        scene = make_scene(config.scene, config.tunnel)
+        return scene, SimRobot(batch, robot, period, config.physics.timestep)
+
+    return make
 
 
 class _Rows:
@@ -70,14 +120,13 @@ class _Rows:
         batch: int,
         logs: Path | None,
         watch: Watch | None,
+        made: tuple[Scene, Bodies],
     ) -> None:
         self._config, self._name, self._emit, self._batch = config, name, emit, batch
         self._folder, self._logs, self._looks = logs, dict[int, SimulatedLog](), watch
         self._waiting = list(trials)
-        self._scene = make_scene(config.scene, config.tunnel)
+        self._scene, self._robot = made
         self._monitors: list[TrialMonitor | None] = [None] * batch
-        period = config.control.period
-        self._robot = SimRobot(batch, config.robot, period, config.physics.timestep)
 
     @property
     def unfinished(self) -> list[int]:
@@ -85,8 +134,8 @@ class _Rows:
         running = [monitor.trial for monitor in self._monitors if monitor is not None]
         return sorted(running + self._waiting)
 
-    def run(self) -> None:
-        """Run all trials.
+    def run(self, make: ControllerMaker) -> None:
+        """Run all trials, with the controller that `make` makes.
 
         Raises:
             ControllerError: The controller failed as a whole; unfinished trials are left.
@@ -94,7 +143,7 @@ class _Rows:
         config = self._config
         phases = [self._place(row) for row in range(self._batch)]
         try:
-            made = make_controller(self._name, config.control, config.robot, self._batch)
+            made = make(self._name, config.control, config.robot, self._batch)
         except ConfigError as error:
             raise ControllerError(str(error)) from error
         control = CheckedController(made, config.robot, self._batch)
@@ -103,10 +152,9 @@ class _Rows:
             self._log(row, made, phase)
 
         def go_on(frame: AntennaFrame, command: JointCommand) -> bool:
-            if self._looks is not None:
-                self._looks(self._robot.world(0), frame, made)
             for log in self._logs.values():
                 log.take(frame, command)
+            self._look(frame, made)
             for row, monitor in enumerate(self._monitors):
                 if monitor is not None and self._watch(row, monitor, control) and self._waiting:
                     phase = self._place(row)
@@ -122,7 +170,7 @@ class _Rows:
         gait, period = config.control.gait, config.control.period
         start = draw_trial(config, self._scene, trial, gait, period)
         self._robot.load(row, start.world, start.chance)
-        before = start.world.outlines()[1]
+        before = self._robot.world(row).outlines()[1]
         self._monitors[row] = TrialMonitor(
             config.seed, trial, self._name, start.scene, before, config.time_limit
         )
@@ -135,8 +183,8 @@ class _Rows:
 
     def _log(self, row: int, controller: Controller, phase: float) -> None:
         """Begin the log of the trial that was put into a row."""
-        config, monitor = self._config, self._monitors[row]
-        if self._folder is None or monitor is None:
+        config, monitor, world = self._config, self._monitors[row], self._robot.world(row)
+        if self._folder is None or monitor is None or not isinstance(world, World):
             return
         header = Header(
             controller=self._name,
@@ -146,8 +194,23 @@ class _Rows:
             trial=monitor.trial,
             phase=phase,
         )
-        world, path = self._robot.world(row), self.log_of(monitor.trial)
+        path = self.log_of(monitor.trial)
         self._logs[row] = SimulatedLog(path, header, controller, world, row)
+
+    def _look(self, frame: AntennaFrame, controller: Controller) -> None:
+        """Let somebody look at the first row after a tick, and keep the events in the logs."""
+        world = self._robot.world(0) if self._looks is not None else None
+        if self._looks is None or not isinstance(world, World):
+            return
+        for text in self._looks(world, frame, controller):
+            for log in self._logs.values():
+                log.event(text)
+
+    def drop_logs(self) -> None:
+        """Remove the logs of trials that are given up."""
+        for log in self._logs.values():
+            log.close()
+            log.path.unlink(missing_ok=True)
 
     def _watch(self, row: int, monitor: TrialMonitor, control: CheckedController) -> bool:
         """Look at a row after a tick; whether its trial has ended."""

@@ -9,7 +9,7 @@ from pydantic import field_validator, model_validator
 from antennate.control.registry import BUILT_IN, CONTROLLERS, require_read
 from antennate.params.base import number, require_different, require_whole_steps
 from antennate.params.control import ControlParams
-from antennate.robots.spec import HARDWARE_ALONE
+from antennate.robots.readers import HARDWARE_ALONE
 from antennate.sim.trial import TrialConfig
 
 

@@ -8,9 +8,10 @@ from typing import Any
 
 from antennate.experiments.tunnel import measures
 from antennate.experiments.tunnel import run as tunnel
+from antennate.experiments.tunnel.batch import BATCH
 from antennate.messages import short_names
 from antennate.sim.scenes.registry import TUNNEL
-from antennate.studies.experiment import Experiment
+from antennate.studies.experiment import Experiment, Trials
 from antennate.studies.measures import Table, successes
 
 
@@ -82,4 +83,8 @@ EXPERIMENT = Experiment.of_folder(
     filmed=True,
     failed=lambda result: bool(_none_valid(result)),
     logged=tunnel.run,
+    trials=Trials("controller", tunnel.every, tunnel.run_rows, BATCH),
+    viewed=lambda config, on_step, on_row, view, logs: tunnel.run(
+        config, 1, on_step, on_row, logs, view
+    ),
 )

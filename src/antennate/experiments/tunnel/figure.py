@@ -16,16 +16,17 @@ from matplotlib.ticker import MaxNLocator, PercentFormatter
 
 from antennate import figures as style
 from antennate.experiments.tunnel.monitor import TrialPath, TrialResult
-from antennate.experiments.tunnel.run import TunnelOutcome
+from antennate.experiments.tunnel.run import SHOWN_TRIALS, TunnelOutcome
 from antennate.messages import short_names
 from antennate.types import Floats, Maneuver
 
-SHOWN_TRIALS = 5
-"""Trials drawn in the figure of trajectories."""
 MARGIN = 0.3
 """Shown around the scene and the robots at the end [m]."""
 FARTHEST = 1.0
 """Robots farther out than this are cut off [m]; a trial ends before, unless the physics failed."""
+
+_OUTLINE = 0.7
+"""Width of lines around the robot [points]: its antennae are thinner than that."""
 
 _OUTCOMES = {
     "success": "out after {:.1f} s",
@@ -150,9 +151,14 @@ def _draw_trial(panel: Axes, path: TrialPath) -> None:
     for maneuver, points in _stretches(path):
         colour = style.MANEUVER_COLOURS[maneuver]
         panel.plot(*points.T, color=colour, linewidth=1.4, zorder=3)
-    panel.plot(*path.links.T, color=style.INK, linewidth=2.4, alpha=0.75, zorder=4)
-    panel.plot(*path.links.T, color=style.INK, linestyle="", marker="o", markersize=3, zorder=4)
-    panel.plot(*path.links[0], color=style.INK, marker="o", markersize=5.5, zorder=5)
+    robot = PolyCollection(
+        [part.tolist() for part in path.parts],
+        facecolors=style.INK,
+        edgecolors=style.INK,
+        linewidths=_OUTLINE,
+        zorder=4,
+    )
+    panel.add_collection(robot, autolim=False)
 
 
 def _stretches(path: TrialPath) -> Iterator[tuple[Maneuver, Floats]]:
@@ -165,12 +171,11 @@ def _stretches(path: TrialPath) -> Iterator[tuple[Maneuver, Floats]]:
 
 def _handles(paths: Sequence[TrialPath]) -> list[Any]:
     """What is drawn: of the scene only what it has."""
-    lines = [
+    lines: list[Any] = [
         Line2D([], [], color=colour, label=f"head, {style.MANEUVER_NAMES[maneuver]}")
         for maneuver, colour in style.MANEUVER_COLOURS.items()
     ]
-    robot = {"linewidth": 2.4, "marker": "o", "markersize": 5, "label": "robot at the end"}
-    lines.append(Line2D([], [], color=style.INK, **robot))
+    lines.append(Patch(facecolor=style.INK, label="robot at the end"))
     dashed = {"linewidth": 1.0, "linestyle": (0, (2, 2))}
     lines.append(Line2D([], [], color=style.MUTED, **dashed, label="exit"))
     walls = [Patch(facecolor=style.MUTED, label="wall")]
@@ -202,8 +207,10 @@ def summary(
         if not valid:
             continue
         time = found["restricted_mean_time_s"]
-        _interval(rate, i, found["successes"] / valid, found["wilson95"], colour)
-        _interval(mean, i, time, found["restricted_mean_time_95"] or (time, time), colour)
+        ends = found["wilson95"], found["restricted_mean_time_95"]
+        share95, time95 = ends if valid >= style.ENOUGH_TRIALS else ((), ())
+        _interval(rate, i, found["successes"] / valid, share95, colour)
+        _interval(mean, i, time, time95 or (), colour)
         exits = sorted(r.time_s for r in rows if r.controller == name and r.outcome == "success")
         inside.step(
             [0.0, *exits, time_limit],
@@ -218,7 +225,7 @@ def summary(
     counted = [f"{label}\nn = {n}" for label, n in zip(short.values(), valid, strict=True)]
     _name_lines(rate, counted)
     _name_lines(mean, list(short.values()))
-    _title_panels(rate, inside, mean, time_limit)
+    _title_panels(rate, inside, mean, time_limit, min(valid))
     if inside.lines:
         inside.legend(loc="upper right")
     return figure
@@ -232,14 +239,16 @@ def _name_lines(panel: Axes, labels: Sequence[str]) -> None:
     panel.grid(visible=False, axis="y")
 
 
-def _title_panels(rate: Axes, inside: Axes, mean: Axes, time_limit: float) -> None:
+def _title_panels(rate: Axes, inside: Axes, mean: Axes, time_limit: float, trials: int) -> None:
     rate.set(
-        xlim=(-0.02, 1.02), xlabel="trials that succeeded [%]", title="Success with Wilson 95 %"
+        xlim=(-0.02, 1.02),
+        xlabel="trials that succeeded [%]",
+        title=f"Success; {style.interval_note('Wilson 95 %', trials)}",
     )
     mean.set(
         xlim=(0, 1.02 * time_limit),
         xlabel="restricted mean time [s]",
-        title="Failures as the limit; 95 %",
+        title=f"Failures as the limit; {style.interval_note('95 %', trials)}",
     )
     inside.set(
         xlim=(0, time_limit),
@@ -253,7 +262,13 @@ def _title_panels(rate: Axes, inside: Axes, mean: Axes, time_limit: float) -> No
 
 
 def _interval(panel: Axes, at: int, value: float, ends: Sequence[float], colour: str) -> None:
+    """A value, and its interval if it has one."""
     panel.plot(
-        list(ends), [at, at], color=colour, linewidth=2.4, solid_capstyle="butt", clip_on=False
+        list(ends),
+        [at] * len(ends),
+        color=colour,
+        linewidth=2.4,
+        solid_capstyle="butt",
+        clip_on=False,
     )
     panel.plot(value, at, color=colour, marker="o", markersize=8, clip_on=False)

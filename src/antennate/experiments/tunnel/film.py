@@ -37,7 +37,7 @@ def record(
     """
     recorder, models, rows = FilmRecorder(speed), [], list[TrialResult]()
 
-    def watch(world: World, frame: AntennaFrame, control: Controller) -> None:
+    def watch(world: World, frame: AntennaFrame, control: Controller) -> tuple[()]:
         models[:] = [world.model]
         recorder.take(
             *(world.t, world.data.qpos, world.links().mean(axis=0)),
@@ -46,6 +46,7 @@ def record(
             contact=control.contact[0],
             maneuver=control.maneuver[0],
         )
+        return ()
 
     run_trials(config, controller, [trial], lambda found: rows.append(found[0]), watch=watch)
     title = f"{label}, trial {trial}: {rows[0].outcome} ({speed:g}×)"

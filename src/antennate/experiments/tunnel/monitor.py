@@ -8,12 +8,11 @@ the episode ends, recovered, with the next such gain.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Literal, Protocol
 
 import numpy as np
 
 from antennate.sim.scenes.scene import SceneInstance
-from antennate.sim.world import World
 from antennate.types import Floats, Maneuver
 
 Outcome = Literal["success", "timeout", "left", "invalid"]
@@ -24,6 +23,36 @@ STUCK_TIME = 5.0
 """Time without such a gain after which the robot is stuck [s]."""
 _EVERY = 10
 """Ticks between two looks: 10 Hz at the usual rate."""
+
+
+class Watched(Protocol):
+    """What is looked at: `World` on the CPU, `WarpRow` in a batch on a device."""
+
+    @property
+    def t(self) -> float:
+        """Time since the start [s]."""
+        ...
+
+    @property
+    def head(self) -> Floats:
+        """Position of the head link [m], shape (3,)."""
+        ...
+
+    def obstacle_force(self) -> float:
+        """Sum of the normal forces between robot and obstacles [N] in the last physics step."""
+        ...
+
+    def links(self) -> Floats:
+        """Plan positions of the links, head first [m], shape (L, 2)."""
+        ...
+
+    def parts(self) -> list[Floats]:
+        """Polygons of all parts of the robot in plan [m], each (n, 2)."""
+        ...
+
+    def outlines(self) -> tuple[list[Floats], list[Floats]]:
+        """Polygons of all obstacles in plan [m]: those fixed, those that can move."""
+        ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,6 +103,7 @@ class TrialPath:
         after: The same at the end.
         exit: Ends of the exit line [m], shape (2, 2).
         links: The robot's links at the end [m], shape (L, 2).
+        parts: All parts of the robot at the end, legs and antennae included, polygons likewise.
     """
 
     t: Floats
@@ -84,6 +114,7 @@ class TrialPath:
     after: list[Floats]
     exit: Floats
     links: Floats
+    parts: list[Floats]
 
 
 @dataclass
@@ -114,13 +145,13 @@ class TrialMonitor:
     _samples: list[tuple[float, float, float, int]] = field(default_factory=list)
     _counts: list[int] = field(default_factory=lambda: [0] * len(Maneuver))
 
-    def watch(self, world: World, maneuver: int, failed: bool) -> Outcome | None:
+    def watch(self, world: Watched, maneuver: int, failed: bool) -> Outcome | None:
         """Look at the world after a tick; the outcome once there is one."""
         if failed:
             return "invalid"
         self._counts[maneuver] += 1
         self._ticks += 1
-        t = world.data.time
+        t = world.t
         if self._ticks % _EVERY and t < self.time_limit:
             return None
         head = world.head[:2].copy()
@@ -143,7 +174,7 @@ class TrialMonitor:
             self._is_stuck = True
             self._stuck += 1
 
-    def result(self, world: World, outcome: Outcome, reason: str) -> TrialResult:
+    def result(self, world: Watched, outcome: Outcome, reason: str) -> TrialResult:
         """The row of a trial that ended so."""
         share = np.array(self._counts) / max(1, sum(self._counts))
         forces = np.array(self._forces) if self._forces else np.zeros(1)
@@ -165,7 +196,7 @@ class TrialMonitor:
             reason=reason,
         )
 
-    def path(self, world: World) -> TrialPath:
+    def path(self, world: Watched) -> TrialPath:
         """The trial as a figure draws it."""
         samples = np.array(self._samples).reshape(-1, 4)
         fixed, after = world.outlines()
@@ -178,4 +209,5 @@ class TrialMonitor:
             after=after,
             exit=self.scene.exit,
             links=world.links().copy(),
+            parts=world.parts(),
         )

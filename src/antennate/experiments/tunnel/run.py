@@ -2,25 +2,34 @@
 
 from __future__ import annotations
 
+import functools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from antennate.control.registry import make_controller
-from antennate.errors import ConfigError
+from antennate.errors import ConfigError, WorkerError
 from antennate.experiments.tunnel import measures
-from antennate.experiments.tunnel.batch import run_trials
+from antennate.experiments.tunnel.batch import Emit, run_trials
 from antennate.experiments.tunnel.config import TunnelConfig
 from antennate.experiments.tunnel.monitor import TrialPath, TrialResult
 from antennate.sim.scenes.registry import TUNNEL
 from antennate.sim.trial import check_start
-from antennate.studies.experiment import OnRow, OnStep, no_row, no_step
-from antennate.studies.pool import run_tasks
+from antennate.sim.world import World
+from antennate.studies.experiment import OnRow, OnStep, Trial, no_row, no_step
+from antennate.studies.pool import gather
+from antennate.studies.work import Failure
+from antennate.telemetry.view.pace import Restart
+from antennate.telemetry.view.simulation import SimulationView
+from antennate.types import AntennaFrame, Controller, Maneuver
 
 _TASK = 12
 """Most trials handed to a process at once."""
+SHOWN_TRIALS = 5
+"""Trials of which the figure draws the paths; those of the others are not kept."""
+_Found = tuple[TrialResult, TrialPath | None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,13 +76,98 @@ def check(config: TunnelConfig) -> None:
             raise ConfigError(f"--controllers: {error}") from error
 
 
-_Task = tuple[TunnelConfig, str, list[int], Path | None]
-"""Configuration, name of the controller, trials, folder for their logs."""
+def every(config: TunnelConfig) -> list[Trial]:
+    """All trials, controller by controller."""
+    return [(name, trial) for name in config.controllers for trial in range(config.trials)]
 
 
-def _run_task(task: _Task, emit: Callable[[Any], None]) -> None:
-    config, name, trials, logs = task
-    run_trials(config, name, trials, emit, logs=logs)
+def run_rows(
+    config: TunnelConfig, trials: Sequence[Trial], emit: Callable[[int, Any], None]
+) -> None:
+    """Run some trials; emit the index and the row of each."""
+    _run([(config, *trial, None) for trial in trials], lambda i, found: emit(i, found[0]))
+
+
+RunTrials = Callable[[TunnelConfig, str, Sequence[int], Emit], None]
+"""Runs trials of one controller, and emits each as it ends."""
+_Task = tuple[TunnelConfig, str, int, Path | None]
+"""Configuration, name of the controller, trial, folder for its log."""
+
+
+def _run(
+    tasks: Sequence[_Task], emit: Callable[[int, _Found], None], run: RunTrials | None = None
+) -> None:
+    """Run trials, those of one controller in lockstep."""
+    places = {(name, trial): i for i, (_, name, trial, _) in enumerate(tasks)}
+    config, _, _, logs = tasks[0]
+    for name in dict.fromkeys(name for name, _ in places):
+        numbers = [trial for controller, trial in places if controller == name]
+
+        def take(item: tuple[TrialResult, TrialPath]) -> None:
+            row, path = item
+            shown = path if row.trial < SHOWN_TRIALS else None
+            emit(places[row.controller, row.trial], (row, shown))
+
+        if run is None:
+            run_trials(config, name, numbers, take, logs=logs)
+        else:
+            run(config, name, numbers, take)
+
+
+def _run_batched(
+    tasks: Sequence[_Task], emit: Callable[[int, _Found], None], device: str | None
+) -> None:
+    """The same on a GPU.
+
+    Raises:
+        ConfigError: There is none, or logs are wanted.
+    """
+    from antennate.experiments.tunnel.warp import run_trials_on_warp
+
+    if tasks[0][3] is not None:
+        raise ConfigError("--log: expected another engine, found warp, which keeps no logs")
+    _run(tasks, emit, functools.partial(run_trials_on_warp, device=device))
+
+
+def _lost(config: TunnelConfig, trial: Trial, failure: Failure) -> _Found:
+    """What is told of a trial whose worker died, or that did not end."""
+    if failure.status == "failed":
+        raise failure.error or WorkerError(f"a worker failed: {failure.reason}")
+    name, number = trial
+    shares = {f"share_{m.name.lower()}": 0.0 for m in Maneuver}
+    row = TrialResult(
+        seed=config.seed,
+        trial=number,
+        controller=name,
+        outcome="invalid",
+        time_s=config.time_limit,
+        progress_m=0.0,
+        stuck=0,
+        recovered=0,
+        **shares,
+        force_mean_n=0.0,
+        force_max_n=0.0,
+        reason=failure.reason,
+    )
+    return row, None
+
+
+def _run_viewed(
+    config: TunnelConfig, name: str, trial: int, emit: Emit, logs: Path | None, view: SimulationView
+) -> None:
+    """One trial on a page; begun anew with another seed whenever a person wants that."""
+
+    def watch(world: World, frame: AntennaFrame, control: Controller) -> Sequence[str]:
+        return view.tick(world.model, world.data, frame, control)
+
+    while True:
+        view.begin(f"{name}, trial {trial}", config.seed)
+        try:
+            run_trials(config, name, [trial], emit, logs=logs, watch=watch, make=view.controller)
+        except Restart as wish:
+            config = config.model_copy(update={"seed": wish.seed})
+        else:
+            return
 
 
 def run(
@@ -82,31 +176,39 @@ def run(
     on_step: OnStep = no_step,
     on_row: OnRow = no_row,
     logs: Path | None = None,
+    view: SimulationView | None = None,
 ) -> TunnelOutcome:
     """Run all trials of all controllers, with the log of each in a folder if one is given.
+
+    With a view they run in this process, one after the other, and give the same.
 
     Raises:
         LogError: A log cannot be written.
         SceneError: A scene cannot be built as described.
-        WorkerError: A worker process died.
+        WorkerError: A worker process failed.
     """
-    total = config.trials * len(config.controllers)
-    size = max(1, min(_TASK, math.ceil(total / (3 * workers))))
-    chunks = [
-        list(range(first, min(first + size, config.trials)))
-        for first in range(0, config.trials, size)
-    ]
-    tasks = [(config, name, chunk, logs) for name in config.controllers for chunk in chunks]
-    found: list[tuple[TrialResult, TrialPath]] = []
+    trials = every(config)
+    size = max(1, min(_TASK, math.ceil(len(trials) / (3 * workers))))
+    found: list[_Found] = []
 
-    def take(item: tuple[TrialResult, TrialPath]) -> None:
+    def take(item: _Found) -> None:
         found.append(item)
         on_row(item[0])
-        on_step(len(found), total)
 
     interrupted = False
     try:
-        run_tasks(_run_task, tasks, workers, take)
+        if view is None:
+            gather(
+                *(_run, [(config, *trial, logs) for trial in trials], workers, on_step, take),
+                chunk=size,
+                together=True,
+                batched=_run_batched,
+                lost=lambda place, failure: _lost(config, trials[place], failure),
+            )
+        else:
+            for done, trial in enumerate(trials, start=1):
+                _run_viewed(config, *trial, take, logs, view)
+                on_step(done, len(trials))
     except KeyboardInterrupt:
         interrupted = True
     order = {name: i for i, name in enumerate(config.controllers)}
@@ -114,6 +216,6 @@ def run(
     return TunnelOutcome(
         config=config,
         rows=[row for row, _ in found],
-        paths={(row.controller, row.trial): path for row, path in found},
+        paths={(row.controller, row.trial): path for row, path in found if path is not None},
         interrupted=interrupted,
     )

@@ -8,7 +8,7 @@ from typing import Any
 from antennate.experiments.wall import measures
 from antennate.experiments.wall import run as wall
 from antennate.sim.chain import require_solver
-from antennate.studies.experiment import Experiment
+from antennate.studies.experiment import Experiment, Trials
 from antennate.studies.measures import Table, successes
 
 
@@ -47,5 +47,9 @@ def _hangs(result: Mapping[str, Any]) -> str:
 
 
 EXPERIMENT = Experiment.of_folder(
-    __name__, wall.WallConfig, wall.run, tables, sentence, filmed=True, check=require_solver
+    *(__name__, wall.WallConfig, wall.run, tables, sentence),
+    filmed=True,
+    trials=Trials("profile", wall.every, wall.run_rows),
+    viewed=lambda config, on_step, on_row, view, logs: wall.run(config, 1, on_step, on_row, view),
+    check=require_solver,
 )

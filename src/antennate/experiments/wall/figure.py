@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.patches import Circle
 
 from antennate import figures as style
 from antennate.experiments.wall.outcome import Traverse, WallTrial
@@ -59,12 +60,15 @@ def _draw_outcomes(panel: Axes, profiles: Mapping[str, Mapping[str, Any]], title
         floor += shares
     for place, profile in zip(places, profiles.values(), strict=True):
         low, high = profile["wilson95"]
-        panel.plot([place, place], [low, high], color=style.INK, linewidth=1.4)
+        if profile["trials"] >= style.ENOUGH_TRIALS:
+            panel.plot([place, place], [low, high], color=style.INK, linewidth=1.4)
     labels = [
         f"{name.replace('_', chr(10))}\n{profile['trials']}" for name, profile in profiles.items()
     ]
     panel.set_xticks(places, labels)
-    panel.set(title=f"{title}; bars: Wilson 95 % of success", ylim=(0, 1.02))
+    trials = min(profile["trials"] for profile in profiles.values())
+    note = style.interval_note("bars: Wilson 95 % of success", trials)
+    panel.set(title=f"{title}; {note}", ylim=(0, 1.02))
     panel.grid(axis="x", visible=False)
 
 
@@ -105,6 +109,14 @@ def sticks(rows: Sequence[WallTrial], border: float) -> Figure:
     return figure
 
 
+def _draw_boulders(panel: Axes, seen: Traverse) -> None:
+    """The boulders that the antenna could have reached."""
+    along = seen.shapes[..., 1]
+    reached = (seen.boulders[:, 1] > along.min()) & (seen.boulders[:, 1] < along.max())
+    for x, y, radius in (1e3 * seen.boulders[reached]).tolist():
+        panel.add_patch(Circle((x, y), radius, color=style.MUTED, linewidth=0))
+
+
 @style.styled
 def passages(examples: Mapping[str, Traverse]) -> Figure:
     """The first trial of every profile: advance of the tip, and shapes along the wall.
@@ -114,16 +126,14 @@ def passages(examples: Mapping[str, Traverse]) -> Figure:
     """
     figure = style.canvas(2.2 * len(examples) + 0.8, 5.2)
     panels = figure.subplots(2, len(examples), squeeze=False, height_ratios=(1, 1.3))
-    colours = style.series(len(examples))
-    for (profile, seen), colour, (above, below) in zip(
-        examples.items(), colours, panels.T, strict=True
-    ):
+    for (profile, seen), (above, below) in zip(examples.items(), panels.T, strict=True):
+        colour = style.PROFILE_LOOKS[profile][0]
         above.plot(1e3 * seen.base, 1e3 * seen.tip, color=colour)
         above.plot([0, 1e3 * seen.base[-1]], [0, 1e3 * seen.base[-1]], color=style.FAINT, zorder=0)
         above.set(title=profile.replace("_", " "), xlabel="travel of the base [mm]")
         for shape in seen.shapes:
             below.plot(*(1e3 * shape.T), color=colour, linewidth=1.0)
-        below.axvline(0, color=style.MUTED, linewidth=1.0)
+        _draw_boulders(below, seen)
         below.set_aspect("equal")
         below.set(xlabel="from the crests [mm]")
     panels[0, 0].set_ylabel("advance of the tip [mm]")

@@ -60,7 +60,9 @@ class Traverse:
         force: Contact force [N], shape (n,).
         flex: Flex under the flex sensor [rad], shape (n,).
         hinges: Hinge angles [rad], shape (t, n).
-        shapes: Hinges and tip in the plane [m] at every tenth of the travel, shape (11, n + 1, 2).
+        shapes: Hinges and tip in the plane [m], x from the crests on, at every tenth of the travel,
+            shape (11, n + 1, 2).
+        boulders: Middle and radius of each boulder in the same plane [m], shape (k, 3).
     """
 
     base: Floats
@@ -70,6 +72,7 @@ class Traverse:
     flex: Floats
     hinges: Floats
     shapes: Floats
+    boulders: Floats
 
 
 def classify(wall: WallParams, seed: int, trial: int, profile: str, seen: Traverse) -> WallTrial:

@@ -10,7 +10,7 @@ is counted once more without the `start`. A trial that does both counts as a jam
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -18,7 +18,7 @@ import numpy as np
 from pydantic import model_validator
 
 from antennate.antenna.statics import PROFILES, Profile, with_profile
-from antennate.errors import SimulationError
+from antennate.errors import SimulationError, WorkerError
 from antennate.experiments.wall import measures
 from antennate.experiments.wall.outcome import SAMPLE_PERIOD, Traverse, WallTrial, classify
 from antennate.params.base import Params, number, require_different
@@ -28,8 +28,11 @@ from antennate.robots.antenna import AntennaSpec
 from antennate.robots.sensor import SensorParams
 from antennate.sim import chain
 from antennate.sim.bench import Ball, Bench, compile_bench
-from antennate.studies.experiment import OnRow, OnStep, no_row, no_step
+from antennate.studies.experiment import OnRow, OnStep, Trial, no_row, no_step
 from antennate.studies.pool import gather
+from antennate.studies.work import Failure
+from antennate.telemetry.view.pace import Restart
+from antennate.telemetry.view.simulation import SimulationView
 from antennate.types import Floats
 
 REFERENCE: Profile = "descending"
@@ -130,9 +133,7 @@ def _unwatched(bench: Bench) -> None:
     """Look at nothing."""
 
 
-def passage(
-    config: WallConfig, profile: Profile, trial: int, watch: Watch = _unwatched
-) -> Traverse:
+def passage(config: WallConfig, profile: str, trial: int, watch: Watch = _unwatched) -> Traverse:
     """Move one antenna along the wall.
 
     Args:
@@ -154,31 +155,39 @@ def passage(
     phase = rng.uniform(0.0, 1.0) * wall.sphere_diameter
     antenna = with_profile(config.antenna, profile)
     antenna = antenna.model_copy(update={"friction": min(friction, 2.0)})
-    balls = _spheres(config, antenna, angle, phase)
-    pull = (0.0, {"down": -_GRAVITY, "up": _GRAVITY, "off": 0.0}[wall.gravity])
     crest = antenna.length * math.sin(angle) + antenna.radius + _CLEAR
+    balls = _boulders(wall, antenna, angle, phase, crest)
+    pull = (0.0, {"down": -_GRAVITY, "up": _GRAVITY, "off": 0.0}[wall.gravity])
     way = (math.pi / 2 - angle, overlap + _CLEAR, crest)
     if config.solver == "chain":
         fast = chain.ChainBench(config.physics, antenna, balls, pull, factors=factors)
-        return _drive_chain(config, antenna, fast, *way)
+        return _drive_chain(config, antenna, fast, balls, *way)
     model = compile_bench(config.physics, antenna, balls, pull)
     for i, factor in enumerate(factors):
         joint = model.joint(f"antenna/hinge{i}")
         joint.stiffness *= factor
-    return _drive(config, Bench(model, antenna), *way, watch)
+    return _drive(config, Bench(model, antenna), balls, *way, watch)
 
 
-def _spheres(config: WallConfig, antenna: AntennaSpec, angle: float, phase: float) -> list[Ball]:
+def _boulders(
+    wall: WallParams, antenna: AntennaSpec, angle: float, phase: float, crest: float
+) -> list[Ball]:
     """Spheres all along the way, their crests clear of the tip at first."""
-    wall, pitch = config.wall, config.wall.sphere_diameter
-    x = antenna.length * math.sin(angle) + antenna.radius + _CLEAR + pitch / 2
+    pitch = wall.sphere_diameter
     below = -2 * pitch - max(0.0, -antenna.length * math.cos(angle))
     above = wall.travel + 1.2 * antenna.length
-    return [Ball(x, float(y), pitch / 2) for y in np.arange(below + phase, above, pitch)]
+    heights = np.arange(below + phase, above, pitch)
+    return [Ball(crest + pitch / 2, float(y), pitch / 2) for y in heights]
 
 
 def _drive(
-    config: WallConfig, bench: Bench, base: float, approach: float, crest: float, watch: Watch
+    config: WallConfig,
+    bench: Bench,
+    balls: Sequence[Ball],
+    base: float,
+    approach: float,
+    crest: float,
+    watch: Watch,
 ) -> Traverse:
     wall = config.wall
     bench.place(0.0, 0.0, base)
@@ -205,13 +214,20 @@ def _drive(
             hinges.append(bench.hinges().copy())
     base_y, tip_y, touching, forces, flex = np.array(rows, float).T
     from_crest = np.array(shapes) - [crest, 0.0]
-    return Traverse(base_y, tip_y, touching, forces, flex, np.array(hinges), from_crest)
+    shown = _about(balls, crest)
+    return Traverse(base_y, tip_y, touching, forces, flex, np.array(hinges), from_crest, shown)
+
+
+def _about(balls: Sequence[Ball], crest: float) -> Floats:
+    """Centres of spheres from the crest on, and their radii [m], shape (n, 3)."""
+    return np.array([(ball.x - crest, ball.y, ball.radius) for ball in balls])
 
 
 def _drive_chain(
     config: WallConfig,
     antenna: AntennaSpec,
     bench: chain.ChainBench,
+    balls: Sequence[Ball],
     base: float,
     approach: float,
     crest: float,
@@ -235,6 +251,7 @@ def _drive_chain(
         seen.hinges[:, : antenna.sensed_hinges].sum(axis=1),
         seen.hinges,
         went[sorted(_marks(path))].joints - [crest, 0.0],
+        _about(balls, crest),
     )
 
 
@@ -248,18 +265,61 @@ def _ramp(length: float, speed: float) -> list[float]:
     return (length * np.arange(1, count + 1) / count).tolist()
 
 
+_Task = tuple[WallConfig, str, int]
+
+
+def _invalid(
+    config: WallConfig, profile: str, trial: int, reason: str
+) -> tuple[WallTrial, Traverse | None]:
+    none = [math.nan] * 7
+    row = WallTrial(config.seed, trial, profile, "invalid", "invalid", *none, reason=reason)
+    return row, None
+
+
+def every(config: WallConfig) -> list[Trial]:
+    """All trials, number by number."""
+    return [(profile, trial) for trial in range(config.trials) for profile in config.profiles]
+
+
+def run_rows(config: WallConfig, trials: Sequence[Trial], emit: Callable[[int, Any], None]) -> None:
+    """Run some trials; emit the index and the row of each."""
+    for i, (profile, trial) in enumerate(trials):
+        emit(i, run_trial(config, profile, trial)[0])
+
+
 def run_trial(
-    config: WallConfig, profile: Profile, trial: int
+    config: WallConfig, profile: str, trial: int, watch: Watch = _unwatched
 ) -> tuple[WallTrial, Traverse | None]:
     """One trial, and of the first of a profile its passage."""
     try:
-        seen = passage(config, profile, trial)
+        seen = passage(config, profile, trial, watch)
     except SimulationError as error:
-        none = [math.nan] * 7
-        row = WallTrial(config.seed, trial, profile, "invalid", "invalid", *none, reason=str(error))
-        return row, None
+        return _invalid(config, profile, trial, str(error))
     row = classify(config.wall, config.seed, trial, profile, seen)
     return row, seen if trial == 0 else None
+
+
+def _run_viewed(
+    tasks: Sequence[_Task], on_step: OnStep, on_row: OnRow, view: SimulationView
+) -> Iterator[tuple[WallTrial, Traverse | None]]:
+    """All trials on a page, one after the other; with another seed whenever a person wants that."""
+
+    def watch(bench: Bench) -> None:
+        view.tick(bench.model, bench.data)
+
+    for done, (config, profile, trial) in enumerate(tasks, start=1):
+        seed = config.seed
+        while True:
+            view.begin(f"{profile}, trial {trial}", seed)
+            changed = config.model_copy(update={"seed": seed})
+            try:
+                found = run_trial(changed, profile, trial, watch)
+                break
+            except Restart as wish:
+                seed = wish.seed
+        on_row(found[0])
+        on_step(done, len(tasks))
+        yield found
 
 
 def run(
@@ -267,18 +327,30 @@ def run(
     workers: int = 1,
     on_step: OnStep = no_step,
     on_row: OnRow = no_row,
+    view: SimulationView | None = None,
 ) -> WallOutcome:
     """Run all trials of all profiles.
 
+    With a view they run in this process, one after the other, and give the same.
+
     Raises:
         MissingPackageError: The solver needs a package that is not installed.
-        WorkerError: A worker process died.
+        WorkerError: A worker process failed.
     """
     chain.warm_up(config.solver)
-    tasks = [
-        (config, profile, trial) for trial in range(config.trials) for profile in config.profiles
-    ]
-    found = gather(run_trial, tasks, workers, on_step, lambda item: on_row(item[0]))
+    trials = every(config)
+    tasks: list[_Task] = [(config, *trial) for trial in trials]
+
+    def lost(place: int, failure: Failure) -> tuple[WallTrial, Traverse | None]:
+        if failure.status == "failed":
+            raise failure.error or WorkerError(f"a worker failed: {failure.reason}")
+        return _invalid(config, *trials[place], failure.reason)
+
+    if view is None:
+        how = {"on_result": lambda item: on_row(item[0]), "lost": lost}
+        found = gather(run_trial, tasks, workers, on_step, **how)
+    else:
+        found = list(_run_viewed(tasks, on_step, on_row, view))
     found.sort(key=lambda item: config.profiles.index(item[0].profile))
     examples = {row.profile: seen for row, seen in found if seen is not None}
     return WallOutcome(config, [row for row, _ in found], examples)

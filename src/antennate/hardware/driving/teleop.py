@@ -19,7 +19,8 @@ from antennate.params.base import paths_of
 from antennate.params.control import ControlParams, EscapeParams, RepetitionParams
 from antennate.params.dead_man import DeadManParams
 from antennate.params.setup import TeleopParams
-from antennate.robots.spec import SIMULATION_ALONE, RobotSpec
+from antennate.robots.readers import SIMULATION_ALONE
+from antennate.robots.spec import RobotSpec
 from antennate.types import AntennaFrame, Bools, Contact, Floats, Ints, JointCommand, Maneuver
 
 KEYS = {

@@ -6,7 +6,8 @@ from typing import ClassVar
 
 from antennate.params.base import Params
 from antennate.params.setup import JogParams, SetupParams
-from antennate.robots.spec import SIMULATION_ALONE, RobotSpec
+from antennate.robots.readers import SIMULATION_ALONE
+from antennate.robots.spec import RobotSpec
 
 _UNREAD = (*SIMULATION_ALONE, "robot.release")
 

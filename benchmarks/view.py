@@ -1,0 +1,130 @@
+"""What a live view and a log cost: a simulated trial, and the pace of `antennate drive`.
+
+- `log`, `view`, `view_and_log`: wall time of trials with them over that without, at full speed,
+  interleaved in one process; `cpu` the same of the CPU time of that process. At most 1.05 is asked.
+- `missed_share`, `walking_missed_share`: cycles that a drive against a twin missed, with a page and
+  without one, in turn.
+
+Nothing else may run meanwhile. With `--wait` it prints the link of the page and waits for Enter, so
+that a browser draws it too; without one the page is served, but nobody looks.
+"""
+
+from __future__ import annotations
+
+import argparse
+import itertools
+import json
+import os
+import statistics
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+import pace
+
+from antennate.experiments.tunnel.batch import run_trials
+from antennate.experiments.tunnel.config import TunnelConfig
+from antennate.sim.world import World
+from antennate.telemetry.view.process import ViewProcess
+from antennate.telemetry.view.simulation import SimulationView
+from antennate.types import AntennaFrame, Controller
+
+CONTROLLER = "closed"
+CASES = {"plain": (False, False), "log": (False, True), "view": (True, False)}
+CASES |= {"view_and_log": (True, True)}
+"""Whether each case has a view, and a log."""
+
+
+def trial(config: TunnelConfig, number: int, logs: Path | None, page: ViewProcess | None) -> None:
+    """One trial, one at a time, as `tunnel --view` runs it."""
+    if page is None:
+        run_trials(config, CONTROLLER, [number], lambda found: None, logs=logs)
+        return
+    view = SimulationView(page.channel, 0.0)
+    view.begin(f"{CONTROLLER}, trial {number}", config.seed)
+
+    def watch(world: World, frame: AntennaFrame, control: Controller) -> Any:
+        return view.tick(world.model, world.data, frame, control)
+
+    kept: list[Any] = []
+    run_trials(
+        config, CONTROLLER, [number], kept.append, logs=logs, watch=watch, make=view.controller
+    )
+
+
+def simulated(trials: int, repetitions: int, wait: bool) -> dict[str, Any]:
+    """Ratios of the cases to the plain one, medians over trials."""
+    config = TunnelConfig()
+    walls: dict[str, list[float]] = {name: [] for name in CASES}
+    cpus: dict[str, list[float]] = {name: [] for name in CASES}
+    with (
+        ViewProcess(0, "antennate.cli.view_server") as page,
+        tempfile.TemporaryDirectory() as folder,
+    ):
+        if wait:
+            input("open the link, then press Enter ")
+        for number, turn in itertools.product(range(trials), range(repetitions)):
+            for name, (viewed, logged) in CASES.items():
+                logs = Path(folder) / f"{number}-{turn}-{name}"
+                logs.mkdir()
+                begin = time.monotonic(), time.process_time()
+                trial(config, number, logs if logged else None, page if viewed else None)
+                walls[name].append(time.monotonic() - begin[0])
+                cpus[name].append(time.process_time() - begin[1])
+        dropped = page.channel.dropped
+    ratios = {
+        name: {
+            "wall": statistics.median(_ratios(walls[name], walls["plain"])),
+            "cpu": statistics.median(_ratios(cpus[name], cpus["plain"])),
+        }
+        for name in CASES
+        if name != "plain"
+    }
+    return {**ratios, "dropped": dropped}
+
+
+def _ratios(times: list[float], plain: list[float]) -> list[float]:
+    return [one / other for one, other in zip(times, plain, strict=True)]
+
+
+def driven(seconds: float, pairs: int) -> dict[str, Any]:
+    """Missed cycles of drives with a page and without, in turn."""
+    found: dict[str, list[dict[str, Any]]] = {"plain": [], "view": []}
+    for _ in range(pairs):
+        found["plain"].append(pace.summary(pace.walk(seconds, 0)))
+        found["view"].append(
+            pace.summary(pace.walk(seconds, 0, more=("--view", "--view-port", "0")))
+        )
+    keys = ("missed_share", "walking_missed_share", "worst_lateness_ms")
+    return {
+        name: {key: [row.get(key) for row in rows] for key in keys} for name, rows in found.items()
+    }
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--trials", type=int, default=4)
+    parser.add_argument("--repetitions", type=int, default=5)
+    parser.add_argument("--seconds", type=float, default=20.0, help="time of each walk")
+    parser.add_argument("--pairs", type=int, default=3, help="drives with and without a page")
+    parser.add_argument("--wait", action="store_true", help="wait until a browser has the page")
+    parser.add_argument("--json", action="store_true", help="print one JSON object and no table")
+    args = parser.parse_args()
+    result: dict[str, Any] = {"cores": os.cpu_count()}
+    if args.trials:
+        result["simulated"] = simulated(args.trials, args.repetitions, args.wait)
+    if args.pairs:
+        result["driven"] = driven(args.seconds, args.pairs)
+    if args.json:
+        print(json.dumps(result))
+        return
+    for name, rows in result.items():
+        print(f"{name}: {rows}" if not isinstance(rows, dict) else name)
+        for case, values in rows.items() if isinstance(rows, dict) else ():
+            print(f"  {case}: {values}")
+
+
+if __name__ == "__main__":
+    main()

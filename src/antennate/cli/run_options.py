@@ -1,0 +1,60 @@
+"""The flags that say where trials are run, and the workers that they ask for."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+from pydantic.dataclasses import dataclass
+
+from antennate.cli.options import option
+from antennate.cli.results import ResultOptions
+from antennate.errors import ConfigError
+from antennate.messages import shortened
+from antennate.studies.engines import FORMS, LOCAL, make_engine
+from antennate.studies.pool import TIMEOUT, Workers, core_count
+
+
+@dataclass(frozen=True)
+class Options(ResultOptions):
+    """How to run; nothing here changes a result."""
+
+    workers: int | None = option(None, "processes to use, else one for each core", "INT", ge=1)
+    no_figures: bool = option(False, "draw no figures")
+    resume: bool = option(False, "go on with the run that the folder holds")
+    retry: bool = option(False, "the same, and run trials again that crashed or hung")
+    engine: str = option(LOCAL, f"where the workers are: {', '.join(FORMS)}", "ENGINE")
+    shard: str | None = option(None, "run one of N parts, for `antennate merge`", "I/N")
+    slurm: tuple[str, ...] = option((), "what SLURM is asked for, as timeout_min=60", "NAME=VALUE")
+    trial_timeout: float = option(
+        TIMEOUT, "time after which a trial is given up that has not ended [s]", gt=0
+    )
+
+
+def workers_of(options: Options, closed: bool, apart: bool) -> Workers:
+    """The workers that are asked for; see `Workers`. They are given the store later.
+
+    Raises:
+        ConfigError: The engine or the shard is nothing of the kind, or a view shows the trials.
+        MissingPackageError: The package of the engine is not installed.
+    """
+    shard, engine = _shard(options.shard), make_engine(options.engine, options.slurm)
+    for name in ("shard", "resume", "retry") if getattr(options, "view", False) else ():
+        if getattr(options, name):
+            raise ConfigError(f"--{name}: expected no --view beside it, found one")
+    if engine is not None and getattr(options, "view", False):
+        raise ConfigError(f"--engine: expected {LOCAL} beside --view, found {options.engine}")
+    how: dict[str, Any] = {"timeout": options.trial_timeout, "retry": options.retry}
+    count = options.workers or core_count()
+    return Workers(count, engine, shard=shard, closed=closed, apart=apart, **how)
+
+
+def _shard(text: str | None) -> tuple[int, int] | None:
+    """The part that is carried out, and of how many."""
+    if text is None:
+        return None
+    found = re.fullmatch(r"([0-9]{1,6})/([0-9]{1,6})", text)
+    number, count = (int(found[1]), int(found[2])) if found else (0, 0)
+    if not 1 <= number <= count:
+        raise ConfigError(f"--shard: expected I/N, I from 1 to N, found {shortened(text)}")
+    return number, count

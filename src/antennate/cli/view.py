@@ -1,0 +1,122 @@
+"""`antennate view`: a log on a page, or that of a run."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Sequence
+from pathlib import Path
+
+from pydantic.dataclasses import dataclass
+
+from antennate import experiments
+from antennate.cli import view_server
+from antennate.cli.arguments import parse
+from antennate.cli.exit_codes import OK
+from antennate.cli.options import option
+from antennate.cli.view_options import FoxgloveOptions, foxglove_of
+from antennate.errors import AntennateError, BadInputError, ConfigError
+from antennate.params.base import Params
+from antennate.sim.scenes.registry import make_scene
+from antennate.sim.trial import TrialConfig, draw_trial
+from antennate.sim.world import World
+from antennate.studies.report import command_of
+from antennate.studies.run_directory import LOG, LOGS, RunDirectory
+from antennate.telemetry.header import Header
+from antennate.telemetry.reader import LogReader
+from antennate.telemetry.view.pace import Restart
+from antennate.telemetry.view.player import LogPlayer
+from antennate.telemetry.view.process import PORT, ViewProcess
+
+DESCRIPTION = """\
+Show the log of a drive or of a simulation on a page of this computer: the robot, charts of what was
+read and decided, and a map. It works without a network; over ssh, forward the port that it tells.
+
+A run with several logs wants the name of one. Ctrl-C ends it."""
+
+
+class ViewConfig(Params):
+    """A view has no parameters."""
+
+
+@dataclass(frozen=True)
+class Options(FoxgloveOptions):
+    """What to show, and where."""
+
+    shown: Path | None = option(None, "a log, or the folder of a run", "RUN|LOG", positional=True)
+    port: int = option(PORT, "port of the page, 0 takes any", "PORT", ge=0, le=65535)
+    speed: float = option(
+        1.0, "times real time at which it begins, 0 as fast as it goes", "FLOAT", ge=0, le=100
+    )
+
+
+def command(argv: Sequence[str]) -> int:
+    """Show one log until Ctrl-C.
+
+    Raises:
+        AntennateError: There is no such log, or the page cannot be served.
+    """
+    _, options = parse("view", DESCRIPTION, ViewConfig, argv, Options)
+    if options.shown is None:
+        raise ConfigError("expected a log or the folder of a run, found none")
+    path = _log_of(options.shown)
+    with LogReader(path) as log:
+        header = log.header
+    with (
+        ViewProcess(options.port, view_server.__name__, foxglove_of(options)) as page,
+        contextlib.suppress(KeyboardInterrupt),  # that is how it ends
+    ):
+        player = LogPlayer(page.channel, header, str(path), options.speed, arena_of(path, header))
+        while not page.channel.closed:
+            with contextlib.suppress(Restart), LogReader(path) as log:
+                player.begin()
+                player.play(log)
+                _complain(player, log)
+                player.rest()
+    return OK
+
+
+def _complain(player: LogPlayer, log: LogReader) -> None:
+    """Say on the page what of a log could not be read."""
+    if log.bad or log.missing:
+        player.say(f"{log.bad} damaged places, {log.missing} ticks missing in this log")
+
+
+def _log_of(path: Path) -> Path:
+    """The log that is meant.
+
+    Raises:
+        BadInputError: There is none, or more than one.
+    """
+    if not path.is_dir():
+        return path
+    logs = sorted((path / LOGS).glob("*.mcap")) or [each for each in [path / LOG] if each.exists()]
+    if not logs:
+        raise BadInputError(
+            f"{path}: expected a run with a log, found none; --log keeps those of a simulation"
+        )
+    if len(logs) > 1:
+        names = ", ".join(str(each) for each in logs[:3])
+        raise BadInputError(
+            f"{path}: expected a run with one log, found {len(logs)}; name one of {names}, …"
+        )
+    return logs[0]
+
+
+def arena_of(path: Path, header: Header) -> World | None:
+    """The world of a trial as its run has it, None where no run tells."""
+    if header.trial is None or path.parent.name != LOGS:
+        return None
+    try:
+        run = RunDirectory.open(path.parent.parent)
+        name = command_of(run)
+        model = experiments.load(name).config if name in experiments.names() else None
+        if model is None or not issubclass(model, TrialConfig):
+            return None
+        config = run.config(model)
+        gait, period = header.params.gait, header.params.period
+        seed = config.seed if header.seed is None else header.seed
+        config = config.model_copy(update={"seed": seed})
+        scene = make_scene(config.scene, config.tunnel)
+        return draw_trial(config, scene, header.trial, gait, period).world
+    except AntennateError:
+        return None  # the log is shown all the same, on a bare floor

@@ -1,0 +1,116 @@
+"""The flags of a live view, and the view that they ask for."""
+
+from __future__ import annotations
+
+import contextlib
+import sys
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+from pydantic.dataclasses import dataclass
+
+from antennate.cli import view_server
+from antennate.cli.options import option
+from antennate.errors import ConfigError
+from antennate.studies.run_directory import BY_HAND, RunDirectory
+from antennate.telemetry.view.foxglove import PORT as FOXGLOVE_PORT
+from antennate.telemetry.view.process import PORT, ViewProcess
+from antennate.telemetry.view.simulation import SimulationView
+
+
+@dataclass(frozen=True)
+class FoxgloveOptions:
+    """Whether other tools may read along."""
+
+    foxglove: bool = option(False, "serve its topics live for Foxglove and Lichtblick, unchecked")
+    foxglove_port: int = option(
+        FOXGLOVE_PORT, "port for these, 0 takes any", "PORT", ge=0, le=65535
+    )
+
+
+@dataclass(frozen=True)
+class PageOptions(FoxgloveOptions):
+    """Where the page is."""
+
+    view: bool = option(False, "show it on a page of this computer while it runs")
+    view_port: int = option(PORT, "port of that page, 0 takes any", "PORT", ge=0, le=65535)
+
+
+@dataclass(frozen=True)
+class ViewOptions(PageOptions):
+    """The same where time is simulated."""
+
+    view_paused: bool = option(False, "--view begins paused, so that nothing is missed")
+    view_speed: float = option(
+        1.0, "times real time at which --view begins, 0 as fast as it goes", "FLOAT", ge=0, le=100
+    )
+
+
+def foxglove_of(options: FoxgloveOptions) -> int | None:
+    """The port for Foxglove, None without it.
+
+    Raises:
+        ConfigError: A port is named, but it is not wanted.
+    """
+    if not options.foxglove and options.foxglove_port != FOXGLOVE_PORT:
+        raise ConfigError("--foxglove-port: expected --foxglove beside it, found none")
+    return options.foxglove_port if options.foxglove else None
+
+
+def page_of(options: PageOptions) -> ViewProcess | None:
+    """The process of the page that is wanted, None of none; it is to be closed.
+
+    Raises:
+        ConfigError: Something is said of a page that is not wanted.
+        AntennateError: It cannot be served.
+    """
+    foxglove = foxglove_of(options)
+    if not options.view and options.view_port != PORT:
+        raise ConfigError("--view-port: expected --view beside it, found none")
+    if not options.view and getattr(options, "view_paused", False):
+        raise ConfigError("--view-paused: expected --view beside it, found none")
+    if not (options.view or options.foxglove) and getattr(options, "view_speed", 1.0) != 1.0:
+        raise ConfigError("--view-speed: expected --view or --foxglove beside it, found none")
+    if not options.view and foxglove is None:
+        return None
+    return ViewProcess(options.view_port if options.view else None, view_server.__name__, foxglove)
+
+
+@contextlib.contextmanager
+def view_of(options: Any) -> Iterator[SimulationView | None]:
+    """The view of a simulation, None if none is wanted.
+
+    Raises:
+        AntennateError: As `page_of`.
+    """
+    process = page_of(options) if isinstance(options, ViewOptions) else None
+    if process is None or not isinstance(options, ViewOptions):
+        yield None
+        return
+    with process:
+        speed, paused = options.view_speed, options.view_paused
+        yield SimulationView(process.channel, speed, paused=paused)
+
+
+def require_one_worker(options: Any) -> None:
+    """Check that no processes are asked for beside a view.
+
+    Raises:
+        ConfigError: Some are.
+    """
+    workers = getattr(options, "workers", None)
+    shown = getattr(options, "view", False) or getattr(options, "foxglove", False)
+    if shown and workers not in (None, 1):
+        raise ConfigError(
+            "--workers: expected 1 beside --view or --foxglove, which show one trial at a time, "
+            f"found {workers}"
+        )
+
+
+def say_by_hand(lines: Sequence[str], run: RunDirectory) -> None:
+    """Keep what a person changed in the run, and say so."""
+    if not lines:
+        return
+    head = "Changed by hand while it ran: this run does not follow from its configuration."
+    run.write(BY_HAND, "\n".join([head, *lines]) + "\n")
+    sys.stderr.write(f"changed by hand, so not reproducible: {run.path / BY_HAND}\n")

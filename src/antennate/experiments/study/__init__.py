@@ -1,0 +1,6 @@
+"""Run an experiment at many points of its parameters: a grid, a list, a random or a Sobol plan.
+
+FILE is a TOML file that names the experiment, what is varied and how; `studies/` holds ours. The
+folder of a study is continued without being asked: a study that was killed goes on where it was
+when the same command is given again. A trial that crashes or never ends is a row with a status.
+"""

@@ -1,0 +1,97 @@
+"""What `antennate study` is told."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+from pydantic.fields import FieldInfo
+
+from antennate.params.base import Params, number
+from antennate.studies.plan import Axes, Kind, Point, Range, make_points
+
+
+class StudyConfig(Params):
+    """Everything that decides the outcome of `antennate study`."""
+
+    experiment: str = number(
+        "tunnel", "1", "assumed: the question of the paper", examples=["tunnel", "wall"]
+    )
+    """Experiment that is run at each point, or a function trial(config, seed) as MODULE:NAME."""
+    plan: Kind = number("grid", "1", "assumed: every combination is what a map needs")
+    """How points are chosen: grid, list, random, sobol or morris."""
+    points: int = number(16, "1", "assumed: a power of 2, as Sobol's points need", ge=1, le=100000)
+    """Points of random and sobol, trajectories of morris."""
+    seed: int = number(0, "1", "assumed: any", ge=0)
+    """Seed of the plan; trials have that of their experiment."""
+    trials: int | None = number(
+        None, "1", "assumed: as many as the experiment has by itself", ge=1, le=100000
+    )
+    """Trials at each point."""
+    response: str | None = number(None, "1", "assumed: the share of successes if there is one")
+    """Column of the rows whose mean is compared between points."""
+    settings: dict[str, Any] = number({}, "1", "assumed: the defaults of the experiment")
+    """Parameters of the experiment that are the same at all points."""
+    vary: dict[str, tuple[Any, ...] | Range] = number({}, "1", "assumed: nothing varies")
+    """Parameters that vary, by dotted name: a list of values, or low and high of a range."""
+    assumed: float | None = number(
+        None, "1", "assumed: only what is named varies", gt=0, lt=1, examples=[0.2]
+    )
+    """Vary every assumed number of the experiment by this share of its default, up and down."""
+    leave_out: tuple[str, ...] = number((), "1", "assumed: none is left out")
+    """Assumed numbers that do not vary, or all of a group."""
+
+    def points_of(self, model: type[Params] | None) -> list[Point]:
+        """All points, in order.
+
+        Raises:
+            ConfigError: The plan is empty or cannot be made.
+        """
+        return make_points(self.plan, self.axes(model), self.points, self.seed)
+
+    def axes(self, model: type[Params] | None) -> Axes:
+        """What varies: what is named, and the assumed numbers of the experiment if asked for."""
+        found: dict[str, Any] = dict(self.vary)
+        if self.assumed is not None and model is not None:
+            for name, range_ in assumed_ranges(model, self.assumed):
+                left_out = any(f"{name}.".startswith(f"{group}.") for group in self.leave_out)
+                if not left_out and name not in found:
+                    found[name] = range_
+        return found
+
+
+def assumed_ranges(model: type[Params], share: float) -> Iterator[tuple[str, Range]]:
+    """Each number of a configuration whose source is an assumption, with a range around it.
+
+    Numbers that are 0 by default, whole numbers and lists have no such range: a study names them.
+    """
+    for name, value, field in assumed_fields(model()):
+        if isinstance(value, float) and value != 0.0 and name not in model.unread:
+            ends = sorted((value * (1.0 - share), value * (1.0 + share)))
+            low, high = _bounds(field)
+            yield name, Range(low=max(ends[0], low), high=min(ends[1], high))
+
+
+def assumed_fields(group: Params, path: str = "") -> Iterator[tuple[str, Any, FieldInfo]]:
+    """Dotted name, value and field of each parameter whose source is an assumption."""
+    for name, field in type(group).model_fields.items():
+        value = getattr(group, name)
+        extra = field.json_schema_extra if isinstance(field.json_schema_extra, dict) else {}
+        if isinstance(value, Params):
+            yield from assumed_fields(value, f"{path}{name}.")
+        elif str(extra.get("source", "")).startswith("assumed"):
+            yield path + name, value, field
+
+
+def _bounds(field: FieldInfo) -> tuple[float, float]:
+    """The least and the largest value that a field takes."""
+    low, high = -math.inf, math.inf
+    for bound in field.metadata:
+        for name, towards in (("ge", None), ("gt", math.inf)):
+            if (limit := getattr(bound, name, None)) is not None:
+                low = limit if towards is None else math.nextafter(limit, towards)
+        for name, towards in (("le", None), ("lt", -math.inf)):
+            if (limit := getattr(bound, name, None)) is not None:
+                high = limit if towards is None else math.nextafter(limit, towards)
+    return low, high

@@ -1,0 +1,165 @@
+"""Trials of an experiment at every point of a plan."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from antennate.experiments.study import measures
+from antennate.experiments.study.config import StudyConfig
+from antennate.experiments.study.subject import Rows, Subject, configurations, find
+from antennate.studies.experiment import OnRow, OnStep, Trial, no_row, no_step
+from antennate.studies.plan import Point
+from antennate.studies.pool import gather
+from antennate.studies.work import Failure
+
+STATUS, REASON = "status", "reason"
+_Task = tuple[str, int, Any, Trial]
+"""What is run, number of the point, its configuration, the trial."""
+
+
+@dataclass(frozen=True)
+class StudyOutcome:
+    """All rows, point by point.
+
+    Attributes:
+        config: What was run.
+        points: The points of the plan.
+        condition: Column that tells the condition of a row; empty without.
+        axes: Names of what varies.
+        rows: One for each trial, all with the same keys.
+        total: Trials of the whole plan.
+        interrupted: Whether some are missing.
+    """
+
+    config: StudyConfig
+    points: Sequence[Point]
+    condition: str
+    axes: Sequence[str]
+    rows: Rows
+    total: int
+    interrupted: bool = False
+
+    def result(self) -> dict[str, Any]:
+        """The content of result.json."""
+        return {
+            "schema": 1,
+            "command": "study",
+            "experiment": self.config.experiment,
+            "plan": self.config.plan,
+            "axes": list(self.axes),
+            "trials": self.total,
+            "interrupted": self.interrupted,
+            **measures.summary(self.config, self.points, self.axes, self.condition, self.rows),
+        }
+
+
+def check(config: StudyConfig) -> None:
+    """Find what cannot be run before anything is.
+
+    Raises:
+        BadInputError: There is no such experiment, a parameter is unknown, the plan is empty, or a
+            point of it is out of bounds.
+    """
+    subject = find(config.experiment)
+    (_, first), *_ = configurations(config, subject)
+    subject.check(first)
+
+
+def run(
+    config: StudyConfig,
+    workers: int = 1,
+    on_step: OnStep = no_step,
+    on_row: OnRow = no_row,
+) -> StudyOutcome:
+    """Run all trials of all points.
+
+    Raises:
+        BadInputError: As for `check`.
+        WorkerError: The workers cannot run anything.
+    """
+    subject = find(config.experiment)
+    points = configurations(config, subject)
+    tasks: list[_Task] = [
+        (config.experiment, number, configured, trial)
+        for number, (_, configured) in enumerate(points)
+        for trial in subject.every(configured)
+    ]
+    found: list[tuple[int, Rows]] = []
+
+    def lost(place: int, failure: Failure) -> tuple[int, Rows]:
+        condition, trial = tasks[place][3]
+        row = {"trial": trial, STATUS: failure.status, REASON: failure.reason}
+        return place, [({subject.condition: condition} if subject.condition else {}) | row]
+
+    def take(item: tuple[int, Rows]) -> None:
+        found.append(item)
+        for row in item[1]:
+            on_row({"point": tasks[item[0]][1], **row})
+
+    chunk = max(1, min(subject.most, math.ceil(len(tasks) / (3 * workers))))
+    numbered = [(place, *task) for place, task in enumerate(tasks)]
+    interrupted = False
+    try:
+        gather(*(_run, numbered, workers, on_step, take), chunk=chunk, together=True, lost=lost)
+    except KeyboardInterrupt:
+        interrupted = True
+    rows = _table(subject, [point for point, _ in points], tasks, found)
+    axes = list(config.axes(subject.model))
+    return StudyOutcome(
+        *(config, [point for point, _ in points], subject.condition, axes, rows, len(tasks)),
+        interrupted=interrupted,
+    )
+
+
+def _run(
+    tasks: Sequence[tuple[int, str, int, Any, Trial]],
+    emit: Callable[[int, tuple[int, Rows]], None],
+) -> None:
+    """Run some trials, those of one point at once."""
+    subject = find(tasks[0][1])
+    by_point: dict[int, list[int]] = {}
+    for index, task in enumerate(tasks):
+        by_point.setdefault(task[2], []).append(index)
+    for indices in by_point.values():
+
+        def take(i: int, rows: Rows, indices: list[int] = indices) -> None:
+            emit(indices[i], (tasks[indices[i]][0], [_with_status(row) for row in rows]))
+
+        trials = [tasks[index][4] for index in indices]
+        subject.run(tasks[indices[0]][3], trials, take)
+
+
+def _with_status(row: Mapping[str, Any]) -> dict[str, Any]:
+    """A row that says whether its numbers may be used: ok, invalid or nan."""
+    bad = [name for name, v in row.items() if isinstance(v, float) and not math.isfinite(v)]
+    status = "invalid" if row.get("outcome") == "invalid" else "nan" if bad else "ok"
+    reason = row.get(REASON) or (f"not finite: {', '.join(bad)}" if status == "nan" else "")
+    return {**row, STATUS: status, REASON: reason}
+
+
+def _table(
+    subject: Subject,
+    points: Sequence[Point],
+    tasks: Sequence[_Task],
+    found: Sequence[tuple[int, Rows]],
+) -> Rows:
+    """All rows in the order of the plan, each with the same columns."""
+    in_order = sorted(found, key=lambda item: item[0])
+    whole = [
+        {"point": tasks[place][1], **_cells(points[tasks[place][1]]), **row}
+        for place, rows in in_order
+        for row in rows
+    ]
+    columns = dict.fromkeys(name for row in whole for name in row if name not in (STATUS, REASON))
+    return [{n: row.get(n) for n in (*columns, STATUS, REASON)} for row in whole]
+
+
+def _cells(point: Point) -> dict[str, Any]:
+    """The values of a point as cells of a table: lists as text."""
+    return {
+        name: " ".join(map(str, value)) if isinstance(value, list | tuple) else value
+        for name, value in point.items()
+    }

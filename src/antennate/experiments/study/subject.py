@@ -1,0 +1,165 @@
+"""What a study runs: an experiment trial by trial, an experiment as a whole, or a function."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, is_dataclass
+from pathlib import Path
+from typing import Any, Protocol
+
+from pydantic import BaseModel, ValidationError
+
+from antennate import experiments
+from antennate.errors import BadInputError, ConfigError
+from antennate.experiments.study.config import StudyConfig
+from antennate.lookup import Registry
+from antennate.params.base import Params
+from antennate.params.reading import describe, put_over, with_bases
+from antennate.studies.experiment import Experiment, Trial, no_row, no_step
+from antennate.studies.plan import Point
+
+Rows = list[dict[str, Any]]
+FUNCTIONS: Registry[Callable[..., Any]] = Registry("trial function", "antennate.trials", {})
+"""Functions trial(config, seed) -> row: config holds the parameters by name, seed is a number."""
+
+
+class Subject(Protocol):
+    """What is run at each point.
+
+    Attributes:
+        model: Class of its configuration, None if it takes any parameters.
+        condition: Column of its rows that tells the condition; empty without.
+        most: Trials that may be run at once.
+    """
+
+    model: type[Params] | None
+    condition: str
+    most: int
+
+    def configured(self, values: Mapping[str, Any]) -> Any:
+        """Its configuration from nested values."""
+        ...
+
+    def check(self, config: Any) -> None:
+        """Raise if a configuration cannot be run."""
+        ...
+
+    def every(self, config: Any) -> Sequence[Trial]:
+        """All trials of a configuration."""
+        ...
+
+    def run(self, config: Any, trials: Sequence[Trial], emit: Callable[[int, Rows], None]) -> None:
+        """Run some trials; emit the index and the rows of each."""
+        ...
+
+
+def find(name: str) -> Subject:
+    """What a study names.
+
+    Raises:
+        BadInputError: There is no such experiment or function.
+    """
+    if name in experiments.names():
+        return _OfExperiment(experiments.load(name))
+    if ":" in name or name in FUNCTIONS.added:
+        return _OfFunction(name)
+    raise BadInputError(f"experiment: {experiments.unknown(name)}")
+
+
+def configurations(config: StudyConfig, subject: Subject) -> list[tuple[Point, Any]]:
+    """Every point with its configuration.
+
+    Raises:
+        ConfigError: A parameter is unknown, a value out of bounds, or the plan is empty.
+    """
+    settings = put_over(config.settings, {} if config.trials is None else {"trials": config.trials})
+    return [
+        (point, subject.configured(put_over(settings, nested(point))))
+        for point in config.points_of(subject.model)
+    ]
+
+
+def nested(point: Point) -> dict[str, Any]:
+    """Dotted names as nested tables."""
+    found: dict[str, Any] = {}
+    for name, value in point.items():
+        inner = value
+        for part in reversed(name.split(".")):
+            inner = {part: inner}
+        found = put_over(found, inner)
+    return found
+
+
+class _OfExperiment:
+    def __init__(self, experiment: Experiment[Any, Any]) -> None:
+        self._experiment, self._trials = experiment, experiment.trials
+        self.model: type[Params] | None = experiment.config
+        self.condition = self._trials.condition if self._trials else ""
+        self.most = self._trials.most if self._trials else 1
+
+    def configured(self, values: Mapping[str, Any]) -> Params:
+        model = self._experiment.config
+        text = json.dumps(with_bases(values, model, Path()), default=_plain)
+        try:
+            config = model.model_validate_json(text, strict=True)
+        except ValidationError as error:
+            raise ConfigError(f"{self._experiment.name}: {describe(error, model)}") from None
+        return config
+
+    def check(self, config: Any) -> None:
+        self._experiment.check(config)
+
+    def every(self, config: Any) -> Sequence[Trial]:
+        return self._trials.every(config) if self._trials else [("", 0)]
+
+    def run(self, config: Any, trials: Sequence[Trial], emit: Callable[[int, Rows], None]) -> None:
+        if self._trials is not None:
+            self._trials.run(config, trials, lambda i, row: emit(i, [asdict(row)]))
+            return
+        outcome = self._experiment.run(config, 1, no_step, no_row)
+        emit(0, [asdict(row) for row in outcome.rows] or [_numbers(outcome.result())])
+
+
+class _OfFunction:
+    model: type[Params] | None = None
+    condition = ""
+    most = 1
+
+    def __init__(self, name: str) -> None:
+        self._function = FUNCTIONS.find(name)
+
+    def configured(self, values: Mapping[str, Any]) -> Mapping[str, Any]:
+        return values
+
+    def check(self, config: Any) -> None:
+        pass
+
+    def every(self, config: Mapping[str, Any]) -> Sequence[Trial]:
+        return [("", seed) for seed in range(config.get("trials", 1))]
+
+    def run(self, config: Any, trials: Sequence[Trial], emit: Callable[[int, Rows], None]) -> None:
+        given = {name: value for name, value in config.items() if name != "trials"}
+        for i, (_, seed) in enumerate(trials):
+            row = self._function(given, seed)
+            emit(i, [{"trial": seed, **(asdict(row) if is_dataclass(row) else dict(row))}])  # type: ignore[arg-type]
+
+
+def _plain(value: Any) -> Any:
+    return value.model_dump(mode="json") if isinstance(value, BaseModel) else str(value)
+
+
+def plain(values: Any) -> Any:
+    """Values given in Python as a file would hold them."""
+    return json.loads(json.dumps(values, default=_plain))
+
+
+def _numbers(result: Mapping[str, Any], path: str = "") -> dict[str, Any]:
+    """Numbers and texts of a result as one row, by dotted name."""
+    found: dict[str, Any] = {}
+    for key, value in result.items():
+        if isinstance(value, Mapping):
+            found |= _numbers(value, f"{path}{key}.")
+        elif value is None or isinstance(value, str | int | float):
+            found[path + key] = value
+    return found

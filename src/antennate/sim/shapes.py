@@ -1,0 +1,190 @@
+"""What a model shows, as plain arrays: shapes once, then where they are and which forces act.
+
+Another process draws it without the engine.
+"""
+
+from __future__ import annotations
+
+import io
+import zipfile
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from antennate.errors import BadInputError
+from antennate.sim import layers
+from antennate.sim.appearance import Colour, colours
+from antennate.types import Bools, Floats, Ints
+
+SPHERE = int(mujoco.mjtGeom.mjGEOM_SPHERE)
+CAPSULE = int(mujoco.mjtGeom.mjGEOM_CAPSULE)
+ELLIPSOID = int(mujoco.mjtGeom.mjGEOM_ELLIPSOID)
+CYLINDER = int(mujoco.mjtGeom.mjGEOM_CYLINDER)
+BOX = int(mujoco.mjtGeom.mjGEOM_BOX)
+MESH = int(mujoco.mjtGeom.mjGEOM_MESH)
+_DRAWN = (SPHERE, CAPSULE, ELLIPSOID, CYLINDER, BOX, MESH)
+_PLANE = int(mujoco.mjtGeom.mjGEOM_PLANE)
+_SLIDE, _FREE = int(mujoco.mjtJoint.mjJNT_SLIDE), int(mujoco.mjtJoint.mjJNT_FREE)
+_HIDDEN_GROUP = 3
+"""Geoms of this group and above are collision shapes that no viewer of the engine shows."""
+_OURS = layers.LEG | layers.BODY | layers.ANTENNA
+_LARGEST = 1 << 26
+
+Poses = NDArray[np.float32]
+"""Place and rotation matrix of each shape, row by row, shape (n, 12)."""
+Arrows = NDArray[np.float32]
+"""Place [m] and normal force on the robot [N] of each contact, shape (k, 6)."""
+
+
+class Shapes(NamedTuple):
+    """The shapes of a model.
+
+    Attributes:
+        kind: SPHERE, CAPSULE, ELLIPSOID, CYLINDER, BOX or MESH, shape (n,).
+        size: Half sizes as the engine has them [m], shape (n, 3).
+        colour: Red, green, blue and opacity, 0 to 255, shape (n, 4).
+        robot: Which belong to the robot, shape (n,).
+        moves: Which can move, shape (n,).
+        body: Number of the body that can be dragged, -1 of none, shape (n,).
+        mesh: Number of its mesh, -1 of none, shape (n,).
+        vertices: Corners of all meshes [m], shape (v, 3).
+        faces: Triangles of all meshes, numbers of corners of that mesh, shape (f, 3).
+        ends: Where the corners and the triangles of each mesh end, shape (m, 2).
+        floor: Height of the floor [m], shape (1,); NaN without one.
+    """
+
+    kind: Ints
+    size: NDArray[np.float32]
+    colour: NDArray[np.uint8]
+    robot: Bools
+    moves: Bools
+    body: Ints
+    mesh: Ints
+    vertices: NDArray[np.float32]
+    faces: Ints
+    ends: Ints
+    floor: Floats
+
+    def pack(self) -> bytes:
+        """All of it as bytes, for another process."""
+        file = io.BytesIO()
+        arrays = {name: getattr(self, name) for name in self._fields}
+        np.savez(file, allow_pickle=False, **arrays)
+        return file.getvalue()
+
+    @classmethod
+    def unpack(cls, content: bytes) -> Shapes:
+        """Back from `pack`.
+
+        Raises:
+            BadInputError: It is something else.
+        """
+        try:
+            with np.load(io.BytesIO(content[:_LARGEST]), allow_pickle=False) as file:
+                return cls(*(file[name] for name in cls._fields))
+        except (ValueError, KeyError, OSError, EOFError, zipfile.BadZipFile) as error:
+            raise BadInputError(f"expected the shapes of a model, found {error}") from None
+
+
+class VisibleModel:
+    """A model and what can be seen of it.
+
+    Args:
+        model: The compiled model.
+        sides: Colours of the left and the right antenna.
+    """
+
+    def __init__(self, model: mujoco.MjModel, sides: tuple[Colour, Colour]) -> None:
+        self._model = model
+        painted = colours(model, sides)
+        has = model.geom_matid >= 0
+        painted[has] = model.mat_rgba[model.geom_matid[has]]
+        seen = np.isin(model.geom_type, _DRAWN) & (model.geom_group < _HIDDEN_GROUP)
+        self._shown: Ints = np.flatnonzero(seen & (painted[:, 3] > 0))
+        self._colour = np.rint(255 * painted[self._shown]).astype(np.uint8)
+        self._ours = (model.geom_contype & _OURS) != 0
+        self._floor = (model.geom_contype & layers.FLOOR) != 0
+        self._slides = {body: found for body in range(model.nbody) if (found := self._free(body))}
+
+    def shapes(self) -> Shapes:
+        """What does not change while it runs."""
+        model, shown = self._model, self._shown
+        body = model.geom_bodyid[shown]
+        planes = np.flatnonzero(model.geom_type == _PLANE)
+        mesh = np.where(model.geom_type[shown] == MESH, model.geom_dataid[shown], -1)
+        numbers = range(model.nmesh)
+        return Shapes(
+            kind=model.geom_type[shown].astype(np.int64),
+            size=model.geom_size[shown].astype(np.float32),
+            colour=self._colour,
+            robot=self._ours[shown],
+            moves=model.body_weldid[body] != 0,
+            body=np.where([int(each) in self._slides for each in body], body, -1).astype(np.int64),
+            mesh=mesh.astype(np.int64),
+            vertices=model.mesh_vert.reshape(-1, 3).astype(np.float32),
+            faces=model.mesh_face.reshape(-1, 3).astype(np.int64),
+            ends=np.array(
+                [
+                    (
+                        model.mesh_vertadr[i] + model.mesh_vertnum[i],
+                        model.mesh_faceadr[i] + model.mesh_facenum[i],
+                    )
+                    for i in numbers
+                ],
+                np.int64,
+            ).reshape(-1, 2),
+            floor=np.array([float(model.geom_pos[planes[0], 2]) if len(planes) else np.nan]),
+        )
+
+    def poses(self, data: mujoco.MjData) -> Poses:
+        """Where the shapes are."""
+        found = np.empty((len(self._shown), 12), np.float32)
+        found[:, :3] = data.geom_xpos[self._shown]
+        found[:, 3:] = data.geom_xmat[self._shown]
+        return found
+
+    def forces(self, data: mujoco.MjData) -> Arrows:
+        """Normal forces of obstacles on the robot in the last physics step."""
+        contact = data.contact
+        geoms = contact.geom
+        ours = self._ours[geoms]
+        on = (ours[:, 0] != ours[:, 1]) & ~self._floor[geoms].any(axis=1)
+        which = np.flatnonzero(on & (contact.efc_address >= 0))
+        force = data.efc_force[contact.efc_address[which]]
+        sign = np.where(ours[which, 1], 1.0, -1.0)  # the normal points to the second geom
+        found = np.empty((len(which), 6), np.float32)
+        found[:, :3] = contact.pos[which]
+        found[:, 3:] = contact.frame[which, :3] * (sign * force)[:, None]
+        return found
+
+    def move(self, data: mujoco.MjData, body: int, x: float, y: float) -> bool:
+        """Put a body that can be dragged to x, y [m], at rest; False if it is none.
+
+        The engine wakes it if it slept.
+        """
+        if body not in self._slides:
+            return False
+        across, along, speed = self._slides[body]
+        place = data.xpos[body]
+        data.qpos[across] += x - place[0]
+        data.qpos[along] += y - place[1]
+        data.qvel[speed : speed + 2] = 0.0
+        mujoco.mj_forward(self._model, data)
+        return True
+
+    def _free(self, body: int) -> tuple[int, int, int] | None:
+        """Coordinates of x and y and the first speed of a body that slides over the floor."""
+        model = self._model
+        geoms = np.flatnonzero(model.geom_bodyid == body)
+        count, first = model.body_jntnum[body], model.body_jntadr[body]
+        if not len(geoms) or self._ours[geoms].any() or not count or model.body_parentid[body]:
+            return None
+        kinds = model.jnt_type[first : first + count].tolist()
+        at, speed = int(model.jnt_qposadr[first]), int(model.jnt_dofadr[first])
+        if kinds[0] == _FREE:
+            return at, at + 1, speed
+        axes = model.jnt_axis[first : first + 2]
+        plain = kinds[:2] == [_SLIDE, _SLIDE] and np.array_equal(axes, np.eye(3)[:2])
+        return (at, at + 1, speed) if plain else None

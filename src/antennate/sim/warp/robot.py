@@ -1,0 +1,258 @@
+"""Simulated robots in lockstep on a device: what `SimRobot` is, for a batch of MuJoCo Warp.
+
+The sensors, the disturbances and the clock are those of `SimRobot`; the worlds step in float32.
+"""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+
+from antennate.antenna.sensor import SensorChain
+from antennate.errors import SceneError, SimulationError
+from antennate.robots.spec import RobotSpec
+from antennate.sim.bounds import broken, sound
+from antennate.sim.sim_robot import Disturbance
+from antennate.sim.warp.arenas import is_parked
+from antennate.sim.warp.worlds import Limits, WarpWorlds
+from antennate.sim.world import World
+from antennate.types import AntennaFrame, Floats, JointCommand
+
+
+class WarpRow:
+    """One robot of the batch, as a trial looks at it; the true state, from float32.
+
+    Attributes:
+        world: The same world on the CPU; its state is the start until somebody asks for more.
+        chance: What chance does to it.
+        ticks: Control periods since its start.
+        commanded: Whether it was told anything yet.
+        failure: What ended its simulation, if anything did.
+    """
+
+    def __init__(self, batch: WarpRobot, row: int, world: World, chance: Disturbance) -> None:
+        self._batch, self._row = batch, row
+        self.world, self.chance = world, chance
+        self.ticks = 0
+        self.commanded = False
+        self.failure: SimulationError | None = None
+
+    @property
+    def t(self) -> float:
+        """Time since the world was made [s]: counted, since float32 would lose some."""
+        return self.ticks * self._batch.period
+
+    @property
+    def head(self) -> Floats:
+        """Position of the head link [m], shape (3,)."""
+        root = self.world.places.root
+        return self._batch.positions[self._row, root : root + 3]
+
+    def obstacle_force(self) -> float:
+        """Sum of the normal forces between robot and obstacles [N] in the last physics step."""
+        return float(self._batch.forces()[self._row])
+
+    def links(self) -> Floats:
+        """Plan positions of the links, head first [m], shape (L, 2)."""
+        self._follow()
+        return self.world.links()
+
+    def parts(self) -> list[Floats]:
+        """Polygons of all parts of the robot in plan [m], each (n, 2)."""
+        self._follow()
+        return self.world.parts()
+
+    def outlines(self) -> tuple[list[Floats], list[Floats]]:
+        """Obstacles in plan, as `World.outlines` has them, without those that fill the counts."""
+        self._follow()
+        still, loose = self.world.outlines()
+        return still, [polygon for polygon in loose if not is_parked(polygon)]
+
+    def _follow(self) -> None:
+        data = self.world.data
+        data.qpos[:] = self._batch.positions[self._row]
+        mujoco.mj_kinematics(self.world.model, data)
+
+
+class WarpRobot:
+    """B simulated robots on a device; also their clock. Rows never influence one another.
+
+    Args:
+        batch: Number of rows B.
+        robot: The robot of every row.
+        period: Control period [s]; a whole number of physics steps.
+        timestep: Physics step [s].
+        limits: Sizes on the device.
+        device: Name of a device of Warp, as cuda:0 or cpu; a GPU if not given.
+
+    Attributes:
+        period: Control period [s].
+        positions: Coordinates of all worlds, shape (B, nq).
+        worlds: The worlds on the device, from the first command on.
+    """
+
+    def __init__(
+        self,
+        batch: int,
+        robot: RobotSpec,
+        period: float,
+        timestep: float,
+        limits: Limits,
+        device: str | None = None,
+    ) -> None:
+        self.period = period
+        self._substeps = round(period / timestep)
+        self._batch, self._limits, self._device = batch, limits, device
+        self._yaws, self._parts = robot.yaw_count, list(robot.command_shapes())
+        self._sensors = SensorChain(robot.antenna.sensor, (batch, 2), period)
+        self._rows = dict[int, WarpRow]()
+        self._new, self._ended = set[int](), set[int]()
+        self._missing = np.ones(batch, dtype=bool)
+        self._noise: Floats = np.zeros((batch, 2))
+        self._ticks = 0
+        self.worlds: WarpWorlds | None = None
+        self._forces: Floats | None = None
+        self.positions: Floats = np.zeros((batch, 0))
+        self._controls: Floats = np.zeros((batch, 0))
+
+    @property
+    def clock(self) -> WarpRobot:
+        """The robot itself keeps the time."""
+        return self
+
+    def load(self, row: int, world: World, chance: Disturbance) -> None:
+        """Put a fresh world into a row; it reaches the device with its first command.
+
+        Raises:
+            SceneError: It has another number of joints than the first.
+        """
+        if not self.positions.size:
+            self.positions = np.zeros((self._batch, world.model.nq))
+            self._controls = np.zeros((self._batch, world.model.nu))
+        if world.model.nq != self.positions.shape[1]:
+            raise SceneError(
+                f"--engine warp: expected {self.positions.shape[1]} coordinates in every world, "
+                f"found {world.model.nq}"
+            )
+        self._rows[row] = WarpRow(self, row, world, chance)
+        self._new.add(row)
+        self._sensors.reset(row)
+        self._missing[row] = not world.robot.antenna_count
+        self.positions[row] = world.data.qpos
+
+    def unload(self, row: int) -> None:
+        """Empty a row."""
+        if self._rows.pop(row, None) is not None:
+            self._ended.add(row)
+        self._missing[row] = True
+
+    def world(self, row: int) -> WarpRow:
+        """The robot in a row, and the world around it."""
+        if row not in self._rows:
+            raise IndexError(f"row {row} holds no world")
+        return self._rows[row]
+
+    def failure(self, row: int) -> SimulationError | None:
+        """What ended the row's simulation, if anything did."""
+        held = self._rows.get(row)
+        return held.failure if held else None
+
+    def forces(self) -> Floats:
+        """Summed normal force on obstacles in the last physics step [N], shape (B,)."""
+        if self._forces is None:
+            none = np.zeros(self._batch)
+            self._forces = self.worlds.forces() if self.worlds is not None else none
+        return self._forces
+
+    def now(self) -> float:
+        """Time [s] since the batch began."""
+        return self._ticks * self.period
+
+    def read(self) -> AntennaFrame:
+        """Sample both sensors of every row."""
+        t, flex = np.full(self._batch, np.nan), np.zeros((self._batch, 2))
+        for i, row in self._rows.items():
+            t[i] = row.t
+            self._noise[i] = row.chance.noise(row.ticks)
+        for row in list(self._rows.values())[:1]:
+            hinges = self.positions[:, row.world.places.hinges]
+            flex = np.where(self._missing[:, None], 0.0, hinges.sum(axis=2))
+        counts = self._sensors.step(flex, self._noise)
+        counts[self._missing] = np.nan
+        return AntennaFrame(t=t, counts=counts)
+
+    def write(self, command: JointCommand) -> None:
+        """Command every row's joints."""
+        parts = [getattr(command, name).reshape(self._batch, -1) for name in self._parts]
+        drive = np.concatenate(parts, axis=1)
+        for i, row in self._rows.items():
+            if row.failure is None:
+                drive[i, : self._yaws] += row.chance.joint_bias
+                row.commanded = True
+                try:
+                    row.world.command(drive[i])
+                except SimulationError as error:
+                    self._fail(i, row, error)
+                else:
+                    self._controls[i] = row.world.data.ctrl
+        self._settle()
+
+    def _settle(self) -> None:
+        """Bring to the device what was loaded, stop what has ended, and set all targets.
+
+        Raises:
+            ConfigError: Warp cannot hold the worlds.
+            SceneError: The worlds are not of one structure.
+        """
+        if not self._rows:
+            return
+        if self.worlds is None:
+            first = next(iter(self._rows.values())).world
+            self.worlds = WarpWorlds(first, self._batch, self._limits, self._device)
+        for row in sorted(self._new):
+            self.worlds.put(row, self._rows[row].world)
+        for row in sorted(self._ended - self._rows.keys()):
+            self.worlds.rest(row)
+            self._controls[row] = 0.0
+        self._new.clear()
+        self._ended.clear()
+        self.worlds.command(self._controls)
+
+    def sleep_until(self, t: float) -> None:
+        """Advance the physics of all rows to time t [s]."""
+        while self._ticks * self.period < t - 1e-9:
+            self._ticks += 1
+            moving = {
+                i: row for i, row in self._rows.items() if row.commanded and row.failure is None
+            }
+            if self.worlds is None or not moving:
+                continue
+            for i, row in moving.items():
+                friction = row.chance.leg_friction(row.ticks)
+                if friction is not None:
+                    row.world.set_leg_friction(friction)
+                    self.worlds.set_friction(i, row.world)
+                row.ticks += 1
+            self.worlds.step(self._substeps)
+            self._take(moving)
+
+    def _take(self, moving: dict[int, WarpRow]) -> None:
+        """Take the state of rows from the device, and look for those that are unsound."""
+        if self.worlds is None:
+            return
+        self._forces = None
+        positions, speeds = self.worlds.state()
+        rows = list(moving)
+        self.positions[rows] = positions[rows]
+        dropped = self.worlds.overflows()
+        places = moving[rows[0]].world.places
+        bounded = positions[:, places.bounded]
+        heads = positions[:, places.root : places.root + 3]
+        unsound = np.flatnonzero(~sound(heads, bounded, speeds)).tolist()
+        for i in moving.keys() & {*unsound, *dropped}:
+            found = dropped.get(i) or broken(heads[i], bounded[i], speeds[i])
+            self._fail(i, moving[i], SimulationError(moving[i].ticks * self._substeps, found))
+
+    def _fail(self, i: int, row: WarpRow, error: SimulationError) -> None:
+        row.failure = error
+        self._missing[i] = True

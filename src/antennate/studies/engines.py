@@ -1,0 +1,82 @@
+"""Where trials are run: processes of this machine, a Dask cluster, SLURM, or any executor.
+
+An executor is an object with `submit(function, *arguments)` that returns something with `done()`
+and `result()`, as those of concurrent.futures do.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from typing import Any
+
+from antennate.errors import ConfigError
+from antennate.messages import shown
+from antennate.studies.submitted import Submitted
+from antennate.studies.work import Emit, Engine, Fail, Work
+
+LOCAL = "local"
+WARP = "warp"
+FORMS = (LOCAL, "dask", "dask://HOST:PORT", "slurm", "slurm-local", WARP, f"{WARP}:DEVICE")
+"""How an engine is named; slurm-local starts what would be jobs as processes of this machine."""
+
+
+def make_engine(name: Any, slurm: Sequence[str] = ()) -> Engine | None:
+    """The engine of a name or of an object of the user; None is this machine.
+
+    Args:
+        name: One of FORMS, or an executor.
+        slurm: What SLURM is asked for, each as NAME=VALUE.
+
+    Raises:
+        ConfigError: There is none, or SLURM is asked for something and another engine is named.
+        MissingPackageError: Its package is not installed.
+    """
+    if slurm and name not in ("slurm", "slurm-local"):
+        raise ConfigError("--slurm: expected --engine slurm beside it, found another engine")
+    if name == LOCAL:
+        return None
+    if isinstance(name, str) and re.fullmatch(rf"{WARP}(:.+)?", name):
+        return Device(name.partition(":")[2] or None)
+    if isinstance(name, str):
+        from antennate.studies import cluster  # needs packages that are optional
+
+        if name in ("slurm", "slurm-local"):
+            return cluster.Slurm("slurm" if name == "slurm" else "local", slurm)
+        if name == "dask":
+            return cluster.Dask()
+        if re.fullmatch(r"dask://[^/\s]+:[0-9]{1,5}", name):
+            return cluster.Dask(name.removeprefix("dask://"))
+        raise ConfigError(f"engine: expected one of {', '.join(FORMS)}, found {shown(name)}")
+    if not callable(getattr(name, "submit", None)):
+        raise ConfigError(
+            f"engine: expected a name or an object with submit, found {type(name).__name__}"
+        )
+    return Submitted("executor", name.submit)
+
+
+class Device:
+    """All tasks at once, as one batch on a GPU, in this process.
+
+    Args:
+        device: Name of a device of Warp, as cuda:0 or cpu; a GPU if not given.
+    """
+
+    name = WARP
+
+    def __init__(self, device: str | None = None) -> None:
+        self._device = device
+
+    def run(
+        self, work: Work, parts: Sequence[Sequence[int]], count: int, emit: Emit, fail: Fail
+    ) -> None:
+        """Run the tasks at these places; see `Engine`.
+
+        Raises:
+            ConfigError: This work has no batch.
+        """
+        if work.batched is None:
+            raise ConfigError("--engine warp: expected tunnel, which alone has batches on a GPU")
+        places = [place for part in parts for place in part]
+        tasks = [work.tasks[place] for place in places]
+        work.batched(tasks, lambda i, result: emit(places[i], result), self._device)

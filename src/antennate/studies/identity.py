@@ -1,0 +1,146 @@
+"""What a run is: command, configuration, versions and code; and how two runs differ."""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import importlib.util
+import inspect
+import json
+import sys
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import antennate
+from antennate.lookup import ADDED
+from antennate.messages import shortened
+from antennate.params.base import Params
+from antennate.telemetry.header import versions
+
+_SHOWN = 5
+"""Most differences that are told."""
+_NONE = "nothing"
+
+
+def identity(command: str, config: Params) -> dict[str, Any]:
+    """What decides the numbers of a run, as JSON can hold it."""
+    values = json.loads(config.model_dump_json())
+    return {
+        "command": command,
+        "config": values,
+        "versions": dict(versions()),
+        "code": code() | code_named(values) | _code_added(values) | _code_of(type(config)),
+    }
+
+
+def environment() -> dict[str, Any]:
+    """The part of it that driver and workers must share."""
+    return {"versions": dict(versions()), "code": code()}
+
+
+def content_hash(found: Mapping[str, Any]) -> str:
+    """A short name of an identity: the same for the same content alone."""
+    text = json.dumps(found, sort_keys=True, separators=(",", ":"))
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+@functools.cache
+def code() -> dict[str, str]:
+    """Checksum of every file of this package, but those that only talk to people."""
+    root = Path(antennate.__file__ or "").parent
+    files = [path.relative_to(root) for path in sorted(root.rglob("*.py"))]
+    return {
+        f"antennate/{file.as_posix()}": _checksum(root / file)
+        for file in files
+        if file.parts[0] != "cli"
+    }
+
+
+def code_named(values: Any) -> dict[str, str]:
+    """Checksums of files that a configuration names: FILE, FILE.py:NAME or MODULE:NAME."""
+    found = {}
+    for text in _texts(values):
+        place, _, name = text.rpartition(":")
+        file = Path(place if name and place else text)
+        if file.suffix and file.is_file():
+            found[str(file)] = _checksum(file)
+        elif place and name.isidentifier() and all(map(str.isidentifier, place.split("."))):
+            found |= _module(place)
+    return found
+
+
+def _code_added(values: Any) -> dict[str, str]:
+    """Checksums of the source of objects that were added to a registry and are named."""
+    named = set(_texts(values))
+    added = [pair for objects in ADDED.values() for pair in objects.items() if pair[0] in named]
+    found = {}
+    for name, each in added:
+        try:
+            source = inspect.getsource(each)
+        except (OSError, TypeError):
+            continue  # typed at a prompt
+        found[name] = hashlib.sha256(source.encode()).hexdigest()[:16]
+    return found
+
+
+def _code_of(kind: type) -> dict[str, str]:
+    """Checksum of the module of a configuration of another package."""
+    return {} if kind.__module__.startswith("antennate.") else _module(kind.__module__)
+
+
+def _module(name: str) -> dict[str, str]:
+    try:
+        loaded = getattr(sys.modules.get(name), "__file__", None)
+        spec = None if loaded else importlib.util.find_spec(name)
+    except (ImportError, ValueError, AttributeError):
+        return {}
+    file = loaded or (spec.origin if spec else None)
+    return {name: _checksum(Path(file))} if file and Path(file).is_file() else {}
+
+
+def _checksum(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()[:16]
+
+
+def _texts(values: Any) -> Iterator[str]:
+    if isinstance(values, str):
+        yield values
+    elif isinstance(values, Mapping | list):
+        for item in values.values() if isinstance(values, Mapping) else values:
+            yield from _texts(item)
+
+
+def differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> str:
+    """What differs, in words; empty if nothing does."""
+    before, after = dict(_flat(old, ())), dict(_flat(new, ()))
+    told = [
+        _told(path, before.get(path, _NONE), after.get(path, _NONE))
+        for path in dict.fromkeys([*before, *after])
+        if before.get(path, _NONE) != after.get(path, _NONE)
+    ]
+    more = f" and {len(told) - _SHOWN} more" if len(told) > _SHOWN else ""
+    return ", ".join(told[:_SHOWN]) + more
+
+
+def _told(path: tuple[str, ...], old: Any, new: Any) -> str:
+    group, name = path[0], ".".join(path[1:])
+    if group == "code":
+        return f"the file {name} {_changed(old, new)}"
+    return f"{name or group} {_short(old)}, now {_short(new)}"
+
+
+def _changed(old: Any, new: Any) -> str:
+    return "is new" if old == _NONE else "is gone" if new == _NONE else "changed"
+
+
+def _short(value: Any) -> str:
+    return value if value == _NONE else shortened(json.dumps(value))
+
+
+def _flat(values: Any, path: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...], Any]]:
+    if isinstance(values, Mapping) and values:
+        for key, item in values.items():
+            yield from _flat(item, (*path, str(key)))
+    else:
+        yield path, values

@@ -1,0 +1,164 @@
+"""The points of a study: which values its parameters have, one after the other."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any, Literal
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, model_validator
+
+from antennate.errors import ConfigError
+from antennate.types import Floats
+
+Kind = Literal["grid", "list", "random", "sobol", "morris"]
+Point = dict[str, Any]
+"""Values of the parameters that vary, by dotted name."""
+LEVELS = 4
+"""Levels of each parameter in a Morris plan, as Morris proposes."""
+STEP = LEVELS / (2 * (LEVELS - 1))
+"""How far one parameter moves in it, over its range: all levels are then equally likely."""
+
+
+class Range(BaseModel):
+    """A range of one parameter.
+
+    Attributes:
+        low: Its lower end.
+        high: Its upper end.
+        log: Whether values are spread evenly by their logarithm.
+        whole: Whether only whole numbers are values.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    low: float
+    high: float
+    log: bool = False
+    whole: bool = False
+
+    @model_validator(mode="after")
+    def _in_order(self) -> Range:
+        if self.low >= self.high or (self.log and self.low <= 0):
+            what = "0 < low < high" if self.log else "low < high"
+            raise ValueError(f"expected {what}, got low {self.low:g} and high {self.high:g}")
+        return self
+
+    def at(self, share: float) -> float | int:
+        """The value at a share of the range, 0 to 1; each whole number has an equal part."""
+        low, high = (self.low - 0.5, self.high + 0.5) if self.whole else (self.low, self.high)
+        if self.log:
+            return self.low * (self.high / self.low) ** share
+        value = low + share * (high - low)
+        if self.whole:
+            return min(max(math.floor(value + 0.5), math.ceil(self.low)), math.floor(self.high))
+        return value
+
+
+Axes = Mapping[str, Sequence[Any] | Range]
+"""By dotted name: the values of a parameter, or its range."""
+
+
+def make_points(kind: Kind, axes: Axes, count: int, seed: int) -> list[Point]:
+    """All points, in a fixed order.
+
+    Args:
+        kind: grid takes every combination of lists, list their first values, their second and so
+            on. random and sobol draw points from ranges; of a list they draw one value. morris
+            makes trajectories for elementary effects.
+        axes: What varies.
+        count: Points of random and sobol, trajectories of morris.
+        seed: Seed of what is drawn.
+
+    Raises:
+        ConfigError: Nothing varies, or lists and ranges do not fit the kind.
+    """
+    if not axes or any(not isinstance(axis, Range) and not axis for axis in axes.values()):
+        empty = next((name for name in axes), "vary")
+        raise ConfigError(f"{empty}: expected values, found none: the {kind} is empty")
+    if kind in ("grid", "list"):
+        return _of_lists(kind, axes)
+    rng = np.random.default_rng(seed)
+    if kind == "morris":
+        shares = trajectories(len(axes), count, rng)
+    elif kind == "sobol":
+        from scipy.stats import qmc  # slow to import
+
+        sampler = qmc.Sobol(len(axes), scramble=False)
+        regular = sampler.random_base2(math.ceil(math.log2(count)))[:count]
+        shares = (regular + rng.random(len(axes))) % 1.0  # a shift keeps them spread evenly
+    else:
+        shares = rng.random((count, len(axes)))
+    return [
+        {name: _value(axis, share) for (name, axis), share in zip(axes.items(), row, strict=True)}
+        for row in shares.tolist()
+    ]
+
+
+def _of_lists(kind: Kind, axes: Axes) -> list[Point]:
+    lists: list[Sequence[Any]] = []
+    for name, axis in axes.items():
+        if isinstance(axis, Range):
+            raise ConfigError(f"{name}: expected a list of values for a {kind}, found a range")
+        lists.append(axis)
+    if kind == "grid":
+        return [dict(zip(axes, values, strict=True)) for values in itertools.product(*lists)]
+    if len(lengths := {len(values) for values in lists}) > 1:
+        found = ", ".join(map(str, sorted(lengths)))
+        raise ConfigError(f"vary: expected lists of one length, found lengths {found}")
+    return [dict(zip(axes, values, strict=True)) for values in zip(*lists, strict=True)]
+
+
+def _value(axis: Sequence[Any] | Range, share: float) -> Any:
+    if isinstance(axis, Range):
+        return axis.at(share)
+    return axis[min(int(share * len(axis)), len(axis) - 1)]
+
+
+def trajectories(dimensions: int, count: int, rng: np.random.Generator) -> Floats:
+    """Morris's trajectories: in each, one parameter after the other moves once, in random order.
+
+    Source: Morris, Technometrics 33 (1991) 161.
+
+    Returns:
+        Shares of the ranges, 0 to 1, shape (count · (dimensions + 1), dimensions).
+    """
+    found = []
+    starts = np.arange(LEVELS // 2) / (LEVELS - 1)
+    for _ in range(count):
+        here = rng.choice(starts, dimensions)
+        up = rng.random(dimensions) < 0.5
+        here = np.where(up, here, here + STEP)
+        found.append(here.copy())
+        for moved in rng.permutation(dimensions):
+            here[moved] += STEP if up[moved] else -STEP
+            found.append(here.copy())
+    return np.clip(np.array(found), 0.0, 1.0)
+
+
+def elementary_effects(
+    dimensions: int, count: int, seed: int, response: Sequence[float]
+) -> list[list[float]]:
+    """The effects of each parameter: how the response changes over its whole range.
+
+    Args:
+        dimensions: Parameters.
+        count: Trajectories.
+        seed: Seed of the plan.
+        response: One value for each point of the plan.
+
+    Returns:
+        Effects by parameter, one for each trajectory in which both values are finite.
+    """
+    shares = trajectories(dimensions, count, np.random.default_rng(seed))
+    shares = shares.reshape(count, dimensions + 1, dimensions)
+    values = np.array(response, float).reshape(count, dimensions + 1)
+    effects: list[list[float]] = [[] for _ in range(dimensions)]
+    for steps, found in zip(np.diff(shares, axis=1), np.diff(values, axis=1), strict=True):
+        for step, change in zip(steps, found, strict=True):
+            moved = int(np.argmax(np.abs(step)))
+            if math.isfinite(change):
+                effects[moved].append(float(change / step[moved]))
+    return effects

@@ -1,0 +1,249 @@
+"""The engine of this machine: worker processes, each of which is known to hold certain tasks.
+
+So the task that kills a worker, or does not end, is found, and the others go on.
+concurrent.futures breaks as a whole when one process dies. Each result is sent at once. Processes
+are started fresh (spawn), leave Ctrl-C to the parent, and end when the parent is gone.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import multiprocessing
+import os
+import pickle
+import signal
+import threading
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from multiprocessing.connection import Connection, wait
+from typing import Any
+
+from antennate.errors import WorkerError, in_one_line
+from antennate.lookup import ADDED, NotSent
+from antennate.studies.work import Emit, Fail, Failure, Part, Waiting, Work
+
+_GUARD = (
+    '; a script that uses several workers needs `if __name__ == "__main__":` around what it runs'
+)
+"""What a worker that ended with code 1 most often lacks: it raised while it imported the script."""
+_POLL = 0.1
+"""How long results that are on their way are waited for after Ctrl-C [s]."""
+_LONGEST_WAIT = 3600.0
+"""Most that is waited at once [s]."""
+_STILLBORN = 10
+"""Workers in a row that may end before they are ready, as somebody kills them."""
+_READY, _BEGUN, _FAILED, _RESULT = range(4)
+"""Kinds of messages of a worker."""
+
+
+class Processes:
+    """Worker processes of this machine."""
+
+    name = "local"
+
+    def run(
+        self, work: Work, parts: Sequence[Sequence[int]], count: int, emit: Emit, fail: Fail
+    ) -> None:
+        """Run the tasks on `count` processes; see `Engine`."""
+        checked = sendable(work.tasks)
+        if isinstance(checked, NotSent):
+            raise WorkerError(checked.reason)
+        crew = _Crew(work, parts, added_objects(), emit, fail)
+        try:
+            crew.run(min(count, len(parts)))
+        except KeyboardInterrupt:
+            crew.take_what_came()
+            raise
+        finally:
+            crew.end()
+
+
+class _Crew:
+    def __init__(
+        self,
+        work: Work,
+        parts: Sequence[Sequence[int]],
+        added: Mapping[str, Any],
+        emit: Emit,
+        fail: Fail,
+    ) -> None:
+        self._work, self._waiting, self._added = work, Waiting(parts), added
+        self._emit, self._fail = emit, fail
+        self._members: list[_Member] = []
+        self._stillborn = 0
+
+    def run(self, count: int) -> None:
+        while self._waiting or any(member.places for member in self._members):
+            busy = sum(bool(member.places) for member in self._members)
+            while len(self._members) < min(count, busy + len(self._waiting)):
+                self._members.append(_Member(self._added))
+            for member in self._members:
+                if member.ready and not member.places and self._waiting:
+                    member.give(self._work, self._waiting.next())
+            end = min(member.deadline for member in self._members)
+            left = min(max(0.0, end - time.monotonic()), _LONGEST_WAIT)
+            signs: dict[Any, _Member] = {
+                x: m for m in self._members for x in (m.connection, m.process.sentinel)
+            }
+            for member in {signs[x]: None for x in wait(list(signs), left)}:
+                self._hear(member)
+            for member in [m for m in self._members if time.monotonic() > m.deadline]:
+                self._bury(member, hung=True)
+
+    def _hear(self, member: _Member) -> None:
+        """Take what a worker sent; bury it if it has died."""
+        ended = not member.process.is_alive()
+        try:
+            while member.connection.poll():
+                self._take(member, *member.connection.recv())
+        except (EOFError, OSError):
+            ended = True
+        if ended:
+            self._bury(member)
+
+    def _take(self, member: _Member, kind: int, place: int, content: Any) -> None:
+        member.heard(self._work)
+        if kind == _READY:
+            member.ready, self._stillborn = True, 0
+        elif kind != _BEGUN:
+            member.places.remove(place)
+            (self._emit if kind == _RESULT else self._fail)(place, content)
+
+    def _bury(self, member: _Member, hung: bool = False) -> None:
+        member.kill()
+        self._members.remove(member)
+        code, left = member.process.exitcode, member.places
+        if not member.ready:
+            self._stillborn += 1
+            if code == 1 or self._stillborn > _STILLBORN:
+                guard = _GUARD if code == 1 else ""
+                raise WorkerError(f"a worker process ended with code {code} before its work{guard}")
+        if not left:
+            return
+        given_up = self._waiting.lost(left, self._work.together, final=hung)
+        if given_up is not None:
+            why = (
+                Failure("hung", f"no result within {self._work.timeout:g} s")
+                if hung
+                else Failure("crashed", f"a worker process ended with code {code} in its work")
+            )
+            self._fail(given_up, why)
+
+    def take_what_came(self) -> None:
+        """Take the results that are on their way."""
+        for member in self._members:
+            with contextlib.suppress(EOFError, OSError):
+                while member.connection.poll(_POLL):
+                    self._take(member, *member.connection.recv())
+
+    def end(self) -> None:
+        """End all workers."""
+        for member in self._members:
+            member.kill()
+
+
+class _Member:
+    """One worker process.
+
+    Attributes:
+        ready: Whether it has started.
+        places: Tasks that it holds and has not answered.
+        deadline: When it is given up.
+    """
+
+    def __init__(self, added: Mapping[str, Any]) -> None:
+        context = multiprocessing.get_context("spawn")
+        self.connection, theirs = context.Pipe()
+        self.process = context.Process(target=_serve, args=(theirs, added))
+        with _deaf():
+            self.process.start()
+        theirs.close()
+        self.ready = False
+        self.places: list[int] = []
+        self.deadline = float("inf")
+
+    def give(self, work: Work, places: list[int]) -> None:
+        self.places = places
+        self.heard(work)
+        with contextlib.suppress(OSError):  # it has died: that is heard of next
+            self.connection.send(work.part(places))
+
+    def heard(self, work: Work) -> None:
+        """Begin the time until the next answer."""
+        count = len(self.places) if work.together else 1
+        self.deadline = time.monotonic() + work.timeout * count if count else float("inf")
+
+    def kill(self) -> None:
+        self.process.kill()
+        self.process.join()
+        self.connection.close()
+
+
+def added_objects() -> dict[str, dict[str, Any]]:
+    """Objects that were added to registries here, for workers; what cannot be sent says so."""
+    return {
+        group: {name: sendable(each) for name, each in objects.items()}
+        for group, objects in ADDED.items()
+    }
+
+
+def take_added(added: Mapping[str, Mapping[str, Any]]) -> None:
+    """In a worker: know the objects that were added in the driver."""
+    for group, objects in added.items():
+        ADDED.setdefault(group, {}).update(objects)
+
+
+def sendable(each: Any) -> Any:
+    """The same object if it can be sent to a worker, else what says why not."""
+    try:
+        pickle.dumps(each)
+    except Exception as error:  # noqa: BLE001  (an object's own code may raise anything)
+        return NotSent(
+            f"expected what can be sent to workers, found {in_one_line(error)}; an object of "
+            "your own has to be defined at the top of a module, or run with one worker"
+        )
+    return each
+
+
+@contextlib.contextmanager
+def _deaf() -> Iterator[None]:
+    """Start workers deaf to Ctrl-C, which they inherit, so that none dies half begun."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def _serve(connection: Connection, added: Mapping[str, Any]) -> None:
+    """The life of a worker."""
+    take_added(added)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+    connection.send((_READY, 0, None))
+
+    def emit(place: int, result: Any) -> None:
+        try:
+            connection.send((_RESULT, place, result))
+        except (TypeError, AttributeError, pickle.PicklingError) as error:
+            fail(place, Failure("failed", f"a result that cannot be sent: {in_one_line(error)}"))
+
+    def fail(place: int, failure: Failure) -> None:
+        connection.send((_FAILED, place, Failure(failure.status, failure.reason)))
+
+    with contextlib.suppress(EOFError):
+        while True:
+            part: Part = connection.recv()
+            connection.send((_BEGUN, 0, None))  # what it needs is imported by now
+            part.carry_out(emit, fail)
+
+
+def _end_with_parent() -> None:
+    """End this worker once its parent is gone, also if that was killed."""
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)

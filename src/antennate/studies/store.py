@@ -1,0 +1,195 @@
+"""Finished trials on disk: one line of JSON each with a checksum, only ever appended.
+
+The first line says what is run. A line that a killed process left torn, or that was damaged since,
+fails its checksum: its trial counts as not run. The file is locked while somebody appends to it;
+the system frees the lock when that process ends, however it ends.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import json
+import os
+import re
+import time
+import zlib
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from antennate.errors import BadInputError, OutputError
+from antennate.files import open_regular
+from antennate.studies.codec import dumped
+from antennate.studies.identity import differences
+
+STORE = "trials.store.jsonl"
+_SYNC = 1.0
+"""Time within which lines reach the disk itself, so that a power cut costs no more [s]."""
+_HEAD = re.compile(rb'\{"crc":"([0-9a-f]{8})",')
+
+
+class Store:
+    """The finished trials of one run, open to add more.
+
+    Args:
+        path: The file; it is made if it is missing.
+
+    Attributes:
+        records: What was kept before, by key; of a key that comes twice the last counts.
+        holds_trials: Whether it holds any, kept before or now.
+        damaged: Lines that failed their checksum.
+
+    Raises:
+        OutputError: It cannot be opened, or another process appends to it.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        try:
+            self._file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND | os.O_CLOEXEC, 0o666)
+        except OSError as error:
+            raise OutputError(f"expected to write {path}, found: {error.strerror}") from None
+        try:
+            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            os.close(self._file)
+            raise OutputError(
+                f"{path.parent}: expected a run that nobody works on, found another process at it"
+            ) from None
+        except OSError:
+            pass  # a file system without locks
+        self.records: dict[str, Any] = {}
+        self.identity: Mapping[str, Any] | None = None
+        self._synced = 0.0
+        self._end = 0
+        self.damaged = self._read()
+        self.holds_trials = bool(self.records)
+
+    def _read(self) -> int:
+        """Take what the file holds; how many lines are damaged."""
+        data = _data(self.path)
+        self.identity, self.records, damaged = parsed(data)
+        self._end = len(data)
+        if data and not data.endswith(b"\n"):
+            self._append(b"\n")
+        return damaged
+
+    def begin(self, identity: Mapping[str, Any]) -> None:
+        """Say what is run, or find that it is what the file was begun with.
+
+        Raises:
+            BadInputError: It is something else; the text says what differs.
+            OutputError: It cannot be written.
+        """
+        if self.identity is None:
+            self.records = {}
+            self._append(line({"identity": identity}))
+            self.identity = identity
+        elif changes := differences(self.identity, identity):
+            raise BadInputError(
+                f"{self.path.parent}: expected the run that it was begun with, found another: "
+                f"{changes}; choose another folder or give --overwrite"
+            )
+
+    def append(self, key: str, content: Mapping[str, Any]) -> None:
+        """Keep one trial.
+
+        Raises:
+            OutputError: The disk is full, or the like; what was kept before stays whole.
+        """
+        self._append(line({"key": key, **content}))
+        self.holds_trials = True
+
+    def take(self, records: Mapping[str, Any]) -> None:
+        """Keep the trials of other files."""
+        for key, content in records.items():
+            if key not in self.records:
+                self.append(key, content)
+                self.records[key] = content
+
+    def _append(self, data: bytes) -> None:
+        try:
+            left = data
+            while left:  # a disk that is almost full takes a part
+                left = left[os.write(self._file, left) :]
+            self._end += len(data)
+            if time.monotonic() - self._synced > _SYNC:
+                os.fsync(self._file)
+                self._synced = time.monotonic()
+        except OSError as error:
+            with contextlib.suppress(OSError):
+                os.ftruncate(self._file, self._end)
+            raise OutputError(
+                f"expected to write {self.path}, found: {error.strerror}; what was finished is "
+                "kept, and the run can be resumed"
+            ) from None
+
+    def clear(self) -> None:
+        """Forget everything."""
+        os.ftruncate(self._file, 0)
+        self.identity, self.records, self.damaged, self._end = None, {}, 0, 0
+        self.holds_trials = False
+
+    def close(self, remove: bool = False) -> None:
+        """Let others append; `remove` deletes the file first."""
+        with contextlib.suppress(OSError):
+            if remove:
+                self.path.unlink(missing_ok=True)
+            elif self._end:
+                os.fsync(self._file)
+        with contextlib.suppress(OSError):
+            os.close(self._file)
+
+
+def _data(path: Path) -> bytes:
+    try:
+        with open_regular(path) as file:
+            return file.read()
+    except OSError as error:
+        raise BadInputError(f"{path}: expected a readable file: {error.strerror}") from None
+
+
+def line(content: Mapping[str, Any]) -> bytes:
+    """One line with its checksum, which is that of the same JSON without it."""
+    body = dumped(content).encode()
+    return b'{"crc":"%08x",%b\n' % (zlib.crc32(body), body[1:])
+
+
+def parsed(data: bytes) -> tuple[Mapping[str, Any] | None, dict[str, Any], int]:
+    """What a file says is run, its trials by key, and how many of its lines are damaged.
+
+    Trials before the line that says what is run are of nothing that is known, and are left out.
+    """
+    identity: Mapping[str, Any] | None = None
+    records: dict[str, Any] = {}
+    damaged = 0
+    for content in _contents(data):
+        if content is None:
+            damaged += 1
+        elif "identity" in content and identity is None:
+            identity, records = content["identity"], {}
+        elif "key" in content:
+            records[content["key"]] = content
+    return identity, records, damaged
+
+
+def _contents(data: bytes) -> Iterator[dict[str, Any] | None]:
+    for each in data.split(b"\n"):
+        if not each:
+            continue
+        head = _HEAD.match(each)
+        body = b"{" + each[head.end() :] if head else b""
+        yield json.loads(body) if head and zlib.crc32(body) == int(head[1], 16) else None
+
+
+def read_store(path: Path) -> tuple[Mapping[str, Any], dict[str, Any]]:
+    """What a file says is run, and its trials; nobody need have ended it.
+
+    Raises:
+        BadInputError: It cannot be read, or does not say what is run.
+    """
+    identity, records, _ = parsed(_data(path))
+    if identity is None:
+        raise BadInputError(f"{path}: expected finished trials, found no first line that is sound")
+    return identity, records

@@ -1,0 +1,117 @@
+"""Parts that are submitted to any executor, and what its workers do.
+
+Results come back through the executor, so its workers need not see the files of the driver; they do
+need the same versions and the same code.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import BrokenExecutor
+from typing import Any
+
+from antennate.errors import WorkerError, in_one_line
+from antennate.studies.identity import differences, environment
+from antennate.studies.processes import added_objects, take_added
+from antennate.studies.work import Emit, Fail, Failure, Part, Waiting, Work
+
+_POLL = 0.02
+"""How often the driver looks for parts that have ended [s]."""
+
+
+class Submitted:
+    """Parts that are submitted to an executor of any kind.
+
+    Args:
+        name: What it is called in messages.
+        submit: As of an executor.
+        deaths: What a future raises whose worker died.
+        ahead: Parts that are submitted at once, for each worker.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        submit: Callable[..., Any],
+        deaths: tuple[type[BaseException], ...] = (BrokenExecutor,),
+        ahead: int = 4,
+    ) -> None:
+        self.name, self._submit, self._deaths, self._ahead = name, submit, deaths, ahead
+
+    def run(
+        self, work: Work, parts: Sequence[Sequence[int]], count: int, emit: Emit, fail: Fail
+    ) -> None:
+        """Run the tasks at these places; see `Engine`."""
+        waiting, running = Waiting(parts), dict[Any, list[int]]()
+        told = (environment(), added_objects())
+        try:
+            while waiting or running:
+                while waiting and len(running) < count * self._ahead:
+                    places = waiting.next()
+                    running[self._submitted(work.part(places), *told)] = places
+                ended = [future for future in running if future.done()]
+                for future in ended:
+                    self._take(future, running.pop(future), work, waiting, emit, fail)
+                if not ended:
+                    time.sleep(_POLL)
+        finally:
+            for future in running:
+                if callable(cancel := getattr(future, "cancel", None)):
+                    cancel()
+
+    def _submitted(self, *arguments: Any) -> Any:
+        try:
+            return self._submit(carry_out, *arguments)
+        except Exception as error:
+            raise WorkerError(f"{self.name}: cannot be given work: {in_one_line(error)}") from error
+
+    def _take(
+        self,
+        future: Any,
+        places: list[int],
+        work: Work,
+        waiting: Waiting,
+        emit: Emit,
+        fail: Fail,
+    ) -> None:
+        try:
+            answers = future.result()
+        except self._deaths as error:
+            given_up = waiting.lost(places, together=True)
+            if given_up is not None:
+                fail(given_up, Failure("crashed", f"its worker died: {in_one_line(error)}"))
+            return
+        except Exception as error:
+            raise WorkerError(f"{self.name}: {in_one_line(error)}") from error
+        for place, answer in answers:
+            (fail if isinstance(answer, Failure) else emit)(place, answer)
+
+
+def carry_out(
+    part: Part, theirs: Mapping[str, Any], added: Mapping[str, Any]
+) -> list[tuple[int, Any]]:
+    """In a worker: results and failures by place.
+
+    Raises:
+        WorkerError: The driver has other versions or other code.
+    """
+    require_same(theirs)
+    take_added(added)
+    answers: list[tuple[int, Any]] = []
+
+    def fail(place: int, failure: Failure) -> None:
+        answers.append((place, Failure(failure.status, failure.reason)))
+
+    part.carry_out(lambda place, result: answers.append((place, result)), fail)
+    return answers
+
+
+def require_same(theirs: Mapping[str, Any]) -> None:
+    """Check that this worker has the versions and the code of its driver.
+
+    Raises:
+        WorkerError: It has others.
+    """
+    if changes := differences(theirs, environment()):
+        raise WorkerError(f"expected workers with the driver's versions and code, found {changes}")

@@ -1,0 +1,174 @@
+"""What workers are given, how they carry it out, and what becomes of tasks that fail."""
+
+from __future__ import annotations
+
+from collections import Counter, deque
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal, Protocol
+
+from antennate.errors import WorkerError, in_one_line
+
+Emit = Callable[[int, Any], None]
+"""Takes the place of a task and its result."""
+RETRIES = 2
+"""How often a task is run again whose worker died."""
+
+
+@dataclass(frozen=True)
+class Failure:
+    """Why a task has no result.
+
+    Attributes:
+        status: failed (it raised), crashed (its workers died) or hung (it did not end in time).
+        reason: What happened, in one line.
+        error: What it raised, if that was in this process.
+    """
+
+    status: Literal["failed", "crashed", "hung"]
+    reason: str
+    error: Exception | None = field(default=None, compare=False)
+
+
+Fail = Callable[[int, Failure], None]
+"""Takes the place of a task and why it has no result."""
+
+
+@dataclass(frozen=True)
+class Work:
+    """Tasks of one kind.
+
+    Attributes:
+        function: At the top of a module: function(*task) -> result; with `together`
+            function(tasks, emit), which emits the index of a task and its result.
+        tasks: Its arguments.
+        together: Whether several tasks are carried out at once.
+        timeout: Time after which a task that has not ended is given up [s].
+        folder: Run directory that it belongs to, None without.
+        batched: batched(tasks, emit, device) does the same on a GPU, None if nothing does.
+    """
+
+    function: Callable[..., Any]
+    tasks: Sequence[tuple[Any, ...]]
+    together: bool
+    timeout: float
+    folder: Path | None = None
+    batched: Callable[..., Any] | None = None
+
+    def part(self, places: Sequence[int]) -> Part:
+        """Some of it, to be sent to a worker."""
+        tasks = {place: self.tasks[place] for place in places}
+        return Part(self.function, tasks, self.together, self.timeout)
+
+
+@dataclass(frozen=True)
+class Part:
+    """Some tasks by place, as a worker is given them."""
+
+    function: Callable[..., Any]
+    tasks: dict[int, tuple[Any, ...]]
+    together: bool
+    timeout: float
+
+    def carry_out(self, emit: Emit, fail: Fail) -> None:
+        """Run the tasks; those that raise are told to `fail`, and the others go on."""
+        left = dict(self.tasks)
+        told: Exception | None = None
+
+        def take(place: int, result: Any) -> None:
+            nonlocal told
+            try:
+                emit(place, result)
+            except Exception as error:
+                told = error
+                raise
+            del left[place]
+
+        places = list(self.tasks)
+        while left:
+            now = list(left) if self.together and len(left) == len(places) else [next(iter(left))]
+            try:
+                if self.together:
+                    tasks = [self.tasks[place] for place in now]
+                    self.function(tasks, lambda i, result, now=now: take(now[i], result))
+                    if missing := [place for place in now if place in left]:
+                        raise WorkerError(f"expected {len(now)} results, {len(missing)} missing")
+                else:
+                    take(now[0], self.function(*self.tasks[now[0]]))
+            except Exception as error:  # noqa: BLE001  (a trial may raise anything)
+                if told is not None:
+                    raise told from None
+                if len(now) == 1:
+                    del left[now[0]]
+                    known = isinstance(error, WorkerError)
+                    reason = str(error) if known else in_one_line(error)
+                    fail(now[0], Failure("failed", reason, error))
+                else:
+                    places = []  # one of them raised: from now on each is run alone
+
+
+class Engine(Protocol):
+    """Where tasks are run. See `antennate.studies.engines`."""
+
+    name: str
+
+    def run(
+        self, work: Work, parts: Sequence[Sequence[int]], count: int, emit: Emit, fail: Fail
+    ) -> None:
+        """Run the tasks at these places, given in parts, on so many workers.
+
+        Raises:
+            WorkerError: The workers cannot run anything.
+        """
+        ...
+
+
+class Waiting:
+    """Parts that wait for a worker, and what becomes of those whose worker died.
+
+    A task that may have killed its worker is run again, alone, so that nothing else is lost with
+    it; a task that kills RETRIES + 1 workers is given up.
+    """
+
+    def __init__(self, parts: Sequence[Sequence[int]]) -> None:
+        self._parts = deque(list(part) for part in parts)
+        self._deaths: Counter[int] = Counter()
+
+    def __len__(self) -> int:
+        return len(self._parts)
+
+    def next(self) -> list[int]:
+        """The next part."""
+        return self._parts.popleft()
+
+    def lost(self, left: Sequence[int], together: bool, final: bool = False) -> int | None:
+        """Put back what a dead worker left; the task that is given up, if one is.
+
+        Args:
+            left: Places without a result, in order.
+            together: Whether all of them ran, or the first alone.
+            final: Whether one that ran alone has no further chance.
+        """
+        suspects, others = (list(left), []) if together else (list(left[:1]), list(left[1:]))
+        if others:
+            self._parts.appendleft(others)
+        if len(suspects) == 1:
+            self._deaths[suspects[0]] += 1
+            if final or self._deaths[suspects[0]] > RETRIES:
+                return suspects[0]
+        self._parts.extendleft([place] for place in reversed(suspects))
+        return None
+
+
+class Here:
+    """This process, one task after the other."""
+
+    name = "here"
+
+    def run(
+        self, work: Work, parts: Sequence[Sequence[int]], count: int, emit: Emit, fail: Fail
+    ) -> None:
+        """Run all; a task that crashes or hangs takes this process with it."""
+        for part in parts:
+            work.part(part).carry_out(emit, fail)

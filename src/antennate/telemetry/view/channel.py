@@ -1,0 +1,156 @@
+"""Messages between a program and the process that shows it; sending never waits.
+
+Both ends of a pair of sockets keep the borders of messages. What does not fit is dropped and
+counted; the next message is newer anyway. Only the shapes of a scene, which come once, are longer
+than a message may be: they follow one another in pieces, and for those one waits.
+"""
+
+from __future__ import annotations
+
+import json
+import select
+import socket
+import time
+from collections.abc import Iterator, Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from antennate.errors import BadInputError
+
+SCENE, MORE, POSES, TICK = b"S", b"M", b"P", b"T"
+"""Kinds of messages: the scene and a piece of it, poses with forces, a tick."""
+HEADER, TEXT, STATE, END = b"H", b"X", b"Z", b"E"
+"""The header of a log, a line of text, the state of the controls, the end in order."""
+READY, FAILED = b"R", b"F"
+"""What the other process says at first: it serves, or why it cannot."""
+ORDER = b"O"
+"""The kind that the page sends: what a person wants, as JSON."""
+_PIECE = 1 << 16
+_LONGEST = 1 << 18
+_ROOM = 1 << 20
+"""Bytes that may wait to be taken; the system may allow less."""
+_PATIENCE = 5.0
+"""Longest wait for room for a piece of the scene [s]; assumed: the other end is starting."""
+
+
+class Poses(NamedTuple):
+    """Where all shapes are at a time.
+
+    Attributes:
+        t: Time of the trial [s].
+        poses: As of `sim.shapes`, shape (n, 12).
+        forces: As of `sim.shapes`, shape (k, 6).
+    """
+
+    t: float
+    poses: Any
+    forces: Any
+
+    def pack(self) -> bytes:
+        """It as bytes."""
+        head = np.array([self.t, len(self.poses)], np.float64).tobytes()
+        return head + self.poses.tobytes() + self.forces.tobytes()
+
+    @classmethod
+    def unpack(cls, content: bytes) -> Poses:
+        """Back from `pack`.
+
+        Raises:
+            BadInputError: It is something else.
+        """
+        try:
+            t, count = np.frombuffer(content, np.float64, 2)
+            numbers = np.frombuffer(content, np.float32, offset=16)
+            end = 12 * int(count)
+            return cls(float(t), numbers[:end].reshape(-1, 12), numbers[end:].reshape(-1, 6))
+        except ValueError as error:
+            raise BadInputError(f"expected poses, found {error}") from None
+
+
+class Channel:
+    """One end of the pair.
+
+    Attributes:
+        dropped: Messages for which there was no room.
+        closed: The other end is gone.
+    """
+
+    def __init__(self, end: socket.socket) -> None:
+        self._end = end
+        end.setblocking(False)
+        end.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _ROOM)
+        self.dropped, self.closed = 0, False
+
+    @staticmethod
+    def pair() -> tuple[socket.socket, socket.socket]:
+        """Two sockets; each makes a `Channel` in its process."""
+        return socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+
+    def fileno(self) -> int:
+        """Its file, to wait for."""
+        return self._end.fileno()
+
+    def send(self, kind: bytes, content: bytes = b"") -> bool:
+        """Send a message, or drop it if there is no room now; whether it was taken."""
+        try:
+            self._end.send(kind + content)
+        except BlockingIOError:
+            self.dropped += 1
+            return False
+        except OSError:
+            self.closed = True
+            return False
+        return True
+
+    def tell(self, kind: bytes, **content: Any) -> bool:
+        """Send a message that is a JSON object."""
+        return self.send(kind, json.dumps(content).encode())
+
+    def send_whole(self, kind: bytes, content: bytes) -> bool:
+        """Send a long message in pieces; False if the other end takes none."""
+        end = time.monotonic() + _PATIENCE
+        pieces = [content[at : at + _PIECE] for at in range(0, len(content), _PIECE)] or [b""]
+        kinds = [MORE] * (len(pieces) - 1) + [kind]
+        for each, piece in zip(kinds, pieces, strict=True):
+            while not self.send(each, piece):
+                self.dropped -= not self.closed
+                left = end - time.monotonic()
+                if self.closed or left <= 0 or not select.select((), (self._end,), (), left)[1]:
+                    return False
+        return True
+
+    def receive(self) -> Iterator[tuple[bytes, bytes]]:
+        """Kind and content of what has come; a long message is put together."""
+        held = b""
+        while True:
+            try:
+                message = self._end.recv(_LONGEST)
+            except BlockingIOError:
+                if not held:
+                    return
+                select.select((self._end,), (), (), _PATIENCE)
+                continue
+            except OSError:
+                message = b""
+            if not message:
+                self.closed = True
+                return
+            if message[:1] == MORE:
+                held += message[1:]
+                continue
+            content, held = held + message[1:], b""
+            yield message[:1], content
+
+    def close(self) -> None:
+        """Close this end."""
+        self._end.close()
+
+
+def read(content: bytes) -> Mapping[str, Any]:
+    """The JSON object of a message; empty for anything else."""
+    try:
+        found = json.loads(content)
+    except ValueError:
+        return {}
+    return found if isinstance(found, dict) else {}

@@ -1,0 +1,200 @@
+"""The topics of a log, live, for Foxglove and Lichtblick.
+
+foxglove-sdk takes any Host and Origin and knows no token, so that any page that is open in a
+browser of this computer can read along. Nothing can be sent back.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from importlib.resources import files
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from antennate.errors import BadInputError, MissingPackageError
+from antennate.sim import shapes
+from antennate.sim.shapes import Shapes
+from antennate.telemetry.header import Header
+from antennate.telemetry.ticks import Tick
+from antennate.telemetry.topics import CONFIG, EVENTS, TOPICS, Topic
+from antennate.telemetry.view.channel import HEADER, POSES, SCENE, TEXT, TICK, Poses
+
+PORT = 8765
+"""Usual port of a Foxglove WebSocket."""
+_HOST = "127.0.0.1"
+_IDLE = 0.1
+_INFO = 20
+_ARROW = (0.05, 0.003, 0.01, 0.008)
+"""Length for 1 N [m], diameter of the shaft, length and diameter of the head [m]."""
+
+
+def layout() -> Path:
+    """The layout file that shows these topics, for `Import layout from file`."""
+    return Path(str(files("antennate.telemetry.view").joinpath("foxglove-layout.json")))
+
+
+class FoxgloveSink:
+    """Serves the messages that a log would have, and the scene.
+
+    Args:
+        port: Port on this computer, 0 for any that is free.
+
+    Raises:
+        MissingPackageError: foxglove-sdk is not installed.
+        BadInputError: The port is taken.
+    """
+
+    def __init__(self, port: int) -> None:
+        require_foxglove()
+        self._sdk = sdk = import_module("foxglove")
+        self._messages: Any = import_module("foxglove.messages")
+        self._context = context = sdk.Context()  # channels close with it
+        try:
+            self._server = sdk.start_server(
+                name="antennate", host=_HOST, port=port, context=context
+            )
+        except (OSError, RuntimeError) as error:
+            raise BadInputError(
+                f"foxglove: expected port {port} of {_HOST} free, found: {error}; "
+                "choose another with --foxglove-port, 0 takes any"
+            ) from None
+        self._channels = {
+            topic: sdk.Channel(
+                topic.name,
+                message_encoding="cdr",
+                schema=sdk.Schema(
+                    name=topic.type.name, encoding="ros2msg", data=topic.type.schema.encode()
+                ),
+                context=context,
+            )
+            for topic in TOPICS
+        }
+        self._scene_channel = import_module("foxglove.channels").SceneUpdateChannel(
+            "/scene", context=context
+        )
+        self._names: tuple[str, ...] = ()
+        self._start = self._now = 0
+        self._shapes: Shapes | None = None
+
+    @property
+    def address(self) -> str:
+        """What to open as a Foxglove WebSocket."""
+        return f"ws://{_HOST}:{self._server.port}"
+
+    def draw(self, now: float) -> float:
+        """Nothing waits to be drawn."""
+        return _IDLE
+
+    def take(self, kind: bytes, content: bytes) -> None:
+        """Send a message on."""
+        if kind == TICK:
+            self._tick(Tick.unpack(content))
+        elif kind == POSES and self._shapes is not None:
+            self._scene(self._shapes, Poses.unpack(content))
+        elif kind == SCENE:
+            self._shapes = Shapes.unpack(content)
+        elif kind == TEXT:
+            time = divmod(self._now, 10**9)
+            text = content.decode("utf-8", "replace")
+            self._send(EVENTS, EVENTS.type.encode(*time, _INFO, "antennate", text, "", "", 0))
+        elif kind == HEADER:
+            header = Header.unpack(content)
+            self._names, self._start = header.robot.joint_names, header.start
+            self._now = header.start
+            self._send(CONFIG, header.messages()[CONFIG])
+
+    def _tick(self, tick: Tick) -> None:
+        self._now = max(0, self._start + round(1e9 * tick.now))
+        for topic, data in tick.messages(self._names, self._now):
+            self._send(topic, data)
+
+    def _send(self, topic: Topic, data: bytes) -> None:
+        self._channels[topic].log(data, log_time=self._now)
+
+    def _scene(self, what: Shapes, now: Poses) -> None:
+        made = self._messages
+        turned = Rotation.from_matrix(now.poses[:, 3:].reshape(-1, 3, 3))
+        poses = [
+            made.Pose(position=_vector(made, at), orientation=_quaternion(made, q))
+            for at, q in zip(now.poses[:, :3].tolist(), turned.as_quat().tolist(), strict=True)
+        ]
+        colours = [made.Color(r=r, g=g, b=b, a=a) for r, g, b, a in (what.colour / 255).tolist()]
+        entity: dict[str, list[Any]] = {"cubes": [], "spheres": [], "cylinders": []}
+        for i, (kind, size) in enumerate(zip(what.kind.tolist(), what.size.tolist(), strict=True)):
+            name, full = _primitive(kind, size)
+            more = {"bottom_scale": 1.0, "top_scale": 1.0} if name == "cylinders" else {}
+            make = getattr(made, _PRIMITIVES[name])
+            shape = make(pose=poses[i], size=_vector(made, full), color=colours[i], **more)
+            entity[name].append(shape)
+        arrows = [_arrow(made, each) for each in now.forces]
+        stamp = made.Timestamp(sec=self._now // 10**9, nsec=self._now % 10**9)
+        self._scene_channel.log(
+            made.SceneUpdate(
+                entities=[
+                    made.SceneEntity(
+                        timestamp=stamp, frame_id="world", id="world", arrows=arrows, **entity
+                    )
+                ]
+            ),
+            log_time=self._now,
+        )
+
+
+_PRIMITIVES = {"cubes": "CubePrimitive", "spheres": "SpherePrimitive"}
+_PRIMITIVES |= {"cylinders": "CylinderPrimitive"}
+
+
+def require_foxglove() -> None:
+    """Find out whether topics can be served live.
+
+    Raises:
+        MissingPackageError: foxglove-sdk is not installed.
+    """
+    if find_spec("foxglove") is None:
+        raise MissingPackageError(
+            "foxglove: expected the package foxglove-sdk, found none; install it with "
+            "`pip install 'antennate[foxglove]'`"
+        )
+
+
+def _primitive(kind: int, size: list[float]) -> tuple[str, list[float]]:
+    """The nearest primitive of a shape, and its whole size [m]; a capsule has flat ends."""
+    if kind in (shapes.CAPSULE, shapes.CYLINDER):
+        return "cylinders", [2 * size[0], 2 * size[0], 2 * size[1]]
+    if kind == shapes.SPHERE:
+        return "spheres", [2 * size[0]] * 3
+    if kind == shapes.ELLIPSOID:
+        return "spheres", [2 * each for each in size]
+    return "cubes", [2 * each for each in size]
+
+
+def _arrow(made: Any, force: Any) -> Any:
+    length = float(np.linalg.norm(force[3:]))
+    turned = Rotation.align_vectors([force[3:] / (length or 1.0)], [[1.0, 0.0, 0.0]])[0]
+    pose = made.Pose(
+        position=_vector(made, force[:3].tolist()),
+        orientation=_quaternion(made, turned.as_quat().tolist()),
+    )
+    scale, shaft, head, wide = _ARROW
+    return made.ArrowPrimitive(
+        pose=pose,
+        shaft_length=scale * length,
+        shaft_diameter=shaft,
+        head_length=head,
+        head_diameter=wide,
+        color=made.Color(r=0.84, g=0.37, b=0.0, a=1.0),
+    )
+
+
+def _vector(made: Any, values: list[float]) -> Any:
+    x, y, z = values
+    return made.Vector3(x=x, y=y, z=z)
+
+
+def _quaternion(made: Any, values: list[float]) -> Any:
+    x, y, z, w = values
+    return made.Quaternion(x=x, y=y, z=z, w=w)

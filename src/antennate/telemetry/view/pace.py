@@ -1,0 +1,126 @@
+"""The program's side of a view: when a picture is due, how fast time goes, what a person wants."""
+
+from __future__ import annotations
+
+import math
+import select
+import time
+from collections.abc import Mapping
+from typing import Any
+
+from antennate.telemetry.view.channel import ORDER, STATE, TEXT, Channel, read
+
+RATE = 60.0
+"""Pictures a second."""
+_LOOK = 0.05
+"""Longest wait of a program that is paused before it looks again [s]."""
+_LATE = 0.2
+"""A program that is later than this does not catch up [s]."""
+
+
+class Restart(Exception):
+    """A person wants the trial anew, with a seed; a log from its beginning.
+
+    Attributes:
+        seed: The seed.
+    """
+
+    def __init__(self, seed: int) -> None:
+        super().__init__(f"restart with seed {seed}")
+        self.seed = seed
+
+
+class Pace:
+    """Lets a simulation or a log run at a speed, stand and step, as the page wants it.
+
+    If the page is gone it runs on without one, as fast as it goes.
+
+    Args:
+        channel: To the process that shows it.
+        speed: Times real time at which it begins; 0 is as fast as it goes.
+
+    Attributes:
+        state: What the page shows of the controls.
+    """
+
+    def __init__(self, channel: Channel, speed: float) -> None:
+        self.channel = channel
+        self.state: dict[str, Any] = {"speed": speed, "paused": False, "values": {}}
+        self._steps = 0
+        self._next = -math.inf
+        self._begin: tuple[float, float] | None = None
+
+    def tell(self) -> None:
+        """Show the state of the controls."""
+        self.channel.tell(STATE, **self.state)
+
+    def say(self, text: str) -> None:
+        """Show a line."""
+        self.channel.send(TEXT, text.encode())
+
+    def due(self) -> bool:
+        """Whether a picture is due; if so, orders have been taken."""
+        now = time.monotonic()
+        if now < self._next:
+            return False
+        self._next = now + 1.0 / RATE
+        self.look()
+        return True
+
+    def wait(self, t: float) -> None:
+        """Return when time t [s] of the program has come.
+
+        Raises:
+            Restart: A person wants it anew.
+        """
+        while self.state["paused"] and not self._steps and not self.channel.closed:
+            select.select((self.channel,), (), (), _LOOK)
+            self.look()
+            self.redraw()
+            self._begin = None
+        if self._steps:
+            self._steps -= 1
+            self._next = -math.inf  # a step is shown at once
+        speed = self.state["speed"]
+        if not speed or self.channel.closed:
+            self._begin = None
+            return
+        now = time.monotonic()
+        if self._begin is None or t < self._begin[1]:
+            self._begin = now, t
+        due = self._begin[0] + (t - self._begin[1]) / speed
+        if now > due + _LATE:
+            self._begin = None
+        while (left := due - time.monotonic()) > 0 and not self.channel.closed:
+            time.sleep(min(left, _LOOK))
+            self.look()
+            if self.state["paused"] or self.state["speed"] != speed:
+                self._begin = None
+                return
+
+    def redraw(self) -> None:
+        """Show again what may have been changed while it stands."""
+
+    def look(self) -> None:
+        """Carry out what the page wants.
+
+        Raises:
+            Restart: A person wants it anew.
+        """
+        for kind, content in self.channel.receive():
+            if kind == ORDER:
+                self.carry_out(read(content))
+
+    def carry_out(self, order: Mapping[str, Any]) -> None:
+        """Carry out one order; an unknown one is left alone."""
+        what, value = order.get("do"), order.get("value")
+        if what == "pause":
+            self.state["paused"] = bool(order.get("on"))
+            self.tell()
+        elif what == "step":
+            self.state["paused"] = True
+            self._steps += 1
+            self.tell()
+        elif what == "speed" and isinstance(value, float | int) and 0 <= value <= 100:
+            self.state["speed"] = float(value)
+            self._begin = None

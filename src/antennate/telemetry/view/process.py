@@ -1,0 +1,123 @@
+"""The process that serves the page, seen from the program that is shown."""
+
+from __future__ import annotations
+
+import contextlib
+import select
+import socket
+import subprocess
+import sys
+from importlib.util import find_spec
+
+from antennate.errors import BadInputError, MissingPackageError
+from antennate.telemetry.view.channel import END, FAILED, READY, Channel
+from antennate.telemetry.view.foxglove import require_foxglove
+
+HOST = "127.0.0.1"
+PORT = 8777
+"""Usual port of the page (assumed: nothing known uses it)."""
+_STARTING = 60.0
+"""Longest wait for the process to serve [s]: its imports on a busy machine; assumed."""
+_ENDING = 2.0
+
+
+class ViewProcess:
+    """Serves the page from a process of its own; a context.
+
+    Args:
+        port: Port of the page on this computer, 0 for any that is free; None without a page.
+        module: What that process runs; its words are the files of the channel and of the page's
+            socket, and the port for Foxglove, a hyphen for what is not wanted.
+        foxglove: Port for Foxglove likewise, None without it.
+
+    Attributes:
+        channel: To it.
+        port: The port of the page, 0 without one.
+
+    Raises:
+        MissingPackageError: viser or foxglove-sdk is not installed.
+        BadInputError: A port is taken, or the process cannot serve.
+    """
+
+    def __init__(self, port: int | None, module: str, foxglove: int | None = None) -> None:
+        if port is not None:
+            require_viser()
+        if foxglove is not None:
+            require_foxglove()
+        listener = socket.socket() if port is None else _listener(port)
+        self.port: int = 0 if port is None else listener.getsockname()[1]
+        ours, theirs = Channel.pair()
+        with listener, theirs:
+            files = [theirs.fileno()] + ([] if port is None else [listener.fileno()])
+            words = [*map(str, files), *(["-"] if port is None else [])]
+            words.append("-" if foxglove is None else str(foxglove))
+            self._process = subprocess.Popen(  # noqa: S603 our own words
+                [sys.executable, "-m", module, *words],
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL,  # viser prints there
+                pass_fds=files,
+                process_group=0,  # Ctrl-C in the terminal is for the program alone
+            )
+        self.channel = Channel(ours)
+        try:
+            self._wait()
+        except BaseException:
+            self.close()
+            raise
+
+    def _wait(self) -> None:
+        """Until it serves."""
+        ready, _, _ = select.select((self.channel,), (), (), _STARTING)
+        kind, text = next(self.channel.receive() if ready else iter(()), (b"", b""))
+        if kind == READY:
+            return
+        if kind == FAILED:
+            raise BadInputError(text.decode())
+        raise BadInputError("view: expected its process to serve, found that it does not")
+
+    def close(self) -> None:
+        """End it."""
+        self.channel.send(END)
+        self.channel.close()
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            self._process.wait(_ENDING)
+        self._process.kill()
+        self._process.wait()
+
+    def __enter__(self) -> ViewProcess:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+def require_viser() -> None:
+    """Find out whether the page can be served.
+
+    Raises:
+        MissingPackageError: viser is not installed.
+    """
+    if find_spec("viser") is None:
+        raise MissingPackageError(
+            "view: expected the package viser, found none; install it with "
+            "`pip install 'antennate[view]'`"
+        )
+
+
+def _listener(port: int) -> socket.socket:
+    """A socket of this computer alone.
+
+    Raises:
+        BadInputError: The port is taken.
+    """
+    listener = socket.socket()
+    listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    try:
+        listener.bind((HOST, port))
+    except OSError as error:
+        listener.close()
+        raise BadInputError(
+            f"view: expected port {port} of {HOST} free, found: {error.strerror}; "
+            "choose another with --view-port, 0 takes any"
+        ) from None
+    return listener

@@ -1,0 +1,189 @@
+"""The 3-D scene: the shapes of a model, where they are, and contact forces as arrows.
+
+Shapes of one kind are one node, so that a picture is a few messages, however many shapes there are.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import trimesh
+import viser
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from antennate.sim import shapes
+from antennate.sim.shapes import Shapes
+from antennate.telemetry.view.channel import Poses
+from antennate.types import Floats, Ints
+
+ROOT = "/world"
+_ARROW = (190, 0, 60)
+_FLOOR = 4.0
+"""Side of the floor that is drawn [m]; it goes on beyond in the distance."""
+_CELL = 0.1
+_AMBIENT = 1.5
+"""Light from all sides, so that nothing is black behind what one sees through."""
+_ALONG_Z = np.array([0.0, 0.0, 1.0])
+
+
+class SceneView:
+    """The scene of one model.
+
+    Args:
+        server: Where it is shown.
+        what: The shapes.
+
+    Attributes:
+        shapes: The shapes.
+        groups: The nodes of the scene.
+        places: Where the shapes are [m], shape (n, 3).
+        middle: How far everything is moved to follow the robot [m], shape (3,).
+        follow: Whether the robot stays in the middle of the picture.
+        arrow_scale: Length of an arrow for each unit of force [m/N].
+    """
+
+    def __init__(self, server: viser.ViserServer, what: Shapes) -> None:
+        self._server, self.shapes = server, what
+        self.follow, self.arrow_scale = True, 0.1
+        self.places = np.zeros((len(what.kind), 3), np.float32)
+        self.middle: Floats = np.zeros(3)
+        server.scene.reset()
+        server.scene.set_up_direction("+z")
+        server.scene.configure_environment_map(None)
+        server.scene.add_light_ambient("/light", intensity=_AMBIENT)
+        self._root = server.scene.add_frame(ROOT, show_axes=False)
+        if np.isfinite(what.floor[0]):
+            _floor(server, float(what.floor[0]))
+        self.groups = [_Group(server, *group) for group in _groups(what)]
+        self._arrows = server.scene.add_arrows(
+            f"{ROOT}/forces",
+            np.zeros((0, 2, 3)),
+            _ARROW,
+            shaft_radius=0.004,
+            head_radius=0.009,
+            head_length=0.018,
+        )
+        self._aimed = False
+
+    def show(self, now: Poses, target: Floats) -> None:
+        """Put everything where it is.
+
+        Args:
+            now: The poses.
+            target: What stays in the middle of the picture while it is followed [m], shape (2,).
+        """
+        self.places = places = now.poses[:, :3]
+        turned = now.poses[:, 3:].reshape(-1, 3, 3)
+        with self._server.atomic():
+            for group in self.groups:
+                group.place(places, turned)
+            ends = now.forces[:, :3] + self.arrow_scale * now.forces[:, 3:]
+            self._arrows.points = np.stack([now.forces[:, :3], ends], axis=1)
+            self.middle = np.array([-target[0], -target[1], 0.0]) if self.follow else np.zeros(3)
+            self._root.position = self.middle
+        if not self._aimed:
+            self._aim(places)
+
+    def _aim(self, places: NDArray[np.float32]) -> None:
+        """Look from behind and above at the robot, once."""
+        self._aimed = True
+        ours = places[self.shapes.robot]
+        reach = float(np.ptp(ours if len(ours) else places, axis=0).max())
+        camera = self._server.initial_camera
+        camera.position = (-0.7 * reach, -0.9 * reach, 1.3 * reach)
+        camera.look_at = (0.0, 0.0, 0.0)
+
+
+class _Group:
+    """Shapes that are drawn as one node: instances of one mesh.
+
+    Attributes:
+        which: Numbers of the shapes.
+        node: The node of the scene.
+    """
+
+    def __init__(
+        self,
+        server: viser.ViserServer,
+        name: str,
+        which: Ints,
+        mesh: tuple[Any, Any],
+        scale: Floats,
+        shift: Floats,
+        colour: NDArray[np.uint8],
+    ) -> None:
+        self.which, self._shift = which, shift
+        count = len(which)
+        self.node = server.scene.add_batched_meshes_simple(
+            f"{ROOT}/{name}",
+            *mesh,
+            batched_wxyzs=np.tile([1.0, 0.0, 0.0, 0.0], (count, 1)),
+            batched_positions=np.zeros((count, 3)),
+            batched_scales=scale,
+            batched_colors=colour[:, :3],
+            batched_opacities=None if (colour[:, 3] == 255).all() else colour[:, 3] / 255.0,
+            lod="off",
+        )
+        self._before: NDArray[np.float32] = np.zeros(0, np.float32)
+
+    def place(self, places: NDArray[np.float32], turned: NDArray[np.float32]) -> None:
+        """Put its shapes where they are, if anything has moved."""
+        mine = Rotation.from_matrix(turned[self.which])
+        at = places[self.which] + mine.apply(self._shift)
+        now = np.concatenate([at.ravel(), mine.as_quat().ravel()]).astype(np.float32)
+        if not np.array_equal(now, self._before):
+            self._before = now
+            self.node.batched_positions = at
+            self.node.batched_wxyzs = mine.as_quat(scalar_first=True)
+
+
+def _groups(
+    what: Shapes,
+) -> list[tuple[str, Ints, tuple[Any, Any], Floats, Floats, NDArray[np.uint8]]]:
+    """Name, shapes, mesh, scale and shift along their own axes, and colour of each group."""
+    round_, box = trimesh.creation.icosphere(2), trimesh.creation.box((2.0, 2.0, 2.0))
+    tube = trimesh.creation.cylinder(1.0, 2.0, sections=24)
+    found = []
+    kind, size = what.kind, what.size.astype(np.float64)
+
+    def add(name: str, which: Ints, mesh: Any, scale: Floats, shift: float = 0.0) -> None:
+        for moves in (False, True):
+            mine = what.moves[which] == moves
+            if mine.any():
+                some = which[mine]
+                along = shift * size[some, 1:2] * _ALONG_Z
+                label = f"{name}_{'moving' if moves else 'fixed'}"
+                found.append((label, some, mesh, scale[mine], along, what.colour[some]))
+
+    def of(*kinds: int) -> Ints:
+        return np.flatnonzero(np.isin(kind, kinds))
+
+    ball, tubes = of(shapes.SPHERE), of(shapes.CAPSULE, shapes.CYLINDER)
+    whole, caps, boxes = of(shapes.ELLIPSOID), of(shapes.CAPSULE), of(shapes.BOX)
+    sphere = (round_.vertices, round_.faces)
+    add("sphere", ball, sphere, size[ball][:, [0, 0, 0]])
+    add("ellipsoid", whole, sphere, size[whole])
+    add("tube", tubes, (tube.vertices, tube.faces), size[tubes][:, [0, 0, 1]])
+    for name, sign in (("top", 1.0), ("bottom", -1.0)):
+        add(name, caps, sphere, size[caps][:, [0, 0, 0]], sign)
+    add("box", boxes, (box.vertices, box.faces), size[boxes])
+    for number, (corners, triangles) in enumerate(what.ends.tolist()):
+        first, start = what.ends[number - 1].tolist() if number else (0, 0)
+        mesh = (what.vertices[first:corners], what.faces[start:triangles])
+        which = np.flatnonzero(what.mesh == number)
+        add(f"mesh{number}", which, mesh, np.ones((len(which), 3)))
+    return found
+
+
+def _floor(server: viser.ViserServer, height: float) -> None:
+    server.scene.add_grid(
+        f"{ROOT}/floor",
+        width=_FLOOR,
+        height=_FLOOR,
+        infinite_grid=True,
+        cell_size=_CELL,
+        section_size=5 * _CELL,
+        position=(0.0, 0.0, height),
+    )

@@ -1,0 +1,206 @@
+"""A simulation that is watched, and changed by hand.
+
+What is changed by hand is told to the log and to the result, as the run does not follow from its
+configuration any more.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from antennate.colours import SERIES, rgba
+from antennate.control.registry import make_controller
+from antennate.errors import ConfigError
+from antennate.hardware.driving.decision import decision_of
+from antennate.messages import one_line
+from antennate.params.control import ControlParams
+from antennate.robots.spec import RobotSpec
+from antennate.sim.shapes import VisibleModel
+from antennate.telemetry.ticks import Tick, decided
+from antennate.telemetry.view.channel import POSES, SCENE, TICK, Channel, Poses
+from antennate.telemetry.view.pace import Pace, Restart
+from antennate.telemetry.view.tuning import Tuning
+from antennate.types import AntennaFrame, Controller
+
+_SIDES = (rgba(SERIES[0]), rgba(SERIES[1]))
+_FARTHEST = 50.0
+"""Farthest from the origin that an obstacle is put [m]; a world beyond 100 m is unsound."""
+NONE = -1
+"""Stands for a maneuver where there is none."""
+_NOT_A_NUMBER = (math.nan, math.nan)
+_UNKNOWN = (2, 2)
+
+
+class SimulationView(Pace):
+    """Shows one trial after the other.
+
+    Args:
+        channel: To the process that shows it.
+        speed: Times real time at which it begins; 0 is as fast as it goes.
+        steered: Whether the page has controls; without them it changes nothing.
+        paused: Whether it stands at first.
+
+    Attributes:
+        by_hand: What was changed by hand, in order.
+    """
+
+    def __init__(
+        self, channel: Channel, speed: float = 1.0, steered: bool = True, paused: bool = False
+    ) -> None:
+        super().__init__(channel, speed)
+        self.state["paused"] = paused
+        self._steered = steered
+        if not steered:
+            self.state = {"speed": None, "paused": False}
+        self.by_hand: list[str] = []
+        self._fresh: list[str] = []
+        self._tuning: Tuning | None = None
+        self._seen: Any = None
+        self._model: VisibleModel | None = None
+        self._data: Any = None
+        self._title, self._number = "", 0
+        self._last: tuple[AntennaFrame | None, Controller | None, int] = (None, None, NONE)
+
+    def begin(self, title: str, seed: int | None = None) -> None:
+        """A trial begins; `seed` is the one that it has, None where there is no chance."""
+        self._title, self._number, self._seen = title, 0, None
+        self._tuning = None
+        self.state |= {"title": title, "values": {}}
+        self.state.pop("seed", None)
+        if seed is not None:
+            self.state["seed"] = seed
+
+    def controller(
+        self, name: str, control: ControlParams, robot: RobotSpec, batch: int = 1
+    ) -> Controller:
+        """A controller of that name whose numbers the page can change.
+
+        Raises:
+            ConfigError: There is none, or it cannot be made.
+        """
+
+        def make(values: ControlParams) -> Controller:
+            return make_controller(name, values, robot, batch)
+
+        self._tuning = Tuning(name, control, make)
+        self.state["values"] = self._tuning.values
+        return self._tuning.controller
+
+    def tick(
+        self,
+        model: Any,
+        data: Any,
+        frame: AntennaFrame | None = None,
+        controller: Controller | None = None,
+        maneuver: int = NONE,
+    ) -> Sequence[str]:
+        """Show a tick if a picture is due, and wait until its time has come.
+
+        Args:
+            model: The compiled model, of mujoco.
+            data: Its state.
+            frame: What was read, None without antennae.
+            controller: What decided, None without one.
+            maneuver: The `Maneuver` without a controller, if there is one.
+
+        Returns:
+            What was changed by hand since the last tick, for the log.
+
+        Raises:
+            Restart: A person wants the trial anew, with a seed.
+        """
+        if self._seen is not model:
+            self._show_model(model)
+        self._data, self._number = data, self._number + 1
+        self._last = frame, controller, maneuver
+        self.wait(data.time)
+        if self.due():
+            self.redraw()
+        done, self._fresh = self._fresh, []
+        return done
+
+    def redraw(self) -> None:
+        """Show where everything is."""
+        if self._model is not None and self._data is not None:
+            poses, forces = self._model.poses(self._data), self._model.forces(self._data)
+            self.channel.send(POSES, Poses(self._data.time, poses, forces).pack())
+            self.channel.send(TICK, self._tick(self._data.time, *self._last).pack())
+
+    def _show_model(self, model: Any) -> None:
+        self._seen, self._model = model, VisibleModel(model, _SIDES)
+        self.tell()
+        self.channel.send_whole(SCENE, self._model.shapes().pack())
+
+    def _tick(
+        self, t: float, frame: AntennaFrame | None, controller: Controller | None, maneuver: int
+    ) -> Tick:
+        more: dict[str, Any] = {"phase": math.nan, "contact": _UNKNOWN, "level": _NOT_A_NUMBER}
+        counts = _NOT_A_NUMBER if frame is None else tuple(frame.counts[0].tolist())
+        if controller is not None and frame is not None:
+            choice = decision_of(controller)
+            more |= decided(controller, choice, frame)
+            maneuver = choice.maneuver
+        more |= {"t": t, "counts": counts, "maneuver": maneuver}
+        return Tick(**more, number=self._number, now=t, reading=counts, angles=())
+
+    def look(self) -> None:
+        """Carry out what the page wants, if it may want anything.
+
+        Raises:
+            Restart: A person wants the trial anew, with a seed.
+        """
+        if self._steered:
+            super().look()
+
+    def carry_out(self, order: Mapping[str, Any]) -> None:
+        """Carry out one order; one that cannot be is left alone, and the page says so.
+
+        Raises:
+            Restart: A person wants the trial anew, with a seed.
+        """
+        super().carry_out(order)
+        what = order.get("do")
+        if what == "set":
+            self._set(str(order.get("name")), order.get("value"))
+        elif what == "move":
+            self._move(order)
+        elif what == "restart" and "seed" in self.state:
+            seed = order.get("seed")
+            if isinstance(seed, int) and 0 <= seed < 1 << 32:
+                self._note(f"begun anew with seed {seed}")
+                raise Restart(seed)
+
+    def _set(self, name: str, value: Any) -> None:
+        if self._tuning is None:
+            return
+        try:
+            if done := self._tuning.set(name, value):
+                self._note(done)
+        except ConfigError as error:
+            self.say(one_line(str(error)))
+        self.state["values"] = self._tuning.values
+        self.tell()
+
+    def _move(self, order: Mapping[str, Any]) -> None:
+        body, x, y = (order.get(each) for each in ("body", "x", "y"))
+        if not isinstance(body, int) or self._model is None:
+            return
+        if not isinstance(x, float | int) or not isinstance(y, float | int):
+            return
+        if not (abs(x) <= _FARTHEST and abs(y) <= _FARTHEST):  # nor where one is NaN
+            return
+        if self._model.move(self._data, body, x, y) and order.get("end"):
+            self._note(f"obstacle {body} moved to x = {x:.3f} m, y = {y:.3f} m")
+
+    def _note(self, what: str) -> None:
+        """Keep what was changed by hand; of a slider that is drawn the last value counts."""
+        t = 0.0 if self._data is None else float(self._data.time)
+        line = f"{self._title}, {t:.2f} s: {what}"
+        self._fresh.append(f"by hand: {what}")
+        name = what.partition(" = ")[0]
+        if self.by_hand and name in self.by_hand[-1] and self.by_hand[-1].startswith(self._title):
+            self.by_hand.pop()
+        self.by_hand.append(line)
+        self.say(f"by hand: {what}")

@@ -1,0 +1,105 @@
+"""`antennate calibrate`: pushes counted one way, hysteresis told from bad data, bad columns."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import antennate
+from antennate.cli import main
+from antennate.types import Floats
+
+POINTS = 60
+UP = np.linspace(0.0, 1.0, POINTS)
+
+
+def written(
+    path: Path, counts: Floats, bend: Floats, t: Floats, trial: Floats | None = None
+) -> str:
+    """A recording as a file."""
+    names, columns = ["time", "counts", "bend"], [t, counts, bend]
+    if trial is not None:
+        names, columns = ["trial", *names], [trial, *columns]
+    rows = [",".join(f"{value:.17g}" for value in row) for row in np.column_stack(columns)]
+    path.write_text("\n".join([",".join(names), *rows, ""]))
+    return str(path)
+
+
+def loops(pushes: int, gap: float, noise: float = 2.0) -> tuple[Floats, Floats, Floats]:
+    """Readings, bends and times of pushes there and back; both ways are `gap` of the span apart."""
+    bend = np.tile(np.concatenate([UP, UP[::-1]]), pushes)
+    way = np.tile(np.repeat([1.0, -1.0], POINTS), pushes)
+    off = np.random.default_rng(0).normal(0.0, noise, len(bend))
+    counts = 1500 + 400 * (bend + gap / 2 * way * np.sin(np.pi * bend)) + off
+    return np.round(counts), bend, np.arange(len(bend)) / 100.0
+
+
+def test_one_long_recording_is_as_many_pushes_everywhere(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = written(tmp_path / "long.csv", *loops(4, 0.05))
+    found = antennate.run("calibrate", recording=file, draws=20).summary
+    assert found["calibration"]["trials"] == found["assessment"]["pushes"] == 4
+    assert main(["calibrate", "--recording", file, "--draws", "20", "--no-figures"]) == 0
+    told = capsys.readouterr().out
+    assert "pushes: 4" in told
+    assert "of 4 pushes" in told
+
+
+def test_a_long_recording_has_the_intervals_of_its_pushes(tmp_path: Path) -> None:
+    """Readings of one push err together: what is drawn anew is the push."""
+    counts, bend, t = loops(6, 0.0)
+    counts = counts + 20 * np.repeat([1, -1, 2, -2, 1, -1], 2 * POINTS)
+    trial = np.repeat(np.arange(6.0), 2 * POINTS)
+    files = [
+        written(tmp_path / "long.csv", counts, bend, t),
+        written(tmp_path / "trials.csv", counts, bend, t, trial),
+    ]
+    long, split = (antennate.run("calibrate", recording=f, draws=40).summary for f in files)
+    ends = [found["calibration"]["midpoint_95"] for found in (long, split)]
+    assert ends[0] == pytest.approx(ends[1], rel=0.002)  # one reading lies between two pushes
+
+
+@pytest.mark.parametrize(
+    ("gap", "noise", "told"),
+    [(0.5, 2.0, "the rest is hysteresis"), (0.0, 110.0, "perhaps marks and readings do not match")],
+)
+def test_hysteresis_is_told_from_data_that_do_not_match(
+    gap: float, noise: float, told: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = written(tmp_path / "loop.csv", *loops(4, gap, noise))
+    assert main(["calibrate", "--recording", file, "--draws", "20", "--no-figures"]) == 0
+    assert told in " ".join(capsys.readouterr().out.split())
+
+
+@pytest.mark.parametrize(
+    ("factor", "offset", "row", "found"), [(0.25, 0.0, 122, "0.25"), (1.0, 1e17, 2, "1e+17")]
+)
+def test_trials_are_numbered_in_whole_numbers(
+    factor: float,
+    offset: float,
+    row: int,
+    found: str,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    trial = offset + factor * np.repeat(np.arange(4.0), 2 * POINTS)
+    file = written(tmp_path / "trials.csv", *loops(4, 0.05), trial)
+    assert main(["calibrate", "--recording", file]) == 2
+    error = capsys.readouterr().err
+    assert f"row {row}: expected a whole number" in error
+    assert f"in trial, found {found};" in error
+
+
+def test_milliseconds_declared_as_seconds_are_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """100 Hz, so exactly 10 s apart if it were seconds."""
+    counts, bend, t = loops(4, 0.05)
+    file = written(tmp_path / "ms.csv", counts, bend, np.round(1000 * t))
+    assert main(["calibrate", "--recording", file]) == 2
+    assert "is s the right --columns.time-unit?" in capsys.readouterr().err
+    words = ["--columns.time-unit", "ms", "--draws", "20", "--no-figures"]
+    assert main(["calibrate", "--recording", file, *words]) == 0

@@ -1,0 +1,83 @@
+"""The docs: tutorials that run as they stand, pages that can be found, lines that fit a page."""
+
+from __future__ import annotations
+
+import re
+import time
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from first_hour import Command
+from pages import DOCS, Script, blocks
+
+from antennate.cli import commands
+
+PAGES = ["first-tunnel.md", *(f"tutorials/{p.name}" for p in (DOCS / "tutorials").glob("*.md"))]
+WITH_A_TWIN = {"tutorials/calibrate.md", "tutorials/drive.md"}
+"""Those in real time."""
+WIDEST = 96
+"""Letters of code in a line on a screen of 1280 pixels."""
+
+
+@pytest.mark.parametrize("page", sorted({*PAGES} - WITH_A_TWIN))
+def test_a_tutorial_runs(page: str, tmp_path: Path) -> None:
+    with Script(page, tmp_path, {}) as script:
+        assert len(script.blocks) >= 5
+        script.run()
+
+
+def hold_marks(record: Command, script: Script) -> None:
+    """Hold the antenna at each mark that is asked for."""
+    assert script.twin is not None
+    for _ in range(4 * 5):
+        mark = record.until(r"hold at (\d+) mm")[1]
+        script.twin.order(f"touch left:{mark}mm")
+        time.sleep(0.3)  # the bend has to arrive before it is confirmed
+        record.type()
+    script.twin.order("touch left:0mm")
+
+
+@pytest.mark.slow
+def test_an_antenna_of_the_twin_is_calibrated(tmp_path: Path) -> None:
+    with Script("tutorials/calibrate.md", tmp_path, {"record": hold_marks}) as script:
+        script.run()
+
+
+@pytest.mark.slow
+def test_the_twin_is_driven(tmp_path: Path) -> None:
+    with Script("tutorials/drive.md", tmp_path, {}) as script:
+        script.run()
+
+
+@pytest.mark.parametrize("page", sorted(str(p.relative_to(DOCS)) for p in DOCS.rglob("*.md")))
+def test_no_line_of_code_is_wider_than_a_page(page: str) -> None:
+    wide = [
+        line for block in blocks(page) for line in block.text.splitlines() if len(line) > WIDEST
+    ]
+    assert wide == []
+
+
+def test_every_page_has_its_place_in_the_navigation() -> None:
+    site = tomllib.loads((DOCS.parent / "zensical.toml").read_text())
+
+    def pages(entry: Any) -> Iterator[str]:
+        if isinstance(entry, str):
+            yield entry
+        else:
+            for each in entry.values() if isinstance(entry, dict) else entry:
+                yield from pages(each)
+
+    there = [str(path.relative_to(DOCS)) for path in DOCS.rglob("*.md")]
+    assert sorted(pages(site["project"]["nav"])) == sorted(there)
+
+
+def test_every_command_is_linked_where_the_list_of_commands_begins() -> None:
+    begin, *sections = (DOCS / "commands.md").read_text().split("\n## ")
+    linked = re.findall(r"\[`(\w+)`\]\(#antennate-(\w+)\)", begin)
+    assert [name for name, _ in linked] == [anchor for _, anchor in linked]
+    assert {name for name, _ in linked} == set(commands())
+    assert [f"`antennate {name}`" for name, _ in linked] == [s.splitlines()[0] for s in sections]
+    assert "(commands.md)" in (DOCS / "index.md").read_text()

@@ -1,0 +1,70 @@
+"""The live sink for Foxglove and Lichtblick: our topics with our definitions, and their layout."""
+
+import json
+import re
+import struct
+from pathlib import Path
+
+from view_rig import shown
+from websockets.sync.client import ClientConnection, connect
+
+from antennate.telemetry.topics import ANTENNA, TICK_TOPICS, TOPICS
+from antennate.telemetry.view.foxglove import layout
+
+PATIENCE = 60.0
+HEAD = struct.Struct("<BIQ")
+"""Begin of a message: kind 1, subscription and time, as the Foxglove WebSocket protocol has it."""
+
+
+def advertised(connection: ClientConnection) -> dict[str, dict[str, str]]:
+    """The channels that a server offers, by topic."""
+    while True:
+        message = json.loads(connection.recv(PATIENCE))
+        if message["op"] == "advertise":
+            return {channel["topic"]: channel for channel in message["channels"]}
+
+
+def test_a_running_simulation_can_be_read_live(tmp_path: Path) -> None:
+    """Another program gets the topics of a log, in the same form, while the trial runs."""
+    words = "tunnel --controllers open --trials 1 --scene flat --time-limit 3600 --foxglove"
+    with shown(*words.split(), "--foxglove-port", "0", folder=tmp_path) as view:
+        address = re.search(r"ws://\S+?(?=,)", view.said("foxglove: "))
+        assert address is not None
+        assert address[0].startswith("ws://127.0.0.1:")
+        how = {"subprotocols": ["foxglove.sdk.v1"], "proxy": None}
+        with connect(address[0], **how) as connection:  # type: ignore[arg-type]
+            found = advertised(connection)
+            assert set(found) >= {topic.name for topic in TOPICS} | {"/scene"}
+            for topic in TICK_TOPICS:
+                channel = found[topic.name]
+                assert (channel["schemaName"], channel["encoding"]) == (topic.type.name, "cdr")
+                assert channel["schema"] == topic.type.schema
+            ask = {"id": 1, "channelId": found[ANTENNA.name]["id"]}
+            connection.send(json.dumps({"op": "subscribe", "subscriptions": [ask]}))
+            times = list[float]()
+            while len(times) < 3:
+                data = connection.recv(PATIENCE)
+                if isinstance(data, bytes) and HEAD.unpack_from(data)[:2] == (1, 1):
+                    times.append(ANTENNA.type.decode(data[HEAD.size :])["t"])
+            assert times == sorted(times)
+            assert times[0] < times[-1]
+
+
+def test_the_layout_shows_what_there_is() -> None:
+    """Each topic and each field that a panel names is one of ours."""
+    table = json.loads(layout().read_text())
+    fields = {topic.name: {field.name for field in topic.type.fields} for topic in TOPICS}
+    panels = table["configById"]
+    for panel in panels.values():
+        for path in panel.get("paths", []):
+            topic, name = re.fullmatch(r"(/\w+)\.(\w+)(?:\[[01]\])?", path["value"]).groups()  # type: ignore[union-attr]
+            assert name in fields[topic]
+        for key in ("topicPath", "topicToRender"):
+            assert panel.get(key, "/events") in fields
+
+    def placed(node: dict[str, dict[str, str]] | str) -> set[str]:
+        if isinstance(node, str):
+            return {node}
+        return placed(node["first"]) | placed(node["second"])
+
+    assert placed(table["layout"]) == set(panels)

@@ -1,0 +1,177 @@
+"""The same study on every engine: Dask, SLURM's jobs as processes, Snakemake's commands, Python."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import re
+import shlex
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from study_trials import trial
+
+import antennate
+from antennate.cli import main
+from antennate.errors import WorkerError
+from antennate.studies import cluster
+from antennate.studies.identity import environment
+from antennate.studies.store import read_store
+from antennate.studies.work import Part
+
+HERE = Path(__file__).parent
+ROOT = HERE.parent
+VARY = {"x": [0.5, 1.5]}
+
+
+@pytest.fixture(autouse=True)
+def _there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    path = os.pathsep.join([str(Path(antennate.__file__).parents[1]), str(HERE)])
+    monkeypatch.setenv("PYTHONPATH", path)
+
+
+def table(out: str, **how: Any) -> bytes:
+    """The table of a small study of a function."""
+    antennate.study(trial, VARY, {"sleep": 0.01}, trials=8, out=out, **how)
+    return Path(out, "trials.csv").read_bytes()
+
+
+def test_a_function_is_studied_from_python() -> None:
+    result = antennate.study(trial, VARY, trials=3)
+    assert [row["value"] for row in result.rows[:3]] == pytest.approx([0.2, 0.4, 0.6])
+    assert result.summary["statuses"] == {"ok": 6}
+    assert list(result.to_dataframe().columns[:2]) == ["point", "x"]
+    springs = antennate.study("springs", {"coil_mm": [3.5, 4.0]})
+    assert len(springs.rows) == 2
+    with pytest.raises(antennate.BadInputError, match="did you mean"):
+        antennate.study("springs", {"coil_m": [1.0]})
+
+
+def test_jobs_of_slurm_leave_the_same_table() -> None:
+    pytest.importorskip("submitit")
+    assert table("jobs", workers=2, engine="slurm-local") == table("here")
+
+
+def test_a_job_that_begins_again_goes_on_and_its_driver_finds_what_it_did(tmp_path: Path) -> None:
+    """SLURM begins a job again with the tasks that it was first given."""
+    notes = tmp_path / "notes.txt"
+    os.environ["STUDY_NOTES"] = str(notes)
+    try:
+        tasks = {place: ({"x": 1.0}, place) for place in range(3)}
+        part = Part(trial, tasks, together=False, timeout=60.0)
+        job = cluster.Resumable(str(tmp_path / "job.jsonl"), environment(), part, {})
+        assert job() == 3
+        assert job() == 0
+        assert len(notes.read_text().splitlines()) == 3
+        assert sorted(read_store(tmp_path / "job.jsonl")[1]) == ["0", "1", "2"]
+    finally:
+        del os.environ["STUDY_NOTES"]
+
+
+def test_a_job_of_another_version_is_refused(tmp_path: Path) -> None:
+    part = Part(trial, {}, together=False, timeout=60.0)
+    old = {**environment(), "versions": {"numpy": "1.0"}}
+    with pytest.raises(WorkerError, match=r'numpy "1\.0", now'):
+        cluster.Resumable(str(tmp_path / "job.jsonl"), old, part, {})()
+
+
+def test_a_scheduler_that_is_not_there_is_one_line(capsys: pytest.CaptureFixture[str]) -> None:
+    Path("plan.toml").write_text('experiment = "springs"\n[vary]\ncoil_mm = [3.5, 4.0]\n')
+    assert main(["study", "plan.toml", "--engine", "dask://127.0.0.1:9", "--out", "run"]) == 2
+    said = capsys.readouterr().err.strip().splitlines()
+    assert said[-1].startswith("antennate study: error: dask: expected a scheduler at")
+    assert main(["study", "plan.toml", "--slurm", "timeout_min=5", "--out", "run"]) == 2
+    assert "expected --engine slurm beside it" in capsys.readouterr().err
+
+
+@contextlib.contextmanager
+def scheduler() -> Iterator[tuple[str, list[subprocess.Popen[bytes]]]]:
+    """A scheduler of Dask with two workers on this machine; its address, and the workers."""
+    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    words = [sys.executable, "-m", "distributed.cli.dask_scheduler"]
+    words += ["--host", "127.0.0.1", "--port", "0", "--no-dashboard", "--scheduler-file", "s.json"]
+    running = [subprocess.Popen(words, **quiet)]
+    try:
+        end = time.monotonic() + 60.0
+        while not Path("s.json").exists():
+            assert time.monotonic() < end
+            time.sleep(0.1)
+        address = re.search(r"tcp://([0-9.:]+)", Path("s.json").read_text())
+        assert address is not None
+        words = [sys.executable, "-m", "distributed.cli.dask_worker", "--scheduler-file", "s.json"]
+        words += ["--nthreads", "1", "--no-dashboard", "--no-nanny"]
+        workers = [subprocess.Popen(words, **quiet) for _ in range(2)]
+        running += workers
+        yield address[1], workers
+    finally:
+        for process in reversed(running):
+            process.kill()
+            process.wait()
+
+
+def test_dask_leaves_the_same_table_when_a_worker_is_killed(tmp_path: Path) -> None:
+    pytest.importorskip("distributed")
+    alone = table("here")
+    with scheduler() as (address, workers):
+        notes = tmp_path / "notes.txt"
+        os.environ["STUDY_NOTES"] = str(notes)
+
+        def kill() -> None:
+            workers[0].send_signal(signal.SIGKILL)
+
+        timer = threading.Timer(0.2, kill)
+        timer.start()
+        try:
+            found = table("dask", workers=2, engine=f"dask://{address}")
+        finally:
+            timer.join()
+            del os.environ["STUDY_NOTES"]
+        assert workers[0].wait() == -signal.SIGKILL
+    assert found == alone
+
+
+def test_the_commands_of_the_snakefile_leave_the_same_table() -> None:
+    """Its commands in the order of its rules; `snakemake --cores 2` runs the same ones."""
+    Path("plan.toml").write_text('experiment = "springs"\n[vary]\ncoil_mm = [3.5, 4.0]\n')
+    text = (ROOT / "examples" / "snakemake" / "Snakefile").read_text()
+    shard, merge = re.findall(r'shell:\s*f?"(.*)"', text)
+    outputs = dict(re.findall(r'rule (\w+):(?:\n    .*?)*?\n    output: "(.*)"', text))
+    assert outputs == {"shard": "shards/{i}/shard.json", "merge": "run/trials.csv"}
+    for number in "12":
+        words = shard.replace("{STUDY}", "plan.toml").replace("{SHARDS}", "2")
+        assert main(shlex.split(words.replace("{{wildcards.i}}", number))[1:]) == 0
+        assert Path(outputs["shard"].replace("{i}", number)).is_file()
+    words = merge.replace("{params.folders}", "shards/1 shards/2")
+    assert main(shlex.split(words)[1:]) == 0
+    assert main(["study", "plan.toml", "--out", "whole"]) == 0
+    assert Path("run/trials.csv").read_bytes() == Path("whole/trials.csv").read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("tunnel", ["--trials", "3", "--time-limit", "0.5", "--controllers", "open", "closed"]),
+        ("wall", ["--trials", "2", "--profiles", "stiff", "--wall.travel", "0.06"]),
+        ("gait", ["--cycles", "2", "--sweep-points", "2"]),
+        ("calibrate", ["--rig.pushes", "2", "--rig.speeds", "0.3", "--draws", "20"]),
+    ],
+)
+def test_every_command_goes_on_with_the_same_numbers(name: str, words: list[str]) -> None:
+    """Half of the trials were there before; all that is written is the same."""
+    words = [name, *words, "--workers", "1"]
+    assert main([*words, "--out", "whole"]) == 0
+    assert main([*words, "--out", "run", "--shard", "1/2"]) == 0
+    assert main([*words, "--out", "run", "--resume"]) == 0
+    for path in sorted(Path("whole").rglob("*.*")):
+        again = Path("run") / path.relative_to("whole")
+        if path.name not in ("command.txt", "report.html"):
+            assert again.read_bytes() == path.read_bytes(), path
+    assert not Path("run/trials.store.jsonl").exists()

@@ -1,0 +1,236 @@
+"""A live view in a browser: the scene is there, charts move, and what a person does is done."""
+
+import io
+import json
+import re
+import signal
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from urllib.parse import urlsplit
+
+import numpy as np
+import pytest
+from browser import CHROMIUM, Tab, browser
+from PIL import Image
+from view_rig import PATIENCE, Shown, shown
+
+from antennate import simulate
+from antennate.params.control import ControlParams, RuleParams
+from antennate.telemetry.reader import LogReader
+from antennate.telemetry.ticks import Tick
+from antennate.telemetry.topics import EVENTS
+from antennate.types import Contact
+
+pytestmark = pytest.mark.skipif(
+    CHROMIUM is None, reason="no chromium here; `apt-get install chromium` brings it"
+)
+
+IMAGES = Path(__file__).parent.parent / "docs" / "images"
+KNOWN = "unsafe-eval"
+"""A part of viser that is not used here wants to make code of text, which the page forbids."""
+
+TIME = "parseFloat(document.body.innerText.match(/time\\s+([0-9.]+) s/)[1])"
+"""The time that the page shows, in JavaScript."""
+
+NOTICE = ".mantine-Notification-root"
+"""What the page says of a computer that draws slowly."""
+
+Keep = Callable[..., None]
+
+
+@pytest.fixture
+def keep(request: pytest.FixtureRequest) -> Keep:
+    """Keeps a picture of a page for the docs, if that is wanted, once something is true."""
+
+    def picture(tab: Tab, name: str, when: str = "true") -> None:
+        if request.config.getoption("--pictures"):
+            tab.run(f"document.querySelectorAll('{NOTICE} button').forEach(e => e.click())")
+            tab.until(f"!document.querySelector('{NOTICE}')")
+            tab.until(when)
+            data = tab.picture("webp", quality=60)
+            (IMAGES / f"view-{name}.webp").write_bytes(data)
+
+    return picture
+
+
+@pytest.fixture
+def tab(tmp_path: Path) -> Iterator[Tab]:
+    """A tab of a browser."""
+    with browser(tmp_path / "browser") as found:
+        yield found
+
+
+def opened(tab: Tab, view: Shown) -> None:
+    """Open the page; return when its scene and its status are there."""
+    tab.open(view.link)
+    tab.until("!!document.querySelector('canvas')")
+    tab.until("/time\\s+[0-9.]+ s/.test(document.body.innerText)")
+
+
+def status(tab: Tab, name: str) -> str:
+    """A line of the status on the page."""
+    text = str(tab.run("document.getElementById('status').innerText"))
+    found = re.search(rf"^{name}\s+(.*)$", text, re.M)
+    assert found is not None, text
+    return found[1]
+
+
+def seconds(tab: Tab) -> float:
+    """The time that the page shows [s]."""
+    return float(status(tab, "time").split()[0])
+
+
+def charts(tab: Tab) -> str:
+    """What the charts have drawn, as one text."""
+    return str(
+        tab.run("[...document.querySelectorAll('.uplot canvas')].map(c => c.toDataURL()).join()")
+    )
+
+
+def colours(tab: Tab) -> int:
+    """Different colours in the middle of the picture: one of an empty scene has few."""
+    picture = Image.open(io.BytesIO(tab.picture())).convert("RGB")
+    width, height = picture.size
+    middle = picture.crop((width // 3, height // 4, 2 * width // 3, 3 * height // 4))
+    return len(np.unique(np.asarray(middle).reshape(-1, 3), axis=0))
+
+
+def stays_here(tab: Tab, view: Shown) -> None:
+    """Nothing was asked for from elsewhere, and nothing else went wrong."""
+    for address in tab.requests:
+        parts = urlsplit(address)
+        ours = parts.netloc == f"127.0.0.1:{view.port}" and parts.scheme in ("http", "ws")
+        assert ours or parts.scheme in ("data", "blob"), address
+    assert any(urlsplit(address).scheme == "ws" for address in tab.requests)
+    assert [each for each in tab.troubles if KNOWN not in each] == []
+
+
+def test_a_person_changes_what_a_simulation_decides(tab: Tab, keep: Keep, tmp_path: Path) -> None:
+    """θ goes from 0.98 to 0.3: until then all is as without a page, then contact begins at 0.3."""
+    words = "tunnel --controllers paper --trials 1 --control.rule.threshold 0.98 --time-limit 40"
+    more = ("--log", "--view", "--view-port", "0", "--view-speed", "0.25", "--out", "run")
+    with shown(*words.split(), *more, "--view-paused", folder=tmp_path) as view:
+        opened(tab, view)
+        before = charts(tab)
+        tab.click("label", "pause")  # it begins
+        tab.until(f"{TIME} > 2")
+        assert charts(tab) != before
+        tab.click("label", "pause")
+        tab.until("!!document.querySelector('svg polyline')")
+        assert colours(tab) > 50
+        tab.fill("θ: level that is contact", "0.3")
+        tab.until("document.body.innerText.includes('by hand: control.rule.threshold = 0.3')")
+        tab.click("label", "pause")
+        tab.until(f"{TIME} > 4")
+        keep(tab, "tunnel")
+        tab.choose("speed", "max")
+        assert view.process.wait(PATIENCE) == 0
+        stays_here(tab, view)
+    run = tmp_path / "run"
+    assert "control.rule.threshold = 0.3" in (run / "by-hand.txt").read_text()
+    assert "not follow from its configuration" in (run / "report.html").read_text()
+    ticks, changed = read_log(run / "logs" / "paper-0.mcap")
+    assert 0 < changed < len(ticks)
+    control = ControlParams(rule=RuleParams(threshold=0.98))
+    alone = simulate("paper", control=control, time_limit=40.0)
+    assert [tick.maneuver for tick in ticks[:changed]] == alone.maneuver[:changed].tolist()
+    held = control.rule.hysteresis
+    for number, tick in enumerate(ticks):
+        for level, contact in zip(tick.level, tick.contact, strict=True):
+            if number < changed and level < 0.98 - held:
+                assert contact == Contact.FREE
+            if number > changed and level >= 0.3:
+                assert contact == Contact.CONTACT
+    later = [max(tick.level) for tick in ticks[changed + 1 :]]
+    assert any(0.3 <= level < 0.98 - held for level in later)
+
+
+def read_log(path: Path) -> tuple[list[Tick], int]:
+    """The ticks of a log, and how many of them there were before something was done by hand."""
+    ticks, changed = list[Tick](), 0
+    with LogReader(path) as log:
+        for records, tick in log.groups():
+            for record in records:
+                if record.topic is EVENTS and "by hand" in EVENTS.type.decode(record.data)["msg"]:
+                    changed = changed or record.number
+            if tick is not None:
+                ticks.append(tick)
+    return ticks, changed
+
+
+def test_a_person_stops_steps_and_begins_anew(tab: Tab, tmp_path: Path) -> None:
+    """A pause stops time, a step is one control period, a restart has the seed that is wanted."""
+    words = "tunnel --controllers open --trials 1 --time-limit 20 --view --view-port 0 --out run"
+    with shown(*words.split(), "--view-paused", folder=tmp_path) as view:
+        opened(tab, view)
+        stood = settled(tab)
+        tab.click("button", "one step")
+        tab.until(f"!document.body.innerText.includes('{stood:.2f} s')")
+        assert settled(tab) == pytest.approx(stood + 0.01)
+        drag_a_cylinder(tab)
+        tab.fill("seed", "7")
+        tab.click("button", "restart with this seed")
+        tab.until("/time\\s+0\\.0[0-9] s/.test(document.body.innerText)")
+        tab.click("label", "pause")
+        tab.choose("speed", "max")
+        assert view.process.wait(PATIENCE) == 0
+    run = tmp_path / "run"
+    lines = (run / "by-hand.txt").read_text()
+    assert "begun anew with seed 7" in lines
+    assert re.search(r"obstacle \d+ moved to x = -?[0-9.]+ m, y = -?[0-9.]+ m", lines)
+    rows = (run / "trials.csv").read_text().splitlines()
+    assert dict(zip(rows[0].split(","), rows[1].split(","), strict=True))["seed"] == "7"
+    assert json.loads((run / "result.json").read_text())["seed"] == 0  # that of the configuration
+
+
+def drag_a_cylinder(tab: Tab) -> None:
+    """Drag from one place of the picture after the other until one of them was on a cylinder."""
+    for y in range(150, 700, 60):
+        for x in range(360, 860, 70):
+            tab.drag((x, y), (x + 10, y), (x + 25, y + 5), (x + 40, y + 10))
+            time.sleep(0.3)
+            if tab.run("document.body.innerText.includes('by hand: obstacle')"):
+                return
+    raise AssertionError("no cylinder was moved")
+
+
+def settled(tab: Tab) -> float:
+    """The time that the page shows once it stands [s]."""
+    end = time.monotonic() + PATIENCE
+    while time.monotonic() < end:
+        before = seconds(tab)
+        time.sleep(0.5)
+        if seconds(tab) == before:
+            return before
+    raise AssertionError("time does not stand")
+
+
+def test_a_drive_and_its_twin_are_shown(tab: Tab, keep: Keep, tmp_path: Path) -> None:
+    """The pages of both are read only; charts move while the robot of the twin is driven."""
+    twin = ("twin", "--view", "--view-port", "0", "--duration", "600")
+    with shown(*twin, folder=tmp_path) as served:
+        paths = json.loads(served.answer())
+        words = [*("drive", "--arm", "--no-touch-check", "--duration", "600", "--out", "run")]
+        words += ["--esp32", paths["esp32"], "--bus", paths["bus"], "--view", "--view-port", "0"]
+        with shown(*words, folder=tmp_path) as driven:
+            for view, name in ((driven, "drive"), (served, "twin")):
+                opened(tab, view)
+                before, begin = charts(tab), seconds(tab)
+                if name == "drive":
+                    assert status(tab, "supervisor")
+                    assert "frames" in status(tab, "counters")
+                    tab.until(f"{TIME} > {begin + 1}")
+                    assert charts(tab) != before
+                assert colours(tab) > 50
+                assert not tab.run(
+                    "/pause|one step|restart|θ: level/.test(document.body.innerText)"
+                )
+                walks = "/sent [1-9]/.test(document.body.innerText)"
+                if name == "drive":
+                    keep(tab, name, walks)
+                stays_here(tab, view)
+                tab.requests.clear()
+            driven.process.send_signal(signal.SIGINT)
+            assert driven.process.wait(PATIENCE) is not None
+    assert (tmp_path / "run" / "drive.mcap").exists()

@@ -1,0 +1,208 @@
+"""What a program does for a page that shows it: send, wait, and carry out what a person wants."""
+
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from view_rig import ANTENNATE
+
+from antennate.control.registry import make_controller
+from antennate.control.retunable import Retunable
+from antennate.params.control import ControlParams, RuleParams
+from antennate.robots.spec import RobotSpec
+from antennate.telemetry.view.channel import ORDER, POSES, SCENE, STATE, TICK, Channel, read
+from antennate.telemetry.view.pace import Pace, Restart
+from antennate.telemetry.view.process import ViewProcess
+from antennate.types import AntennaFrame, Contact
+
+Pair = tuple[Channel, Channel]
+
+
+@pytest.fixture
+def pair() -> Iterator[Pair]:
+    """Both ends of a channel."""
+    ours, theirs = map(Channel, Channel.pair())
+    yield ours, theirs
+    ours.close()
+    theirs.close()
+
+
+def test_a_page_that_takes_nothing_holds_nobody_up(pair: Pair) -> None:
+    """A sender is as fast with a full channel as with an empty one, and counts what was lost."""
+    ours, _ = pair
+    sent = sum(ours.send(POSES, bytes(4000)) for _ in range(5000))
+    assert 0 < sent < 5000
+    assert ours.dropped == 5000 - sent
+    assert not ours.closed
+
+
+def test_a_long_message_comes_whole(pair: Pair) -> None:
+    """Shapes of a scene, of more bytes than a message may have."""
+    ours, theirs = pair
+    content = np.arange(40_000, dtype=np.int32).tobytes()
+    assert ours.send_whole(SCENE, content)
+    assert list(theirs.receive()) == [(SCENE, content)]
+
+
+def test_an_end_that_closes_is_noticed(pair: Pair) -> None:
+    """The program runs on without a page."""
+    ours, theirs = pair
+    theirs.close()
+    assert not ours.send(TICK, b"x")
+    assert list(ours.receive()) == []
+    assert ours.closed
+    begin = time.monotonic()
+    pace = Pace(ours, 0.001)
+    pace.wait(0.0)
+    pace.wait(3600.0)  # a thousand hours at this speed
+    assert time.monotonic() - begin < 60
+
+
+def test_time_goes_as_fast_as_is_wanted(pair: Pair) -> None:
+    """0.2 s of the program at 4 times real time take 0.05 s or more."""
+    pace = Pace(pair[0], 4.0)
+    pace.wait(10.0)
+    begin = time.monotonic()
+    pace.wait(10.2)
+    assert time.monotonic() - begin >= 0.05
+
+
+def test_a_page_makes_it_stand_and_step(pair: Pair) -> None:
+    """One step lets one tick pass; nobody is asked twice."""
+    ours, theirs = pair
+    pace = Pace(ours, 0.0)
+    theirs.tell(ORDER, do="pause", on=True)
+    theirs.tell(ORDER, do="step")
+    pace.look()
+    pace.wait(0.0)  # the step
+    assert pace.state["paused"]
+    theirs.tell(ORDER, do="pause", on=False)
+    pace.wait(0.01)
+    assert not pace.state["paused"]
+    states = [read(content)["paused"] for kind, content in theirs.receive() if kind == STATE]
+    assert states == [True, True, False]
+
+
+def test_orders_that_are_none_are_left_alone(pair: Pair) -> None:
+    """Whatever comes, the program goes on as before."""
+    ours, theirs = pair
+    pace = Pace(ours, 2.0)
+    before = dict(pace.state)
+    for content in (b"", b"[]", b"{", b"null", b'{"do": "speed", "value": "x"}', b"\xff"):
+        theirs.send(ORDER, content)
+    theirs.tell(ORDER, do="speed", value=-1.0)
+    theirs.tell(ORDER, do="speed", value=float("nan"))
+    pace.look()
+    assert pace.state == before
+
+
+def test_other_numbers_change_what_is_decided() -> None:
+    """A level between two thresholds is contact for one of them; the gait goes on in its phase."""
+    control = ControlParams(rule=RuleParams(threshold=0.9))
+    robot = RobotSpec()
+    controller = Retunable(lambda values: make_controller("paper", values, robot), control)
+    controller.reset(np.array([0]), 0.5)
+    lasting = round(1.0 / control.period)
+    curve = control.conditioning
+    span = curve.counts_high - curve.counts_low
+    half = curve.counts_low + span * curve.midpoint  # the reading whose level is one half
+    frame = AntennaFrame(t=np.zeros(1), counts=np.full((1, 2), half))
+
+    def walk() -> None:
+        for _ in range(lasting):
+            controller.step(frame)
+
+    walk()
+    assert controller.level[0] == pytest.approx([0.5, 0.5])
+    assert controller.contact[0].tolist() == [Contact.FREE, Contact.FREE]
+    phase = controller.phase
+    controller.retune(ControlParams(rule=RuleParams(threshold=0.3)))
+    assert controller.phase == pytest.approx(phase)
+    walk()
+    assert controller.contact[0].tolist() == [Contact.CONTACT, Contact.CONTACT]
+
+
+def said(*words: str, code: str = "", folder: Path) -> tuple[int, str]:
+    """Exit code and stderr of a command; `code` runs before it."""
+    start = f"{code}\nfrom antennate.cli import main\nraise SystemExit(main())"
+    how = [sys.executable, "-c", start] if code else ANTENNATE
+    done = subprocess.run(
+        [*how, *words], capture_output=True, text=True, cwd=folder, timeout=120, check=False
+    )
+    return done.returncode, done.stderr
+
+
+FLAT = ["--trials", "1", "--controllers", "open", "--scene", "flat", "--time-limit", "1"]
+TUNNEL = ["tunnel", *FLAT, "--view"]
+
+
+def test_a_port_that_is_taken_is_told_in_one_line(tmp_path: Path) -> None:
+    """Nothing is run and nothing left."""
+    with ViewProcess(0, "antennate.cli.view_server") as view:
+        code, text = said(*TUNNEL, "--view-port", str(view.port), folder=tmp_path)
+    assert code == 2
+    assert text.count("\n") == 1
+    assert str(view.port) in text
+    assert "--view-port" in text
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("package", "flags", "extra"),
+    [
+        ("viser", ["--view", "--view-port", "0"], "antennate[view]"),
+        ("foxglove", ["--foxglove", "--foxglove-port", "0"], "antennate[foxglove]"),
+    ],
+)
+def test_a_missing_package_is_told_in_one_line(
+    package: str, flags: list[str], extra: str, tmp_path: Path
+) -> None:
+    """The line names what to install."""
+    hidden = f"import sys; sys.modules['{package}'] = None"
+    code, text = said("tunnel", *FLAT, *flags, code=hidden, folder=tmp_path)
+    assert code == 2
+    assert text.count("\n") == 1
+    assert extra in text
+
+
+def test_a_port_of_foxglove_that_is_taken_is_told_in_one_line(tmp_path: Path) -> None:
+    """Its own server finds that out."""
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = str(taken.getsockname()[1])
+        code, text = said("tunnel", *FLAT, "--foxglove", "--foxglove-port", port, folder=tmp_path)
+    assert code == 2
+    assert text.count("\n") == 1
+    assert "--foxglove-port" in text
+
+
+@pytest.mark.parametrize(
+    ("words", "flag"),
+    [
+        (["tunnel", "--view-port", "1234"], "--view-port"),
+        (["tunnel", "--view-speed", "2"], "--view-speed"),
+        (["tunnel", "--view-paused"], "--view-paused"),
+        (["tunnel", "--view", "--workers", "2"], "--workers"),
+        (["tunnel", "--view", "--view-port", "65536"], "--view-port"),
+        (["tunnel", "--view", "--view-speed", "-1"], "--view-speed"),
+        (["tunnel", "--foxglove-port", "1"], "--foxglove-port"),
+        (["sensor", "--view"], "--view"),
+    ],
+)
+def test_what_would_be_ignored_is_refused(words: list[str], flag: str, tmp_path: Path) -> None:
+    """A flag that says something of a page needs one."""
+    code, text = said(*words, folder=tmp_path)
+    assert code == 2
+    assert text.count("\n") == 1
+    assert flag in text
+
+
+def test_a_restart_has_its_seed() -> None:
+    """What a person wants comes as an exception, out of whatever runs."""
+    assert Restart(7).seed == 7
