@@ -12,6 +12,7 @@ from pydantic.dataclasses import dataclass
 from antennate.cli import view_server
 from antennate.cli.options import option
 from antennate.errors import ConfigError
+from antennate.params.base import Params
 from antennate.studies.run_directory import BY_HAND, RunDirectory
 from antennate.telemetry.view import ports
 
@@ -98,11 +99,11 @@ def view_of(options: Any) -> Iterator[SimulationView | None]:
         yield SimulationView(process.channel, speed, paused=paused)
 
 
-def require_one_worker(options: Any) -> None:
-    """Check that no processes are asked for beside a view.
+def require_viewable(options: Any, config: Params) -> None:
+    """Check that what is run beside a view can be shown: by the engine, in this process.
 
     Raises:
-        ConfigError: Some are.
+        ConfigError: It cannot.
     """
     workers = getattr(options, "workers", None)
     shown = getattr(options, "view", False) or getattr(options, "foxglove", False)
@@ -110,6 +111,11 @@ def require_one_worker(options: Any) -> None:
         raise ConfigError(
             "--workers: expected 1 beside --view or --foxglove, which show one trial at a time, "
             f"found {workers}"
+        )
+    if shown and getattr(config, "solver", "mujoco") != "mujoco":
+        raise ConfigError(
+            "--solver: expected mujoco beside --view or --foxglove, as nothing else draws, "
+            "found chain"
         )
 
 
