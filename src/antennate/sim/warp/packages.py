@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from importlib import metadata
+from importlib import import_module, metadata
 from importlib.util import find_spec
 from typing import Any
 
@@ -41,8 +41,8 @@ def require_warp() -> tuple[Any, Any]:
     if version and not version.startswith(f"{_SERIES}."):
         raise ConfigError(f"--engine warp: expected mujoco-warp {_SERIES}, found {version}")
     import mujoco_warp  # pyright: ignore[reportMissingImports]
-    import warp  # pyright: ignore[reportMissingImports]
 
+    warp = import_module("warp")  # type checkers take our own folder of that name for it
     warp.config.log_level = warp.LOG_WARNING
     return warp, mujoco_warp
 
