@@ -315,6 +315,11 @@ def test_what_the_chain_does_not_read_or_draw_is_refused() -> None:
         require_films(wall, WallConfig(solver="chain"), 0)
 
 
+def test_the_chain_has_no_view(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    assert main(["wall", "--solver", "chain", "--view", "--out", str(tmp_path / "run")]) == 2
+    assert "expected mujoco beside --view" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     ("change", "said"),
     [

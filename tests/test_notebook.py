@@ -149,8 +149,9 @@ def test_an_own_class_of_a_module_runs_in_workers() -> None:
     ],
 )
 def test_a_wrong_word_is_one_line(wrong: dict[str, object], why: str) -> None:
+    settings = dict(wrong)
     with pytest.raises(antennate.BadInputError, match=why) as error:
-        antennate.run(**wrong)  # pyright: ignore[reportArgumentType]
+        antennate.run(settings.pop("experiment"), **settings)  # pyright: ignore[reportArgumentType]
     assert "\n" not in str(error.value)
 
 

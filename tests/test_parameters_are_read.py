@@ -130,8 +130,8 @@ TINY: dict[str, list[dict[str, Any]]] = {
     "sensor": [{"hold_time": 1.0}, {"sensor": OTHER_SENSOR}],
     "servo": [
         {"recording": ["servo.json"], "fit": True, "draws": 20},
-        {"recording": ["servo.json"], "servo": "xc430_w240"},
-        {"recording": ["servo.json"], "servo": "xl430_w250"},
+        {"recording": ["silent.json"], "servo": "xc430_w240", "supply": 11.1},
+        {"recording": ["silent.json"], "servo": "xl430_w250", "supply": 11.1},
     ],
     "tracks": [
         {"synthetic": {"trials": 1, "frames": 200}},
@@ -164,7 +164,8 @@ def test_every_parameter_of_an_experiment_is_read_or_refused(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     Path("recording.csv").write_text(RECORDING)
-    of_twin(Path("servo.json"), 1200, 400, 0.5, 2.5)
+    told = of_twin(Path("servo.json"), 1200, 400, 0.5, 2.5).read_text()
+    Path("silent.json").write_text(told.replace("input_volts", "volts"))
     Path("tracks.csv").write_text(TRACKS)
     monkeypatch.setattr(reproduce, "QUICK", PARTS)
     experiment = experiments.load(name)

@@ -22,7 +22,7 @@ TICK = 2 * math.pi / 4096
 
 def documented(command: str) -> list[str]:
     """Words of the first command of the page that is this one, from its name on."""
-    lines = PAGE.read_text().splitlines()
+    lines = PAGE.read_text().replace("\\\n", "").splitlines()
     line = next(row for row in lines if row.startswith(f"uv run antennate {command} "))
     return line.split()[3:]
 

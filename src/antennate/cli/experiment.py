@@ -15,7 +15,7 @@ from antennate.cli.options import option
 from antennate.cli.progress import progress, stop_signals
 from antennate.cli.results import drawn_table, folder_for, tell
 from antennate.cli.run_options import Options, workers_of
-from antennate.cli.view_options import ViewOptions, require_one_worker, say_by_hand, view_of
+from antennate.cli.view_options import ViewOptions, require_viewable, say_by_hand, view_of
 from antennate.errors import BadInputError, ConfigError, OutputError, WorkerError
 from antennate.experiments.running import keep, require_films, write_films
 from antennate.params.base import Params
@@ -130,7 +130,7 @@ def carry_out(
         AntennateError: The physics became invalid, a worker died, or a file could not be written;
             what was measured is kept and shown first.
     """
-    require_one_worker(options)
+    require_viewable(options, config)
     crew = workers_of(options, closed=shards is not None, apart=experiment.continued)
     logs = isinstance(options, LogOptions) and options.log
     kind = f"{experiment.name} --log" if logs else experiment.name

@@ -14,7 +14,6 @@ from antennate.cli.arguments import parse
 from antennate.cli.exit_codes import BAD_INPUT, OK
 from antennate.cli.options import option
 from antennate.cli.results import ResultOptions, folder_for, tell
-from antennate.cli.view import arena_of
 from antennate.cli.view_options import ViewOptions, page_of, say_by_hand
 from antennate.errors import ConfigError
 from antennate.messages import one_line, short_names
@@ -24,8 +23,6 @@ from antennate.studies.report import View
 from antennate.studies.run_directory import RunDirectory
 from antennate.telemetry.reader import Damage, LogReader
 from antennate.telemetry.replay import ReplayConfig, Replayed, recorded_controller, replay
-from antennate.telemetry.view.pace import Restart
-from antennate.telemetry.view.replayed import ReplayPlayer
 from antennate.types import Maneuver
 
 DESCRIPTION = """\
@@ -81,6 +78,10 @@ def _replayed(
         with LogReader(path) as log:
             controller = recorded_controller(log.header, config.controller)
             return log, replay(log, controller, log.header), ()
+    from antennate.cli.view import arena_of  # these import much, for a page
+    from antennate.telemetry.view.pace import Restart
+    from antennate.telemetry.view.replayed import ReplayPlayer
+
     with page:
         while True:
             with contextlib.suppress(Restart), LogReader(path) as log:

@@ -9,7 +9,7 @@ import sys
 from collections.abc import Callable, Sequence
 from contextlib import nullcontext
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from pydantic.dataclasses import dataclass
@@ -23,8 +23,6 @@ from antennate.errors import ConfigError
 from antennate.hardware.driving.priority import LEVEL, urgent
 from antennate.hardware.ports.keys import read_key
 from antennate.sim.world import World
-from antennate.telemetry.view.process import ViewProcess
-from antennate.telemetry.view.simulation import SimulationView
 from antennate.twin.config import TwinConfig, watched
 from antennate.twin.endpoints import Endpoint
 from antennate.twin.faults import Faults, read
@@ -36,6 +34,9 @@ from antennate.twin.servo_box import ServoBox, ServoEntry, read_list
 from antennate.twin.tcp import TcpEndpoint
 from antennate.twin.udp import UdpEndpoint
 from antennate.types import AntennaFrame
+
+if TYPE_CHECKING:
+    from antennate.telemetry.view.process import ViewProcess
 
 _LAST_PORT = 65_534
 
@@ -131,6 +132,8 @@ def _serve_robot(config: TwinConfig, places: Places, orders: Orders | None) -> i
 
 def _shown(page: ViewProcess, robot: TwinRobot, config: TwinConfig) -> Callable[[World], None]:
     """What shows the twin after each tick; it serves in real time, so a page cannot stop it."""
+    from antennate.telemetry.view.simulation import SimulationView  # imports much
+
     view = SimulationView(page.channel, steered=False)
     view.begin(f"twin, trial {config.trial}")
 

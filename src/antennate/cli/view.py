@@ -23,9 +23,10 @@ from antennate.studies.report import command_of
 from antennate.studies.run_directory import LOG, LOGS, RunDirectory
 from antennate.telemetry.header import Header
 from antennate.telemetry.reader import LogReader
+from antennate.telemetry.view import ports
 from antennate.telemetry.view.pace import Restart
 from antennate.telemetry.view.player import LogPlayer
-from antennate.telemetry.view.process import PORT, ViewProcess
+from antennate.telemetry.view.process import ViewProcess
 
 DESCRIPTION = """\
 Show the log of a drive or of a simulation on a page of this computer: the robot, charts of what was
@@ -43,7 +44,7 @@ class Options(FoxgloveOptions):
     """What to show, and where."""
 
     shown: Path | None = option(None, "a log, or the folder of a run", "RUN|LOG", positional=True)
-    port: int = option(PORT, "port of the page, 0 takes any", "PORT", ge=0, le=65535)
+    port: int = option(ports.PAGE, "port of the page, 0 takes any", "PORT", ge=0, le=65535)
     speed: float = option(
         1.0, "times real time at which it begins, 0 as fast as it goes", "FLOAT", ge=0, le=100
     )

@@ -5,17 +5,20 @@ from __future__ import annotations
 import contextlib
 import sys
 from collections.abc import Iterator, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from pydantic.dataclasses import dataclass
 
 from antennate.cli import view_server
 from antennate.cli.options import option
 from antennate.errors import ConfigError
+from antennate.params.base import Params
 from antennate.studies.run_directory import BY_HAND, RunDirectory
-from antennate.telemetry.view.foxglove import PORT as FOXGLOVE_PORT
-from antennate.telemetry.view.process import PORT, ViewProcess
-from antennate.telemetry.view.simulation import SimulationView
+from antennate.telemetry.view import ports
+
+if TYPE_CHECKING:  # both import much, for a page that few runs want
+    from antennate.telemetry.view.process import ViewProcess
+    from antennate.telemetry.view.simulation import SimulationView
 
 
 @dataclass(frozen=True)
@@ -24,7 +27,7 @@ class FoxgloveOptions:
 
     foxglove: bool = option(False, "serve its topics live for Foxglove and Lichtblick, unchecked")
     foxglove_port: int = option(
-        FOXGLOVE_PORT, "port for these, 0 takes any", "PORT", ge=0, le=65535
+        ports.FOXGLOVE, "port for these, 0 takes any", "PORT", ge=0, le=65535
     )
 
 
@@ -33,7 +36,7 @@ class PageOptions(FoxgloveOptions):
     """Where the page is."""
 
     view: bool = option(False, "show it on a page of this computer while it runs")
-    view_port: int = option(PORT, "port of that page, 0 takes any", "PORT", ge=0, le=65535)
+    view_port: int = option(ports.PAGE, "port of that page, 0 takes any", "PORT", ge=0, le=65535)
 
 
 @dataclass(frozen=True)
@@ -52,7 +55,7 @@ def foxglove_of(options: FoxgloveOptions) -> int | None:
     Raises:
         ConfigError: A port is named, but it is not wanted.
     """
-    if not options.foxglove and options.foxglove_port != FOXGLOVE_PORT:
+    if not options.foxglove and options.foxglove_port != ports.FOXGLOVE:
         raise ConfigError("--foxglove-port: expected --foxglove beside it, found none")
     return options.foxglove_port if options.foxglove else None
 
@@ -65,7 +68,7 @@ def page_of(options: PageOptions) -> ViewProcess | None:
         AntennateError: It cannot be served.
     """
     foxglove = foxglove_of(options)
-    if not options.view and options.view_port != PORT:
+    if not options.view and options.view_port != ports.PAGE:
         raise ConfigError("--view-port: expected --view beside it, found none")
     if not options.view and getattr(options, "view_paused", False):
         raise ConfigError("--view-paused: expected --view beside it, found none")
@@ -73,6 +76,8 @@ def page_of(options: PageOptions) -> ViewProcess | None:
         raise ConfigError("--view-speed: expected --view or --foxglove beside it, found none")
     if not options.view and foxglove is None:
         return None
+    from antennate.telemetry.view.process import ViewProcess
+
     return ViewProcess(options.view_port if options.view else None, view_server.__name__, foxglove)
 
 
@@ -87,16 +92,18 @@ def view_of(options: Any) -> Iterator[SimulationView | None]:
     if process is None or not isinstance(options, ViewOptions):
         yield None
         return
+    from antennate.telemetry.view.simulation import SimulationView
+
     with process:
         speed, paused = options.view_speed, options.view_paused
         yield SimulationView(process.channel, speed, paused=paused)
 
 
-def require_one_worker(options: Any) -> None:
-    """Check that no processes are asked for beside a view.
+def require_viewable(options: Any, config: Params) -> None:
+    """Check that what is run beside a view can be shown: by the engine, in this process.
 
     Raises:
-        ConfigError: Some are.
+        ConfigError: It cannot.
     """
     workers = getattr(options, "workers", None)
     shown = getattr(options, "view", False) or getattr(options, "foxglove", False)
@@ -104,6 +111,11 @@ def require_one_worker(options: Any) -> None:
         raise ConfigError(
             "--workers: expected 1 beside --view or --foxglove, which show one trial at a time, "
             f"found {workers}"
+        )
+    if shown and getattr(config, "solver", "mujoco") != "mujoco":
+        raise ConfigError(
+            "--solver: expected mujoco beside --view or --foxglove, as nothing else draws, "
+            "found chain"
         )
 
 

@@ -309,9 +309,9 @@ def _weights(length: Floats, mass: Floats, inertia: Floats, armature: Floats) ->
     whole = (rows.T * mass) @ rows
     whole[0, 0] += CARRIAGE_MASS
     whole[1:, 1:] += (moves.T * (inertia - mass * length**2 / 4)) @ moves + np.diag(armature)
-    inverse = np.linalg.inv(whole)
+    inverse = np.asarray(np.linalg.inv(whole), np.float64)
     across = np.einsum("ij,jk,ik->i", rows, inverse, rows)
     return {
         "stop_weight": np.diag(inverse)[1:].copy(),
-        "touch_weight": (across + 1.0 / whole[0, 0]) / 3.0,
+        "touch_weight": (across + 1.0 / float(whole[0, 0])) / 3.0,
     }

@@ -296,7 +296,7 @@ def _stops(model, q, v, touches):
 
 @njit(**_PART)
 def _contacts(model, v, joints, arms, cosine, sine, pairs, pair_count, first, touches):
-    """Pairs that overlap, written behind the first ones; returns how many touches there are."""
+    """Pairs that overlap, written behind the first ones; returns how many touches, or -1."""
     count, rod = first, len(model.length) + 2
     for p in range(2 * pair_count):
         i, k, second = pairs[p // 2, 0], pairs[p // 2, 1], p % 2 == 1
@@ -310,7 +310,7 @@ def _contacts(model, v, joints, arms, cosine, sine, pairs, pair_count, first, to
         if square >= reach * reach or square < 1e-24:
             continue
         if count == MOST_TOUCHES:
-            return CROWDED
+            return -1
         apart = math.sqrt(square)
         depth = apart - reach
         nx, ny = nx / apart, ny / apart

@@ -68,7 +68,7 @@ class Push:
             MissingPackageError: The solver needs a package that is not installed.
             SimulationError: The physics became invalid.
         """
-        t = np.arange(ticks) * (1.0 / self.antenna.sensor.rate)
+        t = np.asarray(np.arange(ticks) * (1.0 / self.antenna.sensor.rate), np.float64)
         told = self._told(t)
         flex, y = self._on_chain(told) if solver == "chain" else self._on_engine(told)
         return t, flex, y + self._touch

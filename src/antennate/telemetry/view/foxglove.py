@@ -23,8 +23,6 @@ from antennate.telemetry.ticks import Tick
 from antennate.telemetry.topics import CONFIG, EVENTS, TOPICS, Topic
 from antennate.telemetry.view.channel import HEADER, POSES, SCENE, TEXT, TICK, Poses
 
-PORT = 8765
-"""Usual port of a Foxglove WebSocket."""
 _HOST = "127.0.0.1"
 _IDLE = 0.1
 _INFO = 20

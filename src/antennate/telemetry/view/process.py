@@ -14,8 +14,6 @@ from antennate.telemetry.view.channel import END, FAILED, READY, Channel
 from antennate.telemetry.view.foxglove import require_foxglove
 
 HOST = "127.0.0.1"
-PORT = 8777
-"""Usual port of the page (assumed: nothing known uses it)."""
 _STARTING = 60.0
 """Longest wait for the process to serve [s]: its imports on a busy machine; assumed."""
 _ENDING = 2.0
