@@ -21,6 +21,8 @@ _KEPT = 600
 """Ticks in a chart: 10 s of them at 60 Hz."""
 _HEIGHT = 120
 _SIDES = ("left", "right")
+_STEP = 100.0
+"""Limits of the readings are multiples of this [counts], so that they seldom change."""
 _PATH = 400
 """Points of the path on the map; every second one goes when there are more."""
 _MARGIN = 0.1
@@ -31,21 +33,24 @@ _MUTED, _FAINT = "#6E6E6E", "#D8CDB8"
 class Charts:
     """Counts, level with theta, contact and maneuver over time."""
 
-    def __init__(self, server: viser.ViserServer) -> None:
+    def __init__(self, server: viser.ViserServer, tab: Any) -> None:
+        self._server, self._tab = server, tab
         self._rows = deque[tuple[float, ...]](maxlen=_KEPT)
+        self._limits = (0.0, _STEP)
         pair = [(side, SERIES[i]) for i, side in enumerate(_SIDES)]
-        self._charts = [
-            (_chart(server, "readings [counts]", pair, None), (1, 2)),
-            (
-                _chart(server, "level b, and θ", [*pair, ("θ", _MUTED)], (0.0, 1.0)),
-                (3, 4, 8),
-            ),
-            (_chart(server, "contact: 0 free, 1 touches, 2 unknown", pair, (-0.2, 2.2)), (5, 6)),
-            (
-                _chart(server, _maneuvers(), [("maneuver", "#222222")], (-0.2, 4.2)),
-                (7,),
-            ),
-        ]
+        contact, one = "contact: 0 free, 1 touches, 2 unknown", [("maneuver", "#222222")]
+        self._add = {
+            (1, 2): ("readings [counts]", pair, self._limits),
+            (3, 4, 8): ("level b, and θ", [*pair, ("θ", _MUTED)], (0.0, 1.0)),
+            (5, 6): (contact, pair, (-0.2, 2.2)),
+            (7,): (_maneuvers(), one, (-0.2, 4.2)),
+        }
+        begin = np.stack([np.arange(2.0), *np.zeros((8, 2))])
+        self._charts = {which: self._chart(which, begin) for which in self._add}
+
+    def _chart(self, which: tuple[int, ...], columns: Floats) -> Any:
+        with self._tab:
+            return _chart(self._server, *self._add[which], _data(columns, which), which[0])
 
     def take(self, tick: Tick, theta: float) -> None:
         """Keep a tick; a time before the last one begins anew."""
@@ -61,8 +66,28 @@ class Charts:
         if not self._rows:
             return
         columns = np.array(self._rows).T
-        for chart, which in self._charts:
-            chart.data = (columns[0], *(columns[i] for i in which))
+        limits = _limits(columns[1:3])
+        if limits != self._limits:  # a chart finds none itself where a reading is missing
+            self._limits, which = limits, (1, 2)
+            self._add[which] = (*self._add[which][:2], limits)
+            self._charts[which].remove()
+            self._charts[which] = self._chart(which, columns)
+            return  # a chart takes no others before it is there
+        for which, chart in self._charts.items():
+            chart.data = _data(columns, which)
+
+
+def _data(columns: Floats, which: tuple[int, ...]) -> tuple[Floats, ...]:
+    return columns[0], *(columns[i] for i in which)
+
+
+def _limits(counts: Floats) -> tuple[float, float]:
+    """Whole steps around the readings that are known [counts]."""
+    known = counts[np.isfinite(counts)]
+    if not known.size:
+        return 0.0, _STEP
+    low, high = _STEP * np.floor(known.min() / _STEP), _STEP * np.ceil(known.max() / _STEP)
+    return float(low), float(max(high, low + _STEP))
 
 
 def _maneuvers() -> str:
@@ -73,22 +98,23 @@ def _chart(
     server: viser.ViserServer,
     title: str,
     lines: Sequence[tuple[str, str]],
-    limits: tuple[float, float] | None,
+    limits: tuple[float, float],
+    data: tuple[Floats, ...],
+    order: float,
 ) -> Any:
-    empty = np.zeros(2)
     axis: Any = uplot.Axis(size=56)
-    scale = {} if limits is None else {"y": uplot.Scale(range=limits)}
     return server.gui.add_uplot(
-        (np.arange(2.0), *(empty for _ in lines)),
+        data,
         (
             uplot.Series(label="t [s]"),
             *(uplot.Series(label=name, stroke=colour, width=1.5) for name, colour in lines),
         ),
         title=title,
-        scales={"x": uplot.Scale(time=False), **scale},
+        scales={"x": uplot.Scale(time=False), "y": uplot.Scale(range=limits)},
         axes=(uplot.Axis(size=24), axis),
         legend=uplot.Legend(show=False),
         height=_HEIGHT,
+        order=order,
     )
 
 

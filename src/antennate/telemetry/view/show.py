@@ -95,8 +95,7 @@ class Page:
         gui.main_panel.dock_right()
         self._status = gui.add_html(_status(None, {}, ()))
         panel = gui.add_panel()
-        with panel.add_tab("signals"):
-            self._charts = Charts(server)
+        self._charts = Charts(server, panel.add_tab("signals"))
         panel.dock_left()
         self._map = Map(server)
         with gui.add_folder("picture"):
