@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import signal
+from importlib.util import find_spec
 
 import pytest
 from hypothesis import settings
@@ -17,6 +18,22 @@ for number in (signal.SIGHUP, signal.SIGINT, signal.SIGQUIT):
         signal.signal(
             number, signal.default_int_handler if number == signal.SIGINT else signal.SIG_DFL
         )
+
+OPTIONAL = {
+    "test_chain.py": "numba",
+    "test_foxglove.py": "foxglove",
+    "test_view.py": "viser",
+    "test_view_gate.py": "viser",
+    "test_view_program.py": "viser",
+}
+"""What tests of optional parts need: `uv run --group optional pytest` installs it."""
+collect_ignore = [name for name, package in OPTIONAL.items() if find_spec(package) is None]
+
+
+def pytest_report_header() -> str:
+    """Say what is left out."""
+    left = [f"{name} ({OPTIONAL[name]} is not installed)" for name in collect_ignore]
+    return f"left out: {', '.join(left)}" if left else "nothing is left out"
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
