@@ -171,8 +171,9 @@ def test_a_person_stops_steps_and_begins_anew(tab: Tab, tmp_path: Path) -> None:
         drag_a_cylinder(tab)
         tab.fill("seed", "7")
         tab.click("button", "restart with this seed")
+        tab.until("document.body.innerText.includes('by hand: begun anew with seed 7')")
         tab.until("/time\\s+0\\.0[0-9] s/.test(document.body.innerText)")
-        tab.click("label", "pause")
+        go_on(tab)
         tab.choose("speed", "max")
         assert view.process.wait(PATIENCE) == 0
     run = tmp_path / "run"
@@ -193,6 +194,19 @@ def drag_a_cylinder(tab: Tab) -> None:
             if tab.run("document.body.innerText.includes('by hand: obstacle')"):
                 return
     raise AssertionError("no cylinder was moved")
+
+
+def go_on(tab: Tab) -> None:
+    """End a pause. The controls are made anew with a scene, and a click on the old ones is lost."""
+    end = time.monotonic() + PATIENCE
+    while time.monotonic() < end:
+        stood = settled(tab)
+        tab.click("label", "pause")
+        for _ in range(50):
+            time.sleep(0.1)
+            if seconds(tab) != stood:
+                return
+    raise AssertionError("the pause does not end")
 
 
 def settled(tab: Tab) -> float:
