@@ -84,6 +84,7 @@ def test_a_job_of_another_version_is_refused(tmp_path: Path) -> None:
 
 
 def test_a_scheduler_that_is_not_there_is_one_line(capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("distributed")
     Path("plan.toml").write_text('experiment = "springs"\n[vary]\ncoil_mm = [3.5, 4.0]\n')
     assert main(["study", "plan.toml", "--engine", "dask://127.0.0.1:9", "--out", "run"]) == 2
     said = capsys.readouterr().err.strip().splitlines()

@@ -171,7 +171,7 @@ def test_a_person_stops_steps_and_begins_anew(tab: Tab, tmp_path: Path) -> None:
         drag_a_cylinder(tab)
         tab.fill("seed", "7")
         tab.click("button", "restart with this seed")
-        tab.until("document.body.innerText.includes('by hand: begun anew with seed 7')")
+        tab.until("!document.body.innerText.includes('by hand: obstacle')")  # another scene
         tab.until("/time\\s+0\\.0[0-9] s/.test(document.body.innerText)")
         go_on(tab)
         tab.choose("speed", "max")
