@@ -56,9 +56,9 @@ def disturbed(folder: Path, most: int, chance: random.Random) -> tuple[int, int]
             except subprocess.TimeoutExpired:
                 pass
             try:
-                crew = children(driver.pid)
-                if crew and chance.random() < 0.6:
-                    os.kill(chance.choice(crew), signal.SIGKILL)
+                processes = children(driver.pid)
+                if processes and chance.random() < 0.6:
+                    os.kill(chance.choice(processes), signal.SIGKILL)
                     workers += 1
                     continue
             except OSError:

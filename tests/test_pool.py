@@ -52,11 +52,11 @@ def test_what_dies_hangs_or_raises_is_found_and_the_others_end(
 ) -> None:
     """A task that kills its worker has three chances; one that never ends has one alone."""
     tasks = [(number, str(tmp_path)) for number in range(8)]
-    crew = Workers(2, timeout=2.0)
+    workers = Workers(2, timeout=2.0)
     found = gather(
         function,
         tasks,
-        crew,
+        workers,
         no_step,
         chunk=chunk,
         together=function is trouble_together,
@@ -95,9 +95,9 @@ def test_there_is_at_least_one_core() -> None:
 
 def test_any_executor_can_be_the_engine() -> None:
     with ProcessPoolExecutor(1, get_context("spawn")) as executor:
-        crew = Workers(2, make_engine(executor))
-        assert gather(halves, [(7, 2), (9, 4)], crew, no_step) == [(3, 1), (2, 1)]
-        answer = gather(halves, [(7, 0), (9, 4)], crew, no_step, lost=lost)
+        workers = Workers(2, make_engine(executor))
+        assert gather(halves, [(7, 2), (9, 4)], workers, no_step) == [(3, 1), (2, 1)]
+        answer = gather(halves, [(7, 0), (9, 4)], workers, no_step, lost=lost)
         assert answer[0][0] == "failed"
         assert answer[1] == (2, 1)
 

@@ -131,7 +131,7 @@ def carry_out(
             what was measured is kept and shown first.
     """
     require_viewable(options, config)
-    crew = workers_of(options, closed=shards is not None, apart=experiment.continued)
+    workers = workers_of(options, closed=shards is not None, apart=experiment.continued)
     logs = isinstance(options, LogOptions) and options.log
     kind = f"{experiment.name} --log" if logs else experiment.name
     kind += " --engine warp" if options.engine.partition(":")[0] == WARP else ""
@@ -144,11 +144,11 @@ def carry_out(
         view_of(options) as view,
         folder_for(experiment.view, options, config, argv, what, resume, name) as run,
     ):
-        run.keeps_store, crew.store = experiment.continued, run.store
+        run.keeps_store, workers.store = experiment.continued, run.store
         if shards and run.store is not None:
             run.store.take(shards.records)
         try:
-            outcome = _outcome(experiment, config, options, crew, run, view)
+            outcome = _outcome(experiment, config, options, workers, run, view)
         except WorkerError:
             if shards:
                 run.discard()
@@ -168,7 +168,7 @@ def _outcome(
     experiment: Experiment[Any, Any],
     config: Params,
     options: Options,
-    crew: Workers,
+    workers: Workers,
     run: RunDirectory,
     view: SimulationView | None,
 ) -> Outcome:
@@ -188,8 +188,8 @@ def _outcome(
         if view is not None and experiment.viewed is not None:
             return experiment.viewed(config, step, keep, view, logs)
         if logs is not None and experiment.logged is not None:
-            return experiment.logged(config, crew, step, keep, logs)
-        return experiment.run(config, crew, step, keep)
+            return experiment.logged(config, workers, step, keep, logs)
+        return experiment.run(config, workers, step, keep)
 
 
 def _end(

@@ -131,14 +131,14 @@ def run(
     found.check(config)
     if video is not None:
         require_films(found, config, video, out)
-    crew = functools.partial(Workers, workers, make_engine(engine))
+    make_workers = functools.partial(Workers, workers, make_engine(engine))
     if out is None:
-        return Result(found, config, found.run(config, crew(), on_step, lambda row: None))
+        return Result(found, config, found.run(config, make_workers(), on_step, lambda row: None))
     place = (found.name, out, overwrite, identity(found.name, config), resume or found.continued)
     with RunDirectory.create(*place) as directory:
         directory.keeps_store = found.continued
         directory.describe(config)
-        outcome = found.run(config, crew(store=directory.store), on_step, directory.append)
+        outcome = found.run(config, make_workers(store=directory.store), on_step, directory.append)
         keep(found, outcome, directory)
         if video is not None:
             write_films(found, config, video, directory)

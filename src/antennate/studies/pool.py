@@ -101,22 +101,22 @@ class _Call:
 
     def __init__(
         self,
-        crew: Workers,
+        workers: Workers,
         total: int,
         package: str,
         take: Callable[[Any], None],
         on_step: Callable[[int, int], None],
         lost: Callable[[int, Failure], Any] | None,
     ) -> None:
-        self._crew, self._number, self._total = crew, next(crew.calls), total
+        self._workers, self._number, self._total = workers, next(workers.calls), total
         self._packages = {"antennate", package}
         self._take, self._on_step, self._lost = take, on_step, lost
         self.found: dict[int, Any] = {}
 
     def emit(self, place: int, result: Any) -> None:
         """Keep a result."""
-        if self._crew.store is not None:
-            self._crew.store.append(f"{self._number}.{place}", {"result": encoded(result)})
+        if self._workers.store is not None:
+            self._workers.store.append(f"{self._number}.{place}", {"result": encoded(result)})
         self._finish(place, result)
 
     def fail(self, place: int, failure: Failure) -> None:
@@ -124,9 +124,9 @@ class _Call:
         if self._lost is None:
             raise failure.error or WorkerError(_in_words(failure))
         result = self._lost(place, failure)
-        if self._crew.store is not None:
+        if self._workers.store is not None:
             content = {"failure": [failure.status, failure.reason]}
-            self._crew.store.append(f"{self._number}.{place}", content)
+            self._workers.store.append(f"{self._number}.{place}", content)
         self._finish(place, result)
 
     def _finish(self, place: int, result: Any) -> None:
@@ -136,13 +136,13 @@ class _Call:
 
     def resume(self) -> None:
         """Take what was finished before."""
-        records = self._crew.store.records if self._crew.store is not None else {}
+        records = self._workers.store.records if self._workers.store is not None else {}
         for place in range(self._total) if records else ():
             record = records.pop(f"{self._number}.{place}", None)
             if record is None:
                 continue
             if "failure" in record:
-                if self._lost is None or self._crew.retry:
+                if self._lost is None or self._workers.retry:
                     continue
                 result = self._lost(place, Failure(*record["failure"]))
             else:
@@ -186,22 +186,22 @@ def gather(
         ShardEnd: All tasks of this shard are finished.
         KeyboardInterrupt: After the results that had arrived by then were given to `on_result`.
     """
-    crew = workers if isinstance(workers, Workers) else Workers(workers)
+    workers = workers if isinstance(workers, Workers) else Workers(workers)
     package = function.__module__.partition(".")[0]
-    call = _Call(crew, len(tasks), package, on_result, on_step, lost)
+    call = _Call(workers, len(tasks), package, on_result, on_step, lost)
     call.resume()
-    todo = [place for place in range(len(tasks)) if place not in call.found and crew.mine(place)]
-    if todo and crew.closed:
+    todo = [place for place in range(len(tasks)) if place not in call.found and workers.mine(place)]
+    if todo and workers.closed:
         raise WorkerError(
             f"expected {len(tasks)} finished trials, found {len(call.found)}: a shard is missing"
         )
     parts = [todo[i : i + chunk] for i in range(0, len(todo), chunk)]
     if parts:
-        folder = None if crew.store is None else crew.store.path.parent
-        work = Work(function, tasks, together, crew.timeout, folder, batched)
-        crew.engine(len(parts)).run(work, parts, int(crew), call.emit, call.fail)
-    if crew.shard is not None:
-        raise ShardEnd(sum(map(crew.mine, call.found)), len(tasks))
+        folder = None if workers.store is None else workers.store.path.parent
+        work = Work(function, tasks, together, workers.timeout, folder, batched)
+        workers.engine(len(parts)).run(work, parts, int(workers), call.emit, call.fail)
+    if workers.shard is not None:
+        raise ShardEnd(sum(map(workers.mine, call.found)), len(tasks))
     return [call.found[place] for place in range(len(tasks))]
 
 

@@ -30,7 +30,7 @@ _POLL = 0.1
 """How long results that are on their way are waited for after Ctrl-C [s]."""
 _LONGEST_WAIT = 3600.0
 """Most that is waited at once [s]."""
-_STILLBORN = 10
+_MOST_FAILED_STARTS = 10
 """Workers in a row that may end before they are ready, as somebody kills them."""
 _READY, _BEGUN, _FAILED, _RESULT = range(4)
 """Kinds of messages of a worker."""
@@ -48,17 +48,17 @@ class Processes:
         checked = sendable(work.tasks)
         if isinstance(checked, NotSent):
             raise WorkerError(checked.reason)
-        crew = _Crew(work, parts, added_objects(), emit, fail)
+        pool = _Pool(work, parts, added_objects(), emit, fail)
         try:
-            crew.run(min(count, len(parts)))
+            pool.run(min(count, len(parts)))
         except KeyboardInterrupt:
-            crew.take_what_came()
+            pool.take_what_came()
             raise
         finally:
-            crew.end()
+            pool.end()
 
 
-class _Crew:
+class _Pool:
     def __init__(
         self,
         work: Work,
@@ -69,53 +69,53 @@ class _Crew:
     ) -> None:
         self._work, self._waiting, self._added = work, Waiting(parts), added
         self._emit, self._fail = emit, fail
-        self._members: list[_Member] = []
-        self._stillborn = 0
+        self._workers: list[_Worker] = []
+        self._failed_starts = 0
 
     def run(self, count: int) -> None:
-        while self._waiting or any(member.places for member in self._members):
-            busy = sum(bool(member.places) for member in self._members)
-            while len(self._members) < min(count, busy + len(self._waiting)):
-                self._members.append(_Member(self._added))
-            for member in self._members:
-                if member.ready and not member.places and self._waiting:
-                    member.give(self._work, self._waiting.next())
-            end = min(member.deadline for member in self._members)
+        while self._waiting or any(worker.places for worker in self._workers):
+            busy = sum(bool(worker.places) for worker in self._workers)
+            while len(self._workers) < min(count, busy + len(self._waiting)):
+                self._workers.append(_Worker(self._added))
+            for worker in self._workers:
+                if worker.ready and not worker.places and self._waiting:
+                    worker.give(self._work, self._waiting.next())
+            end = min(worker.deadline for worker in self._workers)
             left = min(max(0.0, end - time.monotonic()), _LONGEST_WAIT)
-            signs: dict[Any, _Member] = {
-                x: m for m in self._members for x in (m.connection, m.process.sentinel)
+            signs: dict[Any, _Worker] = {
+                x: m for m in self._workers for x in (m.connection, m.process.sentinel)
             }
-            for member in {signs[x]: None for x in wait(list(signs), left)}:
-                self._hear(member)
-            for member in [m for m in self._members if time.monotonic() > m.deadline]:
-                self._bury(member, hung=True)
+            for worker in {signs[x]: None for x in wait(list(signs), left)}:
+                self._receive(worker)
+            for worker in [m for m in self._workers if time.monotonic() > m.deadline]:
+                self._remove(worker, hung=True)
 
-    def _hear(self, member: _Member) -> None:
-        """Take what a worker sent; bury it if it has died."""
-        ended = not member.process.is_alive()
+    def _receive(self, worker: _Worker) -> None:
+        """Take what a worker sent; remove it if it has died."""
+        ended = not worker.process.is_alive()
         try:
-            while member.connection.poll():
-                self._take(member, *member.connection.recv())
+            while worker.connection.poll():
+                self._take(worker, *worker.connection.recv())
         except (EOFError, OSError):
             ended = True
         if ended:
-            self._bury(member)
+            self._remove(worker)
 
-    def _take(self, member: _Member, kind: int, place: int, content: Any) -> None:
-        member.heard(self._work)
+    def _take(self, worker: _Worker, kind: int, place: int, content: Any) -> None:
+        worker.answered(self._work)
         if kind == _READY:
-            member.ready, self._stillborn = True, 0
+            worker.ready, self._failed_starts = True, 0
         elif kind != _BEGUN:
-            member.places.remove(place)
+            worker.places.remove(place)
             (self._emit if kind == _RESULT else self._fail)(place, content)
 
-    def _bury(self, member: _Member, hung: bool = False) -> None:
-        member.kill()
-        self._members.remove(member)
-        code, left = member.process.exitcode, member.places
-        if not member.ready:
-            self._stillborn += 1
-            if code == 1 or self._stillborn > _STILLBORN:
+    def _remove(self, worker: _Worker, hung: bool = False) -> None:
+        worker.kill()
+        self._workers.remove(worker)
+        code, left = worker.process.exitcode, worker.places
+        if not worker.ready:
+            self._failed_starts += 1
+            if code == 1 or self._failed_starts > _MOST_FAILED_STARTS:
                 guard = _GUARD if code == 1 else ""
                 raise WorkerError(f"a worker process ended with code {code} before its work{guard}")
         if not left:
@@ -131,18 +131,18 @@ class _Crew:
 
     def take_what_came(self) -> None:
         """Take the results that are on their way."""
-        for member in self._members:
+        for worker in self._workers:
             with contextlib.suppress(EOFError, OSError):
-                while member.connection.poll(_POLL):
-                    self._take(member, *member.connection.recv())
+                while worker.connection.poll(_POLL):
+                    self._take(worker, *worker.connection.recv())
 
     def end(self) -> None:
         """End all workers."""
-        for member in self._members:
-            member.kill()
+        for worker in self._workers:
+            worker.kill()
 
 
-class _Member:
+class _Worker:
     """One worker process.
 
     Attributes:
@@ -155,7 +155,7 @@ class _Member:
         context = multiprocessing.get_context("spawn")
         self.connection, theirs = context.Pipe()
         self.process = context.Process(target=_serve, args=(theirs, added))
-        with _deaf():
+        with _without_ctrl_c():
             self.process.start()
         theirs.close()
         self.ready = False
@@ -164,11 +164,11 @@ class _Member:
 
     def give(self, work: Work, places: list[int]) -> None:
         self.places = places
-        self.heard(work)
-        with contextlib.suppress(OSError):  # it has died: that is heard of next
+        self.answered(work)
+        with contextlib.suppress(OSError):  # it has died: that is noticed next
             self.connection.send(work.part(places))
 
-    def heard(self, work: Work) -> None:
+    def answered(self, work: Work) -> None:
         """Begin the time until the next answer."""
         count = len(self.places) if work.together else 1
         self.deadline = time.monotonic() + work.timeout * count if count else float("inf")
@@ -206,8 +206,8 @@ def sendable(each: Any) -> Any:
 
 
 @contextlib.contextmanager
-def _deaf() -> Iterator[None]:
-    """Start workers deaf to Ctrl-C, which they inherit, so that none dies half begun."""
+def _without_ctrl_c() -> Iterator[None]:
+    """Start workers that ignore Ctrl-C, which they inherit, so that none dies half begun."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -219,7 +219,7 @@ def _deaf() -> Iterator[None]:
 
 
 def _serve(connection: Connection, added: Mapping[str, Any]) -> None:
-    """The life of a worker."""
+    """What a worker process does until it is ended."""
     take_added(added)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, daemon=True).start()

@@ -21,6 +21,7 @@ from antennate.antenna.statics import PROFILES, Profile, with_profile
 from antennate.errors import SimulationError, WorkerError
 from antennate.experiments.wall import measures
 from antennate.experiments.wall.outcome import SAMPLE_PERIOD, Traverse, WallTrial, classify
+from antennate.experiments.wall.way import COMMAND_PERIOD, from_crest, marks, ramp, spheres
 from antennate.params.base import Params, number, require_different
 from antennate.params.bench import BenchVariationParams, Solver, WallParams, solver
 from antennate.params.scene import BenchPhysicsParams
@@ -33,13 +34,10 @@ from antennate.studies.pool import gather
 from antennate.studies.work import Failure
 from antennate.telemetry.view.pace import Restart
 from antennate.telemetry.view.simulation import SimulationView
-from antennate.types import Floats
 
 REFERENCE: Profile = "descending"
 """The profile that all others are compared with."""
-_COMMAND_PERIOD = 0.002
-"""Time between commands to the carriage [s]."""
-_SAMPLES = round(SAMPLE_PERIOD / _COMMAND_PERIOD)
+_SAMPLES = round(SAMPLE_PERIOD / COMMAND_PERIOD)
 """Commands to a sample."""
 _CLEAR = 0.002
 """Distance between tip and crests before the approach [m]."""
@@ -85,10 +83,10 @@ class WallConfig(Params):
                 f"wall.travel must exceed start and jam_travel together, "
                 f"{self.wall.start + self.wall.jam_travel:g} m, got {self.wall.travel:g} m"
             )
-        ratio = _COMMAND_PERIOD / self.physics.timestep
+        ratio = COMMAND_PERIOD / self.physics.timestep
         if abs(ratio - round(ratio)) > 1e-6 or round(ratio) < 1:
             raise ValueError(
-                f"physics.timestep must divide {_COMMAND_PERIOD:g} s, got {self.physics.timestep:g}"
+                f"physics.timestep must divide {COMMAND_PERIOD:g} s, got {self.physics.timestep:g}"
             )
         chain.require_read(self.solver, self.physics)
         return self
@@ -156,7 +154,7 @@ def passage(config: WallConfig, profile: str, trial: int, watch: Watch = _unwatc
     antenna = with_profile(config.antenna, profile)
     antenna = antenna.model_copy(update={"friction": min(friction, 2.0)})
     crest = antenna.length * math.sin(angle) + antenna.radius + _CLEAR
-    balls = _boulders(wall, antenna, angle, phase, crest)
+    balls = spheres(wall, antenna, angle, phase, crest)
     pull = (0.0, {"down": -_GRAVITY, "up": _GRAVITY, "off": 0.0}[wall.gravity])
     way = (math.pi / 2 - angle, overlap + _CLEAR, crest)
     if config.solver == "chain":
@@ -167,17 +165,6 @@ def passage(config: WallConfig, profile: str, trial: int, watch: Watch = _unwatc
         joint = model.joint(f"antenna/hinge{i}")
         joint.stiffness *= factor
     return _drive(config, Bench(model, antenna), balls, *way, watch)
-
-
-def _boulders(
-    wall: WallParams, antenna: AntennaSpec, angle: float, phase: float, crest: float
-) -> list[Ball]:
-    """Spheres all along the way, their crests clear of the tip at first."""
-    pitch = wall.sphere_diameter
-    below = -2 * pitch - max(0.0, -antenna.length * math.cos(angle))
-    above = wall.travel + 1.2 * antenna.length
-    heights = np.arange(below + phase, above, pitch)
-    return [Ball(crest + pitch / 2, float(y), pitch / 2) for y in heights]
 
 
 def _drive(
@@ -192,20 +179,20 @@ def _drive(
     wall = config.wall
     bench.place(0.0, 0.0, base)
     bench.step(round(_SETTLE / config.physics.timestep))
-    substeps = round(_COMMAND_PERIOD / config.physics.timestep)
-    for x in _ramp(approach, wall.speed):
+    substeps = round(COMMAND_PERIOD / config.physics.timestep)
+    for x in ramp(approach, wall.speed):
         bench.command(x, 0.0, wall.speed, 0.0, base)
         bench.step(substeps)
         watch(bench)
     begin = bench.tip()[1]
-    path = _ramp(wall.travel, wall.speed)
+    path = ramp(wall.travel, wall.speed)
     rows, hinges, shapes = [], [], []
-    marks = _marks(path)
+    shown_at = marks(path)
     for i, y in enumerate(path):
         bench.command(approach, y, 0.0, wall.speed, base)
         bench.step(substeps)
         watch(bench)
-        if i in marks:
+        if i in shown_at:
             shapes.append(bench.joints())
         if i % _SAMPLES == 0:
             force = float(np.hypot(*bench.contact_force()))
@@ -213,14 +200,8 @@ def _drive(
             rows.append((y, tip, bench.touching(), force, bench.flex()))
             hinges.append(bench.hinges().copy())
     base_y, tip_y, touching, forces, flex = np.array(rows, float).T
-    from_crest = np.array(shapes) - [crest, 0.0]
-    shown = _about(balls, crest)
-    return Traverse(base_y, tip_y, touching, forces, flex, np.array(hinges), from_crest, shown)
-
-
-def _about(balls: Sequence[Ball], crest: float) -> Floats:
-    """Centres of spheres from the crest on, and their radii [m], shape (n, 3)."""
-    return np.array([(ball.x - crest, ball.y, ball.radius) for ball in balls])
+    drawn = (np.array(hinges), np.array(shapes) - [crest, 0.0], from_crest(balls, crest))
+    return Traverse(base_y, tip_y, touching, forces, flex, *drawn)
 
 
 def _drive_chain(
@@ -234,10 +215,10 @@ def _drive_chain(
 ) -> Traverse:
     """As `_drive`, all commands of a way at once."""
     speed, timestep = config.wall.speed, config.physics.timestep
-    substeps = round(_COMMAND_PERIOD / timestep)
+    substeps = round(COMMAND_PERIOD / timestep)
     bench.place(0.0, 0.0, base)
     bench.drive(bench.commands(np.zeros((1, 2)), np.zeros(2), base), round(_SETTLE / timestep))
-    ahead, path = np.array(_ramp(approach, speed)), np.array(_ramp(config.wall.travel, speed))
+    ahead, path = np.array(ramp(approach, speed)), np.array(ramp(config.wall.travel, speed))
     there = np.column_stack([ahead, np.zeros_like(ahead)])
     came = bench.drive(bench.commands(there, np.array([speed, 0.0]), base), substeps)
     along = np.column_stack([np.full_like(path, approach), path])
@@ -250,19 +231,9 @@ def _drive_chain(
         np.hypot(*seen.force.T),
         seen.hinges[:, : antenna.sensed_hinges].sum(axis=1),
         seen.hinges,
-        went[sorted(_marks(path))].joints - [crest, 0.0],
-        _about(balls, crest),
+        went[sorted(marks(path))].joints - [crest, 0.0],
+        from_crest(balls, crest),
     )
-
-
-def _marks(path: Sequence[float] | Floats) -> set[int]:
-    """Where on a way the antenna's shape is kept: every tenth."""
-    return {round(i * (len(path) - 1) / 10) for i in range(11)}
-
-
-def _ramp(length: float, speed: float) -> list[float]:
-    count = max(1, math.ceil(length / (speed * _COMMAND_PERIOD) - 1e-9))
-    return (length * np.arange(1, count + 1) / count).tolist()
 
 
 _Task = tuple[WallConfig, str, int]
