@@ -99,7 +99,7 @@ class Script:
             command = Command(words[0], self._folder)
             self._acts[words[0][0]](command, self)
             assert command.end() == 0, command.text
-            self._take(command.output + command.text)
+            self._note_output(command.output + command.text)
         elif block.kind == "sh":
             self._carry_out(["bash", "-euc", _SHELL + block.text])
         elif block.title:
@@ -124,9 +124,9 @@ class Script:
             env=os.environ | own,
         )
         assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-2000:]
-        self._take(done.stdout + done.stderr)
+        self._note_output(done.stdout + done.stderr)
 
-    def _take(self, text: str) -> None:
+    def _note_output(self, text: str) -> None:
         self.said += " ".join(text.split()) + " "
 
     def _compare(self, text: str) -> None:
