@@ -18,6 +18,7 @@ import json
 import sys
 import time
 from importlib import metadata
+from typing import Any
 
 from antennate.errors import AntennateError
 from antennate.experiments.tunnel.batch import run_trials
@@ -91,31 +92,40 @@ def main() -> None:
         raise SystemExit(f"benchmarks/gpu.py: {error}") from None
 
 
-def report(told: argparse.Namespace) -> None:
+def measure(batches: list[int], seconds: float, device: str | None) -> dict[str, Any]:
+    """The figures of all batch sizes, and of the machine.
+
+    Raises:
+        AntennateError: There is no such device, or Warp is not installed.
+    """
     warp, _ = require_warp()
-    config = TunnelConfig(time_limit=told.seconds)
+    config = TunnelConfig(time_limit=seconds)
     plain = make_scene(config.scene, config.tunnel)
-    drawn = (draw_scene(config, plain, trial) for trial in range(max(told.batches)))
+    drawn = (draw_scene(config, plain, trial) for trial in range(max(batches)))
     scene = PaddedTunnels(plain, drawn)
     limits = room_for(TunnelConfig(), CONTROLLER, range(2), scene)
-    about = {
-        "device": (
-            warp.get_device(told.device) if told.device else warp.get_preferred_device()
-        ).name,
+    table = []
+    for batch in batches:
+        table.append(measured(config, scene, batch, limits, device))
+        sys.stderr.write(f"{batch} robots: {table[-1]['robot_seconds_per_second']:.3g} s/s\n")
+    return {
+        "device": (warp.get_device(device) if device else warp.get_preferred_device()).name,
         "mujoco_warp": metadata.version("mujoco-warp"),
         "warp": metadata.version("warp-lang"),
-        "seconds": told.seconds,
+        "seconds": seconds,
         "rows": limits.rows,
         "contacts": limits.contacts,
+        "batches": table,
     }
-    table = []
-    for batch in told.batches:
-        table.append(measured(config, scene, batch, limits, told.device))
-        sys.stderr.write(f"{batch} robots: {table[-1]['robot_seconds_per_second']:.3g} s/s\n")
+
+
+def report(told: argparse.Namespace) -> None:
+    found = measure(told.batches, told.seconds, told.device)
     if told.json:
-        print(json.dumps({**about, "batches": table}, indent=1))
+        print(json.dumps(found, indent=1))
         return
-    print(", ".join(f"{name} {value}" for name, value in about.items()))
+    table = found.pop("batches")
+    print(", ".join(f"{name} {value}" for name, value in found.items()))
     for name in table[0]:
         print(f"{name:>26}", *(f"{row[name]:>10.4g}" for row in table))
 

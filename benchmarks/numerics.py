@@ -20,8 +20,8 @@ from unittest import mock
 import mujoco
 import numpy as np
 
+from antennate.experiments.gait import run as gait
 from antennate.experiments.gait.pace import measure
-from antennate.experiments.gait.run import GaitStudyConfig, walk_flat
 from antennate.experiments.tunnel import run as experiment
 from antennate.experiments.tunnel.monitor import TrialResult
 from antennate.experiments.tunnel.run import TunnelConfig
@@ -112,20 +112,22 @@ TUNNELS = (
 def walk(engine: Engine) -> dict[str, float]:
     """Speed and leg penetration of FORWARD on the flat floor."""
     ticks = max(1, round(0.01 / engine.timestep))
-    config = GaitStudyConfig(rate=1.0 / (ticks * engine.timestep), physics=engine.physics)
+    config = gait.GaitStudyConfig(rate=1.0 / (ticks * engine.timestep), physics=engine.physics)
     sunk: list[float] = []
-    step = World.step
 
-    def watched(self: World, count: int) -> None:
-        step(self, count)
-        sunk.append(-float(self.data.contact.dist.min(initial=0.0)))
+    class Watched(World):
+        work = 0.0
+
+        def advance(self, count: int) -> None:
+            super().advance(count)
+            sunk.append(-float(self.data.contact.dist.min(initial=0.0)))
 
     with (
-        mock.patch.object(trial, "compile_world", engine.compile),
-        mock.patch.object(World, "step", watched),
+        mock.patch.object(gait, "compile_world", engine.compile),
+        mock.patch.object(gait, "MeteredWorld", Watched),
     ):
         before = time.process_time()
-        walked = walk_flat(config, "forward", GaitParams(), Maneuver.FORWARD)
+        walked = gait.walk_flat(config, "forward", GaitParams(), Maneuver.FORWARD)
         cpu = time.process_time() - before
     pace = measure(walked, config.settling_cycles, config.cycles)
     settled = np.array(sunk)[len(sunk) // 3 :]
@@ -254,6 +256,8 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="few tunnels, coarser reference")
     options = parser.parse_args()
     flat: dict[str, Any] = {engine.name: walk(engine) | push(engine) for engine in WALKS}
+    if not options.json:
+        print(flat_table(flat), flush=True)
     step = 0.0005 if options.quick else 0.00025
     finer = Engine(
         f"{1e3 * step:g} ms, impratio 10, no sleep",
@@ -267,7 +271,7 @@ def main() -> None:
     if options.json:
         print(json.dumps({"flat": flat, "tunnel": outcomes}, indent=2))
         return
-    print(flat_table(flat), tunnel_table(outcomes), sep="\n\n")
+    print(f"\n{tunnel_table(outcomes)}")
     print(f"\nCoulomb: {1e3 * coulomb_stop(TunnelParams()):.2f} mm; tunnels end after {limit:g} s.")
 
 

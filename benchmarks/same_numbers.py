@@ -18,7 +18,7 @@ RENAMED = {
     "fate_after_start": ("outcome_after_start",),
     "status": ("outcome",),
 }
-KEYS = ("arm", "kind", "wall", "speed_m_s", "profile", "condition", "trial", "side")
+KEYS = ("arm", "controller", "kind", "wall", "speed_m_s", "profile", "condition", "trial", "side")
 VERSIONED = ("schema",)
 SHOWN = 10
 

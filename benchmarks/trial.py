@@ -1,49 +1,44 @@
-"""What a trial costs beside its physics, how fast it runs, and how the cost grows with cylinders.
+"""What a trial costs beside its physics, and a physics step beside that of a humanoid.
 
-- `trial_over_bare_engine`: CPU time of whole tunnel trials (sensing, control, recording),
-  stepped twelve at a time as the program does, over CPU time of the bare engine that replays their
-  commands, one trial after the other, on the same models from the same starts. Drawing and
-  compiling a tunnel is in neither. The replay must end on the same bits. The table shows trials
-  stepped one at a time as well.
-- `realtime_factor`: simulated seconds per CPU second of whole trials, twelve at a time.
-- `growth`: CPU time per simulated second with n cylinders over that with 10. The robot paces to and
-  fro at the start of one long tunnel, of which only the n cylinders nearest to the start are kept:
-  its own work is the same in every case, and what is measured is what the others cost.
+- `over_bare_engine`: CPU time of whole tunnel trials (sensing, control, recording), stepped twelve
+  at a time as the program does, over CPU time of the bare engine that replays their commands, one
+  trial after the other, on the same models from the same starts. Drawing and compiling a tunnel is
+  in neither. The replay must end on the same bits, and so must every timed trial.
+- `bare_at_once`: the bare engine that steps twelve worlds in turn, over one after the other.
+- `step_over_humanoid`: a physics step of the tunnel over one of a humanoid that falls on a floor.
+- `tick`: how long a controller takes for one control tick, alone and for many robots at once.
 """
 
 from __future__ import annotations
 
-import argparse
-import json
-import statistics
+import itertools
+import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 from unittest import mock
 
+import mujoco
 import numpy as np
+from measuring import cpu_seconds, in_turn, ratios, spread
 
-from antennate.control.gait import Gait
-from antennate.control.loop import run_loop
+from antennate.control.registry import make_controller
 from antennate.experiments.tunnel import batch as experiment
-from antennate.experiments.tunnel.run import TunnelConfig
-from antennate.params.scene import TunnelParams
+from antennate.experiments.tunnel.config import TunnelConfig
 from antennate.sim.gears import Gears
-from antennate.sim.scenes import geometry
-from antennate.sim.scenes.tunnel import Tunnel, TunnelScene
-from antennate.sim.sim_robot import SimRobot
-from antennate.sim.trial import Trial, draw_trial, make_world
+from antennate.sim.scenes.tunnel import TunnelScene
+from antennate.sim.trial import Trial, draw_trial
 from antennate.sim.world import PREFIX, World
-from antennate.types import AntennaFrame, Floats, Ints, JointCommand, Maneuver
+from antennate.types import AntennaFrame, Controller, Floats, JointCommand
 
 CONTROLLER = "closed"
-LOCKSTEP = 12
+LOCKSTEP = experiment.BATCH
 """Trials the program steps at once."""
-COUNTS = (10, 30, 60, 120)
-_PACING = 3.0
-"""Time walked each way while the cost of cylinders is measured [s]: about one body length."""
+HUMANOID_STEPS = 10_000
+HUMANOID_STEP = 0.005
+"""Its physics step [s]."""
 
 
 @dataclass
@@ -54,44 +49,37 @@ class Tape:
     friction: Floats | None = None
 
 
-def seconds_of(action: Callable[[], Any]) -> float:
-    """CPU time of an action [s]."""
-    before = time.process_time()
-    action()
-    return time.process_time() - before
-
-
 def prepare(config: TunnelConfig, trials: int) -> list[Trial]:
     """The starts of all trials, fresh."""
     scene, control = TunnelScene(config.tunnel), config.control
     return [draw_trial(config, scene, i, control.gait, control.period) for i in range(trials)]
 
 
-def run_whole(config: TunnelConfig, starts: list[Trial], batch: int) -> None:
+def run_whole(config: TunnelConfig, starts: list[Trial], batch: int, **more: Any) -> None:
     """Run prepared trials as `antennate tunnel` does."""
     with mock.patch.object(experiment, "draw_trial", lambda _, __, trial, *___: starts[trial]):
-        experiment.run_trials(config, CONTROLLER, range(len(starts)), lambda _: None, batch)
+        experiment.run_trials(config, CONTROLLER, range(len(starts)), lambda _: None, batch, **more)
 
 
 @contextmanager
 def recording(worlds: list[World]):
     """Record what worlds are told while they run; yields one tape a world."""
     tapes = {id(world): Tape() for world in worlds}
-    step, set_leg_friction = World.step, World.set_leg_friction
+    advance, set_leg_friction = World.advance, World.set_leg_friction
 
     def recorded_friction(self: World, friction: Floats) -> None:
         tapes[id(self)].friction = friction.copy()
         set_leg_friction(self, friction)
 
-    def recorded_step(self: World, count: int) -> None:
+    def recorded_advance(self: World, count: int) -> None:
         tape = tapes[id(self)]
         tape.ticks.append((tape.friction, self.data.ctrl.copy(), count))
         tape.friction = None
-        step(self, count)
+        advance(self, count)
 
     with (
         mock.patch.object(World, "set_leg_friction", recorded_friction),
-        mock.patch.object(World, "step", recorded_step),
+        mock.patch.object(World, "advance", recorded_advance),
     ):
         yield list(tapes.values())
 
@@ -105,19 +93,27 @@ def record(config: TunnelConfig, trials: int) -> tuple[list[Tape], list[World]]:
     return tapes, worlds
 
 
-def replay(tapes: list[Tape], worlds: list[World]) -> None:
-    """The bare engine: tell fresh worlds what the tapes say, one after the other.
+def replay(tapes: list[Tape], worlds: list[World], batch: int = 1) -> None:
+    """The bare engine: tell fresh worlds what the tapes say, so many in turn, a tick each.
 
     The friction of loaded gears, where servos have it, belongs to the engine.
     """
-    for tape, world in zip(tapes, worlds, strict=True):
-        data = world.data
-        ctrl, step = data.ctrl, Gears(world.model, world.robot, PREFIX).step
-        for friction, controls, count in tape.ticks:
-            if friction is not None:
-                world.set_leg_friction(friction)
-            ctrl[:] = controls
-            step(data, count)
+    players = [play(tape, world) for tape, world in zip(tapes, worlds, strict=True)]
+    for begin in range(0, len(players), batch):
+        for _ in itertools.zip_longest(*players[begin : begin + batch]):
+            pass
+
+
+def play(tape: Tape, world: World) -> Iterator[None]:
+    """Tell a world what a tape says, and stop after each tick."""
+    data = world.data
+    ctrl, step = data.ctrl, Gears(world.model, world.robot, PREFIX).step
+    for friction, controls, count in tape.ticks:
+        if friction is not None:
+            world.set_leg_friction(friction)
+        ctrl[:] = controls
+        step(data, count)
+        yield
 
 
 def check_same(worlds: list[World], others: list[World]) -> None:
@@ -128,111 +124,178 @@ def check_same(worlds: list[World], others: list[World]) -> None:
                 raise SystemExit(f"trial {i}: {name} differs between the trial and its replay")
 
 
-@dataclass(frozen=True)
-class Cost:
-    """Medians for one number of trials at once."""
+def humanoid() -> mujoco.MjModel:
+    """A humanoid on a floor with the engine's own numerics at 5 ms.
 
-    over_bare_engine: float
-    realtime_factor: float
+    It is our own, as the engine's package holds none: as many degrees of freedom (27) and motors
+    (21) as the humanoid of the engine's samples, and about as many capsules.
+    """
+    spec = mujoco.MjSpec()
+    spec.compiler.degree = False
+    spec.option.timestep = HUMANOID_STEP
+    spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=[20, 20, 1])
+    capsule = mujoco.mjtGeom.mjGEOM_CAPSULE
+
+    def part(parent: Any, name: str, at: tuple[float, ...], axes: str, *ends: tuple[float, ...]):
+        """A body on hinges about some axes, of capsules from its origin (to x, y, z; radius)."""
+        body = parent.add_body(name=name, pos=at)
+        for axis in axes:
+            joint = f"{name}_{axis}"
+            body.add_joint(
+                name=joint,
+                axis=[float(axis == each) for each in "xyz"],
+                range=[-1.2, 1.2],
+                limited=mujoco.mjtLimited.mjLIMITED_TRUE,
+                stiffness=5.0,
+                damping=2.0,
+                armature=0.01,
+            )
+            spec.add_actuator(
+                name=joint, trntype=mujoco.mjtTrn.mjTRN_JOINT, target=joint, gear=[40] + [0] * 5
+            )
+        for *end, radius in ends:
+            body.add_geom(type=capsule, fromto=[0, 0, 0, *end], size=[radius, 0, 0])
+        return body
+
+    chest = part(spec.worldbody, "chest", (0, 0, 1.4), "", (0, 0.1, 0, 0.07), (0, -0.1, 0, 0.07))
+    chest.add_freejoint(name="root")
+    part(chest, "head", (0, 0, 0.15), "", (0, 0, 0.08, 0.08))
+    waist = part(chest, "waist", (0, 0, -0.2), "yz", (0, 0.06, 0, 0.06), (0, -0.06, 0, 0.06))
+    pelvis = part(waist, "pelvis", (0, 0, -0.17), "x", (0, 0.07, 0, 0.09), (0, -0.07, 0, 0.09))
+    for number, sign in (("1", 1.0), ("2", -1.0)):
+        thigh = part(pelvis, f"thigh_{number}", (0, sign * 0.1, 0), "xzy", (0, 0, -0.34, 0.06))
+        shin = part(thigh, f"shin_{number}", (0, 0, -0.4), "y", (0, 0, -0.3, 0.045))
+        foot = part(shin, f"foot_{number}", (0, 0, -0.39), "yx", (0.14, 0.02, 0, 0.027))
+        foot.add_geom(type=capsule, fromto=[-0.07, 0, 0, 0.14, -0.02, 0], size=[0.027, 0, 0])
+        upper = (0.16, sign * 0.16, -0.16)
+        arm = part(chest, f"arm_{number}", (0, sign * 0.17, 0.06), "xy", (*upper, 0.04))
+        part(arm, f"forearm_{number}", (0.18, sign * 0.18, -0.18), "y", (0.17, 0, 0.17, 0.03))
+    return spec.compile()
 
 
-def measure_trials(config: TunnelConfig, trials: int, repetitions: int) -> dict[int, Cost]:
-    """The cost of trials stepped one and twelve at a time, medians of interleaved repetitions."""
+def fall(model: mujoco.MjModel, steps: int) -> float:
+    """CPU time of physics steps of a humanoid that moves all motors at random [s]."""
+    data, rng = mujoco.MjData(model), np.random.default_rng(0)
+    ticks = rng.uniform(-0.3, 0.3, (steps // 10, model.nu))
+
+    def go() -> None:
+        for targets in ticks:
+            data.ctrl[:] = targets
+            mujoco.mj_step(model, data, 10)
+
+    return cpu_seconds(go)
+
+
+def measure(quick: bool) -> dict[str, Any]:
+    """Trials one and twelve at a time over the bare engine, and its step over a humanoid's."""
+    config = TunnelConfig(time_limit=3.0 if quick else 8.0)
+    trials = 6 if quick else LOCKSTEP
     tapes, ended = record(config, trials)
     simulated = sum(world.t for world in ended)
-    ratios: dict[int, list[float]] = {1: [], LOCKSTEP: []}
-    seconds: dict[int, list[float]] = {1: [], LOCKSTEP: []}
-    for _ in range(repetitions):
-        bare_worlds = [start.world for start in prepare(config, trials)]
-        bare = seconds_of(lambda worlds=bare_worlds: replay(tapes, worlds))
-        check_same(bare_worlds, ended)
-        for batch in ratios:
-            starts = prepare(config, trials)
-            whole = seconds_of(lambda s=starts, b=batch: run_whole(config, s, b))
-            check_same([start.world for start in starts], ended)
-            ratios[batch].append(whole / bare)
-            seconds[batch].append(whole)
+    ticks = sum(len(tape.ticks) for tape in tapes)
+    model, steps = humanoid(), HUMANOID_STEPS
+
+    def bare(batch: int) -> float:
+        worlds = [start.world for start in prepare(config, trials)]
+        seconds = cpu_seconds(lambda: replay(tapes, worlds, batch))
+        check_same(worlds, ended)
+        return seconds
+
+    def whole(batch: int) -> float:
+        starts = prepare(config, trials)
+        seconds = cpu_seconds(lambda: run_whole(config, starts, batch))
+        check_same([start.world for start in starts], ended)
+        return seconds
+
+    cases: dict[Any, Callable[[], float]] = {
+        "bare": lambda: bare(1),
+        "bare at once": lambda: bare(LOCKSTEP),
+        1: lambda: whole(1),
+        LOCKSTEP: lambda: whole(LOCKSTEP),
+        "humanoid": lambda: fall(model, steps),
+    }
+    found = in_turn(cases, 3 if quick else 5)
+    step = [1e6 * s / simulated * config.physics.timestep for s in found["bare"]]
+    step_humanoid = [1e6 * s / steps for s in found["humanoid"]]
     return {
-        batch: Cost(statistics.median(ratios[batch]), simulated / statistics.median(seconds[batch]))
-        for batch in ratios
+        "trials": trials,
+        "simulated_s": round(simulated, 1),
+        "at_once": {
+            str(n): {
+                "over_bare_engine": spread(ratios(found[n], found["bare"])),
+                "realtime_factor": spread([simulated / s for s in found[n]]),
+                "own_us_per_tick": spread(
+                    [1e6 * (a - b) / ticks for a, b in zip(found[n], found["bare"], strict=True)]
+                ),
+            }
+            for n in (1, LOCKSTEP)
+        },
+        "bare_at_once": spread(ratios(found["bare at once"], found["bare"])),
+        "step_us": spread(step),
+        "humanoid_step_us": spread(step_humanoid),
+        "step_over_humanoid": spread(ratios(step, step_humanoid)),
+        "humanoid": {"dof": model.nv, "motors": model.nu, "geoms": model.ngeom},
+        "tunnel": {"dof": ended[0].model.nv, "geoms": ended[0].model.ngeom},
     }
 
 
-class Pacing:
-    """A control that walks to and fro."""
+class Noting:
+    """A controller that keeps what it reads."""
 
-    def __init__(self, config: TunnelConfig) -> None:
-        self._gait = Gait(config.control.gait, config.robot, 1, config.control.period)
+    def __init__(self, made: Controller) -> None:
+        self._made, self.frames = made, list[AntennaFrame]()
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._made, name)
 
     def step(self, frame: AntennaFrame) -> JointCommand:
-        back = int(frame.t[0] / _PACING) % 2
-        return self._gait.step(np.array([int(Maneuver.REVERSE if back else Maneuver.FORWARD)]))
+        self.frames.append(frame)
+        return self._made.step(frame)
 
 
-def long_tunnel(config: TunnelConfig) -> tuple[Tunnel, Ints]:
-    """A tunnel with cylinders enough, and their order from the start."""
-    segments = (1.0,) * 10
-    turns = (90.0, -90.0) * 4 + (90.0,)
-    params = TunnelParams(segments=segments, turns_deg=turns, mirror="never", strewn=20)
-    drawn = TunnelScene(params).draw(config.robot, np.random.default_rng(0))
-    along = [geometry.progress(drawn.centre, where) for where in drawn.cylinders]
-    return drawn, np.argsort(along)
+def frames_of(config: TunnelConfig, trials: int) -> list[AntennaFrame]:
+    """What a controller reads in real trials, until the first of them ends."""
+    kept = list[Noting]()
+
+    def make(name: str, *arguments: Any) -> Any:
+        kept.append(Noting(make_controller(name, *arguments)))
+        return kept[-1]
+
+    run_whole(config, prepare(config, trials), trials, make=make)
+    return [frame for frame in kept[0].frames if np.isfinite(frame.t).all()]
 
 
-def seconds_with(config: TunnelConfig, drawn: Tunnel, seconds: float) -> float:
-    """CPU time of pacing for some simulated seconds in this tunnel."""
-    robot, period = config.robot, config.control.period
-    world = make_world(config.physics, robot, drawn)
-    world.place(0.0, 0.0, 0.0, np.zeros(robot.yaw_count), np.zeros((robot.links, 2)))
-    body = SimRobot(1, robot, period, config.physics.timestep)
-    chance = prepare(config, 1)[0].chance
-    body.load(0, world, chance)
-    control = Pacing(config)
-
-    def go_on(frame: AntennaFrame, command: JointCommand) -> bool:
-        return world.t < seconds
-
-    return seconds_of(lambda: run_loop(body, control, period, go_on))
+def tick_times(config: TunnelConfig, frames: list[AntennaFrame], rows: int) -> Floats:
+    """Time on the clock of each control tick for so many robots [µs]."""
+    control = make_controller(CONTROLLER, config.control, config.robot, rows)
+    control.reset(np.arange(rows), np.linspace(0.0, 2.0 * math.pi, rows))
+    columns = np.arange(rows) % len(frames[0].t)
+    wide = [AntennaFrame(t=f.t[columns], counts=f.counts[columns]) for f in frames]
+    times = np.zeros(len(wide))
+    for i, frame in enumerate(wide):
+        before = time.perf_counter_ns()
+        control.step(frame)
+        times[i] = time.perf_counter_ns() - before
+    return times / 1e3
 
 
-def measure_growth(config: TunnelConfig, seconds: float, repetitions: int) -> dict[str, float]:
-    """Cost with n cylinders over the cost with the fewest, medians of interleaved repetitions."""
-    drawn, order = long_tunnel(config)
-    ratios: dict[int, list[float]] = {count: [] for count in COUNTS}
-    for _ in range(repetitions):
-        costs = {}
-        for count in COUNTS:
-            kept = replace(drawn, cylinders=drawn.cylinders[order[:count]])
-            costs[count] = seconds_with(config, kept, seconds)
-        for count in COUNTS:
-            ratios[count].append(costs[count] / costs[COUNTS[0]])
-    return {str(count): statistics.median(ratios[count]) for count in COUNTS}
-
-
-def main() -> None:
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--json", action="store_true", help="print one JSON object")
-    parser.add_argument("--trials", type=int, default=12, help="trials of the closed controller")
-    parser.add_argument("--seconds", type=float, default=20.0, help="longest trial [s]")
-    parser.add_argument("--repetitions", type=int, default=5, help="interleaved repetitions")
-    options = parser.parse_args()
-    config = TunnelConfig(time_limit=options.seconds)
-    costs = measure_trials(config, options.trials, options.repetitions)
-    growth = measure_growth(config, options.seconds, options.repetitions)
-    if options.json:
-        found = {
-            "trial_over_bare_engine": costs[LOCKSTEP].over_bare_engine,
-            "realtime_factor": costs[LOCKSTEP].realtime_factor,
-            "growth": growth,
-        }
-        print(json.dumps(found, indent=2))
-        return
-    print("trials at once  over bare engine  realtime factor")
-    for batch, cost in costs.items():
-        print(f"{batch:14d}  {cost.over_bare_engine:16.2f}  {cost.realtime_factor:15.1f}")
-    print("cylinders", *(f"{count:>6}" for count in growth))
-    print("cost     ", *(f"{ratio:6.2f}" for ratio in growth.values()))
-
-
-if __name__ == "__main__":
-    main()
+def measure_ticks(quick: bool) -> dict[str, Any]:
+    """Median and 99th percentile of a control tick, for one robot and for many at once."""
+    config = TunnelConfig(time_limit=3.0 if quick else 10.0)
+    frames = frames_of(config, LOCKSTEP)
+    sizes = (1, 12, 128, 1024)
+    taken: dict[int, list[Floats]] = {rows: [] for rows in sizes}
+    for i in range(3 if quick else 7):
+        for rows in sizes[:: -1 if i % 2 else 1]:
+            taken[rows].append(tick_times(config, frames, rows))
+    return {
+        "ticks": len(frames),
+        "period_us": 1e6 * config.control.period,
+        "robots": {
+            str(rows): {
+                name: spread([float(np.percentile(t, share)) for t in times])
+                for name, share in (("p50", 50), ("p99", 99))
+            }
+            for rows, times in taken.items()
+        },
+    }

@@ -3,7 +3,8 @@
 A heading of the page is a command, and the pictures below it are figures of its run. Without
 options each command runs as it stands and its pictures go to docs/images; names of commands choose
 some. `--quick FOLDER` runs them with few trials and puts the pictures there, which shows that all
-can still be drawn. `--check` runs nothing: each picture is there, and each is shown on a page.
+can still be drawn. `--check` runs nothing: each picture is there and shown on a page, and every
+experiment has its place in the gallery.
 """
 
 import argparse
@@ -15,11 +16,16 @@ import sys
 import tempfile
 from pathlib import Path
 
+from antennate import experiments
 from antennate.cli import main as antennate
 
 ROOT = Path(__file__).parent
 IMAGES = ROOT / "images"
-FIGURES = {"tunnel.png": "trajectories.png", "hexapod.png": "unknown.png"}
+FIGURES = {
+    "tunnel.png": "trajectories.png",
+    "hexapod.png": "unknown.png",
+    "study.png": "map.png",
+}
 """Names in the run where they are not those of the picture."""
 SCRIPTS = {"tunnel.webp": "film.py", "replay.png": "replay.py"}
 """What draws the pictures that no single command draws."""
@@ -27,6 +33,7 @@ FEW = {
     "force": "--profiles descending --speeds 0.15 --place-step 0.1",
     "gait": "--sweep-points 4 --cycles 2",
     "gait --config examples/hexapod.toml": "--draws 5 --sweep-points 4",
+    "study studies/wall_design.toml": "--trials 1",
     "sweep": "--profiles descending --estimate.trials 8",
     "touch": "--trials 1 --speeds 0.15",
     "tunnel": "--trials 1 --time-limit 20",
@@ -41,16 +48,20 @@ def gallery() -> dict[str, list[str]]:
     """Pictures of the page by the command that draws them."""
     _, *parts = _HEADING.split((ROOT / "gallery.md").read_text(encoding="utf-8"))
     return {
-        words: _PICTURE.findall(text) for words, text in zip(parts[::2], parts[1::2], strict=True)
+        words: _PICTURE.findall(text.partition("\n## ")[0])
+        for words, text in zip(parts[::2], parts[1::2], strict=True)
     }
 
 
 def check() -> None:
-    """Compare the pictures with the pages.
+    """Compare the pictures with the pages, and the gallery with the experiments.
 
     Raises:
-        SystemExit: A picture is missing, or one is shown nowhere.
+        SystemExit: A picture is missing, one is shown nowhere, or the gallery lacks an experiment.
     """
+    text = (ROOT / "gallery.md").read_text(encoding="utf-8")
+    if lacks := [name for name in experiments.names() if f"`antennate {name}" not in text]:
+        raise SystemExit(f"docs/gallery.md: expected every experiment, lacks {', '.join(lacks)}")
     pages = [*ROOT.rglob("*.md"), ROOT.parent / "README.md"]
     shown = {name for page in pages for name in _PICTURE.findall(page.read_text(encoding="utf-8"))}
     there = {path.name for path in IMAGES.iterdir()}

@@ -27,7 +27,7 @@ tests, the column `measured` is written by hand from their runs and those of `be
 | row | fault | required | measured | tests |
 |---|---|---|---|---|
 """
-_TEST = re.compile(r"^(?:def )?test_((?:[LESTBGKMX]\d+_)+)", re.MULTILINE)
+_TEST = re.compile(r"^(?:def )?test_((?:[LESTBGKMWX]\d+_)+)", re.MULTILINE)
 
 
 def shown() -> dict[str, dict[str, int]]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import signal
+from collections.abc import Iterator
 from importlib.util import find_spec
 
 import pytest
@@ -19,8 +20,22 @@ for number in (signal.SIGHUP, signal.SIGINT, signal.SIGQUIT):
             number, signal.default_int_handler if number == signal.SIGINT else signal.SIG_DFL
         )
 
+
+@pytest.fixture(autouse=True)
+def _signals_stay_as_they_are() -> Iterator[None]:
+    """A program that was asked to end ignores what asks again; here others begin after it."""
+    asks = (signal.SIGHUP, signal.SIGINT, signal.SIGQUIT, signal.SIGTERM)
+    before = {number: signal.getsignal(number) for number in asks}
+    yield
+    for number, handler in before.items():
+        signal.signal(number, handler)
+
+
 OPTIONAL = {
     "test_chain.py": "numba",
+    "test_design.py": "optuna",
+    "test_design_measures.py": "optuna",
+    "test_design_resume.py": "optuna",
     "test_foxglove.py": "foxglove",
     "test_view.py": "viser",
     "test_view_gate.py": "viser",

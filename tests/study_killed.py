@@ -1,8 +1,11 @@
 """Kills studies at random moments, the driver or one of its workers, until each is finished.
 
+A kill comes after a random part of the time that an undisturbed study took, so that it falls on
+any part of a study on a slow computer too.
+
 Words: folder, number of kills, seed. Prints one JSON object: kills of drivers and of workers,
 studies, tables that differ from an undisturbed one, trials lost, trials twice in a table, and
-trials that were carried out again.
+trials that were carried out again. After each study the same so far, on stderr.
 """
 
 from __future__ import annotations
@@ -14,8 +17,11 @@ import random
 import signal
 import subprocess
 import sys
+import time
 from collections import Counter
 from pathlib import Path
+
+import antennate
 
 TRIALS = 300
 """Trials of one study."""
@@ -24,7 +30,7 @@ experiment = "{code}:trial"
 plan = "grid"
 trials = {trials}
 [settings]
-sleep = 0.005
+sleep = 0.03
 [vary]
 x = [0.5, 1.5]
 """
@@ -33,7 +39,8 @@ x = [0.5, 1.5]
 def start(folder: Path, out: str) -> subprocess.Popen[bytes]:
     words = [sys.executable, "-m", "antennate", "study", "plan.toml", "--trust-code"]
     words += ["--out", out, "--workers", "2", "--no-figures", "--json"]
-    known = {**os.environ, "STUDY_NOTES": str(folder / "notes.txt")}
+    source = str(Path(antennate.__file__).parents[1])  # PYTHONPATH may be relative, and cwd is not
+    known = {**os.environ, "PYTHONPATH": source, "STUDY_NOTES": str(folder / "notes.txt")}
     pipes = {"stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE}
     return subprocess.Popen(words, cwd=folder, env=known, **pipes)
 
@@ -44,14 +51,14 @@ def children(process: int) -> list[int]:
     return [int(n) for n in every if b"spawn_main" in Path(f"/proc/{n}/cmdline").read_bytes()]
 
 
-def disturbed(folder: Path, most: int, chance: random.Random) -> tuple[int, int]:
+def disturbed(folder: Path, most: int, longest: float, chance: random.Random) -> tuple[int, int]:
     """One study, killed again and again until it ends; kills of its drivers and of its workers."""
     drivers = workers = 0
     while True:
         driver = start(folder, "run")
         while drivers + workers < most:
             try:
-                driver.wait(chance.uniform(0.0, 3.0))
+                driver.wait(chance.uniform(0.0, longest))
                 break
             except subprocess.TimeoutExpired:
                 pass
@@ -79,11 +86,13 @@ def one(folder: Path, most: int, chance: random.Random) -> dict[str, int]:
     notes = folder / "notes.txt"
     plan = PLAN.format(code=code, trials=TRIALS // 2)
     (folder / "plan.toml").write_text(plan)
+    begin = time.monotonic()
     whole = start(folder, "whole")
     said = whole.communicate()[1]
+    took = time.monotonic() - begin
     assert whole.returncode == 0, said.decode()
     notes.unlink()
-    drivers, workers = disturbed(folder, most, chance)
+    drivers, workers = disturbed(folder, most, took, chance)
     tables = [(folder / run / "trials.csv").read_bytes() for run in ("whole", "run")]
     rows = list(csv.DictReader(tables[1].decode().splitlines()))
     different = {(row["x"], row["trial"]) for row in rows if row["status"] == "ok"}
@@ -105,6 +114,7 @@ def main() -> None:
     while total["drivers"] + total["workers"] < count:
         left = count - total["drivers"] - total["workers"]
         total.update(one(folder / str(total["studies"]), left, chance))
+        sys.stderr.write(f"{json.dumps(total)}\n")
     sys.stdout.write(json.dumps(total))
 
 

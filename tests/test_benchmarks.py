@@ -1,35 +1,40 @@
 """The benchmarks measure what they say."""
 
 import importlib
-import importlib.util
+import json
+import shutil
+import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from antennate.experiments.tunnel.run import TunnelConfig
+from antennate.control.registry import make_controller
+from antennate.experiments.tunnel.config import TunnelConfig
 from antennate.params.scene import TunnelParams
 from antennate.robots.spec import RobotSpec
 
-FOLDER = Path(__file__).parents[1] / "benchmarks"
+ROOT = Path(__file__).parents[1]
+FOLDER = ROOT / "benchmarks"
 
 
-def loaded(name):
+@pytest.fixture
+def loaded(monkeypatch):
+    """Imports a module of the benchmarks by its name."""
     if not FOLDER.is_dir():
         pytest.skip("benchmarks are not part of this copy")
-    spec = importlib.util.spec_from_file_location(f"benchmark_{name}", FOLDER / f"{name}.py")
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module
-    spec.loader.exec_module(module)
-    return module
+    monkeypatch.syspath_prepend(str(FOLDER))
+    return importlib.import_module
 
 
-@pytest.fixture(scope="module")
-def trial():
+@pytest.fixture
+def trial(loaded):
     return loaded("trial")
 
 
-def test_a_drive_that_ended_in_a_fault_says_its_causes():
+def test_a_drive_that_ended_in_a_fault_says_its_causes(loaded):
     pace = loaded("pace")
     why = "FAULT SILENT_SERVO: servos do not answer (servo 7); HOLD STALE: no fresh sample"
     ended = {"worst_state": "FAULT", "why": why, "pace": None, "walking": None}
@@ -60,19 +65,114 @@ def test_a_replay_that_differs_is_refused(trial):
         trial.check_same(worlds, ended)
 
 
-def test_long_tunnel_has_cylinders_enough(trial):
-    drawn, order = trial.long_tunnel(TunnelConfig())
+def test_each_engine_of_the_numerics_reaches_the_walk(loaded):
+    numerics = loaded("numerics")
+    elliptic, pyramid = (
+        numerics.walk(numerics.Engine("", timestep=0.004, contact_time=0.008, pyramidal=cone))
+        for cone in (False, True)
+    )
+    assert elliptic["speed_m_s"] != pyramid["speed_m_s"]
+
+
+def test_long_tunnel_has_cylinders_enough(loaded):
+    growth = loaded("growth")
+    drawn, order = growth.long_tunnel(TunnelConfig())
     assert sorted(order) == list(range(len(drawn.cylinders)))
-    assert len(order) >= max(trial.COUNTS)
+    assert len(order) >= max(growth.CYLINDERS)
 
 
-def test_three_masters_are_put_to_the_same_test(monkeypatch):
+def test_cut_springs_bend_as_much(loaded):
+    """Springs in series: their compliances add up to those of the whole ones."""
+    growth = loaded("growth")
+    whole = np.reciprocal(growth.with_hinges(6).antenna.spring_stiffness()).sum()
+    for count in growth.HINGES[1:]:
+        antenna = growth.with_hinges(count).antenna
+        assert antenna.hinges == count
+        assert np.reciprocal(antenna.spring_stiffness()).sum() == pytest.approx(whole)
+
+
+def test_the_humanoid_is_as_large_as_that_of_the_samples(trial):
+    model = trial.humanoid()
+    assert (model.nv, model.nu) == (27, 21)
+
+
+def test_a_spread_is_a_median_with_its_ends(loaded):
+    measuring = loaded("measuring")
+    found = measuring.spread([3.0, 1.0, 2.0])
+    assert found == {"median": 2.0, "low": 1.0, "high": 3.0, "count": 3}
+
+
+def test_cases_are_measured_in_turn(loaded):
+    order = []
+    cases = {name: lambda n=name: order.append(n) or float(len(order)) for name in "ab"}
+    found = loaded("measuring").in_turn(cases, 2)
+    assert order == ["a", "b", "b", "a"]
+    assert found == {"a": [1.0, 4.0], "b": [2.0, 3.0]}
+
+
+def test_two_threads_give_the_same_rows(loaded):
+    """The rows of one lockstep batch on two threads, an uneven number of them."""
+    cores = loaded("cores")
+    config = TunnelConfig(time_limit=0.5)
+    expected = cores.rows_of(config, range(3))
+    with ThreadPoolExecutor(cores.CORES) as pool:
+        found = cores.on_threads(config, 3, pool)
+    assert sorted(found, key=lambda row: row.trial) == expected
+
+
+def test_the_first_step_is_noted_once(loaded, monkeypatch, tmp_path):
+    starting, trial = loaded("starting"), loaded("trial")
+    monkeypatch.setenv(starting.NOTE, str(tmp_path / "note"))
+    config = TunnelConfig(time_limit=0.05)
+    made = starting.noting(config.control, config.robot, 1)
+    plain = make_controller("closed", config.control, config.robot, 1)
+    for frame in trial.frames_of(config, 1):
+        assert np.array_equal(made.step(frame).yaw, plain.step(frame).yaw)
+    assert len((tmp_path / "note").read_text().split()) == 1
+
+
+def test_three_masters_are_put_to_the_same_test(loaded):
     """Ours takes no wrong and no stale value; how long anything takes is not judged here."""
-    if not FOLDER.is_dir():
-        pytest.skip("benchmarks are not part of this copy")
-    monkeypatch.syspath_prepend(str(FOLDER))
-    bus = importlib.import_module("bus")
+    bus = loaded("bus")
     found = bus.measure("ours", reads=1)
     assert found.late_asked > 0
     assert found.crc_wrong == found.late_stale == 0
     assert set(bus.MASTERS) == {"ours", "rustypot", "sdk"}
+
+
+def run_page(folder: Path, *options: str) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-W", "error", str(folder / "performance.py"), *options]
+    return subprocess.run(command, capture_output=True, text=True, check=False)
+
+
+@pytest.fixture
+def page(tmp_path):
+    """The script of the page beside what was measured."""
+    for name in ("performance.py", "generated.py", "performance.json", "performance.toml"):
+        shutil.copy(ROOT / "docs" / name, tmp_path / name)
+    return tmp_path
+
+
+def test_the_page_tells_what_was_measured(page):
+    assert "out of date" in run_page(page, "--check").stderr
+    done = run_page(page)
+    assert done.returncode == 0, done.stderr
+    assert (page / "performance.md").read_text() == (ROOT / "docs/performance.md").read_text()
+    assert run_page(page, "--check").returncode == 0
+
+
+def test_the_page_says_what_is_missed_not_measured_and_busy(page):
+    file = page / "performance.json"
+    parts = json.loads(file.read_text())
+    del parts["start"]
+    over = parts["trial"]["figures"]["at_once"]["12"]["over_bare_engine"]
+    over |= {"median": 1.5, "low": 1.4, "high": 1.6}
+    parts["trial"]["about"] |= {"others": 1.25, "quick": False}
+    parts["peers"]["figures"]["peers"]["pybullet"] = {"failed": "no wheel | found"}
+    file.write_text(json.dumps(parts))
+    assert run_page(page).returncode == 0
+    text = (page / "performance.md").read_text()
+    assert "| 1.5 (1.4–1.6) | **not met**, machine not idle |" in text
+    assert "Not measured yet: `python benchmarks/performance.py --parts start`." in text
+    assert "**The machine was not idle** while trial" in text
+    assert "not measured: no wheel &#124; found" in text

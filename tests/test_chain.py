@@ -290,7 +290,7 @@ def test_without_numba_one_line_says_how_to_get_it(
         out = tmp_path / command
         assert main([command, "--solver", "chain", "--out", str(out)]) == 2
         said = capsys.readouterr().err.strip()
-        assert "pip install 'antennate[fast]'" in said
+        assert "pip install './antennate[fast]'" in said
         assert "\n" not in said
         assert not out.exists()
     with pytest.raises(MissingPackageError):

@@ -84,9 +84,9 @@ def test_help_fits_two_screens_and_help_all_shows_every_flag(capsys, command):
     whole = capsys.readouterr().out
     assert max(map(len, whole.splitlines())) <= 80
     flags = set(re.findall(r"^  (--[a-z0-9-]+)(?!\S)", "\n".join(short), re.MULTILINE))
-    assert ("--config" in flags) == (command not in ("report", "merge", "study", "view")), (
-        "these have no parameters, or take the file without a flag"
-    )
+    assert ("--config" in flags) == (
+        command not in ("report", "merge", "study", "design", "view")
+    ), "these have no parameters, or take the file without a flag"
     assert flags <= set(re.findall(r"^  (--[a-z0-9-]+)(?!\S)", whole, re.MULTILINE))
 
 
@@ -436,14 +436,14 @@ def test_one_and_two_workers_write_the_same_bytes(capsys, tmp_path):
 
 
 def test_an_invalid_trial_is_a_row_and_no_success(capsys, tmp_path, monkeypatch):
-    sound = World.step
+    sound = World.advance
 
     def blow_up(self, count):
         if self.t > 0.5:
             self.data.qvel[:] = 1e12
         sound(self, count)
 
-    monkeypatch.setattr(World, "step", blow_up)
+    monkeypatch.setattr(World, "advance", blow_up)
     assert main([*SMALL, "--trials", "2", "--out", "run"]) == 2
     last = capsys.readouterr().out.strip().splitlines()[-1]
     assert last.startswith("No trial of open is valid: simulation invalid at physics step")

@@ -22,6 +22,7 @@ WIDEST = 96
 """Letters of code in a line on a screen of 1280 pixels."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("page", sorted({*PAGES} - WITH_A_TWIN))
 def test_a_tutorial_runs(page: str, tmp_path: Path) -> None:
     with Script(page, tmp_path, {}) as script:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import pytest
@@ -60,6 +61,18 @@ def test_B17_the_latency_timer_is_read_from_the_system(
     row = latency_row("/dev/ttyUSB7", False, DoctorParams(), tmp_path)
     assert row.grade == grade
     assert (f"echo 1 | sudo tee {file}" in row.cure) is (grade == "bad")
+
+
+def test_B17_late_answers_of_a_twin_are_no_fault_of_an_adapter() -> None:
+    ends = os.openpty()
+    try:
+        row = latency_row(os.ttyname(ends[1]), True, DoctorParams())
+    finally:
+        for end in ends:
+            os.close(end)
+    assert row.grade == "bad"
+    assert "end other programs" in row.cure
+    assert "FTDI" not in row.cure
 
 
 @pytest.mark.parametrize(

@@ -325,6 +325,19 @@ def test_a_silent_first_servo_does_not_end_fast_reads() -> None:
     assert rig.bus.fast
 
 
+def test_fast_reads_that_were_answered_outlast_a_busy_computer() -> None:
+    rig = Rig()
+    rig.cycle()
+    rig.twin.fast = False  # as answers that come too late
+    for _ in range(20):
+        rig.cycle()
+    rig.twin.fast = True
+    answers, took = rig.cycle()
+    assert rig.bus.fast
+    assert took < 0.005
+    assert positions(answers) == TRUE
+
+
 def test_goals_reach_all_servos() -> None:
     rig = Rig()
     rig.bus.write_all(116, {i: (50 * i).to_bytes(4, "little") for i in IDS})

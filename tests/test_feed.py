@@ -47,7 +47,7 @@ def script(source: str) -> Callable[[int], list[str]]:
 
 def until(true: Callable[[], object], feed: Feed, begin: int = 1) -> tuple[int, float]:
     """Send a tick every 10 ms until something is true: the next number, the longest sending."""
-    number, worst, end = begin, 0.0, time.monotonic() + 30.0
+    number, worst, end = begin, 0.0, time.monotonic() + 90.0
     while not true() and time.monotonic() < end:
         before = time.thread_time()
         feed.send(tick(number).pack())

@@ -9,6 +9,8 @@ from antennate import figures as style
 from antennate.control.registry import BUILT_IN
 from antennate.experiments.gait import figure as gait
 from antennate.experiments.tunnel import figure as tunnel
+from antennate.experiments.tunnel.batch import SHOWN_TRIALS, run_trials
+from antennate.experiments.tunnel.config import TunnelConfig
 from antennate.experiments.wall import figure as wall
 from antennate.experiments.wall.outcome import Traverse
 from antennate.types import Maneuver
@@ -257,3 +259,16 @@ def test_each_profile_has_its_colour_and_its_boulders_along_the_wall():
         circles = [patch.get_center() for patch in panel.patches]
         assert len(circles) == np.sum((boulders[:, 1] > 0.0) & (boulders[:, 1] < 0.1))
         assert {x for x, _ in circles} == {3.0}  # [mm]: the crests are at 0
+
+
+def test_paths_are_kept_of_the_trials_that_are_drawn():
+    found = {}
+
+    def take(item):
+        found[item[0].trial] = item[1]
+
+    last = SHOWN_TRIALS - 1
+    run_trials(TunnelConfig(time_limit=0.02), "open", [last, last + 1], take)
+    assert found[last].parts
+    assert found[last].before
+    assert found[last + 1] is None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import shutil
 import sys
 from pathlib import Path
 from types import SimpleNamespace
@@ -15,6 +16,13 @@ import antennate
 from antennate import experiments
 from antennate.cli import main
 from antennate.errors import AntennateError, BadInputError
+from antennate.experiments.bench_film import BenchRecorder
+from antennate.experiments.calibrate.run import CalibrateConfig
+from antennate.experiments.calibrate.run import push as record_push
+from antennate.experiments.force.loads import ForceConfig
+from antennate.experiments.force.run import traverse
+from antennate.experiments.sweep.config import SweepConfig
+from antennate.experiments.sweep.run import map_cell
 from antennate.experiments.tunnel.config import TunnelConfig
 from antennate.experiments.tunnel.film import films
 from antennate.sim import gl
@@ -177,21 +185,68 @@ def test_a_film_is_written_and_the_study_stays_as_it_is(
     assert not Path("filmed/films/open.mp4").exists()
 
 
+def test_the_film_of_a_log_needs_room_before_it_is_drawn(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """26 pictures of 4 kB; nothing of a film that cannot be kept is drawn."""
+    require_drawing()
+    antennate.simulate("open", scene="flat", time_limit=1.0, log="log.mcap")
+    assert main(["log", "film", "log.mcap", "--out", "nowhere/a.mp4"]) == 2
+    assert "expected a folder to write nowhere/a.mp4" in capsys.readouterr().err
+    monkeypatch.setattr(shutil, "disk_usage", lambda place: SimpleNamespace(free=20_000.0))
+    assert main(["log", "film", "log.mcap"]) == 2
+    told = capsys.readouterr().err
+    assert told.endswith("expected 104 kB free for log.mp4, found 20 kB\n")
+    assert told.count("\n") == 1
+    assert [path.name for path in Path().iterdir()] == ["log.mcap"]
+
+
 @pytest.mark.parametrize(
-    ("name", "settings", "condition", "traces"),
+    ("name", "settings", "condition", "traces", "speed"),
     [
-        ("gait", {"cycles": 2, "settling_cycles": 0}, "turn_l", 2),
-        ("wall", {"profiles": ("descending",)}, "descending", 2),
-        ("touch", {"profiles": ("stiff",), "walls": ("flat",), "speeds": (0.1,)}, "stiff", 3),
+        ("gait", {"cycles": 2, "settling_cycles": 0}, "turn_l", 2, 1.0),
+        ("wall", {"profiles": ("descending",)}, "descending", 2, 1.0),
+        ("touch", {"profiles": ("stiff",), "walls": ("flat",), "speeds": (0.1,)}, "stiff", 3, 1.0),
+        ("sweep", {"profiles": ("stiff",)}, "stiff", 2, 1.0),
+        ("ringdown", {}, "antenna", 1, 0.2),
+        ("calibrate", {}, "0.1 m_s", 2, 0.2),
+        ("force", {"profiles": ("stiff",)}, "stiff", 2, 0.25),
     ],
 )
 def test_other_experiments_are_recorded_at_the_pace_of_their_films(
-    name: str, settings: dict[str, Any], condition: str, traces: int
+    name: str, settings: dict[str, Any], condition: str, traces: int, speed: float
 ) -> None:
     experiment = experiments.load(name)
     assert experiment.films is not None
     made = experiment.films(experiment.config(**settings), 0)[condition]()
-    assert np.diff(made.t) == pytest.approx(1.0 / RATE, abs=0.011)
+    assert np.diff(made.t) == pytest.approx(speed / RATE, abs=0.011 if speed == 1.0 else 0.0011)
+    assert len(made.t) > 20
+    assert np.ptp(made.traces[0].values) > 1.0, "the antenna bends"
     assert len(made.traces) == traces
     for shown in (*(trace.values for trace in made.traces), *(b.states for b in made.bands)):
         assert len(shown) == len(made.t) == len(made.positions) == len(made.targets)
+
+
+def test_a_recording_has_no_rig_to_film(capsys: pytest.CaptureFixture[str]) -> None:
+    Path("push.csv").write_text("t,counts,bend\n0,100,0\n")
+    assert main(["calibrate", "--recording", "push.csv", "--video", "--out", "run"]) == 2
+    told = capsys.readouterr().err
+    assert told.endswith("video: expected the rig, which alone can be filmed, found a recording\n")
+    assert told.count("\n") == 1
+    assert not Path("run").exists()
+
+
+def test_a_watched_bench_moves_as_an_unwatched_one() -> None:
+    """To the last bit, although the watcher asks for everything that films show."""
+    config = SweepConfig(profiles=("stiff",))
+    cell = ("stiff", "fixed", 0, 0.65, 1.2, 0.5)
+    seen = BenchRecorder(config.antenna)
+    assert map_cell(config, *cell, seen.watch) == map_cell(config, *cell)
+    assert seen.film("stiff", "wall").bands[0].states.any(), "it touched the wall"
+    push = CalibrateConfig()
+    watched = record_push(push, 0, BenchRecorder(push.antenna).watch)
+    plain = record_push(push, 0)
+    assert watched.samples.counts.tobytes() == plain.samples.counts.tobytes()
+    force = ForceConfig()
+    seen = BenchRecorder(force.antenna)
+    assert traverse(force, "stiff", 3, seen.watch)[0] == traverse(force, "stiff", 3)[0]

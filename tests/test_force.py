@@ -125,7 +125,7 @@ def test_slow_smooth_traverse_is_the_statics():
 
 
 def test_a_traverse_that_blows_up_is_invalid_and_enters_nothing(monkeypatch):
-    def burst(self, count):
+    def burst(self, count, watch=None):
         raise SimulationError(7, "engine warning")
 
     monkeypatch.setattr(Bench, "press", burst)

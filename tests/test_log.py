@@ -9,6 +9,7 @@ import resource
 import struct
 import subprocess
 import sys
+import time
 import zlib
 from collections.abc import Iterator
 from dataclasses import replace
@@ -31,8 +32,18 @@ from antennate.telemetry.cdr import MessageType
 from antennate.telemetry.header import Header
 from antennate.telemetry.reader import LogReader
 from antennate.telemetry.ticks import Tick
-from antennate.telemetry.topics import CONFIG, TICK_TOPICS, TOPICS, VERSIONS
-from antennate.telemetry.writer import LogWriter
+from antennate.telemetry.topics import (
+    ANTENNA,
+    CONFIG,
+    COORDINATES,
+    EVENTS,
+    JOINT_COMMANDS,
+    TICK_TOPICS,
+    TOPICS,
+    VERSIONS,
+    Topic,
+)
+from antennate.telemetry.writer import SYNC, LogWriter
 
 ROOM = 0.0
 
@@ -201,7 +212,9 @@ def test_G2_what_is_no_log_is_refused_in_one_line(tmp_path: Path, data: bytes, s
     assert "\n" not in str(error.value)
 
 
-def foreign(path: Path, config: str | bytes | None, changed: str = "") -> None:
+def foreign(
+    path: Path, config: str | bytes | None, changed: str = "", encoding: str = "cdr"
+) -> None:
     """A log of the right topics by `mcap` alone, one of them `changed` in its definition."""
     with path.open("wb") as file:
         writer = Writer(file)
@@ -209,7 +222,7 @@ def foreign(path: Path, config: str | bytes | None, changed: str = "") -> None:
         for topic in TOPICS:
             schema = topic.type.schema.encode() + b"uint8 more\n" * (topic.name == changed)
             kind = writer.register_schema(topic.type.name, "ros2msg", schema)
-            channel = writer.register_channel(topic.name, "cdr", kind)
+            channel = writer.register_channel(topic.name, encoding, kind)
             if topic is CONFIG and config is not None:
                 data = config if isinstance(config, bytes) else topic.type.encode(config)
                 writer.add_message(channel, 0, data, 0)
@@ -224,7 +237,7 @@ def foreign(path: Path, config: str | bytes | None, changed: str = "") -> None:
         (None, "found no /config"),
         ("[" * 100_000, "found no JSON"),
         ("[]", "found no JSON"),
-        (b"", "expected a std_msgs/msg/String, found 0 bytes"),
+        (b"", "/config: expected a std_msgs/msg/String, found 0 bytes"),
         ('{"controller": 3}', "controller: expected text, found 3"),
         ('{"controller": "open", "params": {"gates": 1}}', "params.gates: expected a known key"),
     ],
@@ -246,6 +259,41 @@ def test_G2_other_definitions_of_messages_are_refused(tmp_path: Path) -> None:
     foreign(tmp_path / "other", config, changed="/antenna")
     with pytest.raises(LogError, match="expected antennate_msgs/msg/Antenna as now defined"):
         LogReader(tmp_path / "other")
+
+
+def test_G2_another_encoding_of_messages_is_refused(tmp_path: Path) -> None:
+    foreign(tmp_path / "log", '{"controller": "open", "params": {}}', encoding="json")
+    with pytest.raises(LogError, match="expected messages in /config encoded as cdr, found json"):
+        LogReader(tmp_path / "log")
+
+
+@pytest.mark.parametrize(
+    ("topic", "kind"),
+    [
+        (ANTENNA, "antennate_msgs/msg/Antenna"),
+        (JOINT_COMMANDS, "sensor_msgs/msg/JointState"),
+        (EVENTS, "rcl_interfaces/msg/Log"),
+        (COORDINATES, "antennate_msgs/msg/Coordinates"),
+    ],
+)
+def test_G2_a_message_of_a_known_topic_that_is_not_of_its_type_is_named(
+    tmp_path: Path, topic: Topic, kind: str
+) -> None:
+    """Of three ticks the second one has three bytes in place of a message."""
+    path = tmp_path / "log"
+    with LogWriter(path, HEADER, ROOM, flush=0.0) as log:
+        log.write(tick(1))
+        messages = dict(tick(2).messages(HEADER.robot.joint_names, 2)) | {topic: b"abc"}
+        for each, data in messages.items():
+            log.add(each, 2, 2, data)
+        log.flush()
+        log.write(tick(3))
+    with LogReader(path) as reader:
+        reader.survey() if topic is EVENTS else list(reader)
+        assert reader.ticks == 3 - (topic in (ANTENNA, JOINT_COMMANDS))
+        assert [each.reason for each in reader.damage] == [
+            f"{topic.name}: expected a {kind}, found 3 bytes: another encoding"
+        ]
 
 
 def test_G2_random_bytes_between_records_hide_none(tmp_path: Path) -> None:
@@ -319,6 +367,73 @@ def test_the_readers_of_mcap_read_all_of_it(tmp_path: Path) -> None:
     assert all(crcs)
 
 
+@pytest.mark.parametrize("size", [500, 20_000, 1 << 30])
+def test_a_log_that_another_program_has_written_anew_is_read_whole(
+    tmp_path: Path, size: int
+) -> None:
+    """Header and ticks share chunks, or channels and their schemas stand in several."""
+    written(tmp_path / "log", 30)
+    with (tmp_path / "log").open("rb") as file, (tmp_path / "new").open("wb") as copy:
+        writer, schemas, channels = Writer(copy, chunk_size=size), {}, {}
+        writer.start()
+        for schema, channel, message in make_reader(file).iter_messages(log_time_order=False):
+            assert schema is not None
+            if channel.topic not in channels:
+                if schema.name not in schemas:
+                    about = (schema.name, schema.encoding, schema.data)
+                    schemas[schema.name] = writer.register_schema(*about)
+                about = (channel.topic, channel.message_encoding, schemas[schema.name])
+                channels[channel.topic] = writer.register_channel(*about)
+            writer.add_message(
+                channels[channel.topic],
+                message.log_time,
+                message.data,
+                message.publish_time,
+                message.sequence,
+            )
+        writer.finish()
+    read = found(tmp_path / "copy", (tmp_path / "new").read_bytes())
+    assert read is not None
+    numbers, reader = read
+    assert numbers == list(range(1, 31))
+    assert (reader.bad, reader.missing, reader.end) == (0, 0, 30)
+    with LogReader(tmp_path / "new") as one, LogReader(tmp_path / "log") as other:
+        assert one.header == other.header
+        assert one.survey().messages == other.survey().messages
+        assert one.ticks == 30
+
+
+def test_a_file_that_only_looks_like_the_next_one_is_left_out(tmp_path: Path) -> None:
+    """It has the same header, as another run of the same, but begins with the first tick."""
+    written(tmp_path / "walk.mcap", 20)
+    written(tmp_path / "walk-2.mcap", 30)
+    with LogReader(tmp_path / "walk.mcap") as log:
+        numbers = [one.number for one in log]
+    assert numbers == list(range(1, 21))
+    assert [(one.path.name, one.reason) for one in log.damage] == [
+        ("walk-2.mcap", "a file of another log")
+    ]
+    other = HEADER.model_copy(update={"seed": 8})
+    (tmp_path / "walk-2.mcap").unlink()
+    with LogWriter(tmp_path / "walk-2.mcap", other, ROOM, flush=0.0) as writer:
+        writer.write(tick(21))
+    with LogReader(tmp_path / "walk.mcap") as log:
+        assert len(list(log)) == 20
+    assert (log.bad, log.missing, log.end) == (1, 0, 20)
+
+
+def test_messages_have_the_time_of_day(tmp_path: Path) -> None:
+    """A loop that began with the year 2027; other tools draw their curves over these times."""
+    begin = 1_798_761_600 * 10**9
+    times = (0.5, 0.51, 60.0)
+    with LogWriter(tmp_path / "log", HEADER.model_copy(update={"start": begin}), ROOM) as log:
+        for number, now in enumerate(times, start=1):
+            log.write(replace(tick(number), now=now))
+    with (tmp_path / "log").open("rb") as file:
+        found = [message.log_time for *_, message in make_reader(file).iter_messages(["/antenna"])]
+    assert found == [begin + round(1e9 * now) for now in times]
+
+
 def _until_the_end(messages: Iterator) -> Iterator:
     """What `mcap` reads of a file that has no end."""
     try:
@@ -375,6 +490,41 @@ def test_G1_a_killed_program_loses_a_quarter_of_a_second_at_most(
         assert bad <= 1  # the chunk that was being written
     assert max(lost for *_, lost in results) > 0.05
     assert max(given for given, *_ in results) > 30
+
+
+def test_G3_a_power_cut_loses_a_second_at_most(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """After it a file holds what it held when the disk was last asked to keep it."""
+    path, kept, names = tmp_path / "log", [0], list[Path]()
+
+    def asked(file: int) -> None:
+        kept.append(os.fstat(file).st_size)
+
+    def asked_whole(file: int) -> None:
+        names.append(Path(f"/proc/self/fd/{file}").readlink())
+
+    monkeypatch.setattr(os, "fdatasync", asked)
+    monkeypatch.setattr(os, "fsync", asked_whole)
+    log, begin, cuts = LogWriter(path, HEADER, ROOM, sync=SYNC), time.monotonic(), []
+    before = stood = 0.0  # time in which a busy machine let nothing of this happen
+    while (now := time.monotonic() - begin) < 3.0:
+        before, stood = now, max(stood, now - before)
+        log.write(replace(tick(log.written), now=now))
+        if log.written % 5 == 0:
+            cuts.append((now, kept[-1]))
+        time.sleep(0.01)
+    log.close()
+    assert tmp_path in names
+    assert len(set(kept)) >= 4
+    whole, rest = path.read_bytes(), tmp_path / "rest"
+    for now, size in cuts:
+        if now <= 1.0:
+            continue
+        rest.write_bytes(whole[:size])
+        with LogReader(rest) as reader:
+            last = max(each.now for each in reader)
+        assert now - last <= 1.0 + stood
 
 
 def test_G4_a_full_disk_ends_the_log_with_one_message_and_keeps_what_was_written(

@@ -5,8 +5,12 @@ from __future__ import annotations
 import csv
 import gc
 import json
+import resource
 import shutil
+from importlib.util import find_spec
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -60,6 +64,44 @@ def test_info_says_what_there_is(log: Path, capsys: pytest.CaptureFixture[str]) 
     assert f"{TICKS} ticks in" in said
 
 
+def info(path: Path, capsys: pytest.CaptureFixture[str]) -> tuple[int, dict[str, Any]]:
+    """Exit code and findings of `info`."""
+    code = main(["log", "info", str(path), "--json"])
+    return code, json.loads(capsys.readouterr().out)
+
+
+def test_info_finds_the_same_by_the_summary_as_by_reading_every_tick(
+    log: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The same log without its end has no summary."""
+    data = log.read_bytes()
+    closed = info(log, capsys)
+    log.write_bytes(unclosed(data))
+    opened = info(log, capsys)
+    assert closed[0] == 0
+    assert closed[1]["duration_s"] == pytest.approx(0.01 * TICKS, abs=0.05)
+    assert closed[1].pop("closed")
+    assert not opened[1].pop("closed")
+    assert closed[1] == opened[1]
+
+
+def test_info_finds_what_is_damaged_or_missing_in_a_closed_log(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Tick 3 was never written; then a bit of the chunk of tick 2 is turned over."""
+    path = tmp_path / "log.mcap"
+    with LogWriter(path, HEADER, flush=0.0) as out:
+        for number in (1, 2, 4):
+            out.write(tick(number))
+    code, found = info(path, capsys)
+    assert (code, found["ticks"], found["missing"], found["damaged"]) == (2, 3, 1, 0)
+    data = bytearray(path.read_bytes())
+    data[chunks(data)[2][1] - 1] ^= 4
+    path.write_bytes(data)
+    code, found = info(path, capsys)
+    assert (code, found["ticks"], found["missing"], found["damaged"]) == (2, 2, 2, 1)
+
+
 def test_recover_makes_one_file_of_all_parts_that_others_open(
     log: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -94,6 +136,43 @@ def test_recover_makes_one_file_of_all_parts_that_others_open(
     assert not list(log.parent.glob(".*"))
 
 
+def test_recover_says_what_it_leaves_out_and_touches_no_file_of_the_user(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Ticks 3 and 5 were never written; the chunk of tick 2 is damaged."""
+    monkeypatch.chdir(tmp_path)
+    with LogWriter(Path("a.mcap"), HEADER, flush=0.0) as out:
+        for number in (1, 2, 4, 6):
+            out.write(tick(number))
+    data = bytearray(Path("a.mcap").read_bytes())
+    data[chunks(data)[2][1] - 1] ^= 4
+    Path("a.mcap").write_bytes(data)
+    Path(".a-recovered.mcap").write_text("mine")
+    assert main(["log", "recover", "a.mcap"]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert "3 ticks were written" in said
+    assert "damaged places left out: 1; ticks missing: 3" in said
+    assert Path(".a-recovered.mcap").read_text() == "mine"
+    assert sorted(path.name for path in tmp_path.glob(".*")) == [".a-recovered.mcap"]
+
+
+def test_recover_names_the_file_of_the_user_where_the_disk_is_full(
+    log: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    try:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (20000, hard))
+        assert main(["log", "recover", "drive.mcap", "--out", "a.mcap"]) == 2
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert "expected to write a.mcap, found: " in capsys.readouterr().err
+    monkeypatch.setattr(shutil, "disk_usage", lambda place: SimpleNamespace(free=2.5e4))
+    assert main(["log", "recover", "drive.mcap", "--out", "a.mcap"]) == 2
+    size = 1.5e-3 * log.stat().st_size
+    assert f"expected {size:.4g} kB free for a.mcap, found 25 kB" in capsys.readouterr().err
+    assert [path.name for path in log.parent.iterdir()] == ["drive.mcap"]
+
+
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
 def test_rosbags_opens_a_killed_log_once_it_is_recovered(log: Path) -> None:
     rosbags = pytest.importorskip("rosbags.highlevel")
@@ -112,6 +191,32 @@ def test_rosbags_opens_a_killed_log_once_it_is_recovered(log: Path) -> None:
     np.testing.assert_array_equal([f.counts for f in found], [w.counts for w in wanted])
 
 
+def test_rerun_opens_a_killed_log_once_it_is_recovered(log: Path) -> None:
+    """Its reader makes a column of each topic, and curves of the joints with their names."""
+    rerun = pytest.importorskip("rerun.chunk")
+    killed = log.with_name("killed.mcap")
+    killed.write_bytes(unclosed(log.read_bytes())[:-100])
+    with pytest.raises(ValueError, match="summary is missing"):
+        list(rerun.McapReader(str(killed)).stream())
+    assert main(["log", "recover", "killed.mcap", "--out", "whole.mcap"]) == 0
+    found: dict[str, list[Any]] = {}
+    for chunk in rerun.McapReader("whole.mcap").stream():
+        table = chunk.to_record_batch().to_pydict()
+        for name, values in table.items():
+            found.setdefault(f"{chunk.entity_path} {name}", []).extend(values)
+    with LogReader(log) as reader:
+        wanted = list(reader)
+    antenna = [one for [one] in found["/antenna antennate_msgs.msg.Antenna:message"]]
+    np.testing.assert_array_equal([a["counts"] for a in antenna], [w.counts for w in wanted])
+    np.testing.assert_array_equal([a["level"] for a in antenna], [w.level for w in wanted])
+    maneuver = [one for [one] in found["/maneuver antennate_msgs.msg.Maneuver:message"]]
+    assert [m["maneuver"] for m in maneuver] == [w.maneuver for w in wanted]
+    angles = found["/joint_commands/position Scalars:scalars"]
+    np.testing.assert_array_equal(angles, [w.angles for w in wanted])
+    assert found["/joint_commands/position SeriesLines:names"][0] == list(RobotSpec().joint_names)
+    assert any("OK after" in str(text) for text in found["/events TextLog:text"])
+
+
 def test_export_writes_every_number_to_the_last_digit(log: Path) -> None:
     assert main(["log", "export", str(log)]) == 0
     with log.with_suffix(".csv").open(newline="") as file:
@@ -128,11 +233,9 @@ def test_export_writes_every_number_to_the_last_digit(log: Path) -> None:
 
 def test_export_to_parquet(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
     pandas = pytest.importorskip("pandas")
-    try:
-        import pyarrow  # noqa: F401
-    except ImportError:
+    if find_spec("pyarrow") is None:
         assert main(["log", "export", str(log), "--out", "a.parquet"]) == 2
-        assert "pip install antennate[parquet]" in capsys.readouterr().err
+        assert "pip install './antennate[parquet]'" in capsys.readouterr().err
         return
     assert main(["log", "export", str(log), "--out", "a.parquet"]) == 0
     table = pandas.read_parquet("a.parquet")
@@ -153,7 +256,7 @@ def test_plot_draws_it(log: Path) -> None:
     ("argv", "what"),
     [
         ([], "expected the name of a log, found none"),
-        (["show", "drive.mcap"], "expected one of info, recover, export or plot, found show"),
+        (["show", "drive.mcap"], "expected one of info, recover, export, plot or film, found show"),
         (["info", "nothing.mcap"], "nothing.mcap: No such file"),
         (["info", "text"], "no intact header, 0 intact ticks; damaged places: 1"),
         (["info", "drive.mcap", "--out", "a"], "--out: expected no file for `info`"),
@@ -161,6 +264,8 @@ def test_plot_draws_it(log: Path) -> None:
         (["export", "drive.mcap", "--out", "a.xls"], "a name with .csv or .parquet, found a.xls"),
         (["recover", "drive.mcap", "--out", "drive.mcap"], "expected another file than the log"),
         (["recover", "text", "--out", "new.mcap"], "no intact header"),
+        (["recover", "gone.mcap", "--out", "drive.mcap", "--overwrite"], "gone.mcap: No such file"),
+        (["recover", "drive.mcap", "--out", "x.mcap", "--overwrite"], "found the folder x.mcap"),
         (["plot", "empty.mcap"], "expected a log with ticks, found none"),
         (["export", "drive.mcap", "--out", "nowhere/a.csv"], "nowhere/a.csv: expected to write"),
     ],
@@ -169,6 +274,7 @@ def test_what_cannot_be_done_is_refused_in_one_line(
     argv: list[str], what: str, log: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     Path("text").write_text("not a log of anything\n")
+    Path("x.mcap").mkdir()
     LogWriter(Path("empty.mcap"), HEADER).close()
     before = {path.name for path in Path().iterdir()}
     assert main(["log", *argv]) == 2

@@ -5,8 +5,10 @@ from __future__ import annotations
 import io
 import json
 import os
+import re
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -14,9 +16,10 @@ from terminal import Terminal
 
 from antennate.cli.output import Output
 from antennate.cli.results import print_table
-from antennate.messages import short_names
+from antennate.messages import extra, short_names
 from antennate.studies.measures import Table
 
+ROOT = Path(__file__).parents[1]
 RUN = [sys.executable, "-m", "antennate", "springs", "--out", "run"]
 SHELL = ["bash", "-c"]
 
@@ -129,3 +132,18 @@ def test_two_controllers_of_one_name_are_told_apart(capsys: pytest.CaptureFixtur
     assert list(short.values()) == wanted
     print_table(Table("Drive", wanted[:2], [("frames", ["1", "2"])]))
     assert ["a.py:", "b.py:"] in [line.split() for line in capsys.readouterr().out.splitlines()]
+
+
+def test_a_missing_extra_is_told_as_pip_and_uv_take_it() -> None:
+    """docs/install.md says how extras are installed: the package is on no index."""
+    pages = (ROOT / "docs" / "install.md").read_text()
+    known = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
+    named = set()
+    for file in sorted((ROOT / "src").rglob("*.py")):
+        text = file.read_text()
+        assert not re.search(r"pip install '?antennate\[", text), file
+        named |= set(re.findall(r"\{extra\([\"'](\w+)[\"']\)\}", text))
+    assert {"view", "video", "fast", "hardware"} <= named <= set(known)
+    uv, pip = re.findall(r"`([^`]*)`", extra("video"))
+    assert uv.removesuffix(" ...") in pages
+    assert pip in pages

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from importlib.metadata import EntryPoint
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from antennate import lookup
 from antennate.cli import main
 from antennate.control.controllers import RuleController, closed_loop, open_loop
 from antennate.control.registry import CONTROLLERS, make_controller
@@ -67,11 +65,16 @@ def test_a_controller_is_found_by_module_and_by_file(
     assert isinstance(make_controller("antennate.control.controllers:paper"), RuleController)
 
 
-def test_an_installed_package_can_bring_a_controller(monkeypatch: pytest.MonkeyPatch) -> None:
-    point = EntryPoint("theirs", "antennate.control.controllers:paper", "antennate.controllers")
-    monkeypatch.setattr(
-        lookup, "entry_points", lambda group, name="theirs": [point] if name == "theirs" else []
+def test_an_installed_package_can_bring_a_controller(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    about = tmp_path / "theirs-1.0.dist-info"
+    about.mkdir()
+    (about / "METADATA").write_text("Metadata-Version: 2.1\nName: theirs\nVersion: 1.0\n")
+    (about / "entry_points.txt").write_text(
+        "[antennate.controllers]\ntheirs = antennate.control.controllers:paper\n"
     )
+    monkeypatch.syspath_prepend(str(tmp_path))
     assert CONTROLLERS.names[-1] == "theirs"
     assert isinstance(make_controller("theirs"), RuleController)
 

@@ -47,7 +47,7 @@ def lost(place: int, failure: Failure) -> Any:
 @pytest.mark.parametrize(
     ("chunk", "function"), [(2, trouble), (4, trouble_together)], ids=["one by one", "together"]
 )
-def test_what_dies_hangs_or_raises_is_found_and_the_others_end(
+def test_W4_what_dies_hangs_or_raises_is_found_and_the_others_end(
     tmp_path: Path, chunk: int, function: Any
 ) -> None:
     """A task that kills its worker has three chances; one that never ends has one alone."""

@@ -211,11 +211,16 @@ def test_the_figure_shows_every_stretch_and_repeats_its_bytes() -> None:
         recorded=np.repeat([Maneuver.FORWARD, Maneuver.HOLD], 50).astype(int),
         replayed=np.repeat([Maneuver.FORWARD, 7], 50).astype(int),
         state=["OFF"] * 30 + ["OK"] * 70,
+        threshold=0.4,
     )
     figure = draw(course)
     bars = [len(panel.collections) for panel in figure.axes]
     assert bars == [0, 0, 2, 5]  # one unknown, one contact; 2 recorded, 1 known replayed, 2 states
+    assert figure.axes[1].lines[-1].get_ydata() == [0.4, 0.4]
     assert style.render(figure) == style.render(draw(course))
+    simulated = draw(dataclasses.replace(course, replayed=None, state=[""] * n))
+    rows = [label.get_text() for label in simulated.axes[3].get_yticklabels()]
+    assert rows == ["recorded"]  # no supervisor
 
 
 def test_G7_a_tick_without_a_decision_keeps_the_last_pose_that_was_not_refused(log: Path) -> None:

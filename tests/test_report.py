@@ -63,6 +63,7 @@ def test_a_run_leaves_a_page_with_everything(capsys: pytest.CaptureFixture[str])
     assert page.tags.count("img") == len(list(Path("run/figures").glob("*.svg"))) == 1
     assert "prefers-color-scheme: dark" in page.source
     assert "@media print" in page.source
+    assert "></pre>" not in page.source, "an empty box"
     changed = page.text.split("Parameters")[1]
     assert "coil_mm4.03.77" in changed.replace("\n", ""), "this run, then the default"
 

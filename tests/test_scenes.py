@@ -341,6 +341,7 @@ def test_a_bad_scene_is_told_before_anything_is_written(tmp_path, capsys):
     ("code", "limit", "told"),
     [
         ("import time; time.sleep(60)", 0.2, "compiles within 0.2 s"),
+        ("import os; os.kill(os.getpid(), 24)", 60, "compiles within 10 s of CPU time"),  # SIGXCPU
         ("import os; os.abort()", 60, "crashes MuJoCo .signal 6."),
         ("raise MemoryError", 60, "crashes MuJoCo .exit code 1."),
     ],
@@ -380,3 +381,14 @@ def test_an_error_in_ones_own_scene_names_it(tmp_path):
     )
     with pytest.raises(AntennateError, match=r"mine\.py:Mine.*ZeroDivisionError"):
         check_start(TrialConfig(scene=f"{tmp_path / 'mine.py'}:Mine"))
+
+
+def test_a_scene_that_draws_nothing_is_told_with_what_is_missing(tmp_path, capsys):
+    path = tmp_path / "empty.py"
+    path.write_text(
+        "class Empty:\n    random = False\n    def draw(self, robot, rng):\n        return None\n"
+    )
+    words = ["tunnel", "--scene", f"{path}:Empty", "--trials", "1", "--out", str(tmp_path / "run")]
+    assert main(words) == 2
+    found = capsys.readouterr().err
+    assert "expected draw to return a SceneInstance, found NoneType without start, length" in found

@@ -88,6 +88,7 @@ def recorded(path: Path, p_gain: float, seconds: float = 5.0) -> str:
     return str(written(path, entries, p_gain, mass=MASS, length=LENGTH))
 
 
+@pytest.mark.slow
 def test_a_servo_with_friction_a_weight_and_another_supply_is_identified(tmp_path: Path) -> None:
     """Steps of the engine and of the formulas differ, which shows in the inertia most."""
     files = [recorded(tmp_path / f"{gain}.json", gain) for gain in (200, 400)]

@@ -8,17 +8,22 @@ import math
 import os
 import subprocess
 import sys
+from collections.abc import Callable
+from importlib.metadata import PathDistribution
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+import antennate
 from antennate import experiments
 from antennate.cli import main
-from antennate.errors import BadInputError, ConfigError, OutputError, WorkerError
+from antennate.errors import BadInputError, OutputError, WorkerError
+from antennate.experiments.study.config import StudyConfig
+from antennate.experiments.study.run import StudyOutcome
 from antennate.studies.identity import identity
-from antennate.studies.plan import Range, elementary_effects, make_points, trajectories
+from antennate.studies.plan import Range
 from antennate.studies.pool import Workers, gather
 from antennate.studies.store import STORE, Store, line, read_store
 
@@ -57,68 +62,7 @@ def refusal(capsys: pytest.CaptureFixture[str], *words: str) -> str:
     return said[-1]
 
 
-def test_a_grid_is_every_combination_and_a_list_goes_in_step() -> None:
-    axes = {"a": [1, 2], "b": ["x", "y", "z"]}
-    assert len(make_points("grid", axes, 1, 0)) == 6
-    assert make_points("grid", axes, 1, 0)[1] == {"a": 1, "b": "y"}
-    assert make_points("list", {"a": [1, 2], "b": [3, 4]}, 1, 0) == [
-        {"a": 1, "b": 3},
-        {"a": 2, "b": 4},
-    ]
-    with pytest.raises(ConfigError, match="lists of one length, found lengths 2, 3"):
-        make_points("list", axes, 1, 0)
-    with pytest.raises(ConfigError, match="found a range"):
-        make_points("grid", {"a": Range(low=0, high=1)}, 1, 0)
-    for empty in ({}, {"a": []}):
-        with pytest.raises(ConfigError, match="the grid is empty"):
-            make_points("grid", empty, 1, 0)
-
-
-def test_drawn_points_fill_their_ranges() -> None:
-    axes = {
-        "a": Range(low=2.0, high=4.0),
-        "b": Range(low=1, high=100, log=True),
-        "c": Range(low=1, high=3, whole=True),
-    }
-    for kind in ("random", "sobol"):
-        points = make_points(kind, axes, 64, 3)
-        assert points == make_points(kind, axes, 64, 3)
-        a, b, c = (np.array([point[name] for point in points]) for name in "abc")
-        assert 2.0 <= a.min() < 2.2
-        assert 3.8 < a.max() <= 4.0
-        assert 0.35 < np.mean(b < 10) < 0.65  # half of the decades
-        assert set(c.tolist()) == {1, 2, 3}
-    halves = np.array([p["a"] for p in make_points("sobol", {"a": axes["a"]}, 64, 3)]) < 3.0
-    assert halves.sum() == 32  # what Sobol's points are made for
-
-
-def test_morris_finds_the_slopes_of_a_plane_and_moves_one_parameter_at_a_time() -> None:
-    shares = trajectories(4, 5, np.random.default_rng(1)).reshape(5, 5, 4)
-    moved = np.abs(np.diff(shares, axis=1)) > 1e-9
-    assert (moved.sum(axis=2) == 1).all()
-    assert (moved.sum(axis=1) == 1).all()
-    assert set(np.round(shares.ravel() * 3).tolist()) == {0, 1, 2, 3}
-    slopes = np.array([3.0, 0.0, -2.0, 0.5])
-    response = (shares @ slopes).ravel().tolist()
-    effects = elementary_effects(4, 5, 1, response)
-    assert np.allclose(np.mean(effects, axis=1), slopes)
-
-
-def test_every_assumed_number_of_the_tunnel_can_vary() -> None:
-    from antennate.experiments.study.config import assumed_fields, assumed_ranges
-
-    model = experiments.load("tunnel").config
-    ranges = dict(assumed_ranges(model, 0.2))
-    assert "control.rule.threshold" in ranges
-    assert (mass := ranges["tunnel.cylinder.mass"]).low == pytest.approx(0.08)
-    assert mass.high == pytest.approx(0.12)
-    assert "tunnel.free_width" not in ranges  # it is the paper's
-    assert "robot.baud" not in ranges  # it is not read
-    told = {name for name, *_ in assumed_fields(model())}
-    assert set(ranges) < told
-
-
-def test_a_study_is_a_table_with_a_status_for_each_trial(
+def test_W6_a_study_is_a_table_with_a_status_for_each_trial(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     plan(mode="nan")
@@ -154,7 +98,7 @@ def test_a_trial_that_fails_is_a_row_and_can_be_run_again(
     assert Path("run/trials.csv").read_bytes() == before
 
 
-def test_a_trial_that_never_ends_is_given_up() -> None:
+def test_W4_a_trial_that_never_ends_is_given_up() -> None:
     plan(mode="hang")
     text = (
         Path("plan.toml").read_text().replace("[0.5, 1.5]", "[0.5]").replace("[[1, 2], [3]]", "[1]")
@@ -164,7 +108,7 @@ def test_a_trial_that_never_ends_is_given_up() -> None:
     assert [row["status"] for row in table()] == ["ok", "hung", "ok"]
 
 
-def test_changes_are_refused_and_named(capsys: pytest.CaptureFixture[str]) -> None:
+def test_W3_changes_are_refused_and_named(capsys: pytest.CaptureFixture[str]) -> None:
     plan()
     assert study("--no-figures") == 0
     before = Path("run/trials.csv").read_bytes()
@@ -179,26 +123,6 @@ def test_changes_are_refused_and_named(capsys: pytest.CaptureFixture[str]) -> No
     words = ("study", "own.toml", "--trust-code", "--out", "own")
     assert "the file own.py changed" in refusal(capsys, *words)
     assert Path("run/trials.csv").read_bytes() == before
-
-
-def test_bad_studies_are_one_line(capsys: pytest.CaptureFixture[str]) -> None:
-    def said(text: str, *words: str) -> str:
-        Path("bad.toml").write_text(text)
-        return refusal(capsys, "study", "bad.toml", *words)
-
-    grid = '[vary]\n"tunnel.free_widht" = [0.4]\n'
-    assert "did you mean free_width?" in said(grid)
-    assert "the grid is empty" in said("")
-    assert "the grid is empty" in said('[vary]\n"tunnel.strewn" = []\n')
-    assert "expected an experiment (" in said('experiment = "tunel"\n[vary]\nx = [1]\n')
-    assert "a number above 0" in said('[vary]\n"tunnel.free_width" = [-1.0]\n')
-    code = '[settings]\ncontrollers = ["own.py:Mine"]\n[vary]\n"tunnel.strewn" = [1]\n'
-    assert "add --trust-code" in said(code)
-    assert "add --experiment own.py:f" in said('experiment = "own.py:f"\n[vary]\nx = [1]\n')
-    good = '[vary]\n"tunnel.strewn" = [1]\n'
-    assert "--shard: expected I/N" in said(good, "--shard", "3/2")
-    assert "engine: expected one of local" in said(good, "--engine", "rya")
-    assert not Path("runs").exists()
 
 
 def test_shards_together_are_the_same_bytes(capsys: pytest.CaptureFixture[str]) -> None:
@@ -219,7 +143,7 @@ def test_shards_together_are_the_same_bytes(capsys: pytest.CaptureFixture[str]) 
     assert "found no shard.json" in refusal(capsys, "merge", "--shards", "run", "--out", "none")
 
 
-def test_a_second_driver_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_W2_a_second_driver_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     plan()
     code = (
         "import sys, time; from pathlib import Path; from antennate.studies.store import Store;"
@@ -237,7 +161,7 @@ def test_a_second_driver_is_refused(tmp_path: Path, capsys: pytest.CaptureFixtur
     assert study("--no-figures") == 0  # the lock went with its process
 
 
-def test_damaged_and_torn_lines_are_run_again(tmp_path: Path) -> None:
+def test_W7_damaged_and_torn_lines_are_run_again(tmp_path: Path) -> None:
     plan()
     assert study("--no-figures") == 0
     before = Path("run/trials.csv").read_bytes()
@@ -256,7 +180,7 @@ def test_damaged_and_torn_lines_are_run_again(tmp_path: Path) -> None:
     assert len(notes.read_text().splitlines()) == 5  # one was flipped, one torn, three are missing
 
 
-def test_a_line_cut_anywhere_is_noticed(tmp_path: Path) -> None:
+def test_W7_a_line_cut_anywhere_is_noticed(tmp_path: Path) -> None:
     store = Store(tmp_path / "s")
     store.begin({"command": "x"})
     store.append("0.0", {"result": [1, math.nan]})
@@ -276,7 +200,7 @@ def test_a_line_cut_anywhere_is_noticed(tmp_path: Path) -> None:
         whole.close()
 
 
-def test_a_full_disk_is_one_line_and_loses_nothing(
+def test_W8_a_full_disk_is_one_line_and_loses_nothing(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     plan()
@@ -299,11 +223,33 @@ def test_a_full_disk_is_one_line_and_loses_nothing(
     assert Path("run/trials.csv").read_bytes() == Path("whole/trials.csv").read_bytes()
 
 
+def test_the_packages_that_are_installed_are_not_read_for_each_trial(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """That takes longer than a short one."""
+    site = tmp_path / "site"
+    (site / "theirs-1.0.dist-info").mkdir(parents=True)
+    monkeypatch.syspath_prepend(str(site))
+    read: list[str] = []
+    text = PathDistribution.read_text
+
+    def noted(self: PathDistribution, name: str) -> str | None:
+        if Path(str(self.locate_file(""))) == site:
+            read.append(name)
+        return text(self, name)
+
+    monkeypatch.setattr(PathDistribution, "read_text", noted)
+    plan()
+    assert study("--no-figures") == 0
+    assert len(table()) == 12
+    assert read.count("entry_points.txt") <= 2  # another package may ask once too
+
+
 def squares(number: int) -> int:
     return number * number
 
 
-def test_ten_thousand_finished_trials_are_known_at_once(tmp_path: Path) -> None:
+def test_W9_ten_thousand_finished_trials_are_known_at_once(tmp_path: Path) -> None:
     """The bound of two seconds is for the whole command; here for the part that grows."""
     import time
 
@@ -346,7 +292,7 @@ def test_what_is_missing_is_an_error_of_ours(tmp_path: Path) -> None:
         read_store(tmp_path / "no")
 
 
-def test_killed_studies_end_with_the_same_table(tmp_path: Path) -> None:
+def test_W1_killed_studies_end_with_the_same_table(tmp_path: Path) -> None:
     """A few kills; by hand `tests/study_killed.py FOLDER 200 SEED` kills 200 times."""
     source = Path(experiments.__file__).parents[2]
     known = {**os.environ, "PYTHONPATH": f"{source}{os.pathsep}{HERE}"}
@@ -357,3 +303,98 @@ def test_killed_studies_end_with_the_same_table(tmp_path: Path) -> None:
     assert kills == 2
     assert found["tables that differ"] == found["lost"] == found["twice"] == 0
     assert 0 <= found["again"] <= 2 * kills
+
+
+def study_of(shares: Callable[[dict[str, Any]], dict[str, float]], seed: int) -> StudyOutcome:
+    """A Morris study of eight parameters whose trials succeed by chance; some seeds are easy."""
+    names = "abcdefgh"
+    config = StudyConfig(
+        plan="morris", points=6, trials=10, vary={name: Range(low=0.0, high=1.0) for name in names}
+    )
+    points, rng = config.points_of(None), np.random.default_rng(seed)
+    easy = rng.uniform(-0.15, 0.15, 10)
+    rows = [
+        {
+            "point": number,
+            "controller": name,
+            "trial": trial,
+            "status": "ok",
+            "outcome": "success" if rng.random() < share + easy[trial] else "timeout",
+        }
+        for number, point in enumerate(points)
+        for name, share in shares(point).items()
+        for trial in range(10)
+    ]
+    return StudyOutcome(config, points, "controller", list(names), rows, len(rows))
+
+
+def test_where_nothing_has_an_effect_none_is_found() -> None:
+    """Over its three targets one study in twenty may err, so of the difference one in sixty."""
+    say = experiments.load("study").sentence
+    sentences = [
+        say(study_of(lambda point: {"open": 0.25, "closed": 0.6}, seed).result())
+        for seed in range(40)
+    ]
+    nothing = (
+        "Of 8 parameters nothing moves the share of successes of closed minus open above the "
+        "noise of 10 trials a point"
+    )
+    assert sum(nothing in sentence for sentence in sentences) >= 38
+
+
+def test_a_cause_that_is_there_is_found_alone() -> None:
+    outcome = study_of(lambda point: {"open": 0.25, "closed": point["d"]}, 1)
+    result = outcome.result()
+    found = [(e["of"], e["parameter"]) for e in result["effects"] if e["above_noise"]]
+    assert found == [("closed", "d"), ("closed minus open", "d")]
+    study = experiments.load("study")
+    said = study.sentence(result)
+    assert "a point, the share of successes of closed minus open hangs on d." in said
+    table = study.tables(result)[0]
+    cells = dict(table.rows)
+    assert cells["d"][-1] == "closed, closed minus open"
+    assert {cells[name][-1] for name in "abcefgh"} == {"-"}
+    assert cells["noise of 10 trials a point"][-1] == ""
+
+
+def test_one_trial_a_point_tells_no_noise() -> None:
+    def slope(config: dict[str, Any], seed: int) -> dict[str, float]:
+        noise = np.random.default_rng([seed, *(round(1e6 * v) for v in config.values())]).normal()
+        return {"length_mm": 9.0 * config["a"] + noise}
+
+    vary = {name: {"low": 0.0, "high": 1.0} for name in "abcd"}
+    many = antennate.study(slope, vary=vary, plan="morris", points=6, trials=8, workers=1)
+    assert "of 8 trials a point, the length hangs on a." in many.sentence
+    one = antennate.study(slope, vary=vary, plan="morris", points=6, trials=1, workers=1)
+    assert "Of 1 trial a point no noise is known" in one.sentence
+
+
+def test_figures_stand_in_one_column_and_tell_counts_and_noise() -> None:
+    from antennate.experiments.study.figure import figures
+
+    drawn = figures(study_of(lambda point: {"open": 0.25, "closed": point["d"]}, 1))["effects"]
+    assert drawn.get_figwidth() <= 5.0  # 8 points are then 8 pixels on a phone of 375
+    assert [panel.get_title(loc="left") for panel in drawn.axes] == [
+        "open",
+        "closed",
+        "closed minus open",
+    ]
+    assert "noise of 10 trials a point" in {t.get_text() for t in drawn.legends[0].get_texts()}
+    assert all(panel.get_xlim()[1] > 90.0 for panel in drawn.axes)  # d changes nearly all
+    config = StudyConfig(vary={"tunnel.free_width": (0.4, 0.5), "tunnel.strewn": (0, 4)}, trials=4)
+    points = config.points_of(None)
+    rows = [
+        {"point": number, "controller": name, "trial": trial, "status": "ok", "outcome": outcome}
+        for number in range(4)
+        for name in ("open", "closed")
+        for trial, outcome in enumerate(["success", "timeout", "left", "timeout"])
+    ]
+    outcome = StudyOutcome(config, points, "controller", list(points[0]), rows, len(rows))
+    drawn = figures(outcome)["map"]
+    assert drawn.get_figwidth() <= 5.0
+    *maps, bar = drawn.axes
+    assert [panel.get_title(loc="left") for panel in maps] == ["open", "closed"]
+    assert len({round(panel.get_position().x0, 6) for panel in maps}) == 1
+    assert maps[1].get_xlabel() == "free width [m]"
+    assert "share of successes [%]" in bar.get_xlabel()
+    assert [text.get_text() for text in maps[0].texts] == ["25\n5–70\n1 of 4"] * 4  # Wilson's

@@ -12,6 +12,8 @@ import sys
 import threading
 import time
 from collections.abc import Iterator
+from concurrent.futures import Future
+from importlib import metadata
 from pathlib import Path
 from typing import Any
 
@@ -21,10 +23,12 @@ from study_trials import trial
 import antennate
 from antennate.cli import main
 from antennate.errors import WorkerError
-from antennate.studies import cluster
-from antennate.studies.identity import environment
+from antennate.experiments.study.config import StudyConfig
+from antennate.studies import slurm
+from antennate.studies.identity import environment, identity, packages_used
 from antennate.studies.store import read_store
-from antennate.studies.work import Part
+from antennate.studies.submitted import Submitted
+from antennate.studies.work import Part, Work
 
 HERE = Path(__file__).parent
 ROOT = HERE.parent
@@ -67,7 +71,7 @@ def test_a_job_that_begins_again_goes_on_and_its_driver_finds_what_it_did(tmp_pa
     try:
         tasks = {place: ({"x": 1.0}, place) for place in range(3)}
         part = Part(trial, tasks, together=False, timeout=60.0)
-        job = cluster.Resumable(str(tmp_path / "job.jsonl"), environment(), part, {})
+        job = slurm.Resumable(str(tmp_path / "job.jsonl"), environment(), part, {})
         assert job() == 3
         assert job() == 0
         assert len(notes.read_text().splitlines()) == 3
@@ -76,11 +80,101 @@ def test_a_job_that_begins_again_goes_on_and_its_driver_finds_what_it_did(tmp_pa
         del os.environ["STUDY_NOTES"]
 
 
+DRIVER = """
+from pathlib import Path
+from study_trials import trial
+from antennate.studies.engines import make_engine
+from antennate.studies.pool import Workers, gather
+from antennate.studies.store import Store
+
+store = Store(Path("run/trials.store.jsonl"))
+store.begin({"study": "of six trials"})
+tasks = [({"x": 1.0, "sleep": 0.5}, seed) for seed in range(6)]
+workers = Workers(1, make_engine("slurm-local"), store=store)
+gather(trial, tasks, workers, lambda done, total: None)
+"""
+
+
+def driver(notes: Path) -> subprocess.Popen[bytes]:
+    """A driver of six trials in one job, in a process that may be killed."""
+    there = {**os.environ, "STUDY_NOTES": str(notes)}
+    return subprocess.Popen([sys.executable, "-c", DRIVER], env=there)
+
+
+def test_jobs_of_a_driver_that_was_killed_are_taken_over(tmp_path: Path) -> None:
+    """No trial is run twice, though the job goes on while the next driver starts."""
+    pytest.importorskip("submitit")
+    notes = tmp_path / "notes.txt"
+    Path("run").mkdir()
+    first = driver(notes)
+    try:
+        end = time.monotonic() + 120.0
+        while not notes.exists():
+            assert time.monotonic() < end
+            time.sleep(0.05)
+    finally:
+        first.kill()
+        first.wait()
+    assert list(Path("run/slurm").glob("*.job"))
+    assert driver(notes).wait() == 0
+    assert sorted(notes.read_text().split()[1::2]) == list("012345")
+    assert not list(Path("run/slurm").glob("*.job"))
+
+
+def test_a_trial_that_hangs_beside_a_worker_of_dask_is_found(tmp_path: Path) -> None:
+    pytest.importorskip("distributed")
+    from antennate.studies.dask import carry_out_apart
+
+    tasks = {place: ({"x": 1.0, "mode": "hang"}, place) for place in (1, 2)}
+    part = Part(trial, tasks, together=False, timeout=1.0)
+    found = dict(carry_out_apart(part, environment(), {}))
+    assert (found[1].status, found[2]["value"]) == ("hung", pytest.approx(1.1))
+
+
+def test_an_engine_gives_work_to_workers_that_join_later() -> None:
+    """One part for each worker: the second is given before the first has ended."""
+    joined = [1, 1, 2]
+    given: list[Future[Any]] = []
+
+    def submit(function: Any, part: Part, *told: Any) -> Future[Any]:
+        given.append(Future())
+        if len(given) == 2:
+            for place, future in enumerate(given):
+                future.set_result([(place, None)])
+        return given[-1]
+
+    def workers() -> int:
+        return joined.pop(0) if len(joined) > 1 else joined[0]
+
+    found: list[int] = []
+    work = Work(trial, [({}, 0), ({}, 1)], together=False, timeout=60.0)
+    engine = Submitted("later", submit, ahead=1, workers=workers)
+    engine.run(work, [[0], [1]], 1, lambda place, result: found.append(place), pytest.fail)
+    assert sorted(found) == [0, 1]
+
+
 def test_a_job_of_another_version_is_refused(tmp_path: Path) -> None:
     part = Part(trial, {}, together=False, timeout=60.0)
     old = {**environment(), "versions": {"numpy": "1.0"}}
     with pytest.raises(WorkerError, match=r'numpy "1\.0", now'):
-        cluster.Resumable(str(tmp_path / "job.jsonl"), old, part, {})()
+        slurm.Resumable(str(tmp_path / "job.jsonl"), old, part, {})()
+
+
+def test_versions_of_optional_packages_count_where_a_run_uses_them(tmp_path: Path) -> None:
+    """numba steps the compiled chain, Optuna proposes designs; neither does anything else."""
+    for package, command, config in [
+        ("numba", "study", StudyConfig(experiment="wall", vary={"solver": ["mujoco", "chain"]})),
+        ("optuna", "design", StudyConfig()),
+    ]:
+        pytest.importorskip(package)
+        used = packages_used(command, config)
+        assert used == (package,)
+        assert identity(command, config)["versions"][package] == metadata.version(package)
+        assert package not in identity("study", StudyConfig())["versions"]
+        theirs = environment(used)
+        theirs["versions"][package] = "0.1"
+        with pytest.raises(WorkerError, match=rf'{package} "0\.1", now'):
+            slurm.Resumable(str(tmp_path / "job.jsonl"), theirs, Part(trial, {}, False, 9.0), {})()
 
 
 def test_a_scheduler_that_is_not_there_is_one_line(capsys: pytest.CaptureFixture[str]) -> None:
@@ -94,24 +188,24 @@ def test_a_scheduler_that_is_not_there_is_one_line(capsys: pytest.CaptureFixture
 
 
 @contextlib.contextmanager
-def scheduler() -> Iterator[tuple[str, list[subprocess.Popen[bytes]]]]:
-    """A scheduler of Dask with two workers on this machine; its address, and the workers."""
+def scheduler(count: int = 2) -> Iterator[tuple[str, list[subprocess.Popen[bytes]]]]:
+    """A scheduler of Dask and its workers on this machine; its address, and all processes."""
     quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
     words = [sys.executable, "-m", "distributed.cli.dask_scheduler"]
     words += ["--host", "127.0.0.1", "--port", "0", "--no-dashboard", "--scheduler-file", "s.json"]
     running = [subprocess.Popen(words, **quiet)]
     try:
         end = time.monotonic() + 60.0
-        while not Path("s.json").exists():
+        address = None
+        while address is None:
             assert time.monotonic() < end
             time.sleep(0.1)
-        address = re.search(r"tcp://([0-9.:]+)", Path("s.json").read_text())
-        assert address is not None
+            text = Path("s.json").read_text() if Path("s.json").exists() else ""
+            address = re.search(r'tcp://([0-9.:]+)"', text)
         words = [sys.executable, "-m", "distributed.cli.dask_worker", "--scheduler-file", "s.json"]
         words += ["--nthreads", "1", "--no-dashboard", "--no-nanny"]
-        workers = [subprocess.Popen(words, **quiet) for _ in range(2)]
-        running += workers
-        yield address[1], workers
+        running += [subprocess.Popen(words, **quiet) for _ in range(count)]
+        yield address[1], running
     finally:
         for process in reversed(running):
             process.kill()
@@ -121,12 +215,12 @@ def scheduler() -> Iterator[tuple[str, list[subprocess.Popen[bytes]]]]:
 def test_dask_leaves_the_same_table_when_a_worker_is_killed(tmp_path: Path) -> None:
     pytest.importorskip("distributed")
     alone = table("here")
-    with scheduler() as (address, workers):
+    with scheduler() as (address, (_, worker, _)):
         notes = tmp_path / "notes.txt"
         os.environ["STUDY_NOTES"] = str(notes)
 
         def kill() -> None:
-            workers[0].send_signal(signal.SIGKILL)
+            worker.send_signal(signal.SIGKILL)
 
         timer = threading.Timer(0.2, kill)
         timer.start()
@@ -135,8 +229,35 @@ def test_dask_leaves_the_same_table_when_a_worker_is_killed(tmp_path: Path) -> N
         finally:
             timer.join()
             del os.environ["STUDY_NOTES"]
-        assert workers[0].wait() == -signal.SIGKILL
+        assert worker.wait() == -signal.SIGKILL
     assert found == alone
+
+
+def test_dask_says_what_it_waits_for_and_what_became_of_its_scheduler(
+    capfd: pytest.CaptureFixture[str],
+    caplog: pytest.LogCaptureFixture,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    pytest.importorskip("distributed")
+    monkeypatch.setattr("antennate.studies.dask.CONNECT", 5.0)
+    Path("plan.toml").write_text('experiment = "springs"\n[vary]\ncoil_mm = [3.5, 4.0]\n')
+    with scheduler(0) as (address, (process,)):
+
+        def kill() -> None:
+            while "waits for workers" not in caplog.text:
+                time.sleep(0.05)
+            process.kill()
+
+        thread = threading.Thread(target=kill, daemon=True)
+        thread.start()
+        assert main(["study", "plan.toml", "--engine", f"dask://{address}", "--out", "run"]) == 2
+        thread.join()
+    assert [record.getMessage() for record in caplog.records] == [
+        f"dask: waits for workers at tcp://{address}"
+    ]
+    said = capfd.readouterr().err.strip().splitlines()
+    assert len(said) == 1
+    assert "found it gone; what has ended is kept, and the same command goes on" in said[0]
 
 
 def test_the_commands_of_the_snakefile_leave_the_same_table() -> None:

@@ -205,7 +205,7 @@ def test_conditions_share_their_chance_and_splits_do_not():
 
 
 def test_a_trial_that_blows_up_is_invalid_and_enters_no_estimate(monkeypatch):
-    def burst(self, count=1):
+    def burst(self, count=1, watch=None):
         raise SimulationError(7, "engine warning")
 
     monkeypatch.setattr(Bench, "step", burst)

@@ -7,6 +7,7 @@ import signal
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 from urllib.parse import urlsplit
 
 import numpy as np
@@ -20,7 +21,7 @@ from antennate.params.control import ControlParams, RuleParams
 from antennate.telemetry.reader import LogReader
 from antennate.telemetry.ticks import Tick
 from antennate.telemetry.topics import EVENTS
-from antennate.types import Contact
+from antennate.types import Contact, Ints
 
 pytestmark = pytest.mark.skipif(
     CHROMIUM is None, reason="no chromium here; `apt-get install chromium` brings it"
@@ -88,12 +89,17 @@ def charts(tab: Tab) -> str:
     )
 
 
-def colours(tab: Tab) -> int:
-    """Different colours in the middle of the picture: one of an empty scene has few."""
+def middle(tab: Tab) -> Ints:
+    """The middle of the picture, shape (n, 3), 0 to 255."""
     picture = Image.open(io.BytesIO(tab.picture())).convert("RGB")
     width, height = picture.size
-    middle = picture.crop((width // 3, height // 4, 2 * width // 3, 3 * height // 4))
-    return len(np.unique(np.asarray(middle).reshape(-1, 3), axis=0))
+    part = picture.crop((width // 3, height // 4, 2 * width // 3, 3 * height // 4))
+    return np.asarray(part, np.int64).reshape(-1, 3)
+
+
+def colours(tab: Tab) -> int:
+    """Different colours in the middle of the picture: one of an empty scene has few."""
+    return len(np.unique(middle(tab), axis=0))
 
 
 def stays_here(tab: Tab, view: Shown) -> None:
@@ -119,6 +125,8 @@ def test_a_person_changes_what_a_simulation_decides(tab: Tab, keep: Keep, tmp_pa
         tab.click("label", "pause")
         tab.until("!!document.querySelector('svg polyline')")
         assert colours(tab) > 50
+        red, _, blue = middle(tab).T  # sand-coloured obstacles differ by 56, washed out ones by 8
+        assert (red - blue > 24).mean() > 0.05
         tab.fill("θ: level that is contact", "0.3")
         tab.until("document.body.innerText.includes('by hand: control.rule.threshold = 0.3')")
         tab.click("label", "pause")
@@ -157,6 +165,27 @@ def read_log(path: Path) -> tuple[list[Tick], int]:
             if tick is not None:
                 ticks.append(tick)
     return ticks, changed
+
+
+def test_a_phone_shows_the_scene_above_the_panel_and_dark_where_it_is_dark(
+    tab: Tab, tmp_path: Path
+) -> None:
+    """In a window of 390 by 844 pixels nothing lies over the scene, and nothing is cut off."""
+    size: dict[str, Any] = {"width": 390, "height": 844, "deviceScaleFactor": 1, "mobile": True}
+    tab.call("Emulation.setDeviceMetricsOverride", **size)
+    dark = [{"name": "prefers-color-scheme", "value": "dark"}]
+    tab.call("Emulation.setEmulatedMedia", features=dark)
+    words = "tunnel --controllers open --trials 1 --view --view-paused --view-port 0"
+    with shown(*words.split(), folder=tmp_path) as view:
+        opened(tab, view)
+        assert tab.run("document.documentElement.dataset.mantineColorScheme") == "dark"
+        place = "JSON.stringify(document.querySelector('%s').getBoundingClientRect())"
+        scene = json.loads(tab.run(place % "canvas"))
+        status_ = json.loads(tab.run(place % "#status"))
+        assert (scene["left"], scene["right"], scene["top"]) == (0, 390, 0)
+        assert 300 < scene["bottom"] <= status_["top"] < status_["bottom"] <= 844
+        assert tab.run("document.documentElement.scrollWidth") <= 390
+        stays_here(tab, view)
 
 
 def test_a_person_stops_steps_and_begins_anew(tab: Tab, tmp_path: Path) -> None:
@@ -220,7 +249,7 @@ def settled(tab: Tab) -> float:
     raise AssertionError("time does not stand")
 
 
-def test_a_drive_and_its_twin_are_shown(tab: Tab, keep: Keep, tmp_path: Path) -> None:
+def test_X23_a_drive_and_its_twin_are_shown(tab: Tab, keep: Keep, tmp_path: Path) -> None:
     """The pages of both are read only; charts move while the robot of the twin is driven."""
     twin = ("twin", "--view", "--view-port", "0", "--duration", "600")
     with shown(*twin, folder=tmp_path) as served:
@@ -234,6 +263,9 @@ def test_a_drive_and_its_twin_are_shown(tab: Tab, keep: Keep, tmp_path: Path) ->
                 if name == "drive":
                     assert status(tab, "supervisor")
                     assert "frames" in status(tab, "counters")
+                    text = str(tab.run("document.body.innerText"))
+                    assert "0 OK, 1 DEGRADED, 2 HOLD, 3 FAULT, 4 OFF" in text
+                    assert "counted in these seconds" in text
                     tab.until(f"{TIME} > {begin + 1}")
                     assert charts(tab) != before
                 assert colours(tab) > 50

@@ -1,11 +1,15 @@
 """The page of a live view answers nobody but the browser that was let in (faults X19 to X25)."""
 
+import json
 import re
 from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import pytest
 from view_rig import LIVE, Shown, ask, cookie, shown
+
+from antennate import simulate
 
 
 @pytest.fixture(scope="module")
@@ -15,6 +19,32 @@ def view(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Shown]:
     words = "tunnel --controllers open --trials 1 --scene flat --time-limit 3600 --view"
     with shown(*words.split(), "--view-port", "0", "--view-speed", "0.1", folder=folder) as found:
         yield found
+
+
+COMMANDS = {
+    "tunnel": "tunnel --controllers open --trials 1 --view-paused --view --view-port 0",
+    "gait": "gait --view-paused --view --view-port 0",
+    "wall": "wall --view-paused --view --view-port 0",
+    "replay": "replay trial.mcap --view-paused --view --view-port 0",
+    "view": "view trial.mcap --port 0",
+    "twin": "twin --duration 600 --view --view-port 0",
+    "drive": "drive --duration 600 --view --view-port 0",
+}
+"""Every command with a page; `teleop` wants a terminal, and shares that of `drive`."""
+
+
+@contextmanager
+def command(name: str, folder: Path) -> Iterator[Shown]:
+    """One of these commands; `drive` has a twin of its own."""
+    with ExitStack() as stack:
+        words = COMMANDS[name].split()
+        if name in ("replay", "view"):
+            simulate("open", scene="flat", time_limit=0.5, log=folder / "trial.mcap")
+        elif name == "drive":
+            twin = stack.enter_context(shown("twin", "--duration", "600", folder=folder))
+            paths = json.loads(twin.answer())
+            words += ["--esp32", paths["esp32"], "--bus", paths["bus"]]
+        yield stack.enter_context(shown(*words, folder=folder))
 
 
 def own(view: Shown) -> str:
@@ -48,7 +78,7 @@ def foreign_origins(port: int) -> list[str]:
     ]
 
 
-def test_names_of_other_computers_are_refused(view: Shown) -> None:
+def test_X20_names_of_other_computers_are_refused(view: Shown) -> None:
     """25 values of Host, of the page and of its live connection."""
     key = cookie(view)
     hosts = foreign_hosts(view.port)
@@ -61,7 +91,7 @@ def test_names_of_other_computers_are_refused(view: Shown) -> None:
         assert ask(view.port, host=f"{name}:{view.port}", Cookie=key)[0] == 200, name
 
 
-def test_pages_of_other_sites_are_refused(view: Shown) -> None:
+def test_X21_pages_of_other_sites_are_refused(view: Shown) -> None:
     """25 values of Origin, even where Host agrees with it."""
     key = cookie(view)
     origins = foreign_origins(view.port)
@@ -75,7 +105,7 @@ def test_pages_of_other_sites_are_refused(view: Shown) -> None:
     assert ask(view.port, Cookie=key, Origin=own(view), **LIVE)[0] == 101
 
 
-def test_nobody_without_the_cookie_is_let_in(view: Shown) -> None:
+def test_X22_nobody_without_the_cookie_is_let_in(view: Shown) -> None:
     """A wrong, an old and no token; a wrong cookie."""
     old = view.link.partition(str(view.port))[2]
     key = cookie(view)
@@ -90,7 +120,7 @@ def test_nobody_without_the_cookie_is_let_in(view: Shown) -> None:
     assert ask(view.port, Cookie=f"a=b; {key}")[0] == 200
 
 
-def test_nothing_but_the_page_is_served(view: Shown) -> None:
+def test_X24_nothing_but_the_page_is_served(view: Shown) -> None:
     """40 other paths, of files that are there as well."""
     key = cookie(view)
     ups = ["../" * count for count in range(1, 9)]
@@ -106,7 +136,7 @@ def test_nothing_but_the_page_is_served(view: Shown) -> None:
         assert "root:" not in text
 
 
-def test_the_answers_keep_the_page_to_itself(view: Shown) -> None:
+def test_X22_X25_the_answers_keep_the_page_to_itself(view: Shown) -> None:
     """The cookie is out of reach of scripts, and the page may load nothing from elsewhere."""
     path = view.link.partition(str(view.port))[2]
     text = ask(view.port, path)[1]
@@ -126,12 +156,26 @@ def test_the_answers_keep_the_page_to_itself(view: Shown) -> None:
         assert scripts is None or not re.search(r"'unsafe-(inline|eval)'|https?:|\*", scripts[1])
 
 
-def test_only_this_computer_can_reach_it(view: Shown) -> None:
-    """All sockets that listen with our port are bound to 127.0.0.1."""
-    listening = [
+@pytest.mark.parametrize("name", COMMANDS)
+def test_X19_the_page_of_every_command_is_behind_the_gate(name: str, tmp_path: Path) -> None:
+    """A wrong Host, a wrong Origin, no cookie, an old link: 403, before and after one is let in."""
+    with command(name, tmp_path) as view:
+        old = view.link.partition(str(view.port))[2]
+        assert ask(view.port)[0] == ask(view.port, Origin=own(view), **LIVE)[0] == 403
+        key, evil = cookie(view), f"evil.example:{view.port}"
+        assert ask(view.port, old)[0] == 403
+        assert ask(view.port, host=evil, Cookie=key)[0] == 403
+        assert ask(view.port, Cookie=key, Origin=f"http://{evil}", **LIVE)[0] == 403
+        assert ask(view.port, Cookie=key)[0] == 200
+        assert ask(view.port, Cookie=key, Origin=own(view), **LIVE)[0] == 101
+        assert listening(view.port) == [f"0100007F:{view.port:04X}"]  # 127.0.0.1, little end first
+
+
+def listening(port: int) -> list[str]:
+    """Addresses of all sockets that listen with a port, as the kernel writes them."""
+    return [
         line.split()[1]
         for name in ("tcp", "tcp6")
         for line in Path(f"/proc/net/{name}").read_text().splitlines()[1:]
-        if line.split()[3] == "0A" and line.split()[1].endswith(f":{view.port:04X}")
+        if line.split()[3] == "0A" and line.split()[1].endswith(f":{port:04X}")
     ]
-    assert listening == [f"0100007F:{view.port:04X}"]  # 127.0.0.1, little end first

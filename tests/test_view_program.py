@@ -1,5 +1,7 @@
 """What a program does for a page that shows it: send, wait, and carry out what a person wants."""
 
+import os
+import signal
 import socket
 import subprocess
 import sys
@@ -9,8 +11,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from view_rig import ANTENNATE
+from view_rig import ANTENNATE, shown
 
+from antennate import simulate
 from antennate.control.registry import make_controller
 from antennate.control.retunable import Retunable
 from antennate.params.control import ControlParams, RuleParams
@@ -152,6 +155,60 @@ def test_a_port_that_is_taken_is_told_in_one_line(tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
 
 
+def test_the_page_of_a_log_names_its_own_option(tmp_path: Path) -> None:
+    """`view` has --port, not --view-port."""
+    simulate("open", scene="flat", time_limit=0.1, log=tmp_path / "trial.mcap")
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        port = str(taken.getsockname()[1])
+        code, text = said("view", "trial.mcap", "--port", port, folder=tmp_path)
+    assert code == 2
+    assert text.count("\n") == 1
+    assert "with --port, 0 takes any" in text
+
+
+@pytest.fixture(scope="module")
+def trial(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The log of a tenth of a second."""
+    path = tmp_path_factory.mktemp("trial") / "trial.mcap"
+    simulate("open", scene="flat", time_limit=0.1, log=path)
+    return path
+
+
+def child_of(process: int) -> int:
+    """The one process that another one has started."""
+    [child] = Path(f"/proc/{process}/task/{process}/children").read_text().split()
+    return int(child)
+
+
+def ended(process: int) -> bool:
+    """Whether a process is gone, or is so soon."""
+    end = time.monotonic() + 10.0
+    while (there := Path(f"/proc/{process}").exists()) and time.monotonic() < end:
+        time.sleep(0.02)
+    return not there
+
+
+def test_a_page_whose_process_dies_ends_the_command_with_2(trial: Path) -> None:
+    with shown("view", trial.name, "--port", "0", folder=trial.parent) as view:
+        assert view.link
+        os.kill(child_of(view.process.pid), signal.SIGKILL)
+        assert view.process.wait(30) == 2
+        assert "found that it ended with code -9" in view.said("antennate view: error: ")
+        assert "Traceback" not in "".join(view.lines)
+
+
+@pytest.mark.parametrize("stop", [signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_ends_the_command_and_its_page(trial: Path, stop: signal.Signals) -> None:
+    with shown("view", trial.name, "--port", "0", folder=trial.parent) as view:
+        assert view.link
+        child = child_of(view.process.pid)
+        view.process.send_signal(stop)
+        assert view.process.wait(30) == 0
+        assert ended(child)
+        assert len(view.lines) == 1
+
+
 @pytest.mark.parametrize(
     ("package", "flags", "extra"),
     [
@@ -185,6 +242,10 @@ def test_a_port_of_foxglove_that_is_taken_is_told_in_one_line(tmp_path: Path) ->
 @pytest.mark.parametrize(
     ("words", "flag"),
     [
+        (
+            ["gait", "--view", "--view-port", "8765", "--foxglove", "--foxglove-port", "8765"],
+            "found 8765 twice",
+        ),
         (["tunnel", "--view-port", "1234"], "--view-port"),
         (["tunnel", "--view-speed", "2"], "--view-speed"),
         (["tunnel", "--view-paused"], "--view-paused"),

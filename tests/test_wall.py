@@ -22,6 +22,8 @@ from antennate.experiments.wall.outcome import (
     longest_stick,
 )
 from antennate.experiments.wall.run import WallConfig, passage, run
+from antennate.robots.antenna import AntennaSpec
+from antennate.sim.bench import compile_bench
 
 PERIOD = 0.01
 SHORT = {"wall": {"travel": 0.03, "start": 0.005, "speed": 0.02}, "trials": 2}
@@ -194,6 +196,35 @@ def test_command_writes_its_run(tmp_path: Path, capsys: pytest.CaptureFixture[st
     assert arm["wilson95"] == pytest.approx(ends, abs=1e-4)
     assert (out / "figures" / "wall.png").stat().st_size > 10_000
     assert (out / "figures" / "sticks.png").stat().st_size > 10_000
+
+
+@pytest.mark.parametrize(
+    "words",
+    [["wall", "--solver", "mujoco"], ["wall", "--solver", "chain"], ["touch"]],
+)
+def test_an_antenna_too_light_for_the_physics_is_refused_in_one_line(
+    words: list[str],
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for flag, value in (("link-mass", "1e-16"), ("base-mass", "1e-16"), ("radius", "1e-200")):
+        assert main([*words, f"--antenna.{flag}", value]) == 2
+        said = capsys.readouterr().err
+        assert "expected at least" in said
+        assert "as the physics takes no body with less inertia" in said
+        assert said.count("\n") == 1
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_lightest_antenna_that_is_taken_is_one_for_the_engine() -> None:
+    """Inertia of a ball of 3 mm: 0.4 m r^2; the engine takes none below 1e-15."""
+    least = 2e-15 / (0.4 * 0.003**2)
+    light = AntennaSpec(link_mass=1.01 * least, base_mass=1.01 * least)
+    assert compile_bench(WallConfig().physics, light).body_inertia[1:].min() > 1e-15
+    with pytest.raises(ValueError, match=r"base_mass: expected at least 5\.56e-10 kg"):
+        AntennaSpec(base_mass=0.99 * least)
 
 
 def test_the_border_of_a_jam_lies_between_the_sticks_beside_it() -> None:

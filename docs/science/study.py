@@ -70,6 +70,7 @@ SERVOS: dict[str, dict[str, float]] = {
     "divisor 256": {"gain_divisor": 256.0},
     "73 % of the stall torque": {"stall_torque": 0.73 * 1.7},
     "both": {"gain_divisor": 256.0, "stall_torque": 0.73 * 1.7},
+    "friction of the load 0.35": {"load_friction": 0.35},
 }
 """The XC430-W240, of which no recording is known."""
 

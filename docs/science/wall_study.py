@@ -4,7 +4,7 @@ Parts: `map` (link mass, overlap, base angle and gravity, five profiles), `windo
 map tells profiles apart), `cells` (the best cells of both on fresh seeds), `sticks` (how long a tip
 stays behind, over the base angle), `scaling` (stiff against compliant without a second force scale)
 and `convergence` (half the timestep). Each writes docs/science/wall_PART.json; `map`, `window` and
-`sticks` a picture as well.
+`sticks` a picture as well. `--solver chain` takes the fast lane, which needs `antennate[fast]`.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import math
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -24,6 +24,7 @@ from matplotlib.figure import Figure
 
 from antennate import figures as style
 from antennate.experiments.wall.run import WallConfig, passage, run
+from antennate.params.bench import Solver
 from antennate.studies.pool import core_count
 
 HERE = Path(__file__).parent
@@ -66,21 +67,23 @@ def _cell(mass: float, overlap: float, angle: float, gravity: str) -> dict[str, 
     }
 
 
-def whole_map(workers: int) -> dict[str, Any]:
+def whole_map(workers: int, solver: Solver) -> dict[str, Any]:
     """All cells; parameters stand above."""
-    return _grid(itertools.product(MASSES_G, OVERLAPS_MM, ANGLES_DEG, GRAVITIES), workers)
+    return _grid(itertools.product(MASSES_G, OVERLAPS_MM, ANGLES_DEG, GRAVITIES), workers, solver)
 
 
-def window(workers: int) -> dict[str, Any]:
+def window(workers: int, solver: Solver) -> dict[str, Any]:
     """The stretch of angles in which the map goes from passing to jamming."""
     where = itertools.product((WINDOW_MASS_G,), WINDOW_OVERLAPS_MM, WINDOW_ANGLES_DEG, GRAVITIES)
-    return _grid(where, workers)
+    return _grid(where, workers, solver)
 
 
-def _grid(places: Iterable[tuple[float, float, float, str]], workers: int) -> dict[str, Any]:
+def _grid(
+    places: Iterable[tuple[float, float, float, str]], workers: int, solver: Solver
+) -> dict[str, Any]:
     cells = []
     for where in places:
-        config = _config(*where, trials=MAP_TRIALS, seed=MAP_SEED)
+        config = _config(*where, trials=MAP_TRIALS, seed=MAP_SEED, solver=solver)
         cells.append({**_cell(*where), "profiles": run(config, workers).result()["profiles"]})
         print(where, file=sys.stderr)
     return {"trials": MAP_TRIALS, "seed": MAP_SEED, "cells": cells}
@@ -102,7 +105,7 @@ def lead(cell: dict[str, Any]) -> float:
     return passed["descending"] - max(passed["stiff"], passed["compliant"])
 
 
-def best_cells(workers: int) -> dict[str, Any]:
+def best_cells(workers: int, solver: Solver) -> dict[str, Any]:
     """On fresh seeds: the cell that fits the paper best by each count, and that of most lead."""
     cells = [
         cell
@@ -120,7 +123,8 @@ def best_cells(workers: int) -> dict[str, Any]:
         tied = [cell for cell in cells if score(cell) == best]
         cell = tied[len(tied) // 2]
         where = [cell[k] for k in ("link_mass_g", "overlap_mm", "base_angle_deg", "gravity")]
-        result = run(_config(*where, trials=FRESH_TRIALS, seed=FRESH_SEED), workers).result()
+        config = _config(*where, trials=FRESH_TRIALS, seed=FRESH_SEED, solver=solver)
+        result = run(config, workers).result()
         out[name] = {
             **_cell(*where),
             "score": best,
@@ -133,13 +137,13 @@ def best_cells(workers: int) -> dict[str, Any]:
     return out
 
 
-def sticks(workers: int) -> dict[str, Any]:
+def sticks(workers: int, solver: Solver) -> dict[str, Any]:
     """Longest sticks over the base angle, at the default mass, overlap and gravity."""
     rows = []
     for angle in STICK_ANGLES_DEG:
         wall = {"base_angle": math.radians(angle)}
         config = WallConfig.model_validate(
-            {"wall": wall, "trials": STICK_TRIALS, "seed": FRESH_SEED}
+            {"wall": wall, "trials": STICK_TRIALS, "seed": FRESH_SEED, "solver": solver}
         )
         outcome = run(config, workers)
         rows += [
@@ -154,7 +158,7 @@ def sticks(workers: int) -> dict[str, Any]:
     return {"trials": STICK_TRIALS, "seed": FRESH_SEED, "rows": rows}
 
 
-def scaling(workers: int) -> dict[str, Any]:
+def scaling(workers: int, solver: Solver) -> dict[str, Any]:
     """Difference of the hinge angles of stiff and compliant over a whole passage."""
     out = {}
     for gravity in GRAVITIES:
@@ -164,6 +168,7 @@ def scaling(workers: int) -> dict[str, Any]:
                 "wall": {"gravity": gravity},
                 "variation": still,
                 "antenna": {"sensor_stiffness_n_mm_per_deg": 0.0},
+                "solver": solver,
             }
         )
         stiff, soft = (passage(config, profile, 0) for profile in ("stiff", "compliant"))
@@ -178,12 +183,13 @@ def scaling(workers: int) -> dict[str, Any]:
     return out
 
 
-def convergence(workers: int) -> dict[str, Any]:
+def convergence(workers: int, solver: Solver) -> dict[str, Any]:
     """The default run at its timestep and at half of it, contacts as stiff as each allows."""
     rows = {}
     for timestep in (5e-4, 2.5e-4):
         physics = {"timestep": timestep, "contact_time": 2 * timestep}
-        rows[timestep] = run(WallConfig.model_validate({"physics": physics}), workers)
+        config = WallConfig.model_validate({"physics": physics, "solver": solver})
+        rows[timestep] = run(config, workers)
     coarse, fine = rows.values()
     return {
         "profiles": {str(k): o.result()["profiles"] for k, o in rows.items()},
@@ -261,12 +267,13 @@ def outcome_map(cells: Sequence[Mapping[str, Any]]) -> Figure:
         held = [cell for cell in cells if tuple(cell[key] for key in apart) == row]
         for profile, panel in zip(profiles, line, strict=True):
             image = _draw_map(panel, held, profile, across)
-        place = ", ".join([f"gravity {row[0]}", *(f"{angle:g} deg" for angle in row[1:])])
+        place = "\n".join([f"gravity {row[0]}", *(f"{angle:g} deg" for angle in row[1:])])
         line[0].set_ylabel(f"{place}\noverlap [mm]")
     for profile, panel in zip(profiles, panels[0], strict=True):
         panel.set_title(profile.replace("_", " "))
     for panel in panels[-1]:
         panel.set_xlabel(label)
+    figure.suptitle("In each cell: successes/jams/slips", x=0.01, ha="left", fontsize=9)
     if image is not None:
         name = "share of successes\nafter the start"
         figure.colorbar(image, ax=panels, label=name, shrink=0.8 if one_mass else 0.3)
@@ -286,7 +293,7 @@ def _draw_map(panel: Axes, cells: Sequence[Mapping[str, Any]], profile: str, acr
         grid[at] = counts["successes"] / counts["trials"]
         mark = f"{counts['successes']}/{counts['jams']}/{counts['slips']}"
         ink = "white" if grid[at] < 0.6 else style.INK
-        panel.text(at[1], at[0], mark, ha="center", va="center", fontsize=6, color=ink)
+        panel.text(at[1], at[0], mark, ha="center", va="center", fontsize=7, color=ink)
     image = panel.imshow(grid, origin="lower", cmap="cividis", vmin=0, vmax=1, aspect="auto")
     panel.set_xticks(range(len(columns)), [f"{value:g}" for value in columns])
     panel.set_yticks(range(len(overlaps)), [f"{o:g}" for o in overlaps])
@@ -309,8 +316,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("part", choices=tuple(PARTS))
     parser.add_argument("--workers", type=int, default=core_count())
+    parser.add_argument("--solver", choices=get_args(Solver), default="mujoco")
     options = parser.parse_args()
-    result = PARTS[options.part](options.workers)
+    result = {"solver": options.solver} | PARTS[options.part](options.workers, options.solver)
     (HERE / f"wall_{options.part}.json").write_text(json.dumps(result, indent=1) + "\n")
     if options.part in ("map", "window"):
         picture = style.render(outcome_map(result["cells"]))["png"]

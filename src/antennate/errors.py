@@ -68,7 +68,7 @@ def in_one_line(error: BaseException) -> str:
     """Type and text of any exception in one line; the type alone if its text cannot be had."""
     name = type(error).__name__
     try:
-        text = " ".join(str(error).split())
+        text = " ".join(str(error).split()).encode(errors="backslashreplace").decode()
     except KeyboardInterrupt:
         raise
     except BaseException:  # noqa: BLE001 anybody's __str__ may raise anything

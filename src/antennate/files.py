@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import os
+import secrets
+import shutil
 import stat
+from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO
 
-from antennate.errors import BadInputError, OutputError
+from antennate.errors import AntennateError, BadInputError, OutputError
+
+_UNITS = (("GB", 1e9), ("MB", 1e6), ("kB", 1e3), ("bytes", 1.0))
 
 
 def open_regular(path: Path) -> BinaryIO:
@@ -22,6 +28,31 @@ def open_regular(path: Path) -> BinaryIO:
         os.close(handle)
         raise OSError(errno.EINVAL, "it is a folder, a pipe or a device", str(path))
     return os.fdopen(handle, "rb")
+
+
+def require_room(path: Path, least: float, error: type[BadInputError] = OutputError) -> None:
+    """Check that a disk has room for a file that is to be written.
+
+    Args:
+        path: The file.
+        least: What it needs [byte].
+        error: What is raised.
+
+    Raises:
+        BadInputError: Of the given type: there is less, or no folder for it.
+    """
+    try:
+        free = shutil.disk_usage(path.parent).free
+    except OSError as cause:
+        raise error(f"expected a folder to write {path}, found: {cause.strerror}") from None
+    if free < least:
+        raise error(f"expected {in_units(least)} free for {path}, found {in_units(free)}")
+
+
+def in_units(size: float) -> str:
+    """A number of bytes for people, as 12.3 MB."""
+    unit, scale = next((each for each in _UNITS if size >= each[1]), _UNITS[-1])
+    return f"{size / scale:.4g} {unit}"
 
 
 def read_limited(path: Path, largest: int, error: type[BadInputError] = BadInputError) -> bytes:
@@ -61,20 +92,44 @@ def write_whole(path: Path, data: bytes, overwrite: bool = False) -> None:
     Raises:
         OutputError: It exists and may not be replaced, or it cannot be written.
     """
-    fresh = path.with_name(f".{path.name}.{os.getpid()}")
+    with writing_whole(path, overwrite) as file:
+        file.write(data)
+
+
+@contextlib.contextmanager
+def writing_whole(path: Path, overwrite: bool = False) -> Iterator[BinaryIO]:
+    """The same, piece by piece: the file is there once the block has ended without an error.
+
+    Raises:
+        OutputError: It exists and may not be replaced, or it cannot be written.
+    """
+    with replacing(path, overwrite) as fresh, fresh.open("xb") as file:
+        yield file
+        file.flush()
+        os.fsync(file.fileno())
+
+
+@contextlib.contextmanager
+def replacing(path: Path, overwrite: bool = False) -> Iterator[Path]:
+    """The name of a file to be made beside another, which it becomes at the end of the block.
+
+    No file has that name before. After an error nothing of it is left.
+
+    Raises:
+        OutputError: The other one exists and may not be replaced, or it cannot be written.
+    """
+    fresh = path.with_name(f".{path.name}.{secrets.token_hex(8)}")
     try:
-        fresh.unlink(missing_ok=True)  # left by a killed process that had the same number
         try:
-            with fresh.open("xb") as file:
-                file.write(data)
-                file.flush()
-                os.fsync(file.fileno())
+            yield fresh
             if overwrite:
                 fresh.replace(path)
             else:
                 os.link(fresh, path)  # unlike replace it fails if the file exists by now
         finally:
             fresh.unlink(missing_ok=True)
+    except AntennateError:
+        raise
     except FileExistsError:
         raise OutputError(
             f"{path}: expected no such file, found one; choose another name or allow overwriting"

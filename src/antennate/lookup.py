@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import functools
 import importlib
 import importlib.util
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from importlib.metadata import entry_points
+from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from types import ModuleType
 from typing import Any, Generic, TypeVar, cast
@@ -20,6 +21,20 @@ T = TypeVar("T")
 
 ADDED: dict[str, dict[str, Any]] = {}
 """Objects given to `Registry.add`, by group and name; worker processes get them too."""
+
+
+def installed(group: str) -> Iterable[EntryPoint]:
+    """The entry points of a group that installed packages declare.
+
+    Reading them takes some milliseconds, more than a short trial: a process does it once for each
+    `sys.path`, and so does not notice what is installed there while it runs.
+    """
+    return _installed(tuple(sys.path)).select(group=group)
+
+
+@functools.cache
+def _installed(path: tuple[str, ...]) -> Any:
+    return entry_points()
 
 
 @dataclass(frozen=True)
@@ -61,7 +76,7 @@ class Registry(Generic[T]):
     @property
     def names(self) -> tuple[str, ...]:
         """All names that need no code of the user, ours first."""
-        others = (point.name for point in entry_points(group=self._group))
+        others = (point.name for point in installed(self._group))
         return tuple(dict.fromkeys((*self._ours, *others, *self.added)))
 
     def add(self, name: str, found: T) -> None:
@@ -122,8 +137,9 @@ class Registry(Generic[T]):
         return cast("T", found)
 
     def _load(self, name: str) -> Any:
-        for point in entry_points(group=self._group, name=name):
-            return point.load()
+        for point in installed(self._group):
+            if point.name == name:
+                return point.load()
         place, _, attribute = name.rpartition(":")
         if place.endswith(".py"):
             module = _module_of(Path(place))

@@ -38,6 +38,14 @@ def typed(*words: str) -> str:
     return shlex.join([*program, *words])
 
 
+def extra(name: str) -> str:
+    """How to get an extra of this package; it follows words such as `install it with`."""
+    return (
+        f"`uv run --extra {name} antennate ...` in a clone, or in the folder above it with `pip "
+        f"install './antennate[{name}]'`"
+    )
+
+
 def short_names(controllers: Iterable[str]) -> dict[str, str]:
     """A label for each controller: of MODULE:NAME or FOLDER/FILE.py:NAME only NAME.
 

@@ -14,7 +14,7 @@ from antennate.cli.exit_codes import BAD_INPUT, INTERRUPTED, OK
 from antennate.cli.options import option
 from antennate.cli.progress import progress, stop_signals
 from antennate.cli.results import drawn_table, folder_for, tell
-from antennate.cli.run_options import Options, workers_of
+from antennate.cli.run_options import Options, go_on, workers_of
 from antennate.cli.view_options import ViewOptions, require_viewable, say_by_hand, view_of
 from antennate.errors import BadInputError, ConfigError, OutputError, WorkerError
 from antennate.experiments.running import keep, require_films, write_films
@@ -22,7 +22,7 @@ from antennate.params.base import Params
 from antennate.studies.engines import WARP
 from antennate.studies.experiment import Experiment, Outcome
 from antennate.studies.formats import to_json
-from antennate.studies.identity import differences, identity
+from antennate.studies.identity import differences, identity, packages_used
 from antennate.studies.measures import Interim
 from antennate.studies.pool import ShardEnd, Workers
 from antennate.studies.run_directory import LOGS, SHARD, RunDirectory
@@ -33,7 +33,7 @@ from antennate.telemetry.view.simulation import SimulationView
 class LogOptions(Options):
     """The same where trials can be logged."""
 
-    log: bool = option(False, "keep the log of every trial, in logs/CONTROLLER-TRIAL.mcap")
+    log: bool = option(False, "keep the log of every trial or walk, in the folder logs")
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ class TrialFilmOptions(FilmOptions):
 class StudyOptions(Options):
     """The same where a file says what is run."""
 
-    config: Path | None = option(None, "TOML file of the study", "FILE", positional=True)
+    config: Path | None = option(None, "TOML file of the study or search", "FILE", positional=True)
     trust_code: bool = option(False, "run code of its own that the file names, as FILE.py:NAME")
 
 
@@ -145,6 +145,7 @@ def carry_out(
         folder_for(experiment.view, options, config, argv, what, resume, name) as run,
     ):
         run.keeps_store, workers.store = experiment.continued, run.store
+        workers.packages = packages_used(kind, config)
         if shards and run.store is not None:
             run.store.take(shards.records)
         try:
@@ -161,7 +162,7 @@ def carry_out(
         if options.shard is not None:
             raise ConfigError(f"--shard: expected trials on workers, found {experiment.name}")
         say_by_hand(() if view is None else view.by_hand, run)
-        return _end(experiment, config, options, run, outcome)
+        return _end(experiment, config, options, run, outcome, None if shards else argv)
 
 
 def _outcome(
@@ -198,11 +199,17 @@ def _end(
     options: Options,
     run: RunDirectory,
     outcome: Outcome,
+    argv: Sequence[str] | None,
 ) -> int:
-    """Keep what came out, tell it, and make the films."""
+    """Keep what came out, tell it, and make the films; `argv` can be given again to go on."""
     result = outcome.result()
     interrupted = bool(result.get("interrupted"))
+    holds_trials = run.store is not None and run.store.holds_trials
+    again = ""
+    if argv is not None and interrupted and holds_trials:
+        again = go_on(experiment.name, argv, run.path)
     if interrupted and not outcome.rows:
+        sys.stderr.write(f"to go on: {again}\n" if again else "")
         raise KeyboardInterrupt
     failure = _keep(experiment, outcome, options, run)
     tell(result, options, experiment.tables(result), experiment.sentence(result))
@@ -211,7 +218,7 @@ def _end(
     if interrupted:
         sys.stderr.write(
             f"antennate {experiment.name}: interrupted: kept {len(outcome.rows)} trials, all "
-            "that had ended; --resume goes on\n"
+            "that had ended\n" + (f"to go on: {again}\n" if again else "")
         )
     elif _film(experiment, config, options, run):
         return BAD_INPUT if experiment.failed(result) else OK

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from importlib import import_module
+from itertools import islice
 from pathlib import Path
 from typing import Any, Literal
 
@@ -13,27 +13,37 @@ from pydantic.dataclasses import dataclass
 from antennate.cli.arguments import parse
 from antennate.cli.exit_codes import OK
 from antennate.cli.options import option
+from antennate.cli.progress import progress, stop_signals
 from antennate.cli.replay import complain
 from antennate.cli.results import ResultOptions, tell
 from antennate.errors import ConfigError, MissingPackageError, OutputError
-from antennate.files import write_whole
-from antennate.messages import one_line, typed
+from antennate.files import require_room, write_whole, writing_whole
+from antennate.messages import extra, one_line, typed
 from antennate.params.base import Params
-from antennate.studies.formats import to_csv
+from antennate.studies.formats import csv_lines
 from antennate.studies.measures import Table
-from antennate.telemetry.reader import LogReader, Record
-from antennate.telemetry.recover import recover
+from antennate.telemetry.reader import LogReader
+from antennate.telemetry.recover import left_out, recover
+from antennate.telemetry.survey import Survey
 from antennate.telemetry.ticks import JOINTS
 from antennate.telemetry.topics import EVENTS
 
 DESCRIPTION = """\
 Look at the log of a drive or a simulation: `info` says what it holds; `recover` writes the log of a
 killed program, and of all programs that followed it, to one file that other tools open; `export`
-writes a row for each tick as CSV or Parquet; `plot` draws it.
+writes a row for each tick as CSV or Parquet; `plot` draws it; `film` makes a film of its first ten
+minutes.
 
 A log is an MCAP file of ROS 2 messages: Foxglove, Lichtblick, PlotJuggler, Rerun and `rosbags` open
 it. The exit code is 2 if it is damaged; what can be read is read."""
-_ENDINGS = {"recover": (".mcap",), "export": (".csv", ".parquet"), "plot": (".png", ".svg")}
+_ENDINGS = {
+    "recover": (".mcap",),
+    "export": (".csv", ".parquet"),
+    "plot": (".png", ".svg"),
+    "film": (".mp4",),
+}
+_ROWS = 4096
+"""Ticks that are written to a Parquet file at once."""
 _SHOWN = 10
 """Most events that `info` prints."""
 
@@ -46,12 +56,14 @@ class LogConfig(Params):
 class Options(ResultOptions):
     """What to do with which log."""
 
-    action: Literal["info", "recover", "export", "plot"] = option(
+    action: Literal["info", "recover", "export", "plot", "film"] = option(
         "info", "what to do", positional=True
     )
     log: str = option("", "log of a drive or a simulation", "LOG", positional=True)
     out: Path | None = option(
-        None, "file to write, .mcap, .csv, .parquet, .png or .svg; else beside the log", "FILE"
+        None,
+        "file to write, .mcap, .csv, .parquet, .png, .svg or .mp4; else beside the log",
+        "FILE",
     )
     overwrite: bool = option(False, "replace that file")
     json: bool = option(False, "print what `info` finds as JSON")
@@ -80,34 +92,36 @@ def command(argv: Sequence[str]) -> int:
         "recover": _recover,
         "export": _export,
         "plot": _plot,
+        "film": _film,
     }
     log = actions[options.action](path, target)
-    tell({}, options, (), f"{log.ticks} ticks were written to {target}.")
-    return OK if options.action == "recover" else complain("log", log)
+    recovered = options.action == "recover"
+    more = f"; {left_out(log)}" if recovered else ""
+    tell({}, options, (), f"{log.ticks} ticks were written to {target}{more}.")
+    return OK if recovered else complain("log", log)
 
 
 def _target(path: Path, options: Options) -> Path:
     """The file to write.
 
     Raises:
-        ConfigError: Its name has another ending, or it is the log itself.
+        ConfigError: Its name has another ending, or it is a folder or the log itself.
     """
     endings = _ENDINGS[options.action]
     stem = f"{path.stem}-recovered" if options.action == "recover" else path.stem
     target = options.out or path.with_name(stem + endings[0])
     if target.suffix not in endings:
         raise ConfigError(f"--out: expected a name with {' or '.join(endings)}, found {target}")
-    if target.exists() and target.samefile(path):
+    if target.is_dir():
+        raise ConfigError(f"--out: expected the name of a file, found the folder {target}")
+    if target.exists() and path.exists() and target.samefile(path):
         raise ConfigError(f"--out: expected another file than the log, found {target}")
     return target
 
 
 def _recover(path: Path, target: Path) -> LogReader:
-    fresh = target.with_name(f".{target.name}")
-    fresh.unlink(missing_ok=True)
-    log = recover(path, fresh)
-    fresh.replace(target)
-    return log
+    with stop_signals():
+        return recover(path, target, overwrite=True)
 
 
 def _export(path: Path, target: Path) -> LogReader:
@@ -116,29 +130,34 @@ def _export(path: Path, target: Path) -> LogReader:
     with LogReader(path) as log:
         rows = (tick.row(log.header.robot, measured) for tick in log)
         if target.suffix == ".csv":
-            write_whole(target, to_csv(rows).encode(), overwrite=True)
+            with writing_whole(target, overwrite=True) as file:
+                file.writelines(line.encode() for line in csv_lines(rows))
         else:
             _write_parquet(target, rows)
     return log
 
 
 def _write_parquet(target: Path, rows: Iterator[Mapping[str, Any]]) -> None:
-    """A Parquet file with a column for each number.
+    """A Parquet file with a column for each number, written in groups of rows.
 
     Raises:
-        MissingPackageError: pandas or pyarrow is not installed.
+        MissingPackageError: pyarrow is not installed.
+        OutputError: It cannot be written.
     """
     try:
-        import pandas
-
-        import_module("pyarrow")  # pandas would say it in four lines
+        arrow: Any = import_module("pyarrow")
+        parquet: Any = import_module("pyarrow.parquet")
     except ImportError:
         raise MissingPackageError(
-            f"{target}: expected pandas and pyarrow, found none; install them with "
-            "`pip install antennate[parquet]`, or write a .csv"
+            f"{target}: expected the package pyarrow, found none; install it with "
+            f"{extra('parquet')}, or write a .csv"
         ) from None
-    data: Any = pandas.DataFrame(list(rows)).to_parquet(index=False)
-    write_whole(target, data, overwrite=True)
+    with writing_whole(target, overwrite=True) as file:
+        first = arrow.Table.from_pylist(list(islice(rows, _ROWS)))
+        with parquet.ParquetWriter(file, first.schema) as out:
+            out.write_table(first)
+            while held := list(islice(rows, _ROWS)):
+                out.write_table(arrow.Table.from_pylist(held, schema=first.schema))
 
 
 def _plot(path: Path, target: Path) -> LogReader:
@@ -147,7 +166,8 @@ def _plot(path: Path, target: Path) -> LogReader:
     from antennate.telemetry.figure import replay as draw
 
     with LogReader(path) as log:
-        count = sum(1 for _ in log)
+        log.survey()
+        count = log.ticks
     if not count:
         raise ConfigError(f"{path}: expected a log with ticks, found none")
     with LogReader(path) as log:
@@ -156,31 +176,34 @@ def _plot(path: Path, target: Path) -> LogReader:
     return log
 
 
-def _info(path: Path, options: Options) -> int:
-    messages: Counter[str] = Counter()
-    events: list[dict[str, Any]] = []
-    times: list[int] = []
+def _film(path: Path, target: Path) -> LogReader:
+    from antennate.cli.view import arena_of  # slow to import
+    from antennate.telemetry.film import PICTURE_SIZE, encoded, require_video
+    from antennate.telemetry.log_film import film_of
+
     with LogReader(path) as log:
-        for records, _ in log.groups():
-            for record in records:
-                messages[record.topic.name] += 1
-                if record.topic is EVENTS:
-                    events.append(_event(record))
-            times = [*times[:1], records[-1].time]
-    duration = 1e-9 * (times[-1] - times[0]) if times else 0.0
-    result = _result(log, messages, duration, events)
-    tell(result, options, [_table(result, events)], _sentence(result))
+        require_video()
+        film = film_of(log, arena_of(path, log.header), path.name)
+    require_room(target, PICTURE_SIZE * len(film.t))
+    with (
+        progress("pictures of the film") as step,
+        stop_signals(),
+        writing_whole(target, overwrite=True) as file,  # opened before anything is drawn
+    ):
+        file.write(encoded(film, step))
+    return log
+
+
+def _info(path: Path, options: Options) -> int:
+    with LogReader(path) as log:
+        result = _result(log, log.survey())
+    tell(result, options, [_table(result)], _sentence(result))
     return complain("log", log)
 
 
-def _event(record: Record) -> dict[str, Any]:
-    return {"time_ns": record.time, "text": EVENTS.type.decode(record.data)["msg"]}
-
-
-def _result(
-    log: LogReader, messages: Counter[str], duration: float, events: list[dict[str, Any]]
-) -> dict[str, Any]:
+def _result(log: LogReader, found: Survey) -> dict[str, Any]:
     header = log.header
+    events = ((time, EVENTS.decode(data)["msg"]) for time, data in found.events)
     return {
         "schema": 1,
         "command": "log",
@@ -194,17 +217,18 @@ def _result(
         "calibrated": bool(header.calibration),
         "versions": dict(header.versions),
         "ticks": log.ticks,
-        "duration_s": duration,
-        "messages": dict(messages),
-        "events": events,
+        "duration_s": 1e-9 * (found.last - found.first),
+        "messages": {topic.name: count for topic, count in found.messages.items()},
+        "events": [{"time_ns": time, "text": text} for time, text in events],
         "missing": log.missing,
         "damaged": log.bad,
         "closed": log.end is not None,
     }
 
 
-def _table(result: Mapping[str, Any], events: Sequence[Mapping[str, Any]]) -> Table:
-    lines = [f"{1e-9 * each['time_ns']:.2f} s {each['text']}" for each in events[:_SHOWN]]
+def _table(result: Mapping[str, Any]) -> Table:
+    events, start = result["events"], result["start_ns"]
+    lines = [f"{1e-9 * (each['time_ns'] - start):.2f} s {each['text']}" for each in events[:_SHOWN]]
     if len(events) > _SHOWN:
         lines.append(f"and {len(events) - _SHOWN} more events")
     rows = [(name, [str(count)]) for name, count in result["messages"].items()]

@@ -17,7 +17,7 @@ from antennate.cli.results import ResultOptions, folder_for, tell
 from antennate.cli.view_options import ViewOptions, page_of, say_by_hand
 from antennate.errors import ConfigError
 from antennate.messages import one_line, short_names
-from antennate.studies.formats import to_csv
+from antennate.studies.formats import csv_lines
 from antennate.studies.measures import Measure, Table
 from antennate.studies.report import View
 from antennate.studies.run_directory import RunDirectory
@@ -188,7 +188,7 @@ def _keep(folder: RunDirectory, path: Path, found: Replayed) -> None:
     with LogReader(path) as log:
         ticks = zip(log, found.maneuvers, strict=True)
         rows = (tick.row(log.header.robot) | {"replayed": each} for tick, each in ticks)
-        folder.write(TICKS, to_csv(rows))
+        folder.write(TICKS, csv_lines(rows))
     if found.maneuvers:
         with LogReader(path) as log:
             figure = draw(Course.of(log, len(found.maneuvers), found.maneuvers))

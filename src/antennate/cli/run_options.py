@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 from pydantic.dataclasses import dataclass
@@ -10,7 +12,7 @@ from pydantic.dataclasses import dataclass
 from antennate.cli.options import option
 from antennate.cli.results import ResultOptions
 from antennate.errors import ConfigError
-from antennate.messages import shortened
+from antennate.messages import shortened, typed
 from antennate.studies.engines import FORMS, LOCAL, make_engine
 from antennate.studies.pool import TIMEOUT, Workers, core_count
 
@@ -47,6 +49,32 @@ def workers_of(options: Options, closed: bool, apart: bool) -> Workers:
     how: dict[str, Any] = {"timeout": options.trial_timeout, "retry": options.retry}
     count = options.workers or core_count()
     return Workers(count, engine, shard=shard, closed=closed, apart=apart, **how)
+
+
+_SAID_ANEW = {"--out": 1, "--overwrite": 0, "--no-overwrite": 0, "--resume": 0, "--no-resume": 0}
+"""Flags that are left out of the words that go on, and how many values each has."""
+
+
+def go_on(command: str, argv: Sequence[str], folder: Path) -> str:
+    """The whole command that goes on with the interrupted run of a folder, ready to be pasted.
+
+    Args:
+        command: Name of the command.
+        argv: Words that it was given.
+        folder: The folder of the run.
+    """
+    kept: list[str] = []
+    values = 0
+    for word in argv:
+        name, given, _ = word.partition("=")
+        count = _SAID_ANEW.get(name.replace("_", "-"))
+        if count is not None:
+            values = 0 if given else count
+        elif values:
+            values -= 1
+        else:
+            kept.append(word)
+    return typed(command, *kept, "--out", str(folder), "--resume")
 
 
 def _shard(text: str | None) -> tuple[int, int] | None:

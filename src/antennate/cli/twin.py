@@ -18,6 +18,7 @@ from antennate.cli.arguments import FromFile, parse
 from antennate.cli.exit_codes import OK
 from antennate.cli.options import option
 from antennate.cli.progress import stop_signals
+from antennate.cli.twin_kept import Kept, KeptOptions
 from antennate.cli.view_options import PageOptions, page_of
 from antennate.errors import ConfigError
 from antennate.hardware.driving.priority import LEVEL, urgent
@@ -25,7 +26,7 @@ from antennate.hardware.ports.keys import read_key
 from antennate.sim.world import World
 from antennate.twin.config import TwinConfig, watched
 from antennate.twin.endpoints import Endpoint
-from antennate.twin.faults import Faults, read
+from antennate.twin.faults import Demand, Faults, read
 from antennate.twin.orders import Orders
 from antennate.twin.passage import Passage
 from antennate.twin.robot import TwinRobot
@@ -67,7 +68,7 @@ wire=ber:SHARE (bits wrong) or loss:SHARE (bytes lost), on both wires both ways.
 
 
 @dataclass(frozen=True)
-class Places(FromFile, PageOptions):
+class Places(FromFile, KeptOptions, PageOptions):
     """Where to serve; two pseudo-terminals if no port is given."""
 
     tcp: str | None = option(
@@ -109,16 +110,16 @@ def command(argv: Sequence[str]) -> int:
 
 def _serve_robot(config: TwinConfig, places: Places, orders: Orders | None) -> int:
     faults = Faults([read(text) for text in config.fault], config.robot.ids)
-    faults.on_begin = lambda demand, t: _say(f"{t:.1f} s after the addresses: {demand}")
     real = places.pace == "real"
     robot, passage = watched(config, boot_id=secrets.randbits(32) if real else None)
-    passage.on_pass = lambda: _tell(passage, places.passed)
     with (
+        Kept(places, robot, passage, config) as kept,
         page_of(places) or nullcontext() as page,
         TwinServer(robot, faults, *_endpoints(places), orders) as server,
     ):
+        _watch(robot, passage, faults, kept, places.passed)
         if page is not None:
-            passage.on_tick = _shown(page, robot, config)
+            kept.watchers.append(_shown(page, robot, config))
         try:
             with urgent(LEVEL + 1) if real else nullcontext():
                 serve = server.run if real else server.run_lockstep
@@ -128,6 +129,31 @@ def _serve_robot(config: TwinConfig, places: Places, orders: Orders | None) -> i
             late = f"its latest tick was {1e3 * server.late:.1f} ms late"
             _say(f"The twin has ended: {invalid}{passage.summary}; {late}.")
     return OK
+
+
+def _watch(
+    robot: TwinRobot, passage: Passage, faults: Faults, kept: Kept, file: Path | None
+) -> None:
+    """Tell what happens, and keep it."""
+
+    def began(demand: Demand, t: float) -> None:
+        _say(f"{t:.1f} s after the addresses: {demand}")
+        kept.event(f"fault: {demand}")
+
+    def passed() -> None:
+        _tell(passage, file)
+        kept.event(passage.summary)
+
+    def returned() -> None:
+        passage.reset()
+        kept.event("carried back to the start")
+
+    def tick(world: World) -> None:
+        for watcher in kept.watchers:
+            watcher(world)
+
+    faults.on_begin, passage.on_pass = began, passed
+    robot.on_return, passage.on_tick = returned, tick
 
 
 def _shown(page: ViewProcess, robot: TwinRobot, config: TwinConfig) -> Callable[[World], None]:
@@ -150,10 +176,10 @@ def _serve_servos(
 ) -> int:
     """Servos without a robot."""
     robot = (places.udp, places.passed, places.pace != "real", places.view)
-    if any(robot) or config.touch or config.factory:
+    if any(robot) or places.log or places.video or config.touch or config.factory:
         raise ConfigError(
-            "--servos: expected no --udp, --passed, --pace lockstep, --view, --touch or --factory, "
-            "as they are for a robot"
+            "--servos: expected no --udp, --passed, --pace lockstep, --view, --log, --video, "
+            "--touch or --factory, as they are for a robot"
         )
     demands = [read(text) for text in config.fault]
     faults = Faults(demands, [entry.id for entry in entries], alone=True)

@@ -13,10 +13,12 @@ from antennate.cli import view_server
 from antennate.cli.arguments import parse
 from antennate.cli.exit_codes import OK
 from antennate.cli.options import option
+from antennate.cli.progress import stop_signals
 from antennate.cli.view_options import FoxgloveOptions, foxglove_of
 from antennate.errors import AntennateError, BadInputError, ConfigError
 from antennate.params.base import Params
-from antennate.sim.scenes.registry import make_scene
+from antennate.params.reading import from_values
+from antennate.sim.scenes.registry import SHIPPED, make_scene
 from antennate.sim.trial import TrialConfig, draw_trial
 from antennate.sim.world import World
 from antennate.studies.report import command_of
@@ -54,7 +56,7 @@ def command(argv: Sequence[str]) -> int:
     """Show one log until Ctrl-C.
 
     Raises:
-        AntennateError: There is no such log, or the page cannot be served.
+        AntennateError: There is no such log, or the page cannot be served, or not any more.
     """
     _, options = parse("view", DESCRIPTION, ViewConfig, argv, Options)
     if options.shown is None:
@@ -63,8 +65,9 @@ def command(argv: Sequence[str]) -> int:
     with LogReader(path) as log:
         header = log.header
     with (
-        ViewProcess(options.port, view_server.__name__, foxglove_of(options)) as page,
+        stop_signals(last=True),
         contextlib.suppress(KeyboardInterrupt),  # that is how it ends
+        ViewProcess(options.port, view_server.__name__, foxglove_of(options), "--port") as page,
     ):
         player = LogPlayer(page.channel, header, str(path), options.speed, arena_of(path, header))
         while not page.channel.closed:
@@ -73,6 +76,7 @@ def command(argv: Sequence[str]) -> int:
                 player.play(log)
                 _complain(player, log)
                 player.rest()
+        raise page.lost()
     return OK
 
 
@@ -104,16 +108,13 @@ def _log_of(path: Path) -> Path:
 
 
 def arena_of(path: Path, header: Header) -> World | None:
-    """The world of a trial as its run has it, None where no run tells."""
-    if header.trial is None or path.parent.name != LOGS:
+    """The world of a trial as the log or its run has it, None where neither tells."""
+    if header.trial is None:
         return None
     try:
-        run = RunDirectory.open(path.parent.parent)
-        name = command_of(run)
-        model = experiments.load(name).config if name in experiments.names() else None
-        if model is None or not issubclass(model, TrialConfig):
+        config = _trial_of(path, header)
+        if config is None:
             return None
-        config = run.config(model)
         gait, period = header.params.gait, header.params.period
         seed = config.seed if header.seed is None else header.seed
         config = config.model_copy(update={"seed": seed})
@@ -121,3 +122,23 @@ def arena_of(path: Path, header: Header) -> World | None:
         return draw_trial(config, scene, header.trial, gait, period).world
     except AntennateError:
         return None  # the log is shown all the same, on a bare floor
+
+
+def _trial_of(path: Path, header: Header) -> TrialConfig | None:
+    """The configuration of a trial, None where nothing tells.
+
+    A log may come from elsewhere, so that of a scene in code of its own only the run can tell.
+
+    Raises:
+        AntennateError: It cannot be read.
+    """
+    if header.arena.get("scene") in SHIPPED:
+        return from_values(TrialConfig, {**header.arena, "robot": header.robot})
+    if path.parent.name != LOGS:
+        return None
+    run = RunDirectory.open(path.parent.parent)
+    name = command_of(run)
+    model = experiments.load(name).config if name in experiments.names() else None
+    if model is None or not issubclass(model, TrialConfig):
+        return None
+    return run.config(model)

@@ -26,7 +26,7 @@ from antennate.telemetry.header import Header
 from antennate.telemetry.ticks import Tick
 from antennate.telemetry.view.channel import HEADER, STATE, TICK, Channel
 from antennate.telemetry.view.pace import RATE
-from antennate.telemetry.writer import LogWriter
+from antennate.telemetry.writer import SYNC, LogWriter
 from antennate.types import Maneuver
 
 REQUIRED, PAGE = "required", "page="
@@ -154,7 +154,7 @@ def main() -> int:
 def _begin(path: Path, first: Message) -> LogWriter | None:
     """The log, None if it cannot be written: the robot walks on without it."""
     try:
-        return LogWriter(path, Header.unpack(first.content))
+        return LogWriter(path, Header.unpack(first.content), sync=SYNC)
     except LogError as error:
         say(error)
         return None

@@ -6,6 +6,7 @@ the summary. An entry point in the group `antennate.experiments` names such an o
 
 from __future__ import annotations
 
+import functools
 import importlib
 import pkgutil
 from typing import TYPE_CHECKING, Any
@@ -72,11 +73,12 @@ def unknown(name: str) -> str:
     return f"expected an experiment ({', '.join(summaries())}), found {shortened(name)}"
 
 
-def _folders() -> list[str]:
-    return [module.name for module in pkgutil.iter_modules(__path__) if module.ispkg]
+@functools.cache
+def _folders() -> tuple[str, ...]:
+    return tuple(module.name for module in pkgutil.iter_modules(__path__) if module.ispkg)
 
 
 def _entries() -> dict[str, EntryPoint]:
-    from importlib.metadata import entry_points
+    from antennate.lookup import installed  # slow to import
 
-    return {entry.name: entry for entry in entry_points(group=GROUP)}
+    return {entry.name: entry for entry in installed(GROUP)}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import re
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -18,7 +17,7 @@ from antennate.params.base import Params
 from antennate.params.reading import from_values
 from antennate.studies.engines import LOCAL, make_engine
 from antennate.studies.experiment import Experiment, Outcome
-from antennate.studies.identity import identity
+from antennate.studies.identity import identity, packages_used
 from antennate.studies.pool import Workers
 from antennate.studies.report import write_report
 from antennate.studies.run_directory import FILMS, RunDirectory
@@ -131,14 +130,16 @@ def run(
     found.check(config)
     if video is not None:
         require_films(found, config, video, out)
-    make_workers = functools.partial(Workers, workers, make_engine(engine))
+    pool = Workers(workers, make_engine(engine))
+    pool.packages = packages_used(found.name, config)
     if out is None:
-        return Result(found, config, found.run(config, make_workers(), on_step, lambda row: None))
+        return Result(found, config, found.run(config, pool, on_step, lambda row: None))
     place = (found.name, out, overwrite, identity(found.name, config), resume or found.continued)
     with RunDirectory.create(*place) as directory:
         directory.keeps_store = found.continued
         directory.describe(config)
-        outcome = found.run(config, make_workers(store=directory.store), on_step, directory.append)
+        pool.store = directory.store
+        outcome = found.run(config, pool, on_step, directory.append)
         keep(found, outcome, directory)
         if video is not None:
             write_films(found, config, video, directory)
@@ -183,6 +184,7 @@ def require_films(
         raise ConfigError(f"video: expected a trial of this run, 0 to {trials - 1}, found {trial}")
     if getattr(config, "solver", "mujoco") != "mujoco":
         raise ConfigError("video: expected the solver mujoco, which alone can draw, found chain")
+    experiment.films(config, trial)
     require_video()
 
 

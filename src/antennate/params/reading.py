@@ -45,6 +45,7 @@ _KINDS = {
     "bool": "true or false",
     "string": "text",
     "tuple": "a list",
+    "dict": "a table",
     "model": "a table",
 }
 """What pydantic's families of error types ask for, by the first word of the type."""

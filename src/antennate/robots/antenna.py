@@ -12,7 +12,8 @@ from antennate.params.base import Params, number
 from antennate.robots.sensor import SensorParams
 from antennate.robots.servos import ServoParams, XL330Params
 
-_Coils = Annotated[float, Field(gt=0)]
+_Coils = Annotated[float, Field(ge=0.25, le=1000)]
+"""Less than a quarter of a turn is no coil spring."""
 
 N_MM_PER_DEG = 1e-3 * 180.0 / math.pi
 """One N·mm/deg in N·m/rad."""
@@ -20,6 +21,10 @@ MOST_HINGES = 100
 """More hinges than this are no chain of springs any more."""
 BASE = "base"
 """Name of the joint that the base servo turns."""
+
+
+_LEAST_INERTIA = 2e-15
+"""Least moment of inertia of a body about its axis [kg·m²]: MuJoCo takes none below 1e-15."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,6 +118,18 @@ class AntennaSpec(Params):
                 f"sensor.active_length must be at most the length of {self.length:g} m, got "
                 f"{sensed:g} m"
             )
+        return self
+
+    @model_validator(mode="after")
+    def _heavy_enough(self) -> AntennaSpec:
+        for name, mass in (("link_mass", self.link_mass), ("base_mass", self.base_mass)):
+            ball = 0.4 * self.radius**2  # of the unit of mass; a link has more
+            if mass * ball < _LEAST_INERTIA:
+                least = _LEAST_INERTIA / ball if ball else math.inf
+                raise ValueError(
+                    f"{name}: expected at least {least:.3g} kg with radius {self.radius:g} m, as "
+                    f"the physics takes no body with less inertia about its axis, found {mass:g} kg"
+                )
         return self
 
     def base(self, servo: ServoParams | None = None) -> BaseDrive:

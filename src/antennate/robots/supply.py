@@ -15,8 +15,6 @@ from antennate.robots.spec import RobotSpec
 
 PLUG = 3.0
 """Rated current of a contact of the servos' plugs, JST EH [A] (datasheet JST eEH)."""
-HUB = 10.0
-"""Most current through a U2D2 Power Hub [A] (ROBOTIS e-Manual)."""
 REGULATOR_EFFICIENCY = 0.9
 """Of the step-down converter for the antennae (assumed: usual at half its load)."""
 WALKING_SHARE = 0.1

@@ -15,8 +15,8 @@ _UNPAINTED = np.array([0.5, 0.5, 0.5, 1.0], dtype=np.float32)
 """The engine's colour of a geom that has none of its own."""
 FLOOR: Colour = (0.97, 0.97, 0.97, 1.0)
 _OBSTACLE: Colour = (0.88, 0.80, 0.66, 0.6)
-_BODY: Colour = (0.22, 0.22, 0.25, 1.0)
-_LEG: Colour = (0.45, 0.47, 0.52, 1.0)
+_BODY: Colour = (0.34, 0.34, 0.38, 1.0)
+_LEG: Colour = (0.53, 0.55, 0.60, 1.0)
 
 
 def colours(model: mujoco.MjModel, sides: tuple[Colour, Colour]) -> NDArray[np.float32]:

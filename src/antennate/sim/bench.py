@@ -7,7 +7,7 @@ or not at all.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
@@ -200,18 +200,25 @@ class Bench:
         self.carriage.command(x, y, speed_x, speed_y)
         self.data.ctrl[self._base_servo] = base
 
-    def step(self, count: int = 1) -> None:
-        """Advance by `count` physics steps.
+    def step(self, count: int = 1, watch: Watch | None = None) -> None:
+        """Advance by `count` physics steps; `watch` looks at the bench after each of them.
 
         Raises:
             SimulationError: A command is not finite, the engine warned, time stood still, or the
                 state left all bounds.
         """
         with self._checked(count):
-            mujoco.mj_step(self.model, self.data, count)
+            if watch is None:
+                mujoco.mj_step(self.model, self.data, count)
+                return
+            for _ in range(count):
+                mujoco.mj_step(self.model, self.data)
+                watch(self)
 
-    def press(self, count: int) -> Floats:
+    def press(self, count: int, watch: Watch | None = None) -> Floats:
         """Advance by `count` physics steps and return the mean over them of `contact_force`.
+
+        `watch` looks at the bench after each step.
 
         A contact that lasts is not on in every step; its mean converges, its share of steps does
         not.
@@ -225,6 +232,8 @@ class Bench:
                 mujoco.mj_step(self.model, self.data)
                 if self.data.ncon:
                     total += self.contact_force()
+                if watch is not None:
+                    watch(self)
         return total / count
 
     @contextmanager
@@ -285,3 +294,11 @@ class Bench:
         """Whether any obstacle presses on the antenna in the last physics step."""
         address = self.data.contact.efc_address
         return bool((self.data.efc_force[address[address >= 0]] > 0).any())
+
+
+Watch = Callable[[Bench], None]
+"""Looks at a bench while it runs, and changes nothing."""
+
+
+def unwatched(bench: Bench) -> None:
+    """Look at nothing."""

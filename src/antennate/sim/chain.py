@@ -16,6 +16,7 @@ import numpy as np
 
 from antennate.antenna.dynamics import link_inertia
 from antennate.errors import MissingPackageError, OutputError, SimulationError
+from antennate.messages import extra
 from antennate.params.bench import Solver
 from antennate.params.scene import PhysicsParams
 from antennate.robots.antenna import AntennaSpec
@@ -49,7 +50,7 @@ def kernel() -> ModuleType:
             raise
         raise MissingPackageError(
             "solver: expected the package numba for chain, found none; install it with "
-            "`pip install 'antennate[fast]'`"
+            f"{extra('fast')}"
         ) from None
     except RuntimeError as error:
         if "cannot cache" not in str(error):

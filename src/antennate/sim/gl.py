@@ -12,6 +12,7 @@ import sys
 from importlib.util import find_spec
 
 from antennate.errors import BadInputError, MissingPackageError
+from antennate.messages import extra
 
 BACKENDS = {"egl": "libegl1 libgl1-mesa-dri", "osmesa": "libosmesa6"}
 """Ways to draw, best first, and the Debian packages of each."""
@@ -37,8 +38,7 @@ def backend() -> str:
     """
     if find_spec("OpenGL") is None:
         raise MissingPackageError(
-            "video: expected the package PyOpenGL, found none; install it with "
-            "`pip install 'antennate[video]'`"
+            f"video: expected the package PyOpenGL, found none; install it with {extra('video')}"
         )
     wanted = os.environ.get("MUJOCO_GL", "").strip().lower()
     names = [wanted] if wanted in BACKENDS else list(BACKENDS)

@@ -23,6 +23,8 @@ from antennate.sim.world import World, compile_world
 
 MOST_OVERLAP = 0.005
 """Deepest that the robot may be in an obstacle at the start [m]: legs stand on edges."""
+_MEMBERS = ("start", "length", "exit", "build", "progress", "succeeded", "left")
+"""What a SceneInstance has."""
 
 
 class TrialConfig(Params):
@@ -91,8 +93,8 @@ def draw_trial(
     """
     for_scene, for_start, for_chance = _generators(config.seed, trial)
     robot, variation = config.robot, config.variation
+    drawn = _drawn(config, scene, for_scene)
     with _errors_of(config.scene):
-        drawn = scene.draw(robot, for_scene)
         world = make_world(config.physics, robot, drawn)
     phase = float(for_start.uniform(0.0, 2.0 * math.pi))
     lateral, heading = for_start.uniform(-1.0, 1.0, 2)
@@ -108,8 +110,7 @@ def draw_scene(config: TrialConfig, scene: Scene, trial: int) -> SceneInstance:
     Raises:
         SceneError: There is none.
     """
-    with _errors_of(config.scene):
-        return scene.draw(config.robot, _generators(config.seed, trial)[0])
+    return _drawn(config, scene, _generators(config.seed, trial)[0])
 
 
 def check_start(config: TrialConfig) -> None:
@@ -120,12 +121,24 @@ def check_start(config: TrialConfig) -> None:
         SceneError: It cannot be read, drawn or built, or the robot does not fit at its start.
     """
     scene = make_scene(config.scene, config.tunnel)
-    with _errors_of(config.scene):
-        drawn = scene.draw(config.robot, _generators(config.seed, 0)[0])
-        if config.scene != TUNNEL:
+    drawn = draw_scene(config, scene, 0)
+    if config.scene != TUNNEL:
+        with _errors_of(config.scene):
             world = make_world(config.physics, config.robot, drawn)
             place_at_start(world, drawn, GaitParams())
             require_room(world)
+
+
+def _drawn(config: TrialConfig, scene: Scene, rng: np.random.Generator) -> SceneInstance:
+    with _errors_of(config.scene):
+        drawn = scene.draw(config.robot, rng)
+        lacking = [name for name in _MEMBERS if not hasattr(drawn, name)]
+    if lacking:
+        raise SceneError(
+            f"scene {config.scene!r}: expected draw to return a SceneInstance, found "
+            f"{type(drawn).__name__} without {', '.join(lacking)}"
+        )
+    return drawn
 
 
 @contextmanager

@@ -116,6 +116,7 @@ class World:
         self.servo_drives = ServoDrives(model, names, stall)
         self._root = places.root
         self._steps = 0
+        self._before = 0.0
         data = self.data
         self._qpos, self._qvel, self._ctrl = data.qpos, data.qvel, data.ctrl
         self.head: Floats = data.qpos[self._root : self._root + 3]
@@ -199,15 +200,28 @@ class World:
         Raises:
             SimulationError: The engine warned, time stood still, or the state left all bounds.
         """
-        before = self.data.time
+        self.advance(count)
+        self.check()
+
+    def advance(self, count: int) -> None:
+        """Advance by `count` physics steps as `step` does, but leave the look at them to `check`.
+
+        Raises:
+            SimulationError: The engine failed.
+        """
+        self._before = self.data.time
         self._steps += count
         try:
             self.gears.step(self.data, count)
         except mujoco.FatalError as error:
             raise SimulationError(self._steps, str(error).splitlines()[0]) from error
-        self._check(before)
 
-    def _check(self, before: float) -> None:
+    def check(self) -> None:
+        """Look at the state after `advance`.
+
+        Raises:
+            SimulationError: The engine warned, time stood still, or the state left all bounds.
+        """
         x, y, height = self.head.tolist()
         bent, speed = self._bent, self._qvel
         self._qpos.take(self._bounded, out=bent, mode="clip")
@@ -215,13 +229,13 @@ class World:
             abs(x) < DISTANCE_LIMIT
             and abs(y) < DISTANCE_LIMIT
             and 0.0 < height < HEIGHT_LIMIT
-            and self.data.time > before
+            and self.data.time > self._before
             and bent.dot(bent) < ANGLE_LIMIT**2  # no entry is larger than the norm
             and speed.dot(speed) < SPEED_LIMIT**2
             and self._warnings.tobytes() == self._no_warning
         )
         if not sound:
-            self._explain(before)
+            self._explain(self._before)
 
     def _explain(self, before: float) -> None:
         """Look closely at a state that may be unsound."""

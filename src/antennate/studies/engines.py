@@ -39,14 +39,16 @@ def make_engine(name: Any, slurm: Sequence[str] = ()) -> Engine | None:
     if isinstance(name, str) and re.fullmatch(rf"{WARP}(:.+)?", name):
         return Device(name.partition(":")[2] or None)
     if isinstance(name, str):
-        from antennate.studies import cluster  # needs packages that are optional
+        # these need packages that are optional
+        from antennate.studies.dask import Dask
+        from antennate.studies.slurm import Slurm
 
         if name in ("slurm", "slurm-local"):
-            return cluster.Slurm("slurm" if name == "slurm" else "local", slurm)
+            return Slurm("slurm" if name == "slurm" else "local", slurm)
         if name == "dask":
-            return cluster.Dask()
+            return Dask()
         if re.fullmatch(r"dask://[^/\s]+:[0-9]{1,5}", name):
-            return cluster.Dask(name.removeprefix("dask://"))
+            return Dask(name.removeprefix("dask://"))
         raise ConfigError(f"engine: expected one of {', '.join(FORMS)}, found {shown(name)}")
     if not callable(getattr(name, "submit", None)):
         raise ConfigError(

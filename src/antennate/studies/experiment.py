@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 
 from antennate.params.base import Params
-from antennate.studies.measures import Table
+from antennate.studies.measures import Measure, Table
 from antennate.studies.report import Body, View
 
 if TYPE_CHECKING:
@@ -65,12 +65,14 @@ class Trials(Generic[Config]):
         run: run(config, trials, emit): runs some, and emits the index and the row of each as it
             ends. The row depends on the configuration and the trial alone.
         most: How many may be run at once.
+        row: Class of the rows, a dataclass; None if it is not told.
     """
 
     condition: str
     every: Callable[[Config], Sequence[Trial]]
     run: Callable[[Config, Sequence[Trial], Callable[[int, Any], None]], None]
     most: int = 1
+    row: type | None = None
 
 
 @dataclass(frozen=True)
@@ -100,6 +102,7 @@ class Experiment(Generic[Config, Found]):
         body: HTML that stands in its report in place of tables and figures.
         trials: Its trials one by one, for studies; without them a study runs it as a whole.
         continued: Whether its folder is continued without being asked, and keeps its trials.
+        measures: What it tells of its trials; studies take labels and units from them.
     """
 
     name: str
@@ -119,6 +122,7 @@ class Experiment(Generic[Config, Found]):
     body: Body | None = None
     trials: Trials[Config] | None = None
     continued: bool = False
+    measures: Sequence[Measure] = ()
 
     @property
     def view(self) -> View:

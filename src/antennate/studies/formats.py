@@ -34,13 +34,20 @@ def to_json(value: Any) -> str:
 
 def to_csv(rows: Iterable[Mapping[str, Any]]) -> str:
     """A table with a header; text that a spreadsheet would take for a formula gets a quote."""
+    return "".join(csv_lines(rows))
+
+
+def csv_lines(rows: Iterable[Mapping[str, Any]]) -> Iterator[str]:
+    """The same line by line, for a table that does not fit into memory."""
     file = io.StringIO()
     writer = csv.writer(file, lineterminator="\n")
     for number, row in enumerate(rows):
         if not number:
             writer.writerow(row)
         writer.writerow([_cell(value) for value in row.values()])
-    return file.getvalue()
+        yield file.getvalue()
+        file.seek(0)
+        file.truncate()
 
 
 def from_csv(text: str) -> list[dict[str, Any]]:

@@ -8,7 +8,7 @@ import importlib.util
 import inspect
 import json
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -29,20 +29,24 @@ def identity(command: str, config: Params) -> dict[str, Any]:
     return {
         "command": command,
         "config": values,
-        "versions": dict(versions()),
+        "versions": dict(versions(packages_used(command, config))),
         "code": code() | code_named(values) | _code_added(values) | _code_of(type(config)),
     }
 
 
-def environment() -> dict[str, Any]:
-    """The part of it that driver and workers must share."""
-    return {"versions": dict(versions()), "code": code()}
+def packages_used(command: str, config: Params) -> tuple[str, ...]:
+    """Optional packages that its numbers depend on: of the compiled chain, a GPU, a search."""
+    words = command.split()
+    return (
+        *(("numba",) if "chain" in _texts(config.model_dump(mode="json")) else ()),
+        *(("mujoco-warp", "warp-lang") if "warp" in words else ()),
+        *(("optuna",) if "design" in words else ()),
+    )
 
 
-def content_hash(found: Mapping[str, Any]) -> str:
-    """A short name of an identity: the same for the same content alone."""
-    text = json.dumps(found, sort_keys=True, separators=(",", ":"))
-    return hashlib.sha256(text.encode()).hexdigest()[:16]
+def environment(packages: Iterable[str] = ()) -> dict[str, Any]:
+    """The part of it that driver and workers must share, with versions of some more packages."""
+    return {"versions": dict(versions(tuple(packages))), "code": code()}
 
 
 @functools.cache

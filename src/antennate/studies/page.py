@@ -128,5 +128,6 @@ def folded(title: str, content: str) -> str:
 
 
 def block(text: str, wrap: bool = False) -> str:
-    """Text as it was typed."""
-    return f'<pre class="{"wrap" if wrap else ""}">{escape(text.rstrip())}</pre>'
+    """Text as it was typed; nothing of none."""
+    text = text.rstrip()
+    return f'<pre class="{"wrap" if wrap else ""}">{escape(text)}</pre>' if text else ""

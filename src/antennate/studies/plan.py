@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
 import math
 from collections.abc import Mapping, Sequence
 from typing import Any, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, model_validator
+from pydantic import BaseModel, ConfigDict, Discriminator, model_validator
 
 from antennate.errors import ConfigError
-from antennate.types import Floats
+from antennate.types import Floats, Ints
 
 Kind = Literal["grid", "list", "random", "sobol", "morris"]
 Point = dict[str, Any]
 """Values of the parameters that vary, by dotted name."""
+MOST_POINTS = 100_000
+"""Most points of a plan."""
 LEVELS = 4
 """Levels of each parameter in a Morris plan, as Morris proposes."""
 STEP = LEVELS / (2 * (LEVELS - 1))
@@ -44,19 +47,42 @@ class Range(BaseModel):
         if self.low >= self.high or (self.log and self.low <= 0):
             what = "0 < low < high" if self.log else "low < high"
             raise ValueError(f"expected {what}, got low {self.low:g} and high {self.high:g}")
+        if self.whole and not (self.low.is_integer() and self.high.is_integer()):
+            raise ValueError(f"expected whole ends, got low {self.low:g} and high {self.high:g}")
         return self
 
     def at(self, share: float) -> float | int:
-        """The value at a share of the range, 0 to 1; each whole number has an equal part."""
-        low, high = (self.low - 0.5, self.high + 0.5) if self.whole else (self.low, self.high)
+        """The value at a share of the range, 0 to 1.
+
+        Each whole number has an equal part; by the logarithm, that which is rounded to it.
+        """
         if self.log:
-            return self.low * (self.high / self.low) ** share
-        value = low + share * (high - low)
+            value = self.low * (self.high / self.low) ** share
+        elif self.whole:
+            value = self.low - 0.5 + share * (self.high - self.low + 1.0)
+        else:
+            value = self.low + share * (self.high - self.low)
         if self.whole:
-            return min(max(math.floor(value + 0.5), math.ceil(self.low)), math.floor(self.high))
+            return min(max(math.floor(value + 0.5), int(self.low)), int(self.high))
         return value
 
 
+def _form(axis: Any) -> str | None:
+    """Whether an axis is a range or a list of choices, None if it is neither."""
+    if isinstance(axis, Mapping):
+        return "range" if "low" in axis or "high" in axis else None
+    if isinstance(axis, Range):
+        return "range"
+    return None if axis is None or isinstance(axis, str | int | float) else "choices"
+
+
+RANGE_OR_CHOICES = Discriminator(
+    _form,
+    custom_error_type="axis",
+    custom_error_message="a list of values, or a table with low and high (names with dots need "
+    "quotes)",
+)
+"""Tells pydantic which of two an axis is, by its tag, `range` or `choices`."""
 Axes = Mapping[str, Sequence[Any] | Range]
 """By dotted name: the values of a parameter, or its range."""
 
@@ -75,9 +101,9 @@ def make_points(kind: Kind, axes: Axes, count: int, seed: int) -> list[Point]:
     Raises:
         ConfigError: Nothing varies, or lists and ranges do not fit the kind.
     """
-    if not axes or any(not isinstance(axis, Range) and not axis for axis in axes.values()):
-        empty = next((name for name in axes), "vary")
-        raise ConfigError(f"{empty}: expected values, found none: the {kind} is empty")
+    if not axes or not all(axes.values()):
+        empty = [f"vary.{name}" for name, axis in axes.items() if not axis] or ["vary"]
+        raise ConfigError(f"{empty[0]}: expected values, found none: the {kind} is empty")
     if kind in ("grid", "list"):
         return _of_lists(kind, axes)
     rng = np.random.default_rng(seed)
@@ -101,9 +127,14 @@ def _of_lists(kind: Kind, axes: Axes) -> list[Point]:
     lists: list[Sequence[Any]] = []
     for name, axis in axes.items():
         if isinstance(axis, Range):
-            raise ConfigError(f"{name}: expected a list of values for a {kind}, found a range")
+            raise ConfigError(
+                f"vary.{name}: expected a list of values for a {kind}, found a range, which is for "
+                "random, sobol and morris"
+            )
         lists.append(axis)
     if kind == "grid":
+        if (count := math.prod(map(len, lists))) > MOST_POINTS:
+            raise ConfigError(f"vary: expected at most {MOST_POINTS} points, found {count}")
         return [dict(zip(axes, values, strict=True)) for values in itertools.product(*lists)]
     if len(lengths := {len(values) for values in lists}) > 1:
         found = ", ".join(map(str, sorted(lengths)))
@@ -139,26 +170,33 @@ def trajectories(dimensions: int, count: int, rng: np.random.Generator) -> Float
 
 
 def elementary_effects(
-    dimensions: int, count: int, seed: int, response: Sequence[float]
-) -> list[list[float]]:
+    dimensions: int, count: int, seed: int, response: Floats | Sequence[float]
+) -> Floats:
     """The effects of each parameter: how the response changes over its whole range.
 
     Args:
         dimensions: Parameters.
         count: Trajectories.
         seed: Seed of the plan.
-        response: One value for each point of the plan.
+        response: One value for each point of the plan, shape (..., points).
 
     Returns:
-        Effects by parameter, one for each trajectory in which both values are finite.
+        An effect for each parameter and trajectory, shape (..., dimensions, count); NaN where one
+        of its two values is not finite.
     """
+    order, moves = _moves(dimensions, count, seed)
+    values = np.asarray(response, float)
+    values = np.where(np.isfinite(values), values, np.nan)
+    values = values.reshape(*values.shape[:-1], count, dimensions + 1)
+    effects = np.diff(values, axis=-1) / moves
+    found = np.take_along_axis(effects, np.broadcast_to(order, effects.shape), axis=-1)
+    return np.swapaxes(found, -1, -2)
+
+
+@functools.lru_cache(maxsize=1)
+def _moves(dimensions: int, count: int, seed: int) -> tuple[Ints, Floats]:
+    """When each parameter moves in each trajectory, how far each move goes: (count, dimensions)."""
     shares = trajectories(dimensions, count, np.random.default_rng(seed))
-    shares = shares.reshape(count, dimensions + 1, dimensions)
-    values = np.array(response, float).reshape(count, dimensions + 1)
-    effects: list[list[float]] = [[] for _ in range(dimensions)]
-    for steps, found in zip(np.diff(shares, axis=1), np.diff(values, axis=1), strict=True):
-        for step, change in zip(steps, found, strict=True):
-            moved = int(np.argmax(np.abs(step)))
-            if math.isfinite(change):
-                effects[moved].append(float(change / step[moved]))
-    return effects
+    steps = np.diff(shares.reshape(count, dimensions + 1, dimensions), axis=1)
+    moved = np.argmax(np.abs(steps), axis=2)
+    return np.argsort(moved, axis=1), np.take_along_axis(steps, moved[..., None], axis=2)[..., 0]

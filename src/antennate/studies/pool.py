@@ -6,6 +6,7 @@ somebody presses Ctrl-C, or when a worker or this process is killed.
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import os
 from collections.abc import Callable, Iterator, Sequence
@@ -45,7 +46,8 @@ def core_count() -> int:
 class Workers(int):
     """How many workers there are, where they are, and what they have finished before.
 
-    It is a number, so that an experiment of another package may use it as one.
+    It is a number, so that an experiment of another package may use it as one. Its `packages` are
+    optional ones whose versions the workers must share with this process.
 
     Args:
         count: How many.
@@ -73,7 +75,8 @@ class Workers(int):
         self = super().__new__(cls, count)
         self._engine, self.store, self.shard, self.timeout = engine, store, shard, timeout
         self.retry, self.closed, self.apart = retry, closed, apart
-        self.calls = itertools.count()
+        self.packages, self.calls = (), itertools.count()
+        self._staying = None
         return self
 
     _engine: Engine | None
@@ -83,13 +86,27 @@ class Workers(int):
     retry: bool
     closed: bool
     apart: bool
+    packages: Sequence[str]
     calls: Iterator[int]
+    _staying: Processes | None
+
+    @contextlib.contextmanager
+    def stay(self) -> Iterator[None]:
+        """Let processes of this machine serve one call after the other; the last one ends them."""
+        self._staying = Processes(stay=True)
+        try:
+            yield
+        finally:
+            self._staying.end()
+            self._staying = None
 
     def engine(self, parts: int) -> Engine:
         """Where so many parts are carried out."""
         if self._engine is not None:
             return self._engine
-        return Here() if not self.apart and (self == 1 or parts <= 1) else Processes()
+        if not self.apart and (self == 1 or parts <= 1):
+            return Here()
+        return self._staying or Processes()
 
     def mine(self, place: int) -> bool:
         """Whether a task belongs to this shard."""
@@ -198,7 +215,7 @@ def gather(
     parts = [todo[i : i + chunk] for i in range(0, len(todo), chunk)]
     if parts:
         folder = None if workers.store is None else workers.store.path.parent
-        work = Work(function, tasks, together, workers.timeout, folder, batched)
+        work = Work(function, tasks, together, workers.timeout, folder, batched, workers.packages)
         workers.engine(len(parts)).run(work, parts, int(workers), call.emit, call.fail)
     if workers.shard is not None:
         raise ShardEnd(sum(map(workers.mine, call.found)), len(tasks))

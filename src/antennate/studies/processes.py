@@ -28,6 +28,8 @@ _GUARD = (
 """What a worker that ended with code 1 most often lacks: it raised while it imported the script."""
 _POLL = 0.1
 """How long results that are on their way are waited for after Ctrl-C [s]."""
+_IMPORT = 60.0
+"""Time that a worker has to import what its first tasks need [s]; it counts for no task."""
 _LONGEST_WAIT = 3600.0
 """Most that is waited at once [s]."""
 _MOST_FAILED_STARTS = 10
@@ -37,9 +39,17 @@ _READY, _BEGUN, _FAILED, _RESULT = range(4)
 
 
 class Processes:
-    """Worker processes of this machine."""
+    """Worker processes of this machine.
+
+    Args:
+        stay: Whether those that live serve the next call too; then `end` ends them.
+    """
 
     name = "local"
+
+    def __init__(self, stay: bool = False) -> None:
+        self._stay = stay
+        self._left: list[_Worker] = []
 
     def run(
         self, work: Work, parts: Sequence[Sequence[int]], count: int, emit: Emit, fail: Fail
@@ -48,14 +58,22 @@ class Processes:
         checked = sendable(work.tasks)
         if isinstance(checked, NotSent):
             raise WorkerError(checked.reason)
-        pool = _Pool(work, parts, added_objects(), emit, fail)
+        pool = _Pool(work, parts, added_objects(), emit, fail, self._left)
+        self._left = []
         try:
             pool.run(min(count, len(parts)))
+            if self._stay:
+                self._left = pool.give_back()
         except KeyboardInterrupt:
             pool.take_what_came()
             raise
         finally:
             pool.end()
+
+    def end(self) -> None:
+        """End the workers that stayed."""
+        while self._left:
+            self._left.pop().kill()
 
 
 class _Pool:
@@ -66,10 +84,11 @@ class _Pool:
         added: Mapping[str, Any],
         emit: Emit,
         fail: Fail,
+        workers: Sequence[_Worker] = (),
     ) -> None:
         self._work, self._waiting, self._added = work, Waiting(parts), added
         self._emit, self._fail = emit, fail
-        self._workers: list[_Worker] = []
+        self._workers = list(workers)
         self._failed_starts = 0
 
     def run(self, count: int) -> None:
@@ -136,6 +155,11 @@ class _Pool:
                 while worker.connection.poll(_POLL):
                     self._take(worker, *worker.connection.recv())
 
+    def give_back(self) -> list[_Worker]:
+        """The workers that live; they are this pool's no more."""
+        kept, self._workers = self._workers, []
+        return kept
+
     def end(self) -> None:
         """End all workers."""
         for worker in self._workers:
@@ -154,7 +178,8 @@ class _Worker:
     def __init__(self, added: Mapping[str, Any]) -> None:
         context = multiprocessing.get_context("spawn")
         self.connection, theirs = context.Pipe()
-        self.process = context.Process(target=_serve, args=(theirs, added))
+        # a parent that ends ends those that are daemons; others it would wait for
+        self.process = context.Process(target=_serve, args=(theirs, added), daemon=True)
         with _without_ctrl_c():
             self.process.start()
         theirs.close()
@@ -165,6 +190,7 @@ class _Worker:
     def give(self, work: Work, places: list[int]) -> None:
         self.places = places
         self.answered(work)
+        self.deadline += _IMPORT
         with contextlib.suppress(OSError):  # it has died: that is noticed next
             self.connection.send(work.part(places))
 
@@ -220,6 +246,7 @@ def _without_ctrl_c() -> Iterator[None]:
 
 def _serve(connection: Connection, added: Mapping[str, Any]) -> None:
     """What a worker process does until it is ended."""
+    multiprocessing.current_process().daemon = False  # so that a trial may start processes too
     take_added(added)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, daemon=True).start()

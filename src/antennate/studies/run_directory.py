@@ -27,7 +27,7 @@ from pathlib import Path
 from typing import IO, Any
 
 from antennate.errors import BadInputError, OutputError
-from antennate.files import decoded, read_limited, write_whole
+from antennate.files import decoded, read_limited, writing_whole
 from antennate.params.base import Params
 from antennate.params.reading import Config, read_file
 from antennate.studies.formats import from_csv, strict, to_csv, to_json, to_toml
@@ -208,7 +208,8 @@ class RunDirectory:
             command: Words of the command line, if it was one.
         """
         self.write(CONFIG, to_toml(config))
-        self.write(VERSIONS, to_json(versions()))
+        told = self.store.identity if self.store is not None else None
+        self.write(VERSIONS, to_json(versions() if told is None else told["versions"]))
         if command:
             self.write(COMMAND, shlex.join(command) + "\n")
 
@@ -248,8 +249,8 @@ class RunDirectory:
         if self.store is not None:
             self.store.holds_trials = False
 
-    def write(self, name: str, content: str | bytes) -> None:
-        """Put one file into the directory, whole or not at all.
+    def write(self, name: str, content: str | bytes | Iterator[str]) -> None:
+        """Put one file into the directory, whole or not at all; a long text comes in pieces.
 
         Raises:
             OutputError: It cannot be written.
@@ -257,8 +258,9 @@ class RunDirectory:
         path = self.path / name
         with _writing(path):
             path.parent.mkdir(exist_ok=True)
-        data = content.encode("utf-8") if isinstance(content, str) else content
-        write_whole(path, data, overwrite=True)
+        with writing_whole(path, overwrite=True) as file:
+            for piece in (content,) if isinstance(content, str | bytes) else content:
+                file.write(piece.encode() if isinstance(piece, str) else piece)
 
     def folder(self, name: str) -> Path:
         """A folder in the directory for files of the run, made if it is not there.

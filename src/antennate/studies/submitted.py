@@ -9,9 +9,11 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import BrokenExecutor
+from importlib.util import find_spec
 from typing import Any
 
-from antennate.errors import WorkerError, in_one_line
+from antennate.errors import MissingPackageError, WorkerError, in_one_line
+from antennate.messages import extra
 from antennate.studies.identity import differences, environment
 from antennate.studies.processes import added_objects, take_added
 from antennate.studies.work import Emit, Fail, Failure, Part, Waiting, Work
@@ -28,6 +30,7 @@ class Submitted:
         submit: As of an executor.
         deaths: What a future raises whose worker died.
         ahead: Parts that are submitted at once, for each worker.
+        workers: How many there are now, where that changes.
     """
 
     def __init__(
@@ -36,17 +39,20 @@ class Submitted:
         submit: Callable[..., Any],
         deaths: tuple[type[BaseException], ...] = (BrokenExecutor,),
         ahead: int = 4,
+        workers: Callable[[], int] | None = None,
     ) -> None:
         self.name, self._submit, self._deaths, self._ahead = name, submit, deaths, ahead
+        self._workers = workers
 
     def run(
         self, work: Work, parts: Sequence[Sequence[int]], count: int, emit: Emit, fail: Fail
     ) -> None:
         """Run the tasks at these places; see `Engine`."""
         waiting, running = Waiting(parts), dict[Any, list[int]]()
-        told = (environment(), added_objects())
+        told = (environment(work.packages), added_objects())
         try:
             while waiting or running:
+                count = self._workers() if self._workers is not None else count
                 while waiting and len(running) < count * self._ahead:
                     places = waiting.next()
                     running[self._submitted(work.part(places), *told)] = places
@@ -113,5 +119,17 @@ def require_same(theirs: Mapping[str, Any]) -> None:
     Raises:
         WorkerError: It has others.
     """
-    if changes := differences(theirs, environment()):
+    if changes := differences(theirs, environment(theirs["versions"])):
         raise WorkerError(f"expected workers with the driver's versions and code, found {changes}")
+
+
+def require_package(package: str, name: str) -> None:
+    """Find out whether the package of an engine is there.
+
+    Raises:
+        MissingPackageError: It is not installed.
+    """
+    if find_spec(package) is None:
+        raise MissingPackageError(
+            f"engine: expected the package {package}, found none; install it with {extra(name)}"
+        )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter, deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal, Protocol
@@ -47,6 +47,7 @@ class Work:
         timeout: Time after which a task that has not ended is given up [s].
         folder: Run directory that it belongs to, None without.
         batched: batched(tasks, emit, device) does the same on a GPU, None if nothing does.
+        packages: Optional packages whose versions workers must share.
     """
 
     function: Callable[..., Any]
@@ -55,6 +56,7 @@ class Work:
     timeout: float
     folder: Path | None = None
     batched: Callable[..., Any] | None = None
+    packages: Collection[str] = ()
 
     def part(self, places: Sequence[int]) -> Part:
         """Some of it, to be sent to a worker."""

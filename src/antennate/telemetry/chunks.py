@@ -15,7 +15,7 @@ from typing import BinaryIO, NamedTuple
 
 MAGIC = b"\x89MCAP0\r\n"
 _HEADER, _FOOTER, _SCHEMA, _CHANNEL, _MESSAGE, _CHUNK, _INDEX = range(1, 8)
-_STATISTICS, _DATA_END = 11, 15
+_CHUNK_INDEX, _STATISTICS, _DATA_END = 8, 11, 15
 _RECORD = struct.Struct("<BQ")
 _PREFIX = struct.Struct("<QQQII")
 """Of a chunk: first and last time, size and CRC of its content, length of the next word."""
@@ -24,6 +24,8 @@ _MARK = struct.pack("<I", len(_ZSTD)) + _ZSTD
 _BEFORE_MARK = _RECORD.size + _PREFIX.size - 4
 _ENTRY = struct.Struct("<HIQQ")
 _FOOT = struct.Struct("<BQQQI")
+_PLACE = struct.Struct("<QQQQI")
+"""Of an index of a chunk: first and last time, begin, length, bytes of the list of channels."""
 _LARGEST = 1 << 26
 """Most bytes of a chunk's content."""
 _LONGEST = 1 << 24
@@ -42,14 +44,16 @@ class Message(NamedTuple):
 
 
 class Chunk(NamedTuple):
-    """An intact chunk: its messages, and the channels that it describes.
+    """An intact chunk: its messages, and what it declares.
 
-    A channel has the topic, the name of the type and its definition.
+    A channel has its topic, the number of its schema and the encoding of its messages; a schema has
+    the name of a type and its definition, and may stand in an earlier chunk.
     """
 
     offset: int
     messages: tuple[Message, ...]
-    channels: Mapping[int, tuple[str, str, str]]
+    channels: Mapping[int, tuple[str, int, str]]
+    schemas: Mapping[int, tuple[str, str]]
 
 
 class Fault(NamedTuple):
@@ -63,6 +67,22 @@ class End(NamedTuple):
     """The summary of a closed file: messages of each channel."""
 
     counts: Mapping[int, int]
+
+
+class Place(NamedTuple):
+    """Where a chunk of a closed file is.
+
+    Attributes:
+        offset, length: Its begin and its length [bytes].
+        first, last: Times of its first and its last message [ns].
+        channels: Those of its messages.
+    """
+
+    offset: int
+    length: int
+    first: int
+    last: int
+    channels: frozenset[int]
 
 
 def walk(file: BinaryIO) -> Iterator[Chunk | Fault | End]:
@@ -79,16 +99,16 @@ def walk(file: BinaryIO) -> Iterator[Chunk | Fault | End]:
         at = _next_chunk(file, 0)
     closed = False
     while at is not None and at < size and not closed:
-        found, end = _record(file, at, size)
-        closed = end is None and not isinstance(found, Fault)
+        found, then = _record(file, at, size)
+        closed = then is None and not isinstance(found, Fault)
         if found is not None:
             yield found
-        if isinstance(found, Fault) and (end is None or _damaged(file, end, size)):
-            end = _next_chunk(file, at + 1)
-        at = end
-    summary = _summary(file, size)
-    if summary is not None:
-        yield summary
+        if isinstance(found, Fault) and (then is None or _damaged(file, then, size)):
+            then = _next_chunk(file, at + 1)
+        at = then
+    end = summary(file)
+    if end is not None:
+        yield end
     elif closed:
         yield Fault(size, "damaged summary")
 
@@ -152,7 +172,17 @@ def _frames_a_chunk(file: BinaryIO, at: int) -> bool:
 def _chunk(at: int, content: bytes) -> Chunk | None:
     """An intact chunk, None if it is damaged."""
     from mcap.exceptions import McapError  # slow to import
-    from zstandard import ZstdDecompressor, ZstdError
+
+    try:
+        data = _unpacked(content)
+        return None if data is None else _contents(at, data)
+    except (struct.error, ValueError, McapError):
+        return None
+
+
+def _unpacked(content: bytes) -> bytes | None:
+    """The records of a chunk, None if it is damaged."""
+    from zstandard import ZstdDecompressor, ZstdError  # slow to import
 
     begin = _PREFIX.size + len(_ZSTD)
     try:
@@ -164,9 +194,9 @@ def _chunk(at: int, content: bytes) -> Chunk | None:
         if wanted > _LARGEST:
             return None
         data = ZstdDecompressor().stream_reader(packed).read(wanted + 1)
-        return _contents(at, data) if len(data) == wanted and zlib.crc32(data) == crc else None
-    except (struct.error, ValueError, ZstdError, McapError):
+    except (struct.error, ZstdError):
         return None
+    return data if len(data) == wanted and zlib.crc32(data) == crc else None
 
 
 def _contents(at: int, data: bytes) -> Chunk:
@@ -179,8 +209,8 @@ def _contents(at: int, data: bytes) -> Chunk:
     from mcap.records import Channel, Schema
 
     messages: list[Message] = []
-    schemas: dict[int, Schema] = {}
-    channels: dict[int, tuple[str, str, str]] = {}
+    schemas: dict[int, tuple[str, str]] = {}
+    channels: dict[int, tuple[str, int, str]] = {}
     place = 0
     while place < len(data):
         kind, length = _RECORD.unpack_from(data, place)
@@ -193,44 +223,96 @@ def _contents(at: int, data: bytes) -> Chunk:
             messages.append(Message(channel, number, time, data[place + _ENTRY.size : end]))
         elif kind == _SCHEMA:
             schema = Schema.read(ReadDataStream(io.BytesIO(data[place:end])))
-            schemas[schema.id] = schema
+            schemas[schema.id] = (schema.name, schema.data.decode(errors="replace"))
         elif kind == _CHANNEL:
             found = Channel.read(ReadDataStream(io.BytesIO(data[place:end])))
-            about = schemas.get(found.schema_id)
-            name, text = ("", b"") if about is None else (about.name, about.data)
-            channels[found.id] = (found.topic, name, text.decode())
+            channels[found.id] = (found.topic, found.schema_id, found.message_encoding)
         place = end
-    return Chunk(at, tuple(messages), channels)
+    return Chunk(at, tuple(messages), channels, schemas)
 
 
-def _summary(file: BinaryIO, size: int) -> End | None:
-    """The summary at the end of a closed file, None of any other."""
+def summary(file: BinaryIO) -> End | None:
+    """The summary at the end of a closed file, None of any other.
+
+    Raises:
+        OSError: The file cannot be read.
+    """
     from mcap.data_stream import ReadDataStream
     from mcap.exceptions import McapError
     from mcap.records import Statistics
 
-    foot = size - _FOOT.size - len(MAGIC)
+    try:
+        for kind, body in _summarised(file):
+            if kind == _STATISTICS:
+                found = Statistics.read(ReadDataStream(io.BytesIO(body)))
+                return End(found.channel_message_counts)
+    except (struct.error, ValueError, McapError):
+        pass
+    return None
+
+
+def places(file: BinaryIO) -> Iterator[Place]:
+    """Where the chunks of a closed file are, in its order.
+
+    Raises:
+        OSError: The file cannot be read.
+        ValueError: Its summary says something else.
+    """
+    known: dict[frozenset[int], frozenset[int]] = {}
+    for kind, body in _summarised(file):
+        if kind == _CHUNK_INDEX:
+            try:
+                first, last, offset, length, size = _PLACE.unpack_from(body)
+                listed = struct.iter_unpack("<HQ", body[_PLACE.size : _PLACE.size + size])
+                channels = frozenset(channel for channel, _ in listed)
+            except struct.error as error:
+                raise ValueError(str(error)) from None
+            yield Place(offset, length, first, last, known.setdefault(channels, channels))
+
+
+def is_sound(file: BinaryIO, place: Place) -> bool:
+    """Whether a chunk is there with the right CRC; nothing of it is decoded.
+
+    Raises:
+        OSError: The file cannot be read.
+    """
+    return _unpacked(_content(file, place)) is not None
+
+
+def chunk_at(file: BinaryIO, place: Place) -> Chunk | None:
+    """The chunk of a place, None if it is damaged.
+
+    Raises:
+        OSError: The file cannot be read.
+    """
+    return _chunk(place.offset, _content(file, place))
+
+
+def _content(file: BinaryIO, place: Place) -> bytes:
+    """What stands in the record of a chunk; empty where there is none."""
+    file.seek(place.offset)
+    record = file.read(min(place.length, _LONGEST))
+    head = _RECORD.pack(_CHUNK, max(0, place.length - _RECORD.size))
+    return record[len(head) :] if record.startswith(head) else b""
+
+
+def _summarised(file: BinaryIO) -> Iterator[tuple[int, bytes]]:
+    """Kind and content of each record of the summary; none of a file that has no intact one."""
+    foot = file.seek(0, io.SEEK_END) - _FOOT.size - len(MAGIC)
     if foot < 0:
-        return None
+        return
     file.seek(foot)
     last = file.read()
     kind, length, start, _, crc = _FOOT.unpack_from(last)
     sound = kind == _FOOTER and length == _FOOT.size - _RECORD.size and last.endswith(MAGIC)
     if not sound or not 0 < start < foot or foot - start > _LONGEST_SUMMARY:
-        return None
+        return
     file.seek(start)
     data = file.read(foot - start)
     if zlib.crc32(last[: _FOOT.size - 4], zlib.crc32(data)) != crc:
-        return None
-    place = 0
-    try:
-        while place < len(data):
-            kind, length = _RECORD.unpack_from(data, place)
-            place += _RECORD.size
-            if kind == _STATISTICS:
-                body = ReadDataStream(io.BytesIO(data[place : place + length]))
-                return End(Statistics.read(body).channel_message_counts)
-            place += length
-    except (struct.error, ValueError, McapError):
-        pass
-    return None
+        return
+    at = 0
+    while at + _RECORD.size <= len(data):
+        kind, length = _RECORD.unpack_from(data, at)
+        at += _RECORD.size + length
+        yield kind, data[at - length : at]

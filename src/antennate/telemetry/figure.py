@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from antennate import figures as style
-from antennate.telemetry.ticks import Tick
+from antennate.telemetry.reader import LogReader
 from antennate.types import Contact, Floats, Ints, Maneuver
 
 _MOST_DRAWN = 5000
@@ -41,6 +41,7 @@ class Course:
         recorded: `Maneuver` decided then, shape (n,).
         replayed: `Maneuver` decided now, shape (n,); None without a replay.
         state: The supervisor's, n of them; empty text without one.
+        threshold: Level from which on there is contact.
     """
 
     t: Floats
@@ -50,18 +51,19 @@ class Course:
     recorded: Ints
     replayed: Ints | None
     state: Sequence[str]
+    threshold: float
 
     @classmethod
-    def of(cls, ticks: Iterable[Tick], count: int, replayed: Sequence[int] | None = None) -> Course:
+    def of(cls, log: LogReader, count: int, replayed: Sequence[int] | None = None) -> Course:
         """Every tick of a short log, some of a long one.
 
         Args:
-            ticks: The log, not empty.
+            log: The log, not empty.
             count: Ticks in it.
             replayed: `Maneuver` decided now, one a tick; None without a replay.
         """
         every = -(-count // _MOST_DRAWN)
-        kept = list(islice(ticks, 0, None, every))
+        kept = list(islice(log, 0, None, every))
         return cls(
             t=np.array([tick.now - kept[0].now for tick in kept]),
             reading=np.array([tick.reading for tick in kept]),
@@ -70,6 +72,7 @@ class Course:
             recorded=np.array([tick.maneuver for tick in kept]),
             replayed=None if replayed is None else np.array(replayed[::every]),
             state=[tick.state for tick in kept],
+            threshold=log.header.params.rule.threshold,
         )
 
 
@@ -84,6 +87,8 @@ def replay(course: Course) -> Figure:
         levels.plot(course.t, course.level[:, side], color=colour, linewidth=1, label=name)
     readings.set(ylabel="reading [counts]", title="Readings")
     readings.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=7)
+    levels.axhline(course.threshold, color=style.INK, linestyle=":", linewidth=1)
+    levels.annotate("θ", (1.005, course.threshold), xycoords=("axes fraction", "data"), va="center")
     levels.set(ylabel="b", ylim=(-0.05, 1.05), title="Bending level")
     _draw_contact(contacts, course)
     _draw_decisions(decisions, course)
@@ -101,16 +106,19 @@ def _draw_contact(panel: Axes, course: Course) -> None:
 def _draw_decisions(panel: Axes, course: Course) -> None:
     rows = {"recorded": course.recorded, "replayed": course.replayed}
     shown = {name: values for name, values in rows.items() if values is not None}
-    for height, values in enumerate(reversed(shown.values()), 1):
-        colours = [_MANEUVERS.get(value) for value in values.tolist()]
+    bands = {
+        name: [_MANEUVERS.get(value) for value in values.tolist()] for name, values in shown.items()
+    }
+    if any(course.state):
+        bands["state"] = [_STATES.get(state) for state in course.state]
+    for height, colours in enumerate(reversed(bands.values())):
         _band(panel, course.t, colours, height)
-    _band(panel, course.t, [_STATES.get(state) for state in course.state], 0)
     panel.set(
         xlabel="time [s]",
-        title="Maneuver and state",
-        yticks=[*range(len(shown), -1, -1)],
-        yticklabels=[*shown, "state"],
-        ylim=(-0.6, len(shown) + 0.6),
+        title="Maneuver and state" if "state" in bands else "Maneuver",
+        yticks=[*reversed(range(len(bands)))],
+        yticklabels=[*bands],
+        ylim=(-0.6, len(bands) - 0.4),
     )
     seen = {value for values in shown.values() for value in values.tolist()}
     key = {style.MANEUVER_NAMES[m]: style.MANEUVER_COLOURS[m] for m in Maneuver if m in seen}

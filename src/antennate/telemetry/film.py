@@ -16,6 +16,7 @@ import numpy as np
 
 from antennate.colours import MANEUVER_COLOURS, MANEUVER_NAMES, SERIES, rgba
 from antennate.errors import BadInputError, MissingPackageError
+from antennate.messages import extra
 from antennate.robots.antenna import AntennaSpec
 from antennate.sim import gl
 from antennate.sim.camera import Camera, Picture, Shot
@@ -24,8 +25,12 @@ from antennate.types import Contact, Floats, Ints, Maneuver
 
 RATE = 25
 """Pictures a second."""
+MOST_PICTURES = 10 * 60 * RATE
+"""Pictures of a film whose length nobody sets: ten minutes, 100 MB of coordinates (assumed)."""
 WIDTH, HEIGHT, STRIP = 880, 496, 150
 """Size of the picture, and height of the strip below it [pixels]."""
+PICTURE_SIZE = 4000.0
+"""Room that a picture of a film takes on disk [byte]: measured 2.8 kB for a trial in the tunnel."""
 _QUALITY = 25
 """Constant rate factor of x264: 18 is said to be lossless to the eye, 28 is poor."""
 _ENCODERS = ("libx264", "libopenh264")
@@ -83,12 +88,16 @@ class FilmRecorder:
             target: Where to look [m], 2 or 3 numbers.
             values: Whatever else is to be shown, numbers or arrays.
         """
-        if t + _ROUNDING < len(self._kept) * self._step:
+        if not self.due(t):
             return
         where = np.array([*target, 0.0][:3], dtype=float)
         self._kept.append((t, np.array(position), where))
         for name, value in values.items():
             self._values.setdefault(name, []).append(np.array(value))
+
+    def due(self, t: float) -> bool:
+        """Whether it is time for a picture."""
+        return t + _ROUNDING >= len(self._kept) * self._step
 
     def __len__(self) -> int:
         """Number of pictures."""
@@ -181,8 +190,7 @@ def _encoder() -> str:
         av = importlib.import_module("av")
     except ImportError:
         raise MissingPackageError(
-            "video: expected the package PyAV, found none; install it with "
-            "`pip install 'antennate[video]'`"
+            f"video: expected the package PyAV, found none; install it with {extra('video')}"
         ) from None
     found = [name for name in _ENCODERS if name in av.codecs_available]
     if not found:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import platform
 from collections.abc import Mapping
@@ -20,9 +21,13 @@ from antennate.telemetry.topics import CALIBRATION, CONFIG, HEADER_TOPICS, VERSI
 
 
 @lru_cache
-def versions() -> Mapping[str, str]:
-    """What numbers may depend on, by name."""
-    return {
+def versions(packages: tuple[str, ...] = ()) -> Mapping[str, str]:
+    """What numbers may depend on, by name.
+
+    Args:
+        packages: Optional packages that count too; one that is not installed is left out.
+    """
+    found = {
         "antennate": __version__,
         "python": platform.python_version(),
         "numpy": metadata.version("numpy"),
@@ -30,6 +35,11 @@ def versions() -> Mapping[str, str]:
         "mujoco": metadata.version("mujoco-core"),
         "platform": f"{platform.system()} {platform.machine()}",
     }
+    for name in packages:
+        if name not in found:
+            with contextlib.suppress(metadata.PackageNotFoundError):
+                found[name] = metadata.version(name)
+    return found
 
 
 class Header(BaseModel):
@@ -43,6 +53,8 @@ class Header(BaseModel):
         trial: Trial of that seed.
         phase: Gait phase at the first tick [rad].
         start: Unix time at which the loop's time was 0 [ns]; 0 where time is simulated.
+        arena: Settings of the trial that tell its scene, as `TrialConfig` has them without the
+            robot; empty where its run tells, or where it was no simulation.
         calibration: The calibration file of the antennae, as text; empty without one.
         versions: Versions of what wrote it, by name.
     """
@@ -56,6 +68,7 @@ class Header(BaseModel):
     trial: int | None = None
     phase: float = 0.0
     start: int = Field(default=0, ge=0, lt=1 << 62)
+    arena: Mapping[str, Any] = Field(default_factory=dict)
     calibration: str = ""
     versions: Mapping[str, str] = Field(default_factory=versions)
 
@@ -96,9 +109,7 @@ class Header(BaseModel):
             LogError: One is missing or damaged.
         """
         texts = {
-            topic: topic.type.decode(found[topic])["data"]
-            for topic in HEADER_TOPICS
-            if topic in found
+            topic: topic.decode(found[topic])["data"] for topic in HEADER_TOPICS if topic in found
         }
         if CONFIG not in texts:
             raise LogError(f"expected a header of a log, found no {CONFIG.name}")

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import re
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from itertools import chain
 from pathlib import Path
@@ -14,8 +16,12 @@ from antennate.files import open_regular
 from antennate.telemetry.chunks import Chunk, End, Fault, walk
 from antennate.telemetry.header import Header
 from antennate.telemetry.parts import parts
+from antennate.telemetry.survey import Survey, by_summary
 from antennate.telemetry.ticks import Tick
 from antennate.telemetry.topics import (
+    CONTACT_FORCES,
+    COORDINATES,
+    EVENTS,
     HEADER_TOPICS,
     MANEUVER,
     TICK_TOPICS,
@@ -25,8 +31,10 @@ from antennate.telemetry.topics import (
 
 _LISTED = 100
 """Most damaged places that are listed."""
+_BESIDE = (EVENTS, CONTACT_FORCES, COORDINATES)
+"""Topics whose messages are no part of a tick."""
 _OURS = dict(enumerate(TOPICS, 1))
-"""Channels of a file whose first chunk is lost."""
+"""Channels of a file that declares none, as its first chunk is lost."""
 _OLD = re.compile(rb"\x00.[\x01-\x09]\x01", re.S)
 """How a log from before MCAP begins: its schema and the kind of its first record."""
 _OLD_VERSION = re.compile(rb'"version": "([\w.+-]{1,30})"')
@@ -50,7 +58,7 @@ class Record(NamedTuple):
 
 
 class LogReader:
-    """The ticks of a log, one after the other; iterate once.
+    """The ticks of a log, one after the other; iterate or survey it once.
 
     Args:
         path: Its first file; those that continue it are read too.
@@ -80,7 +88,8 @@ class LogReader:
             raise LogError(f"expected a log, found {path}: {error.strerror}") from None
         self.parts = parts(path)
         self._part, self._before = path, 0
-        self._channels = _OURS
+        self._declared: dict[int, Topic] = {}
+        self._schemas: dict[int, tuple[str, str]] = {}
         self._first: dict[Topic, bytes] = {}
         self._places: Iterator[Chunk] = self._read()
         try:
@@ -88,6 +97,11 @@ class LogReader:
         except LogError:
             self._file.close()
             raise
+
+    @property
+    def _channels(self) -> Mapping[int, Topic]:
+        """The topics by their channel, as far as they are known."""
+        return self._declared or _OURS
 
     @property
     def missing(self) -> int:
@@ -111,27 +125,68 @@ class LogReader:
         Raises:
             LogError: The disk fails.
         """
+        held, begin = list[Record](), 0
         for chunk in self._places:
-            held: list[Record] = []
+            self._learn(chunk)
             for message in chunk.messages:
                 topic = self._channels.get(message.channel)
                 if topic is None or topic in HEADER_TOPICS:
                     continue
                 record = Record(topic, message.number, message.time, message.data)
                 if held and held[0].number != record.number:
-                    yield from self._grouped(chunk.offset, held)
+                    yield from self._grouped(begin, held)
                     held = []
+                begin = begin if held else chunk.offset
                 held.append(record)
-            if held:
-                yield from self._grouped(chunk.offset, held)
+            if held and not _is_part_of_a_tick(held):
+                yield from self._grouped(begin, held)
+                held = []
+        if held:
+            yield from self._grouped(begin, held)
+
+    def survey(self) -> Survey:
+        """What all of it holds, and what is damaged or missing.
+
+        Of a closed log in one file nothing but events is decoded: its summary tells the rest, and
+        the CRC of each chunk is checked. All others are read as by `groups`.
+
+        Raises:
+            LogError: The disk fails.
+        """
+        found = self._summarised()
+        if found is not None:
+            self.ticks = self.end = found.messages.get(MANEUVER, 0)
+            self.last = found.number
+            return found
+        counts, events, times = Counter[Topic](), list[tuple[int, bytes]](), list[int]()
+        for records, _ in self.groups():
+            counts.update(record.topic for record in records)
+            events += [(record.time, record.data) for record in records if record.topic is EVENTS]
+            times = [*(times or [records[-1].time])[:1], records[-1].time]
+        kept = {topic: counts[topic] for topic in TOPICS if counts[topic]}
+        begin, end = times or (0, 0)
+        return Survey(kept, events, begin, end, self.last)
+
+    def _summarised(self) -> Survey | None:
+        if len(self.parts) > 1:
+            return None
+        try:
+            return by_summary(self._file, self._channels)
+        except OSError as error:
+            raise LogError(f"expected to read {self._part}, found: {error.strerror}") from None
 
     def _grouped(
         self, offset: int, held: list[Record]
     ) -> Iterator[tuple[list[Record], Tick | None]]:
-        """The messages of one number in one chunk, as their tick if it is whole and new."""
+        """The messages of one number in one chunk, as their tick if it is whole and new.
+
+        Those beside the tick that are not of their type are left out.
+        """
+        held = [each for each in held if each.topic not in _BESIDE or self._is_sound(offset, each)]
         found = {record.topic: record.data for record in held}
         if not any(topic in found for topic in TICK_TOPICS):
-            yield held, None
+            if held:
+                yield held, None
             return
         try:
             missing = [topic.name for topic in TICK_TOPICS if topic not in found]
@@ -148,6 +203,14 @@ class LogReader:
         self.last = tick.number
         yield held, tick
 
+    def _is_sound(self, offset: int, record: Record) -> bool:
+        try:
+            record.topic.decode(record.data)
+        except LogError as error:
+            self._note(offset, str(error))
+            return False
+        return True
+
     def __enter__(self) -> LogReader:
         return self
 
@@ -156,12 +219,13 @@ class LogReader:
 
     def _read(self) -> Iterator[Chunk]:
         """The intact chunks of all files; those of later files without their header."""
+        closed = None
         try:
             for path in self.parts:
                 if path != self.path:
                     self._file.close()
-                    self._part, self._before, self.end = path, self.ticks, None
-                    self._file = open_regular(path)
+                    self._part, self._before, closed = path, self.ticks, self.end
+                    self.end, self._file = None, open_regular(path)
                 for place in walk(self._file):
                     if isinstance(place, Fault):
                         self._note(*place)
@@ -172,40 +236,58 @@ class LogReader:
                             if self._channels.get(channel) is MANEUVER
                         )
                         self.end = self._before + sum(ticks)
-                    elif not (self._first and self._repeats(place)):
+                    elif self._is_of_this_log(place):
                         yield place
+                    else:
+                        self._note(place.offset, "a file of another log")
+                        self.end = closed
+                        break
         except OSError as error:
             raise LogError(f"expected to read {self._part}, found: {error.strerror}") from None
 
-    def _repeats(self, chunk: Chunk) -> bool:
-        """Whether it is a header again, at the begin of a later file; another one is noted."""
-        found = {
-            topic: message.data
-            for message in chunk.messages
-            if (topic := self._channels.get(message.channel)) in HEADER_TOPICS
-        }
-        if found and found != self._first:
-            self._note(chunk.offset, "another header")
-        return bool(found)
+    def _is_of_this_log(self, chunk: Chunk) -> bool:
+        """Whether a later file has the header of the first one, and ticks after its last one."""
+        if self._part == self.path:
+            return True
+        self._learn(chunk)
+        found = self._of_header(chunk)
+        if any(self._first.get(topic) != data for topic, data in found.items()):
+            return False
+        numbers = [m.number for m in chunk.messages if self._channels.get(m.channel) is MANEUVER]
+        return self.ticks > self._before or min(numbers, default=math.inf) > self.last
+
+    def _of_header(self, chunk: Chunk) -> dict[Topic, bytes]:
+        found = {self._channels.get(m.channel): m.data for m in chunk.messages}
+        return {topic: found[topic] for topic in HEADER_TOPICS if topic in found}
 
     def _header(self) -> Header:
-        chunk = next(self._places, None)
-        if chunk is not None and chunk.channels:
-            self._channels = self._named(chunk)
-            found = {self._channels.get(m.channel): m.data for m in chunk.messages}
-            self._first = {topic: found[topic] for topic in HEADER_TOPICS if topic in found}
-        if self._first:
+        """The header, from the first chunks; other programs may divide them in another way."""
+        begin: list[Chunk] = []
+        for chunk in self._places:
+            begin.append(chunk)
+            self._learn(chunk)
+            self._first |= self._of_header(chunk)
+            topics = {self._channels.get(message.channel) for message in chunk.messages}
+            if topics.difference(HEADER_TOPICS) or len(self._first) == len(HEADER_TOPICS):
+                break
+        self._places = chain(begin, self._places)
+        if self._first and self._declared:
             try:
                 return Header.of_messages(self._first)
             except LogError as error:
                 raise LogError(f"{self.path}: {error}") from None
         self._refuse_old()
-        self._places = chain(() if chunk is None else (chunk,), self._places)
         ticks = sum(1 for _ in self)
         raise LogError(
             f"{self.path}: expected a log of antennate, an MCAP file, found no intact header, "
             f"{ticks} intact ticks; damaged places: {self.bad}"
         )
+
+    def _learn(self, chunk: Chunk) -> None:
+        """Take note of the channels that a chunk declares."""
+        self._schemas |= chunk.schemas
+        if chunk.channels:
+            self._declared |= self._named(chunk)
 
     def _named(self, chunk: Chunk) -> dict[int, Topic]:
         """The topics by their channel.
@@ -215,14 +297,19 @@ class LogReader:
         """
         ours = {topic.name: topic for topic in TOPICS}
         named: dict[int, Topic] = {}
-        for channel, (name, kind, schema) in chunk.channels.items():
+        for channel, (name, about, encoding) in chunk.channels.items():
             topic = ours.get(name)
             if topic is None:
                 continue
+            kind, schema = self._schemas.get(about, ("nothing", ""))
             if (kind, schema) != (topic.type.name, topic.type.schema):
                 raise LogError(
                     f"{self.path}: expected {topic.type.name} as now defined in {name}, found "
                     f"{kind} of another definition; read it with the version that wrote it"
+                )
+            if encoding != "cdr":
+                raise LogError(
+                    f"{self.path}: expected messages in {name} encoded as cdr, found {encoding}"
                 )
             named[channel] = topic
         return named
@@ -242,6 +329,12 @@ class LogReader:
         self.bad += 1
         if self.bad <= _LISTED:
             self.damage.append(Damage(offset, reason, self._part))
+
+
+def _is_part_of_a_tick(held: list[Record]) -> bool:
+    """Whether more of it may follow in the next chunk, as other programs divide them."""
+    found = {record.topic for record in held}.intersection(TICK_TOPICS)
+    return 0 < len(found) < len(TICK_TOPICS)
 
 
 def count(path: Path) -> int:

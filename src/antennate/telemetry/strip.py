@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from PIL.ImageDraw import ImageDraw
 
 WINDOW = 10.0
-"""Time that charts show [s]."""
+"""Time that charts show, or the whole of a shorter film [s]."""
 _FINE = 2
 """Drawn so many times larger, then made smaller: smooth lines."""
 _TEXT, _ROW, _EDGE = 13, 20, 10
@@ -80,6 +80,7 @@ class Strip:
         height: int,
     ) -> None:
         self._title, self._t, self._traces, self._bands = title, t, traces, bands
+        self._window = min(WINDOW, float(t[-1] - t[0])) or WINDOW
         self._size = (_FINE * width, _FINE * height)
         self._column = self._size[0] / (len(traces) + 1)
 
@@ -90,7 +91,7 @@ class Strip:
         image = Image.new("RGB", self._size, "white")
         draw = ImageDraw.Draw(image)
         draw.fontmode = "L"
-        first = int(np.searchsorted(self._t, self._t[frame] - WINDOW))
+        first = int(np.searchsorted(self._t, self._t[frame] - self._window))
         for i, trace in enumerate(self._traces):
             self._draw_trace(draw, trace, i * self._column, first, frame)
         self._draw_words(draw, len(self._traces) * self._column, first, frame)
@@ -99,7 +100,7 @@ class Strip:
     def _x(self, left: float, right: float, first: int, frame: int) -> Floats:
         """Where times are drawn: now at the right end."""
         age = self._t[frame] - self._t[first : frame + 1]
-        return right - age / WINDOW * (right - left)
+        return right - age / self._window * (right - left)
 
     def _draw_trace(
         self, draw: ImageDraw, trace: Trace, start: float, first: int, frame: int
@@ -139,7 +140,7 @@ class Strip:
         left, right = start + edge, self._size[0] - edge
         type_ = font(text)
         draw.text((left, row / 3), self._title, INK, type_)
-        time = f"{self._t[frame]:.1f} s"
+        time = f"{self._t[frame]:.{1 if self._window > 2.0 else 2}f} s"
         draw.text((right - draw.textlength(time, type_), row / 3), time, INK, type_)
         room = (self._size[1] - 1.6 * row) / max(1, len(self._bands))
         for i, band in enumerate(self._bands):

@@ -200,10 +200,10 @@ class Tick:
         values: dict[str, Any] = {}
         for topic, _ in _OWN:
             if topic in found:
-                values |= topic.type.decode(found[topic])
-        values["angles"] = JOINT_COMMANDS.type.decode(found[JOINT_COMMANDS])["position"]
+                values |= topic.decode(found[topic])
+        values["angles"] = JOINT_COMMANDS.decode(found[JOINT_COMMANDS])["position"]
         if JOINT_STATES in found:
-            state = JOINT_STATES.type.decode(found[JOINT_STATES])
+            state = JOINT_STATES.decode(found[JOINT_STATES])
             values |= {kind: state[name] for kind, name in _ONE.items()}
         return cls(**values)
 

@@ -7,8 +7,9 @@ written from here.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
+from antennate.errors import LogError
 from antennate.telemetry.cdr import MessageType
 
 
@@ -18,6 +19,17 @@ class Topic(NamedTuple):
     name: str
     type: MessageType
     meaning: str
+
+    def decode(self, data: bytes) -> dict[str, Any]:
+        """The values of a message by name.
+
+        Raises:
+            LogError: The bytes are no message of its type; says which topic and type.
+        """
+        try:
+            return self.type.decode(data)
+        except LogError as error:
+            raise LogError(f"{self.name}: {error}") from None
 
 
 _ANTENNA = """\
@@ -117,7 +129,9 @@ _STATE = MessageType("sensor_msgs/msg/JointState", _JOINT_STATE, _STATE_SCHEMA)
 _STRING = MessageType("std_msgs/msg/String", "string data\n")
 
 ANTENNA = Topic("/antenna", _own("Antenna", _ANTENNA), "readings, and what was made of them")
-MANEUVER = Topic("/maneuver", _own("Maneuver", _MANEUVER), "what the controller decided")
+MANEUVER = Topic(
+    "/maneuver", _own("Maneuver", _MANEUVER), "what the controller decided; -1 for a twin"
+)
 COUNTERS = Topic("/counters", _own("Counters", _COUNTERS), "what went wrong so far, on a robot")
 SUPERVISOR = Topic(
     "/supervisor", _own("Supervisor", _SUPERVISOR), "state of a robot's supervisor, and why"

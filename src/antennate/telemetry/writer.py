@@ -2,7 +2,8 @@
 
 A chunk is closed and handed to the operating system, in one piece, `FLUSH` after its first tick. So
 a program that is killed loses the ticks of that time and no other. A power cut may lose what the
-system still holds. Chunks hold whole ticks and are compressed; each has a CRC.
+system still holds: all of the file, or with `sync` no more than the disk is late. Chunks hold whole
+ticks and are compressed; each has a CRC.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ import contextlib
 import io
 import math
 import os
-import shutil
+import threading
 import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -19,6 +20,7 @@ from typing import Any
 
 from antennate import __version__
 from antennate.errors import LogError
+from antennate.files import require_room
 from antennate.telemetry.header import Header
 from antennate.telemetry.ticks import Tick
 from antennate.telemetry.topics import EVENTS, TOPICS, Topic
@@ -27,10 +29,12 @@ LEAST_FREE = 1e9
 """Room for six hours of ticks at 100 Hz [byte] (assumed)."""
 FLUSH = 0.2
 """Time after which the next tick closes a chunk [s], so that a tick waits 0.25 s at most."""
+SYNC = 0.5
+"""Time between two waits for the disk in real time [s], so that a power cut costs less than 1 s."""
 _CHUNK = 1 << 20
 """Bytes after which it is closed sooner, as where simulated time runs fast."""
-_LATEST = 1 << 60
-"""No message is later [ns]."""
+_LATEST = (2**31 - 1) * 10**9
+"""No message is later [ns]: seconds have 32 bits in ROS 2, up to the year 2038."""
 _LEVELS = {"HOLD": 30, "FAULT": 50, "OFF": 20, "DEGRADED": 30}
 """Levels of rcl_interfaces/msg/Log: 20 INFO, 30 WARN, 50 FATAL."""
 
@@ -43,6 +47,9 @@ class LogWriter:
         header: What stands at its beginning.
         least_free: Free space below which it is not begun [byte].
         flush: Time after which ticks are handed to the operating system [s].
+        sync: Time after which the disk is asked to have them too, by a thread that `close` ends
+            [s]; None for only at the end.
+        called: The file that errors name; None for its own path.
 
     Attributes:
         path: Where it is.
@@ -55,7 +62,13 @@ class LogWriter:
     """
 
     def __init__(
-        self, path: Path, header: Header, least_free: float = LEAST_FREE, flush: float = FLUSH
+        self,
+        path: Path,
+        header: Header,
+        least_free: float = LEAST_FREE,
+        flush: float = FLUSH,
+        sync: float | None = None,
+        called: Path | None = None,
     ) -> None:
         from mcap.writer import Writer  # slow to import
 
@@ -64,8 +77,9 @@ class LogWriter:
         self.written = self.kept = self._size = self._time = 0
         self._since, self._state = math.inf, ""
         self.failure = ""
-        self._require_room(least_free)
-        self._file = _NewFile(path)
+        self._called = called or path
+        require_room(self._called, least_free, LogError)
+        self._file = _NewFile(path, self._called)
         file: Any = self._file
         self._writer = Writer(file, chunk_size=1 << 40)
         self._writer.start("ros2", f"antennate {__version__}")
@@ -73,6 +87,8 @@ class LogWriter:
         for topic, data in header.messages().items():
             self.add(topic, 0, header.start, data)
         self.flush()
+        if sync is not None and not self.failure:
+            self._file.keep_safe(sync)
 
     def _register(self) -> dict[Topic, int]:
         schemas: dict[str, int] = {}
@@ -207,36 +223,26 @@ class LogWriter:
         with contextlib.suppress(OSError):
             self._file.close()
         raise LogError(
-            f"expected to write {self.path}, found: {self.failure}; the log ends after "
+            f"expected to write {self._called}, found: {self.failure}; the log ends after "
             f"{self.kept} ticks"
         ) from None
-
-    def _require_room(self, least: float) -> None:
-        try:
-            free = shutil.disk_usage(self.path.parent).free
-        except OSError as error:
-            raise LogError(
-                f"expected a folder to write {self.path}, found: {error.strerror}"
-            ) from None
-        if free < least:
-            raise LogError(
-                f"expected {1e-9 * least:g} GB free for {self.path}, found {1e-9 * free:.2g} GB"
-            )
 
 
 class _NewFile(io.BufferedIOBase):
     """A new file that takes what was written to it in one piece, once it is flushed."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, called: Path) -> None:
         self._held, self._at, self._file = bytearray(), 0, -1
+        self._path, self._over, self._lost = path, threading.Event(), ""
+        self._syncing: threading.Thread | None = None
         try:
             self._file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o644)
         except FileExistsError:
             raise LogError(
-                f"expected a log that does not exist yet, found {path}; choose another name"
+                f"expected a log that does not exist yet, found {called}; choose another name"
             ) from None
         except OSError as error:
-            raise LogError(f"expected to write {path}, found: {error.strerror}") from None
+            raise LogError(f"expected to write {called}, found: {error.strerror}") from None
 
     def write(self, data: bytes) -> int:  # type: ignore[override]
         """Hold it until the next flush."""
@@ -254,6 +260,8 @@ class _NewFile(io.BufferedIOBase):
             OSError: It was not taken, or only in part.
         """
         held, self._held = self._held, bytearray()
+        if self._lost:
+            raise OSError(self._lost)
         if not held:
             return
         count = os.write(self._file, held)
@@ -265,9 +273,35 @@ class _NewFile(io.BufferedIOBase):
         """Wait until the disk has it."""
         os.fsync(self._file)
 
+    def keep_safe(self, period: float) -> None:
+        """From now on let a thread wait for the disk every period [s], until it is closed."""
+        self._syncing = threading.Thread(target=self._sync_always, args=(period,), daemon=True)
+        self._syncing.start()
+
+    def _sync_always(self, period: float) -> None:
+        with contextlib.suppress(OSError):  # not every file system can
+            folder = os.open(self._path.parent, os.O_RDONLY | os.O_CLOEXEC)
+            try:
+                os.fsync(folder)  # the name of the file
+            finally:
+                os.close(folder)
+        try:
+            while not self._over.wait(period):
+                _sync_data(self._file)
+        except OSError as error:
+            self._lost = str(error.strerror or error)
+
     def close(self) -> None:
         """Close it; what is held is lost."""
         self._held.clear()
+        self._over.set()
+        if self._syncing is not None:
+            self._syncing.join()
         if self._file >= 0:
             file, self._file = self._file, -1
             os.close(file)
+
+
+def _sync_data(file: int) -> None:
+    """Wait until the disk has the bytes of a file, if not its times."""
+    getattr(os, "fdatasync", os.fsync)(file)

@@ -128,7 +128,9 @@ class ServoBus:
 
     def _sync_write(self, t: float, present: list[Servo], params: bytes) -> None:
         address, length = two_words(params)
-        known = {servos[0].get("id"): servos for servos in self._by_id(present)}
+        known: dict[int, list[Servo]] = {}
+        for servo in present:
+            known.setdefault(servo.get("id"), []).append(servo)
         for at in range(4, len(params) - length, length + 1):
             for servo in known.get(params[at], ()):
                 servo.write(address, params[at + 1 : at + 1 + length])
@@ -198,7 +200,7 @@ class ServoBus:
         start = t + (RETURN_DELAY_UNIT * servo.get("return_delay_time") if delay is None else delay)
         if trouble and trouble.fault is Fault.LATE:
             start += trouble.delay
-        data = bytes(_collide(replies))
+        data = replies[0] if len(replies) == 1 else bytes(_collide(replies))
         data = spoil(data, trouble.fault) if trouble else data
         end = start + self._byte_time * len(data)
         if not (self.loss and self._rng.random() < self.loss):
@@ -220,7 +222,9 @@ class ServoBus:
 
     def _trouble_of(self, servo: Servo) -> Trouble | None:
         """A fault stays with its servo when the id of that changes."""
-        return servo.trouble or self.trouble.get(self._first_ids.get(id(servo), servo.get("id")))
+        if servo.trouble or not self.trouble:
+            return servo.trouble
+        return self.trouble.get(self._first_ids.get(id(servo), servo.get("id")))
 
     def _use(self, servo: Servo) -> Trouble | None:
         trouble = self._trouble_of(servo)

@@ -15,7 +15,7 @@ from antennate.hardware.dynamixel.tables import (
 from antennate.robots.servos import TICKS_A_TURN, ServoParams
 from antennate.twin.memory import Memory
 from antennate.twin.motion import Motion, steepest
-from antennate.twin.motor import CREEP, FRICTION, FULL, LOOP, RATINGS, Loops
+from antennate.twin.motor import CREEP, FRICTION, FULL, LOOP, RATINGS
 from antennate.twin.planner import SPEED_UNIT
 
 _TICK = 2.0 * math.pi / TICKS_A_TURN
@@ -64,16 +64,8 @@ class DrivenMotion(Motion):
     stands: float | None = None
 
     def __init__(self, memory: Memory, position: float) -> None:
-        self._loops = Loops()
         super().__init__(memory, position)
         self._new_gain = memory.table["position_p_gain"].default or 1
-
-    def refresh(self, t: float) -> bool:
-        """Take note of registers that have changed."""
-        if not super().refresh(t):
-            return False
-        self._loops.read(self.memory)
-        return True
 
     def move(self, t: float) -> bool:
         """The physics does, and says so in `feel`."""

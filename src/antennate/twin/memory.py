@@ -7,7 +7,7 @@ are silent, a read that touches an undefined byte is refused as a whole.
 from __future__ import annotations
 
 from antennate.hardware.dynamixel.packets import StatusError
-from antennate.hardware.dynamixel.tables import Register, Table
+from antennate.hardware.dynamixel.tables import GOALS, Register, Table
 
 
 class Memory:
@@ -22,11 +22,12 @@ class Memory:
     Attributes:
         table: The model.
         version: Counts the changes by `set`, so that what follows from them can be kept.
+        settings: The same without changes of goals.
     """
 
     def __init__(self, table: Table) -> None:
         self.table = table
-        self.version = 0
+        self.version = self.settings = 0
         self._stored: bytes | None = None
         registers = table.registers.values()
         self._bytes = bytearray(max(r.address + r.size for r in registers))
@@ -34,24 +35,26 @@ class Memory:
         self._where = {
             r.name: (slice(r.address, r.address + r.size), r.size, r.signed) for r in registers
         }
+        self._values: dict[str, int] = {}
         self._defined = {a for r in registers for a in range(r.address, r.address + r.size)}
         for register in registers:
             self.set(register.name, register.default or 0)
 
     def get(self, name: str) -> int:
         """The value of a register."""
-        where, _, signed = self._where[name]
-        return int.from_bytes(self._bytes[where], "little", signed=signed)
+        return self._values[name]
 
     def set(self, name: str, value: int) -> None:
         """Change a register, whatever its access."""
         self.show(name, value)
         self.version += 1
+        self.settings += name not in GOALS
 
     def show(self, name: str, value: int) -> None:
         """Change a register that only tells what happens, such as a present velocity."""
         where, size, signed = self._where[name]
         self._bytes[where] = value.to_bytes(size, "little", signed=signed)
+        self._values[name] = value
 
     def read(self, address: int, length: int) -> tuple[StatusError, bytes]:
         """Bytes from an address on."""
@@ -104,8 +107,7 @@ class Memory:
         for register in self.table.registers.values():
             if self._stored and _backed_up(register) and not (ram_only and register.eeprom):
                 where, _, _ = self._where[register.name]
-                self._bytes[where] = self._stored[where]
-        self.version += 1
+                self.set(register.name, register.decode(self._stored[where]))
 
     def _places(self, address: int, length: int) -> list[int]:
         """Where the bytes from an address on really lie."""

@@ -48,11 +48,12 @@ class Motion:
         self.memory = memory
         self.shaft = self._make_shaft(position)
         self.plan = Planner(memory)
+        self._loops = Loops()
         self.stopped = False
         self.sign = 1
         self.mode, self.torque, self.limit = POSITION_MODE, False, 1.0
         self._base = self._homing = 0
-        self._version = -1
+        self._version = self._settings = -1
         self._t = 0.0
 
     @property
@@ -94,10 +95,19 @@ class Motion:
         self.memory.version += 1
 
     def refresh(self, t: float) -> bool:
-        """Take note of registers that have changed by time t [s]; whether any have."""
+        """Take note of registers that have changed by time t [s]; whether any but goals have."""
         if self._version == self.memory.version:
             return False
         self._version = self.memory.version
+        self._changed(t)
+        if self._settings == self.memory.settings:
+            return False
+        self._settings = self.memory.settings
+        self._loops.read(self.memory)
+        return True
+
+    def _changed(self, t: float) -> None:
+        """Registers have changed by time t [s]."""
         get = self.memory.get
         sign = -1 if get("drive_mode") & REVERSED else 1
         if sign != self.sign:
@@ -110,7 +120,6 @@ class Motion:
         now = (self.position, self.sign * self.shaft.speed)
         if self.plan.follow(t, self.driven, now, self._base):
             self._begin()
-        return True
 
     def move(self, t: float) -> bool:
         """Let the shaft turn until t [s]; whether there may be something to tell."""
@@ -155,17 +164,8 @@ class MotorMotion(Motion):
     shaft: Motor
 
     def __init__(self, memory: Memory, position: float) -> None:
-        self._loops = Loops()
         self.resting = False
         super().__init__(memory, position)
-
-    def refresh(self, t: float) -> bool:
-        """Take note of registers that have changed."""
-        if not super().refresh(t):
-            return False
-        self.resting = False
-        self._loops.read(self.memory)
-        return True
 
     def move(self, t: float) -> bool:
         """Let the motor turn the shaft until t [s]."""
@@ -191,6 +191,10 @@ class MotorMotion(Motion):
 
     def _make_shaft(self, position: float) -> Shaft:
         return Motor(position, RATINGS[self.memory.table.model])
+
+    def _changed(self, t: float) -> None:
+        super()._changed(t)
+        self.resting = False
 
     def _begin(self) -> None:
         self._loops.total = 0.0

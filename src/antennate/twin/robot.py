@@ -64,6 +64,7 @@ class TwinRobot:
         bus: The servos on their wire.
         plugging: Plugs servos in and turns shafts, by orders.
         t: Time up to which everything has happened [s].
+        command: Goals of the servos in the last tick of the physics, as angles of the joints.
         touch: Bends the antennae of the standing robot, None for no touches.
         board_silent: The board sends nothing.
         on_return: Called when the robot is carried back to the start, for another drive.
@@ -87,6 +88,7 @@ class TwinRobot:
         self._body = body
         self._watch = watch
         self._joints = Joints(robot)
+        self.command = self._joints.command(np.array(robot.zeros, float))
         self._sign: Floats = np.array(robot.directions, float)
         kinds = [robot.servos.of(name) for name in robot.servo_names]
         self._stall: Floats = np.array([kind.stall_torque for kind in kinds])
@@ -165,7 +167,8 @@ class TwinRobot:
         if pulls is None:
             return None
         goals, gain, push, brake, low, high = pulls.T
-        self._body.write(self._joints.command(goals))
+        self.command = self._joints.command(goals)
+        self._body.write(self.command)
         bounds = np.sort(self._sign * np.stack([low, high]), axis=0)
         drives = np.vstack([gain, self._sign * push, brake, bounds])
         self._body.world(0).servo_drives.set(drives)

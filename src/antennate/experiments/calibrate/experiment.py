@@ -144,6 +144,7 @@ EXPERIMENT = Experiment.of_folder(
     lambda config, workers, on_step, _: calibrate.run(config, workers, on_step),
     tables,
     sentence,
+    filmed=True,
     files=_files,
     check=require_solver,
     parts="pushes",

@@ -12,7 +12,7 @@ from antennate.params.base import Params, number
 from antennate.params.bench import Solver
 from antennate.params.scene import BenchPhysicsParams
 from antennate.robots.antenna import AntennaSpec
-from antennate.sim.bench import Bench, Slider, compile_bench
+from antennate.sim.bench import Bench, Slider, Watch, compile_bench
 from antennate.sim.chain import ChainBench
 from antennate.types import Floats
 
@@ -61,8 +61,12 @@ class Push:
     speed: float
     gap: float
 
-    def run(self, ticks: int, solver: Solver) -> tuple[Floats, Floats, Floats]:
+    def run(
+        self, ticks: int, solver: Solver, watch: Watch | None = None
+    ) -> tuple[Floats, Floats, Floats]:
         """Time [s], flex [rad] and way of the rod from the first touch [m], each shape (ticks,).
+
+        `watch` looks at the bench of the engine after each physics step; the chain has none.
 
         Raises:
             MissingPackageError: The solver needs a package that is not installed.
@@ -70,7 +74,7 @@ class Push:
         """
         t = np.asarray(np.arange(ticks) * (1.0 / self.antenna.sensor.rate), np.float64)
         told = self._told(t)
-        flex, y = self._on_chain(told) if solver == "chain" else self._on_engine(told)
+        flex, y = self._on_chain(told) if solver == "chain" else self._on_engine(told, watch)
         return t, flex, y + self._touch
 
     @property
@@ -92,7 +96,7 @@ class Push:
         y = -self._touch - self.gap + np.where(back, 2 * whole - way, way)
         return np.stack([y, np.where(back, -self.speed, self.speed)], axis=-1)
 
-    def _on_engine(self, told: Floats) -> tuple[Floats, Floats]:
+    def _on_engine(self, told: Floats, watch: Watch | None) -> tuple[Floats, Floats]:
         """Flex [rad] and place of the rod [m] before the commands of each tick."""
         model = compile_bench(self.physics, self.antenna, probe_radius=self.rig.rod_radius)
         for i, factor in enumerate(self.factors):
@@ -106,7 +110,7 @@ class Push:
             rows.append((bench.flex(), float(rod.position[1])))
             for y, speed in commands:
                 rod.command(self.rig.place, y, 0.0, speed)
-                bench.step(self._steps)
+                bench.step(self._steps, watch)
         flex, y = np.array(rows).T
         return flex, y
 

@@ -28,6 +28,7 @@ from antennate.params.base import Params, number
 from antennate.params.bench import BenchVariationParams, Solver, solver
 from antennate.params.scene import BenchPhysicsParams
 from antennate.robots.antenna import AntennaSpec
+from antennate.sim.bench import Watch
 from antennate.sim.chain import require_read, warm_up
 from antennate.studies.experiment import OnStep, Outcome, no_step
 from antennate.studies.pool import gather
@@ -168,8 +169,8 @@ class CalibrateOutcome(Outcome):
         return "\n".join(["[control.conditioning]", *lines]) + "\n"
 
 
-def push(config: CalibrateConfig, trial: int) -> Recording:
-    """One push of the rig.
+def push(config: CalibrateConfig, trial: int, watch: Watch | None = None) -> Recording:
+    """One push of the rig; `watch` looks at the bench of the engine after each physics step.
 
     Raises:
         SimulationError: The physics became invalid.
@@ -184,7 +185,7 @@ def push(config: CalibrateConfig, trial: int) -> Recording:
     noise = reading_noise(config.antenna.sensor, rng, (ticks,))
     sensor = SensorChain(config.antenna.sensor, (), 1.0 / config.antenna.sensor.rate)
     t, flex, way = Push(config.physics, config.antenna, rig, factors, speed, gap).run(
-        ticks, config.solver
+        ticks, config.solver, watch
     )
     counts = np.array([sensor.step(f, float(n)) for f, n in zip(flex, noise, strict=True)])
     bend = way / rig.depth

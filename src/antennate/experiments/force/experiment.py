@@ -55,5 +55,5 @@ def sentence(result: Mapping[str, Any]) -> str:
 
 
 EXPERIMENT = Experiment.of_folder(
-    __name__, ForceConfig, force.run, tables, sentence, parts="profiles"
+    __name__, ForceConfig, force.run, tables, sentence, filmed=True, parts="profiles"
 )

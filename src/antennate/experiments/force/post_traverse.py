@@ -13,7 +13,7 @@ import numpy as np
 from antennate.errors import SimulationError
 from antennate.params.scene import BenchPhysicsParams
 from antennate.robots.antenna import AntennaSpec
-from antennate.sim.bench import Ball, Bench, compile_bench
+from antennate.sim.bench import Ball, Bench, Watch, compile_bench
 from antennate.types import Floats
 
 _CLEARANCE = 0.03
@@ -51,6 +51,7 @@ def drag(
     post_radius: float,
     limit: float,
     rate: float,
+    watch: Watch | None = None,
 ) -> Traverse:
     """Drag the antenna past a post until it slips off or a hinge exceeds its limit.
 
@@ -62,6 +63,7 @@ def drag(
         post_radius: Radius of the post [m].
         limit: Largest hinge angle that still counts [rad].
         rate: Samples a second [Hz].
+        watch: Looks at the bench after each physics step.
     """
     post = Ball(overlap * antenna.length, -(post_radius + antenna.radius + _CLEARANCE), post_radius)
     bench = Bench(compile_bench(physics, antenna, [post]), antenna)
@@ -73,7 +75,7 @@ def drag(
     try:
         while bench.t < end and bench.t - last < _LOST:
             bench.command(0.0, -way(bench.t, speed), 0.0, -speed_at(bench.t, speed), 0.0)
-            force = float(np.linalg.norm(bench.press(steps)))
+            force = float(np.linalg.norm(bench.press(steps, watch)))
             if abs(bench.hinges()).max() > limit:
                 break
             if force > 0.0:

@@ -24,7 +24,7 @@ from antennate.experiments.force.loads import (
 )
 from antennate.experiments.force.post_traverse import Traverse, drag
 from antennate.experiments.reading import between
-from antennate.robots.antenna import AntennaSpec
+from antennate.sim.bench import Watch
 from antennate.studies.experiment import OnRow, OnStep, no_row, no_step
 from antennate.studies.pool import gather
 from antennate.studies.regression import by_group, explained
@@ -125,7 +125,7 @@ def study_profile(config: ForceConfig, profile: str) -> ProfileOutcome:
     largest = largest_force(chain, limit)
     plain, left_out = static_loads(config, profile, 0.0)
     rubbed, also_out = static_loads(config, profile, config.antenna.friction)
-    rows, traverses = _traverse_all(config, profile, antenna, limit)
+    rows, traverses = _traverse_all(config, profile)
     dragged = traverse_points(config, traverses)
     guess = closed_form(chain, dragged, config, largest)
     settled = dragged.age >= config.conditioning.averaging_time
@@ -156,36 +156,39 @@ def study_profile(config: ForceConfig, profile: str) -> ProfileOutcome:
     return ProfileOutcome(profile, summary, rows, plain, dragged)
 
 
-def _traverse_all(
-    config: ForceConfig, profile: str, antenna: AntennaSpec, limit: float
-) -> tuple[list[TraverseRow], list[Traverse]]:
-    rows, found = [], []
-    for k in range(config.traverses):
-        chance = float(np.random.default_rng([config.seed, 1, k]).uniform())
-        share = (k + chance) / config.traverses
-        overlap = config.from_place + (1.0 - config.from_place) * share
-        speed = config.speeds[k % len(config.speeds)]
-        one = drag(
-            config.physics,
-            *(antenna, overlap, speed, config.post_radius, limit, antenna.sensor.rate),
-        )
-        found.append(one)
-        rows.append(
-            TraverseRow(
-                config.seed,
-                k,
-                profile,
-                "invalid" if one.reason else "valid",
-                overlap,
-                speed,
-                len(one.flex),
-                float(one.flex.max(initial=0.0)),
-                float(one.force.max(initial=0.0)),
-                float(one.place[-1]) if len(one.place) else 0.0,
-                one.reason,
-            )
-        )
-    return rows, found
+def _traverse_all(config: ForceConfig, profile: str) -> tuple[list[TraverseRow], list[Traverse]]:
+    found = [traverse(config, profile, k) for k in range(config.traverses)]
+    return [row for row, _ in found], [one for _, one in found]
+
+
+def traverse(
+    config: ForceConfig, profile: str, k: int, watch: Watch | None = None
+) -> tuple[TraverseRow, Traverse]:
+    """The k-th traverse of a profile; `watch` looks at the bench after each physics step."""
+    antenna, limit = with_profile(config.antenna, profile), math.radians(config.hinge_limit_deg)
+    chance = float(np.random.default_rng([config.seed, 1, k]).uniform())
+    share = (k + chance) / config.traverses
+    overlap = config.from_place + (1.0 - config.from_place) * share
+    speed = config.speeds[k % len(config.speeds)]
+    one = drag(
+        config.physics,
+        *(antenna, overlap, speed, config.post_radius, limit, antenna.sensor.rate),
+        watch,
+    )
+    row = TraverseRow(
+        config.seed,
+        k,
+        profile,
+        "invalid" if one.reason else "valid",
+        overlap,
+        speed,
+        len(one.flex),
+        float(one.flex.max(initial=0.0)),
+        float(one.force.max(initial=0.0)),
+        float(one.place[-1]) if len(one.place) else 0.0,
+        one.reason,
+    )
+    return row, one
 
 
 def closed_form(chain: Chain, points: Points, config: ForceConfig, largest: float) -> Floats:

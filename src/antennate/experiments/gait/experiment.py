@@ -99,5 +99,6 @@ EXPERIMENT = Experiment.of_folder(
     check=gait.check,
     filmed=True,
     parts="walks",
-    viewed=lambda config, on_step, on_row, view, logs: gait.run(config, 1, on_step, view),
+    logged=lambda config, workers, on_step, _, logs: gait.run(config, workers, on_step, logs=logs),
+    viewed=lambda config, on_step, _, view, logs: gait.run(config, 1, on_step, view, logs),
 )

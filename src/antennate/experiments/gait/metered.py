@@ -16,10 +16,10 @@ class MeteredWorld(World):
 
     work = 0.0
 
-    def step(self, count: int) -> None:
+    def advance(self, count: int) -> None:
         """Advance by `count` physics steps; every one of them counts with its own power."""
         for _ in range(count):
-            super().step(1)
+            super().advance(1)
             self.work += self._positive_power() * self.model.opt.timestep
 
     def _positive_power(self) -> float:

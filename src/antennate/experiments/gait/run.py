@@ -7,9 +7,12 @@ FORWARD is walked again for numbers that are not known, drawn from their ranges.
 
 from __future__ import annotations
 
+import contextlib
 import math
+import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -20,7 +23,7 @@ from antennate.experiments.gait.config import GaitStudyConfig
 from antennate.experiments.gait.metered import MeteredWorld
 from antennate.experiments.gait.pace import Pace, Walk, measure, rolling_speed
 from antennate.experiments.gait.unknown import drawn
-from antennate.params.control import GaitParams
+from antennate.params.control import ControlParams, GaitParams
 from antennate.params.scene import VariationParams
 from antennate.robots.spec import RobotSpec
 from antennate.sim.scenes.scene import FlatScene
@@ -29,8 +32,10 @@ from antennate.sim.trial import place_at_start
 from antennate.sim.world import World, compile_world
 from antennate.studies.experiment import OnStep, Outcome, no_step
 from antennate.studies.pool import gather
+from antennate.telemetry.header import Header
+from antennate.telemetry.simulated import SimulatedLog
 from antennate.telemetry.view.simulation import SimulationView
-from antennate.types import AntennaFrame, Floats, JointCommand, Maneuver
+from antennate.types import AntennaFrame, Contact, Floats, JointCommand, Maneuver
 
 MANEUVERS = (Maneuver.FORWARD, Maneuver.TURN_L, Maneuver.TURN_R, Maneuver.REVERSE)
 WAVE_OFF = "wave_off"
@@ -130,16 +135,22 @@ class GaitOutcome(Outcome):
 
 
 class _Fixed:
-    """A control of one idea: always the same maneuver."""
+    """A control of one idea: always the same maneuver, whatever the antennae feel."""
 
     def __init__(
         self, gait: GaitParams, robot: RobotSpec, maneuver: Maneuver, period: float
     ) -> None:
         self._gait = Gait(gait, robot, 1, period)
-        self._maneuver = np.array([int(maneuver)])
+        self.maneuver = np.array([int(maneuver)])
+        self.contact = np.full((1, 2), int(Contact.UNKNOWN))
+        self.level = np.full((1, 2), math.nan)
+
+    @property
+    def phase(self) -> Floats:
+        return self._gait.phase
 
     def step(self, frame: AntennaFrame) -> JointCommand:
-        return self._gait.step(self._maneuver)
+        return self._gait.step(self.maneuver)
 
 
 def check(config: GaitStudyConfig) -> None:
@@ -152,6 +163,8 @@ def check(config: GaitStudyConfig) -> None:
 
 
 _Task = tuple[GaitStudyConfig, str, GaitParams, Maneuver]
+LOGGED = "gait"
+"""What stands for the controller in the log of a walk: a maneuver that nobody decides."""
 
 
 Watch = Callable[[World, AntennaFrame], None]
@@ -164,11 +177,21 @@ def walk_flat(
     gait: GaitParams,
     maneuver: Maneuver,
     watch: Watch = lambda world, frame: None,
+    logs: Path | None = None,
 ) -> Walk:
     """Walk one maneuver on the flat floor from a straight start.
 
+    Args:
+        config: The study.
+        name: Name of the walk.
+        gait: The gait.
+        maneuver: The maneuver.
+        watch: Takes world and frame after each tick.
+        logs: Folder for its log, None for no log.
+
     Raises:
         SimulationError: The physics became invalid.
+        LogError: The log cannot be written.
     """
     robot, period = config.robot, 1.0 / config.rate
     scene = FlatScene().draw(robot, np.random.default_rng(0))
@@ -178,16 +201,23 @@ def walk_flat(
     body.load(0, world, _no_chance(robot, period))
     end = (config.settling_cycles + config.cycles) / gait.frequency
     ticks: list[tuple[float, Floats, float]] = []
+    control = _Fixed(gait, robot, maneuver, period)
 
     def go_on(frame: AntennaFrame, command: JointCommand) -> bool:
         failure = body.failure(0)
         if failure is not None:
             raise failure
+        if log is not None:
+            log.take(frame, command)
         watch(world, frame)
         ticks.append((world.t, world.links(), world.work))
         return world.t < end - _TINY
 
-    run_loop(body, _Fixed(gait, robot, maneuver, period), period, go_on)
+    with contextlib.ExitStack() as stack:
+        log = (
+            None if logs is None else stack.enter_context(_log(logs, config, name, control, world))
+        )
+        run_loop(body, control, period, go_on)
     links = np.array([tick[1] for tick in ticks])
     half = robot.links // 2
     axis = links[:, :half].mean(axis=1) - links[:, half:].mean(axis=1)
@@ -202,6 +232,17 @@ def walk_flat(
         weight=float(world.model.body_mass.sum() * np.linalg.norm(world.model.opt.gravity)),
         length=config.length,
     )
+
+
+def _log(
+    folder: Path, config: GaitStudyConfig, name: str, control: _Fixed, world: World
+) -> SimulatedLog:
+    """The log of a walk, in place of what a killed run left of it."""
+    path = folder / (re.sub(r"[^\w.-]", "_", name) + ".mcap")
+    path.unlink(missing_ok=True)
+    params = ControlParams(rate=config.rate, gait=config.gait)
+    header = Header(controller=LOGGED, params=params, robot=config.robot)
+    return SimulatedLog(path, header, control, world)
 
 
 def _no_chance(robot: RobotSpec, period: float) -> Disturbance:
@@ -241,7 +282,14 @@ def _changed(gait: GaitParams, **values: float) -> GaitParams:
     return GaitParams(**{**gait.model_dump(), **values})
 
 
-def _walk_viewed(tasks: Sequence[_Task], on_step: OnStep, view: SimulationView) -> Iterator[Walk]:
+def _walk_logged(task: _Task, logs: Path | None) -> Walk:
+    """One walk, with its log if there is a folder."""
+    return walk_flat(*task, logs=logs)
+
+
+def _walk_viewed(
+    tasks: Sequence[_Task], on_step: OnStep, view: SimulationView, logs: Path | None
+) -> Iterator[Walk]:
     """All walks on a page, one after the other."""
     for done, (config, name, gait, maneuver) in enumerate(tasks, start=1):
 
@@ -249,7 +297,7 @@ def _walk_viewed(tasks: Sequence[_Task], on_step: OnStep, view: SimulationView) 
             view.tick(world.model, world.data, frame, maneuver=int(maneuver))
 
         view.begin(name.replace("_", " "))
-        yield walk_flat(config, name, gait, maneuver, watch)
+        yield walk_flat(config, name, gait, maneuver, watch, logs)
         on_step(done, len(tasks))
 
 
@@ -258,20 +306,23 @@ def run(
     workers: int = 1,
     on_step: OnStep = no_step,
     view: SimulationView | None = None,
+    logs: Path | None = None,
 ) -> GaitOutcome:
     """Walk all maneuvers, the one without body wave, the sweep, and the unknown numbers.
 
-    With a view they run in this process, one after the other, and give the same.
+    With a view they run in this process, one after the other, and give the same. The log of each
+    goes to a folder if one is given.
 
     Raises:
         ConfigError: A draw of the unknown numbers makes no robot or gait.
+        LogError: A log cannot be written.
         SimulationError: The physics became invalid; from a worker it comes as a WorkerError.
     """
     tasks = _tasks(config)
     if view is None:
-        walks = gather(walk_flat, tasks, workers, on_step)
+        walks = gather(_walk_logged, [(task, logs) for task in tasks], workers, on_step)
     else:
-        walks = list(_walk_viewed(tasks, on_step, view))
+        walks = list(_walk_viewed(tasks, on_step, view, logs))
     found = {walk.name: walk for walk in walks}
     return GaitOutcome(
         config=config,

@@ -110,9 +110,9 @@ def _contact(result: Mapping[str, Any]) -> Finding:
     return Finding(
         f"F1 {found['f1']:.2f} ({low:.2f} to {high:.2f}); to say always contact {always:.2f}",
         judged(False, low > always),
-        "At a threshold of one half strong contacts are told and grazes are not: what is called "
-        f"contact is so in {100 * found['precision']:.0f} %, and {100 * found['recall']:.0f} % of "
-        "contact is called so.",
+        "With a threshold of one half strong contacts are found and grazes are not: "
+        f"{100 * found['precision']:.0f} % of the time that is called contact is contact, and "
+        f"{100 * found['recall']:.0f} % of the time in contact is called so.",
         (Bar("always contact", always), Bar("ours", found["f1"], (low, high))),
     )
 

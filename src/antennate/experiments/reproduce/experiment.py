@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from antennate.experiments.reproduce.page import body
-from antennate.experiments.reproduce.run import ReproduceConfig, run
+from antennate.experiments.reproduce.run import CLAIMS, ReproduceConfig, run
 from antennate.experiments.reproduce.verdict import VERDICTS
 from antennate.studies.experiment import Experiment
 from antennate.studies.measures import Table
@@ -29,7 +29,9 @@ def sentence(result: Mapping[str, Any]) -> str:
         f"{result['verdicts'].get(name, 0)} {text}" for name, text in VERDICTS.items()
     )
     few = " With --quick the intervals are wide." if result["quick"] else ""
-    return f"Of {len(result['claims'])} claims: {found}.{few}"
+    unjudged = len(CLAIMS) - len(result["claims"])
+    left = f", {unjudged} not judged" if unjudged else ""
+    return f"Of {len(CLAIMS)} claims: {found}{left}.{few}"
 
 
 EXPERIMENT = Experiment.of_folder(

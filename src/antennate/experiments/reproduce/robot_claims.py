@@ -1,100 +1,26 @@
-"""What the paper says of boulders, gait and tunnel."""
+"""What the paper says of gait and tunnel."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from typing import Any
 
-from antennate.experiments.reproduce.verdict import Bar, Claim, Finding, agrees, judged
+from antennate.experiments.reproduce.verdict import (
+    Bar,
+    Claim,
+    Finding,
+    above,
+    agrees,
+    counted,
+    judged,
+    share_of,
+)
 from antennate.studies.statistics import wilson95
 
-_LIMIT_DEG = 30.0
-"""Deflection of a spring that the paper states [deg]."""
 _NEAR_POINTS = 15.0
 """Distance from the paper's share of robots that cross [points] that agrees with it."""
-_WINDOW = (
-    "at a base angle of 53°, which was chosen on a map: the angle at which the tip meets the "
-    "spheres decides, and the taper moves that border by three to five degrees"
-)
-
-
-def _share(row: Mapping[str, Any], key: str = "successes") -> tuple[float, tuple[float, float]]:
-    """Share of valid trials [%] with its 95 % interval."""
-    valid = row["trials"] - row["invalid"]
-    low, high = wilson95(row[key], valid)
-    return 100.0 * row[key] / max(valid, 1), (100.0 * low, 100.0 * high)
-
-
-def _of(row: Mapping[str, Any], key: str = "successes") -> str:
-    return f"{row[key]} of {row['trials'] - row['invalid']}"
-
-
-def _stiff(result: Mapping[str, Any]) -> Finding:
-    row = result["profiles"]["stiff"]
-    share, interval = _share(row, "jams")
-    return Finding(
-        f"{_of(row, 'jams')} jam",
-        judged(False, share > 50),
-        f"It jams {_WINDOW}.",
-        (Bar("paper", 100.0), Bar("ours", share, interval)),
-    )
-
-
-def _soft(result: Mapping[str, Any]) -> Finding:
-    row = result["profiles"]["compliant"]
-    share, interval = _share(row, "slips")
-    return Finding(
-        f"{_of(row, 'slips')} slip, {_of(row, 'jams')} jam",
-        judged(False, share > 50),
-        f"It slips {_WINDOW}."
-        if share > 50
-        else "The soft antenna does not slip: without a second force beside its springs, such as "
-        "weight, a soft chain takes the same shapes as a stiff one.",
-        (Bar("paper", 100.0), Bar("ours", share, interval)),
-    )
-
-
-def _descending(result: Mapping[str, Any]) -> Finding:
-    row = result["profiles"]["descending"]
-    share, interval = _share(row)
-    return Finding(
-        f"{_of(row)} pass",
-        judged(False, share > 80),
-        f"It passes {_WINDOW}.",
-        (Bar("paper", 100.0), Bar("ours", share, interval)),
-    )
-
-
-def _taper(result: Mapping[str, Any]) -> Finding:
-    ours, *controls = (
-        result["profiles"][n] for n in ("descending", "matched_uniform", "ascending")
-    )
-    share, interval = _share(ours)
-    bars = [Bar("descending", share, interval)]
-    worst = max(_share(row)[0] for row in controls)
-    for name, row in zip(("uniform, same tip stiffness", "ascending"), controls, strict=True):
-        bars.append(Bar(name, *_share(row)))
-    return Finding(
-        f"descending {_of(ours)}, uniform {_of(controls[0])}, ascending {_of(controls[1])}",
-        judged(False, share - worst > 50),
-        f"Two controls that the paper lacks fail where it passes, {_WINDOW}.",
-        tuple(bars),
-    )
-
-
-def _bend(result: Mapping[str, Any]) -> Finding:
-    flex = {name: row["flex_max_deg"] for name, row in result["profiles"].items()}
-    fits = flex["descending"] < _LIMIT_DEG
-    return Finding(
-        f"sum over the sensor {flex['descending']:.0f}° where it passes, up to "
-        f"{max(flex.values()):.0f}° where antennae jam",
-        judged(False, fits),
-        "It holds while the antenna passes; an antenna that jams is bent further.",
-        (
-            Bar("paper, a spring", _LIMIT_DEG),
-            *(Bar(f"ours, {n}, all springs", v) for n, v in flex.items()),
-        ),
-    )
+_ALL = 95.0
+"""Share of robots from which all of them count as crossing [%]."""
 
 
 def _forward(result: Mapping[str, Any]) -> Finding:
@@ -137,9 +63,9 @@ def _of_ten(successes: int) -> Bar:
 
 def _blind(result: Mapping[str, Any]) -> Finding:
     row = result["controllers"]["open"]
-    share, interval = _share(row)
+    share, interval = share_of(row)
     return Finding(
-        f"{_of(row)}",
+        f"{counted(row)}",
         agrees(share, interval, 60.0, _NEAR_POINTS),
         "The corner of 90° was chosen so that a blind robot does about as well as the paper's; "
         "everything else was left as it was.",
@@ -150,17 +76,17 @@ def _blind(result: Mapping[str, Any]) -> Finding:
 def _touch(name: str, reason: str) -> Any:
     def judge(result: Mapping[str, Any]) -> Finding:
         row, blind = result["controllers"][name], result["controllers"]["open"]
-        share, interval = _share(row)
+        share, interval = share_of(row)
         pair = result["paired"][f"open-{name}"]
         better = pair["only_second"] > pair["only_first"] and pair["mcnemar_p"] < 0.05
         return Finding(
-            f"{_of(row)}, blind {_of(blind)} (McNemar p {pair['mcnemar_p']:.2g})",
-            judged(False, share >= 95),
+            f"{counted(row)}, blind {counted(blind)}, McNemar p {pair['mcnemar_p']:.2g}",
+            "undecided" if share < _ALL <= interval[1] else judged(False, share >= _ALL),
             reason + ("" if better else " At this number of trials it is not told from blind."),
             (
                 _of_ten(10),
                 Bar(f"ours, {name}", share, interval),
-                Bar("ours, open", *_share(blind)),
+                Bar("ours, open", *share_of(blind)),
             ),
         )
 
@@ -184,62 +110,21 @@ def _speed(name: str, paper: float, reason: str) -> Any:
 def _faster(result: Mapping[str, Any]) -> Finding:
     rows = {name: result["controllers"][name] for name in ("open", "closed")}
     times = {name: row["restricted_mean_time_s"] for name, row in rows.items()}
-    ratio = times["closed"] / times["open"]
+    speeds = {name: row["speed_m_s"] or 0.0 for name, row in rows.items()}
+    low, high = result["paired"]["open-closed"]["time_difference_95"]
     return Finding(
-        f"restricted mean time {times['closed']:.1f} s with, {times['open']:.1f} s without",
-        judged(False, ratio < 1),
-        f"Ratio {ratio:.2f}, failures counted as the time limit, with our rule for being stuck. A "
-        "mean over successes alone compares different tunnels.",
+        f"restricted mean time {times['closed']:.1f} s with, {times['open']:.1f} s without, "
+        f"{low:.1f} to {high:.1f} s shorter",
+        above((low, high), 0.0),
+        "With our rule for being stuck, and failures counted as the time limit. By the paper's own "
+        f"measure, the mean speed over successes, it is {speeds['closed']:.3f} m/s with feedback "
+        f"and {speeds['open']:.3f} m/s without; that compares different tunnels, as robots "
+        "without feedback fail in the hard ones.",
         tuple(Bar(n, times[n], tuple(rows[n]["restricted_mean_time_95"])) for n in times),
     )
 
 
 ROBOT = (
-    Claim(
-        "stiff_jams",
-        "A stiff antenna jams at a wall of boulders",
-        "jams",
-        "Conditional if most trials jam; no more, as we chose the base angle.",
-        "wall",
-        "% of trials that jam",
-        _stiff,
-    ),
-    Claim(
-        "soft_slips",
-        "A soft antenna slips at a wall of boulders",
-        "slips",
-        "Conditional if most trials slip; no more, as we chose the base angle.",
-        "wall",
-        "% of trials that slip",
-        _soft,
-    ),
-    Claim(
-        "descending_passes",
-        "An antenna stiff at the base and soft at the tip passes a wall of boulders",
-        "passes",
-        "Conditional if more than 80 % pass; no more, as we chose the base angle.",
-        "wall",
-        "% of trials that pass",
-        _descending,
-    ),
-    Claim(
-        "taper_decides",
-        "It is the descending stiffness that lets it pass",
-        "no controls",
-        "Conditional if 50 % more pass than of each control; no more, as we chose the angle.",
-        "wall",
-        "% of trials that pass",
-        _taper,
-    ),
-    Claim(
-        "bend",
-        "Springs bend by less than 30° in use",
-        "below 30°",
-        "Conditional if the antenna that passes stays below it, the sum over its springs included.",
-        "wall",
-        "deg",
-        _bend,
-    ),
     Claim(
         "forward",
         "A body wave from head to tail with stepping legs walks forward",
@@ -284,7 +169,7 @@ ROBOT = (
         "With the published rule all robots cross",
         "10 of 10",
         "Conditional if at least 95 % cross by that rule; no more, as its margins and times are "
-        "ours.",
+        "ours. Undecided if fewer cross, and the interval of the share reaches 95 %.",
         "tunnel",
         "% of trials",
         _touch(
@@ -297,7 +182,8 @@ ROBOT = (
         "feedback",
         "Two antennae are enough to cross the tunnel",
         "10 of 10",
-        "Conditional if at least 95 % cross; no more, as the rule is ours.",
+        "Conditional if at least 95 % cross; no more, as the rule is ours. Undecided if fewer "
+        "cross, and the interval of the share reaches 95 %.",
         "tunnel",
         "% of trials",
         _touch(
@@ -332,7 +218,8 @@ ROBOT = (
         "faster",
         "Feedback makes the robot faster through the tunnel",
         "0.12 against 0.04 m/s",
-        "Conditional if the restricted mean time is shorter; no more, as the rule is ours.",
+        "Conditional if the restricted mean time is shorter; no more, as the rule is ours. "
+        "Undecided if the 95 % interval of the paired difference reaches 0.",
         "tunnel",
         "s",
         _faster,

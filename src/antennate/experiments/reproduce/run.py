@@ -12,10 +12,11 @@ from antennate import experiments
 from antennate.experiments.reproduce.bench_claims import ANTENNA
 from antennate.experiments.reproduce.robot_claims import ROBOT
 from antennate.experiments.reproduce.verdict import VERDICTS, Claim, Finding, Row
+from antennate.experiments.reproduce.wall_claims import WALL
 from antennate.params.base import Params, number
 from antennate.studies.experiment import OnRow, OnStep, no_row, no_step
 
-CLAIMS: tuple[Claim, ...] = (*ANTENNA, *ROBOT)
+CLAIMS: tuple[Claim, ...] = (*ANTENNA, *WALL, *ROBOT)
 """All claims, in the order of the page."""
 QUICK: Mapping[str, Mapping[str, Any]] = {
     "springs": {},
@@ -33,7 +34,7 @@ FULL: Mapping[str, Mapping[str, Any]] = {
     **{name: {} for name in QUICK},
     "tunnel": {"trials": 100},
 }
-"""What it is told otherwise: its defaults, and as many tunnels as on docs/science/tunnel.md."""
+"""What it is told otherwise: its defaults, and more tunnels."""
 _WITHOUT_CHANCE = {"gait"}
 """Takes a seed only for draws of what is not known, and draws nothing here."""
 _PARTS = 100

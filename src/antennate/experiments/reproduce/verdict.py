@@ -6,6 +6,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
+from antennate.studies.statistics import wilson95
+
 Verdict = Literal["reproduced", "conditional", "not_reproduced", "undecided"]
 VERDICTS: Mapping[Verdict, str] = {
     "reproduced": "reproduced",
@@ -37,6 +39,33 @@ def agrees(value: float, interval: tuple[float, float], paper: float, tolerance:
     if high - low > 2 * tolerance and low <= paper + tolerance and high >= paper - tolerance:
         return "undecided"
     return judged(False, abs(value - paper) <= tolerance)
+
+
+def above(interval: tuple[float, float], limit: float) -> Verdict:
+    """The verdict on a number that shall exceed a limit: `conditional` at most, as for `agrees`.
+
+    Undecided if the limit lies within the interval.
+
+    Args:
+        interval: Its 95 % interval.
+        limit: What it shall exceed.
+    """
+    low, high = interval
+    return "undecided" if low <= limit < high else judged(False, low > limit)
+
+
+def share_of(row: Mapping[str, Any], key: str = "successes") -> tuple[float, tuple[float, float]]:
+    """Share of valid trials [%] with its 95 % interval."""
+    valid = row["trials"] - row["invalid"]
+    low, high = wilson95(row[key], valid)
+    return 100.0 * row[key] / max(valid, 1), (100.0 * low, 100.0 * high)
+
+
+def counted(row: Mapping[str, Any], word: str = "", key: str = "successes") -> str:
+    """The count in words with the interval of its share, as "16 of 20 jam (58 to 92 %)"."""
+    low, high = share_of(row, key)[1]
+    count = f"{row[key]} of {row['trials'] - row['invalid']}"
+    return f"{count}{' ' if word else ''}{word} ({low:.0f} to {high:.0f} %)"
 
 
 @dataclass(frozen=True, slots=True)

@@ -70,5 +70,5 @@ def sentence(result: Mapping[str, Any]) -> str:
 
 
 EXPERIMENT = Experiment.of_folder(
-    __name__, RingdownConfig, lambda config, *_: run(config), tables, sentence
+    __name__, RingdownConfig, lambda config, *_: run(config), tables, sentence, filmed=True
 )

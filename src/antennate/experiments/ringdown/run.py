@@ -17,7 +17,7 @@ from antennate.params.scene import BenchPhysicsParams
 from antennate.robots.antenna import MOST_HINGES, AntennaSpec
 from antennate.robots.sensor import SensorParams
 from antennate.robots.spec import RobotSpec
-from antennate.sim.bench import Bench, compile_bench
+from antennate.sim.bench import Bench, Watch, compile_bench, unwatched
 from antennate.studies.experiment import Outcome
 from antennate.types import Floats
 
@@ -163,8 +163,12 @@ def _mode(mode: Mode) -> dict[str, float]:
     }
 
 
-def run(config: RingdownConfig) -> RingdownOutcome:
+def run(config: RingdownConfig, watch: Watch = unwatched) -> RingdownOutcome:
     """Bend the compiled antenna as a load on its tip does, let it go and record it.
+
+    Args:
+        config: What is run.
+        watch: Looks at the bench before each physics step.
 
     Raises:
         ConfigError: A file of another antenna cannot be used.
@@ -184,6 +188,7 @@ def run(config: RingdownConfig) -> RingdownOutcome:
     angles, speeds = np.empty((2, ticks + 1, antenna.hinges + 1))
     tip = np.empty(ticks + 1)
     for tick in range(ticks + 1):
+        watch(bench)
         angles[tick], speeds[tick] = bench.chain()
         tip[tick] = bench.tip()[1]
         bench.step(1)

@@ -41,9 +41,10 @@ def check_course(path: Path, t: Floats, position: Floats, goal: Floats, servo: S
     steps = np.diff(t)
     if (steps <= 0).any():
         i = int(np.argmax(steps <= 0)) + 1
+        cure = "keep one of the two" if steps[i - 1] == 0 else "sort the entries"
         raise BadInputError(
             f"{path}: entry {i}: expected timestamp to rise, found {t[i]:g} after {t[i - 1]:g}; "
-            "sort the entries"
+            f"{cure}"
         )
     if steps.max() > _LARGEST_GAP:
         i = int(np.argmax(steps)) + 1

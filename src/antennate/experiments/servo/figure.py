@@ -56,6 +56,7 @@ def _draw(panel: Axes, outcome: ServoOutcome, place: int, traces: Floats) -> Non
         first = recording.t[int(np.argmax(off))]
         panel.axvline(first, color=style.MUTED, linewidth=0.8, linestyle=":")
         where = {"xycoords": ("data", "axes fraction"), "textcoords": "offset points"}
-        panel.annotate("torque off", (first, 0), xytext=(3, 3), fontsize=7, **where)
+        aside = {"xytext": (-3, -3), "ha": "right", "va": "top"}
+        panel.annotate("torque off", (first, 1), fontsize=8, **aside, **where)
     panel.set_ylabel("position [deg]")
     panel.set_title(f"{recording.name}, gain {recording.p_gain:g}")

@@ -102,8 +102,12 @@ def read(
         ) from None
     except RecursionError:
         raise BadInputError(f"{path}: expected JSON of a recording, found it too deep") from None
-    if not isinstance(table, dict) or not isinstance(table.get("entries"), list):
-        raise BadInputError(f"{path}: expected an object with a list `entries`, found none")
+    if not isinstance(table, dict):
+        kind = type(table).__name__
+        raise BadInputError(f"{path}: expected an object with a list `entries`, found a {kind}")
+    if not isinstance(table.get("entries"), list):
+        kind = type(table["entries"]).__name__ if "entries" in table else "none"
+        raise BadInputError(f"{path}: expected a list `entries`, found {kind}")
     entries = table["entries"]
     if len(entries) < FEWEST:
         raise BadInputError(

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import Any
+from typing import Annotated, Any
 
+from pydantic import Tag
 from pydantic.fields import FieldInfo
 
+from antennate.errors import ConfigError
+from antennate.messages import nearest, shortened
 from antennate.params.base import Params, number
-from antennate.studies.plan import Axes, Kind, Point, Range, make_points
+from antennate.studies.plan import RANGE_OR_CHOICES, Axes, Kind, Point, Range, make_points
 
 
 class StudyConfig(Params):
@@ -33,7 +36,13 @@ class StudyConfig(Params):
     """Column of the rows whose mean is compared between points."""
     settings: dict[str, Any] = number({}, "1", "assumed: the defaults of the experiment")
     """Parameters of the experiment that are the same at all points."""
-    vary: dict[str, tuple[Any, ...] | Range] = number({}, "1", "assumed: nothing varies")
+    vary: dict[
+        str,
+        Annotated[
+            Annotated[tuple[Any, ...], Tag("choices")] | Annotated[Range, Tag("range")],
+            RANGE_OR_CHOICES,
+        ],
+    ] = number({}, "1", "assumed: nothing varies")
     """Parameters that vary, by dotted name: a list of values, or low and high of a range."""
     assumed: float | None = number(
         None, "1", "assumed: only what is named varies", gt=0, lt=1, examples=[0.2]
@@ -51,9 +60,26 @@ class StudyConfig(Params):
         return make_points(self.plan, self.axes(model), self.points, self.seed)
 
     def axes(self, model: type[Params] | None) -> Axes:
-        """What varies: what is named, and the assumed numbers of the experiment if asked for."""
+        """What varies: what is named, and the assumed numbers of the experiment if asked for.
+
+        Raises:
+            ConfigError: Assumed numbers cannot vary in this plan, or there is none that is left
+                out.
+        """
         found: dict[str, Any] = dict(self.vary)
         if self.assumed is not None and model is not None:
+            if self.plan in ("grid", "list"):
+                raise ConfigError(
+                    f"assumed: expected plan random, sobol or morris beside it, found {self.plan}"
+                )
+            known = [name for name, *_ in assumed_fields(model())]
+            for group in self.leave_out:
+                if not any(f"{name}.".startswith(f"{group}.") for name in known):
+                    groups = {name.rpartition(".")[0] for name in known} - {""}
+                    raise ConfigError(
+                        "leave_out: expected an assumed number or a group of them"
+                        f"{nearest(group, [*known, *sorted(groups)])}, found {shortened(group)}"
+                    )
             for name, range_ in assumed_ranges(model, self.assumed):
                 left_out = any(f"{name}.".startswith(f"{group}.") for group in self.leave_out)
                 if not left_out and name not in found:

@@ -5,14 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from antennate.experiments.study import measures
+from antennate.experiments.study import labels, measures
 from antennate.experiments.study import run as study
 from antennate.experiments.study.config import StudyConfig
 from antennate.studies.experiment import Experiment
-from antennate.studies.measures import Table, shown
+from antennate.studies.measures import NONE, Measure, Table, shown
 
 _MOST = 60
 """Most lines of a table."""
+_NAMED = 3
+"""Parameters that the sentence names."""
 
 
 def tables(result: Mapping[str, Any]) -> Sequence[Table]:
@@ -27,26 +29,24 @@ def _points(result: Mapping[str, Any]) -> Table:
     by_point: dict[int, list[Mapping[str, Any]]] = {}
     for cell in cells:
         by_point.setdefault(cell["point"], []).append(cell)
+    measure = labels.measure(result)
+    heads = [f"{name}: {measure.title}" if name else measure.title for name in names]
     rows = [
         (
             str(number),
-            [*(_value(of[0]["values"][axis]) for axis in axes), *map(_response, of)],
+            [
+                *(_value(of[0]["values"][axis]) for axis in axes),
+                *(labels.cell(measure, c["response"], c["response95"]) for c in of),
+            ],
         )
         for number, of in by_point.items()
     ]
-    label = result["response"] or "response"
-    heads = [label.replace("_", " ") if not name else f"{name}: {label}" for name in names]
     note = f"Mean of each point with its 95 % interval, {result['trials']} trials in all."
     if len(rows) > _MOST:
         note += f" The first {_MOST} of {len(rows)} points; result.json has all."
     return Table(
-        "Points", [*(axis.rpartition(".")[2] for axis in axes), *heads], rows[:_MOST], note
+        "Points", [*(labels.axis(result, axis) for axis in axes), *heads], rows[:_MOST], note
     )
-
-
-def _response(cell: Mapping[str, Any]) -> str:
-    mean, ends = cell["response"], cell["response95"]
-    return shown(mean, ".3g") + (f" ({shown(ends, '.3g')})" if ends and mean == mean else "")
 
 
 def _value(value: Any) -> str:
@@ -61,19 +61,32 @@ def _effects(result: Mapping[str, Any]) -> Table:
     for effect in result["effects"]:
         by_name.setdefault(effect["parameter"], {})[effect["of"]] = effect
     ranked = sorted(by_name.items(), key=lambda item: -(item[1][targets[-1]]["mu_star"] or 0.0))
-    rows = [(name, [_size(of[target]) for target in targets]) for name, of in ranked]
+    measure = labels.measure(result)
+    rows = [(name, [*(_size(measure, of[t]) for t in targets), _above(of)]) for name, of in ranked]
+    floors = [labels.cell(measure, ranked[0][1][target].get("noise")) for target in targets]
     return Table(
         "Effects",
-        [target or result["response"] for target in targets],
-        rows,
-        f"Mean size of the change of {result['response']} over the whole range of a parameter "
-        "(Morris's mu*), with its 95 % interval.",
+        [*(target or measure.title for target in targets), "above the noise"],
+        [(f"noise of {_trials(result)} a point", [*floors, ""]), *rows],
+        f"Mean size of the change of the {measure.title} over the whole range of a parameter "
+        "(Morris's mu*), with a 95 % interval over trajectories. Sizes cannot be negative: an "
+        "interval above 0 is no effect. The largest stays below the noise in 95 % of studies "
+        "without any effect, found from these trials, shuffled between the points.",
     )
 
 
-def _size(effect: Mapping[str, Any]) -> str:
-    ends = effect["mu_star95"]
-    return shown(effect["mu_star"], ".3g") + (f" ({shown(ends, '.3g')})" if ends else "")
+def _size(measure: Measure, effect: Mapping[str, Any]) -> str:
+    return labels.cell(measure, effect["mu_star"], effect["mu_star95"])
+
+
+def _above(of: Mapping[str, Mapping[str, Any]]) -> str:
+    found = [target or "yes" for target, effect in of.items() if effect.get("above_noise")]
+    return ", ".join(found) or NONE
+
+
+def _trials(result: Mapping[str, Any]) -> str:
+    most = max(cell["trials"] for cell in result["points"])
+    return f"{most} trial{'s' if most != 1 else ''}"
 
 
 def sentence(result: Mapping[str, Any]) -> str:
@@ -89,16 +102,27 @@ def sentence(result: Mapping[str, Any]) -> str:
         )
         text += f"; successes over all of them (95 % interval): {', '.join(rates)}"
     if result["effects"]:
-        last = result["effects"][-1]["of"]
-        known = [e for e in result["effects"] if e["of"] == last and e["mu_star"] is not None]
-        first = sorted(known, key=lambda effect: -effect["mu_star"])[:3]
-        what = " ".join(filter(None, [result["response"], last and f"of {last}"]))
-        text += (
-            f". {what} hangs most on {', '.join(e['parameter'] for e in first)}" if first else ""
-        )
+        text += f". {_hangs(result)}"
     bad = {name: n for name, n in result["statuses"].items() if name != "ok"}
     text += "." if not bad else f". Trials that say nothing: {_counted(bad)}; trials.csv has why."
     return text
+
+
+def _hangs(result: Mapping[str, Any]) -> str:
+    """What the response hangs on, of the last target: the parameters above the noise."""
+    last = result["effects"][-1]["of"]
+    found = [e for e in result["effects"] if e["of"] == last and e["mu_star"] is not None]
+    found.sort(key=lambda effect: -effect["mu_star"])
+    what = "the " + " of ".join(filter(None, [labels.measure(result).label, last]))
+    above = [effect["parameter"] for effect in found if effect.get("above_noise")]
+    if above:
+        more = f" and {len(above) - _NAMED} more" if len(above) > _NAMED else ""
+        names = ", ".join(above[:_NAMED])
+        return f"Above the noise of {_trials(result)} a point, {what} hangs on {names}{more}"
+    trials = _trials(result)
+    if any(effect.get("above_noise") is None for effect in found):
+        return f"Of {trials} a point no noise is known, so nothing tells what {what} hangs on"
+    return f"Of {len(found)} parameters nothing moves {what} above the noise of {trials} a point"
 
 
 def _counted(counts: Mapping[str, int]) -> str:
@@ -108,5 +132,6 @@ def _counted(counts: Mapping[str, int]) -> str:
 EXPERIMENT = Experiment.of_folder(
     *(__name__, StudyConfig, study.run, tables, sentence),
     check=study.check,
+    failed=lambda result: measures.NO_RESULT.issuperset(result["statuses"]),
     continued=True,
 )

@@ -1,4 +1,7 @@
-"""Figures of `antennate study`: a map of the response, or what it hangs on."""
+"""Figures of `antennate study`: a map of the response, or what it hangs on.
+
+Panels stand below one another, so that a figure can be read on a phone.
+"""
 
 from __future__ import annotations
 
@@ -10,12 +13,19 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from antennate import figures as style
+from antennate.experiments.study import labels
 from antennate.experiments.study.run import StudyOutcome
+from antennate.studies.measures import NONE, Measure, shown
 
-_MOST_BARS = 20
-"""Parameters drawn of a Morris plan."""
-_MOST_ROWS = 6
-"""Rows of maps drawn."""
+_WIDTH = 4.5
+"""Width of a figure [inches]: its letters are then 8 pixels high on a phone."""
+_MOST_SIZES = 12
+"""Parameters drawn for each target of a Morris plan, the largest."""
+_MOST_MAPS = 12
+_MOST_COLUMNS = 5
+"""Columns of a map whose cells have room for interval and counts."""
+_LINE = 0.135
+"""Height of a line of small text [inches]."""
 Result = Mapping[str, Any]
 
 
@@ -31,73 +41,135 @@ def figures(outcome: StudyOutcome) -> dict[str, Figure]:
 
 @style.styled
 def effects(result: Result) -> Figure:
-    """Morris's mu* of each parameter, the largest above; a panel for each condition."""
+    """Morris's mu* of the largest parameters and the noise; a panel for each target."""
     targets = list(dict.fromkeys(effect["of"] for effect in result["effects"]))
-    by_name: dict[str, list[Result]] = {}
-    for effect in result["effects"]:
-        by_name.setdefault(effect["parameter"], []).append(effect)
-    ranked = sorted(by_name, key=lambda name: by_name[name][-1]["mu_star"] or 0.0)[-_MOST_BARS:]
-    figure = style.canvas(2.6 + 2.4 * len(targets), 1.2 + 0.22 * len(ranked))
-    panels = figure.subplots(1, len(targets), squeeze=False, sharey=True)[0]
-    for place, (panel, target) in enumerate(zip(panels, targets, strict=True)):
-        found = [by_name[name][place] for name in ranked]
-        sizes = np.array([effect["mu_star"] or 0.0 for effect in found])
-        ends = np.array([e["mu_star95"] or (s, s) for e, s in zip(found, sizes, strict=True)])
-        whiskers = np.maximum(0.0, [sizes - ends[:, 0], ends[:, 1] - sizes])
-        panel.barh(ranked, sizes, xerr=whiskers, color=style.SERIES[0], ecolor=style.MUTED)
-        panel.set_title(target or result["response"])
-        panel.set_xlabel(f"change of {_words(result['response'])}")
-        panel.grid(visible=False, axis="y")
+    parameters = len(result["effects"]) // len(targets)
+    count = min(_MOST_SIZES, parameters)
+    figure = style.canvas(_WIDTH, 1.0 + len(targets) * (0.75 + 0.32 * count))
+    panels = figure.subplots(len(targets), 1, squeeze=False, sharex=True)[:, 0]
+    measure = labels.measure(result)
+    for panel, target in zip(panels, targets, strict=True):
+        found = [e for e in result["effects"] if e["of"] == target and e["mu_star"] is not None]
+        found.sort(key=lambda effect: effect["mu_star"])
+        _sizes(panel, found[-count:], measure)
+        some = f", the {count} largest of {parameters}" if count < parameters else ""
+        panel.set_title(f"{target or measure.label}{some}")
+    panels[0].set_xlim(left=0.0)  # of all panels; only now, as it ends their scaling
+    unit = f" [{measure.unit}]" if measure.unit else ""
+    panels[-1].set_xlabel(f"mean size of the change of\n{measure.label}{unit}")
+    trials = max(cell["trials"] for cell in result["points"])
+    handles, names = panels[0].get_legend_handles_labels()
+    note = f"noise of {trials} trials a point" if names else "no noise known of 1 trial a point"
+    figure.legend(handles, [note], loc="outside upper left") if names else figure.suptitle(note)
     return figure
+
+
+def _sizes(panel: Axes, found: Sequence[Result], measure: Measure) -> None:
+    """Each mu* with its interval, its name above it; grey as far as noise alone would reach."""
+    noise = found[0]["noise"] if found else None
+    if noise is not None:
+        panel.axvspan(0.0, measure.scale * noise, color=style.FAINT, linewidth=0, label="noise")
+    for place, effect in enumerate(found):
+        size, ends = effect["mu_star"], effect["mu_star95"] or (effect["mu_star"],) * 2
+        colour = style.SERIES[0] if effect["above_noise"] else style.MUTED
+        panel.plot(measure.scale * np.array(ends), [place, place], color=colour, linewidth=1.0)
+        look = {"marker": "o", "markersize": 5, "color": colour}
+        panel.plot(
+            [measure.scale * size],
+            [place],
+            **look,
+            markerfacecolor=colour if effect["above_noise"] else "white",
+        )
+        panel.annotate(
+            effect["parameter"],
+            (0.0, place),
+            xytext=(4, 5),
+            xycoords=("axes fraction", "data"),
+            textcoords="offset points",
+            fontsize=8,
+        )
+    panel.tick_params(labelbottom=True)
+    panel.set_yticks([])
+    panel.set_ylim(-0.6, len(found) - 0.1)
+    panel.spines["left"].set_visible(False)
 
 
 @style.styled
 def maps(result: Result) -> Figure:
-    """A map over the first two parameters; a column for each condition, a row for the others."""
+    """A map over the first two parameters for each condition and each value of the others."""
     x, y, *others = result["axes"]
     cells = result["points"]
     names = list(dict.fromkeys(cell["condition"] for cell in cells))
-    rows = list(dict.fromkeys(_rest(cell, others) for cell in cells))[:_MOST_ROWS]
-    figure = style.canvas(1.6 + 2.6 * len(names), 1.0 + 2.1 * len(rows))
-    panels = figure.subplots(len(rows), len(names), squeeze=False, sharex=True, sharey=True)
+    told = {axis: labels.axis(result, axis) for axis in result["axes"]}
+    rests = list(dict.fromkeys(_rest(told, cell, others) for cell in cells))
+    every = [(name, rest) for rest in rests for name in names]
+    drawn = every[:_MOST_MAPS]
+    steps = [len(dict.fromkeys(_text(cell["values"][axis]) for cell in cells)) for axis in (x, y)]
+    full = steps[0] <= _MOST_COLUMNS
+    height = steps[1] * ((3.6 if full else 1.6) * _LINE) + 0.35
+    figure = style.canvas(_WIDTH, 1.5 + height * len(drawn))
+    panels = figure.subplots(len(drawn), 1, squeeze=False, sharex=True)[:, 0]
+    measure = labels.measure(result)
     known = [c["response"] for c in cells if c["response"] is not None]
     shares = result["response"] == "success_share" or not known
     ends = (0.0, 1.0) if shares else (float(np.nanmin(known)), float(np.nanmax(known)))
     image: Any = None
-    for i, rest in enumerate(rows):
-        for j, name in enumerate(names):
-            here = [c for c in cells if c["condition"] == name and _rest(c, others) == rest]
-            image = _map(panels[i, j], here, (x, y), ends)
-            panels[i, j].set_title(", ".join(filter(None, [name, rest])), fontsize=8)
-    for panel in panels[-1]:
-        panel.set_xlabel(_words(x))
-    for panel in panels[:, 0]:
-        panel.set_ylabel(_words(y))
-    figure.colorbar(image, ax=panels, label=_words(result["response"]), shrink=0.8)
+    for panel, (name, rest) in zip(panels, drawn, strict=True):
+        of = [c for c in cells if (c["condition"], _rest(told, c, others)) == (name, rest)]
+        image = _map(panel, of, (x, y), ends, measure, full)
+        panel.set_title(", ".join(filter(None, [name, rest])))
+        panel.set_ylabel(told[y])
+    panels[-1].set_xlabel(told[x])
+    title = measure.title
+    if full:
+        title += "\nwith its 95 % interval and how many trials it is of"
+    if len(drawn) < len(every):
+        title += f"\nthe first {len(drawn)} of {len(every)} maps"
+    bar = figure.colorbar(image, ax=panels, location="top", label=title, aspect=40, pad=0.01)
+    bar.ax.xaxis.set_major_formatter(lambda value, _: f"{measure.scale * value:.3g}")
     return figure
 
 
-def _map(panel: Axes, cells: Sequence[Result], axes: tuple[str, str], ends: Any) -> Any:
+def _map(
+    panel: Axes,
+    cells: Sequence[Result],
+    axes: tuple[str, str],
+    ends: Any,
+    measure: Measure,
+    full: bool,
+) -> Any:
+    """One map; its cells tell the value and, if they are to be full, interval and counts."""
     columns, rows = (list(dict.fromkeys(_text(c["values"][a]) for c in cells)) for a in axes)
     grid = np.full((len(rows), len(columns)), np.nan)
     for cell in cells:
-        place = (
+        i, j = (
             rows.index(_text(cell["values"][axes[1]])),
             columns.index(_text(cell["values"][axes[0]])),
         )
-        grid[place] = np.nan if cell["response"] is None else cell["response"]
+        value = grid[i, j] = np.nan if cell["response"] is None else cell["response"]
+        dark = value < ends[0] + 0.48 * (ends[1] - ends[0])
+        colour = "white" if dark else "black"
+        text = _told(cell, measure)
+        text = text if full else text.partition("\n")[0]
+        panel.text(j, i, text, ha="center", va="center", color=colour, fontsize=7)
     image = panel.imshow(
         grid, origin="lower", aspect="auto", vmin=ends[0], vmax=ends[1], cmap="cividis"
     )
-    for (i, j), value in np.ndenumerate(grid):
-        dark = value < ends[0] + 0.6 * (ends[1] - ends[0])
-        text = "-" if np.isnan(value) else f"{value:.2g}"
-        colour = "white" if dark else "black"
-        panel.text(j, i, text, ha="center", va="center", color=colour, fontsize=7)
     panel.set_xticks(range(len(columns)), columns)
     panel.set_yticks(range(len(rows)), rows)
     panel.grid(visible=False)
     return image
+
+
+def _told(cell: Result, measure: Measure) -> str:
+    """Value, interval and counts of a cell, a line each."""
+    valid = cell["trials"] - cell["invalid"]
+    counts = f"{cell['successes']} of {valid}" if "successes" in cell else f"n {valid}"
+    if cell["response"] is None:
+        return f"{NONE}\n{counts}"
+    ends = cell["response95"]
+    of = shown(ends, measure.form, measure.scale).replace(" to ", "–") if ends else NONE
+    return f"{shown(cell['response'], measure.form, measure.scale)}\n{of}\n{counts}"
 
 
 @style.styled
@@ -105,39 +177,42 @@ def lines(result: Result) -> Figure:
     """The response against each parameter, with the interval of each point."""
     axes, cells = result["axes"], result["points"]
     names = list(dict.fromkeys(cell["condition"] for cell in cells))
-    figure = style.canvas(1.2 + 3.0 * len(axes), 3.0)
-    panels = figure.subplots(1, len(axes), squeeze=False, sharey=True)[0]
+    figure = style.canvas(_WIDTH, 0.4 + 2.4 * len(axes))
+    panels = figure.subplots(len(axes), 1, squeeze=False, sharey=True)[:, 0]
+    measure = labels.measure(result)
+    scaled = [
+        {
+            **cell,
+            "response": None if cell["response"] is None else measure.scale * cell["response"],
+            "response95": cell["response95"] and [measure.scale * v for v in cell["response95"]],
+        }
+        for cell in cells
+    ]
     for panel, axis in zip(panels, axes, strict=True):
         values = [cell["values"][axis] for cell in cells]
         words = None
         if not all(isinstance(v, int | float) and not isinstance(v, bool) for v in values):
             words = list(dict.fromkeys(map(_text, values)))
         for name, colour in zip(names, style.series(len(names)), strict=True):
-            here = [cell for cell in cells if cell["condition"] == name]
+            here = [cell for cell in scaled if cell["condition"] == name]
             at = [cell["values"][axis] for cell in here]
             x = at if words is None else [float(words.index(_text(v))) for v in at]
             look = {"marker": "o", "color": colour, "label": name or None}
             style.intervals(panel, x, here, ("response", "response95"), **look)
         if words is not None:
             style.categories(panel, words)
-        panel.set_xlabel(_words(axis))
-    panels[0].set_ylabel(_words(result["response"]))
+        panel.set_xlabel(labels.axis(result, axis))
+        panel.set_ylabel(measure.title)
     if len(names) > 1:
-        figure.legend(
-            *panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=len(names)
-        )
+        figure.legend(*panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=2)
     return figure
 
 
-def _rest(cell: Result, others: Sequence[str]) -> str:
-    return ", ".join(f"{_words(o)} {_text(cell['values'][o])}" for o in others)
+def _rest(told: Mapping[str, str], cell: Result, others: Sequence[str]) -> str:
+    return ", ".join(f"{told[o]} {_text(cell['values'][o])}" for o in others)
 
 
 def _text(value: Any) -> str:
     if isinstance(value, list | tuple):
         return " ".join(map(_text, value))
     return f"{value:.3g}" if isinstance(value, float) else str(value)
-
-
-def _words(name: str | None) -> str:
-    return (name or "response").rpartition(".")[2].replace("_", " ")

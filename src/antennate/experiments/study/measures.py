@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
-from itertools import combinations
 from typing import Any
 
 import numpy as np
 
 from antennate.experiments.study.config import StudyConfig
+from antennate.experiments.study.effects import SUCCESS, effects, value
 from antennate.studies import statistics
-from antennate.studies.plan import Point, elementary_effects
+from antennate.studies.plan import Point
 
-SUCCESS = "success_share"
-"""The response of rows that have an outcome."""
 _NO_MEASURE = ("point", "trial", "seed")
+NO_RESULT = frozenset({"failed", "crashed", "hung"})
+"""Statuses of trials that gave no row."""
 Row = Mapping[str, Any]
 
 
@@ -45,7 +44,7 @@ def summary(
             name: _whole([r for n in by_cell if n[1] == name for r in by_cell[n]]) for name in names
         },
         "points": cells,
-        "effects": _effects(config, axes, names, cells, len(points)),
+        "effects": effects(config, axes, by_cell, len(points), names, response),
     }
 
 
@@ -54,7 +53,8 @@ def _default_response(rows: Sequence[Row], axes: Sequence[str]) -> str | None:
     if not rows or "outcome" in rows[0]:
         return SUCCESS if rows else None
     known = [*_NO_MEASURE, *axes]
-    numbers = (n for n, v in rows[0].items() if isinstance(v, float | int) and n not in known)
+    cells = (cell for row in rows for cell in row.items())  # the first one may have failed
+    numbers = (n for n, v in cells if isinstance(v, float | int) and n not in known)
     return next(numbers, None)
 
 
@@ -80,7 +80,8 @@ def _cell(
     counts = _whole(rows)
     mean, interval = counts.get(SUCCESS), counts.get("wilson95")
     if response not in (None, SUCCESS):
-        known = np.array([v for r in rows if r["status"] == "ok" and _is(v := r.get(response))])
+        found = np.array([value(row, response) for row in rows])
+        known = found[np.isfinite(found)]
         mean, low, high = statistics.mean95(known)
         interval = (low, high) if len(known) > 1 else None
     return {
@@ -90,48 +91,4 @@ def _cell(
         **counts,
         "response": mean,
         "response95": interval,
-    }
-
-
-def _is(value: Any) -> bool:
-    return isinstance(value, float | int) and math.isfinite(value)
-
-
-def _effects(
-    config: StudyConfig,
-    axes: Sequence[str],
-    names: Sequence[str],
-    cells: Sequence[Mapping[str, Any]],
-    points: int,
-) -> list[dict[str, Any]]:
-    """Of a Morris plan: the effects of each parameter, on conditions and on their differences."""
-    if config.plan != "morris":
-        return []
-    found = np.array([math.nan if c["response"] is None else c["response"] for c in cells], float)
-    by_name = dict(zip(names, found.reshape(points, len(names)).T, strict=True))
-    targets = dict(by_name)
-    for first, second in combinations(names, 2):
-        targets[f"{second} minus {first}"] = by_name[second] - by_name[first]
-    return [
-        {"of": target, "parameter": name, **_spread(effects)}
-        for target, response in targets.items()
-        for name, effects in zip(
-            axes,
-            elementary_effects(len(axes), config.points, config.seed, response.tolist()),
-            strict=True,
-        )
-    ]
-
-
-def _spread(effects: Sequence[float]) -> dict[str, Any]:
-    """Morris's measures: mean size of the effects, their mean and their standard deviation."""
-    if not effects:
-        return dict.fromkeys(("mu_star", "mu_star95", "mu", "sigma"))
-    values = np.array(effects)
-    size, low, high = statistics.mean95(np.abs(values))
-    return {
-        "mu_star": size,
-        "mu_star95": (low, high) if len(values) > 1 else None,
-        "mu": float(values.mean()),
-        "sigma": float(values.std(ddof=1)) if len(values) > 1 else None,
     }

@@ -3,21 +3,32 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from antennate.errors import ConfigError
 from antennate.experiments.study import measures
 from antennate.experiments.study.config import StudyConfig
-from antennate.experiments.study.subject import Rows, Subject, configurations, find
+from antennate.experiments.study.subject import (
+    Columns,
+    Rows,
+    Subject,
+    among,
+    columns_in,
+    columns_of,
+    configurations,
+    find,
+)
+from antennate.messages import nearest, shortened
 from antennate.studies.experiment import OnRow, OnStep, Trial, no_row, no_step
 from antennate.studies.plan import Point
 from antennate.studies.pool import gather
 from antennate.studies.work import Failure
 
 STATUS, REASON = "status", "reason"
-_Task = tuple[str, int, Any, Trial]
-"""What is run, number of the point, its configuration, the trial."""
+_Task = tuple[str, Sequence[str], int, Any, Trial]
+"""What is run, what varies, number of the point, its configuration, the trial."""
 
 
 @dataclass(frozen=True)
@@ -60,12 +71,27 @@ def check(config: StudyConfig) -> None:
     """Find what cannot be run before anything is.
 
     Raises:
-        BadInputError: There is no such experiment, a parameter is unknown, the plan is empty, or a
-            point of it is out of bounds.
+        BadInputError: There is no such experiment, a parameter or the response is unknown, the plan
+            is empty, or a point of it is out of bounds.
     """
     subject = find(config.experiment)
     (_, first), *_ = configurations(config, subject)
-    subject.check(first)
+    try:
+        subject.check(first)
+    except ConfigError as error:
+        raise ConfigError(f"{config.experiment}: {error}") from None
+    if (known := columns_of(config.experiment)) is not None:
+        _require_response(config, known)
+
+
+def _require_response(config: StudyConfig, columns: Columns) -> None:
+    """Check that there is a column for the response, with numbers."""
+    known = [*([measures.SUCCESS] if "outcome" in columns.every else []), *columns.numbers]
+    if config.response is not None and config.response not in known:
+        raise ConfigError(
+            f"response: expected a measure of {config.experiment}"
+            f"{nearest(config.response, known)}, {among(known)}; found {shortened(config.response)}"
+        )
 
 
 def run(
@@ -82,22 +108,28 @@ def run(
     """
     subject = find(config.experiment)
     points = configurations(config, subject)
+    axes = list(config.axes(subject.model))
     tasks: list[_Task] = [
-        (config.experiment, number, configured, trial)
+        (config.experiment, axes, number, configured, trial)
         for number, (_, configured) in enumerate(points)
         for trial in subject.every(configured)
     ]
     found: list[tuple[int, Rows]] = []
+    checked = False
 
     def lost(place: int, failure: Failure) -> tuple[int, Rows]:
-        condition, trial = tasks[place][3]
+        condition, trial = tasks[place][4]
         row = {"trial": trial, STATUS: failure.status, REASON: failure.reason}
         return place, [({subject.condition: condition} if subject.condition else {}) | row]
 
     def take(item: tuple[int, Rows]) -> None:
         found.append(item)
         for row in item[1]:
-            on_row({"point": tasks[item[0]][1], **row})
+            nonlocal checked
+            if not checked and row[STATUS] in ("ok", "nan"):
+                _require_response(config, columns_in(row))
+                checked = True
+            on_row({"point": tasks[item[0]][2], **row})
 
     chunk = max(1, min(subject.most, math.ceil(len(tasks) / (3 * workers))))
     numbered = [(place, *task) for place, task in enumerate(tasks)]
@@ -107,7 +139,6 @@ def run(
     except KeyboardInterrupt:
         interrupted = True
     rows = _table(subject, [point for point, _ in points], tasks, found)
-    axes = list(config.axes(subject.model))
     return StudyOutcome(
         *(config, [point for point, _ in points], subject.condition, axes, rows, len(tasks)),
         interrupted=interrupted,
@@ -115,26 +146,32 @@ def run(
 
 
 def _run(
-    tasks: Sequence[tuple[int, str, int, Any, Trial]],
+    tasks: Sequence[tuple[int, str, Sequence[str], int, Any, Trial]],
     emit: Callable[[int, tuple[int, Rows]], None],
 ) -> None:
     """Run some trials, those of one point at once."""
-    subject = find(tasks[0][1])
+    subject = find(tasks[0][1], tasks[0][2])
     by_point: dict[int, list[int]] = {}
     for index, task in enumerate(tasks):
-        by_point.setdefault(task[2], []).append(index)
+        by_point.setdefault(task[3], []).append(index)
     for indices in by_point.values():
 
         def take(i: int, rows: Rows, indices: list[int] = indices) -> None:
-            emit(indices[i], (tasks[indices[i]][0], [_with_status(row) for row in rows]))
+            emit(indices[i], (tasks[indices[i]][0], [with_status(row) for row in rows]))
 
-        trials = [tasks[index][4] for index in indices]
-        subject.run(tasks[indices[0]][3], trials, take)
+        trials = [tasks[index][5] for index in indices]
+        subject.run(tasks[indices[0]][4], trials, take)
 
 
-def _with_status(row: Mapping[str, Any]) -> dict[str, Any]:
-    """A row that says whether its numbers may be used: ok, invalid or nan."""
-    bad = [name for name, v in row.items() if isinstance(v, float) and not math.isfinite(v)]
+def with_status(row: Mapping[str, Any], judged: Collection[str] = ()) -> dict[str, Any]:
+    """A row that says whether its numbers may be used: ok, invalid or nan.
+
+    Args:
+        row: The row.
+        judged: Columns that are looked at, all if there are none.
+    """
+    looked = {name: v for name, v in row.items() if not judged or name in judged}
+    bad = [name for name, v in looked.items() if isinstance(v, float) and not math.isfinite(v)]
     status = "invalid" if row.get("outcome") == "invalid" else "nan" if bad else "ok"
     reason = row.get(REASON) or (f"not finite: {', '.join(bad)}" if status == "nan" else "")
     return {**row, STATUS: status, REASON: reason}
@@ -149,7 +186,7 @@ def _table(
     """All rows in the order of the plan, each with the same columns."""
     in_order = sorted(found, key=lambda item: item[0])
     whole = [
-        {"point": tasks[place][1], **_cells(points[tasks[place][1]]), **row}
+        {"point": tasks[place][2], **cells(points[tasks[place][2]]), **row}
         for place, rows in in_order
         for row in rows
     ]
@@ -157,7 +194,7 @@ def _table(
     return [{n: row.get(n) for n in (*columns, STATUS, REASON)} for row in whole]
 
 
-def _cells(point: Point) -> dict[str, Any]:
+def cells(point: Point) -> dict[str, Any]:
     """The values of a point as cells of a table: lists as text."""
     return {
         name: " ".join(map(str, value)) if isinstance(value, list | tuple) else value

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, is_dataclass
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -13,13 +13,18 @@ from pydantic import BaseModel, ValidationError
 from antennate import experiments
 from antennate.errors import BadInputError, ConfigError
 from antennate.experiments.study.config import StudyConfig
+from antennate.experiments.study.rows import own_row
 from antennate.lookup import Registry
+from antennate.messages import shown
 from antennate.params.base import Params
 from antennate.params.reading import describe, put_over, with_bases
 from antennate.studies.experiment import Experiment, Trial, no_row, no_step
 from antennate.studies.plan import Point
 
 Rows = list[dict[str, Any]]
+OF_TRIALS = ("trials", "seed")
+"""Parameters and columns that say which trials there are."""
+_MOST_NAMED = 12
 FUNCTIONS: Registry[Callable[..., Any]] = Registry("trial function", "antennate.trials", {})
 """Functions trial(config, seed) -> row: config holds the parameters by name, seed is a number."""
 
@@ -54,8 +59,12 @@ class Subject(Protocol):
         ...
 
 
-def find(name: str) -> Subject:
+def find(name: str, axes: Collection[str] = ()) -> Subject:
     """What a study names.
+
+    Args:
+        name: An experiment or a function.
+        axes: Names of what varies; a function may have no such column.
 
     Raises:
         BadInputError: There is no such experiment or function.
@@ -63,7 +72,7 @@ def find(name: str) -> Subject:
     if name in experiments.names():
         return _OfExperiment(experiments.load(name))
     if ":" in name or name in FUNCTIONS.added:
-        return _OfFunction(name)
+        return _OfFunction(name, axes)
     raise BadInputError(f"experiment: {experiments.unknown(name)}")
 
 
@@ -74,10 +83,77 @@ def configurations(config: StudyConfig, subject: Subject) -> list[tuple[Point, A
         ConfigError: A parameter is unknown, a value out of bounds, or the plan is empty.
     """
     settings = put_over(config.settings, {} if config.trials is None else {"trials": config.trials})
-    return [
-        (point, subject.configured(put_over(settings, nested(point))))
-        for point in config.points_of(subject.model)
-    ]
+    for name in config.vary:
+        _require_groups(settings, name)
+    found: list[tuple[Point, Any]] = []
+    for point in config.points_of(subject.model):
+        try:
+            found.append((point, subject.configured(put_over(settings, nested(point)))))
+        except ConfigError as error:
+            raise ConfigError(f"{_table_of(str(error), settings, subject)}: {error}") from None
+    return found
+
+
+def _require_groups(settings: Mapping[str, Any], name: str) -> None:
+    """Check that settings hold no value where a name that varies has a group."""
+    group, *parts = name.split(".")
+    inner: Any = settings
+    for part in parts:
+        inner = inner.get(group, {}) if isinstance(inner, Mapping) else inner
+        if not isinstance(inner, Mapping):
+            raise ConfigError(
+                f"settings.{group}: expected a table, as {name} varies, found {shown(inner)}"
+            )
+        group = part
+
+
+def _table_of(fault: str, settings: Mapping[str, Any], subject: Subject) -> str:
+    """The table of a file that a fault of a point is in."""
+    try:
+        subject.configured(settings)
+    except ConfigError as error:
+        if fault.startswith(str(error).partition(" (and ")[0]):
+            return "settings"
+    return "vary"
+
+
+@dataclass(frozen=True)
+class Columns:
+    """Names of the columns of rows.
+
+    Attributes:
+        every: All of them.
+        numbers: Those of numbers that are measured.
+    """
+
+    every: Sequence[str]
+    numbers: Sequence[str]
+
+
+def columns_of(name: str) -> Columns | None:
+    """The columns of an experiment, None if they are not known before it is run."""
+    trials = experiments.load(name).trials if name in experiments.names() else None
+    if trials is None or trials.row is None:
+        return None
+    kinds = {field.name: _kind(field.type) for field in fields(trials.row)}
+    numbers = [n for n, k in kinds.items() if k in ("float", "int") and n not in OF_TRIALS]
+    return Columns(list(kinds), numbers)
+
+
+def columns_in(row: Mapping[str, Any]) -> Columns:
+    """The columns of a row."""
+    numbers = [n for n, v in row.items() if isinstance(v, float | int | None)]
+    return Columns(list(row), [n for n in numbers if n not in OF_TRIALS])
+
+
+def _kind(annotation: Any) -> str:
+    text = annotation if isinstance(annotation, str) else getattr(annotation, "__name__", "")
+    return text.partition(" ")[0]
+
+
+def among(names: Sequence[str]) -> str:
+    """The first names of those that may be chosen."""
+    return f"one of {', '.join(names[:_MOST_NAMED])}" + (", ..." * (len(names) > _MOST_NAMED))
 
 
 def nested(point: Point) -> dict[str, Any]:
@@ -118,7 +194,7 @@ class _OfExperiment:
             self._trials.run(config, trials, lambda i, row: emit(i, [asdict(row)]))
             return
         outcome = self._experiment.run(config, 1, no_step, no_row)
-        emit(0, [asdict(row) for row in outcome.rows] or [_numbers(outcome.result())])
+        emit(0, [asdict(row) for row in outcome.rows] or [numbers(outcome.result())])
 
 
 class _OfFunction:
@@ -126,8 +202,8 @@ class _OfFunction:
     condition = ""
     most = 1
 
-    def __init__(self, name: str) -> None:
-        self._function = FUNCTIONS.find(name)
+    def __init__(self, name: str, axes: Collection[str]) -> None:
+        self._function, self._axes = FUNCTIONS.find(name), axes
 
     def configured(self, values: Mapping[str, Any]) -> Mapping[str, Any]:
         return values
@@ -141,8 +217,7 @@ class _OfFunction:
     def run(self, config: Any, trials: Sequence[Trial], emit: Callable[[int, Rows], None]) -> None:
         given = {name: value for name, value in config.items() if name != "trials"}
         for i, (_, seed) in enumerate(trials):
-            row = self._function(given, seed)
-            emit(i, [{"trial": seed, **(asdict(row) if is_dataclass(row) else dict(row))}])  # type: ignore[arg-type]
+            emit(i, [{"trial": seed, **own_row(self._function(given, seed), self._axes)}])
 
 
 def _plain(value: Any) -> Any:
@@ -154,12 +229,12 @@ def plain(values: Any) -> Any:
     return json.loads(json.dumps(values, default=_plain))
 
 
-def _numbers(result: Mapping[str, Any], path: str = "") -> dict[str, Any]:
+def numbers(result: Mapping[str, Any], path: str = "") -> dict[str, Any]:
     """Numbers and texts of a result as one row, by dotted name."""
     found: dict[str, Any] = {}
     for key, value in result.items():
         if isinstance(value, Mapping):
-            found |= _numbers(value, f"{path}{key}.")
+            found |= numbers(value, f"{path}{key}.")
         elif value is None or isinstance(value, str | int | float):
             found[path + key] = value
     return found

@@ -78,6 +78,7 @@ def _files(outcome: sweep.SweepOutcome) -> Mapping[str, str]:
 
 EXPERIMENT = Experiment.of_folder(
     *(__name__, SweepConfig, sweep.run, tables, sentence),
+    filmed=True,
     files=_files,
     check=require_solver,
     parts="sweeps",

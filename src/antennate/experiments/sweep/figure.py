@@ -65,15 +65,14 @@ def study(result: Mapping[str, Any]) -> Figure:
     ):
         _draw_errors(panel, result["estimates"], quantity)
         panel.set_title(f"{what}, with sensor noise (95 %)")
-        key, note = ("gap", "") if quantity == "gap" else ("base_to_tip", ", base to tip")
+        key, note = ("gap", "") if quantity == "gap" else ("base_to_tip", ",\nbase to tip")
         published = result["published_percent"][key]
         panel.axhline(published, color=style.INK, linewidth=1, linestyle=(0, (4, 2)))
         panel.annotate(
             f"CITRAS {published:g} %{note}",
-            (0.62, published),
+            (2.3, published),
             (0, -2),
             textcoords="offset points",
-            ha="center",
             va="top",
             fontsize=8,
         )

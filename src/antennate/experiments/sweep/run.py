@@ -17,6 +17,7 @@ from antennate.experiments.sweep.estimates import Trial
 from antennate.experiments.sweep.outlines import Outlines
 from antennate.params.sweep import SweepParams
 from antennate.sim import chain
+from antennate.sim.bench import Watch
 from antennate.studies.experiment import OnRow, OnStep, no_row, no_step
 from antennate.studies.pool import gather
 from antennate.studies.statistics import mean95
@@ -138,6 +139,7 @@ def map_cell(
     distance: float,
     centre: float,
     amplitude: float,
+    watch: Watch | None = None,
 ) -> tuple[SweepRow, Outlines | None]:
     """Sweep in one cell of the map and share out the time between the shapes."""
     sweep = SweepParams(centre=centre, amplitude=amplitude, frequency=config.sweep.frequency)
@@ -151,6 +153,7 @@ def map_cell(
         config.speed if motion == "moving" else 0.0,
         config.shape.gap,
         config.solver,
+        watch,
     )
     found: dict[str, Any] = {}
     if not trace.reason:

@@ -19,7 +19,7 @@ from antennate.params.bench import Solver
 from antennate.params.scene import BenchPhysicsParams
 from antennate.params.sweep import ShapeParams, SweepParams
 from antennate.robots.antenna import AntennaSpec
-from antennate.sim.bench import Bar, Bench, compile_bench
+from antennate.sim.bench import Bar, Bench, Watch, compile_bench
 from antennate.sim.chain import ChainBench
 from antennate.types import Bools, Floats
 
@@ -91,6 +91,7 @@ def record(
     speed: float = 0.0,
     gap: float = 5e-4,
     solver: Solver = "mujoco",
+    watch: Watch | None = None,
 ) -> Trace:
     """Sweep beside a wall.
 
@@ -103,6 +104,7 @@ def record(
         speed: Speed of the base along the heading [m/s].
         gap: Distance to the wall that counts as touching [m].
         solver: What steps the physics.
+        watch: Looks at the bench of the engine after each physics step; the chain has none.
 
     Raises:
         MissingPackageError: The solver needs a package that is not installed.
@@ -119,7 +121,7 @@ def record(
         while bench.t < end:
             t = bench.t
             bench.command(way(t, speed), 0.0, speed_at(t, speed), 0.0, commanded(sweep, t))
-            bench.step(steps)
+            bench.step(steps, watch)
             joints, base = bench.joints(), bench.base_angle()
             tip = joints[-1] - joints[0]
             near = wall.distance - float((joints @ wall.normal).max()) - antenna.radius

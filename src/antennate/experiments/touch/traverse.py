@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +12,7 @@ from antennate.errors import SimulationError
 from antennate.experiments.touch.config import MOVES, TouchConfig, reach, site
 from antennate.robots.antenna import AntennaSpec
 from antennate.sim import touch_wall
-from antennate.sim.bench import Bench, compile_bench
+from antennate.sim.bench import Bench, Watch, compile_bench, unwatched
 from antennate.sim.touch_wall import Site, WallKind
 from antennate.types import Floats
 
@@ -91,17 +90,13 @@ def plan(config: TouchConfig, wall: WallKind, speed: float, profile: Profile, tr
     )
 
 
-Watch = Callable[[Bench], None]
-"""Takes the bench after each tick."""
-
-
 def run_traverse(
     config: TouchConfig,
     wall: WallKind,
     speed: float,
     profile: Profile,
     trial: int,
-    watch: Watch = lambda bench: None,
+    watch: Watch = unwatched,
 ) -> Traverse:
     """Move the antenna along the wall; trouble in the physics ends the traverse early."""
     one = plan(config, wall, speed, profile, trial)

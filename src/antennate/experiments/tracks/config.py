@@ -220,7 +220,9 @@ class TracksConfig(Params):
     def _refuse(self, names: tuple[str, ...], why: str) -> None:
         for name in names:
             if getattr(self, name) != type(self).model_fields[name].default:
-                raise ValueError(f"{name}: expected the default, as it is not read {why}")
+                raise ValueError(
+                    f"{name}: expected the default, as it is not read {why}; leave it out"
+                )
 
     @property
     def read_criteria(self) -> tuple[str, ...]:

@@ -52,7 +52,7 @@ def study(outcome: TracksOutcome, result: Mapping[str, Any]) -> Figure:
     _draw_angle(panels["time"], outcome.antennae[most], shapes[most])
     _draw_change(panels["vary"], result)
     handles = [
-        panels["shares"].plot([], [], marker="s", linestyle="", color=colour, label=shape)[0]
+        panels["shares"].plot([], [], _MARKS.get(shape, "s"), color=colour, label=shape)[0]
         for shape, colour in style.SHAPE_COLOURS.items()
     ]
     figure.legend(handles=handles, loc="outside upper center", ncols=len(handles))
@@ -108,7 +108,7 @@ def _draw_outlines(panel: Axes, outcome: TracksOutcome, shapes: list[Ints]) -> N
     panel.set_aspect("equal", adjustable="datalim")
     panel.set_xlabel("outwards / length")
     panel.set_ylabel("ahead / length")
-    panel.set_title(f"Antennae in contact, {_OUTLINES} of each shape")
+    panel.set_title(f"Antennae in contact, up to {_OUTLINES} of each shape")
 
 
 def _draw_angle(panel: Axes, one: Seen, shapes: Ints) -> None:
@@ -130,16 +130,16 @@ def _draw_angle(panel: Axes, one: Seen, shapes: Ints) -> None:
 
 
 def _draw_change(panel: Axes, result: Mapping[str, Any]) -> None:
-    """Share of every shape with each criterion less and more."""
+    """Share of every shape with each criterion less and more; equal ones stand side by side."""
     rows = result["sensitivity"]
-    for name in SHAPES:
+    for k, name in enumerate(SHAPES):
         usual = result["shapes"][name]["share"]
         if usual is None or math.isnan(usual):
             continue
         colour = style.SHAPE_COLOURS[name]
         panel.axhline(usual, color=colour, linewidth=1.0)
         panel.plot(
-            range(len(rows)),
+            np.arange(len(rows)) + 0.15 * (k - 1.5),
             [row["share"][name] for row in rows],
             marker=_MARKS[name],
             linestyle="",

@@ -24,6 +24,7 @@ from antennate.experiments.tracks.track import (
     require_points,
 )
 from antennate.files import read_limited
+from antennate.messages import extra
 from antennate.types import Floats
 
 _SLEAP_CUTOFF = 0.2
@@ -42,8 +43,7 @@ def read(path: Path, names: Sequence[str]) -> list[Track]:
         import h5py
     except ImportError:
         raise MissingPackageError(
-            f"{path}: expected h5py to read HDF5, found none; install it with "
-            "`pip install antennate[tracks]`"
+            f"{path}: expected h5py to read HDF5, found none; install it with {extra('tracks')}"
         ) from None
     data = read_limited(path, LARGEST)
     try:

@@ -33,7 +33,10 @@ from antennate.types import AntennaFrame, Controller, JointCommand, Robot
 
 BATCH = 12
 """Trials of one process stepped in lockstep."""
-Emit = Callable[[tuple[TrialResult, TrialPath]], None]
+SHOWN_TRIALS = 5
+"""Trials of which the figure draws the paths; those of the others are not kept, as they take time.
+"""
+Emit = Callable[[tuple[TrialResult, TrialPath | None]], None]
 Watch = Callable[[World, AntennaFrame, Controller], Sequence[str]]
 """Takes world, frame and controller of the first row after each tick; returns events to log."""
 
@@ -155,8 +158,12 @@ class _Rows:
             for log in self._logs.values():
                 log.take(frame, command)
             self._look(frame, made)
+            maneuvers, faults = control.maneuver.tolist(), control.faults
             for row, monitor in enumerate(self._monitors):
-                if monitor is not None and self._watch(row, monitor, control) and self._waiting:
+                if monitor is None:
+                    continue
+                ended = self._watch(row, monitor, maneuvers[row], faults.get(row))
+                if ended and self._waiting:
                     phase = self._place(row)
                     control.reset(np.array([row]), phase)
                     self._log(row, made, phase)
@@ -170,7 +177,7 @@ class _Rows:
         gait, period = config.control.gait, config.control.period
         start = draw_trial(config, self._scene, trial, gait, period)
         self._robot.load(row, start.world, start.chance)
-        before = self._robot.world(row).outlines()[1]
+        before = self._robot.world(row).outlines()[1] if trial < SHOWN_TRIALS else []
         self._monitors[row] = TrialMonitor(
             config.seed, trial, self._name, start.scene, before, config.time_limit
         )
@@ -195,6 +202,7 @@ class _Rows:
             phase=phase,
         )
         path = self.log_of(monitor.trial)
+        path.unlink(missing_ok=True)  # what a killed worker left of it
         self._logs[row] = SimulatedLog(path, header, controller, world, row)
 
     def _look(self, frame: AntennaFrame, controller: Controller) -> None:
@@ -212,14 +220,12 @@ class _Rows:
             log.close()
             log.path.unlink(missing_ok=True)
 
-    def _watch(self, row: int, monitor: TrialMonitor, control: CheckedController) -> bool:
+    def _watch(self, row: int, monitor: TrialMonitor, maneuver: int, fault: str | None) -> bool:
         """Look at a row after a tick; whether its trial has ended."""
-        fault = control.faults.get(row)
         if fault is not None:
             self.end(row, "invalid", f"controller: {fault}")
             return True
         failure = self._robot.failure(row)
-        maneuver = int(control.maneuver[row])
         outcome = monitor.watch(self._robot.world(row), maneuver, failure is not None)
         if outcome is not None:
             self.end(row, outcome, str(failure or ""))
@@ -231,6 +237,7 @@ class _Rows:
             log.close()
         monitor, world = self._monitors[row], self._robot.world(row)
         if monitor is not None:
-            self._emit((monitor.result(world, outcome, reason), monitor.path(world)))
+            path = monitor.path(world) if monitor.trial < SHOWN_TRIALS else None
+            self._emit((monitor.result(world, outcome, reason), path))
         self._robot.unload(row)
         self._monitors[row] = None

@@ -9,6 +9,7 @@ from typing import Any
 from antennate.experiments.tunnel import measures
 from antennate.experiments.tunnel import run as tunnel
 from antennate.experiments.tunnel.batch import BATCH
+from antennate.experiments.tunnel.monitor import TrialResult
 from antennate.messages import short_names
 from antennate.sim.scenes.registry import TUNNEL
 from antennate.studies.experiment import Experiment, Trials
@@ -83,7 +84,8 @@ EXPERIMENT = Experiment.of_folder(
     filmed=True,
     failed=lambda result: bool(_none_valid(result)),
     logged=tunnel.run,
-    trials=Trials("controller", tunnel.every, tunnel.run_rows, BATCH),
+    trials=Trials("controller", tunnel.every, tunnel.run_rows, BATCH, TrialResult),
+    measures=measures.COLUMNS,
     viewed=lambda config, on_step, on_row, view, logs: tunnel.run(
         config, 1, on_step, on_row, logs, view
     ),

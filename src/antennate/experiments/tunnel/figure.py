@@ -15,8 +15,9 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator, PercentFormatter
 
 from antennate import figures as style
+from antennate.experiments.tunnel.batch import SHOWN_TRIALS
 from antennate.experiments.tunnel.monitor import TrialPath, TrialResult
-from antennate.experiments.tunnel.run import SHOWN_TRIALS, TunnelOutcome
+from antennate.experiments.tunnel.run import TunnelOutcome
 from antennate.messages import short_names
 from antennate.types import Floats, Maneuver
 
@@ -248,7 +249,7 @@ def _title_panels(rate: Axes, inside: Axes, mean: Axes, time_limit: float, trial
     mean.set(
         xlim=(0, 1.02 * time_limit),
         xlabel="restricted mean time [s]",
-        title=f"Failures as the limit; {style.interval_note('95 %', trials)}",
+        title=style.interval_note("Failures as the limit; 95 %", trials).capitalize(),
     )
     inside.set(
         xlim=(0, time_limit),

@@ -44,6 +44,7 @@ CONTROLLER = (
     Measure("force_mean_n", "contact force, mean", "N", of=mean),
     Measure("force_max_n", "contact force, largest", "N", of=largest, form=".1f"),
 )
+COLUMNS = (*CONTROLLER, Measure("time_s", "time, a failure as the limit", "s", form=".1f"))
 PAIR = (
     Measure("trials", "trials valid in both", form="d"),
     Measure("only_first", "only the first succeeded", form="d"),

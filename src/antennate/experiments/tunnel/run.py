@@ -27,8 +27,6 @@ from antennate.types import AntennaFrame, Controller, Maneuver
 
 _TASK = 12
 """Most trials handed to a process at once."""
-SHOWN_TRIALS = 5
-"""Trials of which the figure draws the paths; those of the others are not kept."""
 _Found = tuple[TrialResult, TrialPath | None]
 
 
@@ -103,10 +101,8 @@ def _run(
     for name in dict.fromkeys(name for name, _ in places):
         numbers = [trial for controller, trial in places if controller == name]
 
-        def take(item: tuple[TrialResult, TrialPath]) -> None:
-            row, path = item
-            shown = path if row.trial < SHOWN_TRIALS else None
-            emit(places[row.controller, row.trial], (row, shown))
+        def take(found: _Found) -> None:
+            emit(places[found[0].controller, found[0].trial], found)
 
         if run is None:
             run_trials(config, name, numbers, take, logs=logs)

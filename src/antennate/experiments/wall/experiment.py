@@ -7,6 +7,7 @@ from typing import Any
 
 from antennate.experiments.wall import measures
 from antennate.experiments.wall import run as wall
+from antennate.experiments.wall.outcome import WallTrial
 from antennate.sim.chain import require_solver
 from antennate.studies.experiment import Experiment, Trials
 from antennate.studies.measures import Table, successes
@@ -49,7 +50,8 @@ def _hangs(result: Mapping[str, Any]) -> str:
 EXPERIMENT = Experiment.of_folder(
     *(__name__, wall.WallConfig, wall.run, tables, sentence),
     filmed=True,
-    trials=Trials("profile", wall.every, wall.run_rows),
+    trials=Trials("profile", wall.every, wall.run_rows, row=WallTrial),
+    measures=measures.PROFILE,
     viewed=lambda config, on_step, on_row, view, logs: wall.run(config, 1, on_step, on_row, view),
     check=require_solver,
 )

@@ -28,7 +28,7 @@ from antennate.params.scene import BenchPhysicsParams
 from antennate.robots.antenna import AntennaSpec
 from antennate.robots.sensor import SensorParams
 from antennate.sim import chain
-from antennate.sim.bench import Ball, Bench, compile_bench
+from antennate.sim.bench import Ball, Bench, Watch, compile_bench, unwatched
 from antennate.studies.experiment import OnRow, OnStep, Trial, no_row, no_step
 from antennate.studies.pool import gather
 from antennate.studies.work import Failure
@@ -123,15 +123,7 @@ class WallOutcome:
         }
 
 
-Watch = Callable[[Bench], None]
-"""Takes the bench after each command to the carriage."""
-
-
-def _unwatched(bench: Bench) -> None:
-    """Look at nothing."""
-
-
-def passage(config: WallConfig, profile: str, trial: int, watch: Watch = _unwatched) -> Traverse:
+def passage(config: WallConfig, profile: str, trial: int, watch: Watch = unwatched) -> Traverse:
     """Move one antenna along the wall.
 
     Args:
@@ -259,7 +251,7 @@ def run_rows(config: WallConfig, trials: Sequence[Trial], emit: Callable[[int, A
 
 
 def run_trial(
-    config: WallConfig, profile: str, trial: int, watch: Watch = _unwatched
+    config: WallConfig, profile: str, trial: int, watch: Watch = unwatched
 ) -> tuple[WallTrial, Traverse | None]:
     """One trial, and of the first of a profile its passage."""
     try:

@@ -17,6 +17,8 @@ from antennate.params.doctor import DoctorParams
 from antennate.params.network import NetworkParams
 
 _TIMERS = Path("/sys/bus/usb-serial/devices")
+_TERMINALS = Path("/dev/pts")
+"""Where the twin's ports are."""
 _USUAL_NAME = "ttyUSB0"
 
 
@@ -65,7 +67,9 @@ def latency_row(path: str, slow: bool, params: DoctorParams, timers: Path = _TIM
         f"run `echo {most} | sudo tee {file}`, or `setserial {path} low_latency`; again after "
         "every plug-in"
     )
-    if value is None:
+    if Path(os.path.realpath(path)).parent == _TERMINALS:
+        cure = "if a twin is there, the computer is too busy: end other programs"
+    elif value is None:
         cure = f"if it is an FTDI adapter (U2D2), {set_it}; else use one"
     elif value > most:
         cure = set_it

@@ -45,7 +45,6 @@ def require_quick(
     if (time := median(times)) > _SLOW:
         cure = latency_row(path, True, DoctorParams()).cure
         raise BringUpError(
-            f"--bus: expected answers within {1e3 * _SLOW:g} ms, found {1e3 * time:.1f} ms: the "
-            f"adapter keeps bytes back; {cure}"
+            f"--bus: expected answers within {1e3 * _SLOW:g} ms, found {1e3 * time:.1f} ms; {cure}"
         )
     return time

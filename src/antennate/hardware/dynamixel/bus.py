@@ -33,6 +33,9 @@ PING_DATA = 3
 FAST_TRIES = 3
 """Fast reads without any answer, but answers to a slow one, after which fast ones are given up: at
 1 % loss three in a row are one in 10^6 (assumed)."""
+KNOWN_TRIES = 100
+"""The same once a fast read was answered: then they are understood, and late answers of a second
+are a busy computer's (assumed)."""
 ALONE = 2
 """Misses in a row after which a servo no longer holds up the others; noise loses one (assumed)."""
 BUSY = 0.010
@@ -79,7 +82,7 @@ class Bus:
         self.fast = fast
         self.missed: dict[int, int] = {}
         self._port, self._clock = port, clock
-        self._fast_failures = 0
+        self._fast_failures, self._fast_tries = 0, FAST_TRIES
         self._pending = PendingRequests(self.timing.latest, clock)
         self._calm = False
         self._last_byte = self._sent = clock()
@@ -270,11 +273,12 @@ class Bus:
 
     def _count_fast(self, fast: bool, dumb: bool, answered: bool) -> bool:
         if fast:
-            self._fast_failures = 0 if answered else self._fast_failures
+            if answered:
+                self._fast_failures, self._fast_tries = 0, KNOWN_TRIES
             return not answered
         if dumb and answered:
             self._fast_failures += 1
-            self.fast = self._fast_failures < FAST_TRIES
+            self.fast = self._fast_failures < self._fast_tries
             return False
         return dumb
 

@@ -7,6 +7,7 @@ from urllib.parse import urlsplit
 
 from antennate.errors import BadInputError, ConfigError
 from antennate.hardware.ports.port import Line
+from antennate.messages import extra
 from antennate.params.network import NetworkParams
 
 
@@ -74,7 +75,7 @@ def _serial(path: str, baud: int, flag: str) -> Callable[[], Line]:
         from antennate.hardware.ports.serial_finder import SerialFinder
     except ModuleNotFoundError as error:
         raise ConfigError(
-            f"expected pyserial for real ports, found no module {error.name}; install "
-            "antennate[hardware], or run `uv run --extra hardware antennate ...`"
+            f"expected pyserial for real ports, found no module {error.name}; install it "
+            f"with {extra('hardware')}"
         ) from None
     return SerialFinder(path, baud, flag)

@@ -12,6 +12,7 @@ import math
 import os
 import re
 import resource
+import signal
 import subprocess
 import sys
 from collections.abc import Sequence
@@ -31,8 +32,10 @@ LARGEST_ASSET = 20_000_000
 """Most bytes of a mesh, texture or height field."""
 MOST_ELEMENTS = 20_000
 """Most elements of a model, those of `replicate` and the like counted as often as they come."""
-_LONGEST_COMPILE = 10.0
-"""Most time for the first compilation, the start of its process included [s]."""
+_MOST_CPU = 10
+"""Most CPU time for the first compilation, the start of its process included [s]."""
+_LONGEST_COMPILE = 60.0
+"""Most time for it on a busy machine [s]."""
 _MOST_MEMORY = 2 << 30
 """Most memory of that process [bytes]."""
 _NO_MODEL = 3
@@ -57,11 +60,11 @@ def require_compiles(
 
     Args:
         path: The file.
-        limit: Time that it may take [s].
+        limit: Time that it may take on the clock [s].
         child: What Python runs there, with the path as its argument.
 
     Raises:
-        SceneError: The engine crashes, or takes longer.
+        SceneError: The engine crashes, or takes longer, or more than 10 s of CPU time.
     """
     try:
         code = subprocess.run(  # noqa: S603 a list of words, no shell: this Python and our own module
@@ -74,12 +77,16 @@ def require_compiles(
             check=False,
         ).returncode
     except subprocess.TimeoutExpired:
-        raise SceneError(
-            f"{path}: expected a model that MuJoCo compiles within {limit:g} s, found none"
-        ) from None
+        raise _too_slow(path, f"{limit:g} s") from None
+    if code == -signal.SIGXCPU:
+        raise _too_slow(path, f"{_MOST_CPU} s of CPU time")
     if code not in (0, _NO_MODEL):
         how = f"signal {-code}" if code < 0 else f"exit code {code}"
         raise SceneError(f"{path}: expected an MJCF model, found one that crashes MuJoCo ({how})")
+
+
+def _too_slow(path: Path, limit: str) -> SceneError:
+    return SceneError(f"{path}: expected a model that MuJoCo compiles within {limit}, found none")
 
 
 def read_spec(path: Path) -> mujoco.MjSpec:
@@ -207,6 +214,7 @@ def _below(folder: Path, named: Path) -> Path:
 def _compile(path: Path) -> None:
     """What that process does."""
     resource.setrlimit(resource.RLIMIT_AS, (_MOST_MEMORY, _MOST_MEMORY))
+    resource.setrlimit(resource.RLIMIT_CPU, (_MOST_CPU, _MOST_CPU + 1))
     mujoco.set_mju_user_warning(lambda message: None)
     try:
         model = read_spec(path).compile()

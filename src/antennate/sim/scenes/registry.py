@@ -15,9 +15,10 @@ from antennate.sim.scenes.scene import FlatScene, Scene
 from antennate.sim.scenes.tunnel import TunnelScene
 
 TUNNEL = "tunnel"
-SCENES: Registry[Callable[[], Scene]] = Registry(
-    "scene", "antennate.scenes", {TUNNEL: TunnelScene, "flat": FlatScene}
-)
+_SHIPPED = {TUNNEL: TunnelScene, "flat": FlatScene}
+SHIPPED = tuple(_SHIPPED)
+"""Scenes that need no file and no code of others."""
+SCENES: Registry[Callable[[], Scene]] = Registry("scene", "antennate.scenes", _SHIPPED)
 
 
 def check_name(name: str) -> str:

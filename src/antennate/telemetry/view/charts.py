@@ -11,46 +11,71 @@ import viser
 from viser import uplot
 
 from antennate.colours import MANEUVER_COLOURS, MANEUVER_NAMES, SERIES
+from antennate.hardware.safety.causes import State
 from antennate.sim import shapes
 from antennate.sim.shapes import Shapes
 from antennate.telemetry.ticks import Tick
 from antennate.telemetry.view.channel import Poses
-from antennate.types import Floats, Maneuver
+from antennate.types import Contact, Floats, Maneuver
 
 _KEPT = 600
 """Ticks in a chart: 10 s of them at 60 Hz."""
-_HEIGHT = 120
+_HEIGHT, _PADDING = 120, (10, 10, 0, 0)
+"""Of a chart, and the room above and beside it for the halves of the outermost labels [pixels]."""
 _SIDES = ("left", "right")
+_COUNTERS = ("missed", "crc", "lost", "misses", "stale", "refused")
+"""Counters of what went wrong; those of what went well only grow."""
+_STATE, _COUNTS = (9,), tuple(range(10, 10 + len(_COUNTERS)))
+"""Columns of the supervisor's state and of these counters."""
 _STEP = 100.0
 """Limits of the readings are multiples of this [counts], so that they seldom change."""
 _PATH = 400
 """Points of the path on the map; every second one goes when there are more."""
-_MARGIN = 0.1
+_MARGIN, _PEN = 0.1, 0.006
+"""Room around the map [m], and width of the path as a share of the map."""
 _SHORT = {Maneuver.TURN_L: "left", Maneuver.TURN_R: "right"}
-_MUTED, _FAINT = "#6E6E6E", "#D8CDB8"
+_MUTED = "#858585"
+"""A grey that is read on white and on black."""
+_FAINT, _THIN = "#B09A6A", 0.45
+"""Colour of obstacles, and how much of it covers the page."""
+
+_Look = tuple[str, Sequence[tuple[str, str]], tuple[float, float] | None]
+"""Title, names and colours of its lines, limits (None: as the values are) of a chart."""
 
 
 class Charts:
-    """Counts, level with theta, contact and maneuver over time."""
+    """Counts, level with theta, contact, maneuver, supervisor and counters over time."""
 
     def __init__(self, server: viser.ViserServer, tab: Any) -> None:
         self._server, self._tab = server, tab
         self._rows = deque[tuple[float, ...]](maxlen=_KEPT)
         self._limits = (0.0, _STEP)
+        self._known = set[int]()
         pair = [(side, SERIES[i]) for i, side in enumerate(_SIDES)]
-        contact, one = "contact: 0 free, 1 touches, 2 unknown", [("maneuver", "#222222")]
-        self._add = {
+        contact, one = "contact: 0 free, 1 touches, 2 unknown", [("maneuver", _MUTED)]
+        self._add: dict[tuple[int, ...], _Look] = {
             (1, 2): ("readings [counts]", pair, self._limits),
             (3, 4, 8): ("level b, and θ", [*pair, ("θ", _MUTED)], (0.0, 1.0)),
             (5, 6): (contact, pair, (-0.2, 2.2)),
             (7,): (_maneuvers(), one, (-0.2, 4.2)),
+            _STATE: (_states(), [("supervisor", _MUTED)], (-0.2, 4.2)),
+            _COUNTS: (
+                "counted in these seconds",
+                list(zip(_COUNTERS, SERIES, strict=False)),
+                None,
+            ),
         }
-        begin = np.stack([np.arange(2.0), *np.zeros((8, 2))])
+        begin = np.stack([np.arange(2.0), *np.zeros((_COUNTS[-1], 2))])
         self._charts = {which: self._chart(which, begin) for which in self._add}
 
     def _chart(self, which: tuple[int, ...], columns: Floats) -> Any:
         with self._tab:
             return _chart(self._server, *self._add[which], _data(columns, which), which[0])
+
+    @property
+    def any(self) -> bool:
+        """Whether there is anything to show; a bench has no signals."""
+        return bool(self._known)
 
     def take(self, tick: Tick, theta: float) -> None:
         """Keep a tick; a time before the last one begins anew."""
@@ -58,18 +83,28 @@ class Charts:
             if tick.now == self._rows[-1][0]:
                 return
             self._rows.clear()
-        values = (*tick.reading, *tick.level, *tick.contact, tick.maneuver)
-        self._rows.append((tick.now, *map(float, values), theta))
+        if tick.state:  # on a robot it is news that a reading is missing
+            self._known |= {which[0] for which in self._charts}
+        values = (*tick.reading, *tick.level, *tick.contact, tick.maneuver, theta)
+        state = State.__members__.get(tick.state, np.nan)
+        counts = (getattr(tick, name) for name in _COUNTERS)
+        self._rows.append((tick.now, *map(float, (*values, state, *counts))))
 
     def show(self) -> None:
-        """Draw what was kept."""
+        """Draw what was kept; a chart of what nobody reads or decides here is not shown."""
         if not self._rows:
             return
         columns = np.array(self._rows).T
+        columns[_COUNTS[0] :] -= columns[_COUNTS[0] :, :1]
+        self._known |= _known(columns)
+        for which, chart in self._charts.items():
+            if chart.visible != (which[0] in self._known):
+                chart.visible = which[0] in self._known
         limits = _limits(columns[1:3])
         if limits != self._limits:  # a chart finds none itself where a reading is missing
             self._limits, which = limits, (1, 2)
-            self._add[which] = (*self._add[which][:2], limits)
+            title, lines, _ = self._add[which]
+            self._add[which] = title, lines, limits
             self._charts[which].remove()
             self._charts[which] = self._chart(which, columns)
             return  # a chart takes no others before it is there
@@ -79,6 +114,19 @@ class Charts:
 
 def _data(columns: Floats, which: tuple[int, ...]) -> tuple[Floats, ...]:
     return columns[0], *(columns[i] for i in which)
+
+
+def _known(columns: Floats) -> set[int]:
+    """First columns of the charts in which there is something."""
+    found = {
+        1: np.isfinite(columns[1:3]).any(),
+        3: np.isfinite(columns[3:5]).any(),
+        5: (columns[5:7] != Contact.UNKNOWN).any(),
+        7: (columns[7] >= 0).any(),
+        _STATE[0]: np.isfinite(columns[_STATE[0]]).any(),
+        _COUNTS[0]: np.isfinite(columns[_STATE[0]]).any(),
+    }
+    return {which for which, known in found.items() if known}
 
 
 def _limits(counts: Floats) -> tuple[float, float]:
@@ -94,15 +142,20 @@ def _maneuvers() -> str:
     return ", ".join(f"{int(m)} {_SHORT.get(m, MANEUVER_NAMES[m])}" for m in Maneuver)
 
 
+def _states() -> str:
+    return ", ".join(f"{int(state)} {state.name}" for state in State)
+
+
 def _chart(
     server: viser.ViserServer,
     title: str,
     lines: Sequence[tuple[str, str]],
-    limits: tuple[float, float],
+    limits: tuple[float, float] | None,
     data: tuple[Floats, ...],
     order: float,
 ) -> Any:
     axis: Any = uplot.Axis(size=56)
+    y = uplot.Scale(auto=True) if limits is None else uplot.Scale(range=limits)
     return server.gui.add_uplot(
         data,
         (
@@ -110,10 +163,11 @@ def _chart(
             *(uplot.Series(label=name, stroke=colour, width=1.5) for name, colour in lines),
         ),
         title=title,
-        scales={"x": uplot.Scale(time=False), "y": uplot.Scale(range=limits)},
+        scales={"x": uplot.Scale(time=False), "y": y},
         axes=(uplot.Axis(size=24), axis),
-        legend=uplot.Legend(show=False),
+        legend=uplot.Legend(show=len(lines) > len(_SIDES) + 1),
         height=_HEIGHT,
+        padding=_PADDING,
         order=order,
     )
 
@@ -140,25 +194,28 @@ class Map:
 
     def show(self, what: Shapes, now: Poses) -> None:
         """Draw it."""
-        places, solid = now.poses[:, :2], ~what.robot
-        marks = [_mark(what, now, i, _FAINT) for i in np.flatnonzero(solid).tolist()]
-        marks += [_mark(what, now, i, "#555555") for i in np.flatnonzero(what.robot).tolist()]
+        places = now.poses[:, :2]
+        obstacles, robot = (
+            "".join(_mark(what, now, i) for i in np.flatnonzero(which).tolist())
+            for which in (~what.robot, what.robot)
+        )
         way = " ".join(f"{x:.3f},{-y:.3f}" for x, y in self._path)
         inside = np.concatenate([places, np.array(self._path).reshape(-1, 2)])
         low, high = inside.min(axis=0) - _MARGIN, inside.max(axis=0) + _MARGIN
         width, height = high - low
         self._html.content = (
             f'<svg viewBox="{low[0]:.3f} {-high[1]:.3f} {width:.3f} {height:.3f}" '
-            'style="width:100%;max-height:320px;background:#fff" role="img" '
-            f'aria-label="map from above">{"".join(marks)}'
-            f'<polyline points="{way}" fill="none" stroke="{_COLOUR}" stroke-width="0.008"/></svg>'
+            'style="width:100%;max-height:320px" role="img" aria-label="map from above">'
+            f'<g style="color:{_FAINT};opacity:{_THIN}">{obstacles}</g>{robot}'
+            f'<polyline points="{way}" fill="none" stroke="{_COLOUR}" '
+            f'stroke-width="{_PEN * max(width, height):.5f}"/></svg>'
         )
 
 
 _COLOUR = MANEUVER_COLOURS[Maneuver.FORWARD]
 
 
-def _mark(what: Shapes, now: Poses, i: int, colour: str) -> str:
+def _mark(what: Shapes, now: Poses, i: int) -> str:
     """A shape in plan: a circle, or the outline of a box or of a capsule that lies."""
     x, y = now.poses[i, :2].tolist()
     axes = now.poses[i, 3:].reshape(3, 3)
@@ -170,13 +227,12 @@ def _mark(what: Shapes, now: Poses, i: int, colour: str) -> str:
             for a, b in ((1, 1), (-1, 1), (-1, -1), (1, -1))
         ]
         points = " ".join(f"{u:.3f},{-v:.3f}" for u, v in corners)
-        return f'<polygon points="{points}" fill="{colour}"/>'
+        return f'<polygon points="{points}" fill="currentColor"/>'
     if kind in (shapes.CAPSULE, shapes.CYLINDER):
         dx, dy = (axes[:2, 2] * size[1]).tolist()
         return (
             f'<line x1="{x - dx:.3f}" y1="{-(y - dy):.3f}" x2="{x + dx:.3f}" y2="{-(y + dy):.3f}" '
-            f'stroke="{colour}" stroke-width="{2 * size[0]:.4f}" stroke-linecap="round"/>'
+            f'stroke="currentColor" stroke-width="{2 * size[0]:.4f}" stroke-linecap="round"/>'
         )
-    return (
-        f'<circle cx="{x:.3f}" cy="{-y:.3f}" r="{max(float(size[0]), 0.002):.4f}" fill="{colour}"/>'
-    )
+    radius = max(float(size[0]), 0.002)
+    return f'<circle cx="{x:.3f}" cy="{-y:.3f}" r="{radius:.4f}" fill="currentColor"/>'

@@ -16,6 +16,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from antennate.errors import BadInputError, MissingPackageError
+from antennate.messages import extra
 from antennate.sim import shapes
 from antennate.sim.shapes import Shapes
 from antennate.telemetry.header import Header
@@ -155,7 +156,7 @@ def require_foxglove() -> None:
     if find_spec("foxglove") is None:
         raise MissingPackageError(
             "foxglove: expected the package foxglove-sdk, found none; install it with "
-            "`pip install 'antennate[foxglove]'`"
+            f"{extra('foxglove')}"
         )
 
 

@@ -1,7 +1,8 @@
 """The page of the viser client, and what it is allowed to load: nothing but itself.
 
-The client is one file whose only script unpacks a style and a second script into the page. The
-policy names both scripts by their hash, so that a text that became markup by mistake could not run.
+The client is one file whose only script unpacks a style and a second script into the page; a line
+of ours chooses dark or light before. The policy names all three scripts by their hash, so that a
+text that became markup by mistake could not run.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from importlib import resources
 import numpy as np
 
 from antennate.errors import BadInputError
+from antennate.messages import extra
 from antennate.telemetry.view.gate import HOSTS
 
 _SCRIPT = re.compile(
@@ -23,6 +25,22 @@ _DIGITS = (
     "!#$%()*+,-./0123456789:;=?@ABCDEFGHIJKLMNOPQRSTUVWXYZ[\\]^_abcdefghijklmnopqrstuvwxyz{|}~"
 )
 """The digits of its base 88: five of them hold four bytes."""
+_DARK = """\
+{ const dark = matchMedia("(prefers-color-scheme: dark)").matches
+history.replaceState(null, "", dark ? "?darkMode" : "/") }
+"""
+"""Dark where the browser is: the client looks for that word."""
+_SHEET = '.mantine-Paper-root[style*="position: fixed"]'
+"""The panel of the client in a window narrower than 36em, where it would lie over the scene."""
+_STYLE = f"""\
+@media (max-width: 36em) {{
+  div:has(> {_SHEET}) {{ flex-direction: column }}
+  div:has(> {_SHEET}) > div:has(canvas) {{ height: 0 !important; flex: 1 }}
+  {_SHEET} {{ position: static !important; flex: none; width: 100% !important }}
+  {_SHEET} [style*="width: 20em"] {{ width: 100% !important }}
+}}
+"""
+"""There the scene is above the panel."""
 
 
 def load(port: int) -> tuple[bytes, str]:
@@ -36,11 +54,11 @@ def load(port: int) -> tuple[bytes, str]:
     if match is None or text.count("<script") != 1:
         raise BadInputError(
             "view: expected the page of viser 1.1, found another form; "
-            "install it with `pip install 'antennate[view]'`"
+            f"install it with {extra('view')}"
         )
     packed, style, script, loader = match[1], int(match[2]), int(match[3]), match[4]
     unpacked = _unpacked(packed, style + script)
-    hashes = " ".join(map(_hash, (loader.encode(), unpacked[style:])))
+    hashes = " ".join(map(_hash, (_DARK.encode(), loader.encode(), unpacked[style:])))
     live = " ".join(f"ws://{host}:{port}" for host in HOSTS if "[" not in host)
     policy = (
         f"default-src 'none'; script-src {hashes} 'wasm-unsafe-eval' blob:; worker-src blob:; "
@@ -48,7 +66,8 @@ def load(port: int) -> tuple[bytes, str]:
         f"connect-src 'self' {live} data: blob:; "
         "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
     )
-    text = text.replace("<title>Viser</title>", "<title>antennate</title>")
+    head = f"<title>antennate</title><style>{_STYLE}</style><script>{_DARK}</script>"
+    text = text.replace("<title>Viser</title>", head)
     return text.encode(), policy
 
 

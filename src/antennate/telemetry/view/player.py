@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -10,16 +9,15 @@ from typing import Any
 import numpy as np
 
 from antennate.colours import SERIES, rgba
-from antennate.params.scene import PhysicsParams
 from antennate.sim.shapes import VisibleModel
-from antennate.sim.world import World, compile_world
+from antennate.sim.world import World
 from antennate.telemetry.header import Header
+from antennate.telemetry.log_scene import LogScene
 from antennate.telemetry.reader import LogReader, Record
 from antennate.telemetry.ticks import Tick
 from antennate.telemetry.topics import CONTACT_FORCES, COORDINATES, EVENTS
 from antennate.telemetry.view.channel import HEADER, POSES, SCENE, TICK, Channel, Poses
 from antennate.telemetry.view.pace import Pace, Restart
-from antennate.types import Floats
 
 _SIDES = (rgba(SERIES[0]), rgba(SERIES[1]))
 _LOOK = 0.05
@@ -41,7 +39,9 @@ class LogPlayer(Pace):
     ) -> None:
         super().__init__(channel, speed)
         self._header, self._arena = header, arena
-        self._scene: _Scene | None = None
+        self._scene: LogScene | None = None
+        self._model: VisibleModel | None = None
+        self._forces = np.zeros((0, 6), np.float32)
         self._begin_at: float | None = None
         self.state |= {"title": title, "again": True, "theta": header.params.rule.threshold}
         self.begin()
@@ -49,6 +49,7 @@ class LogPlayer(Pace):
     def begin(self) -> None:
         """From the beginning."""
         self._begin_at = self._scene = None
+        self._forces = np.zeros((0, 6), np.float32)
         self.tell()
         self.channel.send(HEADER, self._header.pack())
 
@@ -62,8 +63,10 @@ class LogPlayer(Pace):
             self._begin_at = tick.now
         self.wait(tick.now - self._begin_at)
         if self.due():
-            if self._scene is not None:
-                self.channel.send(POSES, self._scene.poses(tick.now).pack())
+            if self._scene is not None and self._model is not None:
+                self._scene.place(tick.now)
+                poses = self._model.poses(self._scene.world.data)
+                self.channel.send(POSES, Poses(tick.now, poses, self._forces).pack())
             self.channel.send(TICK, tick.pack())
 
     def play(self, log: LogReader) -> None:
@@ -76,7 +79,7 @@ class LogPlayer(Pace):
         for records, tick in log.groups():
             for record in records:
                 if record.topic is EVENTS:
-                    self.say(EVENTS.type.decode(record.data)["msg"])
+                    self.say(EVENTS.decode(record.data)["msg"])
             if tick is not None:
                 self.keep(tick, records)
                 self.show(tick)
@@ -105,46 +108,15 @@ class LogPlayer(Pace):
         """Keep coordinates and forces of a tick; the first coordinates bring the scene."""
         for record in records:
             if record.topic is COORDINATES:
-                found = COORDINATES.type.decode(record.data)
-                place = np.array(found["position"])
+                found = COORDINATES.decode(record.data)
+                place = found["position"]
                 if self._scene is None:
-                    self._scene = _Scene(self._header, self._arena, len(place))
-                    shapes = self._scene.model.shapes().pack()
-                    self.channel.send_whole(SCENE, shapes)
+                    self._scene = LogScene(self._header, self._arena, len(place))
+                    self._model = VisibleModel(self._scene.world.model, _SIDES)
+                    self.channel.send_whole(SCENE, self._model.shapes().pack())
                 self._scene.take(tick.now, place, found["robot"])
-            elif record.topic is CONTACT_FORCES and self._scene is not None:
-                self._scene.forces = _bars(CONTACT_FORCES.type.decode(record.data))
-
-
-class _Scene:
-    """The world of a log, between the last two places that it tells."""
-
-    def __init__(self, header: Header, arena: World | None, count: int) -> None:
-        robot = header.robot
-        whole = arena is not None and arena.model.nq == count
-        self._bare = not whole
-        world = arena if arena is not None and whole else None
-        self._world = world or World(compile_world(PhysicsParams(), robot), robot)
-        self.model = VisibleModel(self._world.model, _SIDES)
-        self.forces = np.zeros((0, 6), np.float32)
-        self._last: tuple[float, Floats] = (-math.inf, np.zeros(0))
-        self._before = self._last
-
-    def take(self, t: float, place: Floats, robot: int) -> None:
-        """Coordinates at a time [s]; without the arena those of the robot."""
-        if self._bare:
-            place = place[robot : robot + self._world.model.nq]
-        self._before, self._last = self._last, (t, place)
-
-    def poses(self, t: float) -> Poses:
-        """Where all is at a time [s]: between the two places that are known, so a little late."""
-        (first, before), (last, now) = self._before, self._last
-        share = (t - last) / (last - first) if math.isfinite(first) and last > first else 1.0
-        place = now if share >= 1.0 else before + max(0.0, share) * (now - before)
-        if len(place) == self._world.model.nq:
-            self._world.place_all(place)
-        data = self._world.data
-        return Poses(t, self.model.poses(data), self.forces)
+            elif record.topic is CONTACT_FORCES:
+                self._forces = _bars(CONTACT_FORCES.decode(record.data))
 
 
 def _bars(found: Mapping[str, Any]) -> Any:

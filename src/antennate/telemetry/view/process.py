@@ -9,7 +9,8 @@ import subprocess
 import sys
 from importlib.util import find_spec
 
-from antennate.errors import BadInputError, MissingPackageError
+from antennate.errors import BadInputError, MissingPackageError, WorkerError
+from antennate.messages import extra
 from antennate.telemetry.view.channel import END, FAILED, READY, Channel
 from antennate.telemetry.view.foxglove import require_foxglove
 
@@ -27,6 +28,7 @@ class ViewProcess:
         module: What that process runs; its words are the files of the channel and of the page's
             socket, and the port for Foxglove, a hyphen for what is not wanted.
         foxglove: Port for Foxglove likewise, None without it.
+        flag: The option that chooses the port of the page, for an error.
 
     Attributes:
         channel: To it.
@@ -34,15 +36,26 @@ class ViewProcess:
 
     Raises:
         MissingPackageError: viser or foxglove-sdk is not installed.
-        BadInputError: A port is taken, or the process cannot serve.
+        BadInputError: A port is taken or wanted twice, or the process cannot serve.
     """
 
-    def __init__(self, port: int | None, module: str, foxglove: int | None = None) -> None:
+    def __init__(
+        self,
+        port: int | None,
+        module: str,
+        foxglove: int | None = None,
+        flag: str = "--view-port",
+    ) -> None:
         if port is not None:
             require_viser()
         if foxglove is not None:
             require_foxglove()
-        listener = socket.socket() if port is None else _listener(port)
+        if port is not None and port == foxglove != 0:
+            raise BadInputError(
+                f"view: expected different ports for the page and for Foxglove, found "
+                f"{port} twice; choose another with {flag} or --foxglove-port"
+            )
+        listener = socket.socket() if port is None else _listener(port, flag)
         self.port: int = 0 if port is None else listener.getsockname()[1]
         ours, theirs = Channel.pair()
         with listener, theirs:
@@ -73,6 +86,16 @@ class ViewProcess:
             raise BadInputError(text.decode())
         raise BadInputError("view: expected its process to serve, found that it does not")
 
+    def lost(self) -> WorkerError:
+        """What is raised when it ended although nobody told it to."""
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            self._process.wait(_ENDING)
+        code = self._process.poll()
+        found = "takes no messages" if code is None else f"ended with code {code}"
+        return WorkerError(
+            f"view: expected the process of its page to serve until Ctrl-C, found that it {found}"
+        )
+
     def close(self) -> None:
         """End it."""
         self.channel.send(END)
@@ -97,12 +120,11 @@ def require_viser() -> None:
     """
     if find_spec("viser") is None:
         raise MissingPackageError(
-            "view: expected the package viser, found none; install it with "
-            "`pip install 'antennate[view]'`"
+            f"view: expected the package viser, found none; install it with {extra('view')}"
         )
 
 
-def _listener(port: int) -> socket.socket:
+def _listener(port: int, flag: str) -> socket.socket:
     """A socket of this computer alone.
 
     Raises:
@@ -116,6 +138,6 @@ def _listener(port: int) -> socket.socket:
         listener.close()
         raise BadInputError(
             f"view: expected port {port} of {HOST} free, found: {error.strerror}; "
-            "choose another with --view-port, 0 takes any"
+            f"choose another with {flag}, 0 takes any"
         ) from None
     return listener

@@ -20,9 +20,13 @@ from antennate.types import Floats, Ints
 
 ROOT = "/world"
 _ARROW = (190, 0, 60)
+_ROBOT = 0.6
+"""Length of a robot [m], from which on arrows have their full thickness."""
 _FLOOR = 4.0
 """Side of the floor that is drawn [m]; it goes on beyond in the distance."""
 _CELL = 0.1
+_LINES = ((165, 165, 165), (125, 125, 125))
+"""Colours of its lines: seen on white and on black, and no brighter than the robot."""
 _AMBIENT = 1.5
 """Light from all sides, so that nothing is black behind what one sees through."""
 _ALONG_Z = np.array([0.0, 0.0, 1.0])
@@ -61,9 +65,7 @@ class SceneView:
             f"{ROOT}/forces",
             np.zeros((0, 2, 3)),
             _ARROW,
-            shaft_radius=0.004,
-            head_radius=0.009,
-            head_length=0.018,
+            **_thickness(1.0),
         )
         self._aimed = False
 
@@ -91,9 +93,20 @@ class SceneView:
         self._aimed = True
         ours = places[self.shapes.robot]
         reach = float(np.ptp(ours if len(ours) else places, axis=0).max())
+        for name, size in _thickness(min(1.0, reach / _ROBOT)).items():
+            setattr(self._arrows, name, size)
         camera = self._server.initial_camera
         camera.position = (-0.7 * reach, -0.9 * reach, 1.3 * reach)
         camera.look_at = (0.0, 0.0, 0.0)
+
+
+def _thickness(scale: float) -> dict[str, Any]:
+    """Of arrows [m]; thinner beside a single antenna."""
+    return {
+        "shaft_radius": 0.004 * scale,
+        "head_radius": 0.009 * scale,
+        "head_length": 0.018 * scale,
+    }
 
 
 class _Group:
@@ -122,7 +135,7 @@ class _Group:
             batched_wxyzs=np.tile([1.0, 0.0, 0.0, 0.0], (count, 1)),
             batched_positions=np.zeros((count, 3)),
             batched_scales=scale,
-            batched_colors=colour[:, :3],
+            batched_colors=_linear(colour[:, :3]),
             batched_opacities=None if (colour[:, 3] == 255).all() else colour[:, 3] / 255.0,
             lod="off",
         )
@@ -137,6 +150,16 @@ class _Group:
             self._before = now
             self.node.batched_positions = at
             self.node.batched_wxyzs = mine.as_quat(scalar_first=True)
+
+
+def _linear(colour: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Amounts of light, 0 to 255, of colours of a screen (sRGB, IEC 61966-2-1).
+
+    The client takes the colours of instances for amounts of light: without this all are too pale.
+    """
+    c = colour / 255.0
+    light = np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4)
+    return np.rint(255.0 * light).astype(np.uint8)
 
 
 def _groups(
@@ -185,5 +208,7 @@ def _floor(server: viser.ViserServer, height: float) -> None:
         infinite_grid=True,
         cell_size=_CELL,
         section_size=5 * _CELL,
+        cell_color=_LINES[0],
+        section_color=_LINES[1],
         position=(0.0, 0.0, height),
     )

@@ -15,6 +15,7 @@ import viser
 from websockets.asyncio import server as websockets_server
 
 from antennate.errors import BadInputError
+from antennate.messages import extra
 from antennate.telemetry.view.gate import Gate
 
 
@@ -49,7 +50,7 @@ def serve(listener: socket.socket, gate: Gate) -> viser.ViserServer:
         server.stop()
         raise BadInputError(
             "view: expected viser 1.1, which serves through websockets, found another; "
-            "install it with `pip install 'antennate[view]'`"
+            f"install it with {extra('view')}"
         )
     server.gui.configure_theme(
         control_width="large", show_logo=False, show_share_button=False, brand_color=(0, 114, 178)

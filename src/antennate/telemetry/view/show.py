@@ -17,11 +17,9 @@ import numpy as np
 import viser
 
 from antennate.colours import SERIES, rgba
-from antennate.params.scene import PhysicsParams
-from antennate.robots.spec import RobotSpec
 from antennate.sim.shapes import Shapes, VisibleModel
-from antennate.sim.world import World, compile_world
 from antennate.telemetry.header import Header
+from antennate.telemetry.log_scene import LogScene
 from antennate.telemetry.ticks import Tick
 from antennate.telemetry.view.channel import (
     END,
@@ -94,9 +92,9 @@ class Page:
         gui = server.gui
         gui.main_panel.dock_right()
         self._status = gui.add_html(_status(None, {}, ()))
-        panel = gui.add_panel()
-        self._charts = Charts(server, panel.add_tab("signals"))
-        panel.dock_left()
+        self._panel = gui.add_panel(visible=False)
+        self._charts = Charts(server, self._panel.add_tab("signals"))
+        self._panel.dock_left()
         self._map = Map(server)
         with gui.add_folder("picture"):
             self._follow = gui.add_checkbox("follow the robot", True)
@@ -133,7 +131,7 @@ class Page:
             self._robot = None
             self._begin(Shapes.unpack(content))
         elif kind == HEADER:
-            self._robot = _Robot(Header.unpack(content).robot)
+            self._robot = _Robot(Header.unpack(content))
             self._begin(self._robot.model.shapes())
 
     def _take_state(self, state: Mapping[str, Any]) -> None:
@@ -183,6 +181,8 @@ class Page:
 
     def _draw_slow(self) -> None:
         self._charts.show()
+        if self._panel.visible != self._charts.any:
+            self._panel.visible = self._charts.any
         if self._scene is not None and self._drawn is not None and self._robot is None:
             self._map.show(self._scene.shapes, self._drawn)
         self._status.content = _status(self._tick, self._state, tuple(self._lines))
@@ -191,18 +191,15 @@ class Page:
 class _Robot:
     """The robot of a log or a drive: its joints are known, where it is on the floor is not."""
 
-    def __init__(self, robot: RobotSpec) -> None:
-        self._world = World(compile_world(PhysicsParams(), robot), robot)
-        self.model = VisibleModel(self._world.model, _SIDES)
+    def __init__(self, header: Header) -> None:
+        self._scene = LogScene(header, None)
+        self.model = VisibleModel(self._scene.world.model, _SIDES)
 
     def poses(self, tick: Tick) -> Poses:
-        """Where its parts are with the joints measured, or commanded where that is unknown."""
-        angles = np.array(tick.positions or tick.angles)
-        before = self._world.drives()
-        if angles.shape == before.shape:
-            self._world.place_drives(np.where(np.isfinite(angles), angles, before))
-        data = self._world.data
-        return Poses(tick.now, self.model.poses(data), np.zeros((0, 6), np.float32))
+        """Where its parts are."""
+        self._scene.place_joints(tick)
+        poses = self.model.poses(self._scene.world.data)
+        return Poses(tick.now, poses, np.zeros((0, 6), np.float32))
 
 
 def _status(tick: Tick | None, state: Mapping[str, Any], lines: tuple[str, ...]) -> str:
@@ -221,8 +218,8 @@ def _status(tick: Tick | None, state: Mapping[str, Any], lines: tuple[str, ...])
             rows.append(("counters", ", ".join(counts)))
     rows += [("event", line) for line in lines]
     cells = "".join(
-        f'<tr><td style="color:#6E6E6E;padding-right:0.6em;vertical-align:top">{html.escape(name)}'
-        f"</td><td>{html.escape(text)}</td></tr>"
+        f'<tr><td style="color:var(--mantine-color-dimmed);padding-right:0.6em;vertical-align:top">'
+        f"{html.escape(name)}</td><td>{html.escape(text)}</td></tr>"
         for name, text in rows
     )
     return f'<table id="status" style="font-size:0.8em;margin:0.4em">{cells}</table>'

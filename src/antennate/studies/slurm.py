@@ -1,95 +1,39 @@
-"""Engines on a cluster: Dask, and SLURM through submitit."""
+"""The engine of SLURM, through submitit."""
 
 from __future__ import annotations
 
 import contextlib
 import faulthandler
+import getpass
 import hashlib
 import json
+import os
 import pickle
+import platform
+import signal
+import subprocess
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from antennate.errors import (
-    BadInputError,
-    ConfigError,
-    MissingPackageError,
-    OutputError,
-    WorkerError,
-    in_one_line,
-)
+from antennate.errors import BadInputError, ConfigError, OutputError, WorkerError, in_one_line
+from antennate.files import write_whole
 from antennate.messages import shortened
-from antennate.studies.codec import decoded, encoded
+from antennate.studies.codec import decoded, dumped, encoded
 from antennate.studies.identity import environment
 from antennate.studies.processes import added_objects, take_added
 from antennate.studies.store import Store, parsed, read_store
-from antennate.studies.submitted import Submitted, carry_out, require_same
+from antennate.studies.submitted import require_package, require_same
 from antennate.studies.work import Emit, Fail, Failure, Part, Waiting, Work
 
-_CONNECT = 10.0
-"""Time within which a Dask scheduler has to answer [s]."""
 _LOOK = 0.5
 """How often the driver looks for what the jobs of SLURM have finished [s]."""
+_ANSWER = 60.0
+"""Time within which squeue has to answer [s]."""
 _TOGETHER = 12
 """Most tasks that run at once; of a longer list the first is what its job was at."""
-
-
-class Dask:
-    """Workers of Dask: those of a scheduler, or as many as are asked for on this machine.
-
-    Workers may join and leave at any time. A task whose worker died is tried again by Dask itself
-    on others (its `allowed-failures`), and then as every engine does.
-
-    Args:
-        address: HOST:PORT of a scheduler; None starts one here.
-    """
-
-    name = "dask"
-
-    def __init__(self, address: str | None = None) -> None:
-        self._address = address
-        _require("distributed", "dask")
-
-    def run(
-        self, work: Work, parts: Sequence[Sequence[int]], count: int, emit: Emit, fail: Fail
-    ) -> None:
-        """Run the tasks at these places; see `Engine`."""
-        from distributed import KilledWorker
-
-        with self._client(count) as client:
-
-            def submit(function: Any, *arguments: Any) -> Any:
-                return client.submit(carry_out_watched, *arguments, pure=False)
-
-            threads = sum(client.nthreads().values())
-            Submitted(self.name, submit, (KilledWorker,)).run(
-                work, parts, max(count, threads), emit, fail
-            )
-
-    @contextlib.contextmanager
-    def _client(self, count: int) -> Iterator[Any]:
-        from distributed import Client, LocalCluster
-
-        with contextlib.ExitStack() as stack:
-            place: Any = f"tcp://{self._address}"
-            if self._address is None:
-                place = stack.enter_context(
-                    LocalCluster(
-                        n_workers=count,
-                        threads_per_worker=1,
-                        dashboard_address="127.0.0.1:0",
-                        silence_logs=50,
-                    )
-                )
-            try:
-                yield stack.enter_context(Client(place, timeout=_CONNECT, set_as_default=False))
-            except OSError as error:
-                raise WorkerError(
-                    f"dask: expected a scheduler at {place}, found none: {in_one_line(error)}"
-                ) from None
 
 
 class Slurm:
@@ -97,8 +41,9 @@ class Slurm:
 
     A job appends what it has finished to a file of its own, which the driver reads. So a job that
     is preempted and begins again, with the tasks it was first given, goes on where it was; a job
-    that is killed loses the trial that it was at; and a driver that was killed finds what its jobs
-    have finished since.
+    that is killed loses the trial that it was at. What a job was given is kept beside its file. So
+    the next driver after one that was killed finds what its jobs have finished since, and takes
+    over those that still wait or run.
 
     Args:
         cluster: slurm, or local for processes of this machine that are told the same.
@@ -108,7 +53,7 @@ class Slurm:
     name = "slurm"
 
     def __init__(self, cluster: str, options: Sequence[str]) -> None:
-        _require("submitit", "slurm")
+        require_package("submitit", "slurm")
         self._cluster, self._options = cluster, dict(_setting(each) for each in options)
 
     def run(
@@ -118,21 +63,24 @@ class Slurm:
         if work.folder is None:
             raise WorkerError("slurm: expected a run directory that jobs can see, found none")
         files = _Files(work.folder / self.name, work, emit, fail)
-        todo = files.take_old([place for part in parts for place in part])
+        executor = self._executor(files.folder)
+        todo = [place for part in parts for place in part]
+        running, todo = files.take_old(todo, earlier_jobs(files.folder))
         size = max(1, -(-len(todo) // count))  # as many lists as jobs: each job waits in a queue
         waiting = Waiting([todo[i : i + size] for i in range(0, len(todo), size)])
-        running: dict[Any, _Job] = {}
-        executor = self._executor(files.folder)
         try:
             while waiting or running:
                 while waiting and len(running) < count:
                     job = files.job(waiting.next())
-                    running[executor.submit(job.call)] = job
+                    future = executor.submit(job.call)
+                    running[future] = job
+                    files.note(job, self._cluster, future.job_id)
                 for future in list(running):
                     ended, job = future.done(), running[future]
                     files.take(job)
                     if ended:
                         del running[future]
+                        job.note.unlink(missing_ok=True)
                         self._end(future, job, work, waiting, fail)
                 time.sleep(_LOOK if running else 0.0)
         finally:
@@ -170,23 +118,52 @@ class _Files:
     def __init__(self, folder: Path, work: Work, emit: Emit, fail: Fail) -> None:
         self.folder, self._work, self._emit, self._fail = folder, work, emit, fail
         content = pickle.dumps((work.function, list(work.tasks)))
-        self._identity = {**environment(), "work": hashlib.sha256(content).hexdigest()}
+        digest = hashlib.sha256(content).hexdigest()
+        self._identity = {**environment(work.packages), "work": digest}
         self._packages = {"antennate", work.function.__module__.partition(".")[0]}
         try:
             folder.mkdir(exist_ok=True)
         except OSError as error:
             raise OutputError(f"expected to write {folder}, found: {error.strerror}") from None
 
-    def take_old(self, todo: list[int]) -> list[int]:
-        """Take what jobs of a driver that was killed have finished; the places still to do."""
-        left = set(todo)
-        for file in sorted(self.folder.glob("*.jsonl")):
-            job = _Job(file, sorted(left))
-            with contextlib.suppress(BadInputError):
-                if read_store(file)[0] == self._identity:
-                    self.take(job)
-                    left = set(job.left)
-        return sorted(left)
+    def take_old(
+        self, todo: list[int], noted: Mapping[Path, tuple[Any, list[int]]]
+    ) -> tuple[dict[Any, _Job], list[int]]:
+        """Take what jobs of a driver that was killed have finished.
+
+        Args:
+            todo: Places without a result.
+            noted: Jobs that still wait or run, by their files, each with its places.
+
+        Returns:
+            Those jobs that are at this work, and the places that nobody is at. Others are ended.
+        """
+        left, running = set(todo), dict[Any, _Job]()
+        for file in sorted({*self.folder.glob("*.jsonl"), *noted}):
+            future, places = noted.get(file, (None, sorted(left)))
+            job = _Job(file, [place for place in places if place in left])
+            if self._is_ours(file):
+                left -= set(job.left)
+                self.take(job)
+                if future is not None and job.left:
+                    running[future] = job
+                    continue
+                left |= set(job.left)
+            if future is not None:
+                future.cancel()
+                job.note.unlink(missing_ok=True)
+        return running, sorted(left)
+
+    def _is_ours(self, file: Path) -> bool:
+        """Whether a file or, before its job has begun, the note beside it is of this work."""
+        with contextlib.suppress(BadInputError):
+            return read_store(file)[0] == self._identity
+        with contextlib.suppress(OSError, ValueError, KeyError):
+            return json.loads(_Job(file, []).note.read_text())["identity"] == self._checksum()
+        return False
+
+    def _checksum(self) -> str:
+        return hashlib.sha256(dumped(self._identity).encode()).hexdigest()
 
     def job(self, places: list[int]) -> _Job:
         """A new job for some tasks."""
@@ -194,13 +171,21 @@ class _Files:
         call = Resumable(str(file), self._identity, self._work.part(places), added_objects())
         return _Job(file, places, call)
 
+    def note(self, job: _Job, cluster: str, number: str) -> None:
+        """Keep what a job was given, and its number, for a driver after this one."""
+        told = {"cluster": cluster, "job": number, "host": platform.node(), "places": job.left}
+        write_whole(job.note, dumped({**told, "identity": self._checksum()}).encode())
+
     def take(self, job: _Job) -> None:
-        """Take what has come to the file of a job since it was last read."""
-        size = job.file.stat().st_size if job.file.exists() else 0
-        if size == job.size:
+        """Take the lines that have come to the file of a job since it was last read."""
+        if not job.file.exists() or job.file.stat().st_size == job.read:
             return
-        job.size = size
-        records = parsed(job.file.read_bytes())[1]
+        with job.file.open("rb") as file:
+            file.seek(job.read)
+            data = file.read()
+        whole = data[: data.rfind(b"\n") + 1]
+        job.read += len(whole)
+        records = parsed(whole)[1]
         for place in [place for place in job.left if str(place) in records]:
             job.left.remove(place)
             record = records[str(place)]
@@ -212,12 +197,90 @@ class _Files:
 
 @dataclass
 class _Job:
-    """What a job was given and has not finished, and its file as it was last read [bytes]."""
+    """What a job was given and has not finished, and how far its file was read [bytes]."""
 
     file: Path
     left: list[int]
     call: Resumable | None = None
-    size: int = 0
+    read: int = 0
+
+    @property
+    def note(self) -> Path:
+        """What says its number."""
+        return self.file.with_suffix(".job")
+
+
+def earlier_jobs(folder: Path) -> dict[Path, tuple[Any, list[int]]]:
+    """Jobs of an earlier driver that still wait or run, by their files, and what they were given.
+
+    Raises:
+        WorkerError: SLURM does not say which jobs there are.
+    """
+    found: dict[Path, tuple[Any, list[int]]] = {}
+    queue: set[str] | None = None
+    for note in sorted(folder.glob("*.job")):
+        try:
+            told = json.loads(note.read_text())
+            number, places = str(told["job"]), list(told["places"])
+            cluster, host = told["cluster"], told["host"]
+        except (OSError, ValueError, KeyError, TypeError):
+            continue  # torn: it was about to be written
+        if cluster == "local":
+            future: Any = LocalJob(int(number), host)
+            alive = not future.done()
+        else:
+            from submitit import SlurmJob
+
+            queue = _queue() if queue is None else queue
+            future, alive = SlurmJob(folder, number), number in queue
+        if alive:
+            found[note.with_suffix(".jsonl")] = future, places
+        else:
+            note.unlink(missing_ok=True)
+    return found
+
+
+def _queue() -> set[str]:
+    """Numbers of the jobs of this user that wait or run."""
+    words = ["squeue", "--noheader", "--format=%A", f"--user={getpass.getuser()}"]
+    try:
+        said = subprocess.run(  # noqa: S603  (fixed words)
+            words, capture_output=True, text=True, check=True, timeout=_ANSWER
+        )
+    except (OSError, subprocess.SubprocessError) as error:
+        raise WorkerError(
+            "slurm: expected squeue to say which jobs of an earlier command still run, found: "
+            f"{in_one_line(error)}"
+        ) from None
+    return set(said.stdout.split())
+
+
+class LocalJob:
+    """A job of this machine that another process began: submitit knows its own ones only."""
+
+    def __init__(self, process: int, host: str) -> None:
+        self._process, self._here = process, host == platform.node()
+
+    def done(self) -> bool:
+        """Whether its process has ended; one of another machine counts as ended."""
+        if not self._here:
+            return True
+        try:
+            os.kill(self._process, 0)
+            words = Path(f"/proc/{self._process}/cmdline")
+            return words.exists() and b"submitit" not in words.read_bytes()  # its number was reused
+        except OSError:
+            return True
+
+    def cancel(self) -> None:
+        """End it, and with it the process that it started."""
+        with contextlib.suppress(OSError):
+            if not self.done():
+                os.kill(self._process, signal.SIGINT)
+
+    def exception(self) -> str:
+        """Why it ended before its work."""
+        return "it ended"
 
 
 class Resumable:
@@ -262,12 +325,6 @@ def _watched(part: Part) -> Iterator[None]:
         faulthandler.cancel_dump_traceback_later()
 
 
-def carry_out_watched(part: Part, *told: Any) -> list[tuple[int, Any]]:
-    """As `carry_out`, in a worker process that may be ended."""
-    with _watched(part):
-        return carry_out(part, *told)
-
-
 def _setting(text: str) -> tuple[str, Any]:
     name, _, value = text.partition("=")
     if not name.isidentifier() or not value:
@@ -276,13 +333,3 @@ def _setting(text: str) -> tuple[str, Any]:
         return name, json.loads(value)
     except ValueError:
         return name, value
-
-
-def _require(package: str, extra: str) -> None:
-    from importlib.util import find_spec
-
-    if find_spec(package) is None:
-        raise MissingPackageError(
-            f"engine: expected the package {package}, found none; install it with "
-            f"`pip install 'antennate[{extra}]'`"
-        )

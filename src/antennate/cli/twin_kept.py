@@ -1,0 +1,135 @@
+"""What `antennate twin` leaves behind: a log while it serves, a film when it has ended."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from types import TracebackType
+from typing import TYPE_CHECKING, Self
+
+from pydantic.dataclasses import dataclass
+
+from antennate.cli.options import option
+from antennate.cli.progress import progress, stop_signals
+from antennate.errors import ConfigError
+from antennate.files import write_whole
+from antennate.sim.world import World
+from antennate.telemetry.apart import LogProcess
+from antennate.telemetry.twin_log import TwinLog, header_of
+from antennate.twin.config import TwinConfig
+from antennate.twin.passage import Passage
+from antennate.twin.robot import TwinRobot
+
+if TYPE_CHECKING:
+    from antennate.telemetry.twin_film import TwinFilm
+
+
+@dataclass(frozen=True)
+class KeptOptions:
+    """Whether to keep something."""
+
+    log: Path | None = option(None, "keep a log, .mcap; another process writes it", "FILE")
+    video: Path | None = option(None, "film it, .mp4; drawn when it has ended", "FILE")
+
+
+class Kept:
+    """Log and film of a twin; a context, to be left when nobody is served any more.
+
+    Args:
+        options: What is wanted.
+        robot: The twin.
+        passage: How far it has come; its `on_tick` and `on_pass` are the caller's.
+        config: What is served.
+
+    Attributes:
+        watchers: What is to be called with the world after each tick.
+
+    Raises:
+        ConfigError: A file has another ending, or exists.
+        LogError: The log cannot be begun.
+        MissingPackageError: A package of the extra `video` is missing.
+        BadInputError: Nothing here can draw.
+    """
+
+    def __init__(
+        self, options: KeptOptions, robot: TwinRobot, passage: Passage, config: TwinConfig
+    ) -> None:
+        self.watchers: list[Callable[[World], None]] = []
+        self._log: LogProcess | None = None
+        self._film: TwinFilm | None = None
+        self._video = options.video
+        _require("--log", options.log, ".mcap")
+        _require("--video", options.video, ".mp4")
+        if options.video is not None:
+            from antennate.telemetry.film import require_video  # these are slow to import
+            from antennate.telemetry.twin_film import TwinFilm
+
+            require_video()
+            self._film = TwinFilm(robot, passage, config)
+            self.watchers.append(self._film.take)
+        if options.log is not None:
+            self._log = LogProcess(options.log, header_of(config, time.time_ns()))
+            self.watchers.append(TwinLog(self._log, robot, config).take)
+
+    def event(self, text: str) -> None:
+        """Keep in the log what happened now."""
+        if self._log is not None:
+            self._log.event(text)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        if self._log is not None:
+            wrong = self._log.close()
+            _say(f"log: {self._log.path}{f': {wrong}' if wrong else ''}")
+        if self._film is not None and self._video is not None:
+            _draw(self._film, self._video)
+
+
+def _require(flag: str, path: Path | None, ending: str) -> None:
+    """Check a file that is to be written.
+
+    Raises:
+        ConfigError: It has another ending, exists, or has no folder.
+    """
+    if path is None:
+        return
+    if path.suffix != ending:
+        raise ConfigError(f"{flag}: expected a name with {ending}, found {path}")
+    if path.exists():
+        raise ConfigError(f"{flag}: expected no such file yet, found {path}; choose another name")
+    if not path.parent.is_dir():
+        raise ConfigError(f"{flag}: expected a folder for {path}, found none")
+
+
+def _draw(kept: TwinFilm, path: Path) -> None:
+    """Draw the film; a second Ctrl-C gives it up."""
+    from antennate.telemetry.film import MOST_PICTURES, RATE, encoded
+
+    film = kept.film()
+    if film is None:
+        _say("video: no servo had torque, so there is nothing to show")
+        return
+    if kept.full:
+        _say(f"video: it ends after {MOST_PICTURES / RATE / 60:g} min, as long as a film may be")
+    try:
+        with progress("pictures of the film") as step, stop_signals():
+            data = encoded(film, step)
+    except KeyboardInterrupt:
+        _say("video: interrupted: no film was written")
+        return
+    write_whole(path, data)
+    _say(f"video: {path}")
+
+
+def _say(text: str) -> None:
+    sys.stderr.write(text + "\n")
+    sys.stderr.flush()

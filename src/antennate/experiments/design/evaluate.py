@@ -1,0 +1,281 @@
+"""What evaluates a design: experiments with their configurations, trials and rows."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any, NamedTuple
+
+from antennate import experiments
+from antennate.errors import BadInputError, ConfigError
+from antennate.experiments.design.config import OF_SUCCESSES, Axis, DesignConfig, Evaluation
+from antennate.experiments.study.measures import SUCCESS
+from antennate.experiments.study.run import with_status
+from antennate.experiments.study.subject import (
+    OF_TRIALS,
+    Columns,
+    among,
+    columns_of,
+    find,
+    nested,
+    numbers,
+)
+from antennate.messages import nearest, shortened
+from antennate.params.base import Params
+from antennate.params.reading import group_of, put_over
+from antennate.studies.experiment import Trial, no_row, no_step
+from antennate.studies.plan import Point
+
+FRESH = 1_000_000
+"""Added to a seed, it gives one that no trial of a search has."""
+OUTCOME = "outcome"
+OF_DESIGN = ("design", "name", "phase", "evaluation")
+"""Columns that a search fills itself, beside those of a study."""
+Row = dict[str, Any]
+
+
+class Task(NamedTuple):
+    """One trial.
+
+    Attributes:
+        place: Its place among those of its batch.
+        design: Number of the design.
+        label: Label of the evaluation.
+        experiment: What is run.
+        judged: Columns that must be finite numbers.
+        config: Its configuration.
+        trial: Its condition and its number.
+    """
+
+    place: int
+    design: int
+    label: str
+    experiment: str
+    judged: tuple[str, ...]
+    config: Any
+    trial: Trial
+
+
+class Evaluator:
+    """One experiment that evaluates designs.
+
+    Args:
+        label: Label of the evaluation.
+        asked: What the file says of it.
+        names: Names of all parameters of a design.
+
+    Attributes:
+        label: The label.
+        judged: Columns that objectives are made of.
+        reads: Names among those that are parameters of this experiment.
+
+    Raises:
+        BadInputError: There is no such experiment, or a name could mean several parameters.
+    """
+
+    def __init__(self, label: str, asked: Evaluation, names: Sequence[str]) -> None:
+        if not label.replace("-", "_").isidentifier():
+            raise ConfigError(
+                f"evaluate.{shortened(label)}: expected a label of letters, digits and hyphens"
+            )
+        self.label, self.name, self._asked = label, asked.experiment or label, asked
+        try:
+            self._subject = find(self.name)
+        except BadInputError as error:
+            raise ConfigError(f"evaluate.{label}.{error}") from None
+        known = self.name in experiments.names()
+        self._whole = known and experiments.load(self.name).trials is None
+        self._asked_for: dict[str, str] = {}
+        for objective in asked.objectives(label):
+            column = OUTCOME if objective.measure == SUCCESS else objective.column
+            for each in (column, *([OUTCOME] if objective.of_successes else [])):
+                self._asked_for.setdefault(each, objective.measure)
+        self.judged = tuple(self._asked_for)
+        model = self._subject.model
+        paths = None if model is None else [p for p in _leaves(model) if p not in model.unread]
+        found = {name: name if paths is None else self._path(name, paths) for name in names}
+        self._paths = {name: path for name, path in found.items() if path is not None}
+
+    @property
+    def reads(self) -> Sequence[str]:
+        """Names of a design that are parameters of this experiment."""
+        return list(self._paths)
+
+    @property
+    def most(self) -> int:
+        """Trials that may be run at once."""
+        return self._subject.most
+
+    def _path(self, name: str, paths: Sequence[str]) -> str | None:
+        """The parameter of a name: the whole path, or the end of one alone."""
+        if name in paths:
+            return name
+        ends = [path for path in paths if path.endswith(f".{name}")]
+        if len(ends) > 1:
+            raise ConfigError(
+                f"search.{name}: expected one parameter of {self.name}, found {', '.join(ends)}"
+            )
+        return ends[0] if ends else None
+
+    def configured(self, point: Point) -> Any:
+        """The configuration of a design.
+
+        Raises:
+            ConfigError: A value is out of bounds, or does not fit another one.
+        """
+        values = {self._paths[n]: v for n, v in point.items() if n in self._paths}
+        found = put_over(self._asked.settings, nested(values))
+        if self._asked.trials is not None and not self._whole:
+            found = put_over(found, {"trials": self._asked.trials})
+        try:
+            return self._subject.configured(found)
+        except ConfigError as error:
+            label = "" if self.label == self.name else f"evaluate.{self.label}: "
+            raise ConfigError(f"{label}{error}") from None
+
+    def check(self, point: Point) -> None:
+        """Find what cannot be run.
+
+        Raises:
+            BadInputError: As for `configured`; or there are several conditions.
+        """
+        config = self.configured(point)
+        self._subject.check(config)
+        conditions = dict.fromkeys(name for name, _ in self._subject.every(config))
+        if len(conditions) > 1:
+            raise ConfigError(
+                f"evaluate.{self.label}.settings: expected one {self._subject.condition}, found "
+                f"{shortened(', '.join(conditions))}"
+            )
+        if self._whole and "seed" not in type(config).model_fields and self._asked.trials:
+            raise ConfigError(
+                f"evaluate.{self.label}.trials: expected none, as {self.name} has no seed, found "
+                f"{self._asked.trials}"
+            )
+        if (columns := columns_of(self.name)) is not None:
+            self.require(columns)
+
+    def require(self, columns: Columns) -> None:
+        """Check that there is a column for each objective, with numbers.
+
+        Raises:
+            ConfigError: There is none.
+        """
+        every, known = columns.every, columns.numbers
+        for column in self.judged:
+            if column not in (every if column == OUTCOME else known):
+                of_successes = [n + OF_SUCCESSES for n in known] if OUTCOME in every else []
+                known = [SUCCESS, *known] if OUTCOME in every else known
+                wanted = self._asked_for[column]
+                hint = nearest(wanted, [*known, *of_successes])
+                raise ConfigError(
+                    f"evaluate.{self.label}: expected a measure of {self.name}{hint}, "
+                    f"{among(known)}; found {shortened(wanted)}"
+                )
+
+    def trials(self, point: Point, times: int = 1, fresh: bool = False) -> list[tuple[Any, Trial]]:
+        """Configuration and trial of everything that is run of a design.
+
+        Args:
+            point: The design.
+            times: How many times the usual number of trials.
+            fresh: Whether their seeds are those of no search.
+        """
+        config, first = self.configured(point), FRESH if fresh else 0
+        if not isinstance(config, Params):
+            count = times * config.get("trials", 1)
+            return [(config, ("", first + i)) for i in range(count)]
+        start = getattr(config, "seed", None)
+        if self._whole:
+            if start is None:
+                return [(config, ("", 0))]
+            count = times * (self._asked.trials or 1)
+            seeds = range(start + first, start + first + count)
+            return [(config.model_copy(update={"seed": s}), ("", i)) for i, s in enumerate(seeds)]
+        changes = {"trials": times * getattr(config, "trials", 1)}
+        changes |= {} if start is None else {"seed": start + first}
+        config = config.model_copy(update=changes)
+        return [(config, trial) for trial in self._subject.every(config)]
+
+
+def evaluators(config: DesignConfig) -> list[Evaluator]:
+    """What evaluates each design.
+
+    Raises:
+        BadInputError: One cannot be used, or a name is a parameter of none.
+    """
+    names = list(
+        dict.fromkeys([*config.search, *(n for r in config.reference.values() for n in r)])
+    )
+    found = [Evaluator(label, asked, names) for label, asked in config.evaluate.items()]
+    for name in names:
+        where = "search" if name in config.search else "reference"
+        if name.rpartition(".")[2] in OF_TRIALS and "." not in name:
+            raise ConfigError(f"{where}.{name}: expected a parameter of a design, found {name}")
+        if not any(name in evaluator.reads for evaluator in found):
+            paths = [p for e in found for p in _known(e.name)]
+            raise ConfigError(
+                f"{where}: expected a parameter of {', '.join(e.name for e in found)}"
+                f"{nearest(name, paths)}, found {shortened(name)}"
+            )
+    return found
+
+
+def ends_of(config: DesignConfig) -> Iterator[tuple[str, Any]]:
+    """Each parameter that is searched with each of its choices, or the ends of its range."""
+    for name, axis in config.search.items():
+        if not isinstance(axis, Axis):
+            yield from ((name, value) for value in axis)
+            continue
+        whole = (int(axis.low), int(axis.high))
+        for end in whole if axis.whole else (axis.low, axis.high):
+            counts = axis.entries or ()
+            yield from ((name, [end] * count) for count in counts)
+            if not counts:
+                yield name, end
+
+
+def run_tasks(tasks: Sequence[Task], emit: Callable[[int, tuple[int, Row]], None]) -> None:
+    """Run some trials, those of one design and evaluation at once; emit index, place and row."""
+    groups: dict[tuple[int, str], list[int]] = {}
+    for index, task in enumerate(tasks):
+        groups.setdefault((task.design, task.label), []).append(index)
+    for indices in groups.values():
+        first = tasks[indices[0]]
+        known = first.experiment in experiments.names()
+        if known and experiments.load(first.experiment).trials is None:
+            for index in indices:
+                emit(index, (tasks[index].place, _run_whole(tasks[index])))
+            continue
+
+        def take(i: int, rows: list[Row], indices: list[int] = indices) -> None:
+            task = tasks[indices[i]]
+            emit(indices[i], (task.place, with_status(rows[0], task.judged)))
+
+        trials = [tasks[index].trial for index in indices]
+        taken = () if isinstance(first.config, Params) else (*OF_DESIGN, *first.config)
+        find(first.experiment, taken).run(first.config, trials, take)
+
+
+def _run_whole(task: Task) -> Row:
+    """An experiment without trials of its own, as one row: what is judged, or all if that lacks."""
+    outcome = experiments.load(task.experiment).run(task.config, 1, no_step, no_row)
+    found = numbers(outcome.result())
+    judged = {name: found[name] for name in task.judged if name in found}
+    row = judged if len(judged) == len(set(task.judged)) else found
+    start = {"seed": task.config.seed} if hasattr(task.config, "seed") else {}
+    return with_status({"trial": task.trial[1], **start, **row}, task.judged)
+
+
+def _known(name: str) -> list[str]:
+    model = find(name).model
+    return [] if model is None else list(_leaves(model))
+
+
+def _leaves(model: Any, path: str = "") -> Iterator[str]:
+    """Every parameter of a configuration by its dotted path."""
+    for name, field in model.model_fields.items():
+        group = group_of(field.annotation)
+        if group is None:
+            yield path + name
+        else:
+            yield from _leaves(group, f"{path}{name}.")

@@ -1,0 +1,123 @@
+"""The experiment `design`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from antennate.experiments.design import run as design
+from antennate.experiments.design.config import DesignConfig
+from antennate.studies.experiment import Experiment
+from antennate.studies.measures import Table, shown
+
+_MOST = 40
+"""Most lines of a table."""
+Each = Mapping[str, Any]
+
+
+def tables(result: Mapping[str, Any]) -> Sequence[Table]:
+    """The front beside the references, and both on fresh seeds."""
+    judged = [each for each in result["designs"] if each["objectives"]]
+    judged = [each for each in judged if each["reference"] or each["front"]]
+    names = [objective["name"] for objective in result["objectives"]]
+    heads = [axis.rpartition(".")[2] for axis in result["axes"]]
+    rows = [
+        (
+            f"{each['name']}{' *' if each['front'] else ''}",
+            [
+                *(value_text(each["values"].get(axis)) for axis in result["axes"]),
+                *(_worth(each["objectives"][name]) for name in names),
+            ],
+        )
+        for each in judged[:_MOST]
+    ]
+    goals = ", ".join(f"{o['name']} ({o['goal']})" for o in result["objectives"])
+    note = (
+        f"* is on the front: no other design is as good in all of {goals}\nand better in one. "
+        "Means with 95 % intervals. The front was chosen by these values, so they are\noptimistic."
+    )
+    if len(judged) > _MOST:
+        note += f" The first {_MOST} of {len(judged)} designs; result.json has all."
+    found = [Table("The front and the references", [*heads, *names], rows, note)]
+    again = [each for each in result["designs"] if each["fresh"]]
+    if again:
+        lines = [
+            (
+                f"{each['name']}{' *' if each['fresh_front'] else ''}",
+                [_both(each, name) for name in names],
+            )
+            for each in again
+        ]
+        found.append(
+            Table(
+                "On fresh seeds",
+                names,
+                lines,
+                "Search, then fresh seeds by which nothing was chosen, with the 95 % interval.\n"
+                "* is on the front of these designs on fresh seeds.",
+            )
+        )
+    return [table for table in found if table.rows]
+
+
+def value_text(value: Any) -> str:
+    """A value of a design as tables show it; a list as its entries."""
+    if isinstance(value, list | tuple):
+        return " ".join(map(value_text, value))
+    return f"{value:.4g}" if isinstance(value, float) else shown(value, "")
+
+
+def _worth(found: Each) -> str:
+    ends = found["value95"]
+    return shown(found["value"], ".3g") + (f" ({shown(ends, '.3g')})" if ends else "")
+
+
+def _both(each: Each, name: str) -> str:
+    return f"{shown(each['objectives'][name]['value'], '.3g')}, {_worth(each['fresh'][name])}"
+
+
+def sentence(result: Mapping[str, Any]) -> str:
+    """How many designs were compared, and the best ones beside the first reference."""
+    designs = result["designs"]
+    proposed = [each for each in designs if not each["reference"]]
+    text = (
+        f"{len(proposed)} proposed designs and {len(designs) - len(proposed)} references, "
+        f"{result['trials']} trials; {sum(each['front'] for each in designs)} designs on the front"
+    )
+    again = [each for each in designs if each["fresh"]]
+    part, known = ("fresh", again) if again else ("objectives", designs)
+    known = [each for each in known if each[part]]
+    first = next((each for each in known if each["reference"]), None)
+    if known:
+        best = [_best(known, part, objective, first) for objective in result["objectives"]]
+        seeds = "fresh seeds" if again else "the seeds of the search, which flatter"
+        text += f". Best of each objective on {seeds} (95 % interval): {'; '.join(best)}"
+    bad = {name: n for name, n in result["statuses"].items() if name != "ok"}
+    told = ", ".join(f"{n} {name}" for name, n in bad.items())
+    text += f". Trials that say nothing: {told}; trials.csv has why" if bad else ""
+    lost = sum(each["state"] in ("failed", "refused") for each in designs)
+    return text + (f". Designs that could not be judged: {lost}." if lost else ".")
+
+
+def _best(known: Sequence[Each], part: str, objective: Each, first: Each | None) -> str:
+    name = objective["name"]
+    chosen = min if objective["goal"] == "minimize" else max
+    valued = [each for each in known if each[part][name]["value"] is not None]
+    if not valued:
+        return f"{name} none"
+    best = chosen(valued, key=lambda each: each[part][name]["value"])
+    text = f"{name} {_called(best)} {_worth(best[part][name])}"
+    if first is not None and first is not best:
+        text += f", {first['name']} {_worth(first[part][name])}"
+    return text
+
+
+def _called(each: Each) -> str:
+    return each["name"] if each["reference"] else f"design {each['name']}"
+
+
+EXPERIMENT = Experiment.of_folder(
+    *(__name__, DesignConfig, design.run, tables, sentence),
+    check=design.check,
+    continued=True,
+)

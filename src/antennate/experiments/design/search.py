@@ -1,0 +1,229 @@
+"""A search that goes on: propose some designs, run their trials, tell the sampler, and again."""
+
+from __future__ import annotations
+
+import functools
+import json
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from antennate.errors import BadInputError, ConfigError
+from antennate.experiments.design import measures
+from antennate.experiments.design.config import DesignConfig, Goal
+from antennate.experiments.design.designs import Design, DesignOutcome
+from antennate.experiments.design.evaluate import OF_DESIGN, Row, Task, evaluators, run_tasks
+from antennate.experiments.design.propose import Drawn, Told, package, point_of, propose
+from antennate.experiments.study.run import REASON, STATUS, cells
+from antennate.experiments.study.subject import columns_in
+from antennate.studies.experiment import OnRow, OnStep
+from antennate.studies.plan import Point
+from antennate.studies.pool import Workers, gather
+from antennate.studies.work import Failure
+
+SEARCH, VALIDATION = "search", "validation"
+_LABELS = (*OF_DESIGN, "trial", "seed")
+"""Columns that measure nothing."""
+
+
+@dataclass
+class Search:
+    """A search that goes on."""
+
+    config: DesignConfig
+    workers: Workers
+    on_step: OnStep
+    on_row: OnRow
+    designs: list[Design] = field(default_factory=list)
+    asked: list[tuple[Drawn, Design]] = field(default_factory=list)
+    """What was drawn, and the design that it is."""
+    rows: list[Row] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        if self.workers.shard is not None:
+            raise ConfigError(
+                "--shard: expected a run whose trials are known from the start, found design"
+            )
+        self.objectives = self.config.objectives()
+        self.evaluators = evaluators(self.config)
+        self.known: dict[str, Design] = {}
+        self.unchecked = list(self.evaluators)
+        self.before = 0
+        self.each = 0
+
+    def begin(self) -> None:
+        """Evaluate the references."""
+        named = self.config.reference.items()
+        found = [self._design(point, name, True) for name, point in named]
+        self._evaluate(found, SEARCH)
+
+    def proceed(self) -> None:
+        """Propose a batch of designs, and evaluate those that are new."""
+        count = min(self.config.batch, self.config.proposals - len(self.asked))
+        space = self.config.search
+        goals: list[Goal] = [objective.goal for objective in self.objectives]
+        told = [Told(drawn, self._values(design)) for drawn, design in self.asked]
+        drawn = self._kept(
+            f"proposals.{len(self.asked)}",
+            lambda: propose(space, told, goals, count, self.config.seed),
+        )
+        new: list[Design] = []
+        for each in drawn:
+            point = point_of(space, each)
+            design = self.known.get(_key(point))
+            if design is None:
+                design = self._design(point, str(len(self.designs)), False)
+                new.append(design)
+            self.asked.append((each, design))
+        self._evaluate(new, SEARCH)
+
+    def validate(self) -> None:
+        """Run some of the front again, and the references, on fresh seeds."""
+        self._find_front()
+        if not self.config.validated:
+            return
+
+        def choose() -> list[int]:
+            places = [d.number for d in self.designs if d.on_front and not d.reference]
+            first = self.objectives[:1]
+            places.sort(key=lambda n: (*measures.small(self.designs[n].worth or {}, first), n))
+            references = [d.number for d in self.designs if d.reference and d.worth]
+            return [*references, *measures.spread(places, self.config.validated)]
+
+        chosen = [self.designs[number] for number in self._kept("validated", choose)]
+        self._evaluate(chosen, VALIDATION)
+
+    def outcome(self, interrupted: bool) -> DesignOutcome:
+        """What has been found."""
+        self._find_front()
+        columns = dict.fromkeys(
+            name for row in self.rows for name in row if name not in (STATUS, REASON)
+        )
+        rows = [{n: row.get(n) for n in (*columns, STATUS, REASON)} for row in self.rows]
+        repeated = len(self.asked) - sum(not design.reference for design in self.designs)
+        counts = (len(self.asked), repeated)
+        version = package().__version__
+        return DesignOutcome(self.config, self.designs, rows, *counts, version, interrupted)
+
+    def _design(self, point: Point, name: str, reference: bool) -> Design:
+        design = Design(len(self.designs), name, reference, dict(point))
+        self.designs.append(design)
+        self.known.setdefault(_key(point), design)
+        return design
+
+    def _values(self, design: Design) -> list[float | None] | None:
+        """What the sampler is told of a design."""
+        return None if design.worth is None else [v["value"] for v in design.worth.values()]
+
+    def _find_front(self) -> None:
+        judged = [(each, each.worth) for each in self.designs if each.worth is not None]
+        again = [(each, each.fresh) for each in self.designs if each.fresh is not None]
+        best = measures.front_of([worth for _, worth in judged], self.objectives)
+        for (design, _), on_front in zip(judged, best, strict=True):
+            design.on_front = on_front
+        best = measures.front_of([worth for _, worth in again], self.objectives)
+        for (design, _), on_front in zip(again, best, strict=True):
+            design.on_fresh_front = on_front
+
+    def _kept(self, key: str, make: Callable[[], Any]) -> Any:
+        """What was decided before, or else is decided now: read back, it stays as it was."""
+        store = self.workers.store
+        version = package().__version__
+        if store is not None and (record := store.records.get(key)) is not None:
+            if record["optuna"] != version:
+                raise BadInputError(
+                    f"{store.path.parent}: expected optuna {record['optuna']}, with which it was "
+                    f"begun, found {version}; choose another folder or give --overwrite"
+                )
+            return record["decided"]
+        decided = make()
+        if store is not None:
+            store.append(key, {"optuna": version, "decided": decided})
+        return decided
+
+    def _evaluate(self, designs: Sequence[Design], phase: str) -> None:
+        """Run all trials of some designs and judge them."""
+        tasks = [task for design in designs for task in self._tasks(design, phase)]
+        numbered = [task._replace(place=place) for place, task in enumerate(tasks)]
+        found: dict[int, Row] = {}
+
+        def lost(place: int, failure: Failure) -> tuple[int, Row]:
+            row = {"trial": tasks[place].trial[1], STATUS: failure.status, REASON: failure.reason}
+            return place, row
+
+        def take(item: tuple[int, Row]) -> None:
+            place, row = item
+            found[place] = self._labelled(tasks[place], phase, row)
+            self.on_row(found[place])
+
+        self.each = self.each or len(tasks) // max(1, len(designs))
+        total = self.before + len(tasks) + self._to_come(phase)
+        most = max(evaluator.most for evaluator in self.evaluators)
+        chunk = max(1, min(most, math.ceil(len(tasks) / (3 * self.workers))))
+        try:
+            if tasks:
+                how: dict[str, Any] = {"chunk": chunk, "together": True, "lost": lost}
+                step = functools.partial(self._step, self.before, total)
+                gather(run_tasks, numbered, self.workers, step, take, **how)
+        finally:
+            self.rows += [found[place] for place in sorted(found)]
+        self.before += len(tasks)
+        self._check_columns()
+        for design in designs:
+            self._judge(design, phase)
+
+    def _tasks(self, design: Design, phase: str) -> list[Task]:
+        fresh = phase == VALIDATION
+        times = self.config.validation_factor if fresh else 1
+        try:
+            every = [(e, e.trials(design.point, times, fresh)) for e in self.evaluators]
+        except ConfigError as error:
+            design.state, design.reason = "refused", str(error)
+            return []
+        return [
+            Task(0, design.number, e.label, e.name, e.judged, config, trial)
+            for e, trials in every
+            for config, trial in trials
+        ]
+
+    def _labelled(self, task: Task, phase: str, row: Row) -> Row:
+        design = self.designs[task.design]
+        what = {"design": design.number, "name": design.name, "phase": phase}
+        values = cells({name: design.point.get(name) for name in self.config.search})
+        return {**what, "evaluation": task.label, **values, **row}
+
+    def _judge(self, design: Design, phase: str) -> None:
+        if design.state == "refused":
+            return
+        mine = [r for r in self.rows if r["design"] == design.number and r["phase"] == phase]
+        worth = measures.worth(mine, self.objectives, self.config.least_ok)
+        if phase == VALIDATION:
+            design.fresh = worth
+        else:
+            design.worth, design.state = worth, "failed" if worth is None else "ok"
+
+    def _check_columns(self) -> None:
+        """Find an objective that nothing measures, as soon as there is a row."""
+        for evaluator in self.unchecked[:]:
+            mine = (r for r in self.rows if r["evaluation"] == evaluator.label)
+            row = next((r for r in mine if r[STATUS] in ("ok", "nan")), None)
+            if row is not None:
+                others = {*self.config.search, *_LABELS}
+                evaluator.require(columns_in({n: v for n, v in row.items() if n not in others}))
+                self.unchecked.remove(evaluator)
+
+    def _step(self, before: int, total: int, done: int, _: int) -> None:
+        self.on_step(before + done, max(total, before + done))
+
+    def _to_come(self, phase: str) -> int:
+        """How many trials follow those of a batch, as far as is known."""
+        if phase == VALIDATION:
+            return 0
+        chosen = len(self.config.reference) + self.config.validated
+        again = self.config.validation_factor * chosen if self.config.validated else 0
+        return self.each * (self.config.proposals - len(self.asked) + again)
+
+
+def _key(point: Point) -> str:
+    return json.dumps(point, sort_keys=True)

@@ -1,0 +1,68 @@
+"""What tables and figures of a study call the response and the parameters, with their units."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from antennate import experiments
+from antennate.experiments.study.effects import SUCCESS
+from antennate.params.base import Params
+from antennate.studies.measures import Measure, shown
+
+_SHARE = Measure(SUCCESS, "share of successes", "%", form=".0f", scale=100.0)
+_UNITS = {"s": "s", "ms": "ms", "m": "m", "mm": "mm", "n": "N", "deg": "deg", "m_s": "m/s"}
+"""Ends of the names of columns, and the unit that each says."""
+
+
+def measure(result: Mapping[str, Any]) -> Measure:
+    """The response of a study."""
+    return measure_of(result["experiment"], result["response"] or "response")
+
+
+def measure_of(experiment: str, column: str) -> Measure:
+    """The measure of an experiment that is kept in a column, or the column in words.
+
+    Args:
+        experiment: Its name, or the function that measures.
+        column: Its name in `trials.csv`.
+    """
+    if column == SUCCESS:
+        return _SHARE
+    known = _experiment(experiment)
+    for found in known.measures if known else ():
+        if found.name.replace(".", "_") == column and found.label:
+            return found
+    end = next((e for e in sorted(_UNITS, key=len)[::-1] if column.endswith(f"_{e}")), "")
+    words = column.removesuffix(f"_{end}").replace("_", " ")
+    return Measure(column, words, _UNITS.get(end, ""), form=".3g")
+
+
+def cell(of: Measure, number: Any, interval: Any = None) -> str:
+    """A value of a measure as shown, with its interval if it has one."""
+    text = shown(number, of.form, of.scale)
+    return text if interval is None else f"{text} ({shown(interval, of.form, of.scale)})"
+
+
+def axis(result: Mapping[str, Any], path: str) -> str:
+    """A parameter: the last part of its dotted name in words, with its unit."""
+    name, unit = path.rpartition(".")[2], ""
+    known = _experiment(result["experiment"])
+    model: Any = known.config if known else None
+    for part in path.split("."):
+        field = model.model_fields.get(part) if _is_group(model) else None
+        extra = field.json_schema_extra if field else None
+        unit = str(extra.get("unit", "1")) if isinstance(extra, dict) else ""
+        model = field.annotation if field else None
+    if unit in ("", "1"):
+        return name.replace("_", " ")
+    said = "_" + unit.lower().replace("·", "_").replace("/", "_per_")
+    return f"{name.removesuffix(said).replace('_', ' ')} [{unit}]"
+
+
+def _is_group(model: Any) -> bool:
+    return isinstance(model, type) and issubclass(model, Params)
+
+
+def _experiment(name: str) -> Any:
+    return experiments.load(name) if name in experiments.names() else None

@@ -1,0 +1,253 @@
+"""The engine of Dask: the workers of a scheduler, or as many as are asked for on this machine."""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import multiprocessing
+import pickle
+import threading
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import CancelledError
+from typing import Any
+
+from antennate.errors import WorkerError, in_one_line
+from antennate.studies.processes import Processes, take_added
+from antennate.studies.submitted import Submitted, require_package, require_same
+from antennate.studies.work import Emit, Fail, Failure, Part, Work
+
+CONNECT = 10.0
+"""Time within which a scheduler has to answer, or to come back [s]."""
+_ASK = 1.0
+"""How often the scheduler is asked for its workers [s]."""
+_PATIENCE = 60.0
+"""Time without one of our own workers after which another is started: longer than a start [s]."""
+_MOST_STARTS = 3
+"""How often others are started."""
+_STAY = 60.0
+"""How long a process beside a worker waits for its next part [s]."""
+_NOTE = logging.getLogger(__name__)
+_NOISY = ("distributed", "tornado.application")
+"""Loggers that tell a lost connection as tracebacks."""
+
+
+class Dask:
+    """Workers of Dask: those of a scheduler, or as many as are asked for on this machine.
+
+    Workers may join and leave at any time. Each runs its trials in a process beside it, so that a
+    trial that crashes or hangs is found as on one machine, and the worker lives on. A part whose
+    worker died is tried again by Dask itself on others, and then as every engine does.
+
+    Args:
+        address: HOST:PORT of a scheduler; None starts one here.
+    """
+
+    name = "dask"
+
+    def __init__(self, address: str | None = None) -> None:
+        self._address = address
+        require_package("distributed", "dask")
+
+    def run(
+        self, work: Work, parts: Sequence[Sequence[int]], count: int, emit: Emit, fail: Fail
+    ) -> None:
+        """Run the tasks at these places; see `Engine`."""
+        from distributed import KilledWorker
+
+        with _quiet(), self._started(count) as (client, cluster, place):
+
+            def submit(function: Any, *arguments: Any) -> Any:
+                return client.submit(carry_out_apart, *arguments, pure=False)
+
+            workers = _Workers(client, cluster, place, count)
+            try:
+                Submitted(self.name, submit, (KilledWorker,), workers=workers).run(
+                    work, parts, count, emit, fail
+                )
+            except WorkerError as error:
+                if client.status == "running" and not isinstance(error.__cause__, CancelledError):
+                    raise
+                raise WorkerError(
+                    f"dask: expected the scheduler at {place} until the end, found it gone; what "
+                    "has ended is kept, and the same command goes on (with --resume, where it is "
+                    "no study or search)"
+                ) from None
+
+    @contextlib.contextmanager
+    def _started(self, count: int) -> Iterator[tuple[Any, Any, str]]:
+        """A client, our own cluster if it is one, and where its scheduler is."""
+        from distributed import Client, LocalCluster
+
+        with contextlib.ExitStack() as stack:
+            cluster: Any = None
+            if self._address is None:
+                cluster = stack.enter_context(
+                    LocalCluster(
+                        n_workers=count,
+                        threads_per_worker=1,
+                        dashboard_address="127.0.0.1:0",
+                        silence_logs=50,
+                    )
+                )
+            place = f"tcp://{self._address}" if cluster is None else cluster.scheduler_address
+            try:
+                client = Client(
+                    place if cluster is None else cluster, timeout=CONNECT, set_as_default=False
+                )
+            except OSError as error:
+                raise WorkerError(
+                    f"dask: expected a scheduler at {place}, found none: {in_one_line(error)}"
+                ) from None
+            yield stack.enter_context(client), cluster, place
+
+
+class _Workers:
+    """How many parts can run at once, asked for again and again; and what is done if none can."""
+
+    def __init__(self, client: Any, cluster: Any, place: str, count: int) -> None:
+        self._client, self._cluster, self._place = client, cluster, place
+        self._count = self._found = count
+        self._next, self._missing, self._starts, self._told = 0.0, 0.0, 0, False
+
+    def __call__(self) -> int:
+        """Threads of all workers; the last number that is known while the scheduler is silent.
+
+        Raises:
+            WorkerError: Our own workers ended, and others do not start.
+        """
+        now = time.monotonic()
+        if now < self._next or self._client.status != "running":
+            return self._found
+        self._next = now + _ASK
+        with contextlib.suppress(OSError):
+            threads = sum(self._client.nthreads().values())
+            self._found = max(self._count, threads)
+            if self._cluster is not None:
+                self._replace(threads, now)
+            else:
+                if not threads and not self._told:
+                    _NOTE.warning("dask: waits for workers at %s", self._place)
+                self._told = not threads
+        return self._found
+
+    def _replace(self, threads: int, now: float) -> None:
+        """Start others where workers of our own are missing for long."""
+        if threads >= self._count:
+            self._missing = 0.0
+            return
+        self._missing = self._missing or now
+        if now - self._missing < _PATIENCE:
+            return
+        if self._starts == _MOST_STARTS:
+            if not threads:
+                raise WorkerError(
+                    f"dask: expected workers to start, found none after {_MOST_STARTS} attempts"
+                )
+            return
+        self._starts, self._missing = self._starts + 1, now
+        _NOTE.warning(
+            "dask: %d of %d workers are missing; others are started",
+            *(self._count - threads, self._count),
+        )
+        self._cluster.scale(self._count)
+
+
+@contextlib.contextmanager
+def _quiet() -> Iterator[None]:
+    """Without the messages of Dask: what matters of them is told in one line."""
+    import distributed  # sets its loggers up  # noqa: F401
+
+    names = [
+        name
+        for name in logging.Logger.manager.loggerDict
+        if any(f"{name}.".startswith(f"{noisy}.") for noisy in _NOISY)
+    ]
+    before = {name: logging.getLogger(name).level for name in names}
+    for name in names:
+        logging.getLogger(name).setLevel(logging.CRITICAL + 1)
+    try:
+        yield
+    finally:
+        for name, level in before.items():
+            logging.getLogger(name).setLevel(level)
+
+
+def carry_out_apart(
+    part: Part, theirs: Mapping[str, Any], added: Mapping[str, Any]
+) -> list[tuple[int, Any]]:
+    """In a worker: results and failures by place, of trials that run in a process beside it.
+
+    Raises:
+        WorkerError: The driver has other versions or other code, or no process starts.
+    """
+    import cloudpickle  # which Dask needs too; it sends what was typed at a prompt
+
+    require_same(theirs)
+    places = list(part.tasks)
+    function = _Carried(cloudpickle.dumps((part, added)))
+    work = Work(function, [(place,) for place in places], part.together, part.timeout)
+    answers: list[tuple[int, Any]] = []
+
+    def emit(index: int, result: Any) -> None:
+        answers.append((places[index], result))
+
+    def fail(index: int, failure: Failure) -> None:
+        answers.append((places[index], Failure(failure.status, failure.reason)))
+
+    with _processes() as processes:
+        processes.run(work, [range(len(places))], 1, emit, fail)
+    return answers
+
+
+class _Carried:
+    """In the process beside the worker: what carries out tasks of a part, given by their places.
+
+    It is unpacked when it is received, so that no import counts as time of a trial.
+    """
+
+    def __init__(self, content: bytes) -> None:
+        self._content = content
+
+    def __getstate__(self) -> bytes:
+        return self._content
+
+    def __setstate__(self, content: bytes) -> None:
+        self._part, added = pickle.loads(content)  # noqa: S301  (a worker of ours made it)
+        take_added(added)
+
+    def __call__(self, *told: Any) -> Any:
+        """Run one task, or some together and emit their results."""
+        part: Part = self._part
+        if not part.together:
+            return part.function(*part.tasks[told[0]])
+        chosen, emit = told
+        return part.function([part.tasks[place] for (place,) in chosen], emit)
+
+
+_IDLE: dict[Processes, threading.Timer] = {}
+"""Processes beside this worker that wait for a part, and what ends them if none comes."""
+_LOCK = threading.Lock()
+
+
+@contextlib.contextmanager
+def _processes() -> Iterator[Processes]:
+    """A process beside this worker; it serves one part after the other."""
+    multiprocessing.current_process().daemon = False  # a worker under a nanny may then start one
+    with _LOCK:
+        processes, timer = _IDLE.popitem() if _IDLE else (Processes(stay=True), None)
+    if timer is not None:
+        timer.cancel()
+    yield processes
+    timer = threading.Timer(_STAY, _end, [processes])
+    timer.daemon = True
+    with _LOCK:
+        _IDLE[processes] = timer
+    timer.start()
+
+
+def _end(processes: Processes) -> None:
+    with _LOCK:
+        idle = _IDLE.pop(processes, None)
+    if idle is not None:
+        processes.end()

@@ -1,0 +1,214 @@
+"""A log of simulated ticks that a process of its own writes, for a simulation in real time.
+
+The simulation writes each tick to a pipe without waiting. What does not fit is kept here and
+follows with the next ticks; beyond `_WAITING` it is dropped and counted. A pipe that closes without
+`_END` means that the simulation was killed: then the log is not closed either, so that a reader
+sees it.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import os
+import select
+import signal
+import struct
+import subprocess
+import sys
+import threading
+from collections import deque
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Self
+
+import numpy as np
+
+from antennate.errors import LogError
+from antennate.messages import one_line
+from antennate.telemetry.header import Header
+from antennate.telemetry.rows import RowLog, TickRow
+
+_HEAD = struct.Struct("<BI")
+_ROW, _FORCES, _PLACE, _EVENT, _FIRST, _END = range(6)
+_ROOM = 1 << 20
+"""Bytes that the pipe may hold: about 10 s of ticks."""
+_WAITING = 3000
+"""Most messages that wait for room in the pipe: 30 s at 100 Hz."""
+_PATIENCE = 10.0
+"""Time for the other process to write the last ticks to a slow disk [s]; assumed."""
+_IDLE = 0.05
+"""Time without a tick after which those that wait are written [s]."""
+_STDIN, _STDOUT = 0, 1
+_STOPS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+
+
+class LogProcess:
+    """The sending end; as a context it closes the log.
+
+    Args:
+        path: A file that does not exist yet.
+        header: What stands at its beginning.
+
+    Attributes:
+        path: The file.
+        dropped: Messages for which there was no room.
+
+    Raises:
+        LogError: The file exists or cannot be written, or the disk is nearly full.
+    """
+
+    def __init__(self, path: Path, header: Header) -> None:
+        self.path, self.dropped = path, 0
+        self._waiting, self._lock = deque[bytes](), threading.Lock()
+        self._failed = ""
+        self._process = subprocess.Popen(  # noqa: S603 our own words
+            [sys.executable, "-m", __name__, str(path)],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            process_group=0,  # Ctrl-C in the terminal is for the simulation alone
+        )
+        assert self._process.stdin is not None  # noqa: S101 it is asked for
+        self._pipe = self._process.stdin.fileno()
+        with contextlib.suppress(OSError, AttributeError):  # less room where not allowed
+            fcntl.fcntl(self._pipe, fcntl.F_SETPIPE_SZ, _ROOM)
+        self._send(_FIRST, header.pack())
+        answer = self._answer()
+        if answer:
+            self.close()
+            raise LogError(answer)
+        os.set_blocking(self._pipe, False)
+
+    def _answer(self) -> str:
+        """What the process says first: nothing if the log has begun, else why it has not."""
+        assert self._process.stdout is not None  # noqa: S101 it is asked for
+        text = self._process.stdout.readline().decode("utf-8", "replace")
+        return text.strip() if text else "expected a process that writes the log, found none"
+
+    def add(self, row: TickRow) -> None:
+        """Hand over one tick; it is dropped if there is no room."""
+        parts = [(_FORCES, row.forces), (_PLACE, row.place), (_ROW, row.numbers.tobytes())]
+        found = b"".join(
+            _HEAD.pack(kind, len(content)) + content for kind, content in parts if content
+        )
+        self._hand_over(found)
+
+    def event(self, text: str) -> None:
+        """Hand over what happened after the last tick."""
+        content = text.encode()
+        self._hand_over(_HEAD.pack(_EVENT, len(content)) + content)
+
+    def close(self) -> str:
+        """End the log and wait until it is written; what is wrong with it, empty if nothing."""
+        if self._pipe < 0:
+            return self._failed
+        with contextlib.suppress(OSError):
+            os.set_blocking(self._pipe, True)
+            while self._waiting:
+                self._write(self._waiting.popleft())
+            self._send(_END)
+        self._pipe = -1
+        with contextlib.suppress(OSError):
+            self._process.communicate(timeout=_PATIENCE)
+        if self._process.poll() is None:
+            self._process.kill()
+            self._process.wait()
+        if self.dropped:
+            self._failed = f"{self.dropped} ticks are missing in it"
+        elif self._process.returncode:
+            self._failed = "the process that wrote it failed"
+        return self._failed
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def _hand_over(self, message: bytes) -> None:
+        if len(self._waiting) >= _WAITING:
+            self.dropped += 1
+            return
+        with self._lock, contextlib.suppress(OSError):  # full, or nobody reads any more
+            self._waiting.append(message)
+            while self._waiting:
+                first = self._waiting[0]
+                taken = os.write(self._pipe, first)
+                if taken < len(first):
+                    self._waiting[0] = first[taken:]
+                    return
+                self._waiting.popleft()
+
+    def _send(self, kind: int, content: bytes = b"") -> None:
+        self._write(_HEAD.pack(kind, len(content)) + content)
+
+    def _write(self, message: bytes) -> None:
+        while message:
+            message = message[os.write(self._pipe, message) :]
+
+
+def _messages(log: RowLog | None = None) -> Iterator[tuple[int, bytes]]:
+    """What comes, until the pipe closes."""
+    with open(_STDIN, "rb", buffering=0, closefd=False) as stream:
+        while True:
+            while log is not None and not select.select((stream,), (), (), _IDLE)[0]:
+                log.settle()
+            head = _read(stream.fileno(), _HEAD.size)
+            if len(head) < _HEAD.size:
+                return
+            kind, length = _HEAD.unpack(head)
+            content = _read(stream.fileno(), length)
+            if len(content) < length:
+                return
+            yield kind, content
+
+
+def _read(file: int, count: int) -> bytes:
+    """So many bytes, fewer at the end."""
+    found = b""
+    while len(found) < count and (more := os.read(file, count - len(found))):
+        found += more
+    return found
+
+
+def _keep(log: RowLog) -> bool:
+    """Write what comes; whether the simulation ended the log."""
+    forces = place = None
+    for kind, content in _messages(log):
+        if kind == _FORCES:
+            forces = content
+        elif kind == _PLACE:
+            place = content
+        elif kind == _ROW:
+            log.add(TickRow(np.frombuffer(content), forces, place))
+            forces = place = None
+        elif kind == _EVENT:
+            log.event(content.decode())
+        else:
+            return True
+    return False
+
+
+def main() -> int:
+    """Write the log; its path is the only word. One line on stdout says whether it has begun."""
+    for number in _STOPS:  # the simulation decides when it is over
+        signal.signal(number, signal.SIG_IGN)
+    _, first = next(_messages(), (_FIRST, b""))
+    try:
+        log = RowLog(Path(sys.argv[1]), Header.unpack(first))
+    except LogError as error:
+        os.write(_STDOUT, one_line(str(error)).encode() + b"\n")
+        return 1
+    os.write(_STDOUT, b"\n")
+    try:
+        if _keep(log):
+            log.close()
+        else:
+            log.flush()
+    except LogError:
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

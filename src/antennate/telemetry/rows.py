@@ -1,0 +1,173 @@
+"""The log of simulated ticks, which come as rows of numbers.
+
+Simulated time runs much faster than a robot's, so rows are collected and encoded many at once.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from pathlib import Path
+from typing import NamedTuple, Self
+
+import numpy as np
+
+from antennate.telemetry.header import Header
+from antennate.telemetry.topics import (
+    ANTENNA,
+    CONTACT_FORCES,
+    COORDINATES,
+    JOINT_COMMANDS,
+    JOINT_STATES,
+    MANEUVER,
+)
+from antennate.telemetry.writer import FLUSH, LogWriter
+from antennate.types import Floats
+
+HEAD = 9
+"""Numbers of a row before those of the joints: t, counts, level, contact, maneuver, phase."""
+_LEAST_FREE = 1e8
+"""Room for many trials [byte] (assumed)."""
+_MOST = 256
+"""Ticks that are encoded at once."""
+
+
+class TickRow(NamedTuple):
+    """One tick.
+
+    Attributes:
+        numbers: Shape (HEAD + 4 joints,): what `HEAD` says, then the angles commanded [rad], and
+            angles [rad], speeds [rad/s] and torques [N·m] measured.
+        forces: The message of the contact forces, None where nobody looked or nothing touches.
+        place: The message of the coordinates, None where nobody looked.
+    """
+
+    numbers: Floats
+    forces: bytes | None = None
+    place: bytes | None = None
+
+
+class RowLog:
+    """One file, new; as a context it closes itself.
+
+    Args:
+        path: A file that does not exist yet.
+        header: What stands at its beginning.
+
+    Attributes:
+        path: The file.
+
+    Raises:
+        LogError: The file exists or cannot be written, or the disk is nearly full.
+    """
+
+    def __init__(self, path: Path, header: Header) -> None:
+        self.path = path
+        self._out = LogWriter(path, header, _LEAST_FREE)
+        self._names, self._angles = header.robot.joint_names, len(header.robot.joint_names)
+        self._start = header.start
+        self._held: Floats = np.empty((_MOST, HEAD + 4 * self._angles))
+        self._forces: list[bytes | None] = []
+        self._places: list[bytes | None] = []
+        self._count, self._since = 0, math.inf
+
+    def add(self, row: TickRow) -> None:
+        """Keep one tick.
+
+        Raises:
+            LogError: The disk is full or gone.
+        """
+        self._held[self._count], forces, place = row
+        self._forces.append(forces)
+        self._places.append(place)
+        now = time.monotonic()
+        self._since = min(self._since, now)
+        self._count += 1
+        if self._count == _MOST or now - self._since >= FLUSH:
+            self.flush()
+
+    def settle(self) -> None:
+        """Write what has waited long enough; to be called where no tick may follow for a while.
+
+        Raises:
+            LogError: The disk is full or gone.
+        """
+        if time.monotonic() - self._since >= FLUSH:
+            self.flush()
+        self._out.settle()
+
+    def event(self, text: str) -> None:
+        """Keep what happened after the last tick.
+
+        Raises:
+            LogError: The disk is full or gone.
+        """
+        self.flush()
+        self._out.event(text)
+
+    def close(self) -> None:
+        """End it.
+
+        Raises:
+            LogError: The disk is full or gone.
+        """
+        self.flush()
+        self._out.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def flush(self) -> None:
+        """Encode what is held and hand it to the operating system.
+
+        Raises:
+            LogError: The disk is full or gone.
+        """
+        count, self._count, self._since = self._count, 0, math.inf
+        forces, self._forces = self._forces, []
+        places, self._places = self._places, []
+        if not count:
+            return
+        rows = self._held[:count]
+        t, angles = rows[:, 0], self._angles
+        joints = [rows[:, at : at + angles] for at in range(HEAD, rows.shape[1], angles)]
+        pair, nothing = (0.0, 0.0), (0.0,) * angles
+        stamps = self._start + np.rint(1e9 * t).astype(np.int64)
+        time = {"sec": stamps // 10**9, "nanosec": stamps % 10**9}
+        commanded, measured = (0, 0, "", self._names), (0, 0, "", self._names, *3 * (nothing,))
+        self._out.write_many(
+            t.tolist(),
+            {
+                ANTENNA: ANTENNA.type.encode_many(
+                    (0.0, pair, pair, pair, (0, 0), math.nan),
+                    {
+                        "t": t,
+                        "counts": rows[:, 1:3],
+                        "reading": rows[:, 1:3],
+                        "level": rows[:, 3:5],
+                        "contact": rows[:, 5:7].astype(np.int64),
+                    },
+                ),
+                MANEUVER: MANEUVER.type.encode_many(
+                    (0, 0.0, 0, 0.0, True),
+                    {
+                        "number": self._out.written + 1 + np.arange(count),
+                        "now": t,
+                        "maneuver": rows[:, 7].astype(np.int64),
+                        "phase": rows[:, 8],
+                    },
+                ),
+                JOINT_COMMANDS: JOINT_COMMANDS.type.encode_many(
+                    (*commanded, nothing, (), ()), time | {"position": joints[0]}
+                ),
+                JOINT_STATES: JOINT_STATES.type.encode_many(
+                    measured,
+                    time | dict(zip(("position", "velocity", "effort"), joints[1:], strict=True)),
+                ),
+                CONTACT_FORCES: forces,
+                COORDINATES: places,
+            },
+        )

@@ -1,0 +1,75 @@
+"""What a log holds, from the summary of its closed file: no tick is decoded.
+
+The summary tells how many messages there are and where; the CRC of each chunk is checked all the
+same, so that a log which is damaged is not said to be sound.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import BinaryIO, NamedTuple
+
+from antennate.telemetry.chunks import chunk_at, is_sound, places, summary
+from antennate.telemetry.topics import EVENTS, HEADER_TOPICS, MANEUVER, TICK_TOPICS, TOPICS, Topic
+
+
+class Survey(NamedTuple):
+    """What a log holds.
+
+    Attributes:
+        messages: How many there are of each topic, but those of the header.
+        events: Time [ns] and bytes of each event.
+        first, last: Times of the first and the last message [ns]; both 0 without any.
+        number: That of the last tick, 0 without any.
+    """
+
+    messages: Mapping[Topic, int]
+    events: Sequence[tuple[int, bytes]]
+    first: int
+    last: int
+    number: int
+
+
+def by_summary(file: BinaryIO, topics: Mapping[int, Topic]) -> Survey | None:
+    """The survey of a closed file; None if it is not closed, or anything of it is not sound.
+
+    Args:
+        file: The log.
+        topics: Its topics by their channel.
+
+    Raises:
+        OSError: It cannot be read.
+    """
+    end = summary(file)
+    if end is None:
+        return None
+    if not topics.keys() >= end.counts.keys():
+        return None  # channels that later chunks declare, as other programs may
+    counts = {topics[channel]: n for channel, n in end.counts.items()}
+    if len({counts.get(topic, 0) for topic in TICK_TOPICS}) != 1:
+        return None  # a tick is not whole
+    events, times, newest = list[tuple[int, bytes]](), list[int](), None
+    try:
+        for place in places(file):
+            held = {topics[channel] for channel in place.channels if channel in topics}
+            chunk = chunk_at(file, place) if EVENTS in held else None
+            if chunk is None and (EVENTS in held or not is_sound(file, place)):
+                return None
+            messages = () if chunk is None else chunk.messages
+            of_chunk = [(m.time, m.data) for m in messages if topics.get(m.channel) is EVENTS]
+            for _, data in of_chunk:
+                EVENTS.decode(data)
+            events += of_chunk
+            if held.difference(HEADER_TOPICS):
+                times = [*(times or [place.first])[:1], place.last]
+            newest = place if MANEUVER in held else newest
+        chunk = None if newest is None else chunk_at(file, newest)
+    except ValueError:  # also of an event that is none
+        return None
+    messages = () if chunk is None else chunk.messages
+    numbers = [m.number for m in messages if topics.get(m.channel) is MANEUVER]
+    kept = {topic: counts[topic] for topic in TOPICS if counts.get(topic)}
+    for topic in HEADER_TOPICS:
+        kept.pop(topic, None)
+    begin, last = times or (0, 0)
+    return Survey(kept, events, begin, last, max(numbers, default=0))

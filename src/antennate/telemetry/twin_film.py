@@ -1,0 +1,75 @@
+"""The film of a twin, recorded while it serves and drawn afterwards.
+
+It shows what a twin knows: readings, how far the head has come, true contact and torque.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from antennate.robots.spec import ANTENNA_PREFIXES
+from antennate.sim.camera import Shot
+from antennate.sim.world import World
+from antennate.telemetry import film
+from antennate.telemetry.film import MOST_PICTURES, Film, FilmRecorder
+from antennate.telemetry.strip import Band
+from antennate.twin.config import TwinConfig
+from antennate.twin.passage import Passage
+from antennate.twin.robot import TwinRobot
+
+_TOUCHES = {0: ("free", "#DDDDDD"), 1: ("touches", "#222222")}
+_TORQUES = {0: ("off", "#DDDDDD"), 1: ("on", "#999999")}
+
+
+class TwinFilm:
+    """The film of a twin, from the first torque on; it is drawn when all is over.
+
+    Args:
+        robot: The twin.
+        passage: How far it has come.
+        config: What is served.
+    """
+
+    def __init__(self, robot: TwinRobot, passage: Passage, config: TwinConfig) -> None:
+        self._robot, self._passage, self._config = robot, passage, config
+        self._recorder, self._ticks = FilmRecorder(), 0
+
+    @property
+    def full(self) -> bool:
+        """Whether no more pictures are kept."""
+        return len(self._recorder) >= MOST_PICTURES
+
+    def take(self, world: World) -> None:
+        """Offer a tick."""
+        t = self._ticks * self._config.control.period
+        self._ticks += 1
+        if self.full or not self._recorder.due(t):
+            return
+        names, _, _ = world.obstacle_contacts()
+        self._recorder.take(
+            *(t, world.data.qpos, world.links().mean(axis=0)),
+            counts=self._robot.counts,
+            progress=[self._passage.progress],
+            touches=[any(name.startswith(side) for name in names) for side in ANTENNA_PREFIXES],
+            torque=any(servo.torque for servo in self._robot.servos),
+        )
+
+    def film(self) -> Film | None:
+        """The film, None if the physics never began."""
+        kept = self._recorder
+        if not len(kept):
+            return None
+        touches = kept.values("touches").astype(np.int64)
+        return kept.film(
+            f"twin, trial {self._config.trial}",
+            self._robot.world.model,
+            Shot(2.8 * self._config.robot.length),
+            [
+                film.counts_trace(kept.values("counts")),
+                film.trace("way of the head [m]", kept.values("progress")),
+            ],
+            [
+                Band("torque", kept.values("torque").astype(np.int64), _TORQUES),
+                *(Band(side, touches[:, i], _TOUCHES) for i, side in enumerate(("left", "right"))),
+            ],
+        )

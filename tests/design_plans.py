@@ -1,0 +1,72 @@
+"""Small searches over a function, as files, and what they leave."""
+
+from __future__ import annotations
+
+import csv
+import json
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import antennate
+from antennate.cli import main
+
+HERE = Path(__file__).parent
+TRIAL = f"{HERE / 'design_trials.py'}:trial"
+BOTH = 'minimize = ["near", "far"]'
+
+
+def plan(
+    goals: str = BOTH,
+    search: str = "x = { low = -2.0, high = 3.0 }",
+    reference: str = "[reference]\npaper = { x = 2.0 }\n",
+    name: str = "plan.toml",
+    settings: dict[str, Any] | None = None,
+    **more: Any,
+) -> str:
+    """A small search over a function, as a file."""
+    given_ = {"proposals": 12, "batch": 4, "validated": 2, **more}
+    lines = [f"{key} = {json.dumps(value)}" for key, value in given_.items()]
+    inner = [f"{key} = {json.dumps(value)}" for key, value in (settings or {}).items()]
+    Path(name).write_text(
+        "\n".join(lines) + f"\n[search]\n{search}\n{reference}\n"
+        f'[evaluate.bowls]\nexperiment = "{TRIAL}"\ntrials = 3\n{goals}\n'
+        "[evaluate.bowls.settings]\n" + "\n".join(inner) + "\n"
+    )
+    return name
+
+
+def words(*more: str, out: str = "run") -> list[str]:
+    return ["design", "plan.toml", "--trust-code", "--no-figures", "--out", out, *more]
+
+
+def design(out: str = "run", workers: int = 1, figures: bool = False) -> antennate.Result:
+    """Run the file from Python: in this process, which takes less time than the command."""
+    with pytest.MonkeyPatch.context() as patch:
+        if not figures:
+            patch.setattr("antennate.experiments.design.figure.figures", lambda outcome: {})
+        values = tomllib.loads(Path("plan.toml").read_text())
+        return antennate.run("design", out=out, workers=workers, **values)
+
+
+def result(run: str = "run") -> dict[str, Any]:
+    return json.loads(Path(run, "result.json").read_text())
+
+
+def table(run: str = "run") -> list[dict[str, str]]:
+    return list(csv.DictReader(Path(run, "trials.csv").read_text().splitlines()))
+
+
+def same(first: str, second: str, *names: str) -> None:
+    for name in names or ("trials.csv", "result.json"):
+        assert Path(first, name).read_bytes() == Path(second, name).read_bytes(), name
+
+
+def refusal(capsys: pytest.CaptureFixture[str], *given_: str) -> str:
+    capsys.readouterr()
+    assert main(list(given_)) == 2
+    said = capsys.readouterr().err.strip().splitlines()
+    assert "Traceback" not in "".join(said)
+    return said[-1]

@@ -1,0 +1,255 @@
+"""Logs and films of simulations that have no controller of their own: the gait, and the twin."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import subprocess
+import sys
+import time
+import tty
+from pathlib import Path
+
+import numpy as np
+import pytest
+from log_ticks import HEADER
+
+from antennate.cli import main
+from antennate.errors import AntennateError, LogError
+from antennate.experiments.gait.run import GaitStudyConfig, run
+from antennate.experiments.tunnel.config import TunnelConfig
+from antennate.experiments.tunnel.run import run as cross
+from antennate.hardware.dynamixel import packets
+from antennate.robots.spec import RobotSpec
+from antennate.sim import gl
+from antennate.telemetry.apart import LogProcess
+from antennate.telemetry.reader import LogReader
+from antennate.telemetry.rows import HEAD, RowLog, TickRow
+from antennate.telemetry.topics import EVENTS, JOINT_STATES
+from antennate.types import Contact, Maneuver
+
+TICKS = 60
+TURN = 4096
+"""Ticks of a turn of an X servo (e-manual, register 132)."""
+ROBOT = RobotSpec()
+
+
+def test_each_walk_of_the_gait_leaves_a_log(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Its phase runs at the frequency of the gait, and backwards in REVERSE."""
+    run_at = ["--out", str(tmp_path / "run"), "--workers", "1", "--no-figures"]
+    few = ["--sweep-points", "2", "--cycles", "2", "--settling-cycles", "0"]
+    assert main(["gait", "--log", *few, *run_at]) == 0
+    logs = {path.stem: path for path in (tmp_path / "run" / "logs").iterdir()}
+    assert set(logs) == {"forward", "turn_l", "turn_r", "reverse", "wave_off", "sweep0", "sweep1"}
+    gait = GaitStudyConfig().gait
+    for name, sense in (("forward", 1), ("reverse", -1)):
+        with LogReader(logs[name]) as log:
+            ticks = list(log)
+            assert log.end == len(ticks)
+            assert log.header.params.gait == gait
+        assert len(ticks) == pytest.approx(2 / gait.frequency / 0.01, abs=2)
+        advance = np.diff([tick.phase for tick in ticks])
+        assert advance == pytest.approx(sense * 2 * math.pi * gait.frequency * 0.01)
+        assert {tick.maneuver for tick in ticks} == {Maneuver[name.upper()]}
+        assert {tick.contact for tick in ticks} == {(Contact.UNKNOWN, Contact.UNKNOWN)}
+        assert max(abs(tick.angles[0]) for tick in ticks) == pytest.approx(gait.amplitude, rel=0.01)
+    for action in (["info"], ["export"], ["plot"]):
+        assert main(["log", *action, str(logs["forward"])]) == 0
+    capsys.readouterr()
+    assert main(["replay", str(logs["forward"])]) == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1
+    assert "found 'gait'" in said
+    assert main(["replay", str(logs["forward"]), "--controller", "open"]) == 0
+
+
+def test_a_walk_is_the_same_with_and_without_a_log(tmp_path: Path) -> None:
+    """And a log that a killed run left half is replaced."""
+    config = GaitStudyConfig(sweep_points=2, cycles=2, settling_cycles=0)
+    (tmp_path / "forward.mcap").write_bytes(b"half")
+    logged = run(config, logs=tmp_path)
+    assert logged.result() == run(config).result()
+    with LogReader(tmp_path / "forward.mcap") as log:
+        assert log.ticks == 0 < sum(1 for _ in log)
+
+
+def test_a_trial_that_was_killed_is_logged_anew(tmp_path: Path) -> None:
+    """Half a log of it is in the folder of a run that goes on."""
+    (tmp_path / "open-0.mcap").write_bytes(b"half")
+    config = TunnelConfig(scene="flat", trials=1, controllers=("open",), time_limit=0.5)
+    cross(config, logs=tmp_path)
+    with LogReader(tmp_path / "open-0.mcap") as log:
+        assert sum(1 for _ in log) == log.end == pytest.approx(50, abs=1)
+
+
+def sync_write(address: int, size: int, values: list[int]) -> bytes:
+    named = zip(ROBOT.ids, values, strict=True)
+    data = {servo: value.to_bytes(size, "little", signed=True) for servo, value in named}
+    return packets.sync_write(address, data)
+
+
+def walked(folder: Path, *words: str) -> tuple[str, list[list[int]]]:
+    """A twin in lock-step that is sent goals: what it said, and the goals [ticks]."""
+    words = ("twin", "--pace", "lockstep", "--duration", f"{0.01 * TICKS}", *words)
+    ahead = [0] * 5 + [7 * (-1) ** side for _ in range(6) for side in range(2)] + [0] * 2
+    plan = [[ROBOT.zeros[i] + step * ahead[i] for i in range(19)] for step in range(TICKS)]
+    with subprocess.Popen(
+        [sys.executable, "-m", "antennate", *words],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        cwd=folder,
+    ) as process:
+        assert process.stdout is not None
+        bus = os.open(json.loads(process.stdout.readline())["bus"], os.O_RDWR)
+        tty.setraw(bus)
+        os.write(bus, sync_write(64, 1, [1] * 19))
+        for goals in plan:
+            os.write(bus, sync_write(116, 4, goals))
+        _, said = process.communicate(timeout=120)
+        os.close(bus)
+    assert process.returncode == 0, said
+    return said, plan
+
+
+def test_a_twin_logs_goals_readings_and_physics(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["--scene", "flat", "--fault", "servo:3=silent@0.3s", "--log", "twin.mcap"]
+    said, plan = walked(tmp_path, *words)
+    assert "log: twin.mcap\n" in said
+    log = tmp_path / "twin.mcap"
+    with LogReader(log) as reader:
+        groups = list(reader.groups())
+        assert (reader.bad, reader.missing, reader.end) == (0, 0, TICKS)
+        assert reader.header.arena["scene"] == "flat"
+    ticks = [tick for _, tick in groups if tick is not None]
+    sign = np.array(ROBOT.directions) * 2 * math.pi / TURN
+    goals = (np.array(plan) - np.array(ROBOT.zeros)) * sign
+    np.testing.assert_allclose([tick.angles for tick in ticks], goals, atol=1e-12)
+    assert [tick.now for tick in ticks] == pytest.approx(0.01 * np.arange(1, TICKS + 1))
+    assert {tick.maneuver for tick in ticks} == {-1}
+    assert np.isnan([tick.level for tick in ticks]).all()
+    legs = np.array([tick.positions[5:17] for tick in ticks])
+    assert (np.abs(legs[-1]) > 0.2).all()
+    assert not np.isnan([tick.counts for tick in ticks]).any()
+    records = [record for found, _ in groups for record in found]
+    events = [EVENTS.type.decode(r.data)["msg"] for r in records if r.topic is EVENTS]
+    assert any("servo:3=silent" in text for text in events)
+    assert sum(record.topic.name == "/coordinates" for record in records) == TICKS // 10
+    stamped = [record for record in records if record.topic is JOINT_STATES]
+    stamps = [(record.topic.type.decode(record.data), record.time) for record in stamped]
+    assert [10**9 * one["sec"] + one["nanosec"] for one, _ in stamps] == [
+        time for _, time in stamps
+    ]
+    assert main(["log", "info", str(log)]) == 0
+    capsys.readouterr()
+    assert main(["replay", str(log)]) == 2
+    assert capsys.readouterr().err.count("\n") == 1
+
+
+def drawable() -> bool:
+    """Whether films can be made here."""
+    pytest.importorskip("av")
+    try:
+        gl.backend()
+    except AntennateError:
+        return False
+    return True
+
+
+def test_a_twin_and_its_log_are_filmed(tmp_path: Path) -> None:
+    """A second of the film for a second of the walk; the log shows the same at 10 Hz."""
+    if not drawable():
+        pytest.skip("neither EGL nor OSMesa")
+    said, _ = walked(tmp_path, "--scene", "flat", "--video", "twin.mp4", "--log", "twin.mcap")
+    assert "video: twin.mp4\n" in said
+    assert (
+        main(["log", "film", str(tmp_path / "twin.mcap"), "--out", str(tmp_path / "log.mp4")]) == 0
+    )
+    import av
+
+    for name in ("twin.mp4", "log.mp4"):
+        with av.open(str(tmp_path / name)) as container:
+            pictures = [frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)]
+        assert len(pictures) == pytest.approx(TICKS * 0.01 * 25, abs=1)
+        assert np.abs(pictures[-1].astype(int) - pictures[0]).max() > 100
+        assert len(np.unique(pictures[-1][:400].reshape(-1, 3), axis=0)) > 100
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--log", "a.csv"], "--log: expected a name with .mcap, found a.csv"),
+        (["--video", "a.mcap"], "--video: expected a name with .mp4, found a.mcap"),
+        (["--log", "here.mcap"], "--log: expected no such file yet, found here.mcap"),
+        (["--video", "nowhere/a.mp4"], "--video: expected a folder for nowhere/a.mp4"),
+        (["--servos", "1:xl330-m288", "--log", "a.mcap"], "--servos: expected no"),
+    ],
+)
+def test_what_a_twin_cannot_keep_is_refused_in_one_line(
+    words: list[str],
+    said: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("here.mcap").write_bytes(b"")
+    assert main(["twin", "--duration", "1", *words]) == 2
+    out, err = capsys.readouterr()
+    assert (out, err.count("\n")) == ("", 1)
+    assert said in err
+    assert [path.name for path in Path().iterdir()] == ["here.mcap"]
+
+
+def rows(count: int) -> list[TickRow]:
+    """Rows of numbers that follow from their place."""
+    width = HEAD + 4 * len(ROBOT.joint_names)
+    whole = np.arange(5.0, 9.0)  # contacts and so on are whole numbers
+    found = 0.01 * np.arange(1, count + 1)[:, None] + np.arange(width) / 1024
+    found[:, 0], found[:, 5:9] = 0.01 * np.arange(1, count + 1), whole
+    return [TickRow(row) for row in found]
+
+
+def test_a_log_of_another_process_is_that_of_this_one(tmp_path: Path) -> None:
+    kept = rows(700)
+    with RowLog(tmp_path / "here.mcap", HEADER) as log:
+        for row in kept:
+            log.add(row)
+    with LogProcess(tmp_path / "there.mcap", HEADER) as apart:
+        for row in kept:
+            apart.add(row)
+    assert apart.close() == ""
+    with LogReader(tmp_path / "here.mcap") as one, LogReader(tmp_path / "there.mcap") as other:
+        assert [tick.pack() for tick in one] == [tick.pack() for tick in other]
+        assert one.end == other.end == 700
+
+
+def test_a_log_whose_simulation_is_killed_is_not_closed(tmp_path: Path) -> None:
+    """What was handed over is read; a second log at the same place is refused."""
+    code = f"""
+import os, signal, sys
+sys.path[:0] = {sys.path!r}
+from test_simulated_logs import HEADER, LogProcess, Path, rows
+log = LogProcess(Path({str(tmp_path / "log.mcap")!r}), HEADER)
+for row in rows(300):
+    log.add(row)
+os.kill(os.getpid(), signal.SIGKILL)
+"""
+    done = subprocess.run([sys.executable, "-c", code], timeout=120, check=False)
+    assert done.returncode == -9
+    found: list[float] = []
+    for _ in range(100):  # the other process ends by itself
+        with LogReader(tmp_path / "log.mcap") as log:
+            found = [tick.now for tick in log]
+            assert log.end is None
+        if len(found) == 300:
+            break
+        time.sleep(0.1)
+    assert found == pytest.approx(0.01 * np.arange(1, 301))
+    with pytest.raises(LogError, match="expected a log that does not exist yet"):
+        LogProcess(tmp_path / "log.mcap", HEADER)

@@ -1,0 +1,160 @@
+"""Files of studies that cannot be run: one line says what, and nothing is written."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from design_plans import refusal
+
+CHOICES = "expected a list of values, or a table with low and high (names with dots need quotes)"
+GOOD = '[vary]\n"tunnel.strewn" = [1]\n'
+OWN = 'experiment = "own.py:trial"\n[vary]\nx = [1, 2]\n'
+
+
+@pytest.fixture(autouse=True)
+def _there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+def drawn(axis: str, name: str = "tunnel.free_width") -> str:
+    return f'plan = "sobol"\n[vary]\n"{name}" = {axis}\n'
+
+
+@pytest.mark.parametrize(
+    ("axis", "expected"),
+    [
+        ('{ low = "a", high = 3 }', ".range.low: expected a number, found 'a'"),
+        ("{ low = 1.0 }", ".range.high: expected a value, found none"),
+        ("{ low = 0.5, high = 0.4 }", ".range: expected low < high, got low 0.5 and high 0.4"),
+        ("{ low = nan, high = 0.5 }", ".range.low: expected a finite number, found nan"),
+        ("{ low = 0.4, high = inf }", ".range.high: expected a finite number, found inf"),
+        (
+            "{ low = -1.0, high = 0.5, log = true }",
+            ".range: expected 0 < low < high, got low -1 and high 0.5",
+        ),
+        (
+            "{ low = 1.2, high = 1.8, whole = true }",
+            ".range: expected whole ends, got low 1.2 and high 1.8",
+        ),
+        ("{ low = 1, high = 2, hihg = 2 }", ".range.hihg: expected a known key"),
+        ("0.4", f": {CHOICES}, found 0.4"),
+        ('"wide"', f": {CHOICES}, found 'wide'"),
+        ("true", f": {CHOICES}, found True"),
+    ],
+)
+def test_a_bad_range_is_named_as_it_stands_in_the_file(
+    axis: str, expected: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    Path("bad.toml").write_text(drawn(axis))
+    line = refusal(capsys, "study", "bad.toml")
+    assert f"bad.toml: vary.tunnel.free_width{expected}" in line
+    assert "tuple" not in line
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        (
+            "[vary]\ntunnel.free_width = [0.4]\n",
+            f"bad.toml: vary.tunnel: {CHOICES}, found {{'free_width': [0.4]}}",
+        ),
+        ("vary = [1, 2]\n", "bad.toml: vary: expected a table, found [1, 2]"),
+        (f"settings = 3\n{GOOD}", "bad.toml: settings: expected a table, found 3"),
+        ("", "vary: expected values, found none: the grid is empty"),
+        (
+            f'{GOOD}"tunnel.free_width" = []\n',
+            "vary.tunnel.free_width: expected values, found none: the grid is empty",
+        ),
+        (
+            drawn("[0.4]", "tunnel.free_widht"),
+            "vary: tunnel: tunnel.free_widht: expected a known key of tunnel "
+            "(did you mean free_width?), found 'free_widht'",
+        ),
+        (
+            drawn("[0.4, nan]"),
+            "vary: tunnel: tunnel.free_width: expected a finite number, found nan",
+        ),
+        (
+            '[vary]\n"tunnel.free_width" = [0.4, -1.0]\n',
+            "vary: tunnel: tunnel.free_width: expected a number above 0, found -1.0",
+        ),
+        (
+            f"[settings]\ntrails = 3\n{GOOD}",
+            "settings: tunnel: trails: expected a known key (did you mean trials?), found 'trails'",
+        ),
+        (
+            f"[settings]\ntunnel = 3\n{GOOD}",
+            "settings.tunnel: expected a table, as tunnel.strewn varies, found 3",
+        ),
+        (
+            f'[settings]\ncontrollers = ["clsoed"]\n{GOOD}',
+            "found 'clsoed' (did you mean closed?)",
+        ),
+        ('[vary]\ncontrollers = [["clsoed"]]\n', "vary: tunnel: controllers: expected one of open"),
+        (
+            'experiment = "tunel"\n[vary]\nx = [1]\n',
+            "experiment: expected an experiment (calibrate",
+        ),
+        (f"experiment = 3\n{GOOD}", "bad.toml: experiment: expected text, found 3"),
+        (f'plan = "gird"\n{GOOD}', "bad.toml: plan: expected one of grid, list, random"),
+        (f"trails = 3\n{GOOD}", "trails: expected a known key (did you mean trials?)"),
+        (
+            '[vary]\n"tunnel.free_width" = { low = 0.4, high = 0.5 }\n',
+            "vary.tunnel.free_width: expected a list of values for a grid, found a range",
+        ),
+        (
+            "assumed = 0.2\n",
+            "assumed: expected plan random, sobol or morris beside it, found grid",
+        ),
+        (
+            'assumed = 0.2\nplan = "morris"\nleave_out = ["tunel"]\n',
+            "leave_out: expected an assumed number or a group of them (did you mean tunnel?), "
+            "found tunel",
+        ),
+        (
+            f'response = "tims_s"\n{GOOD}',
+            "response: expected a measure of tunnel (did you mean time_s?), one of success_share",
+        ),
+        (
+            "[vary]\n" + "".join(f"{name} = {list(range(100))}\n" for name in "abcde"),
+            "vary: expected at most 100000 points, found 10000000000",
+        ),
+        ("this is not toml\n", "bad.toml: expected TOML, found: Expected '=' after a key"),
+        (OWN, "add --experiment own.py:trial"),
+        (
+            f'[settings]\ncontrollers = ["own.py:Mine"]\n{GOOD}',
+            "add --trust-code",
+        ),
+    ],
+)
+def test_a_bad_study_is_one_line(
+    text: str, expected: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    Path("bad.toml").write_text(text)
+    assert expected in refusal(capsys, "study", "bad.toml")
+    assert not Path("runs").exists()
+
+
+def test_bad_words_are_one_line(capsys: pytest.CaptureFixture[str]) -> None:
+    assert "nobody.toml: expected a readable file: No such file" in refusal(
+        capsys, "study", "nobody.toml"
+    )
+    Path("good.toml").write_text(GOOD)
+    shard = refusal(capsys, "study", "good.toml", "--shard", "3/2")
+    assert "--shard: expected I/N" in shard
+    engine = refusal(capsys, "study", "good.toml", "--engine", "rya")
+    assert "engine: expected one of local" in engine
+    assert not Path("runs").exists()
+
+
+@pytest.mark.parametrize("workers", ["1", "2"])
+def test_a_measure_that_a_function_has_not_is_found_at_its_first_row(
+    workers: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    Path("own.py").write_text(
+        "def trial(config, seed):\n    return {'value': config['x'], 'word': 'a'}\n"
+    )
+    Path("own.toml").write_text(f'response = "valeu"\ntrials = 3\n{OWN}')
+    words = ["study", "own.toml", "--trust-code", "--workers", workers]
+    assert "(did you mean value?), one of trial, value; found valeu" in refusal(capsys, *words)

@@ -1,0 +1,105 @@
+"""Rows of a user's own function in a study: what is kept, and what makes a row `failed`."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+
+import pytest
+
+from antennate.cli import main
+
+OWN = """
+import numpy as np
+
+class Thing:
+    pass
+
+ROWS = [
+    {"value": np.float64(1.5), "n": np.int64(3), "yes": np.bool_(True), "small": np.float32(0.5)},
+    {"value": Thing()},
+    {"value": 1j},
+    {"value": np.complex128(1j)},
+    {"value": 10**400},
+    {"value": "\\ud800"},
+    {"value": 2.5, "point": 7},
+    {"value": 2.5, "trial": 7},
+    {"value": 2.5, "status": "ok"},
+    {"value": 2.5, "reason": "mine"},
+    {"value": 2.5, "seed": 9},
+    {"value": 2.5, "deep.x": 9},
+    {"value": "a" * 20_000_000},
+    [1.0],
+    {1: 2.0},
+    {"value": 2.5, "list": np.arange(2), 'n': None},
+]
+
+def trial(config, seed):
+    if seed == len(ROWS):
+        raise ValueError("\\udcff")
+    return ROWS[seed]
+"""
+REASONS = [
+    "",
+    "column value: expected numbers or text, found an object of type Thing",
+    "column value: expected numbers or text, found an object of type complex",
+    "column value: expected numbers or text, found an object of type complex128",
+    "column value: expected a number below 1.8e308, found a whole number of 1329 bits",
+    "column value: expected Unicode text, found '\\ud800'",
+    *(
+        f"column {name}: expected another name, as the study has this column"
+        for name in ("point", "trial", "status", "reason", "seed", "deep.x")
+    ),
+    "expected a row of at most 1 MB as JSON, found 20 MB",
+    "expected a row as a dictionary or a dataclass, found list",
+    "expected names of columns as text, found int",
+    "",
+    "ValueError: \\udcff",
+]
+PLAN = 'experiment = "own.py:trial"\ntrials = {}\n[vary]\n"deep.x" = [1]\n'
+
+
+@pytest.fixture(autouse=True)
+def _there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+def study(own: str, trials: int, *more: str) -> tuple[int, list[dict[str, str]]]:
+    """Exit code and rows of a study of a function."""
+    Path("own.py").write_text(own)
+    Path("plan.toml").write_text(PLAN.format(trials))
+    words = ["study", "plan.toml", "--trust-code", "--out", "run", "--workers", "1", *more]
+    code = main(words)
+    with Path("run/trials.csv").open(newline="") as file:
+        return code, list(csv.DictReader(file))
+
+
+def test_a_row_that_cannot_be_kept_is_failed_with_a_reason_and_the_study_goes_on() -> None:
+    code, rows = study(OWN, len(REASONS), "--no-figures")
+    assert code == 0
+    found = [row["reason"].removeprefix("BadInputError: ") for row in rows]
+    assert found == REASONS
+    assert [row["status"] for row in rows] == ["failed" if reason else "ok" for reason in REASONS]
+    first, last = rows[0], rows[-2]
+    assert [first[name] for name in ("value", "n", "yes", "small")] == ["1.5", "3", "True", "0.5"]
+    assert (last["value"], last["list"], last["n"]) == ("2.5", "[0, 1]", "")
+    assert [row["trial"] for row in rows] == [str(seed) for seed in range(len(rows))]
+    result = json.loads(Path("run/result.json").read_text())
+    assert (result["response"], result["points"][0]["response"]) == ("value", 2.0)
+
+
+def test_the_response_is_found_where_the_first_trial_failed() -> None:
+    own = "def trial(config, seed):\n    return {'value': 1 / seed}\n"
+    assert study(own, 3, "--no-figures")[0] == 0
+    result = json.loads(Path("run/result.json").read_text())
+    assert (result["response"], result["points"][0]["response"]) == ("value", 0.75)
+
+
+@pytest.mark.parametrize(
+    ("body", "status"), [("raise ValueError", "failed"), ("__import__('time').sleep(99)", "hung")]
+)
+def test_a_study_of_which_no_trial_has_a_result_ends_with_2(body: str, status: str) -> None:
+    own = f"def trial(config, seed):\n    {body}\n"
+    code, rows = study(own, 2, "--trial-timeout", "0.2")
+    assert (code, [row["status"] for row in rows]) == (2, [status, status])
