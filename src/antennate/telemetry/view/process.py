@@ -84,17 +84,21 @@ class ViewProcess:
             return
         if kind == FAILED:
             raise BadInputError(text.decode())
-        raise BadInputError("view: expected its process to serve, found that it does not")
+        raise BadInputError(f"view: expected its process to serve, found that it {self._found()}")
 
     def lost(self) -> WorkerError:
         """What is raised when it ended although nobody told it to."""
+        return WorkerError(
+            "view: expected the process of its page to serve until Ctrl-C, found that it "
+            f"{self._found()}"
+        )
+
+    def _found(self) -> str:
+        """What became of a process that does not serve."""
         with contextlib.suppress(subprocess.TimeoutExpired):
             self._process.wait(_ENDING)
         code = self._process.poll()
-        found = "takes no messages" if code is None else f"ended with code {code}"
-        return WorkerError(
-            f"view: expected the process of its page to serve until Ctrl-C, found that it {found}"
-        )
+        return "takes no messages" if code is None else f"ended with code {code}"
 
     def close(self) -> None:
         """End it."""
