@@ -201,6 +201,19 @@ def test_the_film_of_a_log_needs_room_before_it_is_drawn(
     assert [path.name for path in Path().iterdir()] == ["log.mcap"]
 
 
+def test_an_encoder_that_fails_is_no_fault_of_the_file(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """H.264 with halved colours takes no odd width."""
+    require_drawing()
+    antennate.simulate("open", scene="flat", time_limit=0.1, log="log.mcap")
+    monkeypatch.setattr(film, "WIDTH", WIDTH + 1)
+    assert main(["log", "film", "log.mcap"]) == 2
+    told = capsys.readouterr().err.splitlines()[-1]
+    assert told.startswith("antennate log: error: video: expected to encode it with ")
+    assert [path.name for path in Path().iterdir()] == ["log.mcap"]
+
+
 @pytest.mark.parametrize(
     ("name", "settings", "condition", "traces", "speed"),
     [

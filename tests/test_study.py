@@ -349,7 +349,7 @@ def test_a_cause_that_is_there_is_found_alone() -> None:
     assert found == [("closed", "d"), ("closed minus open", "d")]
     study = experiments.load("study")
     said = study.sentence(result)
-    assert "a point, the share of successes of closed minus open hangs on d." in said
+    assert "a point, the share of successes of closed minus open depends on d." in said
     table = study.tables(result)[0]
     cells = dict(table.rows)
     assert cells["d"][-1] == "closed, closed minus open"
@@ -364,7 +364,7 @@ def test_one_trial_a_point_tells_no_noise() -> None:
 
     vary = {name: {"low": 0.0, "high": 1.0} for name in "abcd"}
     many = antennate.study(slope, vary=vary, plan="morris", points=6, trials=8, workers=1)
-    assert "of 8 trials a point, the length hangs on a." in many.sentence
+    assert "of 8 trials a point, the length depends on a." in many.sentence
     one = antennate.study(slope, vary=vary, plan="morris", points=6, trials=1, workers=1)
     assert "Of 1 trial a point no noise is known" in one.sentence
 

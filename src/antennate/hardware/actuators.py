@@ -1,4 +1,4 @@
-"""What moves the joints of one robot, whatever bus it hangs on."""
+"""What moves the joints of one robot, whatever bus they are on."""
 
 from __future__ import annotations
 

@@ -145,7 +145,7 @@ def _smooth(model, q, v, arms, command, torque, pull):
 
 @njit(**_PART)
 def _fold(model, arms, ahead, chain):
-    """Inertia of all that hangs on each joint, from the tip inwards.
+    """Inertia of all that each joint carries, from the tip inwards.
 
     Args:
         model: The bench.

@@ -6,6 +6,7 @@ arrays of fixed length and sequences of both, without nesting.
 
 from __future__ import annotations
 
+import math
 import re
 import struct
 from collections.abc import Mapping, Sequence
@@ -81,44 +82,6 @@ class MessageType:
             raise LogError(f"expected a {self.name} of numbers that fit, found: {error}") from None
         return _HEADER + body
 
-    def encode_many(
-        self, values: Sequence[Any], columns: Mapping[str, NDArray[Any]]
-    ) -> list[bytes]:
-        """The bytes of messages that differ in some of their numbers, fast.
-
-        Args:
-            values: The values of all; those of the columns are replaced, a sequence by as many.
-            columns: Numbers of each message by field, shape (n,), or (n, count) of several.
-        """
-        data = self.encode(*values)
-        places = self._places(data)
-        kinds = {f.name: np.dtype(f"<{f.code}") for f in self.fields if f.name in columns}
-        shapes = [(kind, columns[name].shape[1:]) for name, kind in kinds.items()]
-        layout = np.dtype(
-            {
-                "names": list(kinds),
-                "formats": shapes,
-                "offsets": [places[name] for name in kinds],
-                "itemsize": len(data),
-            }
-        )
-        count = len(next(iter(columns.values())))
-        block = np.frombuffer(bytearray(data * count), layout)
-        for name, column in columns.items():
-            block[name] = column
-        whole = block.tobytes()
-        return [whole[at : at + len(data)] for at in range(0, len(whole), len(data))]
-
-    def _places(self, data: bytes) -> dict[str, int]:
-        """Where the numbers of each field begin in a message."""
-        body, at, found = data[len(_HEADER) :], 0, dict[str, int]()
-        for each in self.fields:
-            value, at = _take(body, at, each)
-            count = len(value) if isinstance(value, tuple) else 1
-            if each.code:
-                found[each.name] = len(_HEADER) + at - struct.calcsize(f"<{count}{each.code}")
-        return found
-
     def decode(self, data: bytes) -> dict[str, Any]:
         """The values by name; several are a tuple.
 
@@ -141,6 +104,41 @@ class MessageType:
         except (struct.error, ValueError) as error:
             raise LogError(f"expected a {self.name}, found {len(data)} bytes: {error}") from None
         return found
+
+
+class Form:
+    """Messages of one type that differ in some of their numbers alone, made many at once.
+
+    Args:
+        kind: The type.
+        values: The values of all, one for each field.
+        varying: Fields whose numbers are replaced in each, by as many.
+    """
+
+    def __init__(self, kind: MessageType, values: Sequence[Any], varying: Sequence[str]) -> None:
+        self._data = kind.encode(*values)
+        formats, offsets = list[Any](), list[int]()
+        body, at = self._data[len(_HEADER) :], 0
+        for each in kind.fields:
+            value, at = _take(body, at, each)
+            if each.name in varying:
+                shape = (len(value),) if isinstance(value, tuple) else ()
+                formats.append((f"<{each.code}", shape))
+                width = struct.calcsize(f"<{each.code}") * math.prod(shape)
+                offsets.append(len(_HEADER) + at - width)
+        names = [each.name for each in kind.fields if each.name in varying]
+        self._layout = np.dtype(
+            {"names": names, "formats": formats, "offsets": offsets, "itemsize": len(self._data)}
+        )
+
+    def encode(self, columns: Mapping[str, NDArray[Any]]) -> list[bytes]:
+        """The bytes of messages with these numbers, shape (n,), or (n, count) of several."""
+        size, count = len(self._data), len(next(iter(columns.values())))
+        block = np.frombuffer(bytearray(self._data * count), self._layout)
+        for name, column in columns.items():
+            block[name] = column
+        whole = block.tobytes()
+        return [whole[at : at + size] for at in range(0, len(whole), size)]
 
 
 def _field(line: str) -> Field:

@@ -223,17 +223,20 @@ def encoded(film: Film, on_step: Callable[[int, int], None] = lambda done, total
         on_step: Called with how many of how many pictures are drawn.
 
     Raises:
-        AntennateError: As `require_video`.
+        AntennateError: As `require_video`, or the encoder failed.
     """
     name, av = _encoder(), importlib.import_module("av")
     file = io.BytesIO()
-    with av.open(file, "w", format="mp4") as container:
-        stream = container.add_stream(name, rate=Fraction(RATE))
-        stream.width, stream.height, stream.pix_fmt = WIDTH, HEIGHT + STRIP, "yuv420p"
-        stream.options = {"crf": str(_QUALITY), "preset": "medium"}
-        for done, picture in enumerate(pictures(film), start=1):
-            frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(picture), format="rgb24")
-            container.mux(stream.encode(frame))
-            on_step(done, len(film.t))
-        container.mux(stream.encode())
+    try:
+        with av.open(file, "w", format="mp4") as container:
+            stream = container.add_stream(name, rate=Fraction(RATE))
+            stream.width, stream.height, stream.pix_fmt = WIDTH, HEIGHT + STRIP, "yuv420p"
+            stream.options = {"crf": str(_QUALITY), "preset": "medium"}
+            for done, picture in enumerate(pictures(film), start=1):
+                frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(picture), format="rgb24")
+                container.mux(stream.encode(frame))
+                on_step(done, len(film.t))
+            container.mux(stream.encode())
+    except av.FFmpegError as error:
+        raise BadInputError(f"video: expected to encode it with {name}, found: {error}") from None
     return file.getvalue()

@@ -8,10 +8,11 @@ from __future__ import annotations
 import math
 import time
 from pathlib import Path
-from typing import NamedTuple, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
+from antennate.telemetry.cdr import Form
 from antennate.telemetry.header import Header
 from antennate.telemetry.topics import (
     ANTENNA,
@@ -20,6 +21,7 @@ from antennate.telemetry.topics import (
     JOINT_COMMANDS,
     JOINT_STATES,
     MANEUVER,
+    Topic,
 )
 from antennate.telemetry.writer import FLUSH, LogWriter
 from antennate.types import Floats
@@ -64,7 +66,8 @@ class RowLog:
     def __init__(self, path: Path, header: Header) -> None:
         self.path = path
         self._out = LogWriter(path, header, _LEAST_FREE)
-        self._names, self._angles = header.robot.joint_names, len(header.robot.joint_names)
+        self._angles = len(header.robot.joint_names)
+        self._forms = _forms(header.robot.joint_names)
         self._start = header.start
         self._held: Floats = np.empty((_MOST, HEAD + 4 * self._angles))
         self._forces: list[bytes | None] = []
@@ -134,40 +137,53 @@ class RowLog:
         rows = self._held[:count]
         t, angles = rows[:, 0], self._angles
         joints = [rows[:, at : at + angles] for at in range(HEAD, rows.shape[1], angles)]
-        pair, nothing = (0.0, 0.0), (0.0,) * angles
         stamps = self._start + np.rint(1e9 * t).astype(np.int64)
         time = {"sec": stamps // 10**9, "nanosec": stamps % 10**9}
-        commanded, measured = (0, 0, "", self._names), (0, 0, "", self._names, *3 * (nothing,))
+        columns: dict[Topic, dict[str, Any]] = {
+            ANTENNA: {
+                "t": t,
+                "counts": rows[:, 1:3],
+                "reading": rows[:, 1:3],
+                "level": rows[:, 3:5],
+                "contact": rows[:, 5:7].astype(np.int64),
+            },
+            MANEUVER: {
+                "number": self._out.written + 1 + np.arange(count),
+                "now": t,
+                "maneuver": rows[:, 7].astype(np.int64),
+                "phase": rows[:, 8],
+            },
+            JOINT_COMMANDS: time | {"position": joints[0]},
+            JOINT_STATES: time
+            | dict(zip(("position", "velocity", "effort"), joints[1:], strict=True)),
+        }
         self._out.write_many(
             t.tolist(),
             {
-                ANTENNA: ANTENNA.type.encode_many(
-                    (0.0, pair, pair, pair, (0, 0), math.nan),
-                    {
-                        "t": t,
-                        "counts": rows[:, 1:3],
-                        "reading": rows[:, 1:3],
-                        "level": rows[:, 3:5],
-                        "contact": rows[:, 5:7].astype(np.int64),
-                    },
-                ),
-                MANEUVER: MANEUVER.type.encode_many(
-                    (0, 0.0, 0, 0.0, True),
-                    {
-                        "number": self._out.written + 1 + np.arange(count),
-                        "now": t,
-                        "maneuver": rows[:, 7].astype(np.int64),
-                        "phase": rows[:, 8],
-                    },
-                ),
-                JOINT_COMMANDS: JOINT_COMMANDS.type.encode_many(
-                    (*commanded, nothing, (), ()), time | {"position": joints[0]}
-                ),
-                JOINT_STATES: JOINT_STATES.type.encode_many(
-                    measured,
-                    time | dict(zip(("position", "velocity", "effort"), joints[1:], strict=True)),
-                ),
+                **{topic: self._forms[topic].encode(each) for topic, each in columns.items()},
                 CONTACT_FORCES: forces,
                 COORDINATES: places,
             },
         )
+
+
+def _forms(names: tuple[str, ...]) -> dict[Topic, Form]:
+    """Messages of a tick in which all that is known in simulation varies."""
+    pair, each = (0.0, 0.0), (0.0,) * len(names)
+    joints, time = (0, 0, "", names), ("sec", "nanosec")
+    return {
+        ANTENNA: Form(
+            ANTENNA.type,
+            (0.0, pair, pair, pair, (0, 0), math.nan),
+            ("t", "counts", "reading", "level", "contact"),
+        ),
+        MANEUVER: Form(
+            MANEUVER.type, (0, 0.0, 0, 0.0, True), ("number", "now", "maneuver", "phase")
+        ),
+        JOINT_COMMANDS: Form(JOINT_COMMANDS.type, (*joints, each, (), ()), (*time, "position")),
+        JOINT_STATES: Form(
+            JOINT_STATES.type,
+            (*joints, each, each, each),
+            (*time, "position", "velocity", "effort"),
+        ),
+    }

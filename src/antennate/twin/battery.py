@@ -43,5 +43,5 @@ class Battery:
         return max(self._params.voltage - empty - drop, 0.0)
 
     def _direct(self, servo: Servo) -> bool:
-        """Whether it hangs on the supply itself."""
+        """Whether it is wired to the supply itself."""
         return RATINGS[servo.table.model].voltage > self._params.antenna_voltage

@@ -18,7 +18,7 @@ _NAMED = 3
 
 
 def tables(result: Mapping[str, Any]) -> Sequence[Table]:
-    """What the response hangs on, or the points one by one."""
+    """What the response depends on, or the points one by one."""
     found = [_effects(result)] if result["effects"] else [_points(result)]
     return [table for table in found if table.rows]
 
@@ -102,14 +102,14 @@ def sentence(result: Mapping[str, Any]) -> str:
         )
         text += f"; successes over all of them (95 % interval): {', '.join(rates)}"
     if result["effects"]:
-        text += f". {_hangs(result)}"
+        text += f". {_depends(result)}"
     bad = {name: n for name, n in result["statuses"].items() if name != "ok"}
     text += "." if not bad else f". Trials that say nothing: {_counted(bad)}; trials.csv has why."
     return text
 
 
-def _hangs(result: Mapping[str, Any]) -> str:
-    """What the response hangs on, of the last target: the parameters above the noise."""
+def _depends(result: Mapping[str, Any]) -> str:
+    """What the response depends on, of the last target: the parameters above the noise."""
     last = result["effects"][-1]["of"]
     found = [e for e in result["effects"] if e["of"] == last and e["mu_star"] is not None]
     found.sort(key=lambda effect: -effect["mu_star"])
@@ -118,10 +118,10 @@ def _hangs(result: Mapping[str, Any]) -> str:
     if above:
         more = f" and {len(above) - _NAMED} more" if len(above) > _NAMED else ""
         names = ", ".join(above[:_NAMED])
-        return f"Above the noise of {_trials(result)} a point, {what} hangs on {names}{more}"
+        return f"Above the noise of {_trials(result)} a point, {what} depends on {names}{more}"
     trials = _trials(result)
     if any(effect.get("above_noise") is None for effect in found):
-        return f"Of {trials} a point no noise is known, so nothing tells what {what} hangs on"
+        return f"Of {trials} a point no noise is known, so nothing tells what {what} depends on"
     return f"Of {len(found)} parameters nothing moves {what} above the noise of {trials} a point"
 
 

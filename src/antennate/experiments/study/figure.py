@@ -1,4 +1,4 @@
-"""Figures of `antennate study`: a map of the response, or what it hangs on.
+"""Figures of `antennate study`: a map of the response, or what it depends on.
 
 Panels stand below one another, so that a figure can be read on a phone.
 """

@@ -1,4 +1,4 @@
-"""What is told of the trials at each point, and of what the response hangs on."""
+"""What is told of the trials at each point, and of what the response depends on."""
 
 from __future__ import annotations
 

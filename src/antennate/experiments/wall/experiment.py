@@ -33,17 +33,17 @@ def tables(result: Mapping[str, Any]) -> Sequence[Table]:
 
 
 def sentence(result: Mapping[str, Any]) -> str:
-    """Which profiles passed, how sure it is, and what it hangs on."""
-    return f"Walls passed (95 % interval): {successes(result['profiles'])}. {_hangs(result)}"
+    """Which profiles passed, how sure it is, and what it depends on."""
+    return f"Walls passed (95 % interval): {successes(result['profiles'])}. {_border(result)}"
 
 
-def _hangs(result: Mapping[str, Any]) -> str:
+def _border(result: Mapping[str, Any]) -> str:
     at, below, above = (result["border"][key] for key in ("at_mm", "below_mm", "above_mm"))
     if below is None or above is None:
         return f"Longest sticks are all {'above' if below is None else 'up to'} {at:g} mm, the jam."
     return (
-        f"This hangs on what is called a jam: a stick above {at:g} mm. The nearest longest sticks "
-        f"are {below:.1f} and {above:.1f} mm."
+        f"A jam is a stick above {at:g} mm: the base moves so far and the tip does not. This "
+        f"border decides; the nearest longest sticks are {below:.1f} and {above:.1f} mm."
     )
 
 

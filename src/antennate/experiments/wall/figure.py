@@ -104,8 +104,8 @@ def sticks(rows: Sequence[WallTrial], border: float) -> Figure:
     ticks = [tick for tick in (1, 2, 5, 10, 20, 50, 100, 200) if low <= tick <= high]
     panel.set_yticks(ticks, [str(tick) for tick in ticks])
     panel.yaxis.minorticks_off()
-    panel.set_ylabel("longest stick of a trial [mm]")
-    panel.set_title("The outcome hangs on this border; a mark is a trial")
+    panel.set_ylabel("longest stick of a trial:\nthe base moves, the tip does not [mm]")
+    panel.set_title("The outcome depends on this border; a mark is a trial")
     return figure
 
 

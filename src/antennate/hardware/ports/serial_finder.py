@@ -16,7 +16,7 @@ from antennate.hardware.ports.serial_port import SerialPort
 class Identity:
     """What a USB adapter says of itself: vendor, product, serial number if it has one of its own.
 
-    The location is the socket it hangs on, with the interface of an adapter that has several.
+    The location is the socket of its plug, with the interface of an adapter that has several.
     """
 
     vid: int
