@@ -3,9 +3,10 @@
 A kill comes after a random part of the time that an undisturbed study took, so that it falls on
 any part of a study on a slow computer too.
 
-Words: folder, number of kills, seed. Prints one JSON object: kills of drivers and of workers,
-studies, tables that differ from an undisturbed one, trials lost, trials twice in a table, and
-trials that were carried out again. After each study the same so far, on stderr.
+Words: folder, number of kills, seed, trials of a study (else 300). Prints one JSON object:
+kills of drivers and of workers, studies, tables that differ from an undisturbed one, trials lost,
+trials twice in a table, and trials that were carried out again. After each study the same so far,
+on stderr.
 """
 
 from __future__ import annotations
@@ -79,12 +80,12 @@ def disturbed(folder: Path, most: int, longest: float, chance: random.Random) ->
         assert driver.returncode == -signal.SIGKILL, said.decode()
 
 
-def one(folder: Path, most: int, chance: random.Random) -> dict[str, int]:
+def one(folder: Path, most: int, chance: random.Random, trials: int) -> dict[str, int]:
     """One study and what became of it."""
     folder.mkdir(parents=True)
     code = Path(__file__).with_name("study_trials.py")
     notes = folder / "notes.txt"
-    plan = PLAN.format(code=code, trials=TRIALS // 2)
+    plan = PLAN.format(code=code, trials=trials // 2)
     (folder / "plan.toml").write_text(plan)
     begin = time.monotonic()
     whole = start(folder, "whole")
@@ -101,19 +102,20 @@ def one(folder: Path, most: int, chance: random.Random) -> dict[str, int]:
         "workers": workers,
         "studies": 1,
         "tables that differ": int(tables[0] != tables[1]),
-        "lost": TRIALS - len(different),
+        "lost": trials - len(different),
         "twice": len(rows) - len({(row["x"], row["trial"]) for row in rows}),
-        "again": len(notes.read_text().splitlines()) - TRIALS,
+        "again": len(notes.read_text().splitlines()) - trials,
     }
 
 
 def main() -> None:
     folder, count, seed = Path(sys.argv[1]).resolve(), int(sys.argv[2]), int(sys.argv[3])
+    trials = int(sys.argv[4]) if len(sys.argv) > 4 else TRIALS
     chance = random.Random(seed)
     total: Counter[str] = Counter()
     while total["drivers"] + total["workers"] < count:
         left = count - total["drivers"] - total["workers"]
-        total.update(one(folder / str(total["studies"]), left, chance))
+        total.update(one(folder / str(total["studies"]), left, chance, trials))
         sys.stderr.write(f"{json.dumps(total)}\n")
     sys.stdout.write(json.dumps(total))
 

@@ -8,6 +8,7 @@ import math
 import os
 import subprocess
 import sys
+import time
 from collections.abc import Callable
 from importlib.metadata import PathDistribution
 from pathlib import Path
@@ -15,6 +16,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import study_killed
 
 import antennate
 from antennate import experiments
@@ -296,13 +298,38 @@ def test_W1_killed_studies_end_with_the_same_table(tmp_path: Path) -> None:
     """A few kills; by hand `tests/study_killed.py FOLDER 200 SEED` kills 200 times."""
     source = Path(experiments.__file__).parents[2]
     known = {**os.environ, "PYTHONPATH": f"{source}{os.pathsep}{HERE}"}
-    words = [sys.executable, str(HERE / "study_killed.py"), str(tmp_path), "2", "1"]
+    words = [sys.executable, str(HERE / "study_killed.py"), str(tmp_path), "2", "1", "40"]
     done = subprocess.run(words, capture_output=True, text=True, env=known, check=True)
     found = json.loads(done.stdout)
     kills = found["drivers"] + found["workers"]
     assert kills == 2
     assert found["tables that differ"] == found["lost"] == found["twice"] == 0
     assert 0 <= found["again"] <= 2 * kills
+
+
+def test_W5_a_study_that_is_told_to_end_keeps_what_is_done(tmp_path: Path) -> None:
+    """SIGTERM, as a cluster sends it: it ends within 5 s, and goes on later."""
+    plan(sleep=0.1)
+    text = Path("plan.toml").read_text()
+    Path("plan.toml").write_text(text.replace("trials = 3", "trials = 4"))
+    driver = study_killed.start(tmp_path, "run")
+    store = Path("run") / STORE
+    while not store.exists() or store.read_bytes().count(b"\n") < 3:
+        assert driver.poll() is None
+        time.sleep(0.02)
+    driver.terminate()
+    asked = time.monotonic()
+    said = driver.communicate()[1].decode()
+    assert time.monotonic() - asked < 5.0
+    assert driver.returncode == 130
+    assert "Traceback" not in said
+    assert "to go on: " in said
+    done = store.read_bytes()
+    assert study("--no-figures") == 0
+    assert store.read_bytes().startswith(done)
+    values = [float(row["value"]) for row in table()]
+    expected = [(x + 0.1) * (seed + 1) / 3 for x in (0.5, 0.5, 1.5, 1.5) for seed in range(4)]
+    assert values == pytest.approx(expected, rel=1e-12)
 
 
 def study_of(shares: Callable[[dict[str, Any]], dict[str, float]], seed: int) -> StudyOutcome:
