@@ -81,7 +81,7 @@ def test_a_known_front_is_found_and_run_again(capsys: pytest.CaptureFixture[str]
     assert optuna.logging.get_verbosity() == quiet
     told = " ".join(out.split())
     assert "The front was chosen by these values, so they are optimistic." in told
-    assert "24 proposed designs and 1 references" in told
+    assert "Designs proposed: 24, references: 1" in told
     found = result()
     designs = found["designs"]
     assert [each["name"] for each in designs[:2]] == ["paper", "1"]

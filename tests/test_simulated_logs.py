@@ -209,9 +209,9 @@ def test_what_a_twin_cannot_keep_is_refused_in_one_line(
 def rows(count: int) -> list[TickRow]:
     """Rows of numbers that follow from their place."""
     width = HEAD + 4 * len(ROBOT.joint_names)
-    whole = np.arange(5.0, 9.0)  # contacts and so on are whole numbers
     found = 0.01 * np.arange(1, count + 1)[:, None] + np.arange(width) / 1024
-    found[:, 0], found[:, 5:9] = 0.01 * np.arange(1, count + 1), whole
+    found[:, 0] = 0.01 * np.arange(1, count + 1)
+    found[:, [1, 7, 8]] = 3.0, 1.0, 2.0  # maneuver and contacts are whole numbers
     return [TickRow(row) for row in found]
 
 

@@ -29,6 +29,7 @@ class Places:
         leg_geoms: Geoms of the legs, shape (2 L,).
         obstacles: Whether a geom is an obstacle, shape (geoms,).
         own: Whether it is the robot's, shape (geoms,).
+        parts: Name of the body of each geom, without the prefix.
     """
 
     def __init__(self, model: mujoco.MjModel, robot: RobotSpec, prefix: str) -> None:
@@ -53,3 +54,5 @@ class Places:
         self.obstacles: Bools = (model.geom_contype & layers.OBSTACLE) != 0
         owner = model.body_rootid[model.geom_bodyid]
         self.own: Bools = owner == model.body(prefix + robot.link_names[0]).id
+        bodies = [model.body(n).name.removeprefix(prefix) for n in range(model.nbody)]
+        self.parts: list[str] = [bodies[n] for n in model.geom_bodyid.tolist()]

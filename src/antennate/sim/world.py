@@ -119,6 +119,7 @@ class World:
         self._before = 0.0
         data = self.data
         self._qpos, self._qvel, self._ctrl = data.qpos, data.qvel, data.ctrl
+        self._torque = data.actuator_force
         self.head: Floats = data.qpos[self._root : self._root + 3]
         self._bent: Floats = np.zeros(len(self._bounded))
         self._warnings = data.warning.number
@@ -192,7 +193,13 @@ class World:
 
     def drive_torques(self) -> Floats:
         """Torques of all actuators, without what their joints' damping takes [N·m], shape (n,)."""
-        return self.data.actuator_force[self._drive]
+        return self._torque[self._drive]
+
+    def measure_drives(self, found: Floats) -> None:
+        """Write what `drives`, `drive_speeds` and `drive_torques` give to `found`, shape (3, n)."""
+        self._qpos.take(self.places.driven, out=found[0], mode="clip")
+        self._qvel.take(self.places.turning, out=found[1], mode="clip")
+        self._torque.take(self._drive, out=found[2], mode="clip")
 
     def step(self, count: int) -> None:
         """Advance by `count` physics steps.
@@ -294,15 +301,16 @@ class World:
             The part of the robot, the place [m], shape (contacts, 3), and the normal force [N],
             shape (contacts,), of each contact.
         """
+        found = np.flatnonzero(self._on_obstacles())
+        if not len(found):
+            return [], np.zeros((0, 3)), np.zeros(0)
         contact = self.data.contact
-        found = np.flatnonzero(self._on_obstacles() & (contact.efc_address >= 0))
+        address = contact.efc_address[found]
+        found, address = found[address >= 0], address[address >= 0]
         geoms = contact.geom[found]
         ours = np.where(self.places.own[geoms[:, 0]], geoms[:, 0], geoms[:, 1])
-        names = [
-            self.model.body(self.model.geom_bodyid[geom]).name.removeprefix(PREFIX)
-            for geom in ours.tolist()
-        ]
-        return names, contact.pos[found], self.data.efc_force[contact.efc_address[found]]
+        names = [self.places.parts[geom] for geom in ours.tolist()]
+        return names, contact.pos[found], self.data.efc_force[address]
 
     def _on_obstacles(self) -> Bools:
         """Contacts between the robot and an obstacle, shape (contacts,)."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import logging
+import math
 import multiprocessing
 import pickle
 import threading
@@ -22,9 +23,7 @@ CONNECT = 10.0
 _ASK = 1.0
 """How often the scheduler is asked for its workers [s]."""
 _PATIENCE = 60.0
-"""Time without one of our own workers after which another is started: longer than a start [s]."""
-_MOST_STARTS = 3
-"""How often others are started."""
+"""Time without any worker of our own, which Dask starts anew, after which a run ends [s]."""
 _STAY = 60.0
 """How long a process beside a worker waits for its next part [s]."""
 _NOTE = logging.getLogger(__name__)
@@ -60,7 +59,7 @@ class Dask:
             def submit(function: Any, *arguments: Any) -> Any:
                 return client.submit(carry_out_apart, *arguments, pure=False)
 
-            workers = _Workers(client, cluster, place, count)
+            workers = _Workers(client, place, count, cluster is not None)
             try:
                 Submitted(self.name, submit, (KilledWorker,), workers=workers).run(
                     work, parts, count, emit, fail
@@ -105,10 +104,10 @@ class Dask:
 class _Workers:
     """How many parts can run at once, asked for again and again; and what is done if none can."""
 
-    def __init__(self, client: Any, cluster: Any, place: str, count: int) -> None:
-        self._client, self._cluster, self._place = client, cluster, place
+    def __init__(self, client: Any, place: str, count: int, own: bool) -> None:
+        self._client, self._place, self._own = client, place, own
         self._count = self._found = count
-        self._next, self._missing, self._starts, self._told = 0.0, 0.0, 0, False
+        self._next, self._none_since, self._told = 0.0, math.inf, False
 
     def __call__(self) -> int:
         """Threads of all workers; the last number that is known while the scheduler is silent.
@@ -123,34 +122,13 @@ class _Workers:
         with contextlib.suppress(OSError):
             threads = sum(self._client.nthreads().values())
             self._found = max(self._count, threads)
-            if self._cluster is not None:
-                self._replace(threads, now)
-            else:
-                if not threads and not self._told:
-                    _NOTE.warning("dask: waits for workers at %s", self._place)
-                self._told = not threads
+            self._none_since = math.inf if threads else min(self._none_since, now)
+            if self._own and now - self._none_since > _PATIENCE:
+                raise WorkerError(f"dask: expected workers, found none for {_PATIENCE:g} s")
+            if not threads and not self._own and not self._told:
+                _NOTE.warning("dask: waits for workers at %s", self._place)
+            self._told = not threads
         return self._found
-
-    def _replace(self, threads: int, now: float) -> None:
-        """Start others where workers of our own are missing for long."""
-        if threads >= self._count:
-            self._missing = 0.0
-            return
-        self._missing = self._missing or now
-        if now - self._missing < _PATIENCE:
-            return
-        if self._starts == _MOST_STARTS:
-            if not threads:
-                raise WorkerError(
-                    f"dask: expected workers to start, found none after {_MOST_STARTS} attempts"
-                )
-            return
-        self._starts, self._missing = self._starts + 1, now
-        _NOTE.warning(
-            "dask: %d of %d workers are missing; others are started",
-            *(self._count - threads, self._count),
-        )
-        self._cluster.scale(self._count)
 
 
 @contextlib.contextmanager

@@ -27,7 +27,7 @@ from antennate.telemetry.writer import FLUSH, LogWriter
 from antennate.types import Floats
 
 HEAD = 9
-"""Numbers of a row before those of the joints: t, counts, level, contact, maneuver, phase."""
+"""Numbers of a row before those of the joints: t, maneuver, phase, counts, level, contact."""
 _LEAST_FREE = 1e8
 """Room for many trials [byte] (assumed)."""
 _MOST = 256
@@ -142,16 +142,16 @@ class RowLog:
         columns: dict[Topic, dict[str, Any]] = {
             ANTENNA: {
                 "t": t,
-                "counts": rows[:, 1:3],
-                "reading": rows[:, 1:3],
-                "level": rows[:, 3:5],
-                "contact": rows[:, 5:7].astype(np.int64),
+                "counts": rows[:, 3:5],
+                "reading": rows[:, 3:5],
+                "level": rows[:, 5:7],
+                "contact": rows[:, 7:9].astype(np.int64),
             },
             MANEUVER: {
                 "number": self._out.written + 1 + np.arange(count),
                 "now": t,
-                "maneuver": rows[:, 7].astype(np.int64),
-                "phase": rows[:, 8],
+                "maneuver": rows[:, 1].astype(np.int64),
+                "phase": rows[:, 2],
             },
             JOINT_COMMANDS: time | {"position": joints[0]},
             JOINT_STATES: time

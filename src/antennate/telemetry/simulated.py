@@ -32,26 +32,23 @@ class TickRows:
 
     def __init__(self, robot: RobotSpec, controller: Any, world: World, row: int = 0) -> None:
         self._controller, self._world, self._row = controller, world, row
-        self._parts, self._angles = list(robot.command_shapes()), len(robot.joint_names)
+        self._parts = list(robot.command_shapes())
+        angles = len(robot.joint_names)
+        self._numbers: Floats = np.empty(HEAD + 4 * angles)
+        self._decided = self._numbers[3 : HEAD + angles]
+        self._measured = self._numbers[HEAD + angles :].reshape(3, angles)
         self._ticks = 0
 
     def take(self, frame: AntennaFrame, command: JointCommand) -> TickRow:
-        """One tick."""
-        row, made, world = self._row, self._controller, self._world
-        numbers: Floats = np.empty(HEAD + 4 * self._angles)
+        """One tick; its numbers are replaced by those of the next one."""
+        row, made, world, numbers = self._row, self._controller, self._world, self._numbers
         phase = getattr(made, "phase", None)
-        numbers[0] = frame.t[row]
-        numbers[1:3], numbers[3:5] = frame.counts[row], made.level[row]
-        numbers[5:7], numbers[7] = made.contact[row], made.maneuver[row]
-        numbers[8] = math.nan if phase is None else phase[row]
-        at = HEAD
-        for name in self._parts:
-            part = getattr(command, name)[row].ravel()
-            numbers[at : at + len(part)] = part
-            at += len(part)
-        for measured in (world.drives(), world.drive_speeds(), world.drive_torques()):
-            numbers[at : at + self._angles] = measured
-            at += self._angles
+        numbers[0], numbers[1] = frame.t[row], made.maneuver[row]
+        numbers[2] = math.nan if phase is None else phase[row]
+        joints = [getattr(command, name)[row].ravel() for name in self._parts]
+        decided = [frame.counts[row], made.level[row], made.contact[row], *joints]
+        np.concatenate(decided, out=self._decided)
+        world.measure_drives(self._measured)
         self._ticks += 1
         if (self._ticks - 1) % _LOOK_EVERY:
             return TickRow(numbers)

@@ -81,8 +81,8 @@ def sentence(result: Mapping[str, Any]) -> str:
     designs = result["designs"]
     proposed = [each for each in designs if not each["reference"]]
     text = (
-        f"{len(proposed)} proposed designs and {len(designs) - len(proposed)} references, "
-        f"{result['trials']} trials; {sum(each['front'] for each in designs)} designs on the front"
+        f"Designs proposed: {len(proposed)}, references: {len(designs) - len(proposed)}, "
+        f"trials: {result['trials']}, on the front: {sum(each['front'] for each in designs)}"
     )
     again = [each for each in designs if each["fresh"]]
     part, known = ("fresh", again) if again else ("objectives", designs)
