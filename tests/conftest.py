@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import atexit
+import os
+import shutil
 import signal
+import tempfile
 from collections.abc import Iterator
 from importlib.util import find_spec
 
@@ -19,6 +23,14 @@ for number in (signal.SIGHUP, signal.SIGINT, signal.SIGQUIT):
         signal.signal(
             number, signal.default_int_handler if number == signal.SIGINT else signal.SIG_DFL
         )
+
+# Where Python is told to keep no bytecode, as in many containers, each of the programs that the
+# tests start compiles all that it imports: half of the time of all tests. So it is kept here, in a
+# folder that is removed at the end.
+if os.environ.pop("PYTHONDONTWRITEBYTECODE", ""):
+    kept = tempfile.mkdtemp(prefix="bytecode-")
+    os.environ["PYTHONPYCACHEPREFIX"] = kept
+    atexit.register(shutil.rmtree, kept, ignore_errors=True)
 
 
 @pytest.fixture(autouse=True)
