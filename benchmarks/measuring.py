@@ -15,6 +15,7 @@ from typing import Any
 
 Spread = dict[str, float]
 """Median, smallest and largest of several repetitions, and their number."""
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # programs start as on a computer that keeps it
 PACKAGES = ("antennate", "mujoco-core", "numpy", "numba", "distributed")
 
 

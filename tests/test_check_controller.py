@@ -54,6 +54,13 @@ class NoArray(Around):
         return command
 
 
+class ObjectLevel(Around):
+    def step(self, frame: AntennaFrame) -> JointCommand:
+        command = super().step(frame)
+        self.level = self.inner.level.astype(object)
+        return command
+
+
 class NoManeuver(Around):
     def step(self, frame: AntennaFrame) -> JointCommand:
         command = super().step(frame)
@@ -183,6 +190,7 @@ BROKEN = {
     ForOneOnly: "IndexError.*with 5 rows",
     FewJoints: r"expected yaw of shape \(5, 5\), found \(5, 2\)",
     NoArray: "expected an array as level, found list",
+    ObjectLevel: "expected real numbers as level, found an array of object",
     NoManeuver: "expected a maneuver of 0 to 4, found 7",
     FloatManeuver: "expected whole numbers as maneuver, found an array of float64",
     NoContact: "expected contacts of 0 to 2",

@@ -6,6 +6,7 @@ import shlex
 import pytest
 
 from antennate.cli import main
+from antennate.sim.world import World
 from antennate.studies.run_directory import RunDirectory
 
 TUNNEL = ["tunnel", "--controllers", "open", "--time-limit", "0.2", "--trials", "3"]
@@ -24,6 +25,29 @@ def interrupted(capsys, monkeypatch, *words):
         assert main([*words]) == 130
     (line,) = [a for a in capsys.readouterr().err.splitlines() if a.startswith("to go on: ")]
     return shlex.split(line.removeprefix("to go on: "))
+
+
+def test_nothing_stays_of_a_run_that_is_interrupted_before_its_first_trial(
+    capsys, tmp_path, monkeypatch
+):
+    """So the same command runs again, with --resume as well."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "there").mkdir()
+
+    def advance(self, count):
+        raise KeyboardInterrupt
+
+    words = [*TUNNEL, "--log", "--workers", "1", "--no-figures", "--out"]
+    for folder in ("new", "there"):
+        with monkeypatch.context() as patched:
+            patched.setattr(World, "advance", advance)
+            assert main([*words, folder]) == 130
+    assert [path.name for path in tmp_path.rglob("*")] == ["there"]
+    (tmp_path / "there" / "logs").mkdir()
+    (tmp_path / "there" / "logs" / "a.mcap").write_bytes(b"of somebody")
+    capsys.readouterr()
+    assert main([*words, "there", "--resume"]) == 2
+    assert "expected an unfinished run, found there/logs/a.mcap" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 from log_ticks import HEADER
 
+import antennate
 from antennate.cli import main
 from antennate.errors import AntennateError, LogError
 from antennate.experiments.gait.run import GaitStudyConfig, run
@@ -74,6 +75,34 @@ def test_a_walk_is_the_same_with_and_without_a_log(tmp_path: Path) -> None:
     assert logged.result() == run(config).result()
     with LogReader(tmp_path / "forward.mcap") as log:
         assert log.ticks == 0 < sum(1 for _ in log)
+
+
+@pytest.mark.parametrize("phase", ["0.3", "'turn'", "np.zeros((1, 2))", "1 / 0"])
+def test_a_phase_that_is_something_else_is_unknown_in_the_log(tmp_path: Path, phase: str) -> None:
+    """The protocol knows no phase: whose controller has an attribute of that name may use it."""
+    (tmp_path / "own.py").write_text(
+        f"""
+import numpy as np
+from antennate.control.registry import make_controller
+
+class Own:
+    def __init__(self, params, robot, batch):
+        self._made = make_controller("closed", params, robot, batch)
+
+    def __getattr__(self, name):
+        return getattr(self._made, name)
+
+    @property
+    def phase(self):
+        return {phase}
+"""
+    )
+    log = tmp_path / "a.mcap"
+    antennate.simulate(f"{tmp_path / 'own.py'}:Own", scene="flat", time_limit=0.1, log=log)
+    with LogReader(log) as read:
+        phases = [tick.phase for tick in read]
+    assert len(phases) > 5
+    assert all(map(math.isnan, phases))
 
 
 def test_a_trial_that_was_killed_is_logged_anew(tmp_path: Path) -> None:

@@ -89,15 +89,25 @@ def test_W6_a_study_is_a_table_with_a_status_for_each_trial(
 def test_a_trial_that_fails_is_a_row_and_can_be_run_again(
     mode: str, status: str, reason: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    plan(mode=mode)
-    assert study() == 0
+    text = Path(plan(mode=mode)).read_text()
+    Path("plan.toml").write_text(text.replace("[0.5, 1.5]", "[0.5]"))
+    assert study("--no-figures") == 0
     bad = [row for row in table() if row["status"] != "ok"]
     assert {row["status"] for row in bad} == {status}
-    assert len(bad) == 4
+    assert len(bad) == 2
     assert reason in bad[0]["reason"]
     before = Path("run/trials.csv").read_bytes()
     assert study() == 0  # nothing is left to do
     assert Path("run/trials.csv").read_bytes() == before
+
+
+def test_a_child_that_a_trial_forks_says_nothing(capfd: pytest.CaptureFixture[str]) -> None:
+    plan(mode="fork")
+    assert study("--no-figures") == 0
+    found = [(row["status"], float(row["value"])) for row in table()]
+    expected = [(x + 0.1) * (seed + 1) / 3 for x in (0.5, 0.5, 1.5, 1.5) for seed in range(3)]
+    assert found == [("ok", pytest.approx(value)) for value in expected]
+    assert "Traceback" not in capfd.readouterr().err
 
 
 def test_W4_a_trial_that_never_ends_is_given_up() -> None:

@@ -39,9 +39,8 @@ def csv_rows(
         BadInputError: Of the given type: it is no CSV, or lacks a column.
     """
     if not data:
-        raise error(
-            f"{path}: row 1: expected a header with {', '.join(needed)}, found an empty file"
-        )
+        names = f" with {', '.join(needed)}" if needed else ""
+        raise error(f"{path}: row 1: expected a header{names}, found an empty file")
     try:
         text = decoded(path, data, error)
     except BadInputError as cause:

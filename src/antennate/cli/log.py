@@ -240,6 +240,8 @@ def _sentence(result: Mapping[str, Any]) -> str:
     """What it holds, in one sentence."""
     recovering = typed("log", "recover", result["log"])
     closed = "it is complete" if result["closed"] else f"it was not closed: {recovering}"
+    if result["damaged"] or result["missing"]:
+        closed = f"it is damaged: {recovering}"
     by = one_line(result["versions"].get("antennate", "of unknown version"))
     return (
         f"{result['ticks']} ticks in {result['duration_s']:.2f} s, in "

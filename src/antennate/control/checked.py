@@ -11,6 +11,9 @@ from antennate.robots.spec import RobotSpec
 from antennate.types import AntennaFrame, Bools, Controller, Floats, Ints, JointCommand, Maneuver
 
 _LAST = max(Maneuver)
+_KINDS = tuple((name, "whole numbers", "iu") for name in ("maneuver", "contact"))
+_KINDS = (*_KINDS, ("level", "real numbers", "fiu"))
+"""What the numbers of a decision are, and the kinds of NumPy that hold them."""
 
 
 class CheckedController:
@@ -87,10 +90,10 @@ class CheckedController:
                     )
                 if value.shape != shape:
                     raise ControllerError(f"expected {name} of shape {shape}, found {value.shape}")
-        for name in ("maneuver", "contact"):
+        for name, words, kinds in _KINDS:
             kind = getattr(self._controller, name).dtype
-            if kind.kind not in "iu":
-                raise ControllerError(f"expected whole numbers as {name}, found an array of {kind}")
+            if kind.kind not in kinds:
+                raise ControllerError(f"expected {words} as {name}, found an array of {kind}")
 
     def _all_sound(self, command: JointCommand) -> bool:
         """Whether no row has a fault. A product that is finite has finite factors."""

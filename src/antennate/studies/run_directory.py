@@ -124,7 +124,8 @@ class RunDirectory:
             held = _held(place)
             goes_on = resume and not overwrite and (place / STORE) in held
             if held and not overwrite and not goes_on:
-                found = "a finished one" if resume else held[0]
+                finished = resume and place / RESULT in held
+                found = "a finished one" if finished else held[0]
                 raise OutputError(
                     f"expected {'an unfinished run' if resume else 'a folder without a run'}, "
                     f"found {found}; choose another or give --overwrite"
@@ -310,8 +311,10 @@ class RunDirectory:
         with contextlib.suppress(OSError, OutputError):
             self._drop_partial()
             self._give_room()
-            for name in (CONFIG, VERSIONS, COMMAND) if self._created else ():
-                (self.path / name).unlink(missing_ok=True)
+            for file in [*map(self.path.joinpath, (CONFIG, VERSIONS, COMMAND)), *_logs(self.path)]:
+                file.unlink(missing_ok=True)
+            if _is(self.path / LOGS):
+                (self.path / LOGS).rmdir()
             for path in self._created:
                 path.rmdir()
 
@@ -341,6 +344,10 @@ def _held(place: Path) -> list[Path]:
         if path.suffix in endings
     ]
     return [place / name for name in _NAMES if os.path.lexists(place / name)] + inner
+
+
+def _logs(place: Path) -> list[Path]:
+    return sorted((place / LOGS).glob("*.mcap")) if _is(place / LOGS) else []
 
 
 def _is(folder: Path) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections import Counter, deque
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field
@@ -77,9 +78,11 @@ class Part:
         """Run the tasks; those that raise are told to `fail`, and the others go on."""
         left = dict(self.tasks)
         told: Exception | None = None
+        process = os.getpid()
 
         def take(place: int, result: Any) -> None:
             nonlocal told
+            _end_forked(process)
             try:
                 emit(place, result)
             except Exception as error:
@@ -99,6 +102,7 @@ class Part:
                 else:
                     take(now[0], self.function(*self.tasks[now[0]]))
             except Exception as error:  # noqa: BLE001  (a trial may raise anything)
+                _end_forked(process)
                 if told is not None:
                     raise told from None
                 if len(now) == 1:
@@ -108,6 +112,12 @@ class Part:
                     fail(now[0], Failure("failed", reason, error))
                 else:
                     places = []  # one of them raised: from now on each is run alone
+
+
+def _end_forked(process: int) -> None:
+    """End the copy of a worker that a user's function has forked, and that came back from it."""
+    if os.getpid() != process:
+        os._exit(0)
 
 
 class Engine(Protocol):

@@ -278,10 +278,10 @@ class LogReader:
                 raise LogError(f"{self.path}: {error}") from None
         self._refuse_old()
         ticks = sum(1 for _ in self)
-        raise LogError(
-            f"{self.path}: expected a log of antennate, an MCAP file, found no intact header, "
-            f"{ticks} intact ticks; damaged places: {self.bad}"
-        )
+        found = f"no intact header, {ticks} intact ticks; damaged places: {self.bad}"
+        if self.end is not None and not (self.bad or ticks):
+            found = "one of another program"
+        raise LogError(f"{self.path}: expected a log of antennate, an MCAP file, found {found}")
 
     def _learn(self, chunk: Chunk) -> None:
         """Take note of the channels that a chunk declares."""

@@ -42,9 +42,7 @@ class TickRows:
     def take(self, frame: AntennaFrame, command: JointCommand) -> TickRow:
         """One tick; its numbers are replaced by those of the next one."""
         row, made, world, numbers = self._row, self._controller, self._world, self._numbers
-        phase = getattr(made, "phase", None)
-        numbers[0], numbers[1] = frame.t[row], made.maneuver[row]
-        numbers[2] = math.nan if phase is None else phase[row]
+        numbers[:3] = frame.t[row], made.maneuver[row], _phase(made, row, len(frame.t))
         joints = [getattr(command, name)[row].ravel() for name in self._parts]
         decided = [frame.counts[row], made.level[row], made.contact[row], *joints]
         np.concatenate(decided, out=self._decided)
@@ -54,6 +52,17 @@ class TickRows:
             return TickRow(numbers)
         place = COORDINATES.type.encode(*world.coordinates())
         return TickRow(numbers, _contacts(world), place)
+
+
+def _phase(controller: Any, row: int, rows: int) -> float:
+    """Gait phase of a row [rad]; NaN if the attribute of that name is missing or something else."""
+    try:
+        phase = np.asarray(controller.phase, float)
+    except KeyboardInterrupt:
+        raise
+    except BaseException:  # noqa: BLE001 a property of anybody may raise anything
+        return math.nan
+    return float(phase[row]) if phase.shape == (rows,) else math.nan
 
 
 def _contacts(world: World) -> bytes | None:

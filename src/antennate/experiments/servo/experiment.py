@@ -65,11 +65,15 @@ def sentence(result: Mapping[str, Any]) -> str:
             f"The model as given misses the measured position by {model['error_deg']:.1f}° on "
             "average; --fit identifies it."
         )
-    held = ", ".join(f"{error:.1f}° on {name}" for name, error in model["held_out_deg"].items())
-    return (
-        f"The whole model misses the measured position by {model['error_deg']:.1f}° where it was "
-        f"fitted and, fitted on the rest, by {held}."
-    )
+    text = f"The whole model misses the measured position by {model['error_deg']:.1f}° where it was"
+    known = {name: each for name, each in model["held_out_deg"].items() if each is not None}
+    if not known:
+        return (
+            f"{text} fitted; of no part of the recordings an error could be found with a fit to "
+            "the rest: give longer recordings, or several."
+        )
+    held = ", ".join(f"{error:.1f}° on {name}" for name, error in known.items())
+    return f"{text} fitted and, fitted on the rest, by {held}."
 
 
 EXPERIMENT = Experiment.of_folder(
