@@ -100,9 +100,9 @@ def test_near_the_borders_criteria_matter_and_errors_of_tracking_cost_frames() -
 
 
 def test_a_line_is_fitted_to_the_tips_of_a_long_recording() -> None:
-    """A matrix of all tips against all would have 720 GB."""
+    """A matrix of all tips against all would have 320 GB."""
     rng = np.random.default_rng(0)
-    x = rng.uniform(0.0, 5000.0, 300_000)
+    x = rng.uniform(0.0, 5000.0, 200_000)
     tips = np.stack([x, 100.0 + 0.1 * x + rng.normal(0.0, 1.0, len(x))], axis=1)
     wall = wall_of(TrackWallParams(kind="line"), "long.csv", tips, 100.0)
     x0, y0, x1, y1 = wall.numbers
