@@ -182,7 +182,11 @@ def growth(figures: Figures) -> str:
         for n, one in figures[kind].items()
     ]
     columns = ("what grows", "number", "cost", "CPU time a simulated second [ms]")
-    return "## How the cost grows\n\n" + table(columns, rows)
+    note = (
+        "The cost is the median of ratios within a repetition, the CPU time a median over all. "
+        "Where the machine\nchanged between repetitions the two need not agree.\n\n"
+    )
+    return "## How the cost grows\n\n" + note + table(columns, rows)
 
 
 WAYS = {

@@ -87,10 +87,10 @@ from antennate.control.registry import make_controller
 
 class Own:
     def __init__(self, params, robot, batch):
-        self._made = make_controller("closed", params, robot, batch)
+        self.made = make_controller("closed", params, robot, batch)
 
     def __getattr__(self, name):
-        return getattr(self._made, name)
+        return getattr(self.made, name)
 
     @property
     def phase(self):

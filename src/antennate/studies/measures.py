@@ -26,6 +26,7 @@ class Measure:
         of: How rows make it; None if it is computed elsewhere.
         form: Its format.
         scale: Factor to the unit shown.
+        join: Between two numbers, as the ends of an interval.
     """
 
     name: str
@@ -34,6 +35,7 @@ class Measure:
     of: Of | None = None
     form: str = ".2f"
     scale: float = 1.0
+    join: str = " to "
 
     @property
     def title(self) -> str:
@@ -49,15 +51,15 @@ class Measure:
 
     def cell(self, summary: Mapping[str, Any]) -> str:
         """Its value in a summary as a table shows it."""
-        return shown(self.value(summary), self.form, self.scale)
+        return shown(self.value(summary), self.form, self.scale, self.join)
 
 
-def shown(value: Any, form: str = ".2f", scale: float = 1.0) -> str:
+def shown(value: Any, form: str = ".2f", scale: float = 1.0, join: str = " to ") -> str:
     """A number, an interval as `low to high`, a text, or a dash for None and NaN."""
     if isinstance(value, str):
         return value
     if isinstance(value, Sequence | np.ndarray):
-        return " to ".join(f"{scale * end:{form}}" for end in value)
+        return join.join(f"{scale * end:{form}}" for end in value)
     if value is None or value != value:
         return NONE
     return f"{scale * value if scale != 1.0 else value:{form}}"

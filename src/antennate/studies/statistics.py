@@ -62,7 +62,8 @@ class PairedTest:
         only_first: Seeds on which only the first succeeded; `only_second` likewise.
         mcnemar_p: Exact two-sided McNemar test on those.
         time_difference_s: Mean of restricted time, first minus second [s], with its 95 % interval.
-        wilcoxon_p: Two-sided signed-rank test on restricted times.
+        wilcoxon_p: Two-sided signed-rank test on restricted times. One seed has neither that nor
+            the interval.
         both: Seeds on which both succeeded; `both_time_s` are the mean times of the first and the
             second on those [s], None without any.
     """
@@ -71,8 +72,8 @@ class PairedTest:
     only_second: int
     mcnemar_p: float
     time_difference_s: float
-    time_difference_95: tuple[float, float]
-    wilcoxon_p: float
+    time_difference_95: tuple[float, float] | None
+    wilcoxon_p: float | None
     both: int
     both_time_s: tuple[float, float] | None
 
@@ -88,9 +89,11 @@ def compare(first_ok: Bools, second_ok: Bools, first_t: Floats, second_t: Floats
     if np.any(difference != 0):
         test = stats.wilcoxon(difference, zero_method="zsplit", method="asymptotic")
         rank = float(np.asarray(test)[1])
+    several = len(difference) > 1
     both = first_ok & second_ok
     times = (float(first_t[both].mean()), float(second_t[both].mean())) if both.any() else None
     return PairedTest(
         *(success.only_first, success.only_second, success.mcnemar_p),
-        *(mean, (low, high), rank, int(both.sum()), times),
+        *(mean, (low, high) if several else None, rank if several else None),
+        *(int(both.sum()), times),
     )

@@ -33,8 +33,8 @@ def tables(result: Mapping[str, Any]) -> Sequence[Table]:
     ]
     goals = ", ".join(f"{o['name']} ({o['goal']})" for o in result["objectives"])
     note = (
-        f"* is on the front: no other design is as good in all of {goals}\nand better in one. "
-        "Means with 95 % intervals. The front was chosen by these values, so they are\noptimistic."
+        f"* is on the front: no other design is as good in all of\n{goals}\nand better in one. "
+        "Means with 95 % intervals. The front was chosen by these values,\nso they are optimistic."
     )
     if len(judged) > _MOST:
         note += f" The first {_MOST} of {len(judged)} designs; result.json has all."

@@ -39,8 +39,8 @@ def _taper(result: Mapping[str, Any]) -> Finding:
     return Finding(
         f"animal {animal:.0f} : 1, ladder {ladder:g} : 1",
         judged(ladder >= animal, ladder > 1),
-        "Both fall from base to tip, but the ladder does not follow the animal far: springs of one "
-        "wire span a factor of ten at most.",
+        "In direction alone: both fall from base to tip, but springs of one wire span a factor of "
+        "ten at most.",
         (Bar("animal, fourth power of diameter", animal), Bar("ladder of the robot", ladder)),
     )
 
@@ -61,7 +61,8 @@ def _sigmoid(result: Mapping[str, Any]) -> Finding:
     errors = result["calibration"]["cross_validated_rmse"]
     best = min(errors, key=errors.__getitem__)
     return Finding(
-        ", ".join(f"{name} {value:.3f}" for name, value in errors.items()),
+        "error of the level on pushes left out (rms): "
+        + ", ".join(f"{name} {value:.3f}" for name, value in errors.items()),
         judged(best == "sigmoid"),
         f"Over pushes left out, the best of these curves is {best}: a sigmoid is one curve that "
         "serves, not the one that the readings ask for.",
@@ -131,7 +132,7 @@ def _shapes(result: Mapping[str, Any]) -> Finding:
         ),
         "undecided" if not seen and not absent else judged(False, seen),
         "With limits of straight and of bent that are ours. Shares of ticks beside a wall, fixed "
-        "or moving; of the walls the one at which a shape is surest.",
+        "or moving; each shape at the wall where it is surest, so they do not add up to 100 %.",
         tuple(Bar(n, 100 * s[0], (100 * s[1], 100 * s[2])) for n, s in shares.items()),
     )
 

@@ -28,8 +28,8 @@ def tables(result: Mapping[str, Any]) -> Sequence[Table]:
         {short[name]: row for name, row in controllers.items()},
         measures.CONTROLLER,
         f"{many} a controller, seed {result['seed']}. A failure counts as the time limit, "
-        f"{result['time_limit_s']:g} s; invalid trials\nare left out of all rows below theirs. "
-        "Intervals of means are bootstrapped.",
+        f"{result['time_limit_s']:g} s.\nInvalid trials do not count in the rows below "
+        "`invalid`. Intervals of means are bootstrapped.",
     )
     two_by_two = Table.of(
         "Pairs, trial by trial",

@@ -126,7 +126,10 @@ def _box(paths: Sequence[TrialPath]) -> tuple[Floats, Floats] | None:
     links = np.concatenate([path.links for path in paths])
     near = ((links > low - FARTHEST) & (links < high + FARTHEST)).all(axis=1)  # false for NaN
     points = np.concatenate([points, links[near]])
-    return points.min(axis=0) - MARGIN, points.max(axis=0) + MARGIN
+    low, high = points.min(axis=0) - MARGIN, points.max(axis=0) + MARGIN
+    pushed = np.concatenate([low[None], *(each for path in paths for each in path.after)])
+    pushed = pushed[((pushed > low - FARTHEST) & (pushed < high + FARTHEST)).all(axis=1)]
+    return np.minimum(low, pushed.min(axis=0)), np.maximum(high, pushed.max(axis=0))
 
 
 def _frame(panel: Axes, box: tuple[Floats, Floats] | None) -> None:

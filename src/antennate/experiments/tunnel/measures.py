@@ -50,7 +50,7 @@ PAIR = (
     Measure("only_first", "only the first succeeded", form="d"),
     Measure("only_second", "only the second", form="d"),
     Measure("both", "both succeeded", form="d"),
-    Measure("both_time_s", "  time, first and second", "s", form=".1f"),
+    Measure("both_time_s", "  time, first and second", "s", form=".1f", join=", "),
     Measure("mcnemar_p", "McNemar p", form=".3g"),
     Measure("time_difference_s", "time, first - second", "s", form="+.1f"),
     Measure("time_difference_95", "  95 %", "s", form="+.1f"),
