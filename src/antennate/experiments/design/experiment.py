@@ -12,6 +12,7 @@ from antennate.studies.measures import Table, shown
 
 _MOST = 40
 """Most lines of a table."""
+_GOOD = {"minimize": "small is good", "maximize": "large is good"}
 Each = Mapping[str, Any]
 
 
@@ -19,22 +20,25 @@ def tables(result: Mapping[str, Any]) -> Sequence[Table]:
     """The front beside the references, and both on fresh seeds."""
     judged = [each for each in result["designs"] if each["objectives"]]
     judged = [each for each in judged if each["reference"] or each["front"]]
-    names = [objective["name"] for objective in result["objectives"]]
+    objectives = result["objectives"]
+    names = [_title(objective) for objective in objectives]
     heads = [axis.rpartition(".")[2] for axis in result["axes"]]
     rows = [
         (
             f"{each['name']}{' *' if each['front'] else ''}",
             [
                 *(value_text(each["values"].get(axis)) for axis in result["axes"]),
-                *(_worth(each["objectives"][name]) for name in names),
+                *(_worth(each, "objectives", objective) for objective in objectives),
             ],
         )
         for each in judged[:_MOST]
     ]
-    goals = ", ".join(f"{o['name']} ({o['goal']})" for o in result["objectives"])
-    note = (
-        f"* is on the front: no other design is as good in all of\n{goals}\nand better in one. "
-        "Means with 95 % intervals. The front was chosen by these values,\nso they are optimistic."
+    note = "".join(
+        f"{name}: {_GOOD[o['goal']]}.\n" for name, o in zip(names, objectives, strict=True)
+    )
+    note += (
+        "* is on the front: no other design is as good in all of these and better in one.\nMeans "
+        "with 95 % intervals. The front was chosen by these values, so they are optimistic."
     )
     if len(judged) > _MOST:
         note += f" The first {_MOST} of {len(judged)} designs; result.json has all."
@@ -44,7 +48,7 @@ def tables(result: Mapping[str, Any]) -> Sequence[Table]:
         lines = [
             (
                 f"{each['name']}{' *' if each['fresh_front'] else ''}",
-                [_both(each, name) for name in names],
+                [_both(each, objective) for objective in objectives],
             )
             for each in again
         ]
@@ -67,13 +71,22 @@ def value_text(value: Any) -> str:
     return f"{value:.4g}" if isinstance(value, float) else shown(value, "")
 
 
-def _worth(found: Each) -> str:
+def _title(objective: Each) -> str:
+    """The label of an evaluation, and what is measured there with its unit."""
+    return f"{objective['name'].partition('.')[0]}: {objective['title']}"
+
+
+def _worth(each: Each, part: str, objective: Each) -> str:
+    """A value of a design in the unit of the title, with its interval if it has one."""
+    found, scale = each[part][objective["name"]], objective["scale"]
     ends = found["value95"]
-    return shown(found["value"], ".3g") + (f" ({shown(ends, '.3g')})" if ends else "")
+    text = shown(found["value"], ".3g", scale)
+    return f"{text} ({shown(ends, '.3g', scale)})" if ends else text
 
 
-def _both(each: Each, name: str) -> str:
-    return f"{shown(each['objectives'][name]['value'], '.3g')}, {_worth(each['fresh'][name])}"
+def _both(each: Each, objective: Each) -> str:
+    found = each["objectives"][objective["name"]]["value"]
+    return f"{shown(found, '.3g', objective['scale'])}, {_worth(each, 'fresh', objective)}"
 
 
 def sentence(result: Mapping[str, Any]) -> str:
@@ -104,11 +117,11 @@ def _best(known: Sequence[Each], part: str, objective: Each, first: Each | None)
     chosen = min if objective["goal"] == "minimize" else max
     valued = [each for each in known if each[part][name]["value"] is not None]
     if not valued:
-        return f"{name} none"
+        return f"{_title(objective)}: none"
     best = chosen(valued, key=lambda each: each[part][name]["value"])
-    text = f"{name} {_called(best)} {_worth(best[part][name])}"
+    text = f"{_title(objective)}: {_called(best)} {_worth(best, part, objective)}"
     if first is not None and first is not best:
-        text += f", {first['name']} {_worth(first[part][name])}"
+        text += f", {first['name']} {_worth(first, part, objective)}"
     return text
 
 

@@ -41,6 +41,8 @@ from antennate.types import Maneuver
 
 _SLOW = 0.1
 """Time between two pictures of charts, map and status [s]: they are read, not watched."""
+_ARROW_ROBOT, _ARROW_BENCH = 20, 100
+"""Length of an arrow at first [mm/N]: robots push with newtons, antennae with tenths of one."""
 _LINES = 6
 _SIDES = (rgba(SERIES[0]), rgba(SERIES[1]))
 _COUNTERS = ("missed", "frames", "crc", "lost", "misses", "stale", "sent", "refused")
@@ -98,7 +100,7 @@ class Page:
         self._map = Map(server)
         with gui.add_folder("picture"):
             self._follow = gui.add_checkbox("follow the robot", True)
-            self._arrow = gui.add_slider("arrows [mm for 1 N]", 1, 500, 1, 100)
+            self._arrow = gui.add_slider("arrows [mm for 1 N]", 1, 500, 1, _ARROW_ROBOT)
 
     def draw(self, now: float) -> float:
         """Draw what is due at a time [s]; the time until more may be due [s]."""
@@ -150,6 +152,8 @@ class Page:
             self._controls.show(state)
 
     def _begin(self, shapes: Shapes) -> None:
+        if self._scene is None:
+            self._arrow.value = _ARROW_ROBOT if shapes.robot.any() else _ARROW_BENCH
         self._scene = SceneView(self._server, shapes)
         self._poses = self._drawn = None
         if self._controls is not None:
