@@ -98,7 +98,7 @@ def read(
     except json.JSONDecodeError as error:
         raise BadInputError(
             f"{path}: expected JSON, found an error at line {error.lineno}, column {error.colno} "
-            f"({error.msg}); is the file truncated, or neither JSON nor a log (.mcap)?"
+            f"({error.msg}); is the file truncated? JSON and logs (.mcap) are read"
         ) from None
     except RecursionError:
         raise BadInputError(f"{path}: expected JSON of a recording, found it too deep") from None
