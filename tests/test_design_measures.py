@@ -114,7 +114,7 @@ def test_a_search_by_successes_goes_where_trials_succeed() -> None:
     front = [each["values"]["x"] for each in proposed if each["front"]]
     assert front
     assert max(front) < 0.0
-    assert "bowls.far@success" in found.sentence
+    assert "bowls: far (successes only): design" in found.sentence
     assert Path("run/figures/tradeoff.png").stat().st_size > 10_000
 
 
@@ -127,7 +127,7 @@ def test_a_search_in_which_nothing_succeeds_ends() -> None:
     designs = found.summary["designs"]
     assert {each["state"] for each in designs} == {"ok"}
     assert all(each["front"] for each in designs)  # none is better than another
-    assert "bowls.far@success none" in found.sentence
+    assert "bowls: far (successes only): none" in found.sentence
 
 
 @pytest.mark.parametrize(
