@@ -25,8 +25,8 @@ for number in (signal.SIGHUP, signal.SIGINT, signal.SIGQUIT):
         )
 
 # Where Python is told to keep no bytecode, as in many containers, each of the programs that the
-# tests start compiles all that it imports, which takes seconds. So it is kept here, in a folder that
-# is removed at the end.
+# tests start compiles all that it imports, which takes seconds. So it is kept here, in a folder
+# that is removed at the end.
 if os.environ.pop("PYTHONDONTWRITEBYTECODE", ""):
     kept = tempfile.mkdtemp(prefix="bytecode-")
     os.environ["PYTHONPYCACHEPREFIX"] = kept
