@@ -324,8 +324,10 @@ def test_W5_a_study_that_is_told_to_end_keeps_what_is_done(tmp_path: Path) -> No
     Path("plan.toml").write_text(text.replace("trials = 3", "trials = 4"))
     driver = study_killed.start(tmp_path, "run")
     store = Path("run") / STORE
+    end = time.monotonic() + 120.0
     while not store.exists() or store.read_bytes().count(b"\n") < 3:
         assert driver.poll() is None
+        assert time.monotonic() < end
         time.sleep(0.02)
     driver.terminate()
     said = driver.communicate(timeout=60)[1].decode()  # 2 s where little else runs

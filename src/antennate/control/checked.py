@@ -11,8 +11,11 @@ from antennate.robots.spec import RobotSpec
 from antennate.types import AntennaFrame, Bools, Controller, Floats, Ints, JointCommand, Maneuver
 
 _LAST = max(Maneuver)
-_KINDS = tuple((name, "whole numbers", "iu") for name in ("maneuver", "contact"))
-_KINDS = (*_KINDS, ("level", "real numbers", "fiu"))
+_KINDS = (
+    ("maneuver", "whole numbers", "iu"),
+    ("contact", "whole numbers", "iu"),
+    ("level", "real numbers", "fiu"),
+)
 """What the numbers of a decision are, and the kinds of NumPy that hold them."""
 
 

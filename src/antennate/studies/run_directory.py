@@ -138,7 +138,7 @@ class RunDirectory:
                     path.rmdir()
                 raise
             for file in held:
-                kept = (LOGS in file.parts and goes_on) or file.name == STORE
+                kept = (file.parent == place / LOGS and goes_on) or file.name == STORE
                 if not kept and (command, file.name) != ("calibrate", CALIBRATION):
                     file.unlink()
             return cls(place, missing, (place / PARTIAL).open("x", encoding="utf-8"), store)
@@ -311,8 +311,9 @@ class RunDirectory:
         with contextlib.suppress(OSError, OutputError):
             self._drop_partial()
             self._give_room()
-            for file in [*map(self.path.joinpath, (CONFIG, VERSIONS, COMMAND)), *_logs(self.path)]:
-                file.unlink(missing_ok=True)
+            for file in _held(self.path):
+                if file.name in (CONFIG, VERSIONS, COMMAND) or file.parent == self.path / LOGS:
+                    file.unlink()
             if _is(self.path / LOGS):
                 (self.path / LOGS).rmdir()
             for path in self._created:
@@ -344,10 +345,6 @@ def _held(place: Path) -> list[Path]:
         if path.suffix in endings
     ]
     return [place / name for name in _NAMES if os.path.lexists(place / name)] + inner
-
-
-def _logs(place: Path) -> list[Path]:
-    return sorted((place / LOGS).glob("*.mcap")) if _is(place / LOGS) else []
 
 
 def _is(folder: Path) -> bool:

@@ -12,6 +12,7 @@ from antennate.robots.spec import RobotSpec
 from antennate.sim.world import World
 from antennate.telemetry.header import Header
 from antennate.telemetry.rows import HEAD, RowLog, TickRow
+from antennate.telemetry.ticks import numbers_of
 from antennate.telemetry.topics import CONTACT_FORCES, COORDINATES
 from antennate.types import AntennaFrame, Floats, JointCommand
 
@@ -42,7 +43,9 @@ class TickRows:
     def take(self, frame: AntennaFrame, command: JointCommand) -> TickRow:
         """One tick; its numbers are replaced by those of the next one."""
         row, made, world, numbers = self._row, self._controller, self._world, self._numbers
-        numbers[:3] = frame.t[row], made.maneuver[row], _phase(made, row, len(frame.t))
+        phases = numbers_of(made, "phase")
+        phase = phases[row] if len(phases) == len(frame.t) else math.nan
+        numbers[:3] = frame.t[row], made.maneuver[row], phase
         joints = [getattr(command, name)[row].ravel() for name in self._parts]
         decided = [frame.counts[row], made.level[row], made.contact[row], *joints]
         np.concatenate(decided, out=self._decided)
@@ -52,17 +55,6 @@ class TickRows:
             return TickRow(numbers)
         place = COORDINATES.type.encode(*world.coordinates())
         return TickRow(numbers, _contacts(world), place)
-
-
-def _phase(controller: Any, row: int, rows: int) -> float:
-    """Gait phase of a row [rad]; NaN if the attribute of that name is missing or something else."""
-    try:
-        phase = np.asarray(controller.phase, float)
-    except KeyboardInterrupt:
-        raise
-    except BaseException:  # noqa: BLE001 a property of anybody may raise anything
-        return math.nan
-    return float(phase[row]) if phase.shape == (rows,) else math.nan
 
 
 def _contacts(world: World) -> bytes | None:

@@ -233,14 +233,14 @@ def angles_of(command: JointCommand, joints: int | None = None) -> tuple[float, 
         command: The command; it may be anything.
         joints: Number of joints; all angles are NaN if the command has others.
     """
-    parts = (_flat(command, name) for name in ("yaw", "leg", "antenna", "pitch"))
+    parts = (numbers_of(command, name) for name in ("yaw", "leg", "antenna", "pitch"))
     angles = tuple(angle for part in parts for angle in part)
     return angles if joints in (None, len(angles)) else (math.nan,) * joints
 
 
 def decided(controller: Controller, decision: Decision, frame: AntennaFrame) -> dict[str, Any]:
     """The fields that every world has; NaN for a level or a phase that the controller lacks."""
-    phase, level = _flat(controller, "phase"), _flat(controller, "level")
+    phase, level = numbers_of(controller, "phase"), numbers_of(controller, "level")
     return {
         "t": float(frame.t[0]),
         "counts": tuple(frame.counts[0].tolist()),
@@ -251,7 +251,7 @@ def decided(controller: Controller, decision: Decision, frame: AntennaFrame) -> 
     }
 
 
-def _flat(owner: Any, name: str) -> tuple[float, ...]:
+def numbers_of(owner: Any, name: str) -> tuple[float, ...]:
     """Numbers in an attribute of any object; empty if there are none."""
     try:
         return tuple(np.asarray(getattr(owner, name), float).ravel().tolist())

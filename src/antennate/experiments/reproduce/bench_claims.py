@@ -132,7 +132,8 @@ def _shapes(result: Mapping[str, Any]) -> Finding:
         ),
         "undecided" if not seen and not absent else judged(False, seen),
         "With limits of straight and of bent that are ours. Shares of ticks beside a wall, fixed "
-        "or moving; each shape at the wall where it is surest, so they do not add up to 100 %.",
+        "or moving; each shape at the wall where the lower end of its interval is highest, so they "
+        "do not add up to 100 %.",
         tuple(Bar(n, 100 * s[0], (100 * s[1], 100 * s[2])) for n, s in shares.items()),
     )
 
