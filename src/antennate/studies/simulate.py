@@ -16,7 +16,7 @@ from antennate.sim.scenes.registry import make_scene
 from antennate.sim.sim_robot import SimRobot
 from antennate.sim.trial import Trial, TrialConfig, draw_trial
 from antennate.telemetry.header import Header
-from antennate.telemetry.simulated import SimulatedLog
+from antennate.telemetry.simulated import Decisions, SimulatedLog
 from antennate.telemetry.time_series import TimeSeries, TimeSeriesRecorder
 from antennate.types import AntennaFrame, JointCommand
 
@@ -62,13 +62,14 @@ def simulate(
     controlling.reset(np.array([0]), start.phase)
     recorder = TimeSeriesRecorder(controlling, lambda: start.world.head[:2])
     name = controller if isinstance(controller, str) else controller.__name__
+    decisions = Decisions(config.robot, controlling)
     ticks, outcome = 0, "timeout"
 
     def go_on(frame: AntennaFrame, command: JointCommand) -> bool:
         nonlocal ticks, outcome
         recorder.take(frame, command)
         if kept is not None:
-            kept.take(frame, command)
+            kept.take(decisions.take(frame, command)[0])
         ticks += 1
         outcome = "invalid" if robot.failure(0) is not None else "timeout"
         if outcome == "timeout" and ticks % _EVERY == 0:
@@ -86,8 +87,7 @@ def simulate(
                 trial=trial,
                 phase=start.phase,
             )
-            made = SimulatedLog(Path(log), header, controlling, start.world)
-            kept = stack.enter_context(made)
+            kept = stack.enter_context(SimulatedLog(Path(log), header, start.world))
         run_loop(robot, controlling, control.period, go_on)
     return recorder.series(
         {

@@ -20,41 +20,52 @@ _LOOK_EVERY = 10
 """Ticks from one look at the contacts to the next: 10 Hz at the usual rate, as in experiments."""
 
 
-class TickRows:
-    """Makes the rows of one simulated robot.
+class Decisions:
+    """What is read, decided and commanded in each tick, of all rows of a batch at once.
 
     Args:
         robot: Its description.
         controller: What decides: its `level`, `contact`, `maneuver` and `phase` are read after
             each step.
-        world: The simulated robot in its scene.
-        row: Row of the batch.
     """
 
-    def __init__(self, robot: RobotSpec, controller: Any, world: World, row: int = 0) -> None:
-        self._controller, self._world, self._row = controller, world, row
-        self._parts = list(robot.command_shapes())
-        angles = len(robot.joint_names)
+    def __init__(self, robot: RobotSpec, controller: Any) -> None:
+        self._controller, self._parts = controller, list(robot.command_shapes())
+
+    def take(self, frame: AntennaFrame, command: JointCommand) -> Floats:
+        """One tick: how the rows of its logs begin, shape (B, HEAD + joints)."""
+        made, batch = self._controller, len(frame.t)
+        phases = numbers_of(made, "phase")
+        phase = phases if len(phases) == batch else (math.nan,) * batch
+        head = np.array([frame.t, made.maneuver, phase]).T
+        joints = [getattr(command, name).reshape(batch, -1) for name in self._parts]
+        return np.concatenate([head, frame.counts, made.level, made.contact, *joints], axis=1)
+
+
+class TickRows:
+    """Makes the rows of one simulated robot.
+
+    Args:
+        world: The robot in its scene.
+    """
+
+    def __init__(self, world: World) -> None:
+        self._world = world
+        angles = len(world.robot.joint_names)
         self._numbers: Floats = np.empty(HEAD + 4 * angles)
-        self._decided = self._numbers[3 : HEAD + angles]
+        self._decided = self._numbers[: HEAD + angles]
         self._measured = self._numbers[HEAD + angles :].reshape(3, angles)
         self._ticks = 0
 
-    def take(self, frame: AntennaFrame, command: JointCommand) -> TickRow:
-        """One tick; its numbers are replaced by those of the next one."""
-        row, made, world, numbers = self._row, self._controller, self._world, self._numbers
-        phases = numbers_of(made, "phase")
-        phase = phases[row] if len(phases) == len(frame.t) else math.nan
-        numbers[:3] = frame.t[row], made.maneuver[row], phase
-        joints = [getattr(command, name)[row].ravel() for name in self._parts]
-        decided = [frame.counts[row], made.level[row], made.contact[row], *joints]
-        np.concatenate(decided, out=self._decided)
-        world.measure_drives(self._measured)
+    def take(self, decided: Floats) -> TickRow:
+        """One tick, from the robot's row of `Decisions`; the next one replaces its numbers."""
+        self._decided[:] = decided
+        self._world.measure_drives(self._measured)
         self._ticks += 1
         if (self._ticks - 1) % _LOOK_EVERY:
-            return TickRow(numbers)
-        place = COORDINATES.type.encode(*world.coordinates())
-        return TickRow(numbers, _contacts(world), place)
+            return TickRow(self._numbers)
+        place = COORDINATES.type.encode(*self._world.coordinates())
+        return TickRow(self._numbers, _contacts(self._world), place)
 
 
 def _contacts(world: World) -> bytes | None:
@@ -65,27 +76,25 @@ def _contacts(world: World) -> bytes | None:
 
 
 class SimulatedLog(RowLog):
-    """The log of one row of a batch, tick by tick; as a context it closes itself.
+    """The log of one simulated robot, tick by tick; as a context it closes itself.
 
     Args:
         path: A file that does not exist yet.
         header: What stands at its beginning.
-        controller, world, row: As for `TickRows`.
+        world: The robot in its scene.
 
     Raises:
         LogError: The file exists or cannot be written, or the disk is nearly full.
     """
 
-    def __init__(
-        self, path: Path, header: Header, controller: Any, world: World, row: int = 0
-    ) -> None:
+    def __init__(self, path: Path, header: Header, world: World) -> None:
         super().__init__(path, header)
-        self._rows = TickRows(header.robot, controller, world, row)
+        self._rows = TickRows(world)
 
-    def take(self, frame: AntennaFrame, command: JointCommand) -> None:
-        """Keep one tick.
+    def take(self, decided: Floats) -> None:
+        """Keep one tick, from the robot's row of `Decisions`.
 
         Raises:
             LogError: The disk is full or gone.
         """
-        self.add(self._rows.take(frame, command))
+        self.add(self._rows.take(decided))

@@ -15,7 +15,7 @@ from antennate.sim.trial import TrialConfig
 from antennate.sim.world import World
 from antennate.telemetry.apart import LogProcess
 from antennate.telemetry.header import Header
-from antennate.telemetry.simulated import TickRows
+from antennate.telemetry.simulated import Decisions, TickRows
 from antennate.twin.config import TwinConfig
 from antennate.twin.robot import TwinRobot
 from antennate.types import AntennaFrame, Contact
@@ -44,13 +44,14 @@ class TwinLog:
 
     def __init__(self, log: LogProcess, robot: TwinRobot, config: TwinConfig) -> None:
         self._log, self._robot = log, robot
-        self._rows = TickRows(config.robot, _Unknown(), robot.world)
+        self._decisions, self._rows = Decisions(config.robot, _Unknown()), TickRows(robot.world)
 
     def take(self, world: World) -> None:
         """Keep a tick, its time that of the twin."""
         robot = self._robot
         frame = AntennaFrame(t=np.array([robot.t]), counts=robot.counts[None])
-        self._log.add(self._rows.take(frame, robot.command))
+        decided = self._decisions.take(frame, robot.command)
+        self._log.add(self._rows.take(decided[0]))
 
 
 def header_of(config: TwinConfig, start: int) -> Header:

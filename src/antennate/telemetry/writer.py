@@ -16,7 +16,6 @@ import threading
 import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 from antennate import __version__
 from antennate.errors import LogError
@@ -33,6 +32,8 @@ SYNC = 0.5
 """Time between two waits for the disk in real time [s], so that a power cut costs less than 1 s."""
 _CHUNK = 1 << 20
 """Bytes after which it is closed sooner, as where simulated time runs fast."""
+_NUMBERS = 0xFFFFFFFF
+"""A message's number has 32 bits."""
 _LATEST = (2**31 - 1) * 10**9
 """No message is later [ns]: seconds have 32 bits in ROS 2, up to the year 2038."""
 _LEVELS = {"HOLD": 30, "FAULT": 50, "OFF": 20, "DEGRADED": 30}
@@ -70,7 +71,7 @@ class LogWriter:
         sync: float | None = None,
         called: Path | None = None,
     ) -> None:
-        from mcap.writer import Writer  # slow to import
+        from antennate.telemetry.container import Container  # slow to import
 
         self.path, self._header, self._flush = path, header, flush
         self._names = header.robot.joint_names
@@ -80,9 +81,7 @@ class LogWriter:
         self._called = called or path
         require_room(self._called, least_free, LogError)
         self._file = _NewFile(path, self._called)
-        file: Any = self._file
-        self._writer = Writer(file, chunk_size=1 << 40)
-        self._writer.start("ros2", f"antennate {__version__}")
+        self._container = Container(self._file, f"antennate {__version__}")
         self._channels = self._register()
         for topic, data in header.messages().items():
             self.add(topic, 0, header.start, data)
@@ -93,11 +92,9 @@ class LogWriter:
     def _register(self) -> dict[Topic, int]:
         schemas: dict[str, int] = {}
         for kind in {topic.type.name: topic.type for topic in TOPICS}.values():
-            schemas[kind.name] = self._writer.register_schema(
-                kind.name, "ros2msg", kind.schema.encode()
-            )
+            schemas[kind.name] = self._container.add_schema(kind.name, kind.schema)
         return {
-            topic: self._writer.register_channel(topic.name, "cdr", schemas[topic.type.name])
+            topic: self._container.add_channel(topic.name, schemas[topic.type.name])
             for topic in TOPICS
         }
 
@@ -134,13 +131,13 @@ class LogWriter:
         """
         if self.failure:
             return
-        channels = [self._channels[topic] for topic in messages]
+        channels, add = [self._channels[topic] for topic in messages], self._container.add
         for now, *each in zip(times, *messages.values(), strict=True):
             stamp = self._time = self._stamp(now)
             self.written += 1
             for channel, data in zip(channels, each, strict=True):
                 if data is not None:
-                    self._writer.add_message(channel, stamp, data, stamp, self.written)
+                    add(channel, self.written & _NUMBERS, stamp, data)
         self.flush()
 
     def add(self, topic: Topic, number: int, stamp: int, data: bytes) -> None:
@@ -150,7 +147,7 @@ class LogWriter:
         self._since = min(self._since, time.monotonic())
         self._size += len(data)
         self._time = max(self._time, stamp)
-        self._writer.add_message(self._channels[topic], stamp, data, stamp, number & 0xFFFFFFFF)
+        self._container.add(self._channels[topic], number & _NUMBERS, stamp, data)
 
     def event(self, text: str, source: str = "antennate") -> None:
         """Add an event at the time of the last tick."""
@@ -176,7 +173,8 @@ class LogWriter:
         if self.failure:
             return
         try:
-            self._writer.flush()
+            self._container.end_chunk()
+            self._file.flush()
         except OSError as error:
             self._fail(error)
         self.kept, self._size = self.written, 0
@@ -192,7 +190,7 @@ class LogWriter:
             return
         self.flush()
         try:
-            self._writer.finish()
+            self._container.finish()
             self._file.flush()
             self._file.sync()
         except OSError as error:

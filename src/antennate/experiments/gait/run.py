@@ -33,7 +33,7 @@ from antennate.sim.world import World, compile_world
 from antennate.studies.experiment import OnStep, Outcome, no_step
 from antennate.studies.pool import gather
 from antennate.telemetry.header import Header
-from antennate.telemetry.simulated import SimulatedLog
+from antennate.telemetry.simulated import Decisions, SimulatedLog
 from antennate.telemetry.view.simulation import SimulationView
 from antennate.types import AntennaFrame, Contact, Floats, JointCommand, Maneuver
 
@@ -202,21 +202,20 @@ def walk_flat(
     end = (config.settling_cycles + config.cycles) / gait.frequency
     ticks: list[tuple[float, Floats, float]] = []
     control = _Fixed(gait, robot, maneuver, period)
+    decisions = Decisions(robot, control)
 
     def go_on(frame: AntennaFrame, command: JointCommand) -> bool:
         failure = body.failure(0)
         if failure is not None:
             raise failure
         if log is not None:
-            log.take(frame, command)
+            log.take(decisions.take(frame, command)[0])
         watch(world, frame)
         ticks.append((world.t, world.links(), world.work))
         return world.t < end - _TINY
 
     with contextlib.ExitStack() as stack:
-        log = (
-            None if logs is None else stack.enter_context(_log(logs, config, name, control, world))
-        )
+        log = None if logs is None else stack.enter_context(_log(logs, config, name, world))
         run_loop(body, control, period, go_on)
     links = np.array([tick[1] for tick in ticks])
     half = robot.links // 2
@@ -234,15 +233,13 @@ def walk_flat(
     )
 
 
-def _log(
-    folder: Path, config: GaitStudyConfig, name: str, control: _Fixed, world: World
-) -> SimulatedLog:
+def _log(folder: Path, config: GaitStudyConfig, name: str, world: World) -> SimulatedLog:
     """The log of a walk, in place of what a killed run left of it."""
     path = folder / (re.sub(r"[^\w.-]", "_", name) + ".mcap")
     path.unlink(missing_ok=True)
     params = ControlParams(rate=config.rate, gait=config.gait)
     header = Header(controller=LOGGED, params=params, robot=config.robot)
-    return SimulatedLog(path, header, control, world)
+    return SimulatedLog(path, header, world)
 
 
 def _no_chance(robot: RobotSpec, period: float) -> Disturbance:

@@ -27,7 +27,7 @@ from antennate.sim.sim_robot import Disturbance, SimRobot
 from antennate.sim.trial import draw_trial
 from antennate.sim.world import World
 from antennate.telemetry.header import Header
-from antennate.telemetry.simulated import SimulatedLog
+from antennate.telemetry.simulated import Decisions, SimulatedLog
 from antennate.telemetry.view.pace import Restart
 from antennate.types import AntennaFrame, Controller, JointCommand, Robot
 
@@ -152,11 +152,14 @@ class _Rows:
         control = CheckedController(made, config.robot, self._batch)
         for row, phase in enumerate(phases):
             control.reset(np.array([row]), phase)
-            self._log(row, made, phase)
+            self._log(row, phase)
+        decisions = Decisions(config.robot, made)
 
         def go_on(frame: AntennaFrame, command: JointCommand) -> bool:
-            for log in self._logs.values():
-                log.take(frame, command)
+            if self._logs:
+                decided = decisions.take(frame, command)
+                for row, log in self._logs.items():
+                    log.take(decided[row])
             self._look(frame, made)
             maneuvers, faults = control.maneuver.tolist(), control.faults
             for row, monitor in enumerate(self._monitors):
@@ -166,7 +169,7 @@ class _Rows:
                 if ended and self._waiting:
                     phase = self._place(row)
                     control.reset(np.array([row]), phase)
-                    self._log(row, made, phase)
+                    self._log(row, phase)
             return any(monitor is not None for monitor in self._monitors)
 
         run_loop(self._robot, control, config.control.period, go_on)
@@ -188,7 +191,7 @@ class _Rows:
         name = re.sub(r"[^\w.-]", "_", self._name)
         return (self._folder or Path()) / f"{name}-{trial}.mcap"
 
-    def _log(self, row: int, controller: Controller, phase: float) -> None:
+    def _log(self, row: int, phase: float) -> None:
         """Begin the log of the trial that was put into a row."""
         config, monitor, world = self._config, self._monitors[row], self._robot.world(row)
         if self._folder is None or monitor is None or not isinstance(world, World):
@@ -203,7 +206,7 @@ class _Rows:
         )
         path = self.log_of(monitor.trial)
         path.unlink(missing_ok=True)  # what a killed worker left of it
-        self._logs[row] = SimulatedLog(path, header, controller, world, row)
+        self._logs[row] = SimulatedLog(path, header, world)
 
     def _look(self, frame: AntennaFrame, controller: Controller) -> None:
         """Let somebody look at the first row after a tick, and keep the events in the logs."""
