@@ -26,6 +26,11 @@ _PATIENCE = 60.0
 """Time without any worker of our own, which Dask starts anew, after which a run ends [s]."""
 _STAY = 60.0
 """How long a process beside a worker waits for its next part [s]."""
+_UNWATCHED = {
+    "distributed.worker.profile.enabled": False,
+    "distributed.admin.system-monitor.interval": "10s",
+}
+"""For a cluster of our own: trials run beside its workers, so watching these takes time alone."""
 _NOTE = logging.getLogger(__name__)
 _NOISY = ("distributed", "tornado.application")
 """Loggers that tell a lost connection as tracebacks."""
@@ -76,15 +81,18 @@ class Dask:
     @contextlib.contextmanager
     def _started(self, count: int) -> Iterator[tuple[Any, Any, str]]:
         """A client, our own cluster if it is one, and where its scheduler is."""
+        from dask import config
         from distributed import Client, LocalCluster
 
         with contextlib.ExitStack() as stack:
             cluster: Any = None
             if self._address is None:
+                stack.enter_context(config.set(_UNWATCHED))
                 cluster = stack.enter_context(
                     LocalCluster(
                         n_workers=count,
                         threads_per_worker=1,
+                        memory_limit=None,
                         dashboard_address="127.0.0.1:0",
                         silence_logs=50,
                     )
