@@ -18,6 +18,8 @@ from servo_recordings import of_twin
 from antennate import experiments
 from antennate.cli import main
 from antennate.control.registry import BUILT_IN, UNREAD
+from antennate.experiments.force import loads
+from antennate.experiments.force import run as force
 from antennate.experiments.reproduce import run as reproduce
 from antennate.params.control import ControlParams
 from antennate.robots.spec import RobotSpec
@@ -193,6 +195,8 @@ def test_every_parameter_of_an_experiment_is_read_or_refused(
     Path("silent.json").write_text(told.replace("input_volts", "volts"))
     Path("tracks.csv").write_text(TRACKS)
     monkeypatch.setattr(reproduce, "QUICK", PARTS)
+    for module in (loads, force):  # a bisection that is given no configuration, and takes long
+        monkeypatch.setattr(module, "largest_force", lambda chain, limit: 0.05)
     experiment = experiments.load(name)
     read: set[str] = set()
     for values in TINY[name]:
