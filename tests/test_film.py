@@ -25,6 +25,7 @@ from antennate.experiments.sweep.config import SweepConfig
 from antennate.experiments.sweep.run import map_cell
 from antennate.experiments.tunnel.config import TunnelConfig
 from antennate.experiments.tunnel.film import films
+from antennate.params.sweep import SweepParams
 from antennate.sim import gl
 from antennate.telemetry import film
 from antennate.telemetry.film import HEIGHT, RATE, STRIP, WIDTH, FilmRecorder
@@ -224,7 +225,7 @@ def test_an_encoder_that_fails_is_no_fault_of_the_file(
             *("descending", 2, 1.0),
         ),
         ("touch", {"profiles": ("stiff",), "walls": ("flat",), "speeds": (0.1,)}, "stiff", 3, 1.0),
-        ("sweep", {"profiles": ("stiff",)}, "stiff", 2, 1.0),
+        ("sweep", {"profiles": ("stiff",), "sweep": {"frequency": 1.5}}, "stiff", 2, 1.0),
         ("ringdown", {}, "antenna", 1, 0.2),
         ("calibrate", {}, "0.1 m_s", 2, 0.2),
         ("force", {"profiles": ("stiff",)}, "stiff", 2, 0.25),
@@ -255,7 +256,7 @@ def test_a_recording_has_no_rig_to_film(capsys: pytest.CaptureFixture[str]) -> N
 
 def test_a_watched_bench_moves_as_an_unwatched_one() -> None:
     """To the last bit, although the watcher asks for everything that films show."""
-    config = SweepConfig(profiles=("stiff",))
+    config = SweepConfig(profiles=("stiff",), sweep=SweepParams(frequency=2.0))
     cell = ("stiff", "fixed", 0, 0.65, 1.2, 0.5)
     seen = BenchRecorder(config.antenna)
     assert map_cell(config, *cell, seen.watch) == map_cell(config, *cell)
