@@ -62,9 +62,15 @@ def test_a_function_is_studied_from_python() -> None:
         antennate.study("springs", {"coil_m": [1.0]})
 
 
-def test_jobs_of_slurm_leave_the_same_table() -> None:
+@pytest.fixture(scope="module")
+def alone(tmp_path_factory: pytest.TempPathFactory) -> bytes:
+    """The table of a study without an engine."""
+    return table(str(tmp_path_factory.mktemp("alone") / "here"))
+
+
+def test_jobs_of_slurm_leave_the_same_table(alone: bytes) -> None:
     pytest.importorskip("submitit")
-    assert table("jobs", workers=2, engine="slurm-local") == table("here")
+    assert table("jobs", workers=2, engine="slurm-local") == alone
 
 
 def test_a_job_that_begins_again_goes_on_and_its_driver_finds_what_it_did(tmp_path: Path) -> None:
@@ -215,9 +221,8 @@ def scheduler(count: int = 2) -> Iterator[tuple[str, list[subprocess.Popen[bytes
             process.wait()
 
 
-def test_dask_leaves_the_same_table_when_a_worker_is_killed(tmp_path: Path) -> None:
+def test_dask_leaves_the_same_table_when_a_worker_is_killed(tmp_path: Path, alone: bytes) -> None:
     pytest.importorskip("distributed")
-    alone = table("here")
     with scheduler() as (address, (_, worker, _)):
         notes = tmp_path / "notes.txt"
         os.environ["STUDY_NOTES"] = str(notes)
