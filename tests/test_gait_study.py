@@ -120,7 +120,12 @@ def test_study_keeps_its_promises():
 
 def test_result_does_not_depend_on_workers():
     config = study.GaitStudyConfig(
-        cycles=2, settling_cycles=0, sweep_points=2, gait=GaitParams(frequency=1.0)
+        cycles=2,
+        settling_cycles=0,
+        sweep_points=2,
+        rate=50.0,
+        gait=GaitParams(frequency=1.0),
+        physics=PhysicsParams(timestep=0.004, contact_time=0.008),
     )
     assert study.run(config, workers=1).result() == study.run(config, workers=2).result()
 

@@ -23,6 +23,7 @@ from antennate.experiments.tunnel.config import TunnelConfig
 from antennate.experiments.tunnel.run import run as cross
 from antennate.hardware.dynamixel import packets
 from antennate.params.control import GaitParams
+from antennate.params.scene import PhysicsParams
 from antennate.robots.spec import RobotSpec
 from antennate.sim import gl
 from antennate.telemetry.apart import LogProcess
@@ -72,7 +73,9 @@ def test_each_walk_of_the_gait_leaves_a_log(
 def test_a_walk_is_the_same_with_and_without_a_log(tmp_path: Path) -> None:
     """And a log that a killed run left half is replaced."""
     gait = GaitParams(frequency=1.0)
-    config = GaitStudyConfig(sweep_points=2, cycles=2, settling_cycles=0, gait=gait)
+    coarse = PhysicsParams(timestep=0.004, contact_time=0.008)
+    few = {"sweep_points": 2, "cycles": 2, "settling_cycles": 0, "rate": 50.0}
+    config = GaitStudyConfig(**few, gait=gait, physics=coarse)
     (tmp_path / "forward.mcap").write_bytes(b"half")
     logged = run(config, logs=tmp_path)
     assert logged.result() == run(config).result()
