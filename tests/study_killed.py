@@ -108,16 +108,21 @@ def one(folder: Path, most: int, chance: random.Random, trials: int) -> dict[str
     }
 
 
-def main() -> None:
-    folder, count, seed = Path(sys.argv[1]).resolve(), int(sys.argv[2]), int(sys.argv[3])
-    trials = int(sys.argv[4]) if len(sys.argv) > 4 else TRIALS
+def all_of(folder: Path, count: int, seed: int, trials: int) -> Counter[str]:
+    """Studies until there were so many kills, and what became of them."""
     chance = random.Random(seed)
     total: Counter[str] = Counter()
     while total["drivers"] + total["workers"] < count:
         left = count - total["drivers"] - total["workers"]
         total.update(one(folder / str(total["studies"]), left, chance, trials))
         sys.stderr.write(f"{json.dumps(total)}\n")
-    sys.stdout.write(json.dumps(total))
+    return total
+
+
+def main() -> None:
+    folder, count, seed = Path(sys.argv[1]).resolve(), int(sys.argv[2]), int(sys.argv[3])
+    trials = int(sys.argv[4]) if len(sys.argv) > 4 else TRIALS
+    sys.stdout.write(json.dumps(all_of(folder, count, seed, trials)))
 
 
 if __name__ == "__main__":

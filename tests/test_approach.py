@@ -66,7 +66,7 @@ def test_without_an_approach_the_first_motion_runs_at_the_limit() -> None:
 
 
 def test_the_first_motion_is_slow_and_the_gait_begins_where_it_ends() -> None:
-    seen = Seen(approach=1.0, duration=5.0)
+    seen = Seen(approach=1.0, duration=4.0)
     assert seen.report.worst <= State.DEGRADED
     assert int((seen.speeds[:100] >= LIMIT - ROUNDING).sum()) == 0
     waits = int(np.argmax(np.diff(seen.phases) > 0.0))

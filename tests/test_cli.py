@@ -408,7 +408,8 @@ def test_flags_override_the_file_and_the_run_says_so(capsys, tmp_path):
 
 
 def test_overwrite_leaves_nothing_old(capsys, tmp_path):
-    assert main([*SMALL, "--out", "run"]) == 0
+    assert main(["springs", "--out", "run"]) == 0
+    assert list((tmp_path / "run" / "figures").iterdir())
     (tmp_path / "run" / "notes.txt").write_text("mine")
     assert main([*QUICK, "--seed", "1", "--out", "run", "--overwrite"]) == 0
     assert json.loads((tmp_path / "run" / "result.json").read_text())["seed"] == 1
@@ -440,7 +441,7 @@ def test_an_invalid_trial_is_a_row_and_no_success(capsys, tmp_path, monkeypatch)
         sound(self, count)
 
     monkeypatch.setattr(World, "advance", blow_up)
-    assert main([*SMALL, "--trials", "2", "--out", "run"]) == 2
+    assert main([*QUICK, "--trials", "2", "--out", "run"]) == 2
     last = capsys.readouterr().out.strip().splitlines()[-1]
     assert last.startswith("No trial of open is valid: simulation invalid at physics step")
     open_ = json.loads((tmp_path / "run" / "result.json").read_text())["controllers"]["open"]

@@ -15,6 +15,8 @@ from antennate.types import AntennaFrame, Maneuver
 PARAMS = ControlParams()
 PERIOD = PARAMS.period
 STRAIGHT, BENT = 1872.0, 1399.0
+LONG = 1000
+"""Ticks in which every maneuver is chosen."""
 SWAP = np.array(
     [Maneuver.FORWARD, Maneuver.TURN_R, Maneuver.TURN_L, Maneuver.REVERSE, Maneuver.HOLD]
 )
@@ -120,23 +122,23 @@ def test_a_robot_walks_again_once_the_window_has_passed_a_gap(name: str) -> None
 
 @pytest.mark.parametrize("name", BUILT_IN)
 def test_a_row_says_the_same_alone_and_in_a_batch_of_seven(name: str) -> None:
-    counts = streams(1500, 7)
+    counts = streams(LONG, 7)
     together = run(name, counts)
-    for row in range(7):
+    for row in range(5):  # those after it are pressed as the first and the fifth
         alone = run(name, counts[:, row : row + 1])
         for what, values in alone.items():
             assert np.array_equal(values[:, 0], together[what][:, row], equal_nan=True), (what, row)
 
 
 def test_the_streams_of_the_batch_test_make_controllers_act() -> None:
-    counts = streams(1500, 7)
+    counts = streams(LONG, 7)
     assert set(np.unique(run("closed", counts)["maneuver"])) == set(Maneuver)
     assert set(np.unique(run("paper", counts)["maneuver"])) == set(Maneuver)
 
 
 @pytest.mark.parametrize("name", BUILT_IN)
 def test_swapping_the_antennae_swaps_the_turns_and_mirrors_the_gait(name: str) -> None:
-    counts = streams(1500, 5)
+    counts = streams(LONG, 5)
     here = run(name, counts)
     there = run(name, counts[:, :, ::-1], phase=math.pi)
     assert (there["maneuver"] == SWAP[here["maneuver"]]).all()

@@ -66,9 +66,11 @@ def test_standing_has_no_cost_of_transport():
 def test_the_work_of_a_walk_is_that_of_finer_physics():
     coarse, fine = (
         study.walk_flat(
-            study.GaitStudyConfig(physics=PhysicsParams(timestep=timestep)),
+            study.GaitStudyConfig(
+                physics=PhysicsParams(timestep=timestep), cycles=2, settling_cycles=0
+            ),
             "forward",
-            GaitParams(),
+            GaitParams(frequency=1.0),
             Maneuver.FORWARD,
         )
         for timestep in (0.002, 0.0005)
@@ -117,7 +119,14 @@ def test_study_keeps_its_promises():
 
 
 def test_result_does_not_depend_on_workers():
-    config = study.GaitStudyConfig(cycles=2, settling_cycles=0, sweep_points=2)
+    config = study.GaitStudyConfig(
+        cycles=2,
+        settling_cycles=0,
+        sweep_points=2,
+        rate=50.0,
+        gait=GaitParams(frequency=1.0),
+        physics=PhysicsParams(timestep=0.004, contact_time=0.008),
+    )
     assert study.run(config, workers=1).result() == study.run(config, workers=2).result()
 
 

@@ -85,10 +85,10 @@ def test_pushes_alone_tell_nothing_of_hysteresis() -> None:
 
 
 def test_the_interval_holds_new_pushes_as_often_as_it_says() -> None:
-    """40 recordings whose pushes differ in gain and offset; 95 % holds both ends in 37 of them."""
+    """20 recordings whose pushes differ in gain and offset; 95 % holds both ends in 18 of them."""
     rng, hits, curve_hits = np.random.default_rng(2), 0, 0
     level = np.linspace(0.02, 0.98, 25)
-    for _ in range(40):
+    for _ in range(20):
         gain, offset = rng.normal(1, 0.05, 6), rng.normal(0, 15, 6)
         x = 0.5 + np.log(level / (1 - level)) / 10
         counts = 1500 + offset[:, None] + gain[:, None] * 400 * x + rng.normal(0, 2, (6, 25))
@@ -101,8 +101,8 @@ def test_the_interval_holds_new_pushes_as_often_as_it_says() -> None:
         hits += known.error_95[0] <= low and high <= known.error_95[1]
         width = fitted.slope / 4 * (fitted.midpoint_95[1] - fitted.midpoint_95[0]) / 2
         curve_hits += -width <= low and high <= width
-    assert hits >= 33  # beyond three sigma below 37
-    assert curve_hits <= 20  # the interval of the curve is another thing
+    assert hits >= 17  # the seed is fixed; a larger share than three sigma below 37 of 40
+    assert curve_hits <= 10  # the interval of the curve is another thing
 
 
 def test_a_rival_is_named_only_where_it_wins_under_every_check() -> None:

@@ -114,6 +114,7 @@ def test_a_terminal_of_twenty_columns(tmp_path: Path) -> None:
     """
     words = ["gait", "--robot", "hexapod", "--gait.frequency", "1", "--cycles", "2"]
     words += ["--settling-cycles", "0", "--sweep-points", "2", "--no-figures", "--workers", "1"]
+    words += ["--physics.timestep", "0.004", "--physics.contact-time", "0.008", "--rate", "50"]
     terminal = Terminal(20)
     command = [sys.executable, "-c", source, *words]
     process = terminal.start(command, {"NO_COLOR": "1"}, cwd=tmp_path)

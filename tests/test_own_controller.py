@@ -29,7 +29,7 @@ from antennate.twin.lockstep import BoardPort, LockstepClock
 from antennate.types import AntennaFrame, JointCommand, Maneuver
 
 EXAMPLE = f"{Path(__file__).parents[1] / 'examples/own_controller.py'}:OwnController"
-SHORT = {"trials": 3, "time_limit": 1.5, "seed": 3}
+SHORT = {"trials": 3, "time_limit": 1.0, "seed": 3}
 
 
 @pytest.fixture(autouse=True)
@@ -145,7 +145,7 @@ def test_the_example_is_short() -> None:
 def test_the_example_runs_in_the_tunnel_in_worker_processes(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    words = ["--trials", "2", "--time-limit", "1.5", "--workers", "2", "--no-figures"]
+    words = ["--trials", "2", "--time-limit", "0.5", "--workers", "2", "--no-figures"]
     out = ["--out", str(tmp_path / "run")]
     assert main(["tunnel", *words, *out, "--controllers", "open", EXAMPLE]) == 0
     table = (tmp_path / "run" / "trials.csv").read_text()
@@ -232,6 +232,12 @@ class BadReset(Clumsy):
             raise KeyError("of my own")
 
 
+@pytest.fixture(scope="module")
+def sound() -> list[Any]:
+    """The trials of a controller that does not fail."""
+    return rows_of("open")
+
+
 @pytest.mark.parametrize(
     ("kind", "reason"),
     [
@@ -244,11 +250,11 @@ class BadReset(Clumsy):
     ids=lambda what: getattr(what, "__name__", ""),
 )
 def test_a_controller_that_fails_makes_its_trial_invalid_and_no_other(
-    kind: type[Clumsy], reason: str, monkeypatch: pytest.MonkeyPatch
+    kind: type[Clumsy], reason: str, sound: list[Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(Clumsy, "phase", phase_of(1))
     CONTROLLERS.add("clumsy", kind)
-    sound, found = rows_of("open"), rows_of("clumsy")
+    found = rows_of("clumsy")
     assert [row.outcome for row in found] == ["timeout", "invalid", "timeout"]
     assert found[1].reason.startswith(reason)
     for mine, theirs in zip(found, sound, strict=True):

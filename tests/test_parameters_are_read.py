@@ -18,6 +18,8 @@ from servo_recordings import of_twin
 from antennate import experiments
 from antennate.cli import main
 from antennate.control.registry import BUILT_IN, UNREAD
+from antennate.experiments.force import loads
+from antennate.experiments.force import run as force
 from antennate.experiments.reproduce import run as reproduce
 from antennate.params.control import ControlParams
 from antennate.robots.spec import RobotSpec
@@ -93,7 +95,9 @@ TINY: dict[str, list[dict[str, Any]]] = {
                 "legs": {"kind": kind, "servo": "xl430_w250"},
             },
             "unknown": ["robot.leg_friction=0.5:0.6"],
-            "draws": 2,
+            "draws": 1,
+            "physics": {"timestep": 0.004, "contact_time": 0.008},
+            "rate": 50.0,
         }
         for servo, sensor, kind in (
             ("xl330_m288", OTHER_SENSOR, "lifting"),
@@ -124,6 +128,7 @@ TINY: dict[str, list[dict[str, Any]]] = {
             "profiles": ["descending"],
             "place_step": 0.5,
             "speeds": [0.5],
+            "hinge_limit_deg": 5.0,
             "antenna": {"sensor": sensor},
         }
         for sensor in (OTHER_SENSOR, {})
@@ -135,7 +140,8 @@ TINY: dict[str, list[dict[str, Any]]] = {
             "centres": [1.2],
             "amplitudes": [0.5],
             "sweeps": 1,
-            "sweep": {"frequency": 2.0},
+            "sweep": {"frequency": 3.0},
+            "physics": {"timestep": 0.002, "contact_time": 0.004},
             "estimate": {"trials": 6},
             "antenna": {"sensor": sensor},
         }
@@ -185,10 +191,12 @@ def test_every_parameter_of_an_experiment_is_read_or_refused(
         pytest.importorskip("optuna", reason="the extra `design` is not installed")
     monkeypatch.chdir(tmp_path)
     Path("recording.csv").write_text(RECORDING)
-    told = of_twin(Path("servo.json"), 1200, 400, 0.5, 2.5).read_text()
+    told = of_twin(Path("servo.json"), 1200, 400, 0.5, 1.5).read_text()
     Path("silent.json").write_text(told.replace("input_volts", "volts"))
     Path("tracks.csv").write_text(TRACKS)
     monkeypatch.setattr(reproduce, "QUICK", PARTS)
+    for module in (loads, force):  # a bisection that is given no configuration, and takes long
+        monkeypatch.setattr(module, "largest_force", lambda chain, limit: 0.05)
     experiment = experiments.load(name)
     read: set[str] = set()
     for values in TINY[name]:

@@ -131,7 +131,7 @@ def test_two_runs_stand_side_by_side(capsys: pytest.CaptureFixture[str]) -> None
     for row in stiffness:
         assert f"{row['stiffness_n_mm_per_deg']:.4f}"[:5] in page.text
     assert "expected no such file" in refusal(capsys, "--compare", "coil-3.6", "coil-4")
-    main(["taper", "--out", "other"])
+    main(["taper", "--no-figures", "--out", "other"])
     told = refusal(capsys, "--compare", "coil-4", "other")
     assert "expected two runs of one command, found springs in coil-4 and taper in other" in told
 
@@ -146,7 +146,9 @@ def test_a_run_that_was_stopped_has_a_page() -> None:
 
 
 def test_invalid_trials_and_their_reasons_are_shown() -> None:
-    assert main(["wall", "--trials", "1", "--profiles", "stiff", "--out", "run"]) == 0
+    words = ["--wall.travel", "0.03", "--wall.start", "0.002", "--wall.speed", "0.05"]
+    words += ["--trials", "1", "--profiles", "stiff", "--workers", "1", "--no-figures"]
+    assert main(["wall", *words, "--out", "run"]) == 0
     table = Path("run/trials.csv")
     head, row = table.read_text().splitlines()
     bad = row.replace(row.split(",")[3], "invalid") + "time stood <still>"

@@ -31,7 +31,8 @@ def robot_of(links: int, hinges: int) -> RobotSpec:
     return RobotSpec(links=links, mass=links / 3, antenna=AntennaSpec(active_coils=coils))
 
 
-SIZES = [(4, 4), (6, 10), (8, 6)]
+SIZES = [(4, 4), (8, 10)]
+"""Fewer links and hinges than ours, and more."""
 
 
 @pytest.mark.parametrize(("links", "hinges"), SIZES)

@@ -106,7 +106,7 @@ def test_the_twins_servo_is_identified_from_its_recording(
     number: int, name: str, tmp_path: Path
 ) -> None:
     """The twin's motor is another implementation, with the 128 of the manual."""
-    files = [str(of_twin(tmp_path / f"{a}.json", number, 400, a)) for a in (0.6, 1.5)]
+    files = [str(of_twin(tmp_path / f"{a}.json", number, 400, a, 4.0)) for a in (0.6, 1.5)]
     found = antennate.run("servo", recording=files, servo=name, fit=True, draws=20).summary
     line = next(m for m in found["models"] if m["name"] == "line fitted")
     true = XL330Params() if number == 1200 else type(XL330Params()).__bases__[0]()
@@ -246,7 +246,7 @@ def test_positions_that_are_finer_than_ticks_are_taken(tmp_path: Path) -> None:
 
 def test_a_fit_does_not_depend_on_the_parameters_that_it_replaces(tmp_path: Path) -> None:
     """Nor does it leave them out: the model as given stands beside it."""
-    file = str(of_twin(tmp_path / "a.json", 1200, 400, 1.0, 3.0))
+    file = str(of_twin(tmp_path / "a.json", 1200, 400, 1.0, 2.0))
     runs = [
         antennate.run("servo", recording=[file], servos=servos, fit=True, draws=20).summary
         for servos in (ServosParams(), ServosParams(xl330_m288=XL330Params(armature=0.02)))

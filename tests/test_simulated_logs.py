@@ -22,6 +22,8 @@ from antennate.experiments.gait.run import GaitStudyConfig, run
 from antennate.experiments.tunnel.config import TunnelConfig
 from antennate.experiments.tunnel.run import run as cross
 from antennate.hardware.dynamixel import packets
+from antennate.params.control import GaitParams
+from antennate.params.scene import PhysicsParams
 from antennate.robots.spec import RobotSpec
 from antennate.sim import gl
 from antennate.telemetry.apart import LogProcess
@@ -42,10 +44,11 @@ def test_each_walk_of_the_gait_leaves_a_log(
     """Its phase runs at the frequency of the gait, and backwards in REVERSE."""
     run_at = ["--out", str(tmp_path / "run"), "--workers", "1", "--no-figures"]
     few = ["--sweep-points", "2", "--cycles", "2", "--settling-cycles", "0"]
+    few += ["--gait.frequency", "1"]  # the shortest cycle
     assert main(["gait", "--log", *few, *run_at]) == 0
     logs = {path.stem: path for path in (tmp_path / "run" / "logs").iterdir()}
     assert set(logs) == {"forward", "turn_l", "turn_r", "reverse", "wave_off", "sweep0", "sweep1"}
-    gait = GaitStudyConfig().gait
+    gait = GaitParams(frequency=1.0)
     for name, sense in (("forward", 1), ("reverse", -1)):
         with LogReader(logs[name]) as log:
             ticks = list(log)
@@ -69,7 +72,10 @@ def test_each_walk_of_the_gait_leaves_a_log(
 
 def test_a_walk_is_the_same_with_and_without_a_log(tmp_path: Path) -> None:
     """And a log that a killed run left half is replaced."""
-    config = GaitStudyConfig(sweep_points=2, cycles=2, settling_cycles=0)
+    gait = GaitParams(frequency=1.0)
+    coarse = PhysicsParams(timestep=0.004, contact_time=0.008)
+    few = {"sweep_points": 2, "cycles": 2, "settling_cycles": 0, "rate": 50.0}
+    config = GaitStudyConfig(**few, gait=gait, physics=coarse)
     (tmp_path / "forward.mcap").write_bytes(b"half")
     logged = run(config, logs=tmp_path)
     assert logged.result() == run(config).result()
@@ -120,11 +126,11 @@ def sync_write(address: int, size: int, values: list[int]) -> bytes:
     return packets.sync_write(address, data)
 
 
-def walked(folder: Path, *words: str) -> tuple[str, list[list[int]]]:
+def walked(folder: Path, *words: str, ticks: int = TICKS) -> tuple[str, list[list[int]]]:
     """A twin in lock-step that is sent goals: what it said, and the goals [ticks]."""
-    words = ("twin", "--pace", "lockstep", "--duration", f"{0.01 * TICKS}", *words)
+    words = ("twin", "--pace", "lockstep", "--duration", f"{0.01 * ticks}", *words)
     ahead = [0] * 5 + [7 * (-1) ** side for _ in range(6) for side in range(2)] + [0] * 2
-    plan = [[ROBOT.zeros[i] + step * ahead[i] for i in range(19)] for step in range(TICKS)]
+    plan = [[ROBOT.zeros[i] + step * ahead[i] for i in range(19)] for step in range(ticks)]
     with subprocess.Popen(
         [sys.executable, "-m", "antennate", *words],
         stdout=subprocess.PIPE,
@@ -192,9 +198,11 @@ def drawable() -> bool:
 
 def test_a_twin_and_its_log_are_filmed(tmp_path: Path) -> None:
     """A second of the film for a second of the walk; the log shows the same at 10 Hz."""
+    ticks = 28
     if not drawable():
         pytest.skip("neither EGL nor OSMesa")
-    said, _ = walked(tmp_path, "--scene", "flat", "--video", "twin.mp4", "--log", "twin.mcap")
+    words = ["--scene", "flat", "--video", "twin.mp4", "--log", "twin.mcap"]
+    said, _ = walked(tmp_path, *words, ticks=ticks)
     assert "video: twin.mp4\n" in said
     assert (
         main(["log", "film", str(tmp_path / "twin.mcap"), "--out", str(tmp_path / "log.mp4")]) == 0
@@ -204,7 +212,7 @@ def test_a_twin_and_its_log_are_filmed(tmp_path: Path) -> None:
     for name in ("twin.mp4", "log.mp4"):
         with av.open(str(tmp_path / name)) as container:
             pictures = [frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)]
-        assert len(pictures) == pytest.approx(TICKS * 0.01 * 25, abs=1)
+        assert len(pictures) == pytest.approx(ticks * 0.01 * 25, abs=1)
         assert np.abs(pictures[-1].astype(int) - pictures[0]).max() > 100
         assert len(np.unique(pictures[-1][:400].reshape(-1, 3), axis=0)) > 100
 

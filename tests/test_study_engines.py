@@ -33,6 +33,9 @@ from antennate.studies.work import Part, Work
 HERE = Path(__file__).parent
 ROOT = HERE.parent
 VARY = {"x": [0.5, 1.5]}
+QUICK = ["--gait.frequency", "1"]
+"""The shortest cycle."""
+NEAR = ["--wall.travel", "0.03", "--wall.start", "0.002", "--wall.speed", "0.05"]
 
 
 @pytest.fixture(autouse=True)
@@ -59,9 +62,15 @@ def test_a_function_is_studied_from_python() -> None:
         antennate.study("springs", {"coil_m": [1.0]})
 
 
-def test_jobs_of_slurm_leave_the_same_table() -> None:
+@pytest.fixture(scope="module")
+def alone(tmp_path_factory: pytest.TempPathFactory) -> bytes:
+    """The table of a study without an engine."""
+    return table(str(tmp_path_factory.mktemp("alone") / "here"))
+
+
+def test_jobs_of_slurm_leave_the_same_table(alone: bytes) -> None:
     pytest.importorskip("submitit")
-    assert table("jobs", workers=2, engine="slurm-local") == table("here")
+    assert table("jobs", workers=2, engine="slurm-local") == alone
 
 
 def test_a_job_that_begins_again_goes_on_and_its_driver_finds_what_it_did(tmp_path: Path) -> None:
@@ -212,9 +221,8 @@ def scheduler(count: int = 2) -> Iterator[tuple[str, list[subprocess.Popen[bytes
             process.wait()
 
 
-def test_dask_leaves_the_same_table_when_a_worker_is_killed(tmp_path: Path) -> None:
+def test_dask_leaves_the_same_table_when_a_worker_is_killed(tmp_path: Path, alone: bytes) -> None:
     pytest.importorskip("distributed")
-    alone = table("here")
     with scheduler() as (address, (_, worker, _)):
         notes = tmp_path / "notes.txt"
         os.environ["STUDY_NOTES"] = str(notes)
@@ -273,7 +281,7 @@ def test_the_commands_of_the_snakefile_leave_the_same_table() -> None:
         assert Path(outputs["shard"].replace("{i}", number)).is_file()
     words = merge.replace("{params.folders}", "shards/1 shards/2")
     assert main(shlex.split(words)[1:]) == 0
-    assert main(["study", "plan.toml", "--out", "whole"]) == 0
+    assert main(["study", "plan.toml", "--out", "whole", "--workers", "1"]) == 0
     assert Path("run/trials.csv").read_bytes() == Path("whole/trials.csv").read_bytes()
 
 
@@ -281,8 +289,8 @@ def test_the_commands_of_the_snakefile_leave_the_same_table() -> None:
     ("name", "words"),
     [
         ("tunnel", ["--trials", "3", "--time-limit", "0.5", "--controllers", "open", "closed"]),
-        ("wall", ["--trials", "2", "--profiles", "stiff", "--wall.travel", "0.06"]),
-        ("gait", ["--cycles", "2", "--sweep-points", "2"]),
+        ("wall", ["--trials", "2", "--profiles", "stiff", *NEAR]),
+        ("gait", ["--cycles", "2", "--settling-cycles", "0", "--sweep-points", "2", *QUICK]),
         ("calibrate", ["--rig.pushes", "2", "--rig.speeds", "0.3", "--draws", "20"]),
     ],
 )
