@@ -4,7 +4,6 @@ import csv
 import dataclasses
 import json
 import math
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -33,24 +32,14 @@ SMALL = loads.ForceConfig(
 )
 
 
-@pytest.fixture(scope="module", autouse=True)
-def _largest_forces_are_kept() -> Iterator[None]:
-    """The bisection takes most of the time, and every study of a chain asks for it again."""
-    bisected, known = loads.largest_force, {}
-
-    def largest_force(chain: Chain, limit: float) -> float:
-        key = (chain.lengths.tobytes(), chain.stiffness.tobytes(), limit)
-        if key not in known:
-            known[key] = bisected(chain, limit)
-        return known[key]
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(loads, "largest_force", largest_force)
-        patch.setattr(force, "largest_force", largest_force)
-        yield
-
-
 DATA = Path(__file__).parents[2] / "shared" / "data" / "whisker_force_location_rod" / "derived"
+
+
+def _loads(config: loads.ForceConfig, profile: str, friction: float) -> tuple[loads.Points, int]:
+    """Static loads up to the largest force of a profile."""
+    chain = Chain.of(with_profile(config.antenna, profile))
+    largest = loads.largest_force(chain, math.radians(config.hinge_limit_deg))
+    return loads.static_loads(config, profile, friction, largest)
 
 
 def test_largest_force_of_a_small_limit_is_that_of_the_base_hinge():
@@ -70,7 +59,7 @@ def test_largest_force_turns_the_most_bent_hinge_by_the_limit():
 def test_small_loads_bend_the_film_by_the_linear_sum():
     """Flex of a small load is F times the sum over covered hinges of (s - s_i) / k_i."""
     config = loads.ForceConfig(hinge_limit_deg=0.01, loads=3)
-    points, left_out = loads.static_loads(config, "descending", 0.0)
+    points, left_out = _loads(config, "descending", 0.0)
     chain = Chain.of(with_profile(config.antenna, "descending"))
     arms = np.maximum(points.place[:, None] * chain.length - chain.starts, 0.0)
     covered = config.antenna.sensed_hinges
@@ -83,7 +72,7 @@ def test_uniform_chains_without_film_differ_by_the_scale_of_force_alone():
     config = loads.ForceConfig(antenna=BARE, loads=10)
     found = []
     for profile in ("stiff", "compliant"):
-        points, _ = loads.static_loads(config, profile, 0.3)
+        points, _ = _loads(config, profile, 0.3)
         chain = Chain.of(with_profile(BARE, profile))
         largest = loads.largest_force(chain, math.radians(30))
         found.append(force.score(points, "flex", 0.5, None, largest))
@@ -94,7 +83,7 @@ def test_uniform_chains_without_film_differ_by_the_scale_of_force_alone():
 
 def test_a_known_place_tells_the_force_and_friction_blurs_it():
     config = loads.ForceConfig(loads=60)
-    plain, rubbed = (loads.static_loads(config, "descending", mu)[0] for mu in (0.0, 1.0))
+    plain, rubbed = (_loads(config, "descending", mu)[0] for mu in (0.0, 1.0))
     sure = force.score(plain, "flex", 0.5, config.place_step, 1.0)["r2"]
     blurred = force.score(rubbed, "flex", 0.5, config.place_step, 1.0)["r2"]
     blind = force.score(plain, "flex", 0.5, None, 1.0)["r2"]
@@ -103,7 +92,7 @@ def test_a_known_place_tells_the_force_and_friction_blurs_it():
 
 
 def test_the_reading_falls_and_b_rises_with_the_force():
-    points, _ = loads.static_loads(loads.ForceConfig(loads=20), "descending", 0.0)
+    points, _ = _loads(loads.ForceConfig(loads=20), "descending", 0.0)
     tip = points.place > 0.99
     order = np.argsort(points.force[tip])
     assert np.corrcoef(points.scalars["reading"][tip][order], np.arange(tip.sum()))[0, 1] < -0.9

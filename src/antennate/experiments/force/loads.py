@@ -109,8 +109,10 @@ def largest_force(chain: Chain, limit: float) -> float:
     return low
 
 
-def static_loads(config: ForceConfig, profile: str, friction: float) -> tuple[Points, int]:
-    """Loads of uniform size at every place, within the cone of friction about the normal.
+def static_loads(
+    config: ForceConfig, profile: str, friction: float, largest: float
+) -> tuple[Points, int]:
+    """Loads of uniform size up to `largest` [N] at every place, within the cone of friction.
 
     Returns:
         The loads that keep every hinge within the limit, and how many did not.
@@ -120,7 +122,7 @@ def static_loads(config: ForceConfig, profile: str, friction: float) -> tuple[Po
     rng = np.random.default_rng([config.seed, 0])
     places = config.places()
     place = np.repeat(places, 2 * config.loads)
-    size = rng.uniform(0.0, 1.0, len(place)) * largest_force(chain, limit)
+    size = rng.uniform(0.0, 1.0, len(place)) * largest
     lean = rng.uniform(-1.0, 1.0, len(place)) * math.atan(friction)
     force = size[:, None] * np.stack([np.sin(lean), np.cos(lean)], axis=1)
     rest = equilibrium(chain, place * chain.length, force, follower=True)
