@@ -240,7 +240,9 @@ def test_B1_a_silent_servo_is_named_within_100_ms_and_the_others_keep_their_torq
     assert left == [7], "which hears nothing"
 
 
-@pytest.mark.parametrize("what", ["overload", "overheat", "voltage"])
+@pytest.mark.parametrize(
+    "what", ["overload", pytest.param("overheat", marks=pytest.mark.slow), "voltage"]
+)
 def test_B12_a_hardware_error_is_named_within_200_ms_and_it_holds(what: str) -> None:
     log = walked(at(EVENT, f"servo:9={what}"))
     at_error = log.first(Cause.SERVO_ERROR)
@@ -408,7 +410,7 @@ def test_G6_a_robot_whose_record_is_required_holds_while_none_is_kept() -> None:
     assert "one is required" in report.why
 
 
-@pytest.mark.parametrize("bad", [math.nan, math.inf])
+@pytest.mark.parametrize("bad", [math.nan, pytest.param(math.inf, marks=pytest.mark.slow)])
 def test_S5_B14_a_pose_that_is_not_finite_never_reaches_the_bus(bad: float) -> None:
     made = rig(TwinConfig())
     sound = made.session.control.controller.step
