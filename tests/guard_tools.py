@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
+import inspect
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import pytest
@@ -31,6 +33,29 @@ class Guard:
     off: Off
     notice: Callable[[], Any]
     by: tuple[type[BaseException], ...] = (AssertionError, pytest.fail.Exception)
+
+
+def runs_by_itself(notice: Callable[[], Any]) -> bool:
+    """Whether this is a test, or one of its cases, that every run of the suite has."""
+    test = notice.func if isinstance(notice, partial) else notice
+    words = notice.args if isinstance(notice, partial) else ()
+    if not test.__name__.startswith("test_"):
+        return False
+    given = inspect.signature(test).bind_partial(*words).arguments
+    for mark in getattr(test, "pytestmark", ()):
+        if mark.name != "parametrize":
+            return False
+        names, cases = mark.args
+        if isinstance(names, str):
+            names, cases = [names], [case if _marked(case) else (case,) for case in cases]
+        wanted = tuple(given.pop(name, None) for name in names)
+        if wanted not in [tuple(case) for case in cases if not _marked(case)]:
+            return False
+    return not given
+
+
+def _marked(case: Any) -> bool:
+    return bool(getattr(case, "marks", ()))
 
 
 def put(target: Any, name: str, value: Any) -> Off:

@@ -78,7 +78,7 @@ def rails_at_random(rng: np.random.Generator, count: int) -> list[float]:
 )
 def test_S1_a_floating_wire_is_open_within_ten_readings(pattern: Pattern, band: Band) -> None:
     level = 1300.0 if band is RISING else FREE
-    for seed in range(200):
+    for seed in range(10 if pattern is rail_to_rail else 200):  # which begins at either rail
         readings = after_rest(pattern(np.random.default_rng(seed), 10), band, level)
         assert readings[-1].finding is Finding.OPEN
         assert math.isnan(readings[-1].counts)
@@ -258,8 +258,8 @@ def test_S4_noise_of_a_third_of_a_count_is_enough_to_be_alive() -> None:
 
 def test_S4_a_quiet_film_gives_no_alarm() -> None:
     film = channel()
-    feed(film, quiet(np.random.default_rng(6), 200_000))
-    assert film.counted[Finding.OK] == 200_000 - 2
+    feed(film, quiet(np.random.default_rng(6), 100_000))
+    assert film.counted[Finding.OK] == 100_000 - 2
     assert film.counted[Finding.LOST] == 2
     assert film.bad == 2
 
@@ -294,31 +294,40 @@ def maneuvers_of(readings: np.ndarray) -> tuple[list[int], Rig]:
     return [m for m, _ in itertools.groupby(seen)], rig
 
 
-@pytest.mark.parametrize("seed", [1, 2])
-def test_S6_isolated_spikes_change_no_action(seed: int) -> None:
+@pytest.fixture(scope="module")
+def clean() -> tuple[np.ndarray, list[int]]:
+    """60 s of touches as they are read, and the maneuvers that they lead to."""
+    rng = np.random.default_rng(1)
+    readings = np.rint(touches() + rng.normal(0, 2.5, (6000, 2)))
+    maneuvers, _ = maneuvers_of(readings)
+    assert len(maneuvers) > 8
+    return readings, maneuvers
+
+
+@pytest.mark.parametrize("seed", [2, pytest.param(3, marks=pytest.mark.slow)])
+def test_S6_isolated_spikes_change_no_action(
+    seed: int, clean: tuple[np.ndarray, list[int]]
+) -> None:
     """1 % of readings are anything at all; 60 s of touches give the same maneuvers."""
     rng = np.random.default_rng(seed)
-    clean = np.rint(touches() + rng.normal(0, 2.5, (6000, 2)))
-    spiky = clean.copy()
-    hit = rng.random(clean.shape) < 0.01
+    readings, expected = clean
+    spiky = readings.copy()
+    hit = rng.random(readings.shape) < 0.01
     hit[1:] &= ~hit[:-1]
     hit[2:] &= ~hit[:-2]
     spiky[hit] = rng.integers(0, 4096, int(hit.sum()))
-    expected, _ = maneuvers_of(clean)
     found, rig = maneuvers_of(spiky)
-    assert len(expected) > 8
     assert found == expected
     assert all(outputs.state <= State.DEGRADED for outputs in rig.outputs[-6000:])
     assert sum(film.bad for film in rig.films) > 0.5 * hit.sum()
 
 
-def test_S6_hum_of_the_mains_changes_no_action() -> None:
+def test_S6_hum_of_the_mains_changes_no_action(clean: tuple[np.ndarray, list[int]]) -> None:
     """50 Hz, 100 counts: the mean over 0.1 s is blind to it."""
-    rng = np.random.default_rng(9)
-    clean = np.rint(touches() + rng.normal(0, 2.5, (6000, 2)))
+    readings, expected = clean
     t = np.arange(6000) * PERIOD
-    hum = clean + 50 * np.sin(2 * np.pi * 50.0 * t + 1.0)[:, None]
-    assert maneuvers_of(np.rint(hum))[0] == maneuvers_of(clean)[0]
+    hum = readings + 50 * np.sin(2 * np.pi * 50.0 * t + 1.0)[:, None]
+    assert maneuvers_of(np.rint(hum))[0] == expected
 
 
 @pytest.mark.parametrize("share", [0.05, 0.1, 0.3, 0.5])

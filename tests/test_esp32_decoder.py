@@ -49,7 +49,7 @@ def noisy(rate: float, count: int) -> None:
 
 @pytest.mark.parametrize("rate", [1e-5, 1e-4, 1e-3, 1e-2])
 def test_L1_random_bit_errors(rate: float) -> None:
-    noisy(rate, 20_000)
+    noisy(rate, 10_000)
 
 
 @pytest.mark.slow
@@ -63,7 +63,7 @@ def test_L1_random_bit_errors_in_a_million_frames(rate: float) -> None:
 def test_L2_lost_doubled_and_inserted_bytes(kind: str, rate: float) -> None:
     """Every untouched frame arrives, nothing false does, nothing twice."""
     rng = np.random.default_rng(8)
-    samples = [made(i) for i in range(20_000)]
+    samples = [made(i) for i in range(8_000)]
     sent = frames_of(samples)
     hit = rng.random(sent.size) < rate
     if kind == "inserted":
@@ -79,6 +79,7 @@ def test_L2_lost_doubled_and_inserted_bytes(kind: str, rate: float) -> None:
     assert delivered == [samples[i] for i in numbers]
     assert set(np.flatnonzero(untouched).tolist()) <= set(numbers)
     assert sorted(set(numbers)) == numbers
+    assert np.count_nonzero(~untouched) > 100
     assert closed(decoder.counters, decoder.held)
 
 

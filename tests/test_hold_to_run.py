@@ -108,7 +108,7 @@ def test_without_a_key_there_is_no_torque_and_after_its_release_first_no_motion(
 def test_a_key_let_go_again_and_again_is_no_fault() -> None:
     made = rig(TwinConfig())
     presses = iter([True, True, *[False] * 40] * 30)
-    config = DriveConfig(dry_run=0.2, duration=8.0, touch_check=False, hold_to_run=True)
+    config = DriveConfig(dry_run=0.2, duration=4.0, touch_check=False, hold_to_run=True)
     report = drive(made.session, config, True, operator=Operator(pressed=lambda: next(presses)))
     assert report.worst.name == "HOLD"
     assert report.ended == "the end of its time"

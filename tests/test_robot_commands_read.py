@@ -53,6 +53,8 @@ FAULTS = {  # by the number of its readings; with 5 the ports are swapped
 }
 REPLACED = {"controller"}  # `teleop` walks by keys in its place
 SHORT = {"dry_run": 0.1, "duration": 0.5, "stand": 0.1}
+BRIEF = {"patience": 1.0}
+"""Torque is refused before a silent bus; it is asked for so long."""
 DRIFTING = {"control": {"rate": 25.0}, "drift": {"band": 0.02, "speed": 1.0}}
 LIFTING = {"legs": {"kind": "lifting"}, "pitch": {"kind": "actuated"}}
 HEXAPOD = RobotSpec.named("hexapod").model_dump()
@@ -237,6 +239,7 @@ RUNS: dict[str, tuple[type[Params], Callable[..., None], list[dict[str, Any]]]] 
             {
                 **SHORT,
                 "touch_check": False,
+                "touch": BRIEF,
                 "bus_return": 0.1,
                 "fault_time": 0.1,
                 "robot": LIFTING,
@@ -255,7 +258,13 @@ RUNS: dict[str, tuple[type[Params], Callable[..., None], list[dict[str, Any]]]] 
                 "controller": "open",
                 "drift": {"band": 0.02, "speed": 1.0},
             },
-            {**SHORT, "controller": "open", "touch_check": False, "robot": LIFTING},
+            {
+                **SHORT,
+                "controller": "open",
+                "touch_check": False,
+                "touch": BRIEF,
+                "robot": LIFTING,
+            },
         ],
     ),
     "doctor": (

@@ -187,5 +187,11 @@ class Ladder(RuleBasedStateMachine):
         assert self.outputs.torque
 
 
-Ladder.TestCase.settings = settings(max_examples=100, stateful_step_count=50)
+class LongLadder(Ladder):
+    """The same, more often."""
+
+
+Ladder.TestCase.settings = settings(max_examples=50, stateful_step_count=50)
+LongLadder.TestCase.settings = settings(max_examples=200, stateful_step_count=50)
 test_T7_any_events_in_any_order = Ladder.TestCase
+test_T7_any_events_in_any_order_200_times = pytest.mark.slow(LongLadder.TestCase)

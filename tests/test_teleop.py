@@ -99,7 +99,7 @@ def test_the_antennae_oscillate_until_told_again_and_stay_where_they_are() -> No
 def test_keys_walk_the_twin_and_q_ends_it_with_the_torque_off() -> None:
     made = rig(TwinConfig())
     begin = made.clock.now()
-    keyboard = Keyboard(*[(t, "w") for t in np.arange(3.0, 9.0, 0.1)], (11.0, "q"))
+    keyboard = Keyboard(*[(t, "w") for t in np.arange(1.0, 4.0, 0.1)], (6.0, "q"))
     keyboard.now = lambda: made.clock.now() - begin  # type: ignore[method-assign]
 
     def keys() -> list[str]:

@@ -72,7 +72,7 @@ class Walk:
 @pytest.fixture(scope="module")
 def far() -> Walk:
     """Started at 249 turns: past 250 they are forgotten, where 256 are the end."""
-    return Walk(249, duration=6.0)
+    return Walk(249, duration=4.5)
 
 
 def test_legs_near_the_limit_forget_their_turns_and_the_walk_goes_on(far: Walk) -> None:
@@ -83,7 +83,7 @@ def test_legs_near_the_limit_forget_their_turns_and_the_walk_goes_on(far: Walk) 
     first, last = far.standing.index(True), len(far.standing) - far.standing[::-1].index(True)
     assert last - first < 75
     walked = np.ptp(np.array(far.goals)[last:, LEGS], axis=0)
-    assert (walked > 2 * 4096).all()
+    assert (walked > 4096).all()
 
 
 def test_no_goal_jumps_but_by_whole_turns(far: Walk) -> None:
@@ -110,7 +110,7 @@ def test_G7_its_log_replays_alike_for_the_controller_was_not_asked_meanwhile(far
 
 def test_the_maneuvers_are_those_of_a_walk_without_it(far: Walk) -> None:
     """The controller's time stands still with the robot, so that no maneuver is cut short."""
-    plain = Walk(0, duration=3.0)
+    plain = Walk(0, duration=2.7)
     assert plain.rig.session.actuators.turns.forgotten == 0
     n = 250
     assert far.maneuvers[:n] == plain.maneuvers[:n]
@@ -138,7 +138,7 @@ def test_lost_answers_do_not_keep_legs_from_forgetting() -> None:
     def lose(walk: Walk, session: Session) -> None:
         walk.rig.robot.bus.loss = 0.01
 
-    walk = Walk(253, duration=2.0, act=lose)
+    walk = Walk(253, duration=1.6, act=lose)
     assert walk.rig.session.actuators.turns.forgotten == 12
     assert max(walk.states) <= State.HOLD
 
@@ -149,7 +149,7 @@ def test_T7_while_it_holds_no_further_leg_loses_its_torque() -> None:
     def silence(walk: Walk, session: Session) -> None:
         walk.rig.robot.board_silent |= session.actuators.turns.forgotten == 3
 
-    walk = Walk(253, duration=2.5, act=silence)
+    walk = Walk(253, duration=1.8, act=silence)
     assert walk.rig.session.actuators.turns.forgotten < 12
     held = len(walk.states) - walk.states[::-1].index(State.OK)
     assert State.HOLD in walk.states[held:]
@@ -165,7 +165,7 @@ def test_B10_legs_that_have_forgotten_go_on_from_where_they_were_when_the_board_
             session.actuators.turns.forgotten == 3 and len(walk.goals) < 150
         )
 
-    walk = Walk(253, duration=4.0, act=blink)
+    walk = Walk(253, duration=2.8, act=blink)
     assert walk.rig.session.actuators.turns.forgotten == 12
     assert not any(row.count(False) > 1 for row in walk.torque)
     assert walk.states[-1] <= State.DEGRADED
@@ -182,6 +182,6 @@ def test_a_leg_without_torque_to_forget_its_turns_is_not_reported() -> None:
                 session.actuators.state.guard(servo)
         disarmed.extend(session.actuators.state.disarmed)
 
-    walk = Walk(253, duration=2.0, act=look)
+    walk = Walk(253, duration=1.4, act=look)
     assert walk.rig.session.actuators.turns.forgotten == 12
     assert not disarmed

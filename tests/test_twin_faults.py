@@ -117,7 +117,7 @@ def test_L1_B3_bit_errors_are_counted_and_no_wrong_value_is_ever_used(
     truth, states = Truth(made), list[State]()
 
     def look(session: Session, t: float) -> None:
-        if t < 1.5:
+        if t < 0.9:
             return
         if not made.robot.noise.ber:
             broken(made.robot, f"wire=ber:{ber}")
@@ -128,12 +128,12 @@ def test_L1_B3_bit_errors_are_counted_and_no_wrong_value_is_ever_used(
         sample = newest.sample
         assert (sample.left, sample.right) == truth.readings[sample.seq]
         for servo in made.robot.servos:
-            if t > 1.6:
+            if t > 1.0:
                 assert servo.get("goal_position") in truth.goals[servo.get("id")]
         for servo, position in session.actuators.state.positions.items():
             assert position in truth.positions[servo]
 
-    report = drive(made.session, DriveConfig(dry_run=0.5, duration=6.0), arm=True, on_tick=look)
+    report = drive(made.session, DriveConfig(dry_run=0.3, duration=3.5), arm=True, on_tick=look)
     result = report.result(made.session)
     assert made.robot.bus.noise.wrong > 50
     assert made.robot.noise.wrong > 5

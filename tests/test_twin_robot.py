@@ -160,13 +160,17 @@ def test_no_pose_of_a_gait_is_beyond_the_limits(name: str) -> None:
         joints.ticks(control.step(AntennaFrame(t=np.array([0.01 * tick]), counts=counts)))
 
 
-@pytest.mark.parametrize(("name", "trial", "robot"), [("closed", 1, ROBOT), ("paper", 0, MIRRORED)])
+@pytest.mark.parametrize(
+    ("name", "trial", "robot", "limit", "end"),
+    [("closed", 1, ROBOT, 100.0, "success"), ("paper", 0, MIRRORED, 10.0, "timeout")],
+)
 def test_a_whole_trial_through_bytes_is_decided_like_the_pure_simulation(
-    name: str, trial: int, robot: RobotSpec
+    name: str, trial: int, robot: RobotSpec, limit: float, end: str
 ) -> None:
-    config = TunnelConfig(seed=0, robot=robot)
+    config = TunnelConfig(seed=0, robot=robot, time_limit=limit)
     pure = simulated(config, name, trial)
     twin = on_twin(config, name, trial)
+    assert pure.status == end
     assert len({Maneuver.FORWARD, Maneuver.REVERSE} & set(pure.maneuvers)) == 2
     assert twin == pure
 

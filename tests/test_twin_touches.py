@@ -86,10 +86,10 @@ def test_one_twin_serves_many_drives_each_with_its_touches_from_the_same_start()
         made.robot.bus.receive(made.clock.now(), packets.ping(1))
         made.clock.sleep(0.1)
         starts.append([servo.get("present_position") % 4096 for servo in made.robot.servos])
-        plan = DriveConfig(dry_run=0.5, duration=2.0, touch=TouchCheckParams(patience=10.0))
+        plan = DriveConfig(dry_run=0.5, duration=1.0, touch=TouchCheckParams(patience=10.0))
         report = drive(made.session, plan, arm=True)
         assert report.refusal == ""
-        assert report.walk.time == pytest.approx(2.0, abs=0.3)
+        assert report.walk.time == pytest.approx(1.0, abs=0.3)
     assert starts[0] == starts[1]
 
 

@@ -30,7 +30,7 @@ class PowerSaving:
 
     Args:
         twin: The robot and its clock.
-        wake: Time between two wakings from 2 s on [s], 0 for a radio that never sleeps.
+        wake: Time between two wakings from 1 s on [s], 0 for a radio that never sleeps.
     """
 
     def __init__(self, twin: Rig, wake: float) -> None:
@@ -42,7 +42,7 @@ class PowerSaving:
 
     def _arrival(self, t: float) -> float:
         """When what is sent at t arrives [s]."""
-        asleep = self._wake and t > 2.0
+        asleep = self._wake and t > 1.0
         return 0.003 + (self._wake * (math.floor(t / self._wake) + 1.0) if asleep else t)
 
     def read(self, most: int, timeout: float) -> bytes:
@@ -85,13 +85,13 @@ def test_L11_no_decision_on_a_sample_that_power_saving_made_old(beacons: int) ->
     def look(session: Session, t: float) -> None:
         out, newest = session.outputs, session.board.clock.newest
         assert out is not None
-        if t > 2.0:
+        if t > 1.0:
             states.append(out.state)
         if out.move:
             assert newest is not None
             ages.append(t - 1e-6 * newest.sample.ticks)
 
-    drive(session, DriveConfig(dry_run=1.0, duration=4.0), arm=True, on_tick=look)
+    drive(session, DriveConfig(dry_run=0.5, duration=3.0), arm=True, on_tick=look)
     assert ages
     assert max(ages) - min(ages) <= LIMIT + 1e-3  # the shortest delay cannot be known
     held = np.array(states) >= State.HOLD
