@@ -55,7 +55,6 @@ REPLACED = {"controller"}  # `teleop` walks by keys in its place
 SHORT = {"dry_run": 0.1, "duration": 0.5, "stand": 0.1}
 BRIEF = {"patience": 1.0}
 """Torque is refused before a silent bus; it is asked for so long."""
-DRIFTING = {"control": {"rate": 25.0}, "drift": {"band": 0.02, "speed": 1.0}}
 LIFTING = {"legs": {"kind": "lifting"}, "pitch": {"kind": "actuated"}}
 HEXAPOD = RobotSpec.named("hexapod").model_dump()
 """Without antennae."""

@@ -228,7 +228,7 @@ def test_B1_a_silent_servo_is_named_within_100_ms_and_the_others_keep_their_torq
         with_torque.append(sum(servo.torque for servo in rig.robot.servos))
 
     silence = at(1.5, "servo:7=silent")
-    log = walked(act, DriveConfig(dry_run=DRY, fault_time=0.5))
+    log = walked(act, DriveConfig(dry_run=DRY, fault_time=0.5, duration=4.0))
     named = next(t for t, s in zip(log.t, log.texts, strict=True) if "servo 7" in s)
     assert named - 1.5 <= 0.1
     fault = log.state.index(State.FAULT)
