@@ -153,7 +153,8 @@ def intervals(
     known = [(a, row.get(value), row.get(interval)) for a, row in zip(x, rows, strict=True)]
     known = [(a, b, ends or (b, b)) for a, b, ends in known if b is not None and b == b]
     middle = np.array([b for _, b, _ in known])
-    low, high = np.array([ends for *_, ends in known]).reshape(-1, 2).T
+    ends = np.array([ends for *_, ends in known], float).reshape(-1, 2)
+    low, high = np.where(np.isfinite(ends).all(axis=1), ends.T, middle)
     whiskers = np.maximum(0.0, [middle - low, high - middle])
     look = {"markersize": 5, "linestyle": "", "capsize": 2.5, "elinewidth": 1.2, **look}
     panel.errorbar([a for a, *_ in known], middle, yerr=whiskers, **look)

@@ -55,10 +55,12 @@ class Measure:
 
 
 def shown(value: Any, form: str = ".2f", scale: float = 1.0, join: str = " to ") -> str:
-    """A number, an interval as `low to high`, a text, or a dash for None and NaN."""
+    """A number, an interval as `low to high`, a text, or a dash for what is not known."""
     if isinstance(value, str):
         return value
     if isinstance(value, Sequence | np.ndarray):
+        if not np.isfinite(np.array(value, float)).all():  # None in result.json
+            return NONE
         return join.join(f"{scale * end:{form}}" for end in value)
     if value is None or value != value:
         return NONE

@@ -10,7 +10,6 @@ import struct
 import zlib
 from collections import Counter
 from collections.abc import Iterable
-from itertools import groupby
 from typing import Any, Protocol
 
 from mcap.data_stream import RecordBuilder
@@ -68,7 +67,18 @@ class Container:
         self._file, self._packer = file, ZstdCompressor(_EFFORT)
         self._schemas, self._channels = list[Schema](), list[Channel]()
         self._content, self._indexes = bytearray(), dict[int, list[int]]()
-        self._counts, self._chunks = Counter[int](), list[ChunkIndex]()
+        self._chunks, self._counts = bytearray(), Counter[int]()
+        self._statistics = Statistics(
+            attachment_count=0,
+            channel_count=0,
+            channel_message_counts=self._counts,
+            chunk_count=0,
+            message_count=0,
+            message_end_time=0,
+            message_start_time=0,
+            metadata_count=0,
+            schema_count=0,
+        )
         file.write(MAGIC + _bytes([Header("ros2", library)]))
 
     def add_schema(self, name: str, definition: str) -> int:
@@ -85,13 +95,13 @@ class Container:
 
     def add(self, channel: int, number: int, time: int, data: bytes) -> None:
         """Add a message to the chunk, with its number and its time [ns]."""
-        content = self._content
+        content, length = self._content, _MESSAGE.size - _HEAD + len(data)
+        record = _MESSAGE.pack(Opcode.MESSAGE, length, channel, number, time, time) + data
         index = self._indexes.get(channel)
         if index is None:
             index = self._indexes[channel] = []
         index += (time, len(content))
-        length = _MESSAGE.size - _HEAD + len(data)
-        content += _MESSAGE.pack(Opcode.MESSAGE, length, channel, number, time, time) + data
+        content += record
 
     def end_chunk(self) -> None:
         """Write the chunk, unless no message is in it."""
@@ -118,57 +128,51 @@ class Container:
             ) + struct.pack(f"<{len(index)}Q", *index)
             self._counts[channel] += len(index) // 2
         self._file.write(record + after)
-        self._chunks.append(
-            ChunkIndex(
-                chunk_start_offset=start,
-                chunk_length=len(record),
-                message_index_offsets=places,
-                message_index_length=len(after),
-                compression=_COMPRESSION,
-                compressed_size=len(chunk.data),
-                uncompressed_size=len(content),
-                message_start_time=chunk.message_start_time,
-                message_end_time=chunk.message_end_time,
-            )
+        place = ChunkIndex(
+            chunk_start_offset=start,
+            chunk_length=len(record),
+            message_index_offsets=places,
+            message_index_length=len(after),
+            compression=_COMPRESSION,
+            compressed_size=len(chunk.data),
+            uncompressed_size=len(content),
+            message_start_time=chunk.message_start_time,
+            message_end_time=chunk.message_end_time,
         )
+        self._chunks += _bytes([place])
+        self._count(chunk)
+
+    def _count(self, chunk: Chunk) -> None:
+        """Note a chunk in the statistics."""
+        found = self._statistics
+        first = found.message_start_time if found.chunk_count else chunk.message_start_time
+        found.message_start_time = min(first, chunk.message_start_time)
+        found.message_end_time = max(found.message_end_time, chunk.message_end_time)
+        found.chunk_count += 1
 
     def finish(self) -> None:
         """Write the last chunk and the summary. Nothing may follow."""
         self.end_chunk()
         self._file.write(_bytes([DataEnd(0)]))
-        start, body, groups = self._file.tell(), b"", list[SummaryOffset]()
-        summary = [*self._schemas, *self._channels, self._statistics(), *self._chunks]
-        for kind, records in groupby(summary, type):
-            group = _bytes(records)
-            groups.append(SummaryOffset(_KINDS[kind], start + len(body), len(group)))
-            body += group
-        offsets = start + len(body)
-        body += _bytes(groups)
-        foot = _FOOT.pack(Opcode.FOOTER, _FOOT.size - _HEAD + 4, start, offsets)
+        self._statistics.schema_count = len(self._schemas)
+        self._statistics.channel_count = len(self._channels)
+        self._statistics.message_count = self._counts.total()
+        groups = {
+            Opcode.SCHEMA: _bytes(self._schemas),
+            Opcode.CHANNEL: _bytes(self._channels),
+            Opcode.STATISTICS: _bytes([self._statistics]),
+            Opcode.CHUNK_INDEX: self._chunks,
+        }
+        start, body, offsets = self._file.tell(), bytearray(), list[SummaryOffset]()
+        for kind, group in groups.items():
+            if group:
+                offsets.append(SummaryOffset(kind, start + len(body), len(group)))
+                body += group
+        after = start + len(body)
+        body += _bytes(offsets)
+        foot = _FOOT.pack(Opcode.FOOTER, _FOOT.size - _HEAD + 4, start, after)
         crc = zlib.crc32(foot, zlib.crc32(body))
-        self._file.write(body + _bytes([Footer(start, offsets, crc)]) + MAGIC)
-
-    def _statistics(self) -> Statistics:
-        return Statistics(
-            attachment_count=0,
-            channel_count=len(self._channels),
-            channel_message_counts=self._counts,
-            chunk_count=len(self._chunks),
-            message_count=self._counts.total(),
-            message_end_time=max((each.message_end_time for each in self._chunks), default=0),
-            message_start_time=min((each.message_start_time for each in self._chunks), default=0),
-            metadata_count=0,
-            schema_count=len(self._schemas),
-        )
-
-
-_KINDS = {
-    Schema: Opcode.SCHEMA,
-    Channel: Opcode.CHANNEL,
-    Statistics: Opcode.STATISTICS,
-    ChunkIndex: Opcode.CHUNK_INDEX,
-}
-"""What the summary holds."""
+        self._file.write(bytes(body) + _bytes([Footer(start, after, crc)]) + MAGIC)
 
 
 def _bytes(records: Iterable[McapRecord]) -> bytes:
