@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import json
 import math
 import pickle
@@ -17,8 +18,10 @@ import pytest
 import antennate
 from antennate import experiments
 from antennate.control.controllers import open_loop
+from antennate.errors import ControllerError
 from antennate.params.control import ControlParams
 from antennate.params.spring import SpringParams
+from antennate.types import AntennaFrame, JointCommand
 
 SHORT = {"trials": 2, "time_limit": 1.0}
 
@@ -186,6 +189,36 @@ def test_wrong_settings_of_a_trial_are_one_line() -> None:
         antennate.simulate("open", scen="flat")
     with pytest.raises(antennate.BadInputError, match="opne"):
         antennate.simulate("opne")
+
+
+@pytest.mark.parametrize("kept", [False, True])
+@pytest.mark.parametrize(
+    ("name", "value", "said"),
+    [
+        ("maneuver", np.zeros((1, 1), np.int64), r"maneuver of shape \(1,\), found \(1, 1\)"),
+        ("maneuver", np.array([7]), "tick 1: expected a maneuver of 0 to 4, found 7"),
+        ("level", np.zeros(2), r"level of shape \(1, 2\), found \(2,\)"),
+    ],
+)
+def test_an_answer_that_is_no_decision_is_one_line(
+    name: str, value: Any, said: str, kept: bool, tmp_path: Path
+) -> None:
+    def make(*arguments: Any) -> Any:
+        made = open_loop(*arguments)
+        sound = made.step
+
+        def step(frame: AntennaFrame) -> JointCommand:
+            command = sound(frame)
+            setattr(made, name, value)
+            return command
+
+        made.step = step
+        return made
+
+    with pytest.raises(ControllerError, match=said):
+        antennate.simulate(
+            functools.partial(make), time_limit=0.1, log=tmp_path / "log.mcap" if kept else None
+        )
 
 
 def test_without_pandas_the_cure_is_told(

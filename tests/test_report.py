@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -10,6 +11,7 @@ import pytest
 
 import antennate
 from antennate.cli import main
+from antennate.studies.measures import shown
 
 
 class Page(HTMLParser):
@@ -184,3 +186,9 @@ def test_words_that_do_not_fit_are_one_line(capsys: pytest.CaptureFixture[str]) 
     assert "expected the folder of a run, or --compare RUN RUN" in refusal(capsys)
     assert "expected 2 runs, found 1" in refusal(capsys, "--compare", "a")
     assert "expected no other run beside it" in refusal(capsys, "run", "--compare", "a", "b")
+
+
+@pytest.mark.parametrize("ends", [(None, None), (1.0, math.nan), (-math.inf, 1.0)])
+def test_an_interval_that_is_not_known_is_a_dash(ends: tuple[float | None, float | None]) -> None:
+    assert shown(ends) == "-"
+    assert shown((1.0, 2.0)) == "1.00 to 2.00"

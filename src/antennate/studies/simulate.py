@@ -8,8 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from antennate.control.checked import CheckedController
 from antennate.control.loop import run_loop
 from antennate.control.registry import ControllerFactory, make_controller
+from antennate.errors import ControllerError
 from antennate.params.control import ControlParams
 from antennate.params.reading import from_values
 from antennate.sim.scenes.registry import make_scene
@@ -51,6 +53,7 @@ def simulate(
     Raises:
         ConfigError: A setting is unknown or out of bounds, or there is no such controller.
         SceneError: The scene cannot be built.
+        ControllerError: The controller raised an exception, or what it answers is no command.
         LogError: The log cannot be written.
     """
     config, control = from_values(TrialConfig, settings), control or ControlParams()
@@ -61,12 +64,15 @@ def simulate(
     robot.load(0, start.world, start.chance)
     controlling.reset(np.array([0]), start.phase)
     recorder = TimeSeriesRecorder(controlling, lambda: start.world.head[:2])
-    name = controller if isinstance(controller, str) else controller.__name__
+    checked = CheckedController(controlling, config.robot, 1)
+    name = controller if isinstance(controller, str) else _name(controller)
     decisions = Decisions(config.robot, controlling)
     ticks, outcome = 0, "timeout"
 
     def go_on(frame: AntennaFrame, command: JointCommand) -> bool:
         nonlocal ticks, outcome
+        if checked.faults:
+            raise ControllerError(f"tick {ticks + 1}: {checked.faults[0]}")
         recorder.take(frame, command)
         if kept is not None:
             kept.take(decisions.take(frame, command)[0])
@@ -88,7 +94,7 @@ def simulate(
                 phase=start.phase,
             )
             kept = stack.enter_context(SimulatedLog(Path(log), header, start.world))
-        run_loop(robot, controlling, control.period, go_on)
+        run_loop(robot, checked, control.period, go_on)
     return recorder.series(
         {
             "controller": name,
@@ -99,6 +105,11 @@ def simulate(
             "outcome": outcome,
         }
     )
+
+
+def _name(factory: ControllerFactory) -> str:
+    """What a log calls a controller that has no name in a registry."""
+    return str(getattr(factory, "__name__", type(factory).__name__))
 
 
 def _seen(trial: Trial) -> str:
