@@ -155,7 +155,8 @@ class Tab:
 def browser(folder: Path, width: int = 1280, height: int = 940) -> Iterator[Tab]:
     """A tab of a browser whose files are in a folder."""
     assert CHROMIUM is not None
-    words = [CHROMIUM, *_WORDS.split(), f"--window-size={width},{height}"]
+    # it draws without a graphics card: what it shows goes first
+    words = ["nice", CHROMIUM, *_WORDS.split(), f"--window-size={width},{height}"]
     process = subprocess.Popen(
         [*words, f"--user-data-dir={folder}", "about:blank"],
         stdout=subprocess.DEVNULL,
