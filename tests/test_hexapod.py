@@ -104,9 +104,13 @@ def walked(maneuver: Maneuver, **gait: float) -> float:
 
 
 def test_it_walks_as_far_as_an_independent_model_and_not_without_its_wave() -> None:
-    """That model made 0.53 to 0.61 at 1 s and 0.485 at 4 s; geometry alone moves it by 30 %."""
-    assert walked(Maneuver.FORWARD, frequency=1.0) == pytest.approx(0.57, rel=0.3)
-    assert walked(Maneuver.FORWARD, frequency=0.25) == pytest.approx(0.485, rel=0.3)
+    """That model made 0.53 to 0.61 at 1 s and 0.485 at 4 s; geometry alone moves it by 30 %.
+
+    The numbers of docs/science/hexapod.json are held closer: half the timestep changes them by 1 %.
+    """
+    steps = [walked(Maneuver.FORWARD, frequency=hertz) for hertz in (1.0, 0.25)]
+    assert steps == pytest.approx([0.57, 0.485], rel=0.3)
+    assert steps == pytest.approx([0.660, 0.576], rel=0.05)
     assert walked(Maneuver.REVERSE, frequency=1.0) < -0.2
     assert walked(Maneuver.FORWARD, frequency=1.0, amplitude=0.0) == pytest.approx(0.0, abs=0.01)
 
