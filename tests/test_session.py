@@ -155,6 +155,28 @@ def test_B10_torque_comes_on_with_goals_where_servos_stand_and_they_move_slowly(
     assert steps.max() <= math.ceil(4.5 * 0.01 / (2 * math.pi / 4096))
 
 
+@pytest.mark.parametrize(("silence", "armed"), [(0.6, True), (2.5, False)])
+def test_B6_a_bus_that_is_silent_for_a_while_before_torque_delays_it(
+    silence: float, armed: bool
+) -> None:
+    """As of a computer that stands still; one that stays silent is given up before torque."""
+    made = rig(TwinConfig())
+    receive, begin, torque = made.robot.bus.receive, list[float](), list[bool]()
+
+    def listen(t: float, data: bytes) -> None:
+        if t > DRY and not begin:
+            begin.append(t)
+        made.robot.bus.loss = float(bool(begin) and t < begin[0] + silence)
+        receive(t, data)
+        torque.append(any(servo.torque for servo in made.robot.servos))
+
+    made.robot.bus.receive = listen
+    report = drive(made.session, DriveConfig(dry_run=DRY, duration=3.5), arm=True)
+    assert any(torque) == armed
+    assert (report.worst is State.FAULT) == (not armed), report.why
+    assert not any(servo.torque for servo in made.robot.servos)
+
+
 def test_L8_L9_a_silent_board_makes_it_hold_within_100_ms_and_its_return_walk() -> None:
     def act(rig: Rig, t: float) -> None:
         rig.robot.board_silent = EVENT <= t < EVENT + 0.3

@@ -20,7 +20,10 @@ WATCHDOG_COUNTS = 5
 """Bus watchdog [20 ms]: a servo stops 100 ms, ten ticks, after the last packet (assumed)."""
 
 _TRIES = 5
-"""Tries until servos are given up: at 1 % loss five in a row are one in 10^10 (assumed)."""
+"""Tries to take torque off: at 1 % loss five in a row are one in 10^10 (assumed)."""
+_READS = 10
+"""Tries until a servo is given up that is asked: 1 s, so that a computer which stands still for a
+while is no silent servo (assumed)."""
 _BUDGET = 0.1
 """Time for one reading of all outside the loop [s]: ten times what 19 answers take (assumed)."""
 _COMMON = XC430_W240.registers
@@ -166,7 +169,7 @@ def read_register(bus: Bus, ids: Sequence[int], register: Register) -> dict[int,
     Raises:
         BringUpError: A servo did not answer after several tries.
     """
-    values = inquiry.read_some(bus, ids, register, _TRIES, _BUDGET)
+    values = inquiry.read_some(bus, ids, register, _READS, _BUDGET)
     if left := [servo for servo in ids if servo not in values]:
         raise BringUpError(f"could not read {register.name} of servos {left}")
     return values
