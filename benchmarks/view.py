@@ -65,7 +65,8 @@ def simulated(trials: int, repetitions: int, wait: bool) -> dict[str, Any]:
         if wait:
             input("open the link, then press Enter ")
         for number, turn in itertools.product(range(trials), range(repetitions)):
-            for name, (viewed, logged) in CASES.items():
+            first = turn % len(CASES)  # none always follows the same one
+            for name, (viewed, logged) in [*CASES.items()][first:] + [*CASES.items()][:first]:
                 logs = Path(folder) / f"{number}-{turn}-{name}"
                 logs.mkdir()
                 begin = time.monotonic(), time.process_time()
@@ -75,8 +76,8 @@ def simulated(trials: int, repetitions: int, wait: bool) -> dict[str, Any]:
         dropped = page.channel.dropped
     ratios = {
         name: {
-            "wall": statistics.median(_ratios(walls[name], walls["plain"])),
-            "cpu": statistics.median(_ratios(cpus[name], cpus["plain"])),
+            "wall": _middle(walls[name], walls["plain"]),
+            "cpu": _middle(cpus[name], cpus["plain"]),
         }
         for name in CASES
         if name != "plain"
@@ -84,8 +85,11 @@ def simulated(trials: int, repetitions: int, wait: bool) -> dict[str, Any]:
     return {**ratios, "dropped": dropped}
 
 
-def _ratios(times: list[float], plain: list[float]) -> list[float]:
-    return [one / other for one, other in zip(times, plain, strict=True)]
+def _middle(times: list[float], plain: list[float]) -> str:
+    """Median of the ratios, and their quartiles."""
+    ratios = [one / other for one, other in zip(times, plain, strict=True)]
+    low, middle, high = statistics.quantiles(ratios, n=4, method="inclusive")
+    return f"{middle:.3f} ({low:.3f} to {high:.3f})"
 
 
 def driven(seconds: float, pairs: int) -> dict[str, Any]:

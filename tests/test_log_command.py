@@ -20,10 +20,14 @@ from worlds import recorded, session
 
 from antennate import simulate
 from antennate.cli import main
+from antennate.experiments.tunnel.batch import run_trials
+from antennate.experiments.tunnel.config import TunnelConfig
 from antennate.robots.spec import RobotSpec
+from antennate.sim.world import World
 from antennate.telemetry.reader import LogReader
+from antennate.telemetry.topics import CONTACT_FORCES, COORDINATES
 from antennate.telemetry.writer import LogWriter
-from antennate.types import Maneuver
+from antennate.types import AntennaFrame, Controller, Maneuver
 
 TICKS = 180
 
@@ -346,3 +350,28 @@ def test_the_log_of_a_simulated_trial_is_its_time_series(tmp_path: Path) -> None
         assert len(one["part"]) == len(one["x"]) == len(one["normal"]) > 0
         assert min(one["normal"]) >= 0.0
         assert any(part in names or "antenna" in part or "leg" in part for part in one["part"])
+
+
+def test_forces_and_coordinates_in_a_log_are_those_of_their_tick(tmp_path: Path) -> None:
+    """They are encoded later, many at once; the engine has gone on by then."""
+    config = TunnelConfig(trials=1, time_limit=6.0)
+    seen: dict[float, tuple[float, list[float]]] = {}
+
+    def watch(world: World, frame: AntennaFrame, controller: Controller) -> list[str]:
+        seen[float(frame.t[0])] = world.obstacle_force(), world.data.qpos.tolist()
+        return []
+
+    run_trials(config, "open", [0], lambda found: None, logs=tmp_path, watch=watch)
+    looks = pushed = 0
+    with LogReader(tmp_path / "open-0.mcap") as log:
+        for records, tick in log.groups():
+            found = {record.topic: record.topic.decode(record.data) for record in records}
+            if tick is None or COORDINATES not in found:
+                continue
+            force, place = seen.pop(tick.t)
+            assert list(found[COORDINATES]["position"]) == place
+            normal = found[CONTACT_FORCES]["normal"] if CONTACT_FORCES in found else ()
+            assert sum(normal) == pytest.approx(force)
+            looks, pushed = looks + 1, pushed + (force > 0)
+    assert pushed >= 10
+    assert looks == pytest.approx((looks + len(seen)) / 10, abs=1)

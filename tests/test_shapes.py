@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from antennate.errors import BadInputError
-from antennate.sim.shapes import BOX, CAPSULE, MESH, SPHERE, Shapes, VisibleModel
+from antennate.sim.shapes import BOX, CAPSULE, MESH, SPHERE, Shapes, VisibleModel, picture, snapshot
 
 SIDES = ((0.0, 0.0, 1.0, 1.0), (1.0, 0.5, 0.0, 1.0))
 OURS, OBSTACLE, FLOOR = 8, 2, 1
@@ -17,7 +17,7 @@ MODEL = f"""
     <material name="red" rgba="1 0 0 1"/>
   </asset>
   <worldbody>
-    <geom type="plane" size="5 5 .1" pos="0 0 .25" contype="{FLOOR}" conaffinity="0"/>
+    <geom name="floor" type="plane" size="5 5 .1" pos="0 0 .25" contype="{FLOOR}" conaffinity="0"/>
     <geom type="box" size=".1 .2 .3" pos="2 0 1" contype="{OBSTACLE}" material="red"/>
     <geom type="mesh" mesh="wedge" pos="0 3 1" contype="{OBSTACLE}"/>
     <geom type="sphere" size=".1" group="3"/>
@@ -27,7 +27,7 @@ MODEL = f"""
       <geom type="sphere" size=".1" mass="1" contype="{OBSTACLE}" conaffinity="{OURS}"/>
     </body>
     <body name="link" pos="0 0 1.19">
-      <freejoint/>
+      <freejoint name="link"/>
       <geom type="capsule" size=".1 .3" euler="0 90 0" mass="1" contype="{OURS}"
             conaffinity="{OBSTACLE}"/>
     </body>
@@ -73,25 +73,54 @@ def test_shapes_come_back_from_bytes(made: Made) -> None:
 
 
 def test_a_force_is_that_of_the_engine_on_the_robot(made: Made) -> None:
-    """Its size is the engine's normal force, and it pushes the link away from the ball: upwards."""
+    """Its size is the engine's normal force, and it pushes the link away from the ball: upwards.
+
+    A snapshot is a copy: what the engine does afterwards does not change it.
+    """
     model, data, visible = made
     mujoco.mj_step(model, data, 5)
-    forces = visible.forces(data)
-    assert len(forces) == data.ncon == 1
     wrench = np.zeros(6)
     mujoco.mj_contactForce(model, data, 0, wrench)
+    place, t = data.contact.pos[0].copy(), data.time
+    assert data.ncon == 1
+    content = snapshot(data)
+    mujoco.mj_step(model, data, 50)
+    time, _, forces = picture(content, visible.shapes())
+    assert (time, len(forces)) == (t, 1)
     assert wrench[0] > 0
     assert forces[0, 3:] == pytest.approx([0, 0, wrench[0]], rel=1e-5, abs=1e-5)
-    assert forces[0, :3] == pytest.approx(data.contact.pos[0])
+    assert forces[0, :3] == pytest.approx(place)
+
+
+def test_nothing_pushes_where_nothing_touches(made: Made) -> None:
+    """No contact at all, and contacts of the robot with the floor alone."""
+    model, data, visible = made
+    for height, contacts in ((3.0, 0), (0.34, 2)):
+        model.geom("floor").conaffinity = OURS
+        data.joint("link").qpos[:3] = [-2.0, 0.0, height]
+        mujoco.mj_forward(model, data)
+        assert data.ncon == contacts
+        assert len(picture(snapshot(data), visible.shapes())[2]) == 0
 
 
 def test_poses_are_those_of_the_geoms(made: Made) -> None:
-    """Place and rotation matrix, row by row."""
+    """Place and rotation matrix, row by row; a snapshot says the same."""
     _, data, visible = made
     poses = visible.poses(data)
     assert poses.shape == (4, 12)
     assert poses[2, :3] == pytest.approx([0, 0, 1])
     assert poses[2, 3:] == pytest.approx(np.eye(3).ravel())
+    assert np.array_equal(poses, picture(snapshot(data), visible.shapes())[1])
+
+
+def test_what_is_no_snapshot_is_refused(made: Made) -> None:
+    """Too short, cut, and one of a smaller model."""
+    _, data, visible = made
+    other = mujoco.MjModel.from_xml_string("<mujoco><worldbody/></mujoco>")
+    contents = [b"", b"x" * 40, snapshot(data)[:-100], snapshot(mujoco.MjData(other))]
+    for content in contents:
+        with pytest.raises(BadInputError, match="expected a snapshot of this model"):
+            picture(content, visible.shapes())
 
 
 def test_only_what_slides_can_be_moved(made: Made) -> None:

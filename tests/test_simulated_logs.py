@@ -10,6 +10,7 @@ import sys
 import time
 import tty
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -28,9 +29,9 @@ from antennate.robots.spec import RobotSpec
 from antennate.sim import gl
 from antennate.telemetry.apart import LogProcess
 from antennate.telemetry.reader import LogReader
-from antennate.telemetry.rows import HEAD, RowLog, TickRow
+from antennate.telemetry.rows import HEAD, RowLog
 from antennate.telemetry.topics import EVENTS, JOINT_STATES
-from antennate.types import Contact, Maneuver
+from antennate.types import Contact, Floats, Maneuver
 
 TICKS = 60
 TURN = 4096
@@ -243,20 +244,21 @@ def test_what_a_twin_cannot_keep_is_refused_in_one_line(
     assert [path.name for path in Path().iterdir()] == ["here.mcap"]
 
 
-def rows(count: int) -> list[TickRow]:
+def rows(count: int) -> Floats:
     """Rows of numbers that follow from their place."""
     width = HEAD + 4 * len(ROBOT.joint_names)
     found = 0.01 * np.arange(1, count + 1)[:, None] + np.arange(width) / 1024
     found[:, 0] = 0.01 * np.arange(1, count + 1)
     found[:, [1, 7, 8]] = 3.0, 1.0, 2.0  # maneuver and contacts are whole numbers
-    return [TickRow(row) for row in found]
+    return found
 
 
 def test_a_log_of_another_process_is_that_of_this_one(tmp_path: Path) -> None:
     kept = rows(700)
-    with RowLog(tmp_path / "here.mcap", HEADER) as log:
+    with RowLog[Any](tmp_path / "here.mcap", HEADER, list) as log:
         for row in kept:
-            log.add(row)
+            log.row[:] = row
+            log.add()
     with LogProcess(tmp_path / "there.mcap", HEADER) as apart:
         for row in kept:
             apart.add(row)

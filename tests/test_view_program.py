@@ -52,6 +52,22 @@ def test_a_long_message_comes_whole(pair: Pair) -> None:
     assert list(theirs.receive()) == [(SCENE, content)]
 
 
+def test_messages_that_go_together_come_one_by_one(pair: Pair) -> None:
+    """In their order, empty ones too; what there is no room for is dropped as one."""
+    ours, theirs = pair
+    assert ours.send(TICK, b"before")
+    assert ours.send_together((POSES, b"poses" * 1000), (TICK, b""), (STATE, b"{}"))
+    assert list(theirs.receive()) == [
+        (TICK, b"before"),
+        (POSES, b"poses" * 1000),
+        (TICK, b""),
+        (STATE, b"{}"),
+    ]
+    sent = sum(ours.send_together((POSES, bytes(4000)), (TICK, b"t")) for _ in range(5000))
+    assert ours.dropped == 5000 - sent
+    assert len(list(theirs.receive())) == 2 * sent
+
+
 def test_an_end_that_closes_is_noticed(pair: Pair) -> None:
     """The program runs on without a page."""
     ours, theirs = pair

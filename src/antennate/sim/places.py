@@ -9,6 +9,9 @@ from antennate.robots.spec import ANTENNA_PREFIXES, RobotSpec
 from antennate.sim import layers
 from antennate.types import Bools, Ints
 
+ROBOT_AND_OBSTACLE = 3
+"""Sum of the `kinds` of a contact between the robot and an obstacle."""
+
 
 class Places:
     """Indices by part, found once by their names.
@@ -29,6 +32,7 @@ class Places:
         leg_geoms: Geoms of the legs, shape (2 L,).
         obstacles: Whether a geom is an obstacle, shape (geoms,).
         own: Whether it is the robot's, shape (geoms,).
+        kinds: 1 for the robot's, 2 for an obstacle, 0 for others, shape (geoms,).
         parts: Name of the body of each geom, without the prefix.
     """
 
@@ -54,5 +58,6 @@ class Places:
         self.obstacles: Bools = (model.geom_contype & layers.OBSTACLE) != 0
         owner = model.body_rootid[model.geom_bodyid]
         self.own: Bools = owner == model.body(prefix + robot.link_names[0]).id
+        self.kinds: Ints = self.own + 2 * self.obstacles.astype(np.int64)
         bodies = [model.body(n).name.removeprefix(prefix) for n in range(model.nbody)]
         self.parts: list[str] = [bodies[n] for n in model.geom_bodyid.tolist()]

@@ -6,8 +6,9 @@ Another process draws it without the engine.
 from __future__ import annotations
 
 import io
+import struct
 import zipfile
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 from antennate.errors import BadInputError
 from antennate.sim import layers
 from antennate.sim.appearance import Colour, colours
+from antennate.sim.contacts import Contacts
 from antennate.types import Bools, Floats, Ints
 
 SPHERE = int(mujoco.mjtGeom.mjGEOM_SPHERE)
@@ -31,6 +33,8 @@ _HIDDEN_GROUP = 3
 """Geoms of this group and above are collision shapes that no viewer of the engine shows."""
 _OURS = layers.LEG | layers.BODY | layers.ANTENNA
 _LARGEST = 1 << 26
+_SNAPSHOT = struct.Struct("<dIII")
+"""Begin of a snapshot: time [s], geoms, contacts, rows of constraint forces."""
 
 Poses = NDArray[np.float32]
 """Place and rotation matrix of each shape, row by row, shape (n, 12)."""
@@ -42,6 +46,8 @@ class Shapes(NamedTuple):
     """The shapes of a model.
 
     Attributes:
+        geom: Numbers of their geoms, shape (n,).
+        sides: 1 for a geom of the robot, 2 for the floor, 0 for others, shape (geoms,).
         kind: SPHERE, CAPSULE, ELLIPSOID, CYLINDER, BOX or MESH, shape (n,).
         size: Half sizes as the engine has them [m], shape (n, 3).
         colour: Red, green, blue and opacity, 0 to 255, shape (n, 4).
@@ -55,6 +61,8 @@ class Shapes(NamedTuple):
         floor: Height of the floor [m], shape (1,); NaN without one.
     """
 
+    geom: Ints
+    sides: Ints
     kind: Ints
     size: NDArray[np.float32]
     colour: NDArray[np.uint8]
@@ -88,6 +96,47 @@ class Shapes(NamedTuple):
             raise BadInputError(f"expected the shapes of a model, found {error}") from None
 
 
+def snapshot(data: mujoco.MjData) -> bytes:
+    """All that a picture of a state needs, as the engine has it, for another process.
+
+    What of it is drawn is found there, by `picture`, so that the simulation soon goes on.
+    """
+    places, contacts = data.geom_xpos, Contacts.of(data)
+    counts = len(places), len(contacts.geoms), len(contacts.force)
+    head = _SNAPSHOT.pack(data.time, *counts)
+    return b"".join((head, places.data, data.geom_xmat.data, *(part.data for part in contacts)))
+
+
+def picture(content: bytes, shapes: Shapes) -> tuple[float, Poses, Arrows]:
+    """Time [s] of a snapshot, where the shapes are, and normal forces of obstacles on the robot.
+
+    Raises:
+        BadInputError: It is something else, or of another model.
+    """
+    try:
+        t, geoms, count, rows = _SNAPSHOT.unpack_from(content)
+        found, at = list[NDArray[Any]](), _SNAPSHOT.size
+        for kind, *shape in (
+            *((float, geoms, 3), (float, geoms, 9)),
+            *((np.int32, count, 2), (np.int32, count), (float, count, 3), (float, count, 9)),
+            (float, rows),
+        ):
+            found.append(np.ndarray(shape, kind, content, at))
+            at += found[-1].nbytes
+        places, turned, *parts = found
+        contacts = Contacts._make(parts)
+        poses = np.empty((len(shapes.geom), 12), np.float32)
+        poses[:, :3], poses[:, 3:] = places[shapes.geom], turned[shapes.geom]
+        which, force = contacts.between(shapes.sides, 1)  # the robot's, and no floor
+    except (struct.error, TypeError, ValueError, IndexError) as error:
+        raise BadInputError(f"expected a snapshot of this model, found {error}") from None
+    arrows = np.empty((len(which), 6), np.float32)
+    arrows[:, :3] = contacts.place[which]
+    sign = np.where(shapes.sides[contacts.geoms[which, 1]] == 1, 1.0, -1.0)
+    arrows[:, 3:] = contacts.frame[which, :3] * (sign * force)[:, None]
+    return t, poses, arrows
+
+
 class VisibleModel:
     """A model and what can be seen of it.
 
@@ -116,6 +165,8 @@ class VisibleModel:
         mesh = np.where(model.geom_type[shown] == MESH, model.geom_dataid[shown], -1)
         numbers = range(model.nmesh)
         return Shapes(
+            geom=shown,
+            sides=self._ours + 2 * self._floor.astype(np.int64),
             kind=model.geom_type[shown].astype(np.int64),
             size=model.geom_size[shown].astype(np.float32),
             colour=self._colour,
@@ -143,20 +194,6 @@ class VisibleModel:
         found = np.empty((len(self._shown), 12), np.float32)
         found[:, :3] = data.geom_xpos[self._shown]
         found[:, 3:] = data.geom_xmat[self._shown]
-        return found
-
-    def forces(self, data: mujoco.MjData) -> Arrows:
-        """Normal forces of obstacles on the robot in the last physics step."""
-        contact = data.contact
-        geoms = contact.geom
-        ours = self._ours[geoms]
-        on = (ours[:, 0] != ours[:, 1]) & ~self._floor[geoms].any(axis=1)
-        which = np.flatnonzero(on & (contact.efc_address >= 0))
-        force = data.efc_force[contact.efc_address[which]]
-        sign = np.where(ours[which, 1], 1.0, -1.0)  # the normal points to the second geom
-        found = np.empty((len(which), 6), np.float32)
-        found[:, :3] = contact.pos[which]
-        found[:, 3:] = contact.frame[which, :3] * (sign * force)[:, None]
         return found
 
     def move(self, data: mujoco.MjData, body: int, x: float, y: float) -> bool:

@@ -17,12 +17,13 @@ from antennate.params.scene import PhysicsParams
 from antennate.robots.spec import RobotSpec
 from antennate.sim import layers, robot_part
 from antennate.sim.bounds import ANGLE_LIMIT, DISTANCE_LIMIT, HEIGHT_LIMIT, SPEED_LIMIT, broken
+from antennate.sim.contacts import Contacts
 from antennate.sim.gears import Gears
 from antennate.sim.outline import outline
-from antennate.sim.places import Places
+from antennate.sim.places import ROBOT_AND_OBSTACLE, Places
 from antennate.sim.scenes.scene import SceneInstance, add_floor
 from antennate.sim.servo_drives import ServoDrives
-from antennate.types import Bools, Floats
+from antennate.types import Bools, Floats, Ints
 
 mujoco.set_mju_user_warning(lambda message: None)
 """The engine prints its warnings and writes them to a file; we read its counters instead."""
@@ -146,9 +147,9 @@ class World:
         mujoco.mj_getState(self.model, self.data, found, kind)
         return found
 
-    def coordinates(self) -> tuple[int, list[float]]:
-        """Number of the robot's first coordinate, and all coordinates of the model [m, rad]."""
-        return self._root, self._qpos.tolist()
+    def coordinates(self) -> tuple[int, Floats]:
+        """Number of the robot's first coordinate, and all of the model as they are [m, rad]."""
+        return self._root, self._qpos
 
     def place_all(self, position: Floats) -> None:
         """Put everything at coordinates of the model [m, rad], shape (nq,), without physics."""
@@ -294,29 +295,31 @@ class World:
         address = self.data.contact.efc_address[self._on_obstacles()]
         return float(self.data.efc_force[address[address >= 0]].sum())
 
-    def obstacle_contacts(self) -> tuple[list[str], Floats, Floats]:
-        """Where the robot touched obstacles in the last physics step.
+    def obstacle_contacts(
+        self, contacts: Contacts | None = None
+    ) -> tuple[Ints, list[str], Floats, Floats]:
+        """Where the robot touched obstacles in the last physics step, or in an earlier one.
+
+        Args:
+            contacts: All of that step, None for the last.
 
         Returns:
-            The part of the robot, the place [m], shape (contacts, 3), and the normal force [N],
+            Number, part of the robot, place [m], shape (contacts, 3), and normal force [N],
             shape (contacts,), of each contact.
         """
-        found = np.flatnonzero(self._on_obstacles())
-        if not len(found):
-            return [], np.zeros((0, 3)), np.zeros(0)
-        contact = self.data.contact
-        address = contact.efc_address[found]
-        found, address = found[address >= 0], address[address >= 0]
-        geoms = contact.geom[found]
-        ours = np.where(self.places.own[geoms[:, 0]], geoms[:, 0], geoms[:, 1])
+        found = contacts or Contacts.of(self.data)
+        which, force = found.between(self.places.kinds, ROBOT_AND_OBSTACLE)
+        if not len(which):
+            return which, [], np.zeros((0, 3)), force
+        first, second = found.geoms[which].T
+        ours = np.where(self.places.own[first], first, second)
         names = [self.places.parts[geom] for geom in ours.tolist()]
-        return names, contact.pos[found], self.data.efc_force[address]
+        return which, names, found.place[which], force
 
     def _on_obstacles(self) -> Bools:
         """Contacts between the robot and an obstacle, shape (contacts,)."""
-        geoms = self.data.contact.geom
-        kind = self.places.obstacles[geoms]
-        return (kind[:, 0] != kind[:, 1]) & self.places.own[geoms].any(axis=1)
+        kinds = self.places.kinds[self.data.contact.geom]
+        return kinds[:, 0] + kinds[:, 1] == ROBOT_AND_OBSTACLE
 
     def set_leg_friction(self, friction: Floats) -> None:
         """Give every leg its own sliding friction, shape (2 L,)."""

@@ -18,7 +18,7 @@ import subprocess
 import sys
 import threading
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Self
 
@@ -27,10 +27,16 @@ import numpy as np
 from antennate.errors import LogError
 from antennate.messages import one_line
 from antennate.telemetry.header import Header
-from antennate.telemetry.rows import RowLog, TickRow
+from antennate.telemetry.rows import RowLog
+from antennate.telemetry.topics import CONTACT_FORCES, COORDINATES, Topic
+from antennate.types import Floats
 
+_NOTHING: Mapping[Topic, bytes] = {}
+_Log = RowLog[Mapping[Topic, bytes]]
 _HEAD = struct.Struct("<BI")
 _ROW, _FORCES, _PLACE, _EVENT, _FIRST, _END = range(6)
+_BESIDE = {CONTACT_FORCES: _FORCES, COORDINATES: _PLACE}
+_TOPICS = {kind: topic for topic, kind in _BESIDE.items()}
 _ROOM = 1 << 20
 """Bytes that the pipe may hold: about 10 s of ticks."""
 _WAITING = 3000
@@ -85,12 +91,11 @@ class LogProcess:
         text = self._process.stdout.readline().decode("utf-8", "replace")
         return text.strip() if text else "expected a process that writes the log, found none"
 
-    def add(self, row: TickRow) -> None:
-        """Hand over one tick; it is dropped if there is no room."""
-        parts = [(_FORCES, row.forces), (_PLACE, row.place), (_ROW, row.numbers.tobytes())]
-        found = b"".join(
-            _HEAD.pack(kind, len(content)) + content for kind, content in parts if content
-        )
+    def add(self, numbers: Floats, beside: Mapping[Topic, bytes] = _NOTHING) -> None:
+        """Hand over one tick, its numbers as of `RowLog.row`; it is dropped if there is no room."""
+        parts = [(_BESIDE[topic], data) for topic, data in beside.items()]
+        parts.append((_ROW, numbers.tobytes()))
+        found = b"".join(_HEAD.pack(kind, len(content)) + content for kind, content in parts)
         self._hand_over(found)
 
     def event(self, text: str) -> None:
@@ -147,7 +152,7 @@ class LogProcess:
             message = message[os.write(self._pipe, message) :]
 
 
-def _messages(log: RowLog | None = None) -> Iterator[tuple[int, bytes]]:
+def _messages(log: _Log | None = None) -> Iterator[tuple[int, bytes]]:
     """What comes, until the pipe closes."""
     with open(_STDIN, "rb", buffering=0, closefd=False) as stream:
         while True:
@@ -171,17 +176,16 @@ def _read(file: int, count: int) -> bytes:
     return found
 
 
-def _keep(log: RowLog) -> bool:
+def _keep(log: _Log) -> bool:
     """Write what comes; whether the simulation ended the log."""
-    forces = place = None
+    beside: dict[Topic, bytes] = {}
     for kind, content in _messages(log):
-        if kind == _FORCES:
-            forces = content
-        elif kind == _PLACE:
-            place = content
+        if kind in _TOPICS:
+            beside[_TOPICS[kind]] = content
         elif kind == _ROW:
-            log.add(TickRow(np.frombuffer(content), forces, place))
-            forces = place = None
+            log.row[:] = np.frombuffer(content)
+            log.add(beside)
+            beside = {}
         elif kind == _EVENT:
             log.event(content.decode())
         else:
@@ -195,7 +199,7 @@ def main() -> int:
         signal.signal(number, signal.SIG_IGN)
     _, first = next(_messages(), (_FIRST, b""))
     try:
-        log = RowLog(Path(sys.argv[1]), Header.unpack(first))
+        log = _Log(Path(sys.argv[1]), Header.unpack(first), list)
     except LogError as error:
         os.write(_STDOUT, one_line(str(error)).encode() + b"\n")
         return 1

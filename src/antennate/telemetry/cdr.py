@@ -112,13 +112,17 @@ class Form:
     Args:
         kind: The type.
         values: The values of all, one for each field.
-        varying: Fields whose numbers are replaced in each, by as many.
+        varying: Fields whose numbers may be replaced in each, by as many.
+
+    Attributes:
+        size: Bytes of each.
     """
 
     def __init__(self, kind: MessageType, values: Sequence[Any], varying: Sequence[str]) -> None:
-        self._data = kind.encode(*values)
+        data = kind.encode(*values)
+        self._data, self.size = np.frombuffer(data, np.uint8), len(data)
         formats, offsets = list[Any](), list[int]()
-        body, at = self._data[len(_HEADER) :], 0
+        body, at = data[len(_HEADER) :], 0
         for each in kind.fields:
             value, at = _take(body, at, each)
             if each.name in varying:
@@ -128,17 +132,27 @@ class Form:
                 offsets.append(len(_HEADER) + at - width)
         names = [each.name for each in kind.fields if each.name in varying]
         self._layout = np.dtype(
-            {"names": names, "formats": formats, "offsets": offsets, "itemsize": len(self._data)}
+            {"names": names, "formats": formats, "offsets": offsets, "itemsize": self.size}
         )
 
-    def encode(self, columns: Mapping[str, NDArray[Any]]) -> list[bytes]:
-        """The bytes of messages with these numbers, shape (n,), or (n, count) of several."""
-        size, count = len(self._data), len(next(iter(columns.values())))
-        block = np.frombuffer(bytearray(self._data * count), self._layout)
+    def encode(self, count: int, columns: Mapping[str, Any]) -> NDArray[np.uint8]:
+        """The bytes of messages with these numbers, a row each; shape (count, bytes).
+
+        Args:
+            count: How many.
+            columns: Numbers of some fields, of each message or the same of all, shape (count,) or
+                (), and one axis more where a field has several. Other fields are as in `values`.
+        """
+        found = np.empty((count, self.size), np.uint8)
+        self.fill(found, columns)
+        return found
+
+    def fill(self, into: NDArray[np.uint8], columns: Mapping[str, Any]) -> None:
+        """Write what `encode` gives to an array, shape (count, bytes)."""
+        into[:] = self._data
+        block = into.view(self._layout)[:, 0]
         for name, column in columns.items():
             block[name] = column
-        whole = block.tobytes()
-        return [whole[at : at + size] for at in range(0, len(whole), size)]
 
 
 def _field(line: str) -> Field:
@@ -163,19 +177,26 @@ def _put(body: bytearray, field: Field, value: Any) -> None:
     if field.number is None:
         body += bytes(-len(body) % 4) + _COUNT.pack(len(value))
     values: Sequence[Any] = value if field.number != 0 else (value,)
-    if values:
+    if len(values):
         width = struct.calcsize(f"<{field.code}")
-        body += bytes(-len(body) % width) + struct.pack(f"<{len(values)}{field.code}", *values)
+        body += bytes(-len(body) % width)
+        if isinstance(values, np.ndarray):
+            body += values.astype(f"<{field.code}", copy=False).tobytes()
+        else:
+            body += struct.pack(f"<{len(values)}{field.code}", *values)
 
 
 @lru_cache(maxsize=256)
 def _strings(values: tuple[str, ...]) -> bytes:
     """A sequence of strings that begins at a multiple of four bytes."""
-    body = bytearray(_COUNT.pack(len(values)))
-    for text in values:
-        data = text.encode("utf-8", "backslashreplace")
-        body += bytes(-len(body) % 4) + _COUNT.pack(len(data) + 1) + data + b"\0"
-    return bytes(body)
+    found = [_COUNT.pack(len(values)), *map(_string, values)]
+    return b"".join([each + bytes(-len(each) % 4) for each in found[:-1]] + found[-1:])
+
+
+@lru_cache(maxsize=256)
+def _string(text: str) -> bytes:
+    data = text.encode("utf-8", "backslashreplace")
+    return _COUNT.pack(len(data) + 1) + data + b"\0"
 
 
 def _take(body: bytes, at: int, field: Field) -> tuple[Any, int]:

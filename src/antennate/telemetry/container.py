@@ -9,9 +9,10 @@ from __future__ import annotations
 import struct
 import zlib
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any, Protocol
 
+import numpy as np
 from mcap.data_stream import RecordBuilder
 from mcap.opcode import Opcode
 from mcap.records import (
@@ -28,13 +29,17 @@ from mcap.records import (
 )
 from zstandard import ZstdCompressor
 
+from antennate.telemetry.cdr import Form
 from antennate.telemetry.chunks import MAGIC
+from antennate.types import Ints
 
 _COMPRESSION = "zstd"
 _EFFORT = 1
 """Level of the compression: files are 1 % larger than at the usual 3, and it takes a third less."""
 _MESSAGE = struct.Struct("<BQHIQQ")
 """Kind, length, channel, number, and twice the time [ns]: logged and published."""
+_MESSAGES = np.dtype("u1,<u8,<u2,<u4,<u8,<u8")
+"""The same of many at once."""
 _INDEX = struct.Struct("<BQHI")
 """Kind, length, channel, bytes of the pairs of time and place that follow."""
 _HEAD = struct.calcsize("<BQ")
@@ -97,17 +102,58 @@ class Container:
         """Add a message to the chunk, with its number and its time [ns]."""
         content, length = self._content, _MESSAGE.size - _HEAD + len(data)
         record = _MESSAGE.pack(Opcode.MESSAGE, length, channel, number, time, time) + data
-        index = self._indexes.get(channel)
-        if index is None:
-            index = self._indexes[channel] = []
-        index += (time, len(content))
+        self._index_of(channel).extend((time, len(content)))
         content += record
+
+    def add_rows(
+        self,
+        numbers: Ints,
+        times: Ints,
+        messages: Mapping[int, tuple[Form, Mapping[str, Any]]],
+        beside: Mapping[int, Mapping[int, bytes]],
+    ) -> None:
+        """Add rows of messages, one of each channel a row, as `add` would do one after the other.
+
+        Args:
+            numbers: Number of the messages of each row, shape (n,).
+            times: Their time [ns], shape (n,).
+            messages: By channel, the form of its messages and the columns of their numbers.
+            beside: More messages of single rows, by row and by channel.
+        """
+        starts, size = dict[int, int](), 0
+        for channel, (form, _) in messages.items():
+            starts[channel] = size
+            size += _MESSAGE.size + form.size
+        block = np.empty((len(times), size), np.uint8)
+        for channel, (form, columns) in messages.items():
+            begin = starts[channel] + _MESSAGE.size
+            head = block[:, starts[channel] : begin].view(_MESSAGES)[:, 0]
+            length = _MESSAGE.size - _HEAD + form.size
+            found = Opcode.MESSAGE, length, channel, numbers, times, times
+            for name, value in zip(head.dtype.names or (), found, strict=True):
+                head[name] = value
+            form.fill(block[:, begin : begin + form.size], columns)
+        begins, done = np.empty(len(times), np.int64), 0
+        for row in sorted({*beside, len(times) - 1}):
+            begins[done : row + 1] = len(self._content) + size * np.arange(row + 1 - done)
+            self._content += block[done : row + 1].data
+            done = row + 1
+            for channel, data in beside.get(row, {}).items():
+                self.add(channel, int(numbers[row]), int(times[row]), data)
+        for channel, start in starts.items():
+            self._index_of(channel).extend(
+                np.stack([times, begins + start], axis=1).ravel().tolist()
+            )
+
+    def _index_of(self, channel: int) -> list[int]:
+        """Times and places of the messages of a channel in this chunk."""
+        return self._indexes.setdefault(channel, [])
 
     def end_chunk(self) -> None:
         """Write the chunk, unless no message is in it."""
         if not self._indexes:
             return
-        content, indexes = bytes(self._content), self._indexes
+        content, indexes = self._content, self._indexes
         self._content, self._indexes = bytearray(), {}
         times = [time for index in indexes.values() for time in (min(index[::2]), max(index[::2]))]
         chunk = Chunk(

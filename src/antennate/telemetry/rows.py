@@ -7,8 +7,9 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple, Self
+from typing import Any, Generic, Self, TypeVar
 
 import numpy as np
 
@@ -16,8 +17,6 @@ from antennate.telemetry.cdr import Form
 from antennate.telemetry.header import Header
 from antennate.telemetry.topics import (
     ANTENNA,
-    CONTACT_FORCES,
-    COORDINATES,
     JOINT_COMMANDS,
     JOINT_STATES,
     MANEUVER,
@@ -26,35 +25,24 @@ from antennate.telemetry.topics import (
 from antennate.telemetry.writer import FLUSH, LogWriter
 from antennate.types import Floats
 
+Beside = TypeVar("Beside")
 HEAD = 9
-"""Numbers of a row before those of the joints: t, maneuver, phase, counts, level, contact."""
+"""Numbers of a row before those of the joints: t, maneuver, phase, counts, level, contact. Then
+come the angles commanded [rad], and angles [rad], speeds [rad/s] and torques [N·m] measured."""
 _LEAST_FREE = 1e8
 """Room for many trials [byte] (assumed)."""
 _MOST = 256
 """Ticks that are encoded at once."""
 
 
-class TickRow(NamedTuple):
-    """One tick.
-
-    Attributes:
-        numbers: Shape (HEAD + 4 joints,): what `HEAD` says, then the angles commanded [rad], and
-            angles [rad], speeds [rad/s] and torques [N·m] measured.
-        forces: The message of the contact forces, None where nobody looked or nothing touches.
-        place: The message of the coordinates, None where nobody looked.
-    """
-
-    numbers: Floats
-    forces: bytes | None = None
-    place: bytes | None = None
-
-
-class RowLog:
+class RowLog(Generic[Beside]):
     """One file, new; as a context it closes itself.
 
     Args:
         path: A file that does not exist yet.
         header: What stands at its beginning.
+        messages: Makes, of what was given beside some ticks, more messages of each; as late as
+            possible, many at once.
 
     Attributes:
         path: The file.
@@ -63,28 +51,39 @@ class RowLog:
         LogError: The file exists or cannot be written, or the disk is nearly full.
     """
 
-    def __init__(self, path: Path, header: Header) -> None:
-        self.path = path
+    def __init__(
+        self,
+        path: Path,
+        header: Header,
+        messages: Callable[[Sequence[Beside]], Sequence[Mapping[Topic, bytes]]],
+    ) -> None:
+        self.path, self._messages = path, messages
         self._out = LogWriter(path, header, _LEAST_FREE)
         self._angles = len(header.robot.joint_names)
         self._forms = _forms(header.robot.joint_names)
-        self._start = header.start
         self._held: Floats = np.empty((_MOST, HEAD + 4 * self._angles))
-        self._forces: list[bytes | None] = []
-        self._places: list[bytes | None] = []
+        self._beside: dict[int, Beside] = {}
         self._count, self._since = 0, math.inf
 
-    def add(self, row: TickRow) -> None:
-        """Keep one tick.
+    @property
+    def row(self) -> Floats:
+        """Where the numbers of the next tick go, as `HEAD` says, shape (HEAD + 4 joints,)."""
+        return self._held[self._count]
+
+    def add(self, beside: Beside | None = None) -> None:
+        """Keep the tick whose numbers are in `row`.
+
+        Args:
+            beside: What more messages are made of, None for no more.
 
         Raises:
             LogError: The disk is full or gone.
         """
-        self._held[self._count], forces, place = row
-        self._forces.append(forces)
-        self._places.append(place)
+        if beside is not None:
+            self._beside[self._count] = beside
         now = time.monotonic()
-        self._since = min(self._since, now)
+        if not self._count:
+            self._since = now
         self._count += 1
         if self._count == _MOST or now - self._since >= FLUSH:
             self.flush()
@@ -130,14 +129,13 @@ class RowLog:
             LogError: The disk is full or gone.
         """
         count, self._count, self._since = self._count, 0, math.inf
-        forces, self._forces = self._forces, []
-        places, self._places = self._places, []
+        beside, self._beside = self._beside, {}
         if not count:
             return
         rows = self._held[:count]
         t, angles = rows[:, 0], self._angles
         joints = [rows[:, at : at + angles] for at in range(HEAD, rows.shape[1], angles)]
-        stamps = self._start + np.rint(1e9 * t).astype(np.int64)
+        stamps = self._out.stamps(t)
         time = {"sec": stamps // 10**9, "nanosec": stamps % 10**9}
         columns: dict[Topic, dict[str, Any]] = {
             ANTENNA: {
@@ -158,12 +156,9 @@ class RowLog:
             | dict(zip(("position", "velocity", "effort"), joints[1:], strict=True)),
         }
         self._out.write_many(
-            t.tolist(),
-            {
-                **{topic: self._forms[topic].encode(each) for topic, each in columns.items()},
-                CONTACT_FORCES: forces,
-                COORDINATES: places,
-            },
+            stamps,
+            {topic: (self._forms[topic], each) for topic, each in columns.items()},
+            dict(zip(beside, self._messages([*beside.values()]), strict=True)) if beside else {},
         )
 
 

@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from antennate.robots.spec import RobotSpec
+from antennate.sim.contacts import Contacts
 from antennate.sim.world import World
+from antennate.telemetry.cdr import Form
 from antennate.telemetry.header import Header
-from antennate.telemetry.rows import HEAD, RowLog, TickRow
-from antennate.telemetry.ticks import numbers_of
-from antennate.telemetry.topics import CONTACT_FORCES, COORDINATES
+from antennate.telemetry.rows import HEAD, RowLog
+from antennate.telemetry.ticks import floats_of
+from antennate.telemetry.topics import CONTACT_FORCES, COORDINATES, Topic
 from antennate.types import AntennaFrame, Floats, JointCommand
 
 _LOOK_EVERY = 10
@@ -27,19 +30,41 @@ class Decisions:
         robot: Its description.
         controller: What decides: its `level`, `contact`, `maneuver` and `phase` are read after
             each step.
+        batch: B, its rows.
     """
 
-    def __init__(self, robot: RobotSpec, controller: Any) -> None:
-        self._controller, self._parts = controller, list(robot.command_shapes())
+    def __init__(self, robot: RobotSpec, controller: Any, batch: int = 1) -> None:
+        self._controller, self._batch = controller, batch
+        self._rows: Floats = np.empty((batch, HEAD + len(robot.joint_names)))
+        self._t, self._maneuver, self._phase = self._rows.T[:3]
+        self._counts, self._level, self._contact = (self._rows[:, at : at + 2] for at in (3, 5, 7))
+        self._joints: list[tuple[str, Floats]] = []
+        at = HEAD
+        for name, shape in robot.command_shapes().items():
+            size = math.prod(shape[1:])
+            self._joints.append((name, self._rows[:, at : at + size].reshape(batch, *shape[1:])))
+            at += size
 
     def take(self, frame: AntennaFrame, command: JointCommand) -> Floats:
-        """One tick: how the rows of its logs begin, shape (B, HEAD + joints)."""
-        made, batch = self._controller, len(frame.t)
-        phases = numbers_of(made, "phase")
-        phase = phases if len(phases) == batch else (math.nan,) * batch
-        head = np.array([frame.t, made.maneuver, phase]).T
-        joints = [getattr(command, name).reshape(batch, -1) for name in self._parts]
-        return np.concatenate([head, frame.counts, made.level, made.contact, *joints], axis=1)
+        """One tick: how the rows of its logs begin, shape (B, HEAD + joints).
+
+        The next tick replaces them.
+        """
+        made = self._controller
+        phase = floats_of(made, "phase")
+        self._t[:], self._maneuver[:] = frame.t, made.maneuver
+        self._phase[:] = phase if len(phase) == self._batch else math.nan
+        self._counts[:], self._level[:], self._contact[:] = frame.counts, made.level, made.contact
+        for name, part in self._joints:
+            part[:] = getattr(command, name)
+        return self._rows
+
+
+class Look(NamedTuple):
+    """What is seen beside a tick: the state of the engine and its contacts."""
+
+    place: Floats
+    contacts: Contacts
 
 
 class TickRows:
@@ -50,32 +75,44 @@ class TickRows:
     """
 
     def __init__(self, world: World) -> None:
-        self._world = world
-        angles = len(world.robot.joint_names)
-        self._numbers: Floats = np.empty(HEAD + 4 * angles)
-        self._decided = self._numbers[: HEAD + angles]
-        self._measured = self._numbers[HEAD + angles :].reshape(3, angles)
-        self._ticks = 0
+        self._world, self._angles = world, len(world.robot.joint_names)
+        self._decided, self._ticks = HEAD + self._angles, 0
+        self._root, place = world.coordinates()
+        values = self._root, (0.0,) * len(place)
+        self._form = Form(COORDINATES.type, values, ("position",))
 
-    def take(self, decided: Floats) -> TickRow:
-        """One tick, from the robot's row of `Decisions`; the next one replaces its numbers."""
-        self._decided[:] = decided
-        self._world.measure_drives(self._measured)
+    def take(self, decided: Floats, row: Floats) -> Look | None:
+        """One tick; what is seen beside it, None where nobody looks.
+
+        Args:
+            decided: The robot's row of `Decisions`.
+            row: Where all numbers of the tick go, shape (HEAD + 4 joints,).
+        """
+        row[: self._decided] = decided
+        self._world.measure_drives(row[self._decided :].reshape(3, self._angles))
         self._ticks += 1
         if (self._ticks - 1) % _LOOK_EVERY:
-            return TickRow(self._numbers)
-        place = COORDINATES.type.encode(*self._world.coordinates())
-        return TickRow(self._numbers, _contacts(self._world), place)
+            return None
+        return Look(self._world.coordinates()[1].copy(), Contacts.of(self._world.data))
+
+    def messages(self, looks: Sequence[Look]) -> list[dict[Topic, bytes]]:
+        """The messages of each of some looks; many at once take hardly longer than one."""
+        places = np.array([look.place for look in looks])
+        rows = self._form.encode(len(looks), {"position": places})
+        found = [{COORDINATES: row.tobytes()} for row in rows]
+        ends = np.cumsum([len(look.contacts.geoms) for look in looks])
+        contacts = Contacts.joined([look.contacts for look in looks])
+        which, names, points, forces = self._world.obstacle_contacts(contacts)
+        begin, kind = 0, CONTACT_FORCES.type
+        for message, end in zip(found, np.searchsorted(which, ends).tolist(), strict=True):
+            if begin < end:
+                part = slice(begin, end)
+                message[CONTACT_FORCES] = kind.encode(names[part], *points[part].T, forces[part])
+            begin = end
+        return found
 
 
-def _contacts(world: World) -> bytes | None:
-    names, places, forces = world.obstacle_contacts()
-    if not names:
-        return None
-    return CONTACT_FORCES.type.encode(names, *places.T.tolist(), forces.tolist())
-
-
-class SimulatedLog(RowLog):
+class SimulatedLog(RowLog[Look]):
     """The log of one simulated robot, tick by tick; as a context it closes itself.
 
     Args:
@@ -88,8 +125,8 @@ class SimulatedLog(RowLog):
     """
 
     def __init__(self, path: Path, header: Header, world: World) -> None:
-        super().__init__(path, header)
         self._rows = TickRows(world)
+        super().__init__(path, header, self._rows.messages)
 
     def take(self, decided: Floats) -> None:
         """Keep one tick, from the robot's row of `Decisions`.
@@ -97,4 +134,4 @@ class SimulatedLog(RowLog):
         Raises:
             LogError: The disk is full or gone.
         """
-        self.add(self._rows.take(decided))
+        self.add(self._rows.take(decided, self.row))

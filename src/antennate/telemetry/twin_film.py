@@ -45,7 +45,7 @@ class TwinFilm:
         self._ticks += 1
         if self.full or not self._recorder.due(t):
             return
-        names, _, _ = world.obstacle_contacts()
+        _, names, _, _ = world.obstacle_contacts()
         self._recorder.take(
             *(t, world.data.qpos, world.links().mean(axis=0)),
             counts=self._robot.counts,

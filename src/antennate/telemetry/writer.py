@@ -14,15 +14,20 @@ import math
 import os
 import threading
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
+
+import numpy as np
 
 from antennate import __version__
 from antennate.errors import LogError
 from antennate.files import require_room
+from antennate.telemetry.cdr import Form
 from antennate.telemetry.header import Header
 from antennate.telemetry.ticks import Tick
 from antennate.telemetry.topics import EVENTS, TOPICS, Topic
+from antennate.types import Floats, Ints
 
 LEAST_FREE = 1e9
 """Room for six hours of ticks at 100 Hz [byte] (assumed)."""
@@ -36,6 +41,8 @@ _NUMBERS = 0xFFFFFFFF
 """A message's number has 32 bits."""
 _LATEST = (2**31 - 1) * 10**9
 """No message is later [ns]: seconds have 32 bits in ROS 2, up to the year 2038."""
+_LONGEST = 1e9
+"""Longest time of a tick that is one [s]; a NaN is none either."""
 _LEVELS = {"HOLD": 30, "FAULT": 50, "OFF": 20, "DEGRADED": 30}
 """Levels of rcl_interfaces/msg/Log: 20 INFO, 30 WARN, 50 FATAL."""
 
@@ -118,27 +125,44 @@ class LogWriter:
         self.settle()
 
     def write_many(
-        self, times: Sequence[float], messages: Mapping[Topic, Sequence[bytes | None]]
+        self,
+        stamps: Ints,
+        messages: Mapping[Topic, tuple[Form, Mapping[str, Any]]],
+        beside: Mapping[int, Mapping[Topic, bytes]],
     ) -> None:
         """Add ticks that follow one another, made elsewhere, and hand them over at once.
 
         Args:
-            times: Time of each [s].
-            messages: What `Tick.messages` would give, by topic; None where there is nothing.
+            stamps: Time of each [ns], none before the last one's, shape (n,).
+            messages: What `Tick.messages` would give of each, by topic: the form of its messages
+                and the columns of their numbers.
+            beside: More messages of single ticks, by tick and topic.
 
         Raises:
             LogError: The disk is full or gone.
         """
         if self.failure:
             return
-        channels, add = [self._channels[topic] for topic in messages], self._container.add
-        for now, *each in zip(times, *messages.values(), strict=True):
-            stamp = self._time = self._stamp(now)
-            self.written += 1
-            for channel, data in zip(channels, each, strict=True):
-                if data is not None:
-                    add(channel, self.written & _NUMBERS, stamp, data)
+        numbers = (self.written + 1 + np.arange(len(stamps))) & _NUMBERS
+        self.written += len(stamps)
+        self._time = int(stamps[-1])
+        channels = self._channels
+        self._container.add_rows(
+            numbers,
+            stamps,
+            {channels[topic]: found for topic, found in messages.items()},
+            {
+                tick: {channels[topic]: data for topic, data in each.items()}
+                for tick, each in beside.items()
+            },
+        )
         self.flush()
+
+    def stamps(self, times: Floats) -> Ints:
+        """Times of the messages of ticks at times [s] that follow one another [ns], shape (n,)."""
+        since = np.rint(1e9 * np.where(np.abs(times) < _LONGEST, times, 0.0)).astype(np.int64)
+        found = np.clip(self._header.start + since, 0, _LATEST)
+        return np.maximum.accumulate(np.maximum(found, self._time))
 
     def add(self, topic: Topic, number: int, stamp: int, data: bytes) -> None:
         """Add a message as it is, of a tick and a time [ns]; it is not counted as a tick."""
@@ -206,7 +230,7 @@ class LogWriter:
 
     def _stamp(self, now: float) -> int:
         """Time of messages [ns], never before the last one's."""
-        since = round(1e9 * now) if abs(now) < 1e9 else 0
+        since = round(1e9 * now) if abs(now) < _LONGEST else 0
         return max(self._time, min(max(0, self._header.start + since), _LATEST))
 
     def _event(self, tick: Tick, stamp: int) -> bytes:

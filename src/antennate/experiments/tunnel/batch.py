@@ -153,7 +153,7 @@ class _Rows:
         for row, phase in enumerate(phases):
             control.reset(np.array([row]), phase)
             self._log(row, phase)
-        decisions = Decisions(config.robot, made)
+        decisions = Decisions(config.robot, made, self._batch)
 
         def go_on(frame: AntennaFrame, command: JointCommand) -> bool:
             if self._logs:

@@ -18,11 +18,11 @@ from scipy.spatial.transform import Rotation
 from antennate.errors import BadInputError, MissingPackageError
 from antennate.messages import extra
 from antennate.sim import shapes
-from antennate.sim.shapes import Shapes
+from antennate.sim.shapes import Shapes, picture
 from antennate.telemetry.header import Header
 from antennate.telemetry.ticks import Tick
 from antennate.telemetry.topics import CONFIG, EVENTS, TOPICS, Topic
-from antennate.telemetry.view.channel import HEADER, POSES, SCENE, TEXT, TICK, Poses
+from antennate.telemetry.view.channel import HEADER, POSES, SCENE, SNAPSHOT, TEXT, TICK, Poses
 
 _HOST = "127.0.0.1"
 _IDLE = 0.1
@@ -94,6 +94,8 @@ class FoxgloveSink:
             self._tick(Tick.unpack(content))
         elif kind == POSES and self._shapes is not None:
             self._scene(self._shapes, Poses.unpack(content))
+        elif kind == SNAPSHOT and self._shapes is not None:
+            self._scene(self._shapes, Poses(*picture(content, self._shapes)))
         elif kind == SCENE:
             self._shapes = Shapes.unpack(content)
         elif kind == TEXT:

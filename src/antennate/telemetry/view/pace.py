@@ -58,6 +58,12 @@ class Pace:
         """Show a line."""
         self.channel.send(TEXT, text.encode())
 
+    @property
+    def idle(self) -> bool:
+        """Whether it runs at full speed and no picture is due, so that there is nothing to do."""
+        state = self.state
+        return not (state["speed"] or state["paused"]) and time.monotonic() < self._next
+
     def due(self) -> bool:
         """Whether a picture is due; if so, orders have been taken."""
         now = time.monotonic()

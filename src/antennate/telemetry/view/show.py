@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import html
 import math
-import select
 import time
 from collections import deque
 from collections.abc import Mapping, Sequence
@@ -17,7 +16,7 @@ import numpy as np
 import viser
 
 from antennate.colours import SERIES, rgba
-from antennate.sim.shapes import Shapes, VisibleModel
+from antennate.sim.shapes import Shapes, VisibleModel, picture
 from antennate.telemetry.header import Header
 from antennate.telemetry.log_scene import LogScene
 from antennate.telemetry.ticks import Tick
@@ -26,6 +25,7 @@ from antennate.telemetry.view.channel import (
     HEADER,
     POSES,
     SCENE,
+    SNAPSHOT,
     STATE,
     TEXT,
     TICK,
@@ -64,7 +64,7 @@ def run(channel: Channel, displays: Sequence[Display]) -> None:
     """Show what comes until the program has ended."""
     while not channel.closed:
         wait = min(each.draw(time.monotonic()) for each in displays)
-        select.select((channel,), (), (), wait)
+        time.sleep(min(wait, 1.0 / RATE))  # waking up for each message would cost the program time
         for kind, content in channel.receive():
             if kind == END:
                 return
@@ -122,6 +122,9 @@ class Page:
         """Take a message."""
         if kind == POSES:
             self._poses = Poses.unpack(content)
+            self._note_head()
+        elif kind == SNAPSHOT and self._scene is not None:
+            self._poses = Poses(*picture(content, self._scene.shapes))
             self._note_head()
         elif kind == TICK:
             self._take_tick(Tick.unpack(content))

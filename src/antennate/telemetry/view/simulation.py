@@ -13,13 +13,12 @@ from typing import Any
 from antennate.colours import SERIES, rgba
 from antennate.control.registry import make_controller
 from antennate.errors import ConfigError
-from antennate.hardware.driving.decision import decision_of
 from antennate.messages import one_line
 from antennate.params.control import ControlParams
 from antennate.robots.spec import RobotSpec
-from antennate.sim.shapes import VisibleModel
-from antennate.telemetry.ticks import Tick, decided
-from antennate.telemetry.view.channel import POSES, SCENE, TICK, Channel, Poses
+from antennate.sim.shapes import VisibleModel, snapshot
+from antennate.telemetry.ticks import SIMULATED, floats_of
+from antennate.telemetry.view.channel import SCENE, SNAPSHOT, TICK, Channel
 from antennate.telemetry.view.pace import Pace, Restart
 from antennate.telemetry.view.tuning import Tuning
 from antennate.types import AntennaFrame, Controller
@@ -29,8 +28,6 @@ _FARTHEST = 50.0
 """Farthest from the origin that an obstacle is put [m]; a world beyond 100 m is unsound."""
 NONE = -1
 """Stands for a maneuver where there is none."""
-_NOT_A_NUMBER = (math.nan, math.nan)
-_UNKNOWN = (2, 2)
 
 
 class SimulationView(Pace):
@@ -111,10 +108,12 @@ class SimulationView(Pace):
         Raises:
             Restart: A person wants the trial anew, with a seed.
         """
+        self._number += 1
         if self._seen is not model:
             self._show_model(model)
-        self._data, self._number = data, self._number + 1
-        self._last = frame, controller, maneuver
+        elif self.idle:
+            return ()
+        self._data, self._last = data, (frame, controller, maneuver)
         self.wait(data.time)
         if self.due():
             self.redraw()
@@ -124,9 +123,8 @@ class SimulationView(Pace):
     def redraw(self) -> None:
         """Show where everything is."""
         if self._model is not None and self._data is not None:
-            poses, forces = self._model.poses(self._data), self._model.forces(self._data)
-            self.channel.send(POSES, Poses(self._data.time, poses, forces).pack())
-            self.channel.send(TICK, self._tick(self._data.time, *self._last).pack())
+            tick = self._tick(self._data.time, *self._last)
+            self.channel.send_together((SNAPSHOT, snapshot(self._data)), (TICK, tick))
 
     def _show_model(self, model: Any) -> None:
         self._seen, self._model = model, VisibleModel(model, _SIDES)
@@ -135,15 +133,16 @@ class SimulationView(Pace):
 
     def _tick(
         self, t: float, frame: AntennaFrame | None, controller: Controller | None, maneuver: int
-    ) -> Tick:
-        more: dict[str, Any] = {"phase": math.nan, "contact": _UNKNOWN, "level": _NOT_A_NUMBER}
-        counts = _NOT_A_NUMBER if frame is None else tuple(frame.counts[0].tolist())
-        if controller is not None and frame is not None:
-            choice = decision_of(controller)
-            more |= decided(controller, choice, frame)
-            maneuver = choice.maneuver
-        more |= {"t": t, "counts": counts, "maneuver": maneuver}
-        return Tick(**more, number=self._number, now=t, reading=counts, angles=())
+    ) -> bytes:
+        found: dict[str, Any] = {"t": t, "now": t, "number": self._number, "maneuver": maneuver}
+        if frame is not None:
+            found["counts"] = found["reading"] = frame.counts[0]
+        if controller is not None:
+            phase = floats_of(controller, "phase")
+            found["phase"] = phase[0] if len(phase) == 1 else math.nan
+            found["level"], found["contact"] = controller.level[0], controller.contact[0]
+            found["maneuver"] = controller.maneuver[0]
+        return SIMULATED.encode(1, found).tobytes()
 
     def look(self) -> None:
         """Carry out what the page wants, if it may want anything.
