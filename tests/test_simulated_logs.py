@@ -10,6 +10,7 @@ import sys
 import time
 import tty
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -30,8 +31,9 @@ from antennate.sim import gl
 from antennate.telemetry.apart import LogProcess
 from antennate.telemetry.reader import LogReader
 from antennate.telemetry.rows import HEAD, RowLog
+from antennate.telemetry.simulated import Decisions
 from antennate.telemetry.topics import EVENTS, JOINT_STATES
-from antennate.types import Contact, Floats, Maneuver
+from antennate.types import AntennaFrame, Contact, Floats, JointCommand, Maneuver
 
 TICKS = 60
 TURN = 4096
@@ -244,6 +246,37 @@ def test_what_a_twin_cannot_keep_is_refused_in_one_line(
     assert [path.name for path in Path().iterdir()] == ["here.mcap"]
 
 
+@pytest.mark.parametrize("phase", [np.array([0.5, 0.25]), [0.5, 0.25], (1, 2), "none", None, 3.0])
+def test_decisions_of_any_form_are_kept_as_they_are(phase: Any) -> None:
+    """Numbers of other sizes, views with gaps, integers as levels, a phase of any kind."""
+    spaced = np.arange(24.0).reshape(2, 12)
+    made = SimpleNamespace(
+        maneuver=np.array([1, 4], np.int8),
+        level=np.array([[0, 1], [1, 0]]),
+        contact=np.array([[0, 2], [1, 1]], np.int32),
+        phase=phase,
+    )
+    frame = AntennaFrame(t=np.array([0.25, 0.5]), counts=np.array([[1.0, 2.0], [math.nan, 4.0]]))
+    command = JointCommand(
+        yaw=spaced[:, :10:2],
+        leg=np.ones((2, 6, 2), np.float32),
+        antenna=np.array([[7, 8], [9, 10]]),
+    )
+    decisions = Decisions(ROBOT, made, 2)
+    ticks = [decisions.take(frame, command)] * 3
+    made.level = np.array([[0.5, 0.25], [0.75, 0.125]])
+    ticks.append(decisions.take(frame, command))
+    spaced[:] = -1.0  # what is used anew by its owner
+    found = np.empty((4, HEAD + len(ROBOT.joint_names)))
+    decisions.rows(ticks, 1, found)
+    expected = [*phase] if np.shape(phase) == (2,) else [math.nan] * 2
+    head = [0.5, 4.0, expected[1], math.nan, 4.0, 1.0, 0.0, 1.0, 1.0]
+    row = [*head, 12, 14, 16, 18, 20, *[1.0] * 12, 9.0, 10.0]
+    np.testing.assert_array_equal(found[:3], [row] * 3)
+    row[5:7] = 0.75, 0.125
+    np.testing.assert_array_equal(found[3], row)
+
+
 def rows(count: int) -> Floats:
     """Rows of numbers that follow from their place."""
     width = HEAD + 4 * len(ROBOT.joint_names)
@@ -255,10 +288,9 @@ def rows(count: int) -> Floats:
 
 def test_a_log_of_another_process_is_that_of_this_one(tmp_path: Path) -> None:
     kept = rows(700)
-    with RowLog[Any](tmp_path / "here.mcap", HEADER, list) as log:
+    with RowLog[Floats](tmp_path / "here.mcap", HEADER, lambda ticks: (np.array(ticks), {})) as log:
         for row in kept:
-            log.row[:] = row
-            log.add()
+            log.add(row)
     with LogProcess(tmp_path / "there.mcap", HEADER) as apart:
         for row in kept:
             apart.add(row)

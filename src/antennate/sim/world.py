@@ -8,6 +8,7 @@ the world with a `SimulationError`.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import mujoco
 import numpy as np
@@ -100,6 +101,7 @@ class World:
         robot: The robot in it.
         places: Where the robot's parts are in the model.
         gears: Friction of the gears under load.
+        root: Number of the robot's first coordinate.
         head: Position of the head link [m], shape (3,), a view of the state.
         servo_drives: Gain and limits of the servos' drives.
         t: Time since the world was made [s].
@@ -115,13 +117,13 @@ class World:
         names = [PREFIX + n for n in robot.joint_names]
         stall = np.array([robot.servos.of(n).stall_torque for n in robot.servo_names])
         self.servo_drives = ServoDrives(model, names, stall)
-        self._root = places.root
+        self.root = places.root
         self._steps = 0
         self._before = 0.0
         data = self.data
         self._qpos, self._qvel, self._ctrl = data.qpos, data.qvel, data.ctrl
         self._torque = data.actuator_force
-        self.head: Floats = data.qpos[self._root : self._root + 3]
+        self.head: Floats = data.qpos[self.root : self.root + 3]
         self._bent: Floats = np.zeros(len(self._bounded))
         self._warnings = data.warning.number
         self._no_warning = self._warnings.tobytes()
@@ -134,8 +136,8 @@ class World:
     def place(self, x: float, y: float, heading: float, yaw: Floats, leg: Floats) -> None:
         """Put the head at x, y [m] with a heading [rad], joints at yaw (Y,), leg (L, 2) [rad]."""
         q = self.data.qpos
-        q[self._root : self._root + 2] = x, y
-        q[self._root + 3 : self._root + 7] = math.cos(heading / 2), 0.0, 0.0, math.sin(heading / 2)
+        q[self.root : self.root + 2] = x, y
+        q[self.root + 3 : self.root + 7] = math.cos(heading / 2), 0.0, 0.0, math.sin(heading / 2)
         q[self.places.yaw] = yaw
         q[self.places.legs] = leg.ravel()
         mujoco.mj_forward(self.model, self.data)
@@ -146,10 +148,6 @@ class World:
         found = np.empty(mujoco.mj_stateSize(self.model, kind))
         mujoco.mj_getState(self.model, self.data, found, kind)
         return found
-
-    def coordinates(self) -> tuple[int, Floats]:
-        """Number of the robot's first coordinate, and all of the model as they are [m, rad]."""
-        return self._root, self._qpos
 
     def place_all(self, position: Floats) -> None:
         """Put everything at coordinates of the model [m, rad], shape (nq,), without physics."""
@@ -196,11 +194,21 @@ class World:
         """Torques of all actuators, without what their joints' damping takes [N·m], shape (n,)."""
         return self._torque[self._drive]
 
-    def measure_drives(self, found: Floats) -> None:
-        """Write what `drives`, `drive_speeds` and `drive_torques` give to `found`, shape (3, n)."""
-        self._qpos.take(self.places.driven, out=found[0], mode="clip")
-        self._qvel.take(self.places.turning, out=found[1], mode="clip")
-        self._torque.take(self._drive, out=found[2], mode="clip")
+    def snapshot(self) -> bytes:
+        """Coordinates, speeds and torques as they are, for `measured`."""
+        return b"".join((self._qpos.data, self._qvel.data, self._torque.data))
+
+    def measured(self, snapshots: Sequence[bytes]) -> tuple[Floats, Floats]:
+        """What `drives`, `drive_speeds` and `drive_torques` gave when snapshots were taken.
+
+        Returns:
+            These, shape (n, 3, drives), and all coordinates [m, rad], shape (n, nq).
+        """
+        found = np.frombuffer(b"".join(snapshots)).reshape(len(snapshots), -1)
+        angles, speeds, torques = np.split(found, np.cumsum([self.model.nq, self.model.nv]), axis=1)
+        places = self.places
+        parts = angles[:, places.driven], speeds[:, places.turning], torques[:, places.drives]
+        return np.stack(parts, axis=1), angles
 
     def step(self, count: int) -> None:
         """Advance by `count` physics steps.
@@ -264,7 +272,7 @@ class World:
     @property
     def heading(self) -> float:
         """Yaw of the head link [rad], within (-pi, pi]."""
-        w, x, y, z = self.data.qpos[self._root + 3 : self._root + 7]
+        w, x, y, z = self.data.qpos[self.root + 3 : self.root + 7]
         return math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
 
     def links(self) -> Floats:

@@ -75,7 +75,7 @@ def simulate(
             raise ControllerError(f"tick {ticks + 1}: {checked.faults[0]}")
         recorder.take(frame, command)
         if kept is not None:
-            kept.take(decisions.take(frame, command)[0])
+            kept.take(decisions.take(frame, command))
         ticks += 1
         outcome = "invalid" if robot.failure(0) is not None else "timeout"
         if outcome == "timeout" and ticks % _EVERY == 0:
@@ -93,7 +93,7 @@ def simulate(
                 trial=trial,
                 phase=start.phase,
             )
-            kept = stack.enter_context(SimulatedLog(Path(log), header, start.world))
+            kept = stack.enter_context(SimulatedLog(Path(log), header, start.world, decisions))
         run_loop(robot, checked, control.period, go_on)
     return recorder.series(
         {

@@ -18,7 +18,7 @@ import subprocess
 import sys
 import threading
 from collections import deque
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Self
 
@@ -27,12 +27,12 @@ import numpy as np
 from antennate.errors import LogError
 from antennate.messages import one_line
 from antennate.telemetry.header import Header
-from antennate.telemetry.rows import RowLog
+from antennate.telemetry.rows import RowLog, Rows
 from antennate.telemetry.topics import CONTACT_FORCES, COORDINATES, Topic
 from antennate.types import Floats
 
 _NOTHING: Mapping[Topic, bytes] = {}
-_Log = RowLog[Mapping[Topic, bytes]]
+_Tick = tuple[bytes, Mapping[Topic, bytes]]
 _HEAD = struct.Struct("<BI")
 _ROW, _FORCES, _PLACE, _EVENT, _FIRST, _END = range(6)
 _BESIDE = {CONTACT_FORCES: _FORCES, COORDINATES: _PLACE}
@@ -92,7 +92,7 @@ class LogProcess:
         return text.strip() if text else "expected a process that writes the log, found none"
 
     def add(self, numbers: Floats, beside: Mapping[Topic, bytes] = _NOTHING) -> None:
-        """Hand over one tick, its numbers as of `RowLog.row`; it is dropped if there is no room."""
+        """Hand over one tick as it is in `Rows`; it is dropped if there is no room."""
         parts = [(_BESIDE[topic], data) for topic, data in beside.items()]
         parts.append((_ROW, numbers.tobytes()))
         found = b"".join(_HEAD.pack(kind, len(content)) + content for kind, content in parts)
@@ -152,7 +152,7 @@ class LogProcess:
             message = message[os.write(self._pipe, message) :]
 
 
-def _messages(log: _Log | None = None) -> Iterator[tuple[int, bytes]]:
+def _messages(log: RowLog[_Tick] | None = None) -> Iterator[tuple[int, bytes]]:
     """What comes, until the pipe closes."""
     with open(_STDIN, "rb", buffering=0, closefd=False) as stream:
         while True:
@@ -176,15 +176,20 @@ def _read(file: int, count: int) -> bytes:
     return found
 
 
-def _keep(log: _Log) -> bool:
+def _rows(ticks: Sequence[_Tick]) -> Rows:
+    """Rows of ticks that have come."""
+    numbers = np.frombuffer(b"".join(content for content, _ in ticks)).reshape(len(ticks), -1)
+    return numbers, {i: beside for i, (_, beside) in enumerate(ticks) if beside}
+
+
+def _keep(log: RowLog[_Tick]) -> bool:
     """Write what comes; whether the simulation ended the log."""
     beside: dict[Topic, bytes] = {}
     for kind, content in _messages(log):
         if kind in _TOPICS:
             beside[_TOPICS[kind]] = content
         elif kind == _ROW:
-            log.row[:] = np.frombuffer(content)
-            log.add(beside)
+            log.add((content, beside))
             beside = {}
         elif kind == _EVENT:
             log.event(content.decode())
@@ -199,7 +204,7 @@ def main() -> int:
         signal.signal(number, signal.SIG_IGN)
     _, first = next(_messages(), (_FIRST, b""))
     try:
-        log = _Log(Path(sys.argv[1]), Header.unpack(first), list)
+        log = RowLog(Path(sys.argv[1]), Header.unpack(first), _rows)
     except LogError as error:
         os.write(_STDOUT, one_line(str(error)).encode() + b"\n")
         return 1

@@ -25,24 +25,26 @@ from antennate.telemetry.topics import (
 from antennate.telemetry.writer import FLUSH, LogWriter
 from antennate.types import Floats
 
-Beside = TypeVar("Beside")
+Tick = TypeVar("Tick")
 HEAD = 9
-"""Numbers of a row before those of the joints: t, maneuver, phase, counts, level, contact. Then
-come the angles commanded [rad], and angles [rad], speeds [rad/s] and torques [N·m] measured."""
+"""Numbers of a row before those of the joints: t, maneuver, phase, counts, level, contact."""
+Rows = tuple[Floats, Mapping[int, Mapping[Topic, bytes]]]
+"""Numbers of some ticks, shape (n, HEAD + 4 joints): what `HEAD` says, then the angles commanded
+[rad], and angles [rad], speeds [rad/s] and torques [N·m] measured. Beside them, by tick, messages
+of `CONTACT_FORCES` and `COORDINATES`."""
 _LEAST_FREE = 1e8
 """Room for many trials [byte] (assumed)."""
 _MOST = 256
 """Ticks that are encoded at once."""
 
 
-class RowLog(Generic[Beside]):
+class RowLog(Generic[Tick]):
     """One file, new; as a context it closes itself.
 
     Args:
         path: A file that does not exist yet.
         header: What stands at its beginning.
-        messages: Makes, of what was given beside some ticks, more messages of each; as late as
-            possible, many at once.
+        rows: Makes the rows of ticks that were added, many at once.
 
     Attributes:
         path: The file.
@@ -51,41 +53,25 @@ class RowLog(Generic[Beside]):
         LogError: The file exists or cannot be written, or the disk is nearly full.
     """
 
-    def __init__(
-        self,
-        path: Path,
-        header: Header,
-        messages: Callable[[Sequence[Beside]], Sequence[Mapping[Topic, bytes]]],
-    ) -> None:
-        self.path, self._messages = path, messages
+    def __init__(self, path: Path, header: Header, rows: Callable[[Sequence[Tick]], Rows]) -> None:
+        self.path, self._rows = path, rows
         self._out = LogWriter(path, header, _LEAST_FREE)
         self._angles = len(header.robot.joint_names)
         self._forms = _forms(header.robot.joint_names)
-        self._held: Floats = np.empty((_MOST, HEAD + 4 * self._angles))
-        self._beside: dict[int, Beside] = {}
-        self._count, self._since = 0, math.inf
+        self._held: list[Tick] = []
+        self._since = math.inf
 
-    @property
-    def row(self) -> Floats:
-        """Where the numbers of the next tick go, as `HEAD` says, shape (HEAD + 4 joints,)."""
-        return self._held[self._count]
-
-    def add(self, beside: Beside | None = None) -> None:
-        """Keep the tick whose numbers are in `row`.
-
-        Args:
-            beside: What more messages are made of, None for no more.
+    def add(self, tick: Tick) -> None:
+        """Keep one tick.
 
         Raises:
             LogError: The disk is full or gone.
         """
-        if beside is not None:
-            self._beside[self._count] = beside
         now = time.monotonic()
-        if not self._count:
+        if not self._held:
             self._since = now
-        self._count += 1
-        if self._count == _MOST or now - self._since >= FLUSH:
+        self._held.append(tick)
+        if len(self._held) == _MOST or now - self._since >= FLUSH:
             self.flush()
 
     def settle(self) -> None:
@@ -128,11 +114,10 @@ class RowLog(Generic[Beside]):
         Raises:
             LogError: The disk is full or gone.
         """
-        count, self._count, self._since = self._count, 0, math.inf
-        beside, self._beside = self._beside, {}
-        if not count:
+        held, self._held, self._since = self._held, [], math.inf
+        if not held:
             return
-        rows = self._held[:count]
+        count, (rows, beside) = len(held), self._rows(held)
         t, angles = rows[:, 0], self._angles
         joints = [rows[:, at : at + angles] for at in range(HEAD, rows.shape[1], angles)]
         stamps = self._out.stamps(t)
@@ -158,7 +143,7 @@ class RowLog(Generic[Beside]):
         self._out.write_many(
             stamps,
             {topic: (self._forms[topic], each) for topic, each in columns.items()},
-            dict(zip(beside, self._messages([*beside.values()]), strict=True)) if beside else {},
+            beside,
         )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -14,8 +14,8 @@ from antennate.sim.contacts import Contacts
 from antennate.sim.world import World
 from antennate.telemetry.cdr import Form
 from antennate.telemetry.header import Header
-from antennate.telemetry.rows import HEAD, RowLog
-from antennate.telemetry.ticks import floats_of
+from antennate.telemetry.rows import HEAD, RowLog, Rows
+from antennate.telemetry.ticks import numbers_of
 from antennate.telemetry.topics import CONTACT_FORCES, COORDINATES, Topic
 from antennate.types import AntennaFrame, Floats, JointCommand
 
@@ -34,104 +34,132 @@ class Decisions:
     """
 
     def __init__(self, robot: RobotSpec, controller: Any, batch: int = 1) -> None:
-        self._controller, self._batch = controller, batch
-        self._rows: Floats = np.empty((batch, HEAD + len(robot.joint_names)))
-        self._t, self._maneuver, self._phase = self._rows.T[:3]
-        self._counts, self._level, self._contact = (self._rows[:, at : at + 2] for at in (3, 5, 7))
-        self._joints: list[tuple[str, Floats]] = []
-        at = HEAD
-        for name, shape in robot.command_shapes().items():
-            size = math.prod(shape[1:])
-            self._joints.append((name, self._rows[:, at : at + size].reshape(batch, *shape[1:])))
-            at += size
+        self._controller = controller
+        self._unknown = np.full(batch, math.nan)
+        self._parts = robot.command_shapes(batch)
+        pair = (batch, 2)
+        self._layout = np.dtype(
+            [
+                *(("t", float, batch), ("maneuver", np.int64, batch), ("phase", float, batch)),
+                *(("counts", float, pair), ("level", float, pair), ("contact", np.int64, pair)),
+                *((name, float, shape) for name, shape in self._parts.items()),
+            ]
+        )
+        self._kinds = [self._layout[name].base for name in self._layout.names or ()]
 
-    def take(self, frame: AntennaFrame, command: JointCommand) -> Floats:
-        """One tick: how the rows of its logs begin, shape (B, HEAD + joints).
-
-        The next tick replaces them.
-        """
+    def take(self, frame: AntennaFrame, command: JointCommand) -> bytes:
+        """One tick, for `rows`: a copy, in one piece, as this is done in every tick."""
         made = self._controller
-        phase = floats_of(made, "phase")
-        self._t[:], self._maneuver[:] = frame.t, made.maneuver
-        self._phase[:] = phase if len(phase) == self._batch else math.nan
-        self._counts[:], self._level[:], self._contact[:] = frame.counts, made.level, made.contact
-        for name, part in self._joints:
-            part[:] = getattr(command, name)
-        return self._rows
+        try:
+            phase: Any = made.phase
+            usual = phase.shape == self._unknown.shape and phase.dtype == float
+        except KeyboardInterrupt:
+            raise
+        except BaseException:  # noqa: BLE001 a property of anybody may raise anything
+            phase, usual = None, False
+        if not usual:
+            phase = np.array(numbers_of(made, "phase"))
+            phase = phase if phase.shape == self._unknown.shape else self._unknown
+        found = [frame.t, made.maneuver, phase, frame.counts, made.level, made.contact]
+        found += [getattr(command, name) for name in self._parts]
+        if [part.dtype for part in found] != self._kinds:
+            found = [part.astype(kind) for part, kind in zip(found, self._kinds, strict=True)]
+        try:
+            return b"".join(found)
+        except TypeError:  # one is a view with gaps
+            return b"".join([part.tobytes() for part in found])
+
+    def rows(self, ticks: Sequence[bytes], row: int, into: Floats) -> None:
+        """Write how one row of the batch begins in some ticks, shape (n, HEAD + joints)."""
+        block, at = np.frombuffer(b"".join(ticks), self._layout), 0
+        for name in self._layout.names or ():
+            part = block[name][:, row].reshape(len(ticks), -1)
+            into[:, at : at + part.shape[1]] = part
+            at += part.shape[1]
 
 
-class Look(NamedTuple):
-    """What is seen beside a tick: the state of the engine and its contacts."""
+class TakenTick(NamedTuple):
+    """One tick as it was taken: of `Decisions`, of `World.snapshot`, contacts where one looked."""
 
-    place: Floats
-    contacts: Contacts
+    decided: bytes
+    measured: bytes
+    contacts: Contacts | None
 
 
 class TickRows:
-    """Makes the rows of one simulated robot.
+    """Takes the ticks of one simulated robot, and makes the rows and messages of its log of them.
 
     Args:
         world: The robot in its scene.
+        decisions: What is decided for it.
+        row: Its row there.
     """
 
-    def __init__(self, world: World) -> None:
-        self._world, self._angles = world, len(world.robot.joint_names)
-        self._decided, self._ticks = HEAD + self._angles, 0
-        self._root, place = world.coordinates()
-        values = self._root, (0.0,) * len(place)
+    def __init__(self, world: World, decisions: Decisions, row: int = 0) -> None:
+        self._world, self._decisions, self._row = world, decisions, row
+        self._angles, self._ticks = len(world.robot.joint_names), 0
+        values = world.root, (0.0,) * world.model.nq
         self._form = Form(COORDINATES.type, values, ("position",))
 
-    def take(self, decided: Floats, row: Floats) -> Look | None:
-        """One tick; what is seen beside it, None where nobody looks.
-
-        Args:
-            decided: The robot's row of `Decisions`.
-            row: Where all numbers of the tick go, shape (HEAD + 4 joints,).
-        """
-        row[: self._decided] = decided
-        self._world.measure_drives(row[self._decided :].reshape(3, self._angles))
+    def take(self, decided: bytes) -> TakenTick:
+        """One tick, of which `Decisions` says this."""
         self._ticks += 1
-        if (self._ticks - 1) % _LOOK_EVERY:
-            return None
-        return Look(self._world.coordinates()[1].copy(), Contacts.of(self._world.data))
+        look = (self._ticks - 1) % _LOOK_EVERY == 0
+        world = self._world
+        return TakenTick(decided, world.snapshot(), Contacts.of(world.data) if look else None)
 
-    def messages(self, looks: Sequence[Look]) -> list[dict[Topic, bytes]]:
-        """The messages of each of some looks; many at once take hardly longer than one."""
-        places = np.array([look.place for look in looks])
-        rows = self._form.encode(len(looks), {"position": places})
-        found = [{COORDINATES: row.tobytes()} for row in rows]
-        ends = np.cumsum([len(look.contacts.geoms) for look in looks])
-        contacts = Contacts.joined([look.contacts for look in looks])
+    def rows(self, ticks: Sequence[TakenTick]) -> Rows:
+        """What `RowLog` writes of some ticks; many at once take hardly longer than one."""
+        found = np.empty((len(ticks), HEAD + 4 * self._angles))
+        end = HEAD + self._angles
+        self._decisions.rows([tick.decided for tick in ticks], self._row, found[:, :end])
+        measured, places = self._world.measured([tick.measured for tick in ticks])
+        found[:, end:] = measured.reshape(len(ticks), -1)
+        looks = {i: tick.contacts for i, tick in enumerate(ticks) if tick.contacts is not None}
+        return found, self._messages(looks, places) if looks else {}
+
+    def _messages(
+        self, looks: Mapping[int, Contacts], places: Floats
+    ) -> dict[int, dict[Topic, bytes]]:
+        """The messages beside the ticks at which one looked."""
+        coordinates = self._form.encode(len(looks), {"position": places[[*looks]]})
+        found = {i: {COORDINATES: row.tobytes()} for i, row in zip(looks, coordinates, strict=True)}
+        contacts = Contacts.joined([*looks.values()])
         which, names, points, forces = self._world.obstacle_contacts(contacts)
-        begin, kind = 0, CONTACT_FORCES.type
-        for message, end in zip(found, np.searchsorted(which, ends).tolist(), strict=True):
+        columns = names, *points.T.tolist(), forces.tolist()
+        ends = np.cumsum([len(each.geoms) for each in looks.values()])
+        begin, encode = 0, CONTACT_FORCES.type.encode
+        for message, end in zip(found.values(), np.searchsorted(which, ends).tolist(), strict=True):
             if begin < end:
-                part = slice(begin, end)
-                message[CONTACT_FORCES] = kind.encode(names[part], *points[part].T, forces[part])
+                message[CONTACT_FORCES] = encode(*(column[begin:end] for column in columns))
             begin = end
         return found
 
 
-class SimulatedLog(RowLog[Look]):
+class SimulatedLog(RowLog[TakenTick]):
     """The log of one simulated robot, tick by tick; as a context it closes itself.
 
     Args:
         path: A file that does not exist yet.
         header: What stands at its beginning.
         world: The robot in its scene.
+        decisions: What is decided for it.
+        row: Its row there.
 
     Raises:
         LogError: The file exists or cannot be written, or the disk is nearly full.
     """
 
-    def __init__(self, path: Path, header: Header, world: World) -> None:
-        self._rows = TickRows(world)
-        super().__init__(path, header, self._rows.messages)
+    def __init__(
+        self, path: Path, header: Header, world: World, decisions: Decisions, row: int = 0
+    ) -> None:
+        self._ticks = TickRows(world, decisions, row)
+        super().__init__(path, header, self._ticks.rows)
 
-    def take(self, decided: Floats) -> None:
-        """Keep one tick, from the robot's row of `Decisions`.
+    def take(self, decided: bytes) -> None:
+        """Keep one tick, of which `Decisions` says this.
 
         Raises:
             LogError: The disk is full or gone.
         """
-        self.add(self._rows.take(decided, self.row))
+        self.add(self._ticks.take(decided))

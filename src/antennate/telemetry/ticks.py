@@ -17,7 +17,7 @@ from antennate.hardware.driving.decision import Decision
 from antennate.hardware.driving.session import Session
 from antennate.messages import one_line
 from antennate.robots.spec import RobotSpec
-from antennate.telemetry.cdr import Form, MessageType
+from antennate.telemetry.cdr import MessageType
 from antennate.telemetry.topics import (
     ANTENNA,
     COUNTERS,
@@ -30,12 +30,11 @@ from antennate.telemetry.topics import (
     TICK_TOPICS,
     Topic,
 )
-from antennate.types import AntennaFrame, Contact, Controller, Floats, JointCommand
+from antennate.types import AntennaFrame, Controller, JointCommand
 
 _LONGEST_CAUSE = 160
 _ONE = dict(zip(JOINTS[1:], ("position", "velocity", "effort"), strict=True))
 _NEITHER = (math.nan, math.nan)
-_UNKNOWN = (int(Contact.UNKNOWN), int(Contact.UNKNOWN))
 
 Pair = tuple[float, float]
 
@@ -219,14 +218,6 @@ _OWN = tuple((topic, _getter(topic.type)) for topic in (ANTENNA, MANEUVER, COUNT
 _NUMBERS = tuple(f.name for f in TICK.fields if f.code and f.name not in JOINTS[1:])
 
 
-SIMULATED = Form(
-    TICK,
-    _ALL(Tick(0, 0.0, 0.0, _NEITHER, _NEITHER, _NEITHER, _UNKNOWN, 0, math.nan, ())),
-    ("number", "t", "now", "counts", "reading", "level", "contact", "maneuver", "phase"),
-)
-"""Ticks as bytes, of what a simulation knows; the rest of each is unknown."""
-
-
 def fields(robot: RobotSpec) -> tuple[str, ...]:
     """Names of the numbers of a tick that are in its `values`."""
     parts: dict[str, tuple[str, ...]] = {"angles": robot.joint_names}
@@ -262,17 +253,12 @@ def decided(controller: Controller, decision: Decision, frame: AntennaFrame) -> 
 
 def numbers_of(owner: Any, name: str) -> tuple[float, ...]:
     """Numbers in an attribute of any object; empty if there are none."""
-    return tuple(floats_of(owner, name).tolist())
-
-
-def floats_of(owner: Any, name: str) -> Floats:
-    """The same as an array, shape (n,)."""
     try:
-        return np.asarray(getattr(owner, name), float).ravel()
+        return tuple(np.asarray(getattr(owner, name), float).ravel().tolist())
     except KeyboardInterrupt:
         raise
     except BaseException:  # noqa: BLE001 a property of anybody may raise anything
-        return np.zeros(0)
+        return ()
 
 
 def _clean(cause: str) -> str:

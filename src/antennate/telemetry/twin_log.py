@@ -15,7 +15,6 @@ from antennate.sim.trial import TrialConfig
 from antennate.sim.world import World
 from antennate.telemetry.apart import LogProcess
 from antennate.telemetry.header import Header
-from antennate.telemetry.rows import HEAD
 from antennate.telemetry.simulated import Decisions, TickRows
 from antennate.twin.config import TwinConfig
 from antennate.twin.robot import TwinRobot
@@ -45,16 +44,16 @@ class TwinLog:
 
     def __init__(self, log: LogProcess, robot: TwinRobot, config: TwinConfig) -> None:
         self._log, self._robot = log, robot
-        self._decisions, self._rows = Decisions(config.robot, _Unknown()), TickRows(robot.world)
-        self._row = np.empty(HEAD + 4 * len(config.robot.joint_names))
+        self._decisions = Decisions(config.robot, _Unknown())
+        self._rows = TickRows(robot.world, self._decisions)
 
     def take(self, world: World) -> None:
         """Keep a tick, its time that of the twin."""
         robot = self._robot
         frame = AntennaFrame(t=np.array([robot.t]), counts=robot.counts[None])
         decided = self._decisions.take(frame, robot.command)
-        look = self._rows.take(decided[0], self._row)
-        self._log.add(self._row, *([] if look is None else self._rows.messages([look])))
+        numbers, beside = self._rows.rows([self._rows.take(decided)])
+        self._log.add(numbers[0], *beside.values())
 
 
 def header_of(config: TwinConfig, start: int) -> Header:

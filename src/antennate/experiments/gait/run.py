@@ -209,13 +209,17 @@ def walk_flat(
         if failure is not None:
             raise failure
         if log is not None:
-            log.take(decisions.take(frame, command)[0])
+            log.take(decisions.take(frame, command))
         watch(world, frame)
         ticks.append((world.t, world.links(), world.work))
         return world.t < end - _TINY
 
     with contextlib.ExitStack() as stack:
-        log = None if logs is None else stack.enter_context(_log(logs, config, name, world))
+        log = (
+            None
+            if logs is None
+            else stack.enter_context(_log(logs, config, name, world, decisions))
+        )
         run_loop(body, control, period, go_on)
     links = np.array([tick[1] for tick in ticks])
     half = robot.links // 2
@@ -233,13 +237,15 @@ def walk_flat(
     )
 
 
-def _log(folder: Path, config: GaitStudyConfig, name: str, world: World) -> SimulatedLog:
+def _log(
+    folder: Path, config: GaitStudyConfig, name: str, world: World, decisions: Decisions
+) -> SimulatedLog:
     """The log of a walk, in place of what a killed run left of it."""
     path = folder / (re.sub(r"[^\w.-]", "_", name) + ".mcap")
     path.unlink(missing_ok=True)
     params = ControlParams(rate=config.rate, gait=config.gait)
     header = Header(controller=LOGGED, params=params, robot=config.robot)
-    return SimulatedLog(path, header, world)
+    return SimulatedLog(path, header, world, decisions)
 
 
 def _no_chance(robot: RobotSpec, period: float) -> Disturbance:

@@ -128,6 +128,7 @@ class _Rows:
         self._config, self._name, self._emit, self._batch = config, name, emit, batch
         self._folder, self._logs, self._looks = logs, dict[int, SimulatedLog](), watch
         self._waiting = list(trials)
+        self._decisions: Decisions | None = None
         self._scene, self._robot = made
         self._monitors: list[TrialMonitor | None] = [None] * batch
 
@@ -150,16 +151,16 @@ class _Rows:
         except ConfigError as error:
             raise ControllerError(str(error)) from error
         control = CheckedController(made, config.robot, self._batch)
+        decisions = self._decisions = Decisions(config.robot, made, self._batch)
         for row, phase in enumerate(phases):
             control.reset(np.array([row]), phase)
             self._log(row, phase)
-        decisions = Decisions(config.robot, made, self._batch)
 
         def go_on(frame: AntennaFrame, command: JointCommand) -> bool:
             if self._logs:
                 decided = decisions.take(frame, command)
-                for row, log in self._logs.items():
-                    log.take(decided[row])
+                for log in self._logs.values():
+                    log.take(decided)
             self._look(frame, made)
             maneuvers, faults = control.maneuver.tolist(), control.faults
             for row, monitor in enumerate(self._monitors):
@@ -196,6 +197,7 @@ class _Rows:
         config, monitor, world = self._config, self._monitors[row], self._robot.world(row)
         if self._folder is None or monitor is None or not isinstance(world, World):
             return
+        assert self._decisions is not None  # noqa: S101 the controller was made
         header = Header(
             controller=self._name,
             params=config.control,
@@ -206,7 +208,7 @@ class _Rows:
         )
         path = self.log_of(monitor.trial)
         path.unlink(missing_ok=True)  # what a killed worker left of it
-        self._logs[row] = SimulatedLog(path, header, world)
+        self._logs[row] = SimulatedLog(path, header, world, self._decisions, row)
 
     def _look(self, frame: AntennaFrame, controller: Controller) -> None:
         """Let somebody look at the first row after a tick, and keep the events in the logs."""

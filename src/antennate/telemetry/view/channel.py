@@ -8,6 +8,7 @@ than a message may be: they follow one another in pieces, and for those one wait
 from __future__ import annotations
 
 import json
+import math
 import select
 import socket
 import struct
@@ -18,10 +19,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from antennate.errors import BadInputError
+from antennate.telemetry.ticks import Tick
 
-SCENE, MORE, POSES, SNAPSHOT, TICK = b"S", b"M", b"P", b"G", b"T"
-"""Kinds of messages: the scene and a piece of it, poses with forces, the same as a snapshot of the
-engine, a tick."""
+SCENE, MORE, POSES, TICK = b"S", b"M", b"P", b"T"
+"""Kinds of messages: the scene and a piece of it, poses with forces, a tick."""
+SNAPSHOT, STEP = b"G", b"t"
+"""The same of a simulation, with less work for it: a snapshot of the engine, a `Step`."""
 HEADER, TEXT, STATE, END = b"H", b"X", b"Z", b"E"
 """The header of a log, a line of text, the state of the controls, the end in order."""
 READY, FAILED = b"R", b"F"
@@ -29,6 +32,7 @@ READY, FAILED = b"R", b"F"
 _SEVERAL = b"+"
 """A kind that holds messages, each behind its kind and length."""
 _PART = struct.Struct("<cI")
+_STEP = struct.Struct("<qd2dq2d2qd")
 ORDER = b"O"
 """The kind that the page sends: what a person wants, as JSON."""
 _PIECE = 1 << 16
@@ -71,6 +75,41 @@ class Poses(NamedTuple):
             return cls(float(t), numbers[:end].reshape(-1, 12), numbers[end:].reshape(-1, 6))
         except ValueError as error:
             raise BadInputError(f"expected poses, found {error}") from None
+
+
+class Step(NamedTuple):
+    """What a simulation knows of a tick; as of `Tick`."""
+
+    number: int
+    t: float
+    counts: Sequence[float] = (math.nan, math.nan)
+    maneuver: int = 0
+    level: Sequence[float] = (math.nan, math.nan)
+    contact: Sequence[int] = (2, 2)
+    phase: float = math.nan
+
+    def pack(self) -> bytes:
+        """It as bytes."""
+        number, t, counts, maneuver, level, contact, phase = self
+        return _STEP.pack(number, t, *counts, maneuver, *level, *contact, phase)
+
+    @classmethod
+    def tick(cls, content: bytes) -> Tick:
+        """The tick of the bytes.
+
+        Raises:
+            BadInputError: They are something else.
+        """
+        try:
+            number, t, left, right, maneuver, *more = _STEP.unpack(content)
+        except struct.error as error:
+            raise BadInputError(f"expected a step, found {error}") from None
+        *level, one, other, phase = more
+        counts = left, right
+        return Tick(
+            *(number, t, t, counts, counts, (level[0], level[1]), (one, other), maneuver, phase),
+            angles=(),
+        )
 
 
 class Channel:

@@ -22,7 +22,17 @@ from antennate.sim.shapes import Shapes, picture
 from antennate.telemetry.header import Header
 from antennate.telemetry.ticks import Tick
 from antennate.telemetry.topics import CONFIG, EVENTS, TOPICS, Topic
-from antennate.telemetry.view.channel import HEADER, POSES, SCENE, SNAPSHOT, TEXT, TICK, Poses
+from antennate.telemetry.view.channel import (
+    HEADER,
+    POSES,
+    SCENE,
+    SNAPSHOT,
+    STEP,
+    TEXT,
+    TICK,
+    Poses,
+    Step,
+)
 
 _HOST = "127.0.0.1"
 _IDLE = 0.1
@@ -92,6 +102,8 @@ class FoxgloveSink:
         """Send a message on."""
         if kind == TICK:
             self._tick(Tick.unpack(content))
+        elif kind == STEP:
+            self._tick(Step.tick(content))
         elif kind == POSES and self._shapes is not None:
             self._scene(self._shapes, Poses.unpack(content))
         elif kind == SNAPSHOT and self._shapes is not None:

@@ -27,10 +27,12 @@ from antennate.telemetry.view.channel import (
     SCENE,
     SNAPSHOT,
     STATE,
+    STEP,
     TEXT,
     TICK,
     Channel,
     Poses,
+    Step,
     read,
 )
 from antennate.telemetry.view.charts import Charts, Map
@@ -128,6 +130,8 @@ class Page:
             self._note_head()
         elif kind == TICK:
             self._take_tick(Tick.unpack(content))
+        elif kind == STEP:
+            self._take_tick(Step.tick(content))
         elif kind == TEXT:
             self._lines.append(content.decode("utf-8", "replace"))
         elif kind == STATE:

@@ -17,8 +17,8 @@ from antennate.messages import one_line
 from antennate.params.control import ControlParams
 from antennate.robots.spec import RobotSpec
 from antennate.sim.shapes import VisibleModel, snapshot
-from antennate.telemetry.ticks import SIMULATED, floats_of
-from antennate.telemetry.view.channel import SCENE, SNAPSHOT, TICK, Channel
+from antennate.telemetry.ticks import numbers_of
+from antennate.telemetry.view.channel import SCENE, SNAPSHOT, STEP, Channel, Step
 from antennate.telemetry.view.pace import Pace, Restart
 from antennate.telemetry.view.tuning import Tuning
 from antennate.types import AntennaFrame, Controller
@@ -26,6 +26,7 @@ from antennate.types import AntennaFrame, Controller
 _SIDES = (rgba(SERIES[0]), rgba(SERIES[1]))
 _FARTHEST = 50.0
 """Farthest from the origin that an obstacle is put [m]; a world beyond 100 m is unsound."""
+_NOT_A_NUMBER = (math.nan, math.nan)
 NONE = -1
 """Stands for a maneuver where there is none."""
 
@@ -123,26 +124,26 @@ class SimulationView(Pace):
     def redraw(self) -> None:
         """Show where everything is."""
         if self._model is not None and self._data is not None:
-            tick = self._tick(self._data.time, *self._last)
-            self.channel.send_together((SNAPSHOT, snapshot(self._data)), (TICK, tick))
+            step = self._step(self._data.time, *self._last)
+            self.channel.send_together((SNAPSHOT, snapshot(self._data)), (STEP, step.pack()))
 
     def _show_model(self, model: Any) -> None:
         self._seen, self._model = model, VisibleModel(model, _SIDES)
         self.tell()
         self.channel.send_whole(SCENE, self._model.shapes().pack())
 
-    def _tick(
+    def _step(
         self, t: float, frame: AntennaFrame | None, controller: Controller | None, maneuver: int
-    ) -> bytes:
-        found: dict[str, Any] = {"t": t, "now": t, "number": self._number, "maneuver": maneuver}
-        if frame is not None:
-            found["counts"] = found["reading"] = frame.counts[0]
-        if controller is not None:
-            phase = floats_of(controller, "phase")
-            found["phase"] = phase[0] if len(phase) == 1 else math.nan
-            found["level"], found["contact"] = controller.level[0], controller.contact[0]
-            found["maneuver"] = controller.maneuver[0]
-        return SIMULATED.encode(1, found).tobytes()
+    ) -> Step:
+        counts = _NOT_A_NUMBER if frame is None else frame.counts[0].tolist()
+        if controller is None:
+            return Step(self._number, t, counts, maneuver)
+        level, contact = controller.level[0].tolist(), controller.contact[0].tolist()
+        phase = numbers_of(controller, "phase")
+        return Step(
+            *(self._number, t, counts, int(controller.maneuver[0]), level, contact),
+            phase[0] if len(phase) == 1 else math.nan,
+        )
 
     def look(self) -> None:
         """Carry out what the page wants, if it may want anything.
