@@ -31,6 +31,7 @@ IMAGES = Path(__file__).parent.parent / "docs" / "images"
 KNOWN = "unsafe-eval"
 """A part of viser that is not used here wants to make code of text, which the page forbids."""
 
+WIDTHS = "[...document.querySelectorAll('.uplot canvas')].map(e => e.clientWidth)"
 TIME = "parseFloat(document.body.innerText.match(/time\\s+([0-9.]+) s/)[1])"
 """The time that the page shows, in JavaScript."""
 
@@ -268,6 +269,10 @@ def test_X23_a_drive_and_its_twin_are_shown(tab: Tab, keep: Keep, tmp_path: Path
                     assert "counted in these seconds" in text
                     tab.until(f"{TIME} > {begin + 1}")
                     assert charts(tab) != before
+                    tab.until(f"{TIME} > 12")  # limits have changed with the readings by then
+                    widths = tab.run(WIDTHS)
+                    assert len(widths) >= 5
+                    assert min(widths) == max(widths) > 200
                 assert colours(tab) > 50
                 assert not tab.run(
                     "/pause|one step|restart|θ: level/.test(document.body.innerText)"

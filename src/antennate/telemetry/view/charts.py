@@ -47,13 +47,12 @@ class Charts:
     """Counts, level with theta, contact, maneuver, supervisor and counters over time."""
 
     def __init__(self, server: viser.ViserServer, tab: Any) -> None:
-        self._server, self._tab = server, tab
         self._rows = deque[tuple[float, ...]](maxlen=_KEPT)
         self._limits = (0.0, _STEP)
         self._known = set[int]()
         pair = [(side, SERIES[i]) for i, side in enumerate(_SIDES)]
         contact, one = "contact: 0 free, 1 touches, 2 unknown", [("maneuver", _MUTED)]
-        self._add: dict[tuple[int, ...], _Look] = {
+        looks: dict[tuple[int, ...], _Look] = {
             (1, 2): ("readings [counts]", pair, self._limits),
             (3, 4, 8): ("level b, and θ", [*pair, ("θ", _MUTED)], (0.0, 1.0)),
             (5, 6): (contact, pair, (-0.2, 2.2)),
@@ -66,11 +65,11 @@ class Charts:
             ),
         }
         begin = np.stack([np.arange(2.0), *np.zeros((_COUNTS[-1], 2))])
-        self._charts = {which: self._chart(which, begin) for which in self._add}
-
-    def _chart(self, which: tuple[int, ...], columns: Floats) -> Any:
-        with self._tab:
-            return _chart(self._server, *self._add[which], _data(columns, which), which[0])
+        with tab:
+            self._charts = {
+                which: _chart(server, *look, _data(begin, which), which[0])
+                for which, look in looks.items()
+            }
 
     @property
     def any(self) -> bool:
@@ -102,12 +101,8 @@ class Charts:
                 chart.visible = which[0] in self._known
         limits = _limits(columns[1:3])
         if limits != self._limits:  # a chart finds none itself where a reading is missing
-            self._limits, which = limits, (1, 2)
-            title, lines, _ = self._add[which]
-            self._add[which] = title, lines, limits
-            self._charts[which].remove()
-            self._charts[which] = self._chart(which, columns)
-            return  # a chart takes no others before it is there
+            self._limits = limits
+            self._charts[1, 2].scales = _scales(limits)
         for which, chart in self._charts.items():
             chart.data = _data(columns, which)
 
@@ -155,7 +150,6 @@ def _chart(
     order: float,
 ) -> Any:
     axis: Any = uplot.Axis(size=56)
-    y = uplot.Scale(auto=True) if limits is None else uplot.Scale(range=limits)
     return server.gui.add_uplot(
         data,
         (
@@ -163,13 +157,18 @@ def _chart(
             *(uplot.Series(label=name, stroke=colour, width=1.5) for name, colour in lines),
         ),
         title=title,
-        scales={"x": uplot.Scale(time=False), "y": y},
+        scales=_scales(limits),
         axes=(uplot.Axis(size=24), axis),
         legend=uplot.Legend(show=len(lines) > len(_SIDES) + 1),
         height=_HEIGHT,
         padding=_PADDING,
         order=order,
     )
+
+
+def _scales(limits: tuple[float, float] | None) -> dict[str, uplot.Scale]:
+    y = uplot.Scale(auto=True) if limits is None else uplot.Scale(range=limits)
+    return {"x": uplot.Scale(time=False), "y": y}
 
 
 class Map:
