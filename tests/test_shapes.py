@@ -85,7 +85,9 @@ def test_a_force_is_that_of_the_engine_on_the_robot(made: Made) -> None:
     assert data.ncon == 1
     content = snapshot(data)
     mujoco.mj_step(model, data, 50)
-    time, _, forces = picture(content, visible.shapes())
+    found = picture(content, visible.shapes())
+    assert found is not None
+    time, _, forces = found
     assert (time, len(forces)) == (t, 1)
     assert wrench[0] > 0
     assert forces[0, 3:] == pytest.approx([0, 0, wrench[0]], rel=1e-5, abs=1e-5)
@@ -100,7 +102,9 @@ def test_nothing_pushes_where_nothing_touches(made: Made) -> None:
         data.joint("link").qpos[:3] = [-2.0, 0.0, height]
         mujoco.mj_forward(model, data)
         assert data.ncon == contacts
-        assert len(picture(snapshot(data), visible.shapes())[2]) == 0
+        found = picture(snapshot(data), visible.shapes())
+        assert found is not None
+        assert len(found[2]) == 0
 
 
 def test_poses_are_those_of_the_geoms(made: Made) -> None:
@@ -110,17 +114,21 @@ def test_poses_are_those_of_the_geoms(made: Made) -> None:
     assert poses.shape == (4, 12)
     assert poses[2, :3] == pytest.approx([0, 0, 1])
     assert poses[2, 3:] == pytest.approx(np.eye(3).ravel())
-    assert np.array_equal(poses, picture(snapshot(data), visible.shapes())[1])
+    found = picture(snapshot(data), visible.shapes())
+    assert found is not None
+    assert np.array_equal(poses, found[1])
 
 
 def test_what_is_no_snapshot_is_refused(made: Made) -> None:
-    """Too short, cut, and one of a smaller model."""
+    """Too short, and cut; one of another model, whose shapes did not come, is left out."""
     _, data, visible = made
-    other = mujoco.MjModel.from_xml_string("<mujoco><worldbody/></mujoco>")
-    contents = [b"", b"x" * 40, snapshot(data)[:-100], snapshot(mujoco.MjData(other))]
-    for content in contents:
-        with pytest.raises(BadInputError, match="expected a snapshot of this model"):
+    for content in (b"", b"x" * 10, snapshot(data)[:-100]):
+        with pytest.raises(BadInputError, match="expected a snapshot"):
             picture(content, visible.shapes())
+    more = MODEL.replace("<worldbody>", '<worldbody><geom size="1"/>')
+    for text in ("<mujoco><worldbody/></mujoco>", more):
+        other = mujoco.MjData(mujoco.MjModel.from_xml_string(text))
+        assert picture(snapshot(other), visible.shapes()) is None
 
 
 def test_only_what_slides_can_be_moved(made: Made) -> None:

@@ -107,14 +107,18 @@ def snapshot(data: mujoco.MjData) -> bytes:
     return b"".join((head, places.data, data.geom_xmat.data, *(part.data for part in contacts)))
 
 
-def picture(content: bytes, shapes: Shapes) -> tuple[float, Poses, Arrows]:
+def picture(content: bytes, shapes: Shapes) -> tuple[float, Poses, Arrows] | None:
     """Time [s] of a snapshot, where the shapes are, and normal forces of obstacles on the robot.
 
+    None if it is of another model, whose shapes have not come.
+
     Raises:
-        BadInputError: It is something else, or of another model.
+        BadInputError: It is something else.
     """
     try:
         t, geoms, count, rows = _SNAPSHOT.unpack_from(content)
+        if geoms != len(shapes.sides):
+            return None
         found, at = list[NDArray[Any]](), _SNAPSHOT.size
         for kind, *shape in (
             *((float, geoms, 3), (float, geoms, 9)),
@@ -129,7 +133,7 @@ def picture(content: bytes, shapes: Shapes) -> tuple[float, Poses, Arrows]:
         poses[:, :3], poses[:, 3:] = places[shapes.geom], turned[shapes.geom]
         which, force = contacts.between(shapes.sides, 1)  # the robot's, and no floor
     except (struct.error, TypeError, ValueError, IndexError) as error:
-        raise BadInputError(f"expected a snapshot of this model, found {error}") from None
+        raise BadInputError(f"expected a snapshot, found {error}") from None
     arrows = np.empty((len(which), 6), np.float32)
     arrows[:, :3] = contacts.place[which]
     sign = np.where(shapes.sides[contacts.geoms[which, 1]] == 1, 1.0, -1.0)

@@ -25,7 +25,7 @@ from antennate.telemetry.topics import (
 from antennate.telemetry.writer import FLUSH, LogWriter
 from antennate.types import Floats
 
-Tick = TypeVar("Tick")
+Taken = TypeVar("Taken")
 HEAD = 9
 """Numbers of a row before those of the joints: t, maneuver, phase, counts, level, contact."""
 Rows = tuple[Floats, Mapping[int, Mapping[Topic, bytes]]]
@@ -38,7 +38,7 @@ _MOST = 256
 """Ticks that are encoded at once."""
 
 
-class RowLog(Generic[Tick]):
+class RowLog(Generic[Taken]):
     """One file, new; as a context it closes itself.
 
     Args:
@@ -53,15 +53,15 @@ class RowLog(Generic[Tick]):
         LogError: The file exists or cannot be written, or the disk is nearly full.
     """
 
-    def __init__(self, path: Path, header: Header, rows: Callable[[Sequence[Tick]], Rows]) -> None:
+    def __init__(self, path: Path, header: Header, rows: Callable[[Sequence[Taken]], Rows]) -> None:
         self.path, self._rows = path, rows
         self._out = LogWriter(path, header, _LEAST_FREE)
         self._angles = len(header.robot.joint_names)
         self._forms = _forms(header.robot.joint_names)
-        self._held: list[Tick] = []
+        self._held: list[Taken] = []
         self._since = math.inf
 
-    def add(self, tick: Tick) -> None:
+    def add(self, tick: Taken) -> None:
         """Keep one tick.
 
         Raises:

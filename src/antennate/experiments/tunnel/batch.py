@@ -128,7 +128,6 @@ class _Rows:
         self._config, self._name, self._emit, self._batch = config, name, emit, batch
         self._folder, self._logs, self._looks = logs, dict[int, SimulatedLog](), watch
         self._waiting = list(trials)
-        self._decisions: Decisions | None = None
         self._scene, self._robot = made
         self._monitors: list[TrialMonitor | None] = [None] * batch
 
@@ -151,10 +150,10 @@ class _Rows:
         except ConfigError as error:
             raise ControllerError(str(error)) from error
         control = CheckedController(made, config.robot, self._batch)
-        decisions = self._decisions = Decisions(config.robot, made, self._batch)
+        decisions = Decisions(config.robot, made, self._batch)
         for row, phase in enumerate(phases):
             control.reset(np.array([row]), phase)
-            self._log(row, phase)
+            self._log(row, phase, decisions)
 
         def go_on(frame: AntennaFrame, command: JointCommand) -> bool:
             if self._logs:
@@ -170,7 +169,7 @@ class _Rows:
                 if ended and self._waiting:
                     phase = self._place(row)
                     control.reset(np.array([row]), phase)
-                    self._log(row, phase)
+                    self._log(row, phase, decisions)
             return any(monitor is not None for monitor in self._monitors)
 
         run_loop(self._robot, control, config.control.period, go_on)
@@ -192,12 +191,11 @@ class _Rows:
         name = re.sub(r"[^\w.-]", "_", self._name)
         return (self._folder or Path()) / f"{name}-{trial}.mcap"
 
-    def _log(self, row: int, phase: float) -> None:
+    def _log(self, row: int, phase: float, decisions: Decisions) -> None:
         """Begin the log of the trial that was put into a row."""
         config, monitor, world = self._config, self._monitors[row], self._robot.world(row)
         if self._folder is None or monitor is None or not isinstance(world, World):
             return
-        assert self._decisions is not None  # noqa: S101 the controller was made
         header = Header(
             controller=self._name,
             params=config.control,
@@ -208,7 +206,7 @@ class _Rows:
         )
         path = self.log_of(monitor.trial)
         path.unlink(missing_ok=True)  # what a killed worker left of it
-        self._logs[row] = SimulatedLog(path, header, world, self._decisions, row)
+        self._logs[row] = SimulatedLog(path, header, world, decisions, row)
 
     def _look(self, frame: AntennaFrame, controller: Controller) -> None:
         """Let somebody look at the first row after a tick, and keep the events in the logs."""

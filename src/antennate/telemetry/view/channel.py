@@ -20,6 +20,7 @@ import numpy as np
 
 from antennate.errors import BadInputError
 from antennate.telemetry.ticks import Tick
+from antennate.types import Contact
 
 SCENE, MORE, POSES, TICK = b"S", b"M", b"P", b"T"
 """Kinds of messages: the scene and a piece of it, poses with forces, a tick."""
@@ -85,7 +86,7 @@ class Step(NamedTuple):
     counts: Sequence[float] = (math.nan, math.nan)
     maneuver: int = 0
     level: Sequence[float] = (math.nan, math.nan)
-    contact: Sequence[int] = (2, 2)
+    contact: Sequence[int] = (Contact.UNKNOWN, Contact.UNKNOWN)
     phase: float = math.nan
 
     def pack(self) -> bytes:
@@ -93,9 +94,9 @@ class Step(NamedTuple):
         number, t, counts, maneuver, level, contact, phase = self
         return _STEP.pack(number, t, *counts, maneuver, *level, *contact, phase)
 
-    @classmethod
-    def tick(cls, content: bytes) -> Tick:
-        """The tick of the bytes.
+    @staticmethod
+    def unpack(content: bytes) -> Tick:
+        """The tick of what `pack` gave.
 
         Raises:
             BadInputError: They are something else.

@@ -103,11 +103,12 @@ class FoxgloveSink:
         if kind == TICK:
             self._tick(Tick.unpack(content))
         elif kind == STEP:
-            self._tick(Step.tick(content))
+            self._tick(Step.unpack(content))
         elif kind == POSES and self._shapes is not None:
             self._scene(self._shapes, Poses.unpack(content))
         elif kind == SNAPSHOT and self._shapes is not None:
-            self._scene(self._shapes, Poses(*picture(content, self._shapes)))
+            if (now := picture(content, self._shapes)) is not None:
+                self._scene(self._shapes, Poses(*now))
         elif kind == SCENE:
             self._shapes = Shapes.unpack(content)
         elif kind == TEXT:

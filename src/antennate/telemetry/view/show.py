@@ -126,12 +126,13 @@ class Page:
             self._poses = Poses.unpack(content)
             self._note_head()
         elif kind == SNAPSHOT and self._scene is not None:
-            self._poses = Poses(*picture(content, self._scene.shapes))
-            self._note_head()
+            if (now := picture(content, self._scene.shapes)) is not None:
+                self._poses = Poses(*now)
+                self._note_head()
         elif kind == TICK:
             self._take_tick(Tick.unpack(content))
         elif kind == STEP:
-            self._take_tick(Step.tick(content))
+            self._take_tick(Step.unpack(content))
         elif kind == TEXT:
             self._lines.append(content.decode("utf-8", "replace"))
         elif kind == STATE:
