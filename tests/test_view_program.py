@@ -68,6 +68,15 @@ def test_messages_that_go_together_come_one_by_one(pair: Pair) -> None:
     assert len(list(theirs.receive())) == 2 * sent
 
 
+def test_a_message_longer_than_any_may_be_is_dropped(pair: Pair) -> None:
+    """A picture of a scene of very many parts; the page stays."""
+    ours, theirs = pair
+    assert not ours.send(POSES, bytes(1 << 24))
+    assert (ours.dropped, ours.closed) == (1, False)
+    assert ours.send(TICK, b"next")
+    assert list(theirs.receive()) == [(TICK, b"next")]
+
+
 def test_an_end_that_closes_is_noticed(pair: Pair) -> None:
     """The program runs on without a page."""
     ours, theirs = pair

@@ -7,6 +7,7 @@ than a message may be: they follow one another in pieces, and for those one wait
 
 from __future__ import annotations
 
+import errno
 import json
 import math
 import select
@@ -155,8 +156,11 @@ class Channel:
         except BlockingIOError:
             self.dropped += 1
             return False
-        except OSError:
-            self.closed = True
+        except OSError as error:
+            if error.errno == errno.EMSGSIZE:
+                self.dropped += 1  # longer than any message may be here
+            else:
+                self.closed = True
             return False
         return True
 
