@@ -26,7 +26,7 @@ from measuring import in_turn, ratios, spread, wall_seconds
 
 from antennate.control.gait import Gait
 from antennate.experiments.tunnel import run as experiment
-from antennate.experiments.tunnel.batch import BATCH, Bodies, cpu_bodies, run_trials
+from antennate.experiments.tunnel.batch import Bodies, cpu_bodies, run_trials
 from antennate.experiments.tunnel.config import TunnelConfig
 from antennate.experiments.tunnel.monitor import TrialResult
 from antennate.sim.scenes.registry import make_scene
@@ -39,6 +39,8 @@ from antennate.types import AntennaFrame, Floats, JointCommand
 
 CONTROLLER = "closed"
 CORES = 2
+WORLDS = 12
+"""Worlds stepped at once, and half of the trials."""
 
 
 class Halves:
@@ -80,8 +82,10 @@ class Halves:
     def world(self, row: int) -> Any:
         return self._parts[row // self._size].world(row % self._size)
 
-    def failure(self, row: int) -> Any:
-        return self._parts[row // self._size].failure(row % self._size)
+    @property
+    def failures(self) -> Any:
+        parts = enumerate(self._parts)
+        return {i * self._size + row: e for i, part in parts for row, e in part.failures.items()}
 
 
 def rows_of(config: TunnelConfig, trials: Sequence[int], **more: Any) -> list[TrialResult]:
@@ -110,7 +114,7 @@ def shared(config: TunnelConfig, trials: int, pool: Executor) -> list[TrialResul
 
 def measure_trials(quick: bool) -> dict[str, Any]:
     """Two cores over one, for several ways to use them."""
-    trials, seconds = (4, 2.0) if quick else (2 * BATCH, 6.0)
+    trials, seconds = (4, 2.0) if quick else (2 * WORLDS, 6.0)
     config = TunnelConfig(trials=trials, time_limit=seconds, controllers=(CONTROLLER,))
     expected = sorted(rows_of(config, range(trials)), key=lambda row: row.trial)
     context = multiprocessing.get_context("spawn")
@@ -162,17 +166,17 @@ class Stepping:
     """Twelve tunnels of one layout, and what their joints are told at each tick."""
 
     def __init__(self, config: TunnelConfig, ticks: int) -> None:
-        gait = Gait(config.control.gait, config.robot, BATCH, config.control.period)
+        gait = Gait(config.control.gait, config.robot, WORLDS, config.control.period)
         self._substeps = round(config.control.period / config.physics.timestep)
         self._config, plain = config, make_scene(config.scene, config.tunnel)
-        drawn = (draw_scene(config, plain, trial) for trial in range(BATCH))
+        drawn = (draw_scene(config, plain, trial) for trial in range(WORLDS))
         self._scene = PaddedTunnels(plain, drawn)
         worlds = self.worlds()
-        self._targets: Floats = np.zeros((ticks, BATCH, worlds[0].model.nu))
+        self._targets: Floats = np.zeros((ticks, WORLDS, worlds[0].model.nu))
         for at in self._targets:
-            command = gait.step(np.zeros(BATCH, np.int64))
+            command = gait.step(np.zeros(WORLDS, np.int64))
             parts = [getattr(command, name) for name in config.robot.command_shapes()]
-            told = np.concatenate([part.reshape(BATCH, -1) for part in parts], axis=1)
+            told = np.concatenate([part.reshape(WORLDS, -1) for part in parts], axis=1)
             at[:, worlds[0].places.drives] = told
         self.expected: Floats | None = None
         self.same: dict[str, bool] = {}
@@ -180,7 +184,7 @@ class Stepping:
     def worlds(self) -> list[World]:
         """Fresh ones."""
         gait, period = self._config.control.gait, self._config.control.period
-        trials = range(BATCH)
+        trials = range(WORLDS)
         return [draw_trial(self._config, self._scene, i, gait, period).world for i in trials]
 
     def _some(self, worlds: Sequence[World], targets: Floats) -> None:
@@ -196,7 +200,7 @@ class Stepping:
 
     def threads(self, worlds: list[World], pool: Executor) -> Floats:
         """Half of the worlds on each thread at each tick."""
-        half = BATCH // CORES
+        half = WORLDS // CORES
         parts = [slice(i * half, (i + 1) * half) for i in range(CORES)]
         for targets in self._targets:
             list(pool.map(lambda part, t=targets: self._some(worlds[part], t[part]), parts))
@@ -205,7 +209,7 @@ class Stepping:
     def batch(self, worlds: list[World]) -> Floats:
         """The engine's own batch. Worlds with sleeping parts need one that keeps their data."""
         models = [world.model for world in worlds]
-        made = mujoco.batch.Batch(models[0], nsim=BATCH, nthread=CORES, persistent=True)
+        made = mujoco.batch.Batch(models[0], nsim=WORLDS, nthread=CORES, persistent=True)
         made.set_models(models)
         for name in ("qpos", "qvel", "qacc_warmstart"):
             made.bind(name)[:] = [getattr(world.data, name) for world in worlds]
@@ -218,7 +222,7 @@ class Stepping:
     def rollout(self, worlds: list[World]) -> Floats:
         """The engine's rollout, one tick at a time, since the next targets come after it."""
         models, kind = [world.model for world in worlds], mujoco.mjtState.mjSTATE_FULLPHYSICS
-        states = np.zeros((BATCH, mujoco.mj_stateSize(models[0], kind)))
+        states = np.zeros((WORLDS, mujoco.mj_stateSize(models[0], kind)))
         for world, state in zip(worlds, states, strict=True):
             mujoco.mj_getState(world.model, world.data, state, kind)
         data = [mujoco.MjData(models[0]) for _ in range(CORES)]
@@ -262,8 +266,8 @@ def refused() -> str:
     config = TunnelConfig()
     gait, period = config.control.gait, config.control.period
     scene = make_scene(config.scene, config.tunnel)
-    models = [draw_trial(config, scene, i, gait, period).world.model for i in range(BATCH)]
-    made = mujoco.batch.Batch(models[0], nsim=BATCH, nthread=CORES, persistent=True)
+    models = [draw_trial(config, scene, i, gait, period).world.model for i in range(WORLDS)]
+    made = mujoco.batch.Batch(models[0], nsim=WORLDS, nthread=CORES, persistent=True)
     try:
         made.set_models(models)
     except mujoco.FatalError as error:

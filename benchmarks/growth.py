@@ -72,10 +72,10 @@ def walk(config: TunnelConfig, drawn: SceneInstance, seconds: float, fro: bool =
     control = Pacing(config, fro)
 
     def go_on(frame: AntennaFrame, command: JointCommand) -> bool:
-        return body.failure(0) is None and world.t < seconds
+        return body.failures.get(0) is None and world.t < seconds
 
     taken = cpu_seconds(lambda: run_loop(body, control, period, go_on))
-    if failure := body.failure(0):
+    if failure := body.failures.get(0):
         raise SystemExit(f"a robot of {robot.links} links failed: {failure}")
     return taken
 

@@ -1,10 +1,10 @@
 """What a trial costs beside its physics, and a physics step beside that of a humanoid.
 
-- `over_bare_engine`: CPU time of whole tunnel trials (sensing, control, recording), stepped twelve
+- `over_bare_engine`: CPU time of whole tunnel trials (sensing, control, recording), stepped as many
   at a time as the program does, over CPU time of the bare engine that replays their commands, one
   trial after the other, on the same models from the same starts. Drawing and compiling a tunnel is
   in neither. The replay must end on the same bits, and so must every timed trial.
-- `bare_at_once`: the bare engine that steps twelve worlds in turn, over one after the other.
+- `bare_at_once`: the bare engine that steps as many worlds in turn, over one after the other.
 - `step_over_humanoid`: a physics step of the tunnel over one of a humanoid that falls on a floor.
 - `tick`: how long a controller takes for one control tick, alone and for many robots at once.
 """
@@ -187,7 +187,7 @@ def fall(model: mujoco.MjModel, steps: int) -> float:
 
 
 def measure(quick: bool) -> dict[str, Any]:
-    """Trials one and twelve at a time over the bare engine, and its step over a humanoid's."""
+    """Trials one and many at a time over the bare engine, and its step over a humanoid's."""
     config = TunnelConfig(time_limit=3.0 if quick else 8.0)
     trials = 6 if quick else LOCKSTEP
     tapes, ended = record(config, trials)

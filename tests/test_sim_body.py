@@ -76,10 +76,10 @@ def test_a_row_that_fails_reads_nan_and_the_others_go_on_as_if_alone() -> None:
     assert np.isfinite(counts(frames[:20], 0)).all()
     assert np.isnan(counts(frames[20:], 0)).all()
     assert np.array_equal(counts(frames, 1), counts(run(body_of(2), 1, 60), 0))
-    failure = body.failure(0)
+    failure = body.failures.get(0)
     assert failure is not None
     assert failure.step == 100
-    assert body.failure(1) is None
+    assert body.failures.get(1) is None
 
 
 def test_an_empty_row_reads_nan_and_makes_the_mind_hold() -> None:
@@ -124,8 +124,8 @@ def test_a_command_that_is_no_number_fails_its_row_only() -> None:
     yaw = np.zeros((2, 5))
     yaw[0, 2] = math.nan
     body.write(JointCommand(yaw=yaw, leg=np.zeros((2, 6, 2)), antenna=np.zeros((2, 2))))
-    assert "yaw3" in str(body.failure(0))
-    assert body.failure(1) is None
+    assert "yaw3" in str(body.failures.get(0))
+    assert body.failures.get(1) is None
     assert np.isnan(body.read().counts).tolist() == [[True, True], [False, False]]
 
 

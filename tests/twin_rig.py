@@ -14,7 +14,7 @@ import numpy as np
 
 from antennate.control.loop import run_loop
 from antennate.control.registry import make_controller
-from antennate.experiments.tunnel.monitor import TrialMonitor
+from antennate.experiments.tunnel.monitor import LOOK_EVERY, TrialMonitor
 from antennate.experiments.tunnel.run import TunnelConfig
 from antennate.hardware.driving.connect import LATEST
 from antennate.hardware.driving.hardware_robot import HardwareRobot
@@ -90,6 +90,7 @@ class Watch:
         self.body.load(0, start.world, start.chance)
         self.controller = make_controller(name, config.control, config.robot)
         self.controller.reset(np.array([0]), start.phase)
+        self._limit = config.time_limit
         self._monitor = TrialMonitor(config.seed, trial, name, start.scene, [], config.time_limit)
         self.maneuvers: list[int] = []
         self.counts: list[tuple[float, float]] = []
@@ -101,8 +102,11 @@ class Watch:
         self.maneuvers.append(maneuver)
         left, right = frame.counts[0].tolist()
         self.counts.append((left, right))
-        failed = self.body.failure(0) is not None
-        self.status = self._monitor.watch(self.body.world(0), maneuver, failed) or ""
+        world = self.body.world(0)
+        if self.body.failures:
+            self.status = "invalid"
+        elif len(self.maneuvers) % LOOK_EVERY == 0 or world.t >= self._limit:
+            self.status = self._monitor.look(world, world.t, maneuver) or ""
         return not self.status
 
     def decisions(self) -> Decisions:

@@ -49,14 +49,33 @@ def bending_level(params: CurveParams | Curves, counts: Floats) -> Floats:
     Returns:
         b in [0, 1], same shape.
     """
-    x = (counts - params.counts_low) / (params.counts_high - params.counts_low)
-    return sigmoid(params.polarity * params.slope * (x - params.midpoint))
+    return _level(params, _share(params, counts))
 
 
 def flex_fraction(params: CurveParams | Curves, counts: Floats) -> Floats:
     """Flex as a fraction of the calibrated range: 0 straight, 1 fully bent, same shape."""
-    x = (counts - params.counts_low) / (params.counts_high - params.counts_low)
-    return np.where(np.greater(params.polarity, 0), x, 1.0 - x)
+    return _fraction(params, _share(params, counts))
+
+
+def level_and_fraction(params: CurveParams | Curves, counts: Floats) -> tuple[Floats, Floats]:
+    """`bending_level` and `flex_fraction` at once, which takes less than one after the other."""
+    x = _share(params, counts)
+    return _level(params, x), _fraction(params, x)
+
+
+def _share(params: CurveParams | Curves, counts: Floats) -> Floats:
+    """Readings as shares of the range between both ends of the curve."""
+    return (counts - params.counts_low) / (params.counts_high - params.counts_low)
+
+
+def _level(params: CurveParams | Curves, x: Floats) -> Floats:
+    return sigmoid(params.polarity * params.slope * (x - params.midpoint))
+
+
+def _fraction(params: CurveParams | Curves, x: Floats) -> Floats:
+    if isinstance(params, Curves):
+        return np.where(params.polarity > 0, x, 1.0 - x)
+    return x if params.polarity > 0 else 1.0 - x
 
 
 class RunningMean:
@@ -65,17 +84,23 @@ class RunningMean:
     def __init__(self, params: ConditioningParams, batch: int, period: float) -> None:
         self.length = max(1, round(params.averaging_time / period))
         self._ring: Floats = np.zeros((self.length, batch, 2))
-        self._seen: Ints = np.zeros(batch, dtype=np.int64)
+        self._seen: Ints = np.zeros(batch, dtype=np.int64)  # not counted beyond the length
         self._next = 0
+        self._short = self.length
 
     def reset(self, rows: Ints | Bools) -> None:
         """Forget what some rows have seen."""
         self._seen[rows] = 0
+        self._short = self.length
         self._ring[:, rows] = 0.0
 
     def step(self, counts: Floats) -> Floats:
         """Take one reading, shape (B, 2) [counts], and return the mean, same shape."""
         self._ring[self._next] = np.where(np.isfinite(counts), counts, np.nan)
         self._next = (self._next + 1) % self.length
+        total = np.add.reduce(self._ring, axis=0)
+        if not self._short:
+            return total / self.length
+        self._short -= 1
         self._seen = np.minimum(self._seen + 1, self.length)
-        return np.add.reduce(self._ring, axis=0) / self._seen[:, None]
+        return total / self._seen[:, None]

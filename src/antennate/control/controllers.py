@@ -13,7 +13,7 @@ from typing import Protocol
 
 import numpy as np
 
-from antennate.control.conditioning import RunningMean, bending_level, curves, flex_fraction
+from antennate.control.conditioning import RunningMean, curves, level_and_fraction
 from antennate.control.contact import ContactState
 from antennate.control.escape import Escape
 from antennate.control.gait import Gait
@@ -153,9 +153,8 @@ class RuleController:
     def step(self, frame: AntennaFrame) -> JointCommand:
         """One control period: the command for this frame, both with B rows."""
         counts = self._mean.step(frame.counts)
-        self.level = bending_level(self._curves, counts)
+        self.level, flex = level_and_fraction(self._curves, counts)
         self.contact = self._contact.step(self.level)
-        flex = flex_fraction(self._curves, counts)
         self.maneuver = self._rule.step(frame.t, self.level, self.contact, flex)
         return self.gait.step(self.maneuver, self._rule.turn_offset)
 

@@ -80,7 +80,7 @@ def targets(
     else:
         leg = np.zeros((phase.shape[0], robot.links, len(_SIDES)))
     antenna = np.full((phase.shape[0], robot.antenna_count), params.antenna_mean)
-    if sweep is not None:
+    if sweep is not None and params.antenna_amplitude:
         antenna += params.antenna_amplitude * np.sin(sweep)[:, None]
     if not robot.pitch_count:
         return JointCommand(yaw=yaw, leg=leg, antenna=antenna)
@@ -126,10 +126,11 @@ class Gait:
             turn_offset: Yaw offset of the turns [rad], the gait's own if absent.
         """
         size = self.params.turn_offset if turn_offset is None else turn_offset
+        moves = _STEERS[maneuver]
         change = _STEER[maneuver] * size - self.offset
         change = np.minimum(np.maximum(change, -self._slew), self._slew)
-        self.offset += change * _STEERS[maneuver]
+        self.offset += change * moves
         self.phase += _DIRECTION[maneuver] * self._advance
-        self.sweep += _STEERS[maneuver] * self._swing
+        self.sweep += moves * self._swing
         command = targets(self.params, self._robot, self.phase, self.offset, self.sweep)
         return command if self._legs else replace(command, leg=np.zeros_like(command.leg))

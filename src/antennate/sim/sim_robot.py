@@ -6,20 +6,29 @@ antennae read NaN, which the controller takes for UNKNOWN. Rows never influence 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from antennate.antenna.sensor import SensorChain, reading_noise
 from antennate.errors import ConfigError, SimulationError
 from antennate.params.scene import VariationParams
 from antennate.robots.spec import RobotSpec
+from antennate.sim.states import States
 from antennate.sim.world import World
-from antennate.types import AntennaFrame, Floats, JointCommand
+from antennate.types import AntennaFrame, Floats, Ints, JointCommand
 
-_NOISE_BLOCK = 1024
+NOISE_BLOCK = 1024
+"""Ticks whose noise is drawn at once."""
 
 
 class Disturbance:
-    """What chance does to one trial: sensor noise, slipping legs, joints off their zero."""
+    """What chance does to one trial: sensor noise, slipping legs, joints off their zero.
+
+    Attributes:
+        joint_bias: Error of the zero of each yaw joint [rad], shape (Y,).
+        slip_ticks: Ticks from one friction of the legs to the next.
+    """
 
     def __init__(
         self,
@@ -30,20 +39,24 @@ class Disturbance:
     ) -> None:
         self._rng = rng
         self._robot, self._variation = robot, variation
-        self._slip_ticks = max(1, round(variation.slip_time / period))
+        self.slip_ticks = max(1, round(variation.slip_time / period))
         self._noise = np.zeros((0, 2))
         self.joint_bias: Floats = rng.normal(0.0, variation.joint_bias, robot.yaw_count)
 
     def noise(self, tick: int) -> Floats:
         """Reading noise of one tick [counts], shape (2,)."""
-        at = tick % _NOISE_BLOCK
+        at = tick % NOISE_BLOCK
         if at == 0:
-            self._noise = reading_noise(self._robot.antenna.sensor, self._rng, (_NOISE_BLOCK, 2))
+            self._noise = self.noise_block()
         return self._noise[at]
+
+    def noise_block(self) -> Floats:
+        """Reading noise of the next NOISE_BLOCK ticks [counts], shape (NOISE_BLOCK, 2)."""
+        return reading_noise(self._robot.antenna.sensor, self._rng, (NOISE_BLOCK, 2))
 
     def leg_friction(self, tick: int) -> Floats | None:
         """New friction of all legs where this tick draws one, else None."""
-        if tick % self._slip_ticks:
+        if tick % self.slip_ticks:
             return None
         factor = np.exp(self._rng.normal(0.0, self._variation.slip_log_sd, self._robot.leg_count))
         return np.clip(self._robot.leg_friction * factor, 0.02, 2.0)
@@ -52,15 +65,13 @@ class Disturbance:
 class _Row:
     """One world of the batch with its disturbance and its tick count."""
 
-    __slots__ = ("chance", "commanded", "failure", "hinges", "tick", "world")
+    __slots__ = ("chance", "commanded", "tick", "world")
 
-    def __init__(self, world: World, chance: Disturbance, hinges: Floats) -> None:
+    def __init__(self, world: World, chance: Disturbance) -> None:
         self.world = world
         self.chance = chance
-        self.hinges = hinges
         self.tick = 0
         self.commanded = False
-        self.failure: SimulationError | None = None
 
 
 class SimRobot:
@@ -78,6 +89,7 @@ class SimRobot:
 
     def __init__(self, batch: int, robot: RobotSpec, period: float, timestep: float) -> None:
         self._rows: dict[int, _Row] = {}
+        self._failures: dict[int, SimulationError] = {}
         self._batch = batch
         self._yaws = robot.yaw_count
         self._parts = list(robot.command_shapes())
@@ -91,10 +103,12 @@ class SimRobot:
             )
         self._ticks = 0
         sensed = robot.antenna.sensed_hinges if robot.antenna_count else 0
-        self._hinges: Floats = np.zeros((batch, 2, sensed))
+        self._states = States(batch, sensed)
         self._bias: Floats = np.zeros((batch, robot.yaw_count))
-        self._noise: Floats = np.zeros((batch, 2))
-        self._missing = np.ones(batch, dtype=bool)
+        self._noise: Floats = np.zeros((batch, NOISE_BLOCK, 2))
+        self._every: Ints = np.arange(batch)
+        self._empty, self._missing = np.ones((2, batch), dtype=bool)
+        self._moved: set[int] = set()
 
     @property
     def clock(self) -> SimRobot:
@@ -103,10 +117,12 @@ class SimRobot:
 
     def load(self, row: int, world: World, chance: Disturbance) -> None:
         """Put a fresh world into a row."""
-        self._rows[row] = _Row(world, chance, self._hinges[row])
+        self.unload(row)
+        self._rows[row] = _Row(world, chance)
+        self._states.put(row, world)
         self._bias[row] = chance.joint_bias
         self._sensors.reset(row)
-        self._missing[row] = not world.robot.antenna_count
+        self._empty[row], self._missing[row] = False, not world.robot.antenna_count
 
     def put_back(self, row: int, state: Floats) -> None:
         """Let the world of a row go on from a state of its own; its flex sensors forget."""
@@ -116,7 +132,10 @@ class SimRobot:
     def unload(self, row: int) -> None:
         """Empty a row."""
         self._rows.pop(row, None)
-        self._missing[row] = True
+        self._failures.pop(row, None)
+        self._moved.discard(row)
+        self._states.remove(row)
+        self._empty[row] = self._missing[row] = True
 
     def world(self, row: int) -> World:
         """The world in a row."""
@@ -124,10 +143,12 @@ class SimRobot:
             raise IndexError(f"row {row} holds no world")
         return self._rows[row].world
 
-    def failure(self, row: int) -> SimulationError | None:
-        """What ended the row's simulation, if anything did."""
-        held = self._rows.get(row)
-        return held.failure if held else None
+    @property
+    def failures(self) -> Mapping[int, SimulationError]:
+        """What ended simulations, by row."""
+        if self._moved:
+            self._look()
+        return self._failures
 
     def now(self) -> float:
         """Time [s] since the batch began."""
@@ -135,14 +156,16 @@ class SimRobot:
 
     def read(self) -> AntennaFrame:
         """Sample both sensors of every row."""
-        t = np.full(self._batch, np.nan)
+        self._look()
+        at = [0] * self._batch
         for i, row in self._rows.items():
-            t[i] = row.world.data.time
-            row.world.read_hinges(row.hinges)
-            self._noise[i] = row.chance.noise(row.tick)
-        counts = self._sensors.step(self._hinges.sum(axis=2), self._noise)
+            at[i] = row.tick % NOISE_BLOCK
+            if not at[i]:
+                self._noise[i] = row.chance.noise_block()
+        noise = self._noise[self._every, at]
+        counts = self._sensors.step(self._states.hinges.sum(axis=2), noise)
         counts[self._missing] = np.nan
-        return AntennaFrame(t=t, counts=counts)
+        return AntennaFrame(t=np.where(self._empty, np.nan, self._states.times), counts=counts)
 
     def write(self, command: JointCommand) -> None:
         """Command every row's joints."""
@@ -151,7 +174,7 @@ class SimRobot:
         drive[:, : self._yaws] += self._bias
         finite = bool(np.isfinite(drive).all())
         for i, row in self._rows.items():
-            if row.failure is None:
+            if i not in self._failures:
                 row.commanded = True
                 if finite:
                     row.world.command_finite(drive[i])
@@ -159,7 +182,7 @@ class SimRobot:
                 try:
                     row.world.command(drive[i])
                 except SimulationError as error:
-                    self._fail(i, row, error)
+                    self._fail(i, error)
 
     def sleep_until(self, t: float) -> None:
         """Advance the physics of every row that has been commanded to time t [s].
@@ -168,24 +191,37 @@ class SimRobot:
         of the cache, and the looks follow one another faster.
         """
         while self._ticks * self._period < t - 1e-9:
+            if self._moved:
+                self._look()
             self._ticks += 1
             for i, row in self._rows.items():
-                if row.commanded and row.failure is None:
-                    friction = row.chance.leg_friction(row.tick)
-                    if friction is not None:
-                        row.world.set_leg_friction(friction)
+                if row.commanded and i not in self._failures:
+                    if not row.tick % row.chance.slip_ticks:
+                        self._slip(row)
                     row.tick += 1
                     try:
                         row.world.advance(self._substeps)
                     except SimulationError as error:
-                        self._fail(i, row, error)
-            for i, row in self._rows.items():
-                if row.commanded and row.failure is None:
-                    try:
-                        row.world.check()
-                    except SimulationError as error:
-                        self._fail(i, row, error)
+                        self._fail(i, error)
+                    else:
+                        self._moved.add(i)
 
-    def _fail(self, i: int, row: _Row, error: SimulationError) -> None:
-        row.failure = error
+    def _slip(self, row: _Row) -> None:
+        """Draw new friction of all legs."""
+        friction = row.chance.leg_friction(row.tick)
+        if friction is not None:
+            row.world.set_leg_friction(friction)
+
+    def _look(self) -> None:
+        """Take the states of all rows, and find those whose last advance failed."""
+        moved, self._moved = self._moved, set[int]()
+        for i in self._states.look():
+            if i in moved and i not in self._failures:
+                try:
+                    self._rows[i].world.check()
+                except SimulationError as error:
+                    self._fail(i, error)
+
+    def _fail(self, i: int, error: SimulationError) -> None:
+        self._failures[i] = error
         self._missing[i] = True

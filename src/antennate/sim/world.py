@@ -112,7 +112,7 @@ class World:
         self.model = model
         self.data = mujoco.MjData(model)
         self.places = places = Places(model, robot, PREFIX)
-        self._flex, self._bounded, self._drive = places.hinges, places.bounded, places.drives
+        self._bounded, self._drive = places.bounded, places.drives
         self.gears = Gears(model, robot, PREFIX)
         names = [PREFIX + n for n in robot.joint_names]
         stall = np.array([robot.servos.of(n).stall_torque for n in robot.servo_names])
@@ -264,10 +264,6 @@ class World:
         )
         for found in filter(None, checks):
             raise SimulationError(self._steps, found)
-
-    def read_hinges(self, angles: Floats) -> None:
-        """Write the angles of all hinges under the flex sensors to `angles` [rad], shape (2, n)."""
-        self._qpos.take(self._flex, out=angles, mode="clip")
 
     @property
     def heading(self) -> float:

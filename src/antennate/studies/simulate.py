@@ -77,7 +77,7 @@ def simulate(
         if kept is not None:
             kept.take(decisions.take(frame, command))
         ticks += 1
-        outcome = "invalid" if robot.failure(0) is not None else "timeout"
+        outcome = "invalid" if robot.failures else "timeout"
         if outcome == "timeout" and ticks % _EVERY == 0:
             outcome = _seen(start)
         return outcome == "timeout" and start.world.t < time_limit

@@ -122,7 +122,7 @@ class TwinRobot:
     @property
     def failure(self) -> SimulationError | None:
         """What ended the physics, if anything did."""
-        return self._body.failure(0)
+        return self._body.failures.get(0)
 
     @property
     def stood(self) -> int:

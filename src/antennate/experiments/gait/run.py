@@ -205,7 +205,7 @@ def walk_flat(
     decisions = Decisions(robot, control)
 
     def go_on(frame: AntennaFrame, command: JointCommand) -> bool:
-        failure = body.failure(0)
+        failure = body.failures.get(0)
         if failure is not None:
             raise failure
         if log is not None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Protocol
 
@@ -15,6 +15,7 @@ from antennate.control.registry import ControllerMaker, make_controller
 from antennate.errors import ConfigError, ControllerError, SimulationError
 from antennate.experiments.tunnel.config import TunnelConfig
 from antennate.experiments.tunnel.monitor import (
+    LOOK_EVERY,
     Outcome,
     TrialMonitor,
     TrialPath,
@@ -29,10 +30,10 @@ from antennate.sim.world import World
 from antennate.telemetry.header import Header
 from antennate.telemetry.simulated import Decisions, SimulatedLog
 from antennate.telemetry.view.pace import Restart
-from antennate.types import AntennaFrame, Controller, JointCommand, Robot
+from antennate.types import AntennaFrame, Controller, Floats, Ints, JointCommand, Maneuver, Robot
 
-BATCH = 12
-"""Trials of one process stepped in lockstep."""
+BATCH = 24
+"""Trials of one process stepped in lockstep. Each pays its share of what all cost together."""
 SHOWN_TRIALS = 5
 """Trials of which the figure draws the paths; those of the others are not kept, as they take time.
 """
@@ -56,8 +57,9 @@ class Bodies(Robot, Protocol):
         """The world in a row."""
         ...
 
-    def failure(self, row: int) -> SimulationError | None:
-        """What ended the row's simulation, if anything did."""
+    @property
+    def failures(self) -> Mapping[int, SimulationError]:
+        """What ended simulations, by row."""
         ...
 
 
@@ -129,12 +131,15 @@ class _Rows:
         self._folder, self._logs, self._looks = logs, dict[int, SimulatedLog](), watch
         self._waiting = list(trials)
         self._scene, self._robot = made
-        self._monitors: list[TrialMonitor | None] = [None] * batch
+        self._monitors: dict[int, TrialMonitor] = {}
+        self._every: Ints = np.arange(batch)
+        self._ticks, self._begun = 0, dict[int, int]()
+        self._maneuvers: Ints = np.zeros((batch, len(Maneuver)), np.int64)
 
     @property
     def unfinished(self) -> list[int]:
         """Trials that were not emitted, in order."""
-        running = [monitor.trial for monitor in self._monitors if monitor is not None]
+        running = [monitor.trial for monitor in self._monitors.values()]
         return sorted(running + self._waiting)
 
     def run(self, make: ControllerMaker) -> None:
@@ -161,16 +166,12 @@ class _Rows:
                 for log in self._logs.values():
                     log.take(decided)
             self._look(frame, made)
-            maneuvers, faults = control.maneuver.tolist(), control.faults
-            for row, monitor in enumerate(self._monitors):
-                if monitor is None:
-                    continue
-                ended = self._watch(row, monitor, maneuvers[row], faults.get(row))
-                if ended and self._waiting:
+            for row in self._watch(frame.t, control):
+                if self._waiting:
                     phase = self._place(row)
                     control.reset(np.array([row]), phase)
                     self._log(row, phase, decisions)
-            return any(monitor is not None for monitor in self._monitors)
+            return bool(self._monitors)
 
         run_loop(self._robot, control, config.control.period, go_on)
 
@@ -180,6 +181,7 @@ class _Rows:
         gait, period = config.control.gait, config.control.period
         start = draw_trial(config, self._scene, trial, gait, period)
         self._robot.load(row, start.world, start.chance)
+        self._begun[row], self._maneuvers[row] = self._ticks, 0
         before = self._robot.world(row).outlines()[1] if trial < SHOWN_TRIALS else []
         self._monitors[row] = TrialMonitor(
             config.seed, trial, self._name, start.scene, before, config.time_limit
@@ -194,7 +196,7 @@ class _Rows:
     def _log(self, row: int, phase: float, decisions: Decisions) -> None:
         """Begin the log of the trial that was put into a row."""
         config, monitor, world = self._config, self._monitors[row], self._robot.world(row)
-        if self._folder is None or monitor is None or not isinstance(world, World):
+        if self._folder is None or not isinstance(world, World):
             return
         header = Header(
             controller=self._name,
@@ -223,24 +225,34 @@ class _Rows:
             log.close()
             log.path.unlink(missing_ok=True)
 
-    def _watch(self, row: int, monitor: TrialMonitor, maneuver: int, fault: str | None) -> bool:
-        """Look at a row after a tick; whether its trial has ended."""
-        if fault is not None:
-            self.end(row, "invalid", f"controller: {fault}")
-            return True
-        failure = self._robot.failure(row)
-        outcome = monitor.watch(self._robot.world(row), maneuver, failure is not None)
-        if outcome is not None:
-            self.end(row, outcome, str(failure or ""))
-        return outcome is not None
+    def _watch(self, t: Floats, control: CheckedController) -> list[int]:
+        """Watch all rows after a tick at times t [s], shape (B,); those whose trials have ended."""
+        maneuvers, ended = control.maneuver, list[int]()
+        broken = {row: str(error) for row, error in self._robot.failures.items()}
+        if control.faults:
+            broken |= {row: f"controller: {fault}" for row, fault in control.faults.items()}
+            maneuvers = np.clip(maneuvers, 0, max(Maneuver))
+        for row in broken.keys() & self._monitors:
+            self.end(row, "invalid", broken[row])
+            ended.append(row)
+        self._maneuvers[self._every, maneuvers] += 1
+        self._ticks += 1
+        times, ticks, limit = t.tolist(), self._ticks, self._config.time_limit
+        for row, begun in [*self._begun.items()]:
+            if (ticks - begun) % LOOK_EVERY and times[row] < limit:
+                continue
+            world, maneuver = self._robot.world(row), maneuvers.item(row)
+            if (outcome := self._monitors[row].look(world, times[row], maneuver)) is not None:
+                self.end(row, outcome)
+                ended.append(row)
+        return ended
 
-    def end(self, row: int, outcome: Outcome, reason: str) -> None:
+    def end(self, row: int, outcome: Outcome, reason: str = "") -> None:
         """Emit the trial of a row, and empty the row."""
         if (log := self._logs.pop(row, None)) is not None:
             log.close()
-        monitor, world = self._monitors[row], self._robot.world(row)
-        if monitor is not None:
-            path = monitor.path(world) if monitor.trial < SHOWN_TRIALS else None
-            self._emit((monitor.result(world, outcome, reason), path))
+        monitor, world = self._monitors.pop(row), self._robot.world(row)
+        del self._begun[row]
+        path = monitor.path(world) if monitor.trial < SHOWN_TRIALS else None
+        self._emit((monitor.result(world, outcome, reason, self._maneuvers[row]), path))
         self._robot.unload(row)
-        self._monitors[row] = None

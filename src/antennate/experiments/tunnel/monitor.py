@@ -13,7 +13,7 @@ from typing import Literal, Protocol
 import numpy as np
 
 from antennate.sim.scenes.scene import SceneInstance
-from antennate.types import Floats, Maneuver
+from antennate.types import Floats, Ints, Maneuver
 
 Outcome = Literal["success", "timeout", "left", "invalid"]
 
@@ -21,7 +21,7 @@ STUCK_GAIN = 0.02
 """Gain of progress that counts as getting on [m]."""
 STUCK_TIME = 5.0
 """Time without such a gain after which the robot is stuck [s]."""
-_EVERY = 10
+LOOK_EVERY = 10
 """Ticks between two looks: 10 Hz at the usual rate."""
 
 
@@ -119,7 +119,7 @@ class TrialPath:
 
 @dataclass
 class TrialMonitor:
-    """Watches one trial from its first tick to its outcome.
+    """Watches one trial, a look every LOOK_EVERY ticks and one at the time limit.
 
     Attributes:
         seed, trial: What decides all chance.
@@ -135,7 +135,6 @@ class TrialMonitor:
     scene: SceneInstance
     before: list[Floats]
     time_limit: float
-    _ticks: int = 0
     _best: float = 0.0
     _best_at: float = 0.0
     _stuck: int = 0
@@ -143,17 +142,9 @@ class TrialMonitor:
     _is_stuck: bool = False
     _forces: list[float] = field(default_factory=list)
     _samples: list[tuple[float, float, float, int]] = field(default_factory=list)
-    _counts: list[int] = field(default_factory=lambda: [0] * len(Maneuver))
 
-    def watch(self, world: Watched, maneuver: int, failed: bool) -> Outcome | None:
-        """Look at the world after a tick; the outcome once there is one."""
-        if failed:
-            return "invalid"
-        self._counts[maneuver] += 1
-        self._ticks += 1
-        t = world.t
-        if self._ticks % _EVERY and t < self.time_limit:
-            return None
+    def look(self, world: Watched, t: float, maneuver: int) -> Outcome | None:
+        """Look at the world at time t [s]; the outcome once there is one."""
         head = world.head[:2].copy()
         x, y = head.tolist()
         self._samples.append((t, x, y, maneuver))
@@ -174,9 +165,9 @@ class TrialMonitor:
             self._is_stuck = True
             self._stuck += 1
 
-    def result(self, world: Watched, outcome: Outcome, reason: str) -> TrialResult:
-        """The row of a trial that ended so."""
-        share = np.array(self._counts) / max(1, sum(self._counts))
+    def result(self, world: Watched, outcome: Outcome, reason: str, ticks: Ints) -> TrialResult:
+        """The row of a trial that ended so, with `ticks` in each maneuver, shape (5,)."""
+        share = ticks / max(1, ticks.sum())
         forces = np.array(self._forces) if self._forces else np.zeros(1)
         progress = self.scene.progress(world.head[:2].copy())
         if not np.isfinite(progress):

@@ -12,7 +12,7 @@ from typing import Any
 from antennate.control.registry import make_controller
 from antennate.errors import ConfigError, WorkerError
 from antennate.experiments.tunnel import measures
-from antennate.experiments.tunnel.batch import Emit, run_trials
+from antennate.experiments.tunnel.batch import BATCH, Emit, run_trials
 from antennate.experiments.tunnel.config import TunnelConfig
 from antennate.experiments.tunnel.monitor import TrialPath, TrialResult
 from antennate.sim.scenes.registry import TUNNEL
@@ -25,8 +25,6 @@ from antennate.telemetry.view.pace import Restart
 from antennate.telemetry.view.simulation import SimulationView
 from antennate.types import AntennaFrame, Controller, Maneuver
 
-_TASK = 12
-"""Most trials handed to a process at once."""
 _Found = tuple[TrialResult, TrialPath | None]
 
 
@@ -184,7 +182,7 @@ def run(
         WorkerError: A worker process failed.
     """
     trials = every(config)
-    size = max(1, min(_TASK, math.ceil(len(trials) / (3 * workers))))
+    size = max(1, min(BATCH, math.ceil(len(trials) / (3 * workers))))
     found: list[_Found] = []
 
     def take(item: _Found) -> None:

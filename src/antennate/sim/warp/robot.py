@@ -5,6 +5,8 @@ The sensors, the disturbances and the clock are those of `SimRobot`; the worlds 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import mujoco
 import numpy as np
 
@@ -27,7 +29,6 @@ class WarpRow:
         chance: What chance does to it.
         ticks: Control periods since its start.
         commanded: Whether it was told anything yet.
-        failure: What ended its simulation, if anything did.
     """
 
     def __init__(self, batch: WarpRobot, row: int, world: World, chance: Disturbance) -> None:
@@ -35,7 +36,6 @@ class WarpRow:
         self.world, self.chance = world, chance
         self.ticks = 0
         self.commanded = False
-        self.failure: SimulationError | None = None
 
     @property
     def t(self) -> float:
@@ -106,6 +106,7 @@ class WarpRobot:
         self._yaws, self._parts = robot.yaw_count, list(robot.command_shapes())
         self._sensors = SensorChain(robot.antenna.sensor, (batch, 2), period)
         self._rows = dict[int, WarpRow]()
+        self._failures = dict[int, SimulationError]()
         self._new, self._ended = set[int](), set[int]()
         self._missing = np.ones(batch, dtype=bool)
         self._noise: Floats = np.zeros((batch, 2))
@@ -135,6 +136,7 @@ class WarpRobot:
                 f"found {world.model.nq}"
             )
         self._rows[row] = WarpRow(self, row, world, chance)
+        self._failures.pop(row, None)
         self._new.add(row)
         self._sensors.reset(row)
         self._missing[row] = not world.robot.antenna_count
@@ -144,6 +146,7 @@ class WarpRobot:
         """Empty a row."""
         if self._rows.pop(row, None) is not None:
             self._ended.add(row)
+        self._failures.pop(row, None)
         self._missing[row] = True
 
     def world(self, row: int) -> WarpRow:
@@ -152,10 +155,10 @@ class WarpRobot:
             raise IndexError(f"row {row} holds no world")
         return self._rows[row]
 
-    def failure(self, row: int) -> SimulationError | None:
-        """What ended the row's simulation, if anything did."""
-        held = self._rows.get(row)
-        return held.failure if held else None
+    @property
+    def failures(self) -> Mapping[int, SimulationError]:
+        """What ended simulations, by row."""
+        return self._failures
 
     def forces(self) -> Floats:
         """Summed normal force on obstacles in the last physics step [N], shape (B,)."""
@@ -186,13 +189,13 @@ class WarpRobot:
         parts = [getattr(command, name).reshape(self._batch, -1) for name in self._parts]
         drive = np.concatenate(parts, axis=1)
         for i, row in self._rows.items():
-            if row.failure is None:
+            if i not in self._failures:
                 drive[i, : self._yaws] += row.chance.joint_bias
                 row.commanded = True
                 try:
                     row.world.command(drive[i])
                 except SimulationError as error:
-                    self._fail(i, row, error)
+                    self._fail(i, error)
                 else:
                     self._controls[i] = row.world.data.ctrl
         self._settle()
@@ -223,7 +226,7 @@ class WarpRobot:
         while self._ticks * self.period < t - 1e-9:
             self._ticks += 1
             moving = {
-                i: row for i, row in self._rows.items() if row.commanded and row.failure is None
+                i: row for i, row in self._rows.items() if row.commanded and i not in self._failures
             }
             if self.worlds is None or not moving:
                 continue
@@ -251,8 +254,8 @@ class WarpRobot:
         unsound = np.flatnonzero(~sound(heads, bounded, speeds)).tolist()
         for i in moving.keys() & {*unsound, *dropped}:
             found = dropped.get(i) or broken(heads[i], bounded[i], speeds[i])
-            self._fail(i, moving[i], SimulationError(moving[i].ticks * self._substeps, found))
+            self._fail(i, SimulationError(moving[i].ticks * self._substeps, found))
 
-    def _fail(self, i: int, row: WarpRow, error: SimulationError) -> None:
-        row.failure = error
+    def _fail(self, i: int, error: SimulationError) -> None:
+        self._failures[i] = error
         self._missing[i] = True
