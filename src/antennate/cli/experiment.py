@@ -16,7 +16,7 @@ from antennate.cli.progress import progress, stop_signals
 from antennate.cli.results import drawn_table, folder_for, tell
 from antennate.cli.run_options import Options, go_on, workers_of
 from antennate.cli.view_options import ViewOptions, require_viewable, say_by_hand, view_of
-from antennate.errors import BadInputError, ConfigError, OutputError, WorkerError
+from antennate.errors import BadInputError, ConfigError, LogError, OutputError, WorkerError
 from antennate.experiments.running import keep, require_films, write_films
 from antennate.params.base import Params
 from antennate.studies.engines import WARP
@@ -150,9 +150,10 @@ def carry_out(
             run.store.take(shards.records)
         try:
             outcome = _outcome(experiment, config, options, workers, run, view)
-        except WorkerError:
+        except (LogError, OutputError, WorkerError):
             if shards:
                 run.discard()
+            run.keep_logs()
             raise
         except ShardEnd as end:
             told = {"shard": options.shard, "trials": end.count, "of": end.total}

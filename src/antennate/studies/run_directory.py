@@ -244,6 +244,10 @@ class RunDirectory:
         if not result.get("interrupted"):
             self._close_store(remove=not self.keeps_store)
 
+    def keep_logs(self) -> None:
+        """Let it stay when the run ends if it holds logs, even if none of their trials has ended."""
+        self._kept = self._kept or any(path.parent.name == LOGS for path in _held(self.path))
+
     def discard(self) -> None:
         """Let nothing that was kept so far stay when the run ends."""
         self._kept = False
