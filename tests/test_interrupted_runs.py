@@ -7,6 +7,7 @@ import re
 import resource
 import shlex
 import shutil
+import signal
 import subprocess
 import sys
 from types import SimpleNamespace
@@ -57,6 +58,27 @@ def test_nothing_stays_of_a_run_that_is_interrupted_before_its_first_trial(
     capsys.readouterr()
     assert main([*words, "there", "--resume"]) == 2
     assert "expected an unfinished run, found there/logs/a.mcap" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("moment", "stays"), [("describe", False), ("write_figures", True)])
+def test_a_run_that_is_stopped_before_or_after_its_trials_ends_as_by_ctrl_c(
+    capsys, tmp_path, monkeypatch, moment, stays
+):
+    """Batch systems and `docker stop` send SIGTERM, whatever the run does at that time."""
+    done = getattr(RunDirectory, moment)
+
+    def stopped(*given):
+        done(*given)
+        os.kill(os.getpid(), signal.SIGTERM)
+
+    monkeypatch.setattr(RunDirectory, moment, stopped)
+    before = signal.signal(signal.SIGTERM, lambda *_: pytest.fail("SIGTERM ended the program"))
+    try:
+        assert main([*TUNNEL, "--workers", "1", "--out", str(tmp_path / "run")]) == 130
+    finally:
+        signal.signal(signal.SIGTERM, before)
+    assert capsys.readouterr().err.endswith("antennate tunnel: interrupted\n")
+    assert (tmp_path / "run" / "result.json").exists() == (tmp_path / "run").exists() == stays
 
 
 @pytest.mark.parametrize(

@@ -141,6 +141,7 @@ def carry_out(
     resume = options.resume or options.retry or experiment.continued
     name = "merge" if shards else experiment.name
     with (
+        stop_signals(),
         view_of(options) as view,
         folder_for(experiment.view, options, config, argv, what, resume, name) as run,
     ):
@@ -186,7 +187,7 @@ def _outcome(
         found = interim.table()
         return None if found is None else drawn_table(found)
 
-    with progress(experiment.parts, table) as step, stop_signals():
+    with progress(experiment.parts, table) as step:
         if view is not None and experiment.viewed is not None:
             return experiment.viewed(config, step, keep, view, logs)
         if logs is not None and experiment.logged is not None:
@@ -234,7 +235,7 @@ def _film(
     if trial is None:
         return True
     try:
-        with progress("% of the films") as step, stop_signals():
+        with progress("% of the films") as step:
             write_films(experiment, config, trial, run, step)
     except KeyboardInterrupt:
         sys.stderr.write(f"antennate {experiment.name}: interrupted: kept all but some films\n")
