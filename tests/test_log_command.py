@@ -181,14 +181,17 @@ main(["log", sys.argv[2], "drive.mcap", *sys.argv[3:]])
     command = [sys.executable, "-c", stops]
     mine = Path(".table.csv.0123456789abcdef.csv")
     mine.touch()
-    with subprocess.Popen([*command, "SIGSTOP", *words]) as first:
+    first = subprocess.Popen([*command, "SIGSTOP", *words])
+    try:
         assert os.WIFSTOPPED(os.waitpid(first.pid, os.WUNTRACED)[1])
         (living,) = set(Path().glob(".*")) - {mine}
         assert subprocess.run([*command, "SIGKILL", *words], check=False).returncode == -9
         assert len(set(Path().glob(".*")) - {mine, living}) == 1
         assert main(["log", words[0], "drive.mcap", *words[1:]]) == 0
         assert set(Path().glob(".*")) == {mine, living}
+    finally:
         first.kill()
+        first.wait()
     assert main(["log", words[0], "drive.mcap", *words[1:], "--overwrite"]) == 0
     assert set(Path().glob(".*")) == {mine}
 
