@@ -1,13 +1,23 @@
 """What an interrupted run says: the whole command that goes on with it."""
 
+import errno
 import json
+import os
+import re
+import resource
 import shlex
+import shutil
+import signal
+import subprocess
+import sys
+from types import SimpleNamespace
 
 import pytest
 
 from antennate.cli import main
 from antennate.sim.world import World
 from antennate.studies.run_directory import RunDirectory
+from antennate.telemetry.reader import LogReader
 
 TUNNEL = ["tunnel", "--controllers", "open", "--time-limit", "0.2", "--trials", "3"]
 
@@ -50,6 +60,27 @@ def test_nothing_stays_of_a_run_that_is_interrupted_before_its_first_trial(
     assert "expected an unfinished run, found there/logs/a.mcap" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(("moment", "stays"), [("describe", False), ("write_figures", True)])
+def test_a_run_that_is_stopped_before_or_after_its_trials_ends_as_by_ctrl_c(
+    capsys, tmp_path, monkeypatch, moment, stays
+):
+    """Batch systems and `docker stop` send SIGTERM, whatever the run does at that time."""
+    done = getattr(RunDirectory, moment)
+
+    def stopped(*given):
+        done(*given)
+        os.kill(os.getpid(), signal.SIGTERM)
+
+    monkeypatch.setattr(RunDirectory, moment, stopped)
+    before = signal.signal(signal.SIGTERM, lambda *_: pytest.fail("SIGTERM ended the program"))
+    try:
+        assert main([*TUNNEL, "--workers", "1", "--out", str(tmp_path / "run")]) == 130
+    finally:
+        signal.signal(signal.SIGTERM, before)
+    assert capsys.readouterr().err.endswith("antennate tunnel: interrupted\n")
+    assert (tmp_path / "run" / "result.json").exists() == (tmp_path / "run").exists() == stays
+
+
 @pytest.mark.parametrize(
     ("out", "folder"),
     [(["--out", "a run", "--overwrite"], "a run"), (["--out=mine"], "mine"), ([], "runs/tunnel-1")],
@@ -74,3 +105,68 @@ def test_an_interrupted_run_within_uv_names_the_command_of_uv(capsys, tmp_path, 
     told = interrupted(capsys, monkeypatch, *TUNNEL, "--out", "run", "--workers", "1")
     assert told[:4] == ["uv", "run", "antennate", "tunnel"]
     assert told[4:10] == TUNNEL[1:]
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_a_disk_that_is_full_before_a_trial_has_ended_keeps_the_logs(tmp_path, workers):
+    """Several trials run in lockstep. A chunk that was taken in part holds more whole ticks."""
+    words = ["tunnel", "--controllers", "open", "--scene", "flat", "--time-limit", "10"]
+    words += ["--trials", "8", "--log", "--no-figures"]
+    words = [sys.executable, "-m", "antennate", *words, "--workers", str(workers), "--out", "run"]
+
+    def small_disk():
+        resource.setrlimit(resource.RLIMIT_FSIZE, (400_000, resource.RLIM_INFINITY))
+
+    done = subprocess.run(
+        words,
+        cwd=tmp_path,
+        env=os.environ | {"PYTHONDONTWRITEBYTECODE": "1"},
+        preexec_fn=small_disk,
+        stderr=subprocess.PIPE,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 2
+    found = re.fullmatch(
+        r"antennate tunnel: error: (?:a worker failed: )?expected to write (run/logs/open-\d.mcap),"
+        r" found: (?:only \d+ of \d+ bytes were taken; the disk is full|File too large);"
+        r" the log ends after (\d+) ticks\n",
+        done.stderr,
+    )
+    assert found, done.stderr
+    with LogReader(tmp_path / found[1]) as log:
+        assert 20 < int(found[2]) <= sum(1 for _ in log) < 1000
+    assert main([*words[3:-1], str(tmp_path / "run"), "--resume"]) == 0
+    assert len(list((tmp_path / "run" / "logs").iterdir())) == 8
+
+
+def test_a_disk_that_is_full_before_a_log_begins_leaves_nothing(capsys, tmp_path, monkeypatch):
+    monkeypatch.setattr(shutil, "disk_usage", lambda place: SimpleNamespace(free=2.5e4))
+    words = [*TUNNEL, "--log", "--workers", "1", "--out", str(tmp_path / "run")]
+    assert main(words) == 2
+    place = tmp_path / "run" / "logs" / "open-0.mcap"
+    assert capsys.readouterr().err.endswith(
+        f"error: expected 100 MB free for {place}, found 25 kB\n"
+    )
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("kept", [0, 2])
+def test_a_disk_that_takes_no_trial_does_not_promise_more_than_it_holds(
+    capsys, tmp_path, monkeypatch, kept
+):
+    """What is said to be kept is there."""
+    write, taken = os.write, iter([True] * (kept + 1) + [False] * 100)
+
+    def full(file, data):
+        if data.startswith(b'{"crc"') and not next(taken):
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        return write(file, data)
+
+    monkeypatch.setattr(os, "write", full)
+    assert main([*TUNNEL, "--workers", "1", "--out", str(tmp_path / "run")]) == 2
+    (line,) = [a for a in capsys.readouterr().err.splitlines() if "error:" in a]
+    store = tmp_path / "run" / "trials.store.jsonl"
+    assert f"expected to write {store}, found: No space left on device" in line
+    assert ("what was finished is kept, and the run can be resumed" in line) == bool(kept)
+    assert store.exists() == bool(kept)

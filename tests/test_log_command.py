@@ -5,8 +5,11 @@ from __future__ import annotations
 import csv
 import gc
 import json
+import os
 import resource
 import shutil
+import subprocess
+import sys
 from importlib.util import find_spec
 from pathlib import Path
 from types import SimpleNamespace
@@ -158,6 +161,39 @@ def test_recover_says_what_it_leaves_out_and_touches_no_file_of_the_user(
     assert "damaged places left out: 1; ticks missing: 3" in said
     assert Path(".a-recovered.mcap").read_text() == "mine"
     assert sorted(path.name for path in tmp_path.glob(".*")) == [".a-recovered.mcap"]
+
+
+@pytest.mark.parametrize("words", [["recover"], ["export", "--out", "table.csv"]])
+def test_what_a_killed_command_left_goes_with_the_next_and_a_living_one_keeps_its_file(
+    log: Path, words: list[str]
+) -> None:
+    """The first stands still before its file is whole; the second is killed there."""
+    stops = """
+import os, signal, sys
+from antennate.cli import main
+from antennate.telemetry.writer import LogWriter
+def stop(*_):
+    os.kill(os.getpid(), getattr(signal, sys.argv[1]))
+    raise SystemExit(3)
+LogWriter.close = os.fsync = stop
+main(["log", sys.argv[2], "drive.mcap", *sys.argv[3:]])
+"""
+    command = [sys.executable, "-c", stops]
+    mine = Path(".table.csv.0123456789abcdef.csv")
+    mine.touch()
+    first = subprocess.Popen([*command, "SIGSTOP", *words])
+    try:
+        assert os.WIFSTOPPED(os.waitpid(first.pid, os.WUNTRACED)[1])
+        (living,) = set(Path().glob(".*")) - {mine}
+        assert subprocess.run([*command, "SIGKILL", *words], check=False).returncode == -9
+        assert len(set(Path().glob(".*")) - {mine, living}) == 1
+        assert main(["log", words[0], "drive.mcap", *words[1:]]) == 0
+        assert set(Path().glob(".*")) == {mine, living}
+    finally:
+        first.kill()
+        first.wait()
+    assert main(["log", words[0], "drive.mcap", *words[1:], "--overwrite"]) == 0
+    assert set(Path().glob(".*")) == {mine}
 
 
 def test_recover_names_the_file_of_the_user_where_the_disk_is_full(

@@ -13,6 +13,7 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import mujoco
 import numpy as np
 import pytest
 from log_ticks import HEADER
@@ -28,11 +29,14 @@ from antennate.params.control import GaitParams
 from antennate.params.scene import PhysicsParams
 from antennate.robots.spec import RobotSpec
 from antennate.sim import gl
+from antennate.sim.scenes.registry import make_scene
+from antennate.sim.trial import draw_trial
+from antennate.sim.world import World
 from antennate.telemetry.apart import LogProcess
 from antennate.telemetry.reader import LogReader
 from antennate.telemetry.rows import HEAD, RowLog
-from antennate.telemetry.simulated import Decisions
-from antennate.telemetry.topics import EVENTS, JOINT_STATES
+from antennate.telemetry.simulated import Decisions, SimulatedLog
+from antennate.telemetry.topics import CONTACT_FORCES, COORDINATES, EVENTS, JOINT_STATES
 from antennate.types import AntennaFrame, Contact, Floats, JointCommand, Maneuver
 
 TICKS = 60
@@ -275,6 +279,66 @@ def test_decisions_of_any_form_are_kept_as_they_are(phase: Any) -> None:
     np.testing.assert_array_equal(found[:3], [row] * 3)
     row[5:7] = 0.75, 0.125
     np.testing.assert_array_equal(found[3], row)
+
+
+def pushes(world: World) -> list[float]:
+    """Normal forces [N] between the robot and what is not the floor, as the engine tells them."""
+    model, data, force = world.model, world.data, np.zeros(6)
+    found = []
+    for number in range(data.ncon):
+        geoms = data.contact.geom[number]
+        bodies = [model.body(model.geom_bodyid[geom]).name for geom in geoms]
+        if sum(name.startswith("robot/") for name in bodies) != 1:
+            continue
+        assert "floor" not in [model.geom(geom).name for geom in geoms]
+        mujoco.mj_contactForce(model, data, number, force)
+        found.append(float(force[0]))
+    return found
+
+
+def test_contacts_of_a_look_are_its_own_where_the_first_is_with_an_obstacle(tmp_path: Path) -> None:
+    """Robot and cylinders hang above the floor, whose contacts else come before all others."""
+    config = TunnelConfig(trials=1)
+    scene = make_scene(config.scene, config.tunnel)
+    world = draw_trial(config, scene, 0, config.control.gait, config.control.period).world
+    begin, first = world.data.qpos.copy(), world.root
+    begin[[*range(2, first, 4), first + 2]] += 0.2
+    made = SimpleNamespace(
+        maneuver=np.array([1]),
+        level=np.zeros((1, 2)),
+        contact=np.zeros((1, 2), np.int64),
+        phase=np.zeros(1),
+    )
+    frame = AntennaFrame(t=np.zeros(1), counts=np.zeros((1, 2)))
+    command = JointCommand(np.zeros((1, 5)), np.zeros((1, 6, 2)), np.zeros((1, 2)))
+    decisions, expected = Decisions(ROBOT, made), []
+    decided = decisions.take(frame, command)
+    with SimulatedLog(tmp_path / "a.mcap", HEADER, world, decisions) as log:
+        for ahead in (0.36, 0.0, 0.4, 0.54, 0.0, 0.0, 0.6, 0.7):
+            world.data.qpos[:] = begin
+            world.data.qpos[first] += ahead
+            mujoco.mj_forward(world.model, world.data)
+            expected.append(pushes(world))
+            for _ in range(10):  # one look in ten ticks
+                log.take(decided)
+    assert [bool(found) for found in expected] == [
+        True,
+        False,
+        True,
+        True,
+        False,
+        False,
+        True,
+        True,
+    ]
+    with LogReader(tmp_path / "a.mcap") as reader:
+        looks = [
+            {record.topic: record.topic.decode(record.data) for record in records}
+            for records, _ in reader.groups()
+        ]
+    told = [look.get(CONTACT_FORCES, {"normal": []}) for look in looks if COORDINATES in look]
+    for found, wanted in zip(told, expected, strict=True):
+        np.testing.assert_allclose(found["normal"], wanted, rtol=1e-6)
 
 
 def rows(count: int) -> Floats:

@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+from pathlib import Path
+
 import numpy as np
 import pytest
+from scipy.stats import binomtest, t
 
+from antennate.antenna.rivals import student
 from antennate.studies import statistics
 
 
@@ -15,6 +21,38 @@ def test_wilson_intervals_of_the_papers_counts(
     successes: int, trials: int, low: float, high: float
 ) -> None:
     assert statistics.wilson95(successes, trials) == pytest.approx((low, high), abs=0.005)
+
+
+@pytest.mark.parametrize("trials", [1, 2, 3, 10, 30, 97, 100, 4096])
+def test_wilson_intervals_are_those_of_scipy_bit_for_bit(trials: int) -> None:
+    for successes in {*range(0, trials + 1, max(1, trials // 40)), trials}:
+        found = binomtest(successes, trials).proportion_ci(0.95, method="wilson")
+        assert statistics.wilson95(successes, trials) == (found.low, found.high)
+
+
+@pytest.mark.parametrize("count", [2, 3, 10, 200])
+def test_the_quantile_of_student_is_that_of_scipy_bit_for_bit(count: int) -> None:
+    assert student(count) == t.ppf(0.975, count - 1)
+
+
+@pytest.mark.parametrize("words", [["tunnel"], ["study", "plan.toml", "--trust-code"]])
+def test_a_run_of_one_condition_starts_without_the_statistics_of_scipy(
+    tmp_path: Path, words: list[str]
+) -> None:
+    """They take a second to import."""
+    text = (
+        'experiment = "tunnel"\ntrials = 1\n[settings]\ncontrollers = ["open"]\ntime_limit = 0.1\n'
+    )
+    (tmp_path / "plan.toml").write_text(text + '[vary]\n"tunnel.strewn" = [0, 4]\n')
+    few = ["--controllers", "open", "--scene", "flat", "--time-limit", "0.1", "--trials", "1"]
+    words = [*words, *(few if words == ["tunnel"] else []), "--workers", "1", "--no-figures"]
+    code = f"""
+import sys
+from antennate.cli import main
+assert main({words}) == 0
+assert "scipy.stats" not in sys.modules
+"""
+    subprocess.run([sys.executable, "-c", code], cwd=tmp_path, check=True)
 
 
 def test_no_trials_say_nothing() -> None:

@@ -183,6 +183,14 @@ def test_shards_together_are_the_same_bytes(
     line = refusal(capsys, "merge", "--shards", "part1", "other", "--out", "none")
     assert 'other: expected a shard of the same run as part1, found settings.mode "nan"' in line
     assert "found no shard.json" in refusal(capsys, "merge", "--shards", str(run), "--out", "none")
+    for name in ("shard.json", "versions.json"):
+        whole = Path("part2", name).read_bytes()
+        for length in (0, 1, len(whole) // 2, len(whole.rstrip()) - 1):
+            Path("part2", name).write_bytes(whole[:length])
+            line = refusal(capsys, "merge", "--shards", "part1", "part2", "--out", "none")
+            assert f"part2/{name}: expected a whole file of this kind, found: " in line
+        Path("part2", name).write_bytes(whole)
+    assert not Path("none").exists()
 
 
 def test_W2_a_second_driver_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

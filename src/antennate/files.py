@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import fcntl
 import os
+import re
 import secrets
 import shutil
 import stat
@@ -14,6 +16,8 @@ from typing import BinaryIO
 
 from antennate.errors import AntennateError, BadInputError, OutputError
 
+_RANDOM = 8
+"""Random bytes in the name of a file that is not whole yet."""
 _UNITS = (("GB", 1e9), ("MB", 1e6), ("kB", 1e3), ("bytes", 1.0))
 
 
@@ -104,6 +108,7 @@ def writing_whole(path: Path, overwrite: bool = False) -> Iterator[BinaryIO]:
         OutputError: It exists and may not be replaced, or it cannot be written.
     """
     with replacing(path, overwrite) as fresh, fresh.open("xb") as file:
+        lock(file)
         yield file
         file.flush()
         os.fsync(file.fileno())
@@ -118,7 +123,7 @@ def replacing(path: Path, overwrite: bool = False) -> Iterator[Path]:
     Raises:
         OutputError: The other one exists and may not be replaced, or it cannot be written.
     """
-    fresh = path.with_name(f".{path.name}.{secrets.token_hex(8)}")
+    fresh = path.with_name(f".{path.name}.{secrets.token_hex(_RANDOM)}")
     try:
         try:
             yield fresh
@@ -137,3 +142,25 @@ def replacing(path: Path, overwrite: bool = False) -> Iterator[Path]:
     except (OSError, ValueError) as error:
         why = getattr(error, "strerror", None) or error
         raise OutputError(f"{path}: expected to write it, found: {why}") from None
+
+
+def lock(file: BinaryIO) -> bool:
+    """Say that a process works on a file, until it is closed; whether nobody else does.
+
+    The system frees the lock when that process ends, however it ends.
+    """
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:  # another process holds it, or the file system has no locks
+        return False
+    return True
+
+
+def remove_abandoned(path: Path) -> None:
+    """Remove what killed processes left that wrote this file; one that lives holds its lock."""
+    form = re.compile(rf"\.{re.escape(path.name)}\.[0-9a-f]{{{2 * _RANDOM}}}")
+    with contextlib.suppress(OSError):
+        for left in [each for each in path.parent.iterdir() if form.fullmatch(each.name)]:
+            with contextlib.suppress(OSError), open_regular(left) as file:
+                if lock(file):
+                    left.unlink()

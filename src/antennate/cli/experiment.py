@@ -16,7 +16,7 @@ from antennate.cli.progress import progress, stop_signals
 from antennate.cli.results import drawn_table, folder_for, tell
 from antennate.cli.run_options import Options, go_on, workers_of
 from antennate.cli.view_options import ViewOptions, require_viewable, say_by_hand, view_of
-from antennate.errors import BadInputError, ConfigError, OutputError, WorkerError
+from antennate.errors import BadInputError, ConfigError, LogError, OutputError, WorkerError
 from antennate.experiments.running import keep, require_films, write_films
 from antennate.params.base import Params
 from antennate.studies.engines import WARP
@@ -141,6 +141,7 @@ def carry_out(
     resume = options.resume or options.retry or experiment.continued
     name = "merge" if shards else experiment.name
     with (
+        stop_signals(),
         view_of(options) as view,
         folder_for(experiment.view, options, config, argv, what, resume, name) as run,
     ):
@@ -150,9 +151,10 @@ def carry_out(
             run.store.take(shards.records)
         try:
             outcome = _outcome(experiment, config, options, workers, run, view)
-        except WorkerError:
+        except (LogError, OutputError, WorkerError):
             if shards:
                 run.discard()
+            run.keep_logs()
             raise
         except ShardEnd as end:
             told = {"shard": options.shard, "trials": end.count, "of": end.total}
@@ -185,7 +187,7 @@ def _outcome(
         found = interim.table()
         return None if found is None else drawn_table(found)
 
-    with progress(experiment.parts, table) as step, stop_signals():
+    with progress(experiment.parts, table) as step:
         if view is not None and experiment.viewed is not None:
             return experiment.viewed(config, step, keep, view, logs)
         if logs is not None and experiment.logged is not None:
@@ -233,7 +235,7 @@ def _film(
     if trial is None:
         return True
     try:
-        with progress("% of the films") as step, stop_signals():
+        with progress("% of the films") as step:
             write_films(experiment, config, trial, run, step)
     except KeyboardInterrupt:
         sys.stderr.write(f"antennate {experiment.name}: interrupted: kept all but some films\n")

@@ -17,7 +17,7 @@ from antennate.cli.progress import progress, stop_signals
 from antennate.cli.replay import complain
 from antennate.cli.results import ResultOptions, tell
 from antennate.errors import ConfigError, MissingPackageError, OutputError
-from antennate.files import require_room, write_whole, writing_whole
+from antennate.files import remove_abandoned, require_room, write_whole, writing_whole
 from antennate.messages import extra, one_line, typed
 from antennate.params.base import Params
 from antennate.studies.formats import csv_lines
@@ -94,6 +94,7 @@ def command(argv: Sequence[str]) -> int:
         "plot": _plot,
         "film": _film,
     }
+    remove_abandoned(target)
     log = actions[options.action](path, target)
     recovered = options.action == "recover"
     more = f"; {left_out(log)}" if recovered else ""

@@ -16,7 +16,7 @@ from antennate.cli.run_options import Options
 from antennate.errors import BadInputError, ConfigError
 from antennate.params.base import Params
 from antennate.studies.identity import differences
-from antennate.studies.run_directory import SHARD, RunDirectory
+from antennate.studies.run_directory import SHARD, VERSIONS, RunDirectory
 from antennate.studies.store import STORE, read_store
 
 DESCRIPTION = """\
@@ -70,13 +70,15 @@ def _gathered(shards: Sequence[Path]) -> tuple[Any, dict[str, Any]]:
     """What all shards say is run, and their trials.
 
     Raises:
-        BadInputError: One is incomplete, or of another run.
+        BadInputError: One is incomplete or damaged, or of another run.
     """
     identity: Any = None
     records: dict[str, Any] = {}
     for shard in shards:
         if not (shard / SHARD).is_file():
             raise BadInputError(f"{shard}: expected a complete shard, found no {SHARD}")
+        for name in (SHARD, VERSIONS):
+            RunDirectory.open(shard).text(name)  # one that was cut is refused
         found, trials = read_store(shard / STORE)
         if identity is not None and (changes := differences(identity, found)):
             raise BadInputError(

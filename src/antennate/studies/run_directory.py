@@ -189,7 +189,8 @@ class RunDirectory:
         Raises:
             BadInputError: The file is damaged.
         """
-        return self._decoded(name, str) if (self.path / name).exists() else ""
+        decode = _sound_json if name.endswith(".json") else str
+        return self._decoded(name, decode) if (self.path / name).exists() else ""
 
     def _decoded(self, name: str, decode: Any) -> Any:
         path = self.path / name
@@ -243,6 +244,10 @@ class RunDirectory:
         self._drop_partial()
         if not result.get("interrupted"):
             self._close_store(remove=not self.keeps_store)
+
+    def keep_logs(self) -> None:
+        """Let it stay when the run ends if it holds logs, even if none of the trials has ended."""
+        self._kept = self._kept or any(path.parent.name == LOGS for path in _held(self.path))
 
     def discard(self) -> None:
         """Let nothing that was kept so far stay when the run ends."""
@@ -349,6 +354,11 @@ def _held(place: Path) -> list[Path]:
 
 def _is(folder: Path) -> bool:
     return folder.is_dir() and not folder.is_symlink()
+
+
+def _sound_json(text: str) -> str:
+    json.loads(text)
+    return text
 
 
 def _plain(row: Any) -> Mapping[str, Any]:

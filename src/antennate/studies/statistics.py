@@ -2,21 +2,31 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
 from antennate.types import Bools, Floats
 
+_Z95 = 1.959963984540054
+"""The 97.5 % quantile of the normal distribution."""
+
 
 def wilson95(successes: int, trials: int) -> tuple[float, float]:
-    """Wilson 95 % interval of a success rate; (0, 1) without trials."""
-    from scipy import stats  # takes long; only where it is needed
+    """Wilson 95 % interval of a success rate; (0, 1) without trials.
 
+    Every run needs it, and scipy.stats takes a second to import; the numbers are the same, bit for
+    bit. Formula: Newcombe (1998), Statistics in Medicine 17, 857-872, method 3.
+    """
     if trials == 0:
         return 0.0, 1.0
-    interval = stats.binomtest(successes, trials).proportion_ci(0.95, method="wilson")
-    return float(interval.low), float(interval.high)
+    rate, square = successes / trials, _Z95**2
+    below = 2 * (trials + square)
+    center = (2 * trials * rate + square) / below
+    half = _Z95 / below * math.sqrt(4 * trials * rate * (1 - rate) + square)
+    low = 0.0 if successes == 0 else center - half
+    return low, 1.0 if successes == trials else center + half
 
 
 def mean95(values: Floats, seed: int = 0) -> tuple[float, float, float]:

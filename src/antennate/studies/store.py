@@ -98,7 +98,11 @@ class Store:
         Raises:
             OutputError: The disk is full, or the like; what was kept before stays whole.
         """
-        self._append(line({"key": key, **content}))
+        try:
+            self._append(line({"key": key, **content}))
+        except OutputError as error:
+            kept = "; what was finished is kept, and the run can be resumed"
+            raise OutputError(f"{error}{kept if self.holds_trials else ''}") from None
         self.holds_trials = True
 
     def take(self, records: Mapping[str, Any]) -> None:
@@ -120,10 +124,7 @@ class Store:
         except OSError as error:
             with contextlib.suppress(OSError):
                 os.ftruncate(self._file, self._end)
-            raise OutputError(
-                f"expected to write {self.path}, found: {error.strerror}; what was finished is "
-                "kept, and the run can be resumed"
-            ) from None
+            raise OutputError(f"expected to write {self.path}, found: {error.strerror}") from None
 
     def clear(self) -> None:
         """Forget everything."""

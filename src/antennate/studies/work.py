@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal, Protocol
 
-from antennate.errors import WorkerError, in_one_line
+from antennate.errors import LogError, WorkerError, in_one_line
 
 Emit = Callable[[int, Any], None]
 """Takes the place of a task and its result."""
@@ -75,7 +75,10 @@ class Part:
     timeout: float
 
     def carry_out(self, emit: Emit, fail: Fail) -> None:
-        """Run the tasks; those that raise are told to `fail`, and the others go on."""
+        """Run the tasks; those that raise are told to `fail`, and the others go on.
+
+        A log that cannot be written fails all that run beside it, as it is for the disk.
+        """
         left = dict(self.tasks)
         told: Exception | None = None
         process = os.getpid()
@@ -105,11 +108,12 @@ class Part:
                 _end_forked(process)
                 if told is not None:
                     raise told from None
-                if len(now) == 1:
-                    del left[now[0]]
-                    known = isinstance(error, WorkerError)
-                    reason = str(error) if known else in_one_line(error)
-                    fail(now[0], Failure("failed", reason, error))
+                known = isinstance(error, LogError | WorkerError)
+                reason = str(error) if known else in_one_line(error)
+                if len(now) == 1 or isinstance(error, LogError):  # a full disk is one for all
+                    for place in [each for each in now if each in left]:
+                        del left[place]
+                        fail(place, Failure("failed", reason, error))
                 else:
                     places = []  # one of them raised: from now on each is run alone
 

@@ -6,7 +6,7 @@ import math
 from pathlib import Path
 
 from antennate import __version__
-from antennate.files import replacing
+from antennate.files import lock, replacing
 from antennate.telemetry.reader import LogReader
 from antennate.telemetry.topics import EVENTS
 from antennate.telemetry.writer import LogWriter
@@ -35,16 +35,18 @@ def recover(path: Path, target: Path, overwrite: bool = False) -> LogReader:
         room = 1.5 * sum(part.stat().st_size for part in log.parts)
         out = LogWriter(fresh, log.header, room, flush=math.inf, called=target)
         last = 0
-        for records, _ in log.groups():
-            for record in records:
-                out.add(*record)
-                last = max(last, record.time)
-            out.settle()
-        words = f"recovered by antennate {__version__}: {log.ticks} ticks; {left_out(log)}"
-        time = divmod(last, 10**9)
-        event = EVENTS.type.encode(*time, _WARN, "antennate log recover", words, "", "", 0)
-        out.add(EVENTS, 0, last, event)
-        out.close()
+        with fresh.open("rb") as file:
+            lock(file)
+            for records, _ in log.groups():
+                for record in records:
+                    out.add(*record)
+                    last = max(last, record.time)
+                out.settle()
+            words = f"recovered by antennate {__version__}: {log.ticks} ticks; {left_out(log)}"
+            time = divmod(last, 10**9)
+            event = EVENTS.type.encode(*time, _WARN, "antennate log recover", words, "", "", 0)
+            out.add(EVENTS, 0, last, event)
+            out.close()
     return log
 
 

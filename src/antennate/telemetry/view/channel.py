@@ -1,8 +1,9 @@
 """Messages between a program and the process that shows it; sending never waits.
 
 Both ends of a pair of sockets keep the borders of messages. What does not fit is dropped and
-counted; the next message is newer anyway. Only the shapes of a scene, which come once, are longer
-than a message may be: they follow one another in pieces, and for those one waits.
+counted; the next message is newer anyway. A long one, as a picture of very many parts, goes in
+pieces: those for which there is no room follow with the next calls, and until then further long
+ones are dropped. Only for the shapes of a scene, which come once, one waits.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import select
 import socket
 import struct
 import time
+from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -33,12 +35,15 @@ READY, FAILED = b"R", b"F"
 """What the other process says at first: it serves, or why it cannot."""
 _SEVERAL = b"+"
 """A kind that holds messages, each behind its kind and length."""
+_BEGUN, _ENDED = b"b", b"e"
+"""Kinds that hold a piece of a long message, and its last one."""
 _PART = struct.Struct("<cI")
 _STEP = struct.Struct("<qd2dq2d2qd")
 ORDER = b"O"
 """The kind that the page sends: what a person wants, as JSON."""
 _PIECE = 1 << 16
-_LONGEST = 1 << 18
+_LONGEST = 1 << 17
+"""Most bytes of a message that goes at once."""
 _ROOM = 1 << 20
 """Bytes that may wait to be taken; the system may allow less."""
 _PATIENCE = 5.0
@@ -129,6 +134,8 @@ class Channel:
         self._come = select.poll()
         self._come.register(end, select.POLLIN)
         self.dropped, self.closed = 0, False
+        self._left = deque[tuple[bytes, bytes]]()
+        self._pieces = list[bytes]()
 
     @staticmethod
     def pair() -> tuple[socket.socket, socket.socket]:
@@ -151,16 +158,31 @@ class Channel:
         return self._send(parts)
 
     def _send(self, parts: Sequence[bytes]) -> bool:
+        if sum(map(len, parts)) <= _LONGEST:
+            taken = self._put(parts)  # before what is left: it may pass
+            self._go_on()
+        else:
+            self._go_on()
+            if taken := not self._left:
+                *pieces, last = _pieces(b"".join(parts))
+                self._left += [*((_BEGUN, piece) for piece in pieces), (_ENDED, last)]
+                self._go_on()
+        self.dropped += not taken and not self.closed
+        return taken and not self.closed
+
+    def _go_on(self) -> None:
+        """Send what is left of a long message, as far as there is room."""
+        while self._left and self._put(self._left[0]):
+            self._left.popleft()
+
+    def _put(self, parts: Sequence[bytes]) -> bool:
+        """Whether there was room."""
         try:
             self._end.sendmsg(parts)
         except BlockingIOError:
-            self.dropped += 1
             return False
         except OSError as error:
-            if error.errno == errno.EMSGSIZE:
-                self.dropped += 1  # longer than any message may be here
-            else:
-                self.closed = True
+            self.closed |= error.errno != errno.EMSGSIZE  # longer than any message may be here
             return False
         return True
 
@@ -171,7 +193,7 @@ class Channel:
     def send_whole(self, kind: bytes, content: bytes) -> bool:
         """Send a long message in pieces; False if the other end takes none."""
         end = time.monotonic() + _PATIENCE
-        pieces = [content[at : at + _PIECE] for at in range(0, len(content), _PIECE)] or [b""]
+        pieces = _pieces(content) or [b""]
         kinds = [MORE] * (len(pieces) - 1) + [kind]
         for each, piece in zip(kinds, pieces, strict=True):
             while not self.send(each, piece):
@@ -183,6 +205,7 @@ class Channel:
 
     def receive(self) -> Iterator[tuple[bytes, bytes]]:
         """Kind and content of what has come; a long message is put together."""
+        self._go_on()
         held = b""
         while held or self._come.poll(0):
             try:
@@ -197,22 +220,35 @@ class Channel:
             if not message:
                 self.closed = True
                 return
-            if message[:1] == MORE:
+            kind = message[:1]
+            if kind == MORE:
                 held += message[1:]
-                continue
-            if message[:1] == _SEVERAL:
-                yield from _several(message)
-                continue
-            content, held = held + message[1:], b""
-            yield message[:1], content
+            elif kind in (_BEGUN, _ENDED):
+                self._pieces.append(message[1:])
+                if kind == _ENDED:
+                    message = b"".join(self._pieces)
+                    self._pieces.clear()
+                    yield from _messages(message)
+            elif kind == _SEVERAL:
+                yield from _messages(message)
+            else:
+                content, held = held + message[1:], b""
+                yield kind, content
 
     def close(self) -> None:
         """Close this end."""
         self._end.close()
 
 
-def _several(message: bytes) -> Iterator[tuple[bytes, bytes]]:
-    """The messages in one of the kind `_SEVERAL`."""
+def _pieces(content: bytes) -> list[bytes]:
+    return [content[at : at + _PIECE] for at in range(0, len(content), _PIECE)]
+
+
+def _messages(message: bytes) -> Iterator[tuple[bytes, bytes]]:
+    """Itself, or the messages in one of the kind `_SEVERAL`."""
+    if message[:1] != _SEVERAL:
+        yield message[:1], message[1:]
+        return
     at = len(_SEVERAL)
     while at < len(message):
         kind, length = _PART.unpack_from(message, at)
