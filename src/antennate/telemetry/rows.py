@@ -1,18 +1,23 @@
 """The log of simulated ticks, which come as rows of numbers.
 
-Simulated time runs much faster than a robot's, so rows are collected and encoded many at once.
+Simulated time runs much faster than a robot's, so rows are collected and encoded many at once, by
+a thread: the simulation goes on meanwhile, as the engine lets other threads run.
 """
 
 from __future__ import annotations
 
 import math
+import os
 import time
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from functools import cache
 from pathlib import Path
 from typing import Any, Generic, Self, TypeVar
 
 import numpy as np
 
+from antennate.errors import LogError
 from antennate.telemetry.cdr import Form
 from antennate.telemetry.header import Header
 from antennate.telemetry.topics import (
@@ -60,6 +65,7 @@ class RowLog(Generic[Taken]):
         self._forms = _forms(header.robot.joint_names)
         self._held: list[Taken] = []
         self._since = math.inf
+        self._writing: Future[None] | None = None
 
     def add(self, tick: Taken) -> None:
         """Keep one tick.
@@ -72,7 +78,7 @@ class RowLog(Generic[Taken]):
             self._since = now
         self._held.append(tick)
         if len(self._held) == _MOST or now - self._since >= FLUSH:
-            self.flush()
+            self._begin()
 
     def settle(self) -> None:
         """Write what has waited long enough; to be called where no tick may follow for a while.
@@ -82,6 +88,7 @@ class RowLog(Generic[Taken]):
         """
         if time.monotonic() - self._since >= FLUSH:
             self.flush()
+        self._wait()
         self._out.settle()
 
     def event(self, text: str) -> None:
@@ -99,8 +106,10 @@ class RowLog(Generic[Taken]):
         Raises:
             LogError: The disk is full or gone.
         """
-        self.flush()
-        self._out.close()
+        try:
+            self.flush()
+        finally:
+            self._out.close()
 
     def __enter__(self) -> Self:
         return self
@@ -114,9 +123,37 @@ class RowLog(Generic[Taken]):
         Raises:
             LogError: The disk is full or gone.
         """
+        self._begin()
+        self._wait()
+
+    def _begin(self) -> None:
+        """Let the thread write what is held, once it has written what was held before.
+
+        Raises:
+            LogError: The disk is full or gone.
+        """
+        self._wait()
         held, self._held, self._since = self._held, [], math.inf
-        if not held:
+        if held:
+            self._writing = _encoder(os.getpid()).submit(self._write, held)
+
+    def _wait(self) -> None:
+        """Wait until the thread has written.
+
+        Raises:
+            LogError: The disk is full or gone, which is told once.
+        """
+        if self._writing is None:
             return
+        try:
+            self._writing.result()
+        except LogError:
+            self._writing = None
+            raise
+        self._writing = None
+
+    def _write(self, held: Sequence[Taken]) -> None:
+        """Encode ticks, and hand them to the operating system."""
         count, (rows, beside) = len(held), self._rows(held)
         t, angles = rows[:, 0], self._angles
         joints = [rows[:, at : at + angles] for at in range(HEAD, rows.shape[1], angles)]
@@ -145,6 +182,12 @@ class RowLog(Generic[Taken]):
             {topic: (self._forms[topic], each) for topic, each in columns.items()},
             beside,
         )
+
+
+@cache
+def _encoder(process: int) -> ThreadPoolExecutor:
+    """The thread of all logs of a process: a fork has the memory of its parent, but no thread."""
+    return ThreadPoolExecutor(1, f"logs of {process}")
 
 
 def _forms(names: tuple[str, ...]) -> dict[Topic, Form]:
