@@ -165,7 +165,8 @@ class _Rows:
                 decided = decisions.take(frame, command)
                 for log in self._logs.values():
                     log.take(decided)
-            self._look(frame, made)
+            if self._looks is not None:
+                self._look(self._looks, frame, made)
             for row in self._watch(frame.t, control):
                 if self._waiting:
                     phase = self._place(row)
@@ -210,14 +211,13 @@ class _Rows:
         path.unlink(missing_ok=True)  # what a killed worker left of it
         self._logs[row] = SimulatedLog(path, header, world, decisions, row)
 
-    def _look(self, frame: AntennaFrame, controller: Controller) -> None:
+    def _look(self, watch: Watch, frame: AntennaFrame, controller: Controller) -> None:
         """Let somebody look at the first row after a tick, and keep the events in the logs."""
-        world = self._robot.world(0) if self._looks is not None else None
-        if self._looks is None or not isinstance(world, World):
-            return
-        for text in self._looks(world, frame, controller):
-            for log in self._logs.values():
-                log.event(text)
+        world = self._robot.world(0)
+        if isinstance(world, World):
+            for text in watch(world, frame, controller):
+                for log in self._logs.values():
+                    log.event(text)
 
     def drop_logs(self) -> None:
         """Remove the logs of trials that are given up."""

@@ -61,8 +61,9 @@ class Pace:
     @property
     def idle(self) -> bool:
         """Whether it runs at full speed and no picture is due, so that there is nothing to do."""
-        state = self.state
-        return not (state["speed"] or state["paused"]) and time.monotonic() < self._next
+        if time.monotonic() >= self._next:
+            return False
+        return not (self.state["speed"] or self.state["paused"])
 
     def due(self) -> bool:
         """Whether a picture is due; if so, orders have been taken."""
