@@ -165,7 +165,7 @@ def test_the_page_says_what_is_missed_not_measured_and_busy(page):
     file = page / "performance.json"
     parts = json.loads(file.read_text())
     del parts["start"]
-    over = parts["trial"]["figures"]["at_once"]["12"]["over_bare_engine"]
+    over = parts["trial"]["figures"]["at_once"]["24"]["over_bare_engine"]
     over |= {"median": 1.5, "low": 1.4, "high": 1.6}
     parts["trial"]["about"] |= {"others": 1.25, "quick": False}
     parts["peers"]["figures"]["peers"]["pybullet"] = {"failed": "no wheel | found"}

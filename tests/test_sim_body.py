@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
+import mujoco
 import numpy as np
 import pytest
 
@@ -13,6 +14,7 @@ from antennate.control.registry import make_controller
 from antennate.params.control import ControlParams
 from antennate.params.scene import PhysicsParams, VariationParams
 from antennate.robots.spec import RobotSpec
+from antennate.sim.scenes.scene import Route
 from antennate.sim.sim_robot import Disturbance, SimRobot
 from antennate.sim.world import PREFIX, World, compile_world
 from antennate.types import AntennaFrame, JointCommand, Maneuver
@@ -89,6 +91,53 @@ def test_an_empty_row_reads_nan_and_makes_the_mind_hold() -> None:
     assert np.isnan(frame.counts[1]).all()
     assert np.isnan(frame.t[1])
     assert control.maneuver.tolist() == [Maneuver.FORWARD, Maneuver.HOLD]
+
+
+def test_a_row_goes_on_from_a_state_whenever_it_is_put_back() -> None:
+    """Its time goes back, which is no fault of the engine."""
+    body = body_of(1, 2)
+    begin = body.world(0).state()
+    run(body, 2, 6)
+    command = make_controller("open", MIND, batch=2).step(body.read())
+    body.write(command)
+    body.sleep_until(body.now() + 10 * PERIOD)
+    body.put_back(0, begin)
+    frame = body.read()
+    assert not body.failures
+    assert np.isfinite(frame.counts).all()
+    assert frame.t.tolist() == pytest.approx([0.0, 15 * PERIOD])
+
+
+class Balls(Route):
+    """A floor with loose balls far from the robot."""
+
+    def __init__(self, count: int) -> None:
+        super().__init__(np.array([[0.0, 0.0], [2.0, 0.0]]))
+        self.count = count
+
+    def build(self, spec: mujoco.MjSpec) -> None:
+        super().build(spec)
+        for i in range(self.count):
+            ball = spec.worldbody.add_body(pos=[1.0 + 0.3 * i, 1.0, 0.05])
+            ball.add_freejoint()
+            ball.add_geom(type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[0.05, 0.0, 0.0])
+
+
+def test_worlds_of_any_size_share_a_batch() -> None:
+    """A larger one that comes later makes room for itself, and changes nothing for the others."""
+
+    def with_balls(count: int) -> World:
+        return World(compile_world(PhysicsParams(), ROBOT, Balls(count)), ROBOT)
+
+    body, alone, other = body_of(1, None, None), body_of(1), body_of(None)
+    early, early_alone = run(body, 3, 20), run(alone, 1, 20)
+    body.load(1, with_balls(4), chance(7))
+    body.load(2, with_balls(1), chance(8))
+    other.load(0, with_balls(4), chance(7))
+    late, late_alone, late_other = run(body, 3, 20), run(alone, 1, 20), run(other, 1, 20)
+    assert np.array_equal(counts(early + late, 0), counts(early_alone + late_alone, 0))
+    assert np.array_equal(counts(late, 1), counts(late_other, 0))
+    assert np.isfinite(counts(late, 2)).all()
 
 
 def test_a_row_can_be_emptied_and_filled_again() -> None:

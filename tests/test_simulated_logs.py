@@ -364,6 +364,54 @@ def test_a_log_of_another_process_is_that_of_this_one(tmp_path: Path) -> None:
         assert one.end == other.end == 700
 
 
+SLOW = f"""
+import os, signal, sys, threading, time
+sys.path[:0] = {sys.path!r}
+import numpy as np
+from test_simulated_logs import HEADER, Path, RowLog, rows
+
+begun = threading.Event()
+def slowly(ticks):
+    begun.set()
+    time.sleep(0.5)
+    return np.array(ticks), {{}}
+
+log = RowLog(Path(sys.argv[1]), HEADER, slowly)
+for row in rows(300):  # the first 256 are written at once
+    log.add(row)
+begun.wait()
+"""
+"""A log whose thread writes for some time while 44 more ticks wait."""
+
+
+@pytest.mark.parametrize(
+    ("code", "status"),
+    [
+        (
+            "main = threading.main_thread().ident\n"
+            "threading.Timer(0.1, signal.pthread_kill, (main, signal.SIGINT)).start()\n"
+            "log.close()",
+            -2,
+        ),
+        (
+            "if os.fork() == 0:\n    log.add(rows(1)[0])\n    log.close()\n    os._exit(0)\n"
+            "assert os.wait()[1] == 0\nlog.close()",
+            0,
+        ),
+    ],
+    ids=["Ctrl-C", "fork"],
+)
+def test_nothing_keeps_a_log_from_being_written_to_its_end(
+    tmp_path: Path, code: str, status: int
+) -> None:
+    """A person who is impatient while it is closed; a copy of the program, which has no thread."""
+    words = [sys.executable, "-c", SLOW + code, str(tmp_path / "log.mcap")]
+    done = subprocess.run(words, timeout=120, check=False, capture_output=True)
+    assert done.returncode == status, done.stderr
+    with LogReader(tmp_path / "log.mcap") as log:
+        assert sum(1 for _ in log) == log.end == 300
+
+
 def test_a_log_whose_simulation_is_killed_is_not_closed(tmp_path: Path) -> None:
     """What was handed over is read; a second log at the same place is refused."""
     code = f"""

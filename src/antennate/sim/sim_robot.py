@@ -126,6 +126,8 @@ class SimRobot:
 
     def put_back(self, row: int, state: Floats) -> None:
         """Let the world of a row go on from a state of its own; its flex sensors forget."""
+        if self._moved:
+            self._look()
         self._rows[row].world.restore(state)
         self._sensors.reset(row)
 
@@ -187,8 +189,9 @@ class SimRobot:
     def sleep_until(self, t: float) -> None:
         """Advance the physics of every row that has been commanded to time t [s].
 
-        All rows are looked at after all have advanced: a physics step pushes everything else out
-        of the cache, and the looks follow one another faster.
+        What has become of the rows is looked at with the next tick, reading or question for
+        failures, all of them at once: a physics step pushes everything else out of the cache.
+        Until then a world is changed by hand through `put_back` only.
         """
         while self._ticks * self._period < t - 1e-9:
             if self._moved:

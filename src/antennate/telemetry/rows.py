@@ -17,7 +17,6 @@ from typing import Any, Generic, Self, TypeVar
 
 import numpy as np
 
-from antennate.errors import LogError
 from antennate.telemetry.cdr import Form
 from antennate.telemetry.header import Header
 from antennate.telemetry.topics import (
@@ -27,7 +26,7 @@ from antennate.telemetry.topics import (
     MANEUVER,
     Topic,
 )
-from antennate.telemetry.writer import FLUSH, LogWriter
+from antennate.telemetry.writer import LogWriter
 from antennate.types import Floats
 
 Taken = TypeVar("Taken")
@@ -41,6 +40,8 @@ _LEAST_FREE = 1e8
 """Room for many trials [byte] (assumed)."""
 _MOST = 256
 """Ticks that are encoded at once."""
+_PATIENCE = 0.15
+"""Longest that a tick waits for others [s]; where there are many logs, for their thread too."""
 
 
 class RowLog(Generic[Taken]):
@@ -66,6 +67,7 @@ class RowLog(Generic[Taken]):
         self._held: list[Taken] = []
         self._since = math.inf
         self._writing: Future[None] | None = None
+        self._process = os.getpid()
 
     def add(self, tick: Taken) -> None:
         """Keep one tick.
@@ -77,7 +79,7 @@ class RowLog(Generic[Taken]):
         if not self._held:
             self._since = now
         self._held.append(tick)
-        if len(self._held) == _MOST or now - self._since >= FLUSH:
+        if len(self._held) == _MOST or now - self._since >= _PATIENCE:
             self._begin()
 
     def settle(self) -> None:
@@ -86,10 +88,11 @@ class RowLog(Generic[Taken]):
         Raises:
             LogError: The disk is full or gone.
         """
-        if time.monotonic() - self._since >= FLUSH:
+        if time.monotonic() - self._since >= _PATIENCE:
             self.flush()
         self._wait()
-        self._out.settle()
+        if not self._forked:
+            self._out.settle()
 
     def event(self, text: str) -> None:
         """Keep what happened after the last tick.
@@ -108,8 +111,12 @@ class RowLog(Generic[Taken]):
         """
         try:
             self.flush()
+        except KeyboardInterrupt:
+            self.flush()  # the thread works on: the file is closed behind it
+            raise
         finally:
-            self._out.close()
+            if not self._forked:
+                self._out.close()
 
     def __enter__(self) -> Self:
         return self
@@ -134,8 +141,13 @@ class RowLog(Generic[Taken]):
         """
         self._wait()
         held, self._held, self._since = self._held, [], math.inf
-        if held:
-            self._writing = _encoder(os.getpid()).submit(self._write, held)
+        if held and not self._forked:
+            self._writing = _encoder().submit(self._write, held)
+
+    @property
+    def _forked(self) -> bool:
+        """Whether this is a copy in another process: the file is not its own, and has no thread."""
+        return os.getpid() != self._process
 
     def _wait(self) -> None:
         """Wait until the thread has written.
@@ -143,13 +155,12 @@ class RowLog(Generic[Taken]):
         Raises:
             LogError: The disk is full or gone, which is told once.
         """
-        if self._writing is None:
-            return
-        try:
-            self._writing.result()
-        except LogError:
-            self._writing = None
-            raise
+        if self._writing is not None and not self._forked:
+            try:
+                self._writing.result()
+            except Exception:
+                self._writing = None
+                raise
         self._writing = None
 
     def _write(self, held: Sequence[Taken]) -> None:
@@ -185,9 +196,12 @@ class RowLog(Generic[Taken]):
 
 
 @cache
-def _encoder(process: int) -> ThreadPoolExecutor:
-    """The thread of all logs of a process: a fork has the memory of its parent, but no thread."""
-    return ThreadPoolExecutor(1, f"logs of {process}")
+def _encoder() -> ThreadPoolExecutor:
+    """The thread of all logs of this process."""
+    return ThreadPoolExecutor(1, "logs")
+
+
+os.register_at_fork(after_in_child=_encoder.cache_clear)
 
 
 def _forms(names: tuple[str, ...]) -> dict[Topic, Form]:
