@@ -394,8 +394,8 @@ begun.wait()
             -2,
         ),
         (
-            "if os.fork() == 0:\n    log.add(rows(1)[0])\n    log.close()\n    os.kill(os.getpid(), 9)\n"
-            "assert os.wait()[1] == 9\nlog.close()",
+            "if os.fork() == 0:\n    log.add(rows(1)[0])\n    log.close()\n"
+            "    os.kill(os.getpid(), 9)\nassert os.wait()[1] == 9\nlog.close()",
             0,
         ),
     ],
