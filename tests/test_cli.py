@@ -90,6 +90,22 @@ def test_help_fits_two_screens_and_help_all_shows_every_flag(capsys, command):
     assert flags <= set(re.findall(r"^  (--[a-z0-9-]+)(?!\S)", whole, re.MULTILINE))
 
 
+@pytest.mark.parametrize(
+    ("command", "flags"),
+    [
+        ("tunnel", "--trials --seed --controllers --scene --robot --time-limit --out --workers"),
+        ("drive", "--robot --controller --calibration --esp32 --bus --arm"),
+        ("wall", "--trials --seed --profiles --solver --out"),
+    ],
+)
+def test_the_short_help_shows_what_the_command_is_about(capsys, monkeypatch, command, flags):
+    """Also on a narrow terminal, where there is no room for everything."""
+    monkeypatch.setenv("COLUMNS", "80")
+    assert main([command, "--help"]) == 0
+    found = re.findall(r"^  (--[a-z0-9-]+)", capsys.readouterr().out, re.MULTILINE)
+    assert set(flags.split()) <= set(found)
+
+
 def test_help_shows_unit_default_range_and_choices(capsys):
     assert main(["tunnel", "--help-all"]) == 0
     text = " ".join(capsys.readouterr().out.split())

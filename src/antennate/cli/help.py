@@ -21,6 +21,9 @@ _LEAST_TEXT = 24
 SHORT_LINES = 46
 """Most lines of the short page: two screens of 24, less a prompt on each."""
 
+_LATER = ("--view", "--foxglove", "--video", "--slurm", "--shard")
+"""Options that nobody uses first: they come last on the short page."""
+
 
 class Command(NamedTuple):
     """What the help of a command is made from.
@@ -41,28 +44,43 @@ class Command(NamedTuple):
 
 
 def short_page(command: Command) -> str:
-    """What people use first: options outside all groups, names first, and the groups' names."""
+    """What people use first: options outside all groups, names first, and the groups' names.
+
+    Where there is no room for all, parameters and the other options have half of it each, or what
+    the other half leaves.
+    """
     outside = (option for option in command.parameters if len(option.path) == 1)
     top = sorted(outside, key=lambda option: not option.metavar.startswith("NAME"))
-    groups = _groups(command.model, command.parameters)
-    head = _head(command, command.description.split("\n\n")[0])
-    tail = [*groups, "", f"`{typed(command.name, '--help-all')}` shows every option."]
-    lines = list(_section("parameters:", top))
-    if (over := len(head) + len(lines) + len(tail) - SHORT_LINES) > 0:
-        kept, shown = lines[: 2 if len(lines) > 1 else 0], 0
-        for option in top:
-            block = _block(option)
-            if len(kept) + len(block) > len(lines) - over - 1:
-                break
-            kept += block
-            shown += 1
-        lines = [*kept, f"  and {len(top) - shown} more"]
-    return "\n".join([*head, *lines, *tail]) + "\n"
+    head = _usage(command, command.description.split("\n\n")[0])
+    tail = [*_groups(command.model, command.parameters), ""]
+    tail.append(f"`{typed(command.name, '--help-all')}` shows every option.")
+    room = SHORT_LINES - len(head) - len(tail)
+    others = sorted(command.others, key=lambda option: option.offered.startswith(_LATER))
+    others.sort(key=lambda option: not option.positional)
+    needed = len(_section("options:", others))
+    parameters = _cut("parameters:", top, max(room // 2, room - needed))
+    options = _cut("options:", others, room - len(parameters))
+    return "\n".join([*head, *parameters, *options, *tail]) + "\n"
+
+
+def _cut(title: str, options: Sequence[Option], room: int) -> list[str]:
+    """A section in so many lines; a last one counts the options for which there is no room."""
+    lines = _section(title, options)
+    if len(lines) <= room:
+        return lines
+    kept, shown = lines[:2], 0
+    for option in options:
+        block = _block(option)
+        if len(kept) + len(block) >= room:
+            break
+        kept += block
+        shown += 1
+    return [*kept, f"  and {len(options) - shown} more"]
 
 
 def long_page(command: Command) -> str:
     """Every option, group by group."""
-    lines = _head(command, command.description)
+    lines = [*_usage(command, command.description), *_section("options:", command.others)]
     by_group: dict[tuple[str, ...], list[Option]] = {}
     for option in command.parameters:
         by_group.setdefault(option.path[:-1], []).append(option)
@@ -82,10 +100,10 @@ def paragraphs(text: str) -> list[str]:
     return "\n\n".join(blocks).split("\n")
 
 
-def _head(command: Command, description: str) -> list[str]:
+def _usage(command: Command, description: str) -> list[str]:
     free = "".join(f" {option.metavar}" for option in command.others if option.positional)
     usage = f"usage: antennate {command.name}{free} [OPTIONS]"
-    return [usage, "", *paragraphs(description), *_section("options:", command.others)]
+    return [usage, "", *paragraphs(description)]
 
 
 def _section(title: str, options: Sequence[Option]) -> list[str]:

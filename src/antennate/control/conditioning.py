@@ -86,7 +86,7 @@ class RunningMean:
         self._ring: Floats = np.zeros((self.length, batch, 2))
         self._seen: Ints = np.zeros(batch, dtype=np.int64)  # not counted beyond the length
         self._next = 0
-        self._short = self.length
+        self._short = self.length  # ticks until all rows have seen so many
 
     def reset(self, rows: Ints | Bools) -> None:
         """Forget what some rows have seen."""

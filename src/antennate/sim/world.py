@@ -123,7 +123,7 @@ class World:
         data = self.data
         self._qpos, self._qvel, self._ctrl = data.qpos, data.qvel, data.ctrl
         self._torque = data.actuator_force
-        self._all = [memoryview(part) for part in (self._qpos, self._qvel, self._torque)]
+        self._shown = [memoryview(part) for part in (self._qpos, self._qvel, self._torque)]
         self.head: Floats = data.qpos[self.root : self.root + 3]
         self._bent: Floats = np.zeros(len(self._bounded))
         self._warnings = data.warning.number
@@ -197,7 +197,7 @@ class World:
 
     def snapshot(self) -> bytes:
         """Coordinates, speeds and torques as they are, for `measured`."""
-        return b"".join(self._all)
+        return b"".join(self._shown)
 
     def measured(self, snapshots: Sequence[bytes]) -> tuple[Floats, Floats]:
         """What `drives`, `drive_speeds` and `drive_torques` gave when snapshots were taken.
