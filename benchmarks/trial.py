@@ -1,9 +1,10 @@
 """What a trial costs beside its physics, and a physics step beside that of a humanoid.
 
 - `over_bare_engine`: CPU time of whole tunnel trials (sensing, control, recording), stepped as many
-  at a time as the program does at most, over CPU time of the bare engine that replays their commands, one
-  trial after the other, on the same models from the same starts. Drawing and compiling a tunnel is
-  in neither. The replay must end on the same bits, and so must every timed trial.
+  at a time as the program does at most, over CPU time of the bare engine that replays their
+  commands, one trial after the other, on the same models from the same starts. Drawing and
+  compiling a tunnel is in neither. The replay must end on the same bits, and so must every timed
+  trial.
 - `bare_at_once`: the bare engine that steps as many worlds in turn, over one after the other.
 - `step_over_humanoid`: a physics step of the tunnel over one of a humanoid that falls on a floor.
 - `tick`: how long a controller takes for one control tick, alone and for many robots at once.
