@@ -136,8 +136,8 @@ the same bits. 1 would be a controller for nothing. {figures["trials"]} trials,
 {table(columns, rows)}
 The program steps up to {most} trials of a process in lockstep; of the default 30 a controller, 15
 on each of two cores. They share each NumPy call, but their worlds push one another out of the
-cache, and that counts against us: the bare engine alone takes {told(figures["bare_at_once"])} times as
-long if it steps {most} in turn.
+cache, and that counts against us: the bare engine alone takes {told(figures["bare_at_once"])} times
+as long if it steps {most} in turn.
 
 A physics step of the tunnel takes {told(figures["step_us"])} µs, one of a humanoid that falls on a
 floor {told(figures["humanoid_step_us"])} µs: **{told(figures["step_over_humanoid"])} times** as
