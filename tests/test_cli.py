@@ -65,7 +65,9 @@ def test_version_and_help(capsys):
     assert main(["--version"]) == 0
     assert capsys.readouterr().out == f"antennate {antennate.__version__}\n"
     assert main(["--help"]) == 0
-    assert "tunnel" in capsys.readouterr().out
+    shown = capsys.readouterr().out
+    assert "tunnel" in shown
+    assert max(map(len, shown.splitlines())) <= 80
 
 
 def test_python_runs_the_package_as_the_command():

@@ -393,7 +393,7 @@ def study_of(shares: Callable[[dict[str, Any]], dict[str, float]], seed: int) ->
         for name, share in shares(point).items()
         for trial in range(10)
     ]
-    return StudyOutcome(config, points, "controller", list(names), rows, len(rows))
+    return StudyOutcome(config, points, "controller", list(names), rows, len(rows), len(rows))
 
 
 def test_where_nothing_has_an_effect_none_is_found() -> None:
@@ -457,7 +457,9 @@ def test_figures_stand_in_one_column_and_tell_counts_and_noise() -> None:
         for name in ("open", "closed")
         for trial, outcome in enumerate(["success", "timeout", "left", "timeout"])
     ]
-    outcome = StudyOutcome(config, points, "controller", list(points[0]), rows, len(rows))
+    outcome = StudyOutcome(
+        config, points, "controller", list(points[0]), rows, len(rows), len(rows)
+    )
     drawn = figures(outcome)["map"]
     assert drawn.get_figwidth() <= 5.0
     *maps, bar = drawn.axes

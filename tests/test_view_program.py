@@ -5,6 +5,7 @@ import signal
 import socket
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -21,6 +22,7 @@ from antennate.params.control import ControlParams, RuleParams
 from antennate.robots.spec import RobotSpec
 from antennate.sim.shapes import VisibleModel, picture, snapshot
 from antennate.telemetry.view.channel import (
+    END,
     ORDER,
     POSES,
     SCENE,
@@ -101,6 +103,40 @@ def test_a_message_longer_than_the_channel_comes_whole_and_holds_nobody_up(pair:
         list(ours.receive())
     assert found[2:] == [(POSES, content[::-1]), (TICK, b"now")]
     assert ours.dropped == 1
+
+
+def test_the_last_messages_come_before_the_end(pair: Pair) -> None:
+    """A picture of very many parts, then the end, however late the page takes them."""
+    ours, theirs = pair
+    content = np.arange(1_000_000, dtype=np.int32).tobytes()
+    assert ours.send(POSES, content)
+    found: list[tuple[bytes, bytes]] = []
+
+    def take() -> None:
+        time.sleep(0.2)
+        until = time.monotonic() + 20.0
+        while not theirs.closed and time.monotonic() < until:
+            found.extend(theirs.receive())
+
+    page = threading.Thread(target=take)
+    page.start()
+    ours.finish(END)
+    ours.close()
+    page.join()
+    assert found == [(POSES, content), (END, b"")]
+
+
+def test_a_page_that_takes_nothing_delays_the_end_but_a_moment(pair: Pair) -> None:
+    """Whether it is stuck or gone."""
+    ours, theirs = pair
+    assert ours.send(POSES, bytes(4_000_000))
+    start = time.monotonic()
+    ours.finish(END)
+    assert not ours.closed
+    theirs.close()
+    ours.finish(END)
+    assert ours.closed
+    assert time.monotonic() - start < 30.0
 
 
 def test_a_scene_of_3000_parts_moves(pair: Pair) -> None:

@@ -127,7 +127,7 @@ def categories(panel: Axes, labels: Sequence[str]) -> None:
 
 def interval_note(note: str, trials: int) -> str:
     """What a title says of intervals, or why there are none."""
-    return note if trials >= ENOUGH_TRIALS else "too few trials to draw intervals"
+    return note if trials >= ENOUGH_TRIALS else f"no intervals below {ENOUGH_TRIALS} trials"
 
 
 def intervals(

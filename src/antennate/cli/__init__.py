@@ -14,10 +14,10 @@ from antennate import __version__
 from antennate.cli.exit_codes import BAD_INPUT, INTERRUPTED, OK
 
 ROBOT_COMMANDS = {
-    "twin": "serve a simulated robot on two ports: an antenna board and a bus of servos",
+    "twin": "a simulated robot on two ports: an antenna board and a servo bus",
     "robot": "joints, supply, wiring diagram and bill of materials of a robot",
     "doctor": "examine the real robot, or its twin: what is wrong, and the cure",
-    "setup": "from a box of servos to a robot: ports, ids, speeds, settings, one by one",
+    "setup": "from a box of servos to a robot, one servo at a time",
     "zero": "zeros and directions of the joints, by hand",
     "jog": "move one joint by small steps",
     "record": "antenna readings to a CSV file that calibrate takes",

@@ -20,6 +20,10 @@ _FINE = 2
 """Drawn so many times larger, then made smaller: smooth lines."""
 _TEXT, _ROW, _EDGE = 13, 20, 10
 """Height of letters and of a row of text, and free space at the sides [pixels]."""
+_SMALL = 11
+"""Height of the numbers of an axis [pixels]."""
+_SIDES = ("L ", "R ")
+"""What stands before the newest values of two lines."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,11 +116,15 @@ class Strip:
         draw.text((left, row / 3), trace.label, INK, type_)
         x = right
         colours = SERIES[: trace.values.shape[1]]
-        for value, colour in reversed(list(zip(trace.values[frame], colours, strict=True))):
-            words = f"{value:{trace.form}}" if np.isfinite(value) else "-"
+        sides = _SIDES if len(colours) == len(_SIDES) else ("",) * len(colours)
+        for value, colour, side in reversed(
+            list(zip(trace.values[frame], colours, sides, strict=True))
+        ):
+            words = side + (f"{value:{trace.form}}" if np.isfinite(value) else "-")
             x -= draw.textlength(words, type_) + edge
             draw.text((x + edge, row / 3), words, colour, type_)
         draw.rectangle((left, top, right, low), outline=FAINT, width=_FINE)
+        self._draw_ends(draw, trace, left + edge / 2, top, right - edge / 2, low)
 
         def y(value: Any) -> Any:
             share = (np.clip(value, trace.low, trace.high) - trace.low) / (trace.high - trace.low)
@@ -133,6 +141,19 @@ class Strip:
             points = np.stack([across[known], height[known]], axis=1).ravel().tolist()
             if len(points) >= 4:
                 draw.line(points, colour, _FINE + 1, joint="curve")
+
+    def _draw_ends(
+        self, draw: ImageDraw, trace: Trace, left: float, top: float, right: float, low: float
+    ) -> None:
+        """The numbers at the ends of both axes."""
+        small = font(_FINE * _SMALL)
+        ends = [
+            (left, top, f"{trace.high:{trace.form}}", "la"),
+            (left, low, f"{trace.low:{trace.form}}", "ld"),
+            (right, low, f"last {self._window:.3g} s", "rd"),
+        ]
+        for x, y, words, anchor in ends:
+            draw.text((x, y), words, MUTED, small, anchor)
 
     def _draw_words(self, draw: ImageDraw, start: float, first: int, frame: int) -> None:
         """Title and time, then the bands with the names of their states."""

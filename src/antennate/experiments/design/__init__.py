@@ -1,4 +1,4 @@
-"""Search for a better design: several parameters, several objectives, the best trade-offs.
+"""Search for a better design: several parameters and objectives.
 
 FILE is a TOML file that names the parameters and their ranges, the experiments that evaluate a
 design, their objectives, and reference designs; `studies/` holds ours. Optuna proposes (extra

@@ -1,4 +1,4 @@
-"""A servo model against recordings of a real servo: its error, and its fit.
+"""A servo model against recordings of a real servo.
 
 Goals of a recording are told to the model, and its positions compared with the measured ones while
 torque is on; simpler models stand beside it. With --fit the model is identified from the

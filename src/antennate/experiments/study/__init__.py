@@ -1,4 +1,4 @@
-"""Run an experiment at many points of its parameters: a grid, a list, a random or a Sobol plan.
+"""An experiment at many points: a grid, list, random or Sobol plan.
 
 FILE is a TOML file that names the experiment, what is varied and how; `studies/` holds ours. The
 folder of a study is continued without being asked: a study that was killed goes on where it was

@@ -41,12 +41,20 @@ def _points(result: Mapping[str, Any]) -> Table:
         )
         for number, of in by_point.items()
     ]
-    note = f"Mean of each point with its 95 % interval, {result['trials']} trials in all."
+    note = f"Mean of each point with its 95 % interval, {_ended(result)} in all."
     if len(rows) > _MOST:
         note += f" The first {_MOST} of {len(rows)} points; result.json has all."
     return Table(
         "Points", [*(labels.axis(result, axis) for axis in axes), *heads], rows[:_MOST], note
     )
+
+
+def _ended(result: Mapping[str, Any]) -> str:
+    """How many trials there are, of how many if some are missing."""
+    planned = f"{result['trials']} trials"
+    if not result["interrupted"]:
+        return planned
+    return f"{result['ended']} of {planned}"
 
 
 def _value(value: Any) -> str:
@@ -92,7 +100,7 @@ def _trials(result: Mapping[str, Any]) -> str:
 def sentence(result: Mapping[str, Any]) -> str:
     """What came out over all points, and how many trials say nothing."""
     points = len({cell["point"] for cell in result["points"]})
-    text = f"{result['experiment']} at {points} points, {result['trials']} trials"
+    text = f"{result['experiment']} at {points} points, {_ended(result)}"
     told = {n: c for n, c in result["conditions"].items() if c.get(measures.SUCCESS) is not None}
     if told:
         rates = (

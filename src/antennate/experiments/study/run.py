@@ -42,6 +42,7 @@ class StudyOutcome:
         axes: Names of what varies.
         rows: One for each trial, all with the same keys.
         total: Trials of the whole plan.
+        ended: Those of them that have ended.
         interrupted: Whether some are missing.
     """
 
@@ -51,6 +52,7 @@ class StudyOutcome:
     axes: Sequence[str]
     rows: Rows
     total: int
+    ended: int
     interrupted: bool = False
 
     def result(self) -> dict[str, Any]:
@@ -62,6 +64,7 @@ class StudyOutcome:
             "plan": self.config.plan,
             "axes": list(self.axes),
             "trials": self.total,
+            "ended": self.ended,
             "interrupted": self.interrupted,
             **measures.summary(self.config, self.points, self.axes, self.condition, self.rows),
         }
@@ -141,6 +144,7 @@ def run(
     rows = _table(subject, [point for point, _ in points], tasks, found)
     return StudyOutcome(
         *(config, [point for point, _ in points], subject.condition, axes, rows, len(tasks)),
+        ended=len(found),
         interrupted=interrupted,
     )
 

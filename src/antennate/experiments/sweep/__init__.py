@@ -1,4 +1,4 @@
-"""Move an antenna's base to and fro beside walls: its shapes, and the distances that it tells.
+"""Antennae that move to and fro beside walls: shapes and distances.
 
 Which shapes appear at which distance, centre and amplitude of the base oscillation, with the base
 fixed and moving along; and how well flex and base angle together tell the distance of a wall and

@@ -1,4 +1,4 @@
-"""Antennae from tracking software: which shapes they have in contact, and at which angles.
+"""Antennae from tracking software: their shapes in contact.
 
 It takes files of DeepLabCut, SLEAP and TRex, and plain CSV, such as the points of simulated
 antennae that `sweep --points` saves. Body axis, antenna and wall follow from points that you name.

@@ -1,4 +1,4 @@
-"""Walk robots through a corridor of loose cylinders, with and without touch.
+"""Walk robots through loose cylinders, with and without touch.
 
 The controllers differ in one decision: `open` walks forward whatever it feels, `paper` follows the
 published table, `closed` escapes when its readings repeat; your own is named by MODULE:CLASS or

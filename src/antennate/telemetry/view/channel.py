@@ -48,6 +48,8 @@ _ROOM = 1 << 20
 """Bytes that may wait to be taken; the system may allow less."""
 _PATIENCE = 5.0
 """Longest wait for room for a piece of the scene [s]; assumed: the other end is starting."""
+_LAST = 1.0
+"""Longest wait for room for the last messages [s]; assumed: a page that is shown takes them."""
 
 
 class Poses(NamedTuple):
@@ -202,6 +204,15 @@ class Channel:
                 if self.closed or left <= 0 or not select.select((), (self._end,), (), left)[1]:
                     return False
         return True
+
+    def finish(self, kind: bytes) -> None:
+        """Send what is left of a long message, then an empty one of this kind."""
+        end = time.monotonic() + _LAST
+        while not self.closed and (self._left or not self.send(kind)):
+            left = end - time.monotonic()
+            if left <= 0 or not select.select((), (self._end,), (), left)[1]:
+                return
+            self._go_on()
 
     def receive(self) -> Iterator[tuple[bytes, bytes]]:
         """Kind and content of what has come; a long message is put together."""

@@ -102,7 +102,7 @@ class ViewProcess:
 
     def close(self) -> None:
         """End it."""
-        self.channel.send(END)
+        self.channel.finish(END)
         self.channel.close()
         with contextlib.suppress(subprocess.TimeoutExpired):
             self._process.wait(_ENDING)
