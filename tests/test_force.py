@@ -162,6 +162,7 @@ def test_what_cannot_be_run_is_refused(values, message):
         loads.ForceConfig(**values)
 
 
+@pytest.mark.slow
 def test_command_on_two_workers_writes_the_run_of_one(capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     small = SMALL.model_copy(update={"loads": 4, "speeds": (0.5,)})

@@ -236,6 +236,7 @@ def test_what_cannot_be_run_is_refused(values, message):
         SweepConfig(**values)
 
 
+@pytest.mark.slow
 def test_command_writes_its_run_and_the_same_on_two_workers(capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "small.toml").write_text(to_toml(SMALL))

@@ -346,6 +346,7 @@ def test_figures_have_units_and_repeat(outcome):
     assert all(label.endswith(known) for label in labels if label), labels
 
 
+@pytest.mark.slow
 def test_the_command_on_two_workers_writes_the_bytes_of_one(outcome, capsys, tmp_path, monkeypatch):
     monkeypatch.setenv("COLUMNS", "80")
     monkeypatch.chdir(tmp_path)

@@ -13,25 +13,28 @@ _DPI, _CSS_DPI = 200, 96
 """Pixels an inch of our pictures, and of a page."""
 _LEAST = 0.75
 """Letters of 9 points become no smaller than this share; a narrow screen scrolls instead."""
+_BROAD = 440
+"""Pictures of a greater least width do not fit on a phone [px]."""
 _STYLE = """
 :root { color-scheme: light dark; --ink: #222; --muted: #666; --line: #ddd; --page: #fff;
-  --good: #00704d; --fair: #8a5a00; --bad: #a33a00; }
+  --shade: #0004; --good: #00704d; --fair: #8a5a00; --bad: #a33a00; }
 @media (prefers-color-scheme: dark) { :root { --ink: #e8e8e8; --muted: #a8a8a8; --line: #444;
-  --page: #161616; --good: #4fc79b; --fair: #e5ae4a; --bad: #ff9460; }
+  --page: #161616; --shade: #fff5; --good: #4fc79b; --fair: #e5ae4a; --bad: #ff9460; }
   img { filter: invert(0.91) hue-rotate(180deg); } }
 body { font: 16px/1.5 system-ui, sans-serif; color: var(--ink); background: var(--page);
   max-width: 62rem; margin: 0 auto; padding: 1rem; }
 h1 { font-size: 1.6rem; margin-bottom: .3rem; } h2 { font-size: 1.1rem; margin: 1.6rem 0 .3rem; }
 h1, h2, p, figcaption, li { overflow-wrap: anywhere; }
 p { margin: .3rem 0; } .muted, dt, caption, figcaption { color: var(--muted); }
-.scroll { overflow-x: auto; }
-table { border-collapse: collapse; font-size: .9rem; margin: .3rem 0; }
+.scroll { overflow-x: auto; background:
+  linear-gradient(to left, var(--page) 1.5rem, transparent) right / 3rem 100% no-repeat local,
+  linear-gradient(to left, var(--shade), transparent) right / 1rem 100% no-repeat; }
+table { border-collapse: separate; border-spacing: 0; font-size: .9rem; margin: .3rem 0; }
 td, th { text-align: left; vertical-align: top; padding: .2rem 1.2rem .2rem 0;
   border-bottom: 1px solid var(--line); }
 th { font-weight: 600; } table.numbers td + td, table.numbers th + th { text-align: right; }
 table.numbers { font-variant-numeric: tabular-nums; white-space: nowrap; }
-table.numbers td:first-child { position: sticky; left: 0; background: var(--page);
-  box-shadow: inset 0 -1px var(--line); }
+table.numbers td:first-child { position: sticky; left: 0; background: var(--page); }
 section { border-top: 1px solid var(--line); padding: 1rem 0; display: grid; gap: 0 1.5rem;
   grid-template-columns: 1fr minmax(0, 26rem); break-inside: avoid; }
 section > h2, section > .verdict { grid-column: 1 / -1; margin-top: 0; }
@@ -47,9 +50,10 @@ summary { cursor: pointer; } dl { margin: .4rem 0; } dd { margin: 0 0 .4rem; }
 .good, .fair, .bad { font-weight: 600; }
 @media (max-width: 44rem) { .pair, section { grid-template-columns: minmax(0, 1fr); }
   .wide { display: none; } }
+@media (max-width: 30rem) { .broad + figcaption::after { content: " (swipe: it is wider)"; } }
 @media print { body { max-width: none; padding: 0; font-size: 10pt; } pre { white-space: pre-wrap; }
   details::details-content { content-visibility: visible; display: block; block-size: auto; }
-  .scroll { overflow: visible; } .scroll > img { min-width: 0 !important; }
+  .scroll { overflow: visible; background: none; } .scroll > img { min-width: 0 !important; }
   table.numbers { white-space: normal; } tr { break-inside: avoid; } h2 { break-after: avoid; }
   details pre { font-size: 6pt; columns: 2; } video { display: none; } }
 """
@@ -101,9 +105,11 @@ def picture(png: bytes, svg: bytes, described: str) -> str:
     kind, data = ("svg+xml", svg) if len(svg) < len(png) else ("png", png)
     width, height = struct.unpack(">II", png[16:24])
     width, height = (round(size * _CSS_DPI / _DPI) for size in (width, height))
+    least = round(_LEAST * width)
     return (
-        f'<div class="scroll"><img alt="{escape(described)}" width="{width}" height="{height}" '
-        f'style="min-width: {round(_LEAST * width)}px; max-width: {width}px" '
+        f'<div class="scroll{" broad" if least > _BROAD else ""}">'
+        f'<img alt="{escape(described)}" width="{width}" height="{height}" '
+        f'style="min-width: {least}px; max-width: {width}px" '
         f'src="data:image/{kind};base64,{base64.b64encode(data).decode()}"></div>'
     )
 

@@ -25,8 +25,10 @@ _ROBOT = 0.6
 _FLOOR = 4.0
 """Side of the floor that is drawn [m]; it goes on beyond in the distance."""
 _CELL = 0.1
-_LINES = ((165, 165, 165), (125, 125, 125))
-"""Colours of its lines: seen on white and on black, and no brighter than the robot."""
+_LINES = ((125, 125, 125), (95, 95, 95))
+"""Colours of its lines: seen on white and on black."""
+_FADE = 6.0
+"""Where they have faded [m from the camera]; farther ones are too close together to be seen."""
 _AMBIENT = 1.5
 """Light from all sides, so that nothing is black behind what one sees through."""
 _ALONG_Z = np.array([0.0, 0.0, 1.0])
@@ -210,5 +212,6 @@ def _floor(server: viser.ViserServer, height: float) -> None:
         section_size=5 * _CELL,
         cell_color=_LINES[0],
         section_color=_LINES[1],
+        fade_distance=_FADE,
         position=(0.0, 0.0, height),
     )
