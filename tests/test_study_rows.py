@@ -5,10 +5,12 @@ from __future__ import annotations
 import csv
 import json
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from antennate.cli import main
+from antennate.studies.run_directory import RunDirectory
 
 OWN = """
 import numpy as np
@@ -94,6 +96,29 @@ def test_the_response_is_found_where_the_first_trial_failed() -> None:
     assert study(own, 3, "--no-figures")[0] == 0
     result = json.loads(Path("run/result.json").read_text())
     assert (result["response"], result["points"][0]["response"]) == ("value", 0.75)
+
+
+def test_an_interrupted_study_says_how_many_of_its_trials_have_ended(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In the note of its table and in its sentence."""
+    kept = RunDirectory.append
+
+    def append(self: RunDirectory, row: Any) -> None:
+        kept(self, row)
+        if row["trial"] == 1:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(RunDirectory, "append", append)
+    own = "import time\ndef trial(config, seed):\n    time.sleep(60 if seed == 3 else 0)\n"
+    code, rows = study(own + "    return {'value': float(seed)}\n", 4, "--no-figures")
+    assert code == 130
+    ended = len(rows)
+    assert ended in (2, 3)  # one more may have been on its way
+    said = " ".join(capsys.readouterr().out.split())
+    assert said.count(f" {ended} of 4 trials") == 2
+    result = json.loads(Path("run/result.json").read_text())
+    assert (result["trials"], result["ended"], result["interrupted"]) == (4, ended, True)
 
 
 @pytest.mark.parametrize(
