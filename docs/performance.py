@@ -217,8 +217,9 @@ ways give the same rows, number by number. Two processes with a few trials each 
 {told(figures["machine"])} times as fast at once as in turn: that is what this machine gives.
 
 {table(("way", "time [s]", "faster than one process"), rows)}
-The whole default `tunnel`, 90 trials of which some take the full 100 s, took 394 s with `--workers 1`
-and 217 s with two, start included: 1.82 times as fast. That was measured once, by hand.
+The whole default `tunnel`, 90 trials of which some take the full 100 s, took 394 s with
+`--workers 1` and 217 s with two, start included: 1.82 times as fast. That was measured once, by
+hand.
 
 Stepping alone: twelve tunnels, filled up to one number of cylinders, tick by tick on two threads.
 
