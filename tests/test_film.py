@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import io
+import os
 import shutil
+import subprocess
 import sys
 from pathlib import Path
 from types import SimpleNamespace
@@ -136,6 +138,21 @@ def test_without_a_driver_the_package_is_named(
     told = refusal(capsys, "--video")
     assert "expected EGL or OSMesa to draw without a display" in told
     assert "apt-get install libegl1 libgl1-mesa-dri" in told
+
+
+def test_a_way_to_draw_that_does_not_exist_matters_where_something_is_drawn_alone(
+    tmp_path: Path,
+) -> None:
+    """The engine itself raises when it is imported."""
+    words = [sys.executable, "-m", "antennate", "tunnel", "--scene", "flat", "--trials", "1"]
+    words += ["--controllers", "open", "--time-limit", "0.1", "--no-figures", "--out", "run"]
+    env = os.environ | {"MUJOCO_GL": "nonsense"}
+    for more, code, said in (([], 0, ""), (["--video", "--overwrite"], 2, "MUJOCO_GL: expected ")):
+        done = subprocess.run(
+            [*words, *more], cwd=tmp_path, env=env, capture_output=True, text=True, check=False
+        )
+        assert (done.returncode, "Traceback" in done.stderr) == (code, False), done.stderr
+        assert said in done.stderr
 
 
 def test_words_that_do_not_fit_are_one_line(capsys: pytest.CaptureFixture[str]) -> None:

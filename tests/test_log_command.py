@@ -304,6 +304,7 @@ def test_plot_draws_it(log: Path) -> None:
         (["export", "drive.mcap", "--out", "a.xls"], "a name with .csv or .parquet, found a.xls"),
         (["recover", "drive.mcap", "--out", "drive.mcap"], "expected another file than the log"),
         (["recover", "text", "--out", "new.mcap"], "no intact header"),
+        (["recover", "cut.mcap", "--out", "new.mcap"], "expected intact ticks, found none"),
         (["recover", "gone.mcap", "--out", "drive.mcap", "--overwrite"], "gone.mcap: No such file"),
         (["recover", "drive.mcap", "--out", "x.mcap", "--overwrite"], "found the folder x.mcap"),
         (["plot", "empty.mcap"], "expected a log with ticks, found none"),
@@ -316,6 +317,11 @@ def test_what_cannot_be_done_is_refused_in_one_line(
     Path("text").write_text("not a log of anything\n")
     Path("x.mcap").mkdir()
     LogWriter(Path("empty.mcap"), HEADER).close()
+    with log.open("rb") as file:
+        summary = make_reader(file).get_summary()
+    assert summary is not None
+    _, second, *_ = sorted(chunk.chunk_start_offset for chunk in summary.chunk_indexes)
+    Path("cut.mcap").write_bytes(log.read_bytes()[: second + 50])  # the header alone is whole
     before = {path.name for path in Path().iterdir()}
     assert main(["log", *argv]) == 2
     out, err = capsys.readouterr()

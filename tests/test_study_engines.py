@@ -136,7 +136,7 @@ def test_a_trial_that_hangs_beside_a_worker_of_dask_is_found(tmp_path: Path) -> 
 
     tasks = {place: ({"x": 1.0, "mode": "hang"}, place) for place in (1, 2)}
     part = Part(trial, tasks, together=False, timeout=1.0)
-    found = dict(carry_out_apart(part, environment(), {}))
+    found = dict(carry_out_apart(part, environment(), {}, "one"))
     assert (found[1].status, found[2]["value"]) == ("hung", pytest.approx(1.1))
 
 

@@ -37,6 +37,10 @@ def drawn(axis: str, name: str = "tunnel.free_width") -> str:
             "{ low = 1.2, high = 1.8, whole = true }",
             ".range: expected whole ends, got low 1.2 and high 1.8",
         ),
+        (
+            "{ low = -1e308, high = 1e308 }",
+            ".range: expected ends less far apart, got -1e+308 and 1e+308",
+        ),
         ("{ low = 1, high = 2, hihg = 2 }", ".range.hihg: expected a known key"),
         ("0.4", f": {CHOICES}, found 0.4"),
         ('"wide"', f": {CHOICES}, found 'wide'"),
@@ -158,3 +162,13 @@ def test_a_measure_that_a_function_has_not_is_found_at_its_first_row(
     Path("own.toml").write_text(f'response = "valeu"\ntrials = 3\n{OWN}')
     words = ["study", "own.toml", "--trust-code", "--workers", workers]
     assert "(did you mean value?), one of trial, value; found valeu" in refusal(capsys, *words)
+
+
+@pytest.mark.parametrize("name", ["point", "trial", "seed", "status", "reason", "", "a\\nb"])
+def test_what_varies_for_a_function_has_a_name_of_its_own(
+    name: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    Path("own.py").write_text("def trial(config, seed):\n    return {'value': 1.0}\n")
+    Path("bad.toml").write_text(f'experiment = "own.py:trial"\n[vary]\n"{name}" = [1, 2]\n')
+    line = refusal(capsys, "study", "bad.toml", "--trust-code")
+    assert ": expected another name, " in line

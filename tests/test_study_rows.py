@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import time
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ import pytest
 
 from antennate.cli import main
 from antennate.studies.run_directory import RunDirectory
+from antennate.studies.store import STORE
 
 OWN = """
 import numpy as np
@@ -128,3 +130,51 @@ def test_a_study_of_which_no_trial_has_a_result_ends_with_2(body: str, status: s
     own = f"def trial(config, seed):\n    {body}\n"
     code, rows = study(own, 2, "--trial-timeout", "0.2")
     assert (code, [row["status"] for row in rows]) == (2, [status, status])
+
+
+def test_a_trial_that_leaves_the_working_folder_spoils_no_other() -> None:
+    own = "import os\ndef trial(config, seed):\n    os.chdir('/')\n    return {'value': 1.0}\n"
+    _, rows = study(own, 3, "--no-figures")
+    assert [row["status"] for row in rows] == ["ok"] * 3
+
+
+def test_a_worker_that_dies_while_its_child_lives_is_noticed() -> None:
+    """The child holds all files of the worker open; nothing tells of the death but the system."""
+    own = (
+        "import os, signal, time\n"
+        "def trial(config, seed):\n"
+        "    if seed == 0:\n"
+        "        if os.fork() == 0:\n"
+        "            time.sleep(60)\n"
+        "            os._exit(0)\n"
+        "        os.kill(os.getpid(), signal.SIGKILL)\n"
+        "    return {'value': 1.0}\n"
+    )
+    start = time.monotonic()
+    _, rows = study(own, 2, "--no-figures", "--trial-timeout", "600")
+    assert [row["status"] for row in rows] == ["crashed", "ok"]
+    assert time.monotonic() - start < 55.0
+
+
+def test_a_study_does_not_go_on_with_other_code_beside_its_file(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """Of a module that the named file imports, and of one that this one imports."""
+    Path("helper.py").write_text("import constant\n")
+    Path("constant.py").write_text("VALUE = 1.0\n")
+    own = "import helper\ndef trial(config, seed):\n    return {'value': helper.constant.VALUE}\n"
+    assert study(own, 1, "--no-figures")[0] == 0
+    Path("constant.py").write_text("VALUE = 2.0\n")
+    assert study(own, 1, "--no-figures")[0] == 2
+    assert "the file constant.py changed" in capsys.readouterr().err
+
+
+def test_trials_of_which_nobody_knows_what_was_run_are_not_run_again_in_silence(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    own = "def trial(config, seed):\n    return {'value': 1.0}\n"
+    assert study(own, 3, "--no-figures")[0] == 0
+    path = Path("run", STORE)
+    path.write_bytes(path.read_bytes().replace(b"identity", b"identify", 1))
+    assert study(own, 3, "--no-figures")[0] == 2
+    assert "found that damaged, and 3 sound trials" in capsys.readouterr().err

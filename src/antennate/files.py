@@ -137,7 +137,8 @@ def replacing(path: Path, overwrite: bool = False) -> Iterator[Path]:
         raise
     except FileExistsError:
         raise OutputError(
-            f"{path}: expected no such file, found one; choose another name or allow overwriting"
+            f"{path}: expected no such file, found one; choose another name, --overwrite or "
+            "overwrite=True"
         ) from None
     except (OSError, ValueError) as error:
         why = getattr(error, "strerror", None) or error

@@ -41,7 +41,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         The exit code.
     """
     from antennate.cli.output import safe_streams
+    from antennate.sim.gl import keep_wish
 
+    keep_wish()
     words = list(sys.argv[1:] if argv is None else argv)
     name = f"antennate {words[0]}" if words and _known(words[0]) else "antennate"
     with safe_streams() as output:

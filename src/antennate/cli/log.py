@@ -23,7 +23,7 @@ from antennate.params.base import Params
 from antennate.studies.formats import csv_lines
 from antennate.studies.measures import Table
 from antennate.telemetry.reader import LogReader
-from antennate.telemetry.recover import left_out, recover
+from antennate.telemetry.recover import RECOVERED, left_out, recover
 from antennate.telemetry.survey import Survey
 from antennate.telemetry.ticks import JOINTS
 from antennate.telemetry.topics import EVENTS
@@ -109,7 +109,7 @@ def _target(path: Path, options: Options) -> Path:
         ConfigError: Its name has another ending, or it is a folder or the log itself.
     """
     endings = _ENDINGS[options.action]
-    stem = f"{path.stem}-recovered" if options.action == "recover" else path.stem
+    stem = f"{path.stem}{RECOVERED}" if options.action == "recover" else path.stem
     target = options.out or path.with_name(stem + endings[0])
     if target.suffix not in endings:
         raise ConfigError(f"--out: expected a name with {' or '.join(endings)}, found {target}")
@@ -231,7 +231,7 @@ def _table(result: Mapping[str, Any]) -> Table:
     events, start = result["events"], result["start_ns"]
     lines = [f"{1e-9 * (each['time_ns'] - start):.2f} s {each['text']}" for each in events[:_SHOWN]]
     if len(events) > _SHOWN:
-        lines.append(f"and {len(events) - _SHOWN} more events")
+        lines.append(f"and {len(events) - _SHOWN} more events; --json has all")
     rows = [(name, [str(count)]) for name, count in result["messages"].items()]
     note = "\n".join(map(one_line, lines))
     return Table(f"Log of {one_line(result['controller'])}", ["messages"], rows, note)

@@ -20,7 +20,7 @@ from antennate.studies.run_directory import SHARD, VERSIONS, RunDirectory
 from antennate.studies.store import STORE, read_store
 
 DESCRIPTION = """\
-Put the shards of one run together: the same folder as without shards, byte for byte.
+Put the shards of one run together: the table and the result are the same as without shards.
 
 Each shard is the folder of the same command with --shard I/N. All of them must be complete, of the
 same configuration, versions and code."""

@@ -66,12 +66,15 @@ class _Pace:
     """How fast steps come; those that were there at the first call took no time."""
 
     def __init__(self) -> None:
-        self._start, self._first = time.monotonic(), 0
+        self._start, self._first = time.monotonic(), -1
 
     def rate(self, done: int) -> str:
-        """Steps a second or a minute, in words."""
-        self._first = self._first or done - 1
+        """Steps a second or a minute, in words; empty before there is one."""
+        if self._first < 0:
+            self._first = done if done > 1 else 0
         speed = self._speed(done)
+        if done == self._first:
+            return ""
         return f"{speed:.1f}/s" if speed >= 1.0 else f"{60 * speed:.1f}/min"
 
     def left(self, done: int, total: int) -> float:
@@ -91,7 +94,8 @@ def _plain(what: str) -> Callable[[int, int], None]:
         if done * _LINES // total > shown:
             shown = done * _LINES // total
             seconds = time.monotonic() - start
-            left = f", {rate}, {pace.left(done, total):.0f} s left" if done < total else ""
+            more = rate and done < total
+            left = f", {rate}, {pace.left(done, total):.0f} s left" if more else ""
             sys.stderr.write(f"{what}: {done} of {total} after {seconds:.0f} s{left}\n")
             sys.stderr.flush()
 

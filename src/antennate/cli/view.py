@@ -25,6 +25,7 @@ from antennate.studies.report import command_of
 from antennate.studies.run_directory import LOG, LOGS, RunDirectory
 from antennate.telemetry.header import Header
 from antennate.telemetry.reader import LogReader
+from antennate.telemetry.recover import RECOVERED
 from antennate.telemetry.view import ports
 from antennate.telemetry.view.pace import Restart
 from antennate.telemetry.view.player import LogPlayer
@@ -86,6 +87,12 @@ def _complain(player: LogPlayer, log: LogReader) -> None:
         player.say(f"{log.bad} damaged places, {log.missing} ticks missing in this log")
 
 
+def _original(path: Path) -> Path | None:
+    """The log that `log recover` made this one of, None if it did not."""
+    stem = path.stem.removesuffix(RECOVERED)
+    return None if stem == path.stem else path.with_stem(stem)
+
+
 def _log_of(path: Path) -> Path:
     """The log that is meant.
 
@@ -94,7 +101,9 @@ def _log_of(path: Path) -> Path:
     """
     if not path.is_dir():
         return path
-    logs = sorted((path / LOGS).glob("*.mcap")) or [each for each in [path / LOG] if each.exists()]
+    every = sorted((path / LOGS).glob("*.mcap"))
+    logs = [each for each in every if _original(each) not in every]
+    logs = logs or [each for each in [path / LOG] if each.exists()]
     if not logs:
         raise BadInputError(
             f"{path}: expected a run with a log, found none; --log keeps those of a simulation"

@@ -12,10 +12,11 @@ import sys
 from importlib.util import find_spec
 
 from antennate.errors import BadInputError, MissingPackageError
-from antennate.messages import extra
+from antennate.messages import extra, shown
 
 BACKENDS = {"egl": "libegl1 libgl1-mesa-dri", "osmesa": "libosmesa6"}
 """Ways to draw, best first, and the Debian packages of each."""
+_NAME = "MUJOCO_GL"
 _PATIENCE = 60.0
 """Longest wait for a trial [s]; the first one compiles shaders."""
 _TRIAL = """
@@ -28,19 +29,34 @@ context.free()
 """
 
 
+_wish = [""]
+
+
+def keep_wish() -> None:
+    """Take MUJOCO_GL away and keep what it says for `backend`.
+
+    The engine reads it when it is imported, and raises there if it cannot be used, even where
+    nothing is drawn.
+    """
+    _wish[0] = os.environ.pop(_NAME, "")
+
+
 @functools.cache
 def backend() -> str:
     """The first way to draw that works, or the one that MUJOCO_GL names.
 
     Raises:
         MissingPackageError: PyOpenGL is not installed.
-        BadInputError: None works; the text names the packages of the system to install.
+        BadInputError: None works; the text names the packages of the system to install. Or
+            MUJOCO_GL names something else.
     """
     if find_spec("OpenGL") is None:
         raise MissingPackageError(
             f"video: expected the package PyOpenGL, found none; install it with {extra('video')}"
         )
-    wanted = os.environ.get("MUJOCO_GL", "").strip().lower()
+    wanted = (os.environ.get(_NAME) or _wish[0]).strip().lower()
+    if wanted and wanted not in BACKENDS:
+        raise BadInputError(f"{_NAME}: expected {' or '.join(BACKENDS)}, found {shown(wanted)}")
     names = [wanted] if wanted in BACKENDS else list(BACKENDS)
     found = {}
     for name in names:

@@ -7,6 +7,7 @@ import logging
 import math
 import multiprocessing
 import pickle
+import secrets
 import threading
 import time
 from collections.abc import Iterator, Mapping, Sequence
@@ -59,10 +60,11 @@ class Dask:
         """Run the tasks at these places; see `Engine`."""
         from distributed import KilledWorker
 
+        run = secrets.token_hex(8)
         with _quiet(), self._started(count) as (client, cluster, place):
 
             def submit(function: Any, *arguments: Any) -> Any:
-                return client.submit(carry_out_apart, *arguments, pure=False)
+                return client.submit(carry_out_apart, *arguments, run, pure=False)
 
             workers = _Workers(client, place, count, cluster is not None)
             try:
@@ -160,9 +162,11 @@ def _quiet() -> Iterator[None]:
 
 
 def carry_out_apart(
-    part: Part, theirs: Mapping[str, Any], added: Mapping[str, Any]
+    part: Part, theirs: Mapping[str, Any], added: Mapping[str, Any], run: str
 ) -> list[tuple[int, Any]]:
     """In a worker: results and failures by place, of trials that run in a process beside it.
+
+    That process serves one run alone, as it knows the user's code as it was at first.
 
     Raises:
         WorkerError: The driver has other versions or other code, or no process starts.
@@ -181,7 +185,7 @@ def carry_out_apart(
     def fail(index: int, failure: Failure) -> None:
         answers.append((places[index], Failure(failure.status, failure.reason)))
 
-    with _processes() as processes:
+    with _processes(run) as processes:
         processes.run(work, [range(len(places))], 1, emit, fail)
     return answers
 
@@ -211,24 +215,25 @@ class _Carried:
         return part.function([part.tasks[place] for (place,) in chosen], emit)
 
 
-_IDLE: dict[Processes, threading.Timer] = {}
-"""Processes beside this worker that wait for a part, and what ends them if none comes."""
+_IDLE: dict[Processes, tuple[str, threading.Timer]] = {}
+"""Processes beside this worker that wait for a part of a run, and what ends them if none comes."""
 _LOCK = threading.Lock()
 
 
 @contextlib.contextmanager
-def _processes() -> Iterator[Processes]:
-    """A process beside this worker; it serves one part after the other."""
+def _processes(run: str) -> Iterator[Processes]:
+    """A process beside this worker; it serves one part of a run after the other."""
     multiprocessing.current_process().daemon = False  # a worker under a nanny may then start one
     with _LOCK:
-        processes, timer = _IDLE.popitem() if _IDLE else (Processes(stay=True), None)
-    if timer is not None:
-        timer.cancel()
+        processes = next((each for each, (of, _) in _IDLE.items() if of == run), None)
+        if processes is not None:
+            _IDLE.pop(processes)[1].cancel()
+    processes = processes or Processes(stay=True)
     yield processes
     timer = threading.Timer(_STAY, _end, [processes])
     timer.daemon = True
     with _LOCK:
-        _IDLE[processes] = timer
+        _IDLE[processes] = run, timer
     timer.start()
 
 

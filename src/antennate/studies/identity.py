@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import functools
 import hashlib
 import importlib.util
@@ -62,15 +63,38 @@ def code() -> dict[str, str]:
 
 
 def code_named(values: Any) -> dict[str, str]:
-    """Checksums of files that a configuration names: FILE, FILE.py:NAME or MODULE:NAME."""
+    """Checksums of files that a configuration names: FILE, FILE.py:NAME or MODULE:NAME.
+
+    Beside FILE.py also what it imports of its own folder.
+    """
     found = {}
     for text in _texts(values):
         place, _, name = text.rpartition(":")
         file = Path(place if name and place else text)
         if file.suffix and file.is_file():
-            found[str(file)] = _checksum(file)
+            files = _with_imports(file) if file.suffix == ".py" else [file]
+            found |= {str(each): _checksum(each) for each in files}
         elif place and name.isidentifier() and all(map(str.isidentifier, place.split("."))):
             found |= _module(place)
+    return found
+
+
+def _with_imports(first: Path) -> list[Path]:
+    """A file and all beside it that it imports, or that those import."""
+    found = [first]
+    for file in found:
+        try:
+            nodes = [*ast.walk(ast.parse(file.read_bytes()))]
+        except (SyntaxError, ValueError):
+            continue  # it is told where it is imported
+        names = [
+            alias.name for node in nodes if isinstance(node, ast.Import) for alias in node.names
+        ]
+        names += [node.module or "" for node in nodes if isinstance(node, ast.ImportFrom)]
+        for name in dict.fromkeys(name.partition(".")[0] for name in names):
+            module, package = first.with_name(f"{name}.py"), first.parent / name
+            beside = [module] if module.is_file() else sorted(package.rglob("*.py")) if name else []
+            found += [each for each in beside if each not in found]
     return found
 
 

@@ -150,12 +150,14 @@ class Table:
         columns: Names of the columns.
         rows: Name and cells of every row.
         note: Under it.
+        leading: Cells that tell two rows apart in place of their names, from the first on.
     """
 
     title: str
     columns: Sequence[str]
     rows: Sequence[tuple[str, Sequence[str]]]
     note: str = ""
+    leading: int = 0
 
     @classmethod
     def of(

@@ -32,9 +32,11 @@ p { margin: .3rem 0; } .muted, dt, caption, figcaption { color: var(--muted); }
 table { border-collapse: separate; border-spacing: 0; font-size: .9rem; margin: .3rem 0; }
 td, th { text-align: left; vertical-align: top; padding: .2rem 1.2rem .2rem 0;
   border-bottom: 1px solid var(--line); }
+td:first-child { white-space: pre-wrap; }
 th { font-weight: 600; } table.numbers td + td, table.numbers th + th { text-align: right; }
 table.numbers { font-variant-numeric: tabular-nums; white-space: nowrap; }
-table.numbers td:first-child { position: sticky; left: 0; background: var(--page); }
+table.numbers td:first-child { white-space: pre; position: sticky; left: 0;
+  background: var(--page); }
 section { border-top: 1px solid var(--line); padding: 1rem 0; display: grid; gap: 0 1.5rem;
   grid-template-columns: 1fr minmax(0, 26rem); break-inside: avoid; }
 section > h2, section > .verdict { grid-column: 1 / -1; margin-top: 0; }

@@ -30,7 +30,7 @@ _POLL = 0.1
 """How long results that are on their way are waited for after Ctrl-C [s]."""
 _IMPORT = 60.0
 """Time that a worker has to import what its first tasks need [s]; it counts for no task."""
-_LONGEST_WAIT = 3600.0
+_LONGEST_WAIT = 1.0
 """Most that is waited at once [s]."""
 _MOST_FAILED_STARTS = 10
 """Workers in a row that may end before they are ready, as somebody kills them."""
@@ -104,7 +104,9 @@ class _Pool:
             signs: dict[Any, _Worker] = {
                 x: m for m in self._workers for x in (m.connection, m.process.sentinel)
             }
-            for worker in {signs[x]: None for x in wait(list(signs), left)}:
+            told = {signs[x]: None for x in wait(list(signs), left)}
+            dead = {m: None for m in self._workers if not m.process.is_alive()}
+            for worker in told | dead:
                 self._receive(worker)
             for worker in [m for m in self._workers if time.monotonic() > m.deadline]:
                 self._remove(worker, hung=True)

@@ -253,7 +253,10 @@ def _side_by_side(names: Sequence[str], found: Sequence[Sequence[Table]]) -> lis
         columns = list(dict.fromkeys(c for table in here.values() for c in table.columns))
         cells = {name: _cells(table) for name, table in here.items()}
         rows = [
-            (line[0] if name == names[0] else "", [name, *(found.get(c, NONE) for c in columns)])
+            (
+                line[0] if name == next(iter(here)) else "",
+                [name, *(found.get(c, NONE) for c in columns)],
+            )
             for line in dict.fromkeys(line for lines in cells.values() for line in lines)
             for name, found in ((name, cells[name].get(line, {})) for name in here)
         ]
@@ -266,7 +269,8 @@ def _cells(table: Table) -> dict[tuple[str, int], dict[str, str]]:
     """The cells of a table by line and column; a label that comes again is another line."""
     seen: dict[str, int] = {}
     found = {}
-    for label, cells in table.rows:
+    for name, cells in table.rows:
+        label = ", ".join(cells[: table.leading]) or name
         seen[label] = seen.get(label, 0) + 1
         found[label, seen[label]] = dict(zip(table.columns, cells, strict=True))
     return found

@@ -82,8 +82,12 @@ class Store:
             BadInputError: It is something else; the text says what differs.
             OutputError: It cannot be written.
         """
+        if self.identity is None and self.records:
+            raise BadInputError(
+                f"{self.path}: expected what is run in its first line, found that damaged, and "
+                f"{len(self.records)} sound trials; choose another folder or give --overwrite"
+            )
         if self.identity is None:
-            self.records = {}
             self._append(line({"identity": identity}))
             self.identity = identity
         elif changes := differences(self.identity, identity):

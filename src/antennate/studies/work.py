@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 from collections import Counter, deque
 from collections.abc import Callable, Collection, Sequence
@@ -81,7 +82,7 @@ class Part:
         """
         left = dict(self.tasks)
         told: Exception | None = None
-        process = os.getpid()
+        process, back = os.getpid(), _way_back()
 
         def take(place: int, result: Any) -> None:
             nonlocal told
@@ -92,6 +93,7 @@ class Part:
                 told = error
                 raise
             del left[place]
+            back()
 
         places = list(self.tasks)
         while left:
@@ -116,6 +118,22 @@ class Part:
                         fail(place, Failure("failed", reason, error))
                 else:
                     places = []  # one of them raised: from now on each is run alone
+            finally:
+                back()
+
+
+def _way_back() -> Callable[[], None]:
+    """Brings back the working folder that is the present one: a trial may leave it."""
+    try:
+        folder = Path.cwd()
+    except OSError:  # it is gone
+        return lambda: None
+
+    def back() -> None:
+        with contextlib.suppress(OSError):
+            os.chdir(folder)
+
+    return back
 
 
 def _end_forked(process: int) -> None:

@@ -19,6 +19,9 @@ from antennate.params.reading import describe
 from antennate.robots.spec import RobotSpec
 from antennate.telemetry.topics import CALIBRATION, CONFIG, HEADER_TOPICS, VERSIONS, Topic
 
+TWIN = "twin"
+"""The controller of a twin's log: what its client decides is not known."""
+
 
 @lru_cache
 def versions(packages: tuple[str, ...] = ()) -> Mapping[str, str]:

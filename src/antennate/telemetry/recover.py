@@ -6,11 +6,14 @@ import math
 from pathlib import Path
 
 from antennate import __version__
+from antennate.errors import LogError
 from antennate.files import lock, replacing
 from antennate.telemetry.reader import LogReader
 from antennate.telemetry.topics import EVENTS
 from antennate.telemetry.writer import LogWriter
 
+RECOVERED = "-recovered"
+"""What the name of a recovered log has behind that of the log."""
 _WARN = 30
 
 
@@ -28,7 +31,7 @@ def recover(path: Path, target: Path, overwrite: bool = False) -> LogReader:
         The reader, at the end: how many ticks there are, and what is damaged or missing.
 
     Raises:
-        LogError: There is no log, or the disk is full.
+        LogError: There is no log, nothing of it is intact, or the disk is full.
         OutputError: The target exists or cannot be written. Nothing is left after an error.
     """
     with LogReader(path) as log, replacing(target, overwrite) as fresh:
@@ -47,6 +50,8 @@ def recover(path: Path, target: Path, overwrite: bool = False) -> LogReader:
             event = EVENTS.type.encode(*time, _WARN, "antennate log recover", words, "", "", 0)
             out.add(EVENTS, 0, last, event)
             out.close()
+        if not log.ticks and log.bad:
+            raise LogError(f"{path}: expected intact ticks, found none; {left_out(log)}")
     return log
 
 

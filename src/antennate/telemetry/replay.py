@@ -16,7 +16,7 @@ from antennate.errors import LogError
 from antennate.hardware.driving.decision import Decision, decision_of, no_command
 from antennate.params.base import Params, number
 from antennate.robots.spec import RobotSpec
-from antennate.telemetry.header import Header
+from antennate.telemetry.header import TWIN, Header
 from antennate.telemetry.ticks import Tick, angles_of
 from antennate.types import AntennaFrame, Controller, JointCommand
 
@@ -215,9 +215,10 @@ def recorded_controller(header: Header, name: str | None = None) -> Controller:
     """
     wanted = header.controller if name is None else name
     if name is None and wanted not in BUILT_IN:
+        more = "closed, for example" if wanted == TWIN else "with this name if its code may run"
         raise LogError(
             f"expected one of {', '.join(BUILT_IN)} in the log, found {wanted!r}; give "
-            "--controller with this name if its code may run"
+            f"--controller {more}"
         )
     made = make_controller(wanted, header.params, header.robot)
     made.reset(np.array([0]), header.phase)

@@ -22,6 +22,8 @@ _TEXT, _ROW, _EDGE = 13, 20, 10
 """Height of letters and of a row of text, and free space at the sides [pixels]."""
 _SMALL = 11
 """Height of the numbers of an axis [pixels]."""
+_NUMBERS = 42
+"""Room for those numbers [pixels]."""
 _SIDES = ("L ", "R ")
 """What stands before the newest values of two lines."""
 
@@ -111,7 +113,7 @@ class Strip:
     ) -> None:
         text, row, edge = (_FINE * size for size in (_TEXT, _ROW, _EDGE))
         left, right = start + edge, start + self._column - edge
-        top, low = 1.6 * row, self._size[1] - edge
+        top, low = 1.6 * row, self._size[1] - 0.3 * edge - 1.2 * _FINE * _SMALL
         type_ = font(text)
         draw.text((left, row / 3), trace.label, INK, type_)
         x = right
@@ -124,7 +126,6 @@ class Strip:
             x -= draw.textlength(words, type_) + edge
             draw.text((x + edge, row / 3), words, colour, type_)
         draw.rectangle((left, top, right, low), outline=FAINT, width=_FINE)
-        self._draw_ends(draw, trace, left + edge / 2, top, right - edge / 2, low)
 
         def y(value: Any) -> Any:
             share = (np.clip(value, trace.low, trace.high) - trace.low) / (trace.high - trace.low)
@@ -133,7 +134,8 @@ class Strip:
         if trace.mark is not None:
             at = float(y(trace.mark))
             draw.line((left, at, right, at), MUTED, _FINE)
-            draw.text((left + edge / 2, at - 1.1 * text), trace.mark_label, MUTED, type_)
+            beside = left + _NUMBERS * _FINE  # the numbers of the axis
+            draw.text((beside, at - 1.1 * text), trace.mark_label, MUTED, type_)
         across = self._x(left, right, first, frame)
         for k, colour in enumerate(colours):
             height = y(trace.values[first : frame + 1, k])
@@ -141,19 +143,19 @@ class Strip:
             points = np.stack([across[known], height[known]], axis=1).ravel().tolist()
             if len(points) >= 4:
                 draw.line(points, colour, _FINE + 1, joint="curve")
+        self._draw_ends(draw, trace, (left, top, right, low))
 
     def _draw_ends(
-        self, draw: ImageDraw, trace: Trace, left: float, top: float, right: float, low: float
+        self, draw: ImageDraw, trace: Trace, frame: tuple[float, float, float, float]
     ) -> None:
-        """The numbers at the ends of both axes."""
+        """The numbers at the ends of both axes, over the curves."""
+        left, top, right, low = frame
         small = font(_FINE * _SMALL)
-        ends = [
-            (left, top, f"{trace.high:{trace.form}}", "la"),
-            (left, low, f"{trace.low:{trace.form}}", "ld"),
-            (right, low, f"last {self._window:.3g} s", "rd"),
-        ]
-        for x, y, words, anchor in ends:
-            draw.text((x, y), words, MUTED, small, anchor)
+        for y, value, anchor in ((top, trace.high, "la"), (low, trace.low, "ld")):
+            place, words = (left + 2 * _FINE, y), f"{value:{trace.form}}"
+            draw.rectangle(draw.textbbox(place, words, small, anchor), fill="white")
+            draw.text(place, words, MUTED, small, anchor)
+        draw.text((right, low + _FINE), f"last {self._window:.3g} s", MUTED, small, "ra")
 
     def _draw_words(self, draw: ImageDraw, start: float, first: int, frame: int) -> None:
         """Title and time, then the bands with the names of their states."""

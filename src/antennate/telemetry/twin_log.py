@@ -14,14 +14,12 @@ from antennate.params.control import ControlParams
 from antennate.sim.trial import TrialConfig
 from antennate.sim.world import World
 from antennate.telemetry.apart import LogProcess
-from antennate.telemetry.header import Header
+from antennate.telemetry.header import TWIN, Header
 from antennate.telemetry.simulated import Decisions, TickRows
 from antennate.twin.config import TwinConfig
 from antennate.twin.robot import TwinRobot
 from antennate.types import AntennaFrame, Contact
 
-CONTROLLER = "twin"
-"""What stands for the controller in the log of a twin."""
 UNKNOWN_MANEUVER = -1
 
 
@@ -60,7 +58,7 @@ def header_of(config: TwinConfig, start: int) -> Header:
     """The header of a twin's log; its time begins at `start` [ns], a Unix time."""
     fields = set(TrialConfig.model_fields) - {"robot"}
     return Header(
-        controller=CONTROLLER,
+        controller=TWIN,
         params=ControlParams(rate=config.control.rate, gait=config.control.gait),
         robot=config.robot,
         seed=config.seed,

@@ -44,9 +44,8 @@ def _points(result: Mapping[str, Any]) -> Table:
     note = f"Mean of each point with its 95 % interval, {_ended(result)} in all."
     if len(rows) > _MOST:
         note += f" The first {_MOST} of {len(rows)} points; result.json has all."
-    return Table(
-        "Points", [*(labels.axis(result, axis) for axis in axes), *heads], rows[:_MOST], note
-    )
+    columns = [*(labels.axis(result, axis) for axis in axes), *heads]
+    return Table("Points", columns, rows[:_MOST], note, leading=len(axes))
 
 
 def _ended(result: Mapping[str, Any]) -> str:

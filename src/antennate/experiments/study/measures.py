@@ -12,7 +12,7 @@ from antennate.experiments.study.effects import SUCCESS, effects, value
 from antennate.studies import statistics
 from antennate.studies.plan import Point
 
-_NO_MEASURE = ("point", "trial", "seed")
+_NO_MEASURE = ("point", "trial", "seed", "schema")
 NO_RESULT = frozenset({"failed", "crashed", "hung"})
 """Statuses of trials that gave no row."""
 Row = Mapping[str, Any]

@@ -10,6 +10,7 @@ from typing import Any
 from antennate.errors import ConfigError
 from antennate.experiments.study import measures
 from antennate.experiments.study.config import StudyConfig
+from antennate.experiments.study.rows import OF_STUDY
 from antennate.experiments.study.subject import (
     Columns,
     Rows,
@@ -78,6 +79,7 @@ def check(config: StudyConfig) -> None:
             is empty, or a point of it is out of bounds.
     """
     subject = find(config.experiment)
+    _require_names(config, subject)
     (_, first), *_ = configurations(config, subject)
     try:
         subject.check(first)
@@ -85,6 +87,14 @@ def check(config: StudyConfig) -> None:
         raise ConfigError(f"{config.experiment}: {error}") from None
     if (known := columns_of(config.experiment)) is not None:
         _require_response(config, known)
+
+
+def _require_names(config: StudyConfig, subject: Subject) -> None:
+    """Check that what varies has names of its own; those of an experiment are its parameters."""
+    for name in config.vary if subject.model is None else ():
+        if name in OF_STUDY or not (name and name.isprintable()):
+            why = "as the study has this column" if name in OF_STUDY else "of letters that show"
+            raise ConfigError(f"vary.{shortened(name)}: expected another name, {why}")
 
 
 def _require_response(config: StudyConfig, columns: Columns) -> None:

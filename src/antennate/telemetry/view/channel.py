@@ -208,7 +208,7 @@ class Channel:
     def finish(self, kind: bytes) -> None:
         """Send what is left of a long message, then an empty one of this kind."""
         end = time.monotonic() + _LAST
-        while not self.closed and (self._left or not self.send(kind)):
+        while not self.closed and (self._left or not self._put((kind,))):
             left = end - time.monotonic()
             if left <= 0 or not select.select((), (self._end,), (), left)[1]:
                 return
