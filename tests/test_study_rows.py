@@ -146,7 +146,7 @@ def test_a_worker_that_dies_while_its_child_lives_is_noticed() -> None:
         "    if seed == 0:\n"
         "        if os.fork() == 0:\n"
         "            time.sleep(60)\n"
-        "            os._exit(0)\n"
+        "            os.kill(os.getpid(), signal.SIGKILL)\n"
         "        os.kill(os.getpid(), signal.SIGKILL)\n"
         "    return {'value': 1.0}\n"
     )
