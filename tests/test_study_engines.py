@@ -140,6 +140,17 @@ def test_a_trial_that_hangs_beside_a_worker_of_dask_is_found(tmp_path: Path) -> 
     assert (found[1].status, found[2]["value"]) == ("hung", pytest.approx(1.1))
 
 
+def test_a_process_beside_a_worker_of_dask_serves_one_run_alone() -> None:
+    """It has imported the user's code, which may have been edited before the next run."""
+    pytest.importorskip("distributed")
+    from antennate.studies.dask import carry_out_apart
+
+    part = Part(os.getpid, {0: ()}, together=False, timeout=60.0)
+    runs = ("one", "one", "two")
+    first, again, other = (dict(carry_out_apart(part, environment(), {}, run))[0] for run in runs)
+    assert first == again != other
+
+
 def test_an_engine_gives_work_to_workers_that_join_later() -> None:
     """One part for each worker: the second is given before the first has ended."""
     joined = [1, 1, 2]

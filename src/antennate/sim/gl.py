@@ -27,9 +27,8 @@ context.make_current()
 mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100.value).free()
 context.free()
 """
-
-
 _wish = [""]
+"""What MUJOCO_GL said when the command began."""
 
 
 def keep_wish() -> None:
