@@ -223,6 +223,20 @@ def test_bad_words(capsys, tmp_path, argv, parts):
     assert list(tmp_path.iterdir()) == []  # a refused command leaves nothing behind
 
 
+@pytest.mark.parametrize("flag", ["--log", "--video", "--view"])
+def test_a_flag_of_other_commands_is_refused_with_their_names(flag: str, capsys) -> None:
+    line = refusal(capsys, "springs", flag)
+    assert f"expected a flag of this command, found {flag}; " in line
+    told = line.partition(f"{flag}; ")[2].partition(" take it;")[0]
+    having = set()
+    for name in commands():
+        assert main([name, "--help-all"]) == 0
+        having |= (
+            {name} if re.search(rf"^  {flag}\b(?!-)", capsys.readouterr().out, re.M) else set()
+        )
+    assert set(re.split(", | and ", told)) == having
+
+
 @pytest.mark.parametrize(
     ("text", "parts"),
     [

@@ -122,14 +122,16 @@ def test_B13_torque_that_went_off_while_walking_is_the_worst() -> None:
 
 
 @pytest.mark.parametrize(
-    ("when", "refused", "said"),
+    ("when", "check", "refused", "said"),
     [
-        ("1.3s", True, "The robot was not armed: HOLD STALE: no fresh sample"),
-        ("1.55s", False, "no command was sent; worst state HOLD (HOLD STALE: no fresh sample"),
+        ("1.3s", False, True, "The robot was not armed: HOLD STALE: no fresh sample"),
+        ("1.3s", True, True, "The robot was not armed: HOLD STALE: no fresh sample"),
+        ("1.55s", False, False, "no command was sent; worst state HOLD (HOLD STALE: no fresh"),
     ],
 )
 def test_L8_a_drive_that_sent_no_pose_ends_with_2_and_says_so(
     when: str,
+    check: bool,
     refused: bool,
     said: str,
     tmp_path: Path,
@@ -144,15 +146,27 @@ def test_L8_a_drive_that_sent_no_pose_ends_with_2_and_says_so(
 
     monkeypatch.setattr("antennate.cli.drive.connect", in_process)
     monkeypatch.setattr(Feed, "watched", property(lambda feed: True))  # its time is invented
-    argv = ["drive", "--esp32", "board", "--bus", "bus", "--arm", "--no-touch-check"]
+    argv = [
+        "drive",
+        "--esp32",
+        "board",
+        "--bus",
+        "bus",
+        "--arm",
+        f"--{'' if check else 'no-'}touch-check",
+    ]
     argv += ["--dry-run", "0.5", "--duration", "1", "--touch.patience", "0.5"]
     assert main([*argv, "--out", str(tmp_path), "--overwrite"]) == 2
     text = " ".join(capsys.readouterr().out.split())
     assert said in text
+    assert "touch" not in text  # a check that could not be done is not the reason
     result = json.loads((tmp_path / "result.json").read_text())
     assert result["worst_state"] == "HOLD"
     assert result["commands_sent"] == 0
     assert ("STALE" in result["refusal"]) == refused
+    page = (tmp_path / "report.html").read_text()
+    assert "Beside this page: log drive.mcap." in page
+    assert 'alt="figure drive"' in page
 
 
 def test_a_controller_that_does_not_exist_is_named_before_a_port_is_opened(

@@ -295,7 +295,7 @@ def test_plot_draws_it(log: Path) -> None:
 @pytest.mark.parametrize(
     ("argv", "what"),
     [
-        ([], "expected the name of a log, found none"),
+        ([], "expected the name of a log or of a run, found none"),
         (["show", "drive.mcap"], "expected one of info, recover, export, plot or film, found show"),
         (["info", "nothing.mcap"], "nothing.mcap: No such file"),
         (["info", "text"], "no intact header, 0 intact ticks; damaged places: 1"),
@@ -308,6 +308,7 @@ def test_plot_draws_it(log: Path) -> None:
         (["recover", "gone.mcap", "--out", "drive.mcap", "--overwrite"], "gone.mcap: No such file"),
         (["recover", "drive.mcap", "--out", "x.mcap", "--overwrite"], "found the folder x.mcap"),
         (["plot", "empty.mcap"], "expected a log with ticks, found none"),
+        (["export", "empty.mcap"], "expected a log with ticks, found none"),
         (["export", "drive.mcap", "--out", "nowhere/a.csv"], "nowhere/a.csv: expected to write"),
     ],
 )
@@ -341,7 +342,9 @@ def test_a_damaged_log_is_exported_as_far_as_it_goes(
     data[chunks(data)[2][1] - 1] ^= 4
     Path("bad.mcap").write_bytes(data)
     assert main(["log", "export", "bad.mcap"]) == 2
-    assert "found 1 damaged places and 1 ticks missing" in capsys.readouterr().err
+    assert (
+        "found damaged places: 1; ticks missing: 1; ticks read: 2; first" in capsys.readouterr().err
+    )
     assert Path("bad.csv").read_text().count("\n") == 3
 
 

@@ -18,6 +18,7 @@ from antennate.cli import main
 from antennate.errors import LogError
 from antennate.params.control import ControlParams
 from antennate.robots.spec import RobotSpec
+from antennate.studies.run_directory import LOG
 from antennate.telemetry.figure import Course
 from antennate.telemetry.figure import replay as draw
 from antennate.telemetry.header import Header
@@ -96,6 +97,27 @@ def test_another_controller_is_compared(log: Path, capsys: pytest.CaptureFixture
     assert f"first in tick {result['first_difference']['tick']} at " in out
 
 
+def test_replay_export_and_plot_count_time_as_the_loop_did(
+    log: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A loop that began five seconds before its first tick."""
+    path = tmp_path / LOG
+    with LogReader(log) as reader, LogWriter(path, reader.header) as writer:
+        for tick in reader:
+            writer.write(dataclasses.replace(tick, now=tick.now + 5.0))
+    result = said(capsys, str(tmp_path), "--controller", "open")
+    assert main(["log", "export", str(tmp_path)]) == 0
+    with path.with_suffix(".csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    turned = next(row for row in rows if row["maneuver"] != "0")
+    first = result["first_difference"]
+    assert (first["tick"], first["time_s"]) == (int(turned["number"]), float(turned["now"]))
+    with LogReader(path) as reader:
+        times = Course.of(reader, TICKS).t
+    assert times.tolist() == [float(row["now"]) for row in rows]
+    assert times[0] >= 5.0
+
+
 def test_it_leaves_a_table_and_a_figure(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """The table holds what the log holds, to the last digit."""
     live = session(tmp_path, "closed", 1, blind=130)
@@ -136,7 +158,7 @@ def test_G2_a_damaged_log_is_replayed_as_far_as_it_goes(
     out, err = capsys.readouterr()
     result = json.loads(out)
     assert (result["ticks"], result["missing"]) == (TICKS - 1, 1)
-    assert f"1 ticks missing; {TICKS - 1} ticks were read; first at byte " in err
+    assert f"ticks missing: 1; ticks read: {TICKS - 1}; first at byte " in err
     assert err.count("\n") == 1
 
 
@@ -153,9 +175,10 @@ def test_a_log_that_was_not_closed_is_no_error(
 @pytest.mark.parametrize(
     ("argv", "what"),
     [
-        ([], "expected the log of a drive, found none"),
+        ([], "expected the name of a log or of a run, found none"),
         (["nothing.log"], "nothing.log: No such file"),
-        (["."], "it is a folder"),
+        (["."], "expected a run with a log, found none"),
+        (["empty"], "expected a log with ticks, found none"),
         (["text"], "no intact header, 0 intact ticks; damaged places: 1"),
         (["own"], "give --controller with this name if its code may run"),
         (["own", "--controller", "zigzag"], "controller: expected one of open, paper, closed"),
@@ -167,6 +190,7 @@ def test_what_cannot_be_replayed_is_refused_in_one_line(
     (tmp_path / "text").write_text("not a log of anything\n")
     own = Header(controller="this:Class", params=ControlParams())
     LogWriter(tmp_path / "own", own).close()
+    LogWriter(tmp_path / "empty", Header(controller="open", params=ControlParams())).close()
     assert main(["replay", *argv]) == 2
     out, err = capsys.readouterr()
     assert out == ""
@@ -174,10 +198,7 @@ def test_what_cannot_be_replayed_is_refused_in_one_line(
     assert err.count("\n") == 1
 
 
-def test_an_empty_log_is_replayed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    path = tmp_path / "empty"
-    LogWriter(path, Header(controller="open", params=ControlParams())).close()
-    assert said(capsys, str(path), "--out", "out")["ticks"] == 0
+def test_a_replay_without_ticks_has_nothing_to_read() -> None:
     body = ReplayRobot([])
     with pytest.raises(LogError, match="found the end of the log"):
         body.read()
@@ -221,6 +242,10 @@ def test_the_figure_shows_every_stretch_and_repeats_its_bytes() -> None:
     simulated = draw(dataclasses.replace(course, replayed=None, state=[""] * n))
     rows = [label.get_text() for label in simulated.axes[3].get_yticklabels()]
     assert rows == ["recorded"]  # no supervisor
+    nothing = {"level": np.full((n, 2), math.nan), "contact": np.full((n, 2), Contact.UNKNOWN)}
+    undecided = dataclasses.replace(course, recorded=np.full(n, -1), replayed=None, **nothing)
+    of_twin = draw(dataclasses.replace(undecided, state=[""] * n))
+    assert [panel.get_title(loc="left") for panel in of_twin.axes] == ["Readings"]
 
 
 def test_G7_a_tick_without_a_decision_keeps_the_last_pose_that_was_not_refused(log: Path) -> None:

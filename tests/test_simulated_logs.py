@@ -193,6 +193,19 @@ def test_a_twin_logs_goals_readings_and_physics(
     assert capsys.readouterr().err.count("\n") == 1
 
 
+def test_a_fault_before_any_torque_stands_at_its_own_time(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    words = ["--fault", "esp32=silent@0.4s", "--log", "twin.mcap"]
+    assert main(["twin", "--duration", "0.6", *words]) == 0
+    capsys.readouterr()
+    assert main(["log", "info", "twin.mcap", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    times = [1e-9 * (each["time_ns"] - found["start_ns"]) for each in found["events"]]
+    assert (found["ticks"], times) == (0, [pytest.approx(0.4, abs=0.05)])
+
+
 def drawable() -> bool:
     """Whether films can be made here."""
     pytest.importorskip("av")

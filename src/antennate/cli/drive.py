@@ -51,6 +51,9 @@ _LOGLESS = (
     "or the disk full? `record_required = true` lets the robot walk with a log only"
 )
 
+_LONGEST_DRAWN = 30_000
+"""Most ticks of a log that is drawn for the report: it takes some ten seconds."""
+
 DESCRIPTION = """\
 Let a controller walk the real robot, or its twin. First a dry run: everything is read and nothing
 written. Then, with --arm only, torque comes on with every servo where it stands, and the robot
@@ -145,10 +148,19 @@ def walk(
             other = "" if controller is None else " --controller open"
             log = folder.path / (result["logs"] or [LOG])[0]
             _tell(result, orders, f"{shlex.quote(str(log))}{other}")
+        if result["logs"] and result["pace"]["ticks"] <= _LONGEST_DRAWN:
+            with contextlib.suppress(LogError):  # what can be read of it the result tells
+                folder.write_figures({"drive": _figure(log)})
     fault = result["worst_state"] in (State.FAULT.name, State.OFF.name)
     stays_on = result["torque_off"] is False
     idle = _idle(result)
     return BAD_INPUT if fault or stays_on or result["refusal"] or idle else OK
+
+
+def _figure(log: Path) -> Any:
+    from antennate.telemetry.figure import drawn  # slow to import
+
+    return drawn(log)[1]
 
 
 @dataclasses.dataclass(frozen=True)

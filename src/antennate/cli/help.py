@@ -55,12 +55,18 @@ def short_page(command: Command) -> str:
     tail = [*_groups(command.model, command.parameters), ""]
     tail.append(f"`{typed(command.name, '--help-all')}` shows every option.")
     room = SHORT_LINES - len(head) - len(tail)
-    others = sorted(command.others, key=lambda option: option.offered.startswith(_LATER))
+    others = sorted(command.others, key=_rank)
     others.sort(key=lambda option: not option.positional)
     needed = len(_section("options:", others))
     parameters = _cut("parameters:", top, max(room // 2, room - needed))
     options = _cut("options:", others, room - len(parameters))
     return "\n".join([*head, *parameters, *options, *tail]) + "\n"
+
+
+def _rank(option: Option) -> int:
+    """Place among those that come last, -1 of all others."""
+    found = (i for i, name in enumerate(_LATER) if option.offered.startswith(name))
+    return next(found, -1)
 
 
 def _cut(title: str, options: Sequence[Option], room: int) -> list[str]:

@@ -14,7 +14,7 @@ from antennate.cli.arguments import parse
 from antennate.cli.exit_codes import OK
 from antennate.cli.options import option
 from antennate.cli.progress import progress, stop_signals
-from antennate.cli.replay import complain
+from antennate.cli.replay import complain, log_of
 from antennate.cli.results import ResultOptions, tell
 from antennate.errors import ConfigError, MissingPackageError, OutputError
 from antennate.files import remove_abandoned, require_room, write_whole, writing_whole
@@ -59,7 +59,7 @@ class Options(ResultOptions):
     action: Literal["info", "recover", "export", "plot", "film"] = option(
         "info", "what to do", positional=True
     )
-    log: str = option("", "log of a drive or a simulation", "LOG", positional=True)
+    log: str = option("", "log, or the folder of a run with one", "RUN|LOG", positional=True)
     out: Path | None = option(
         None,
         "file to write, .mcap, .csv, .parquet, .png, .svg or .mp4; else beside the log",
@@ -77,8 +77,8 @@ def command(argv: Sequence[str]) -> int:
     """
     _, options = parse("log", DESCRIPTION, LogConfig, argv, Options)
     if not options.log:
-        raise ConfigError("expected the name of a log, found none")
-    path = Path(options.log)
+        raise ConfigError("expected the name of a log or of a run, found none")
+    path = log_of(Path(options.log))
     if options.action == "info":
         if options.out is not None:
             raise ConfigError("--out: expected no file for `info`, found one")
@@ -128,6 +128,7 @@ def _recover(path: Path, target: Path) -> LogReader:
 def _export(path: Path, target: Path) -> LogReader:
     with LogReader(path) as log:
         measured = {name for tick in log for name in JOINTS[1:] if getattr(tick, name)}
+        log.require_ticks()
     with LogReader(path) as log:
         rows = (tick.row(log.header.robot, measured) for tick in log)
         if target.suffix == ".csv":
@@ -163,16 +164,9 @@ def _write_parquet(target: Path, rows: Iterator[Mapping[str, Any]]) -> None:
 
 def _plot(path: Path, target: Path) -> LogReader:
     from antennate.figures import render  # slow to import
-    from antennate.telemetry.figure import Course
-    from antennate.telemetry.figure import replay as draw
+    from antennate.telemetry.figure import drawn
 
-    with LogReader(path) as log:
-        log.survey()
-        count = log.ticks
-    if not count:
-        raise ConfigError(f"{path}: expected a log with ticks, found none")
-    with LogReader(path) as log:
-        figure = draw(Course.of(log, count))
+    log, figure = drawn(path)
     write_whole(target, render(figure)[target.suffix.removeprefix(".")], overwrite=True)
     return log
 

@@ -258,9 +258,21 @@ def read_words(argv: Sequence[str], options: Sequence[Option]) -> dict[tuple[str
     return values
 
 
+_ELSEWHERE = {
+    "--log": "tunnel, gait and twin take it; drive and teleop always keep a log",
+    "--video": "tunnel, gait, wall, touch, sweep, ringdown, calibrate, force and twin take it; "
+    "`antennate log film` makes a film of any log",
+    "--view": "tunnel, gait, wall, twin, drive, teleop and replay take it; `antennate view` shows "
+    "any log",
+}
+"""Which commands have a flag that others could have, too."""
+
+
 def _named_by(flag: str, by_flag: Mapping[str, Option]) -> Option | None:
     """The option of a flag, None of none."""
     if flag and flag not in by_flag:
+        if flag in _ELSEWHERE:
+            raise ConfigError(f"expected a flag of this command, found {flag}; {_ELSEWHERE[flag]}")
         raise ConfigError(f"expected a known flag{nearest(flag, by_flag)}, found {shown(flag)}")
     return by_flag.get(flag)
 

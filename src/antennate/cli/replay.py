@@ -15,13 +15,14 @@ from antennate.cli.exit_codes import BAD_INPUT, OK
 from antennate.cli.options import option
 from antennate.cli.results import ResultOptions, folder_for, tell
 from antennate.cli.view_options import ViewOptions, page_of, say_by_hand
-from antennate.errors import ConfigError
+from antennate.errors import BadInputError, ConfigError
 from antennate.messages import one_line, short_names
 from antennate.studies.formats import csv_lines
 from antennate.studies.measures import Measure, Table
 from antennate.studies.report import View
-from antennate.studies.run_directory import RunDirectory
+from antennate.studies.run_directory import LOG, LOGS, RunDirectory
 from antennate.telemetry.reader import Damage, LogReader
+from antennate.telemetry.recover import RECOVERED
 from antennate.telemetry.replay import ReplayConfig, Replayed, recorded_controller, replay
 from antennate.types import Maneuver
 
@@ -30,6 +31,8 @@ Let the controller of a log decide upon the recorded readings again, or another 
 and compare. The same code decides the same, bit by bit. Damaged parts of a log are left out and
 named; the exit code is 2 then."""
 TICKS = "ticks.csv"
+_NO_STATE = "none"
+"""State of ticks without a supervisor, as in a simulation."""
 COUNTS = (
     Measure("different", "maneuvers that differ", form="d"),
     Measure("different_commands", "commands that differ", form="d"),
@@ -42,7 +45,7 @@ COUNTS = (
 class Options(ViewOptions, ResultOptions):
     """Which log, and what to leave behind."""
 
-    log: str = option("", "log of a drive", "LOG", positional=True)
+    log: str = option("", "log, or the folder of a run with one", "RUN|LOG", positional=True)
     out: Path | None = option(
         None, "folder for result.json, ticks.csv and a figure; none if not given", "FOLDER"
     )
@@ -56,9 +59,10 @@ def command(argv: Sequence[str]) -> int:
     """
     config, options = parse("replay", DESCRIPTION, ReplayConfig, argv, Options)
     if not options.log:
-        raise ConfigError("expected the log of a drive, found none")
-    path = Path(options.log)
+        raise ConfigError("expected the name of a log or of a run, found none")
+    path = log_of(Path(options.log))
     log, found, by_hand = _replayed(path, config, options)
+    log.require_ticks()
     result = _result(log, found, config.controller)
     if options.out is not None:
         with folder_for(VIEW, options, config, argv) as folder:
@@ -96,14 +100,43 @@ def _replayed(
                 return log, found, player.by_hand
 
 
+def log_of(path: Path) -> Path:
+    """The log that is meant by its name, or by the folder of a run that has one.
+
+    Raises:
+        BadInputError: There is none, or more than one.
+    """
+    if not path.is_dir():
+        return path
+    every = sorted((path / LOGS).glob("*.mcap"))
+    logs = [each for each in every if _original(each) not in every]
+    logs = logs or [each for each in [path / LOG] if each.exists()]
+    if not logs:
+        raise BadInputError(
+            f"{path}: expected a run with a log, found none; --log keeps those of a simulation"
+        )
+    if len(logs) > 1:
+        names = ", ".join(str(each) for each in logs[:3])
+        raise BadInputError(
+            f"{path}: expected a run with one log, found {len(logs)}; name one of {names}, …"
+        )
+    return logs[0]
+
+
+def _original(path: Path) -> Path | None:
+    """The log that `log recover` made this one of, None if it did not."""
+    stem = path.stem.removesuffix(RECOVERED)
+    return None if stem == path.stem else path.with_stem(stem)
+
+
 def complain(command: str, log: LogReader) -> int:
     """Say on stderr what of a log could not be read: the exit code of the command."""
     if not log.bad and not log.missing:
         return OK
     place = f"; first at {_place(log.damage[0])}" if log.bad else ""
     sys.stderr.write(
-        f"antennate {command}: error: {log.path}: expected an undamaged log, found {log.bad} "
-        f"damaged places and {log.missing} ticks missing; {log.ticks} ticks were read{place}\n"
+        f"antennate {command}: error: {log.path}: expected an undamaged log, found "
+        f"damaged places: {log.bad}; ticks missing: {log.missing}; ticks read: {log.ticks}{place}\n"
     )
     return BAD_INPUT
 
@@ -127,13 +160,13 @@ def _result(log: LogReader, found: Replayed, controller: str | None) -> dict[str
         "duration_s": found.end - found.start,
         "recorded_shares": {m.name: found.recorded[m] / ticks for m in Maneuver},
         "shares": {m.name: found.maneuvers.count(m) / ticks for m in Maneuver},
-        "states": {state or "none": n / ticks for state, n in found.states.items()},
+        "states": {state or _NO_STATE: n / ticks for state, n in found.states.items()},
         "different": found.different,
         "first_difference": None
         if first is None
         else {
             "tick": first.number,
-            "time_s": first.now - found.start,
+            "time_s": first.now,
             "recorded": Maneuver.label(first.recorded),
             "replayed": Maneuver.label(first.replayed),
         },
@@ -150,8 +183,8 @@ def _tables(result: Mapping[str, Any]) -> Sequence[Table]:
     now = {**result, "states": {}}
     done = [m.name for m in Maneuver if then["shares"][m.name] + now["shares"][m.name]]
     measures = [Measure(f"shares.{name}", name, "%", form=".1f", scale=100.0) for name in done]
-    for name in result["states"]:
-        label = one_line(f"state {name}")
+    for name in () if set(result["states"]) == {_NO_STATE} else result["states"]:
+        label = one_line(f"supervisor {name}")
         measures.append(Measure(f"states.{name}", label, "%", form=".1f", scale=100.0))
     note = (
         f"{result['ticks']} ticks, {result['duration_s']:.2f} s, in "

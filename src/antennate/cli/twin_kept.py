@@ -57,6 +57,7 @@ class Kept:
         self, options: KeptOptions, robot: TwinRobot, passage: Passage, config: TwinConfig
     ) -> None:
         self.watchers: list[Callable[[World], None]] = []
+        self._robot = robot
         self._log: LogProcess | None = None
         self._film: TwinFilm | None = None
         self._video = options.video
@@ -76,7 +77,7 @@ class Kept:
     def event(self, text: str) -> None:
         """Keep in the log what happened now."""
         if self._log is not None:
-            self._log.event(text)
+            self._log.event(text, self._robot.t)
 
     def __enter__(self) -> Self:
         return self

@@ -14,18 +14,18 @@ from antennate.cli.arguments import parse
 from antennate.cli.exit_codes import OK
 from antennate.cli.options import option
 from antennate.cli.progress import stop_signals
+from antennate.cli.replay import log_of
 from antennate.cli.view_options import FoxgloveOptions, foxglove_of
-from antennate.errors import AntennateError, BadInputError, ConfigError
+from antennate.errors import AntennateError, ConfigError
 from antennate.params.base import Params
 from antennate.params.reading import from_values
 from antennate.sim.scenes.registry import SHIPPED, make_scene
 from antennate.sim.trial import TrialConfig, draw_trial
 from antennate.sim.world import World
 from antennate.studies.report import command_of
-from antennate.studies.run_directory import LOG, LOGS, RunDirectory
+from antennate.studies.run_directory import LOGS, RunDirectory
 from antennate.telemetry.header import Header
 from antennate.telemetry.reader import LogReader
-from antennate.telemetry.recover import RECOVERED
 from antennate.telemetry.view import ports
 from antennate.telemetry.view.pace import Restart
 from antennate.telemetry.view.player import LogPlayer
@@ -62,7 +62,7 @@ def command(argv: Sequence[str]) -> int:
     _, options = parse("view", DESCRIPTION, ViewConfig, argv, Options)
     if options.shown is None:
         raise ConfigError("expected a log or the folder of a run, found none")
-    path = _log_of(options.shown)
+    path = log_of(options.shown)
     with LogReader(path) as log:
         header = log.header
     with (
@@ -84,36 +84,7 @@ def command(argv: Sequence[str]) -> int:
 def _complain(player: LogPlayer, log: LogReader) -> None:
     """Say on the page what of a log could not be read."""
     if log.bad or log.missing:
-        player.say(f"{log.bad} damaged places, {log.missing} ticks missing in this log")
-
-
-def _original(path: Path) -> Path | None:
-    """The log that `log recover` made this one of, None if it did not."""
-    stem = path.stem.removesuffix(RECOVERED)
-    return None if stem == path.stem else path.with_stem(stem)
-
-
-def _log_of(path: Path) -> Path:
-    """The log that is meant.
-
-    Raises:
-        BadInputError: There is none, or more than one.
-    """
-    if not path.is_dir():
-        return path
-    every = sorted((path / LOGS).glob("*.mcap"))
-    logs = [each for each in every if _original(each) not in every]
-    logs = logs or [each for each in [path / LOG] if each.exists()]
-    if not logs:
-        raise BadInputError(
-            f"{path}: expected a run with a log, found none; --log keeps those of a simulation"
-        )
-    if len(logs) > 1:
-        names = ", ".join(str(each) for each in logs[:3])
-        raise BadInputError(
-            f"{path}: expected a run with one log, found {len(logs)}; name one of {names}, …"
-        )
-    return logs[0]
+        player.say(f"damaged places in this log: {log.bad}; ticks missing: {log.missing}")
 
 
 def arena_of(path: Path, header: Header) -> World | None:

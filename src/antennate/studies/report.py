@@ -11,6 +11,7 @@ import shlex
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from antennate.errors import BadInputError
@@ -26,6 +27,7 @@ from antennate.studies.run_directory import (
     FIGURES,
     FILMS,
     LARGEST,
+    LOGS,
     PARTIAL,
     REPORT,
     RESULT,
@@ -36,6 +38,8 @@ from antennate.studies.run_directory import (
 
 _MOST_REASONS = 20
 """Most trials whose failure is quoted."""
+_MOST_LOGS = 6
+"""Most logs that are named."""
 Result = Mapping[str, Any]
 Body = Callable[[Result, Mapping[str, str]], str]
 """HTML of a result and of its figures, images by name."""
@@ -103,7 +107,7 @@ def report(run: RunDirectory, view: View) -> str:
     parts.append(f'<div class="pair">{films}</div>' if films else "")
     if result is not None:
         parts.append(_shown(run, result, view))
-    parts += [_failures(run), _settings(run, view), _versions(run)]
+    parts += [_logs(run), _failures(run), _settings(run, view), _versions(run)]
     return page.page(f"antennate {view.name}", "".join(parts))
 
 
@@ -130,9 +134,30 @@ def _images(run: RunDirectory) -> dict[str, str]:
 
 
 def _films(run: RunDirectory) -> dict[str, str]:
-    """The films by name."""
-    found = sorted((run.path / FILMS).glob("*.mp4"))
+    """The films by name, in the order in which the run has what they show."""
+    told = _table(run.text(CONFIG))
+    names = [str(each) for key in _SHOWN if key in told for each in told[key]]
+
+    def place(path: Path) -> tuple[int, str]:
+        found = (i for i, name in enumerate(names) if path.stem.startswith(name))
+        return next(found, len(names)), path.stem
+
+    found = sorted((run.path / FILMS).glob("*.mp4"), key=place)
     return {path.stem: page.film(read_limited(path, LARGEST)) for path in found}
+
+
+_SHOWN = ("controllers", "profiles")
+"""Parameters whose entries have a film each."""
+
+
+def _logs(run: RunDirectory) -> str:
+    """Which logs there are."""
+    folders = (run.path, run.path / LOGS)
+    found = [path for folder in folders for path in sorted(folder.glob("*.mcap"))]
+    names = ", ".join(str(path.relative_to(run.path)) for path in found[:_MOST_LOGS])
+    more = f" and {len(found) - _MOST_LOGS} more" if len(found) > _MOST_LOGS else ""
+    kind = "log" if len(found) == 1 else "logs"
+    return page.paragraphs(f"Beside this page: {kind} {names}{more}.", "muted") if found else ""
 
 
 def _shown(run: RunDirectory, result: Result, view: View) -> str:
@@ -189,11 +214,20 @@ def _flat(text: str) -> dict[str, str]:
             else:
                 found[before + key] = value if isinstance(value, str) else json.dumps(value)
 
+    walk(_table(text), "")
+    return found
+
+
+def _table(text: str) -> dict[str, Any]:
+    """The table of a TOML file.
+
+    Raises:
+        BadInputError: It is no TOML.
+    """
     try:
-        walk(tomllib.loads(text), "")
+        return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise BadInputError(f"{CONFIG}: expected TOML, found: {error}") from None
-    return found
 
 
 def _known_versions(run: RunDirectory) -> dict[str, str]:

@@ -34,6 +34,7 @@ from antennate.types import Floats
 _NOTHING: Mapping[Topic, bytes] = {}
 _Tick = tuple[bytes, Mapping[Topic, bytes]]
 _HEAD = struct.Struct("<BI")
+_TIME = struct.Struct("<d")
 _ROW, _FORCES, _PLACE, _EVENT, _FIRST, _END = range(6)
 _BESIDE = {CONTACT_FORCES: _FORCES, COORDINATES: _PLACE}
 _TOPICS = {kind: topic for topic, kind in _BESIDE.items()}
@@ -98,9 +99,9 @@ class LogProcess:
         found = b"".join(_HEAD.pack(kind, len(content)) + content for kind, content in parts)
         self._hand_over(found)
 
-    def event(self, text: str) -> None:
-        """Hand over what happened after the last tick."""
-        content = text.encode()
+    def event(self, text: str, t: float) -> None:
+        """Hand over what happened after the last tick, at a time of the loop [s]."""
+        content = _TIME.pack(t) + text.encode()
         self._hand_over(_HEAD.pack(_EVENT, len(content)) + content)
 
     def close(self) -> str:
@@ -192,7 +193,7 @@ def _keep(log: RowLog[_Tick]) -> bool:
             log.add((content, beside))
             beside = {}
         elif kind == _EVENT:
-            log.event(content.decode())
+            log.event(content[_TIME.size :].decode(), *_TIME.unpack_from(content))
         else:
             return True
     return False

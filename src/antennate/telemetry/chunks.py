@@ -74,14 +74,11 @@ class Place(NamedTuple):
 
     Attributes:
         offset, length: Its begin and its length [bytes].
-        first, last: Times of its first and its last message [ns].
         channels: Those of its messages.
     """
 
     offset: int
     length: int
-    first: int
-    last: int
     channels: frozenset[int]
 
 
@@ -262,12 +259,12 @@ def places(file: BinaryIO) -> Iterator[Place]:
     for kind, body in _summarised(file):
         if kind == _CHUNK_INDEX:
             try:
-                first, last, offset, length, size = _PLACE.unpack_from(body)
+                _, _, offset, length, size = _PLACE.unpack_from(body)
                 listed = struct.iter_unpack("<HQ", body[_PLACE.size : _PLACE.size + size])
                 channels = frozenset(channel for channel, _ in listed)
             except struct.error as error:
                 raise ValueError(str(error)) from None
-            yield Place(offset, length, first, last, known.setdefault(channels, channels))
+            yield Place(offset, length, known.setdefault(channels, channels))
 
 
 def is_sound(file: BinaryIO, place: Place) -> bool:

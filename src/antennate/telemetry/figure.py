@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from itertools import groupby, islice
+from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -34,7 +35,7 @@ class Course:
     """A drive, tick by tick.
 
     Attributes:
-        t: Time since the first tick [s], shape (n,).
+        t: The loop's time [s], shape (n,).
         reading: Readings of the board [counts], shape (n, 2).
         level: Bending levels, shape (n, 2).
         contact: `Contact`, shape (n, 2).
@@ -65,7 +66,7 @@ class Course:
         every = -(-count // _MOST_DRAWN)
         kept = list(islice(log, 0, None, every))
         return cls(
-            t=np.array([tick.now - kept[0].now for tick in kept]),
+            t=np.array([tick.now for tick in kept]),
             reading=np.array([tick.reading for tick in kept]),
             level=np.array([tick.level for tick in kept]),
             contact=np.array([tick.contact for tick in kept]),
@@ -76,23 +77,52 @@ class Course:
         )
 
 
+def drawn(path: Path) -> tuple[LogReader, Figure]:
+    """A log as it was read, and its figure.
+
+    Raises:
+        LogError: It cannot be read, or has no ticks.
+    """
+    with LogReader(path) as log:
+        log.survey()
+        log.require_ticks()
+        count = log.ticks
+    with LogReader(path) as log:
+        return log, replay(Course.of(log, count))
+
+
 @style.styled
 def replay(course: Course) -> Figure:
-    """Four panels over one time."""
-    figure = style.canvas(9.0, 6.4)
-    panels = figure.subplots(4, 1, sharex=True, height_ratios=[3, 3, 1.2, 1.8])
-    readings, levels, contacts, decisions = panels
-    for side, (name, colour) in enumerate(zip(_SIDES, style.series(2), strict=True)):
-        readings.plot(course.t, course.reading[:, side], color=colour, linewidth=1, label=name)
-        levels.plot(course.t, course.level[:, side], color=colour, linewidth=1, label=name)
-    readings.set(ylabel="reading [counts]", title="Readings")
-    readings.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=7)
-    levels.axhline(course.threshold, color=style.INK, linestyle=":", linewidth=1)
-    levels.annotate("θ", (1.005, course.threshold), xycoords=("axes fraction", "data"), va="center")
-    levels.set(ylabel="b", ylim=(-0.05, 1.05), title="Bending level")
-    _draw_contact(contacts, course)
-    _draw_decisions(decisions, course)
+    """Panels over one time, of what is known: a twin does not know what its client decides."""
+    parts: list[tuple[float, Callable[[Axes, Course], None]]] = [(3.0, _draw_readings)]
+    if np.isfinite(course.level).any():
+        parts.append((3.0, _draw_levels))
+    if (course.contact != Contact.UNKNOWN).any():
+        parts.append((1.2, _draw_contact))
+    if any(course.state) or (course.recorded >= 0).any() or course.replayed is not None:
+        parts.append((1.8, _draw_decisions))
+    heights = [height for height, _ in parts]
+    figure = style.canvas(9.0, 1.0 + 0.6 * sum(heights))
+    panels = figure.subplots(len(parts), 1, sharex=True, height_ratios=heights, squeeze=False)
+    for panel, (_, draw) in zip(panels[:, 0], parts, strict=True):
+        draw(panel, course)
+    panels[-1, 0].set(xlabel="time of the loop [s]")
     return figure
+
+
+def _draw_readings(panel: Axes, course: Course) -> None:
+    for side, (name, colour) in enumerate(zip(_SIDES, style.series(2), strict=True)):
+        panel.plot(course.t, course.reading[:, side], color=colour, linewidth=1, label=name)
+    panel.set(ylabel="reading [counts]", title="Readings")
+    panel.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=7)
+
+
+def _draw_levels(panel: Axes, course: Course) -> None:
+    for side, colour in enumerate(style.series(2)):
+        panel.plot(course.t, course.level[:, side], color=colour, linewidth=1)
+    panel.axhline(course.threshold, color=style.INK, linestyle=":", linewidth=1)
+    panel.annotate("θ", (1.005, course.threshold), xycoords=("axes fraction", "data"), va="center")
+    panel.set(ylabel="b", ylim=(-0.05, 1.05), title="Bending level")
 
 
 def _draw_contact(panel: Axes, course: Course) -> None:
@@ -110,12 +140,11 @@ def _draw_decisions(panel: Axes, course: Course) -> None:
         name: [_MANEUVERS.get(value) for value in values.tolist()] for name, values in shown.items()
     }
     if any(course.state):
-        bands["state"] = [_STATES.get(state) for state in course.state]
+        bands["supervisor"] = [_STATES.get(state) for state in course.state]
     for height, colours in enumerate(reversed(bands.values())):
         _band(panel, course.t, colours, height)
     panel.set(
-        xlabel="time [s]",
-        title="Maneuver and state" if "state" in bands else "Maneuver",
+        title="Maneuver and supervisor" if "supervisor" in bands else "Maneuver",
         yticks=[*reversed(range(len(bands)))],
         yticklabels=[*bands],
         ylim=(-0.6, len(bands) - 0.4),

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 
-from antennate.errors import LogError
 from antennate.sim.camera import Shot
 from antennate.sim.world import World
 from antennate.telemetry import film
@@ -56,8 +55,7 @@ def film_of(log: LogReader, arena: World | None, title: str) -> Film:
             _keep(recorder, scene.world, tick, t)
         if len(recorder) >= MOST_PICTURES:
             break
-    if not len(recorder):
-        raise LogError(f"{log.path}: expected a log with ticks, found none")
+    log.require_ticks()
     return _film(recorder, scene.world, log.header, title)
 
 

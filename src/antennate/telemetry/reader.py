@@ -16,7 +16,7 @@ from antennate.files import open_regular
 from antennate.telemetry.chunks import Chunk, End, Fault, walk
 from antennate.telemetry.header import Header
 from antennate.telemetry.parts import parts
-from antennate.telemetry.survey import Survey, by_summary
+from antennate.telemetry.survey import Survey, by_summary, span
 from antennate.telemetry.ticks import Tick
 from antennate.telemetry.topics import (
     CONTACT_FORCES,
@@ -119,6 +119,15 @@ class LogReader:
             if tick is not None:
                 yield tick
 
+    def require_ticks(self) -> None:
+        """Require that some have been read.
+
+        Raises:
+            LogError: There are none.
+        """
+        if not self.ticks:
+            raise LogError(f"{self.path}: expected a log with ticks, found none")
+
     def groups(self) -> Iterator[tuple[list[Record], Tick | None]]:
         """All messages as they are: those of one tick, with it, then those of none, one by one.
 
@@ -159,13 +168,13 @@ class LogReader:
             self.last = found.number
             return found
         counts, events, times = Counter[Topic](), list[tuple[int, bytes]](), list[int]()
-        for records, _ in self.groups():
+        for records, tick in self.groups():
             counts.update(record.topic for record in records)
             events += [(record.time, record.data) for record in records if record.topic is EVENTS]
-            times = [*(times or [records[-1].time])[:1], records[-1].time]
+            if tick is not None:
+                times = [*times[:1], records[0].time]
         kept = {topic: counts[topic] for topic in TOPICS if counts[topic]}
-        begin, end = times or (0, 0)
-        return Survey(kept, events, begin, end, self.last)
+        return Survey(kept, events, *span(times), self.last)
 
     def _summarised(self) -> Survey | None:
         if len(self.parts) > 1:

@@ -94,14 +94,14 @@ class RowLog(Generic[Taken]):
         if not self._forked:
             self._out.settle()
 
-    def event(self, text: str) -> None:
-        """Keep what happened after the last tick.
+    def event(self, text: str, t: float = 0.0) -> None:
+        """Keep what happened after the last tick, at a time of the loop [s].
 
         Raises:
             LogError: The disk is full or gone.
         """
         self.flush()
-        self._out.event(text)
+        self._out.event(text, t=t)
 
     def close(self) -> None:
         """End it.

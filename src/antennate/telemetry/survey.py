@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import BinaryIO, NamedTuple
 
-from antennate.telemetry.chunks import chunk_at, is_sound, places, summary
+from antennate.telemetry.chunks import Place, chunk_at, is_sound, places, summary
 from antennate.telemetry.topics import EVENTS, HEADER_TOPICS, MANEUVER, TICK_TOPICS, TOPICS, Topic
 
 
@@ -19,7 +19,7 @@ class Survey(NamedTuple):
     Attributes:
         messages: How many there are of each topic, but those of the header.
         events: Time [ns] and bytes of each event.
-        first, last: Times of the first and the last message [ns]; both 0 without any.
+        first, last: Times of the first and the last tick [ns]; both 0 without any.
         number: That of the last tick, 0 without any.
     """
 
@@ -48,7 +48,7 @@ def by_summary(file: BinaryIO, topics: Mapping[int, Topic]) -> Survey | None:
     counts = {topics[channel]: n for channel, n in end.counts.items()}
     if len({counts.get(topic, 0) for topic in TICK_TOPICS}) != 1:
         return None  # a tick is not whole
-    events, times, newest = list[tuple[int, bytes]](), list[int](), None
+    events, ends = list[tuple[int, bytes]](), list[Place]()
     try:
         for place in places(file):
             held = {topics[channel] for channel in place.channels if channel in topics}
@@ -60,16 +60,19 @@ def by_summary(file: BinaryIO, topics: Mapping[int, Topic]) -> Survey | None:
             for _, data in of_chunk:
                 EVENTS.decode(data)
             events += of_chunk
-            if held.difference(HEADER_TOPICS):
-                times = [*(times or [place.first])[:1], place.last]
-            newest = place if MANEUVER in held else newest
-        chunk = None if newest is None else chunk_at(file, newest)
+            if MANEUVER in held:
+                ends = [*ends[:1], place]
+        chunks = [chunk for place in ends if (chunk := chunk_at(file, place)) is not None]
     except ValueError:  # also of an event that is none
         return None
-    messages = () if chunk is None else chunk.messages
-    numbers = [m.number for m in messages if topics.get(m.channel) is MANEUVER]
+    ticks = [m for chunk in chunks for m in chunk.messages if topics.get(m.channel) is MANEUVER]
     kept = {topic: counts[topic] for topic in TOPICS if counts.get(topic)}
     for topic in HEADER_TOPICS:
         kept.pop(topic, None)
-    begin, last = times or (0, 0)
-    return Survey(kept, events, begin, last, max(numbers, default=0))
+    number = max((m.number for m in ticks), default=0)
+    return Survey(kept, events, *span([m.time for m in ticks]), number)
+
+
+def span(times: Sequence[int]) -> tuple[int, int]:
+    """The first and the last of some times in order; both 0 of none."""
+    return (times[0], times[-1]) if times else (0, 0)

@@ -173,11 +173,13 @@ class LogWriter:
         self._time = max(self._time, stamp)
         self._container.add(self._channels[topic], number & _NUMBERS, stamp, data)
 
-    def event(self, text: str, source: str = "antennate") -> None:
-        """Add an event at the time of the last tick."""
-        time = divmod(self._time, 10**9)
-        data = EVENTS.type.encode(*time, _LEVELS["DEGRADED"], source, text, "", "", 0)
-        self.add(EVENTS, self.written, self._time, data)
+    def event(self, text: str, source: str = "antennate", t: float = 0.0) -> None:
+        """Add an event at a time of the loop [s], not before the last tick."""
+        stamp = self._stamp(t)
+        data = EVENTS.type.encode(
+            *divmod(stamp, 10**9), _LEVELS["DEGRADED"], source, text, "", "", 0
+        )
+        self.add(EVENTS, self.written, stamp, data)
 
     def settle(self) -> None:
         """Hand over what has waited long enough; to be called where no tick may follow for a while.

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 
-from antennate.hardware.safety.causes import Outputs
+from antennate.hardware.safety.causes import OF_CONTROLLER, Cause, Outputs, State
 from antennate.hardware.safety.signal_quality import SignalQuality
 
 _SKIP = "; --no-touch-check arms without the check"
+_EXPECTED = OF_CONTROLLER | {Cause.NOT_ARMED, Cause.NOT_READY, Cause.RELEASED}
+"""Causes that stand before the check is over on a robot that is well."""
 
 
 class DryRun:
@@ -49,8 +51,10 @@ class DryRun:
         elif self._quality.refused or (
             t >= self._length + self._patience and self._quality.objections
         ):
-            skip = "" if self._quality.broken else _SKIP  # a broken wire forbids torque anyway
-            self._give_up(t, "; ".join(self._quality.objections) + skip)
+            wire = self._quality.broken
+            ill = [] if wire else _ill(out)
+            skip = "" if ill or wire else _SKIP  # these forbid torque anyway
+            self._give_up(t, "; ".join(ill or self._quality.objections) + skip)
         elif t >= self._length and not self._quality.objections:
             self._first = t
             self._ask(t)
@@ -70,3 +74,9 @@ class DryRun:
 
     def _give_up(self, t: float, why: str) -> None:
         self._waits, self.refusal, self.end = False, why, t
+
+
+def _ill(out: Outputs | None) -> list[str]:
+    """What is wrong with the robot itself, as a board that fell silent during the check."""
+    found = () if out is None else (a for a in out.causes if a.present)
+    return [a.text for a in found if a.cause.severity >= State.HOLD and a.cause not in _EXPECTED]
