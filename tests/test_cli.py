@@ -112,7 +112,7 @@ def test_help_shows_unit_default_range_and_choices(capsys):
     assert main(["tunnel", "--help-all"]) == 0
     text = " ".join(capsys.readouterr().out.split())
     width = "--tunnel.free-width FLOAT widest free width between the linings [m]; above 0"
-    assert f"{width} (default: 0.4)" in text
+    assert f"{width}, at most 100 (default: 0.4)" in text
     assert "--tunnel.mirror {random,never,always}" in text
     assert re.search(r"--trials INT .*?; 1 to 100000 \(default:", text)
     assert text.count("(default:") > 80

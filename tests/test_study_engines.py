@@ -7,6 +7,7 @@ import os
 import re
 import shlex
 import signal
+import socket
 import subprocess
 import sys
 import threading
@@ -191,7 +192,7 @@ def test_versions_of_optional_packages_count_where_a_run_uses_them(tmp_path: Pat
         assert used == (package,)
         assert identity(command, config)["versions"][package] == metadata.version(package)
         assert package not in identity("study", StudyConfig())["versions"]
-        theirs = environment(used)
+        theirs = environment(command, config)
         theirs["versions"][package] = "0.1"
         with pytest.raises(WorkerError, match=rf'{package} "0\.1", now'):
             slurm.Resumable(str(tmp_path / "job.jsonl"), theirs, Part(trial, {}, False, 9.0), {})()
@@ -208,8 +209,10 @@ def test_a_scheduler_that_is_not_there_is_one_line(capsys: pytest.CaptureFixture
 
 
 @contextlib.contextmanager
-def scheduler(count: int = 2) -> Iterator[tuple[str, list[subprocess.Popen[bytes]]]]:
-    """A scheduler of Dask and its workers on this machine; its address, and all processes."""
+def scheduler(
+    count: int = 2, folder: str = "."
+) -> Iterator[tuple[str, list[subprocess.Popen[bytes]]]]:
+    """A scheduler of Dask and its workers in a folder; its address, and all processes."""
     quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
     words = [sys.executable, "-m", "distributed.cli.dask_scheduler"]
     words += ["--host", "127.0.0.1", "--port", "0", "--no-dashboard", "--scheduler-file", "s.json"]
@@ -222,9 +225,9 @@ def scheduler(count: int = 2) -> Iterator[tuple[str, list[subprocess.Popen[bytes
             time.sleep(0.1)
             text = Path("s.json").read_text() if Path("s.json").exists() else ""
             address = re.search(r'tcp://([0-9.:]+)"', text)
-        words = [sys.executable, "-m", "distributed.cli.dask_worker", "--scheduler-file", "s.json"]
+        words = [sys.executable, "-m", "distributed.cli.dask_worker", f"tcp://{address[1]}"]
         words += ["--nthreads", "1", "--no-dashboard", "--no-nanny"]
-        running += [subprocess.Popen(words, **quiet) for _ in range(count)]
+        running += [subprocess.Popen(words, cwd=folder, **quiet) for _ in range(count)]
         yield address[1], running
     finally:
         for process in reversed(running):
@@ -250,6 +253,65 @@ def test_dask_leaves_the_same_table_when_a_worker_is_killed(tmp_path: Path, alon
             del os.environ["STUDY_NOTES"]
         assert worker.wait() == -signal.SIGKILL
     assert found == alone
+
+
+def test_workers_of_dask_in_another_folder_find_the_file_that_a_study_names(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    """Also where packages have other versions, of which one line tells."""
+    distributed = pytest.importorskip("distributed")
+    parts = distributed.versions.get_versions()
+    parts["packages"] |= {"msgpack": "0.1", "toolz": "0.2"}
+    monkeypatch.setattr("distributed.versions.get_versions", lambda *_: parts)
+    Path("own.py").write_text(
+        "def trial(config, seed):\n    return {'value': config['x'] + seed}\n"
+    )
+    Path("plan.toml").write_text('experiment = "own.py:trial"\n[vary]\nx = [1.0, 2.0]\n')
+    Path("away").mkdir()
+    words = ["study", "plan.toml", "--experiment", "own.py:trial"]
+    assert main([*words, "--out", "here", "--workers", "1"]) == 0
+    with scheduler(1, "away") as (address, _):
+        assert main([*words, "--out", "there", "--engine", f"dask://{address}"]) == 0
+    assert Path("there/trials.csv").read_bytes() == Path("here/trials.csv").read_bytes()
+    assert "dask: driver, scheduler or workers have other msgpack, toolz" in caplog.messages
+
+
+def test_a_worker_with_another_copy_of_a_named_file_is_refused(tmp_path: Path) -> None:
+    file = tmp_path / "own.py"
+    file.write_text("def trial(config, seed):\n    return {'value': 1}\n")
+    theirs = environment("study", StudyConfig(experiment=f"{file}:trial"))
+    part = Part(trial, {}, together=False, timeout=60.0)
+    assert slurm.Resumable(str(tmp_path / "job.jsonl"), theirs, part, {})() == 0
+    for edit, told in ((lambda: file.write_text("x = 1\n"), "changed"), (file.unlink, "is gone")):
+        edit()
+        with pytest.raises(WorkerError, match=rf"own\.py {told}"):
+            slurm.Resumable(str(tmp_path / "job.jsonl"), theirs, part, {})()
+
+
+def test_another_program_at_the_port_of_a_scheduler_is_one_line(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One that answers, and one that says nothing."""
+    pytest.importorskip("distributed")
+    monkeypatch.setattr("antennate.studies.dask.CONNECT", 0.5)
+    Path("plan.toml").write_text('experiment = "springs"\n[vary]\ncoil_mm = [3.5, 4.0]\n')
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        address = f"127.0.0.1:{server.getsockname()[1]}"
+
+        def answer() -> None:
+            with server.accept()[0] as connection:
+                connection.sendall(b"HTTP/1.1 400 Bad Request\r\n\r\n")
+
+        words = ["study", "plan.toml", "--engine", f"dask://{address}", "--out", "run"]
+        for found in ("another program", "a program that says nothing for 0.5 s"):
+            if found == "another program":
+                threading.Thread(target=answer, daemon=True).start()
+            assert main(words) == 2
+            said = capsys.readouterr().err.strip().splitlines()
+            assert said == [
+                f"antennate study: error: dask: expected a scheduler at tcp://{address}, "
+                f"found {found}"
+            ]
 
 
 def test_dask_says_what_it_waits_for_and_what_became_of_its_scheduler(

@@ -22,7 +22,7 @@ from antennate.params.base import Params
 from antennate.studies.engines import WARP
 from antennate.studies.experiment import Experiment, Outcome
 from antennate.studies.formats import to_json
-from antennate.studies.identity import differences, identity, packages_used
+from antennate.studies.identity import differences, environment, identity
 from antennate.studies.measures import Interim
 from antennate.studies.pool import ShardEnd, Workers
 from antennate.studies.run_directory import LOGS, SHARD, RunDirectory
@@ -146,7 +146,7 @@ def carry_out(
         folder_for(experiment.view, options, config, argv, what, resume, name) as run,
     ):
         run.keeps_store, workers.store = experiment.continued, run.store
-        workers.packages = packages_used(kind, config)
+        workers.shared = environment(kind, config)
         if shards and run.store is not None:
             run.store.take(shards.records)
         try:

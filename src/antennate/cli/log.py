@@ -14,8 +14,8 @@ from antennate.cli.arguments import parse
 from antennate.cli.exit_codes import OK
 from antennate.cli.options import option
 from antennate.cli.progress import progress, stop_signals
-from antennate.cli.replay import complain, log_of
-from antennate.cli.results import ResultOptions, tell
+from antennate.cli.replay import complain
+from antennate.cli.results import ResultOptions, log_of, tell
 from antennate.errors import ConfigError, MissingPackageError, OutputError
 from antennate.files import remove_abandoned, require_room, write_whole, writing_whole
 from antennate.messages import extra, one_line, typed

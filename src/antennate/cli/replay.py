@@ -13,16 +13,15 @@ from pydantic.dataclasses import dataclass
 from antennate.cli.arguments import parse
 from antennate.cli.exit_codes import BAD_INPUT, OK
 from antennate.cli.options import option
-from antennate.cli.results import ResultOptions, folder_for, tell
+from antennate.cli.results import ResultOptions, folder_for, log_of, tell
 from antennate.cli.view_options import ViewOptions, page_of, say_by_hand
-from antennate.errors import BadInputError, ConfigError
+from antennate.errors import ConfigError
 from antennate.messages import one_line, short_names
 from antennate.studies.formats import csv_lines
 from antennate.studies.measures import Measure, Table
 from antennate.studies.report import View
-from antennate.studies.run_directory import LOG, LOGS, RunDirectory
+from antennate.studies.run_directory import RunDirectory
 from antennate.telemetry.reader import Damage, LogReader
-from antennate.telemetry.recover import RECOVERED
 from antennate.telemetry.replay import ReplayConfig, Replayed, recorded_controller, replay
 from antennate.types import Maneuver
 
@@ -98,35 +97,6 @@ def _replayed(
                 ticks = player.ticks(log)
                 found = replay(ticks, player.controller, log.header, player.decided)
                 return log, found, player.by_hand
-
-
-def log_of(path: Path) -> Path:
-    """The log that is meant by its name, or by the folder of a run that has one.
-
-    Raises:
-        BadInputError: There is none, or more than one.
-    """
-    if not path.is_dir():
-        return path
-    every = sorted((path / LOGS).glob("*.mcap"))
-    logs = [each for each in every if _original(each) not in every]
-    logs = logs or [each for each in [path / LOG] if each.exists()]
-    if not logs:
-        raise BadInputError(
-            f"{path}: expected a run with a log, found none; --log keeps those of a simulation"
-        )
-    if len(logs) > 1:
-        names = ", ".join(str(each) for each in logs[:3])
-        raise BadInputError(
-            f"{path}: expected a run with one log, found {len(logs)}; name one of {names}, …"
-        )
-    return logs[0]
-
-
-def _original(path: Path) -> Path | None:
-    """The log that `log recover` made this one of, None if it did not."""
-    stem = path.stem.removesuffix(RECOVERED)
-    return None if stem == path.stem else path.with_stem(stem)
 
 
 def complain(command: str, log: LogReader) -> int:

@@ -1,4 +1,4 @@
-"""Where the results of a command go: a folder, and standard output."""
+"""Where the results of a command go: a folder, and standard output; and which log a run left."""
 
 from __future__ import annotations
 
@@ -13,11 +13,13 @@ from pydantic.dataclasses import dataclass
 
 from antennate.cli.arguments import FromFile
 from antennate.cli.options import option
+from antennate.errors import BadInputError
 from antennate.params.base import Params
 from antennate.studies.formats import to_json
 from antennate.studies.measures import Table
 from antennate.studies.report import View, write_report
-from antennate.studies.run_directory import RunDirectory
+from antennate.studies.run_directory import LOG, LOGS, RunDirectory
+from antennate.telemetry.recover import RECOVERED
 
 
 @dataclass(frozen=True)
@@ -62,6 +64,35 @@ def folder_for(
         yield folder
         write_report(folder, view)
         sys.stderr.write(f"written to {folder.path}\n")
+
+
+def log_of(path: Path) -> Path:
+    """The log that is meant by its name, or by the folder of a run that has one.
+
+    Raises:
+        BadInputError: There is none, or more than one.
+    """
+    if not path.is_dir():
+        return path
+    every = sorted((path / LOGS).glob("*.mcap"))
+    logs = [each for each in every if _original(each) not in every]
+    logs = logs or [each for each in [path / LOG] if each.exists()]
+    if not logs:
+        raise BadInputError(
+            f"{path}: expected a run with a log, found none; --log keeps those of a simulation"
+        )
+    if len(logs) > 1:
+        names = ", ".join(str(each) for each in logs[:3])
+        raise BadInputError(
+            f"{path}: expected a run with one log, found {len(logs)}; name one of {names}, …"
+        )
+    return logs[0]
+
+
+def _original(path: Path) -> Path | None:
+    """The log that `log recover` made this one of, None if it did not."""
+    stem = path.stem.removesuffix(RECOVERED)
+    return None if stem == path.stem else path.with_stem(stem)
 
 
 def tell(

@@ -14,7 +14,7 @@ from antennate.cli.arguments import parse
 from antennate.cli.exit_codes import OK
 from antennate.cli.options import option
 from antennate.cli.progress import stop_signals
-from antennate.cli.replay import log_of
+from antennate.cli.results import log_of
 from antennate.cli.view_options import FoxgloveOptions, foxglove_of
 from antennate.errors import AntennateError, ConfigError
 from antennate.params.base import Params

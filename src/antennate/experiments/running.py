@@ -17,7 +17,7 @@ from antennate.params.base import Params
 from antennate.params.reading import from_values
 from antennate.studies.engines import LOCAL, make_engine
 from antennate.studies.experiment import Experiment, Outcome
-from antennate.studies.identity import identity, packages_used
+from antennate.studies.identity import environment, identity
 from antennate.studies.pool import Workers
 from antennate.studies.report import write_report
 from antennate.studies.run_directory import FILMS, RunDirectory
@@ -131,7 +131,7 @@ def run(
     if video is not None:
         require_films(found, config, video, out)
     pool = Workers(workers, make_engine(engine))
-    pool.packages = packages_used(found.name, config)
+    pool.shared = environment(found.name, config)
     if out is None:
         return Result(found, config, found.run(config, pool, on_step, lambda row: None))
     place = (found.name, out, overwrite, identity(found.name, config), resume or found.continued)

@@ -42,7 +42,9 @@ class TunnelParams(Params):
     """Turn between one piece and the next."""
     mirror: Literal["random", "never", "always"] = number("random", "1", "assumed: sides are equal")
     """Whether a trial's tunnel is mirrored."""
-    free_width: float = number(0.40, "m", "paper: the widest, twice the robot's width", gt=0)
+    free_width: float = number(
+        0.40, "m", "paper: the widest, twice the robot's width", gt=0, le=100
+    )
     """Widest free width between the linings."""
     corner_radius: float = number(0.0, "m", "assumed: sharp is harder", ge=0)
     """Rounding of the outer wall at a turn."""

@@ -7,16 +7,20 @@ import logging
 import math
 import multiprocessing
 import pickle
+import re
 import secrets
+import socket
+import struct
 import threading
 import time
+import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import CancelledError
 from typing import Any
 
 from antennate.errors import WorkerError, in_one_line
 from antennate.studies.processes import Processes, take_added
-from antennate.studies.submitted import Submitted, require_package, require_same
+from antennate.studies.submitted import Submitted, go_to_folder, require_package, require_same
 from antennate.studies.work import Emit, Fail, Failure, Part, Work
 
 CONNECT = 10.0
@@ -27,6 +31,8 @@ _PATIENCE = 60.0
 """Time without any worker of our own, which Dask starts anew, after which a run ends [s]."""
 _STAY = 60.0
 """How long a process beside a worker waits for its next part [s]."""
+_LENGTH, _LONGEST_GREETING = struct.Struct("<Q"), 1 << 20
+"""The greeting of a scheduler begins with its length; it is never so long [bytes]."""
 _UNWATCHED = {
     "distributed.worker.profile.enabled": False,
     "distributed.admin.system-monitor.interval": "10s",
@@ -101,14 +107,50 @@ class Dask:
                 )
             place = f"tcp://{self._address}" if cluster is None else cluster.scheduler_address
             try:
-                client = Client(
-                    place if cluster is None else cluster, timeout=CONNECT, set_as_default=False
-                )
-            except OSError as error:
+                if cluster is None:
+                    _require_scheduler(place)
+                with _mismatches_in_a_line():
+                    client = Client(
+                        place if cluster is None else cluster, timeout=CONNECT, set_as_default=False
+                    )
+            except (OSError, ImportError) as error:  # ImportError is for versions that cannot talk
                 raise WorkerError(
                     f"dask: expected a scheduler at {place}, found none: {in_one_line(error)}"
                 ) from None
             yield stack.enter_context(client), cluster, place
+
+
+@contextlib.contextmanager
+def _mismatches_in_a_line() -> Iterator[None]:
+    """Tell other versions of packages at the scheduler in a line; Dask has a table of them."""
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        yield
+    for warning in told:
+        text = str(warning.message)
+        if text.startswith("Mismatched versions"):
+            rows = re.findall(r"^\| (\S+) .*\|$", text, re.M)[1:]  # the first is the heading
+            _NOTE.warning("dask: driver, scheduler or workers have other %s", ", ".join(rows))
+        else:
+            warnings.warn(text, warning.category, stacklevel=3)
+
+
+def _require_scheduler(place: str) -> None:
+    """Require that what answers there greets as a scheduler does; a client would wait for ever.
+
+    Raises:
+        OSError: Nothing answers there.
+        WorkerError: It does not.
+    """
+    head, found = b"", "another program"
+    host, _, port = place.removeprefix("tcp://").rpartition(":")
+    with socket.create_connection((host.strip("[]"), int(port)), CONNECT) as connection:
+        try:
+            head = connection.recv(_LENGTH.size, socket.MSG_WAITALL)
+        except TimeoutError:
+            found = f"a program that says nothing for {CONNECT:g} s"
+    if len(head) < _LENGTH.size or _LENGTH.unpack(head)[0] > _LONGEST_GREETING:
+        raise WorkerError(f"dask: expected a scheduler at {place}, found {found}")
 
 
 class _Workers:
@@ -175,7 +217,7 @@ def carry_out_apart(
 
     require_same(theirs)
     places = list(part.tasks)
-    function = _Carried(cloudpickle.dumps((part, added)))
+    function = _Carried(cloudpickle.dumps((part, theirs, added)))
     work = Work(function, [(place,) for place in places], part.together, part.timeout)
     answers: list[tuple[int, Any]] = []
 
@@ -203,7 +245,8 @@ class _Carried:
         return self._content
 
     def __setstate__(self, content: bytes) -> None:
-        self._part, added = pickle.loads(content)  # noqa: S301  (a worker of ours made it)
+        self._part, theirs, added = pickle.loads(content)  # noqa: S301  (a worker of ours made it)
+        go_to_folder(theirs)
         take_added(added)
 
     def __call__(self, *told: Any) -> Any:

@@ -9,7 +9,7 @@ import importlib.util
 import inspect
 import json
 import sys
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -27,11 +27,13 @@ _NONE = "nothing"
 def identity(command: str, config: Params) -> dict[str, Any]:
     """What decides the numbers of a run, as JSON can hold it."""
     values = json.loads(config.model_dump_json())
+    shared = environment(command, config)
+    more = _code_added(values) | _code_of(type(config))
     return {
         "command": command,
         "config": values,
-        "versions": dict(versions(packages_used(command, config))),
-        "code": code() | code_named(values) | _code_added(values) | _code_of(type(config)),
+        "versions": shared["versions"],
+        "code": shared["code"] | more,
     }
 
 
@@ -45,9 +47,20 @@ def packages_used(command: str, config: Params) -> tuple[str, ...]:
     )
 
 
-def environment(packages: Iterable[str] = ()) -> dict[str, Any]:
-    """The part of it that driver and workers must share, with versions of some more packages."""
-    return {"versions": dict(versions(tuple(packages))), "code": code()}
+def environment(command: str = "", config: Params | None = None) -> dict[str, Any]:
+    """The part of it that driver and workers must share; without a command, of this package."""
+    packages = () if config is None else packages_used(command, config)
+    named = {} if config is None else code_named(json.loads(config.model_dump_json()))
+    return {"versions": dict(versions(packages)), "code": code() | named}
+
+
+def environment_here(theirs: Mapping[str, Any], folder: Path) -> dict[str, Any]:
+    """What a worker has of the environment of its driver, which works in this folder."""
+    found = dict(code())
+    for name in theirs["code"].keys() - found.keys():
+        file = folder / name
+        found |= {name: _checksum(file)} if file.is_file() else _module(name)
+    return {"versions": dict(versions(tuple(theirs["versions"]))), "code": found}
 
 
 @functools.cache

@@ -9,7 +9,7 @@ from __future__ import annotations
 import contextlib
 import itertools
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, TypeVar
 
 from antennate.errors import WorkerError
@@ -46,8 +46,8 @@ def core_count() -> int:
 class Workers(int):
     """How many workers there are, where they are, and what they have finished before.
 
-    It is a number, so that an experiment of another package may use it as one. Its `packages` are
-    optional ones whose versions the workers must share with this process.
+    It is a number, so that an experiment of another package may use it as one. Its `shared` is the
+    environment that workers must share with this process.
 
     Args:
         count: How many.
@@ -75,7 +75,7 @@ class Workers(int):
         self = super().__new__(cls, count)
         self._engine, self.store, self.shard, self.timeout = engine, store, shard, timeout
         self.retry, self.closed, self.apart = retry, closed, apart
-        self.packages, self.calls = (), itertools.count()
+        self.shared, self.calls = None, itertools.count()
         self._staying = None
         return self
 
@@ -86,7 +86,7 @@ class Workers(int):
     retry: bool
     closed: bool
     apart: bool
-    packages: Sequence[str]
+    shared: Mapping[str, Any] | None
     calls: Iterator[int]
     _staying: Processes | None
 
@@ -215,7 +215,7 @@ def gather(
     parts = [todo[i : i + chunk] for i in range(0, len(todo), chunk)]
     if parts:
         folder = None if workers.store is None else workers.store.path.parent
-        work = Work(function, tasks, together, workers.timeout, folder, batched, workers.packages)
+        work = Work(function, tasks, together, workers.timeout, folder, batched, workers.shared)
         workers.engine(len(parts)).run(work, parts, int(workers), call.emit, call.fail)
     if workers.shard is not None:
         raise ShardEnd(sum(map(workers.mine, call.found)), len(tasks))

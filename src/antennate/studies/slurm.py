@@ -119,7 +119,7 @@ class _Files:
         self.folder, self._work, self._emit, self._fail = folder, work, emit, fail
         content = pickle.dumps((work.function, list(work.tasks)))
         digest = hashlib.sha256(content).hexdigest()
-        self._identity = {**environment(work.packages), "work": digest}
+        self._identity = {**(work.shared or environment()), "work": digest}
         self._packages = {"antennate", work.function.__module__.partition(".")[0]}
         try:
             folder.mkdir(exist_ok=True)

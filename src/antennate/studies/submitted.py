@@ -6,18 +6,23 @@ need the same versions and the same code.
 
 from __future__ import annotations
 
+import contextlib
+import os
 import time
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import BrokenExecutor
 from importlib.util import find_spec
+from pathlib import Path
 from typing import Any
 
 from antennate.errors import MissingPackageError, WorkerError, in_one_line
 from antennate.messages import extra
-from antennate.studies.identity import differences, environment
+from antennate.studies.identity import differences, environment, environment_here
 from antennate.studies.processes import added_objects, take_added
 from antennate.studies.work import Emit, Fail, Failure, Part, Waiting, Work
 
+_FOLDER = "folder"
+"""Where the driver tells its working folder, from which it names files."""
 _POLL = 0.02
 """How often the driver looks for parts that have ended [s]."""
 
@@ -49,7 +54,7 @@ class Submitted:
     ) -> None:
         """Run the tasks at these places; see `Engine`."""
         waiting, running = Waiting(parts), dict[Any, list[int]]()
-        told = (environment(work.packages), added_objects())
+        told = ({**(work.shared or environment()), _FOLDER: _folder()}, added_objects())
         try:
             while waiting or running:
                 count = self._workers() if self._workers is not None else count
@@ -113,13 +118,28 @@ def carry_out(
     return answers
 
 
+def go_to_folder(theirs: Mapping[str, Any]) -> None:
+    """Work in the folder of the driver, from which it names files, if it is seen here."""
+    with contextlib.suppress(OSError):
+        os.chdir(theirs.get(_FOLDER, ""))
+
+
+def _folder() -> str:
+    try:
+        return str(Path.cwd())
+    except OSError:  # it is gone
+        return ""
+
+
 def require_same(theirs: Mapping[str, Any]) -> None:
     """Check that this worker has the versions and the code of its driver.
 
     Raises:
         WorkerError: It has others.
     """
-    if changes := differences(theirs, environment(theirs["versions"])):
+    folder = Path(theirs.get(_FOLDER, ""))
+    theirs = {key: value for key, value in theirs.items() if key != _FOLDER}
+    if changes := differences(theirs, environment_here(theirs, folder)):
         raise WorkerError(f"expected workers with the driver's versions and code, found {changes}")
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import os
 from collections import Counter, deque
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal, Protocol
@@ -49,7 +49,8 @@ class Work:
         timeout: Time after which a task that has not ended is given up [s].
         folder: Run directory that it belongs to, None without.
         batched: batched(tasks, emit, device) does the same on a GPU, None if nothing does.
-        packages: Optional packages whose versions workers must share.
+        shared: What workers must share with this process, as of `environment`; None for no more
+            than this package.
     """
 
     function: Callable[..., Any]
@@ -58,7 +59,7 @@ class Work:
     timeout: float
     folder: Path | None = None
     batched: Callable[..., Any] | None = None
-    packages: Collection[str] = ()
+    shared: Mapping[str, Any] | None = None
 
     def part(self, places: Sequence[int]) -> Part:
         """Some of it, to be sent to a worker."""

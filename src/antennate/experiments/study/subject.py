@@ -25,6 +25,8 @@ Rows = list[dict[str, Any]]
 OF_TRIALS = ("trials", "seed")
 """Parameters and columns that say which trials there are."""
 _MOST_NAMED = 12
+_LONGEST = 100
+"""Most entries of a list in a result that have columns."""
 FUNCTIONS: Registry[Callable[..., Any]] = Registry("trial function", "antennate.trials", {})
 """Functions trial(config, seed) -> row: config holds the parameters by name, seed is a number."""
 
@@ -230,10 +232,12 @@ def plain(values: Any) -> Any:
 
 
 def numbers(result: Mapping[str, Any], path: str = "") -> dict[str, Any]:
-    """Numbers and texts of a result as one row, by dotted name."""
+    """Numbers and texts of a result as one row, by dotted name; entries of lists count from 0."""
     found: dict[str, Any] = {}
     for key, value in result.items():
-        if isinstance(value, Mapping):
+        if isinstance(value, list | tuple) and len(value) <= _LONGEST:
+            found |= numbers({str(i): item for i, item in enumerate(value)}, f"{path}{key}.")
+        elif isinstance(value, Mapping):
             found |= numbers(value, f"{path}{key}.")
         elif value is None or isinstance(value, str | int | float):
             found[path + key] = value
