@@ -40,6 +40,25 @@ class Page(HTMLParser):
         return inside and not {"script", "link", "iframe", "object"} & set(self.tags)
 
 
+class Rows(HTMLParser):
+    """The rows of all tables of a page."""
+
+    def __init__(self, file: Path) -> None:
+        super().__init__()
+        self.found: list[list[str]] = []
+        self.feed(file.read_text(encoding="utf-8"))
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        if tag == "tr":
+            self.found.append([])
+        elif tag in ("td", "th"):
+            self.found[-1].append("")
+
+    def handle_data(self, data: str) -> None:
+        if self.found and self.found[-1]:
+            self.found[-1][-1] += data
+
+
 @pytest.fixture(autouse=True)
 def _elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
@@ -137,6 +156,29 @@ def test_two_runs_stand_side_by_side(capsys: pytest.CaptureFixture[str]) -> None
     main(["taper", "--no-figures", "--out", "other"])
     told = refusal(capsys, "--compare", "coil-4", "other")
     assert "expected two runs of one command, found springs in coil-4 and taper in other" in told
+
+
+def test_points_of_two_studies_stand_together_by_what_varies() -> None:
+    """Of two grids that share one value, which is the second of one and the first of the other."""
+    column = "springs.0.stiffness_n_mm_per_deg"
+    values = {"coarse": (3.5, 4.0), "fine": (4.0, 4.5)}
+    for name, coils in values.items():
+        settings = {"experiment": "springs", "response": column, "vary": {"coil_mm": list(coils)}}
+        antennate.run("study", out=name, **settings)
+    assert main(["report", "--compare", "coarse", "fine"]) == 0
+    rows = Rows(Path("comparison.html")).found
+    assert ["", "run", "coil [mm]", "springs.0.stiffness [N·mm/deg]"] in rows
+    lines = [row for row in rows if len(row) == 4 and row[1:2] in (["coarse"], ["fine"])]
+    assert [line[:3] for line in lines] == [
+        ["3.5", "coarse", "3.5"],
+        ["", "fine", "-"],
+        ["4", "coarse", "4"],
+        ["", "fine", "4"],
+        ["4.5", "coarse", "-"],
+        ["", "fine", "4.5"],
+    ]
+    assert [line[3] == "-" for line in lines] == [False, True, False, False, True, False]
+    assert lines[2][3] == lines[3][3]
 
 
 def test_a_run_that_was_stopped_has_a_page() -> None:

@@ -11,7 +11,19 @@ from antennate.params.base import Params
 from antennate.studies.measures import Measure, shown
 
 _SHARE = Measure(SUCCESS, "share of successes", "%", form=".0f", scale=100.0)
-_UNITS = {"s": "s", "ms": "ms", "m": "m", "mm": "mm", "n": "N", "deg": "deg", "m_s": "m/s"}
+_UNITS = {
+    "s": "s",
+    "ms": "ms",
+    "m": "m",
+    "mm": "mm",
+    "m_s": "m/s",
+    "deg": "deg",
+    "n": "N",
+    "n_mm": "N·mm",
+    "n_mm_per_deg": "N·mm/deg",
+    "n_m_per_rad": "N·m/rad",
+    "pa": "Pa",
+}
 """Ends of the names of columns, and the unit that each says."""
 
 
