@@ -49,6 +49,7 @@ OPTIONAL = {
     "test_design_measures.py": "optuna",
     "test_design_resume.py": "optuna",
     "test_foxglove.py": "foxglove",
+    "test_pages.py": "websockets",
     "test_view.py": "viser",
     "test_view_gate.py": "viser",
     "test_view_program.py": "viser",

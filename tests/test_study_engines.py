@@ -6,6 +6,7 @@ import contextlib
 import os
 import re
 import shlex
+import shutil
 import signal
 import socket
 import subprocess
@@ -13,8 +14,9 @@ import sys
 import threading
 import time
 from collections.abc import Iterator
-from concurrent.futures import Future
+from concurrent.futures import Future, ProcessPoolExecutor
 from importlib import metadata
+from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
@@ -46,9 +48,9 @@ def _there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PYTHONPATH", path)
 
 
-def table(out: str, **how: Any) -> bytes:
+def table(out: str, sleep: float = 0.01, **how: Any) -> bytes:
     """The table of a small study of a function."""
-    antennate.study(trial, VARY, {"sleep": 0.01}, trials=8, out=out, **how)
+    antennate.study(trial, VARY, {"sleep": sleep}, trials=8, out=out, **how)
     return Path(out, "trials.csv").read_bytes()
 
 
@@ -235,23 +237,29 @@ def scheduler(
             process.wait()
 
 
-def test_dask_leaves_the_same_table_when_a_worker_is_killed(tmp_path: Path, alone: bytes) -> None:
+def test_dask_leaves_the_same_table_when_a_worker_is_killed(
+    tmp_path: Path, alone: bytes, monkeypatch: pytest.MonkeyPatch
+) -> None:
     pytest.importorskip("distributed")
-    with scheduler() as (address, (_, worker, _)):
+    with monkeypatch.context() as patch:
         notes = tmp_path / "notes.txt"
-        os.environ["STUDY_NOTES"] = str(notes)
+        patch.setenv("STUDY_NOTES", str(notes))
+        with scheduler() as (address, (_, worker, _)):
 
-        def kill() -> None:
-            worker.send_signal(signal.SIGKILL)
+            def kill() -> None:
+                """Once four of the sixteen trials have ended; each worker is at one then."""
+                while not notes.exists() or notes.read_text().count("\n") < 4:
+                    time.sleep(0.01)
+                worker.send_signal(signal.SIGKILL)
+                killed.append(notes.read_text().count("\n"))
 
-        timer = threading.Timer(0.2, kill)
-        timer.start()
-        try:
-            found = table("dask", workers=2, engine=f"dask://{address}")
-        finally:
-            timer.join()
-            del os.environ["STUDY_NOTES"]
-        assert worker.wait() == -signal.SIGKILL
+            killed: list[int] = []
+            thread = threading.Thread(target=kill, daemon=True)
+            thread.start()
+            found = table("dask", sleep=0.2, workers=2, engine=f"dask://{address}")
+            thread.join()
+            assert worker.wait() == -signal.SIGKILL
+    assert killed[0] < 12
     assert found == alone
 
 
@@ -268,6 +276,7 @@ def test_workers_of_dask_in_another_folder_find_the_file_that_a_study_names(
     )
     Path("plan.toml").write_text('experiment = "own.py:trial"\n[vary]\nx = [1.0, 2.0]\n')
     Path("away").mkdir()
+    Path("away/own.py").write_text("def trial(config, seed):\n    return {'value': -1.0}\n")
     words = ["study", "plan.toml", "--experiment", "own.py:trial"]
     assert main([*words, "--out", "here", "--workers", "1"]) == 0
     with scheduler(1, "away") as (address, _):
@@ -286,6 +295,26 @@ def test_a_worker_with_another_copy_of_a_named_file_is_refused(tmp_path: Path) -
         edit()
         with pytest.raises(WorkerError, match=rf"own\.py {told}"):
             slurm.Resumable(str(tmp_path / "job.jsonl"), theirs, part, {})()
+
+
+def test_a_worker_in_another_folder_is_refused_or_has_the_same_file() -> None:
+    """A worker of Dask that does not see the driver's folder, and a process of an executor."""
+    pytest.importorskip("distributed")
+    from antennate.studies.dask import carry_out_apart
+
+    file = Path("own.py")
+    file.write_text("def trial(config, seed):\n    return {'value': 1.0}\n")
+    theirs = environment("study", StudyConfig(experiment="own.py:trial"))
+    part = Part(trial, {0: ({"x": 1.0}, 0)}, together=False, timeout=60.0)
+    unseen = {**theirs, "folder": "/nowhere"}
+    assert dict(carry_out_apart(part, unseen, {}, "one"))[0]["outcome"] == "timeout"
+    Path("away").mkdir()
+    (Path("away") / "own.py").write_text("def trial(config, seed):\n    return {'value': 2.0}\n")
+    settings = {"experiment": "own.py:trial", "vary": {"x": [1.0]}}
+    pool = ProcessPoolExecutor(1, get_context("spawn"), os.chdir, (Path("away"),))
+    with pytest.raises(WorkerError, match=r"the file own\.py changed"):
+        antennate.run("study", engine=pool, workers=1, **settings)
+    pool.shutdown()
 
 
 def test_another_program_at_the_port_of_a_scheduler_is_one_line(
@@ -354,6 +383,19 @@ def test_the_commands_of_the_snakefile_leave_the_same_table() -> None:
         assert Path(outputs["shard"].replace("{i}", number)).is_file()
     words = merge.replace("{params.folders}", "shards/1 shards/2")
     assert main(shlex.split(words)[1:]) == 0
+    assert main(["study", "plan.toml", "--out", "whole", "--workers", "1"]) == 0
+    assert Path("run/trials.csv").read_bytes() == Path("whole/trials.csv").read_bytes()
+
+
+def test_snakemake_runs_the_snakefile_and_leaves_the_same_table() -> None:
+    if shutil.which("snakemake") is None:
+        pytest.skip("snakemake is not installed; `uv run --with snakemake pytest` brings it")
+    Path("plan.toml").write_text('experiment = "springs"\n[vary]\ncoil_mm = [3.5, 4.0]\n')
+    path = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
+    words = ["snakemake", "--cores", "2", "--config", "study=plan.toml", "--snakefile"]
+    words.append(str(ROOT / "examples" / "snakemake" / "Snakefile"))
+    done = subprocess.run(words, env={**os.environ, "PATH": path}, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
     assert main(["study", "plan.toml", "--out", "whole", "--workers", "1"]) == 0
     assert Path("run/trials.csv").read_bytes() == Path("whole/trials.csv").read_bytes()
 

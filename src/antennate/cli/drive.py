@@ -21,7 +21,7 @@ from antennate.cli.keyboard import pressed_keys
 from antennate.cli.options import option
 from antennate.cli.results import ResultOptions, folder_for, tell
 from antennate.cli.view_options import PageOptions, page_of
-from antennate.errors import ConfigError, LogError
+from antennate.errors import ConfigError, LogError, OutputError
 from antennate.hardware.driving.arrival import Arrival
 from antennate.hardware.driving.config import DriveConfig
 from antennate.hardware.driving.connect import connect
@@ -51,8 +51,8 @@ _LOGLESS = (
     "or the disk full? `record_required = true` lets the robot walk with a log only"
 )
 
-_LONGEST_DRAWN = 30_000
-"""Most ticks of a log that is drawn for the report: it takes some ten seconds."""
+_LONGEST_DRAWN = 12_000
+"""Most ticks of a log that is drawn for the report: it takes some four seconds."""
 
 DESCRIPTION = """\
 Let a controller walk the real robot, or its twin. First a dry run: everything is read and nothing
@@ -149,8 +149,10 @@ def walk(
             log = folder.path / (result["logs"] or [LOG])[0]
             _tell(result, orders, f"{shlex.quote(str(log))}{other}")
         if result["logs"] and result["pace"]["ticks"] <= _LONGEST_DRAWN:
-            with contextlib.suppress(LogError):  # what can be read of it the result tells
+            try:
                 folder.write_figures({"drive": _figure(log)})
+            except (LogError, OutputError) as error:
+                viewer.say(error)
     fault = result["worst_state"] in (State.FAULT.name, State.OFF.name)
     stays_on = result["torque_off"] is False
     idle = _idle(result)
@@ -295,7 +297,8 @@ def _sentence(result: Mapping[str, Any]) -> str:
     worst = f"worst state {result['worst_state']}{why}"
     torque = _torque(result)
     if result["refusal"]:
-        return f"The robot was not armed: {result['refusal']}; {worst}; {torque}."
+        more = f"; {worst}" if result["why"] and result["why"] not in result["refusal"] else ""
+        return f"The robot was not armed: {result['refusal']}{more}; {torque}."
     if not result["armed"]:
         return f"A dry run: nothing was written to the servos, {worst}; --arm lets the robot walk."
     if _idle(result):
@@ -319,7 +322,7 @@ MEASURES = (
     Measure("pace.ticks", "ticks", form="d"),
     Measure("pace.missed_cycles", "missed ticks", form="d"),
     Measure("pace.missed_share", "missed", "%", scale=100.0),
-    Measure("walking.missed_share", "missed while walking", "%", scale=100.0),
+    Measure("walking.missed_share", "missed since the walk began", "%", scale=100.0),
     Measure("pace.worst_lateness_s", "worst lateness", "ms", form=".1f", scale=1e3),
     Measure("pace.worst_tick_s", "worst tick", "ms", form=".1f", scale=1e3),
     Measure("frames", "frames", form="d"),

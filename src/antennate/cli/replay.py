@@ -152,10 +152,12 @@ def _tables(result: Mapping[str, Any]) -> Sequence[Table]:
     then = {"shares": result["recorded_shares"], "states": result["states"]}
     now = {**result, "states": {}}
     done = [m.name for m in Maneuver if then["shares"][m.name] + now["shares"][m.name]]
-    measures = [Measure(f"shares.{name}", name, "%", form=".1f", scale=100.0) for name in done]
+    measures = [
+        Measure(f"shares.{name}", name, "% of ticks", form=".1f", scale=100.0) for name in done
+    ]
     for name in () if set(result["states"]) == {_NO_STATE} else result["states"]:
         label = one_line(f"supervisor {name}")
-        measures.append(Measure(f"states.{name}", label, "%", form=".1f", scale=100.0))
+        measures.append(Measure(f"states.{name}", label, "% of ticks", form=".1f", scale=100.0))
     note = (
         f"{result['ticks']} ticks, {result['duration_s']:.2f} s, in "
         f"{one_line(', '.join(result['parts']))}.\n"

@@ -18,7 +18,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from antennate.cli.status import StatusLine, write
-from antennate.errors import LogError
+from antennate.errors import AntennateError, LogError
 from antennate.hardware.driving.signals import STOPS
 from antennate.messages import one_line
 from antennate.telemetry.feed import KEPT, NOT_KEPT, Message, messages
@@ -179,7 +179,7 @@ def _settle(log: LogWriter | None) -> None:
         say(error)
 
 
-def say(error: LogError) -> bool:
+def say(error: AntennateError) -> bool:
     """Show an error of the log on stderr, below the status line; always False."""
     write(f"\nantennate drive: {one_line(str(error))}\n")
     return False

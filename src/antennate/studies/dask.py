@@ -6,6 +6,7 @@ import contextlib
 import logging
 import math
 import multiprocessing
+import os
 import pickle
 import re
 import secrets
@@ -20,7 +21,7 @@ from typing import Any
 
 from antennate.errors import WorkerError, in_one_line
 from antennate.studies.processes import Processes, take_added
-from antennate.studies.submitted import Submitted, go_to_folder, require_package, require_same
+from antennate.studies.submitted import Submitted, folder_of, require_package, require_same
 from antennate.studies.work import Emit, Fail, Failure, Part, Work
 
 CONNECT = 10.0
@@ -113,9 +114,10 @@ class Dask:
                     client = Client(
                         place if cluster is None else cluster, timeout=CONNECT, set_as_default=False
                     )
-            except (OSError, ImportError) as error:  # ImportError is for versions that cannot talk
+            except (OSError, ImportError) as error:
+                found = "none" if isinstance(error, OSError) else "one of other versions"
                 raise WorkerError(
-                    f"dask: expected a scheduler at {place}, found none: {in_one_line(error)}"
+                    f"dask: expected a scheduler at {place}, found {found}: {in_one_line(error)}"
                 ) from None
             yield stack.enter_context(client), cluster, place
 
@@ -146,7 +148,7 @@ def _require_scheduler(place: str) -> None:
     host, _, port = place.removeprefix("tcp://").rpartition(":")
     with socket.create_connection((host.strip("[]"), int(port)), CONNECT) as connection:
         try:
-            head = connection.recv(_LENGTH.size, socket.MSG_WAITALL)
+            head = connection.makefile("rb").read(_LENGTH.size)
         except TimeoutError:
             found = f"a program that says nothing for {CONNECT:g} s"
     if len(head) < _LENGTH.size or _LENGTH.unpack(head)[0] > _LONGEST_GREETING:
@@ -215,9 +217,10 @@ def carry_out_apart(
     """
     import cloudpickle  # which Dask needs too; it sends what was typed at a prompt
 
-    require_same(theirs)
+    folder = folder_of(theirs)
+    require_same(theirs, folder)
     places = list(part.tasks)
-    function = _Carried(cloudpickle.dumps((part, theirs, added)))
+    function = _Carried(cloudpickle.dumps((part, str(folder), added)))
     work = Work(function, [(place,) for place in places], part.together, part.timeout)
     answers: list[tuple[int, Any]] = []
 
@@ -245,8 +248,8 @@ class _Carried:
         return self._content
 
     def __setstate__(self, content: bytes) -> None:
-        self._part, theirs, added = pickle.loads(content)  # noqa: S301  (a worker of ours made it)
-        go_to_folder(theirs)
+        self._part, folder, added = pickle.loads(content)  # noqa: S301  (a worker of ours made it)
+        os.chdir(folder)
         take_added(added)
 
     def __call__(self, *told: Any) -> Any:

@@ -59,7 +59,10 @@ def environment_here(theirs: Mapping[str, Any], folder: Path) -> dict[str, Any]:
     found = dict(code())
     for name in theirs["code"].keys() - found.keys():
         file = folder / name
-        found |= {name: _checksum(file)} if file.is_file() else _module(name)
+        if file.is_file():
+            found[name] = _checksum(file)
+        elif _is_module(name):
+            found |= _module(name)
     return {"versions": dict(versions(tuple(theirs["versions"]))), "code": found}
 
 
@@ -167,8 +170,13 @@ def differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> str:
 def _told(path: tuple[str, ...], old: Any, new: Any) -> str:
     group, name = path[0], ".".join(path[1:])
     if group == "code":
-        return f"the file {name} {_changed(old, new)}"
+        kind = "module" if _is_module(name) else "file"
+        return f"the {kind} {name} {_changed(old, new)}"
     return f"{name or group} {_short(old)}, now {_short(new)}"
+
+
+def _is_module(name: str) -> bool:
+    return not name.endswith(".py") and all(map(str.isidentifier, name.split(".")))
 
 
 def _changed(old: Any, new: Any) -> str:

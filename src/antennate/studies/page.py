@@ -20,7 +20,7 @@ _STYLE = """
   --shade: #0004; --good: #00704d; --fair: #8a5a00; --bad: #a33a00; }
 @media (prefers-color-scheme: dark) { :root { --ink: #e8e8e8; --muted: #a8a8a8; --line: #444;
   --page: #161616; --shade: #fff5; --good: #4fc79b; --fair: #e5ae4a; --bad: #ff9460; }
-  img { filter: invert(0.91) hue-rotate(180deg); } }
+  img { background: #fff; border-radius: .3rem; } }
 body { font: 16px/1.5 system-ui, sans-serif; color: var(--ink); background: var(--page);
   max-width: 62rem; margin: 0 auto; padding: 1rem; }
 h1 { font-size: 1.6rem; margin-bottom: .3rem; } h2 { font-size: 1.1rem; margin: 1.6rem 0 .3rem; }

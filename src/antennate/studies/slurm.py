@@ -293,7 +293,7 @@ class Resumable:
 
     def __call__(self) -> int:
         """Carry out what is not in its file yet; how many tasks that was."""
-        require_same({k: v for k, v in self._identity.items() if k != "work"})
+        require_same({k: v for k, v in self._identity.items() if k != "work"}, Path())
         take_added(self._added)
         store = Store(Path(self._file))
         store.begin(self._identity)

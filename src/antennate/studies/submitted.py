@@ -6,8 +6,6 @@ need the same versions and the same code.
 
 from __future__ import annotations
 
-import contextlib
-import os
 import time
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import BrokenExecutor
@@ -107,7 +105,7 @@ def carry_out(
     Raises:
         WorkerError: The driver has other versions or other code.
     """
-    require_same(theirs)
+    require_same(theirs, Path())
     take_added(added)
     answers: list[tuple[int, Any]] = []
 
@@ -118,10 +116,10 @@ def carry_out(
     return answers
 
 
-def go_to_folder(theirs: Mapping[str, Any]) -> None:
-    """Work in the folder of the driver, from which it names files, if it is seen here."""
-    with contextlib.suppress(OSError):
-        os.chdir(theirs.get(_FOLDER, ""))
+def folder_of(theirs: Mapping[str, Any]) -> Path:
+    """The folder of the driver, from which it names files; the present one if it is not seen."""
+    folder = Path(theirs.get(_FOLDER, ""))
+    return folder if folder.is_dir() else Path()
 
 
 def _folder() -> str:
@@ -131,13 +129,16 @@ def _folder() -> str:
         return ""
 
 
-def require_same(theirs: Mapping[str, Any]) -> None:
+def require_same(theirs: Mapping[str, Any], folder: Path) -> None:
     """Check that this worker has the versions and the code of its driver.
+
+    Args:
+        theirs: The driver's environment.
+        folder: Where the trials will run, from which files are named.
 
     Raises:
         WorkerError: It has others.
     """
-    folder = Path(theirs.get(_FOLDER, ""))
     theirs = {key: value for key, value in theirs.items() if key != _FOLDER}
     if changes := differences(theirs, environment_here(theirs, folder)):
         raise WorkerError(f"expected workers with the driver's versions and code, found {changes}")

@@ -8,7 +8,7 @@ from typing import Any
 from antennate.hardware.safety.causes import Cause
 
 MUCH = 0.02
-"""Share of ticks missed while walking above which the computer is named as late (assumed)."""
+"""Share of ticks missed since the walk began above which the computer is told as late (assumed)."""
 _FOLLOW = (Cause.LATE_ANSWERS, Cause.SILENT_SERVO, Cause.WATCHDOG, Cause.PAUSE)
 """What a late computer may cause by itself."""
 
@@ -28,6 +28,6 @@ def late_sentence(result: Mapping[str, Any]) -> list[str]:
         f" {' and '.join(following)} may come from that, not from the servos." if following else ""
     )
     return [
-        f"The computer was late: {share:.1f} % of ticks missed while walking, at most {worst:.0f} "
-        f"ms late; close other programs, see Pace in docs/hardware.md.{may}"
+        f"The computer was late: {share:.1f} % of ticks missed since the walk began, at most "
+        f"{worst:.0f} ms late; close other programs, see Pace in docs/hardware.md.{may}"
     ]

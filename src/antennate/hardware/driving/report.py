@@ -67,6 +67,8 @@ class Report:
         known = self._causes
         if out.state > self.worst or (known is not None and not causes <= known):
             self.worst, self.why, self._causes = out.state, why, causes | (known or set[Cause]())
+        elif causes == known and len(why) > len(self.why):  # of the same causes, more servos
+            self.why = why
 
     def close(self, session: Session) -> None:
         """The last tick is over."""

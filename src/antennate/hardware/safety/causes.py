@@ -35,7 +35,7 @@ class Cause(Enum):
     LATE_ANSWERS = (State.DEGRADED, "servos answer late")
     SUPPLY_UNKNOWN = (State.DEGRADED, "the supply cannot be read")
     SUPPLY_WARN = (State.DEGRADED, "the supply is nearly empty")
-    STALE = (State.HOLD, "no fresh sample")
+    STALE = (State.HOLD, "no fresh sample from the antenna board")
     REBOOT = (State.HOLD, "the antenna board has restarted")
     LOST = (State.HOLD, "no good reading for too long")
     STUCK = (State.HOLD, "a channel repeats one reading")

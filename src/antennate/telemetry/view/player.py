@@ -79,7 +79,8 @@ class LogPlayer(Pace):
         for records, tick in log.groups():
             for record in records:
                 if record.topic is EVENTS:
-                    self.say(EVENTS.decode(record.data)["msg"])
+                    t = 1e-9 * (record.time - self._header.start)
+                    self.say(f"{t:.2f} s: {EVENTS.decode(record.data)['msg']}")
             if tick is not None:
                 self.keep(tick, records)
                 self.show(tick)
