@@ -13,7 +13,7 @@ from antennate.cli.options import option
 from antennate.cli.results import ResultOptions
 from antennate.errors import ConfigError
 from antennate.messages import shortened, typed
-from antennate.studies.engines import FORMS, LOCAL, make_engine
+from antennate.studies.engines import BATCHED, EVERYWHERE, LOCAL, make_engine
 from antennate.studies.pool import TIMEOUT, Workers, core_count
 
 
@@ -25,7 +25,11 @@ class Options(ResultOptions):
     no_figures: bool = option(False, "draw no figures")
     resume: bool = option(False, "go on with the run that the folder holds")
     retry: bool = option(False, "the same, and run trials again that crashed or hung")
-    engine: str = option(LOCAL, f"where the workers are: {', '.join(FORMS)}", "ENGINE")
+    engine: str = option(
+        LOCAL,
+        f"where the workers are: {', '.join(EVERYWHERE)}; for tunnel also {', '.join(BATCHED)}",
+        "ENGINE",
+    )
     shard: str | None = option(None, "run one of N parts, for `antennate merge`", "I/N")
     slurm: tuple[str, ...] = option((), "what SLURM is asked for, as timeout_min=60", "NAME=VALUE")
     trial_timeout: float = option(

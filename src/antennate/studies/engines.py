@@ -17,8 +17,11 @@ from antennate.studies.work import Emit, Engine, Fail, Work
 
 LOCAL = "local"
 WARP = "warp"
-FORMS = (LOCAL, "dask", "dask://HOST:PORT", "slurm", "slurm-local", WARP, f"{WARP}:DEVICE")
+EVERYWHERE = (LOCAL, "dask", "dask://HOST:PORT", "slurm", "slurm-local")
 """How an engine is named; slurm-local starts what would be jobs as processes of this machine."""
+BATCHED = (WARP, f"{WARP}:DEVICE")
+"""The same of those that only tunnel has."""
+FORMS = (*EVERYWHERE, *BATCHED)
 
 
 def make_engine(name: Any, slurm: Sequence[str] = ()) -> Engine | None:
