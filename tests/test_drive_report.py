@@ -222,6 +222,28 @@ def test_S1_S2_a_wire_that_broke_before_arming_is_named_while_one_waits_and_at_t
     assert json.loads((tmp_path / "result.json").read_text())["worst_state"] == "HOLD"
 
 
+def test_a_drive_that_ends_before_its_first_tick_has_a_result(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    @contextlib.contextmanager
+    def in_process(config: DriveConfig, *addresses: object) -> Iterator[Session]:
+        clock = LockstepClock(robot := build(TwinConfig(), 5))
+        session = prepare(config, BoardPort(robot, clock), clock, clock)
+        monkeypatch.setattr(session, "read", interrupted)
+        yield session
+
+    def interrupted() -> AntennaFrame:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("antennate.cli.drive.connect", in_process)
+    argv = ["drive", "--esp32", "board", "--bus", "bus", "--dry-run", "0.5"]
+    assert main([*argv, "--out", str(tmp_path), "--overwrite"]) == 0
+    assert "A dry run: nothing was written to the servos" in capsys.readouterr().out
+    result = json.loads((tmp_path / "result.json").read_text())
+    assert (result["pace"], result["ended"]) == (None, "its controller")
+    assert (tmp_path / "report.html").exists()
+
+
 def test_a_drive_without_a_log_says_so(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

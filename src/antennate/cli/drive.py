@@ -148,7 +148,8 @@ def walk(
             other = "" if controller is None else " --controller open"
             log = folder.path / (result["logs"] or [LOG])[0]
             _tell(result, orders, f"{shlex.quote(str(log))}{other}")
-        if result["logs"] and result["pace"]["ticks"] <= _LONGEST_DRAWN:
+        ticks = 0 if result["pace"] is None else result["pace"]["ticks"]
+        if result["logs"] and 0 < ticks <= _LONGEST_DRAWN:
             try:
                 folder.write_figures({"drive": _figure(log)})
             except (LogError, OutputError) as error:

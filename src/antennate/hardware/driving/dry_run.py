@@ -52,7 +52,7 @@ class DryRun:
             t >= self._length + self._patience and self._quality.objections
         ):
             wire = self._quality.broken
-            ill = [] if wire else _ill(out)
+            ill = [] if wire or self._quality.refused else _ill(out)
             skip = "" if ill or wire else _SKIP  # these forbid torque anyway
             self._give_up(t, "; ".join(ill or self._quality.objections) + skip)
         elif t >= self._length and not self._quality.objections:

@@ -8,7 +8,7 @@ from typing import Any
 from antennate.hardware.safety.causes import Cause
 
 MUCH = 0.02
-"""Share of ticks missed since the walk began above which the computer is told as late (assumed)."""
+"""Share of ticks missed since the walk began above which the computer is named late (assumed)."""
 _FOLLOW = (Cause.LATE_ANSWERS, Cause.SILENT_SERVO, Cause.WATCHDOG, Cause.PAUSE)
 """What a late computer may cause by itself."""
 
