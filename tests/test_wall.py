@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from pydantic import ValidationError
 from antennate.cli import main
 from antennate.errors import SimulationError
 from antennate.experiments.wall import run as wall
+from antennate.experiments.wall.config import WallConfig
 from antennate.experiments.wall.experiment import EXPERIMENT
 from antennate.experiments.wall.outcome import (
     Traverse,
@@ -21,7 +23,8 @@ from antennate.experiments.wall.outcome import (
     longest_gap,
     longest_stick,
 )
-from antennate.experiments.wall.run import WallConfig, passage, run
+from antennate.experiments.wall.passage import passage
+from antennate.experiments.wall.run import run
 from antennate.robots.antenna import AntennaSpec
 from antennate.sim.bench import compile_bench
 
@@ -153,7 +156,7 @@ def test_same_table_on_one_and_two_workers() -> None:
 def test_trouble_in_the_physics_is_an_invalid_trial(monkeypatch: pytest.MonkeyPatch) -> None:
     sound = wall.passage
 
-    def burst(config: WallConfig, arm: wall.Profile, trial: int, *watch: wall.Watch) -> Traverse:
+    def burst(config: WallConfig, arm: str, trial: int, *watch: Any) -> Traverse:
         if trial == 1:
             raise SimulationError(7, "engine warning")
         return sound(config, arm, trial, *watch)

@@ -27,7 +27,8 @@ class Options(ResultOptions):
     retry: bool = option(False, "the same, and run trials again that crashed or hung")
     engine: str = option(
         LOCAL,
-        f"where the workers are: {', '.join(EVERYWHERE)}; for tunnel also {', '.join(BATCHED)}",
+        f"where the workers are: {', '.join(EVERYWHERE)}; for tunnel, wall and studies of them "
+        f"also {', '.join(BATCHED)}",
         "ENGINE",
     )
     shard: str | None = option(None, "run one of N parts, for `antennate merge`", "I/N")

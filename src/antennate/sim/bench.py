@@ -19,6 +19,7 @@ from antennate.errors import SimulationError
 from antennate.params.scene import PhysicsParams
 from antennate.robots.antenna import BASE, AntennaSpec
 from antennate.sim import antenna_part, layers
+from antennate.sim.bounds import ANGLE_LIMIT
 from antennate.sim.world import new_spec, set_contacts
 from antennate.types import Floats, Ints
 
@@ -29,8 +30,6 @@ SLIDE_STIFFNESS, SLIDE_DAMPING = 1e4, 200.0
 """Gains of the slides' servos [N/m], [N·s/m]: critically damped, 10 micrometres per 0.1 N."""
 _SPEED_LIMIT = 1e4
 """No coordinate of a sound bench moves faster [m/s or rad/s]."""
-_ANGLE_LIMIT = 6.3
-"""No hinge of a sound bench turns farther [rad]."""
 _WRENCH = 6
 """Force and torque, as the engine gives them."""
 
@@ -124,29 +123,34 @@ def _slider(spec: mujoco.MjSpec, name: str) -> mujoco.MjsBody:
 
 
 class Slider:
-    """A body of the bench that servos move in the plane."""
+    """A body of the bench that servos move in the plane.
+
+    Attributes:
+        coordinates: Its coordinates x and y, shape (2,).
+        servos: Actuators in the order of `command`, shape (4,).
+    """
 
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, name: str) -> None:
         self._model, self._data = model, data
         slides = (f"{name}_x", f"{name}_y")
-        self._where = _addresses(model, slides)
+        self.coordinates: Ints = _addresses(model, slides)
         servos = (*slides, *(f"{slide}_speed" for slide in slides))
-        self._servos: Ints = np.array([model.actuator(servo).id for servo in servos])
+        self.servos: Ints = np.array([model.actuator(servo).id for servo in servos])
 
     @property
     def position(self) -> Floats:
         """Where it is [m], shape (2,)."""
-        return self._data.qpos[self._where]
+        return self._data.qpos[self.coordinates]
 
     def place(self, x: float, y: float) -> None:
         """Put it at x, y [m], at rest."""
-        self._data.qpos[self._where] = x, y
+        self._data.qpos[self.coordinates] = x, y
         self.command(x, y, 0.0, 0.0)
         mujoco.mj_forward(self._model, self._data)
 
     def command(self, x: float, y: float, speed_x: float, speed_y: float) -> None:
         """Set its target [m] and its speed there [m/s]."""
-        self._data.ctrl[self._servos] = x, y, speed_x, speed_y
+        self._data.ctrl[self.servos] = x, y, speed_x, speed_y
 
 
 def _addresses(model: mujoco.MjModel, joints: Sequence[str]) -> Ints:
@@ -159,6 +163,8 @@ class Bench:
     Attributes:
         model: The compiled model; `data` its state.
         carriage: Carries the antenna; a rod is another `Slider`, "probe".
+        order: Coordinates of carriage, base and n hinges, shape (n + 3,).
+        servos: Actuators in the order of `command`, shape (5,).
     """
 
     def __init__(self, model: mujoco.MjModel, antenna: AntennaSpec) -> None:
@@ -174,6 +180,8 @@ class Bench:
         self._end = 2.0 * float(model.geom(names[-1]).pos[0])
         self._base_servo: int = model.actuator(PREFIX + BASE).id
         self._steps = 0
+        self.order: Ints = np.concatenate([self.carriage.coordinates, self._chain])
+        self.servos: Ints = np.append(self.carriage.servos, self._base_servo)
 
     @property
     def t(self) -> float:
@@ -246,15 +254,10 @@ class Bench:
             yield
         except mujoco.FatalError as error:
             raise SimulationError(self._steps, str(error).splitlines()[0]) from error
-        flex, speed = self.hinges(), self.data.qvel
         if self.data.warning.number.any() or not self.data.time > before:
             raise SimulationError(self._steps, "engine warning")
-        if not abs(flex).max() < _ANGLE_LIMIT or not abs(speed).max() < _SPEED_LIMIT:
-            raise SimulationError(
-                self._steps,
-                f"a hinge is at {abs(flex).max():.3g} rad, a coordinate moves at "
-                f"{abs(speed).max():.3g} m/s or rad/s",
-            )
+        if trouble := broken(self.hinges(), self.data.qvel):
+            raise SimulationError(self._steps, trouble)
 
     def hinges(self) -> Floats:
         """Angles of the n hinges [rad], shape (n,)."""
@@ -294,6 +297,19 @@ class Bench:
         """Whether any obstacle presses on the antenna in the last physics step."""
         address = self.data.contact.efc_address
         return bool((self.data.efc_force[address[address >= 0]] > 0).any())
+
+
+def broken(hinges: Floats, speeds: Floats) -> str:
+    """What is beyond its bound in a state; empty if nothing is.
+
+    Args:
+        hinges: Angles of all hinges [rad], shape (n,).
+        speeds: Speeds of all coordinates [m/s or rad/s], shape (nv,).
+    """
+    flex, speed = abs(hinges).max(), abs(speeds).max()
+    if flex < ANGLE_LIMIT and speed < _SPEED_LIMIT:
+        return ""
+    return f"a hinge is at {flex:.3g} rad, a coordinate moves at {speed:.3g} m/s or rad/s"
 
 
 Watch = Callable[[Bench], None]

@@ -20,7 +20,8 @@ WARP = "warp"
 EVERYWHERE = (LOCAL, "dask", "dask://HOST:PORT", "slurm", "slurm-local")
 """How an engine is named; slurm-local starts what would be jobs as processes of this machine."""
 BATCHED = (WARP, f"{WARP}:DEVICE")
-"""The same of those that only tunnel has."""
+"""The same of those that only tunnel, wall and studies of them have."""
+NO_BATCHES = "--engine warp: expected tunnel, wall or a study of one of them"
 FORMS = (*EVERYWHERE, *BATCHED)
 
 
@@ -81,7 +82,12 @@ class Device:
             ConfigError: This work has no batch.
         """
         if work.batched is None:
-            raise ConfigError("--engine warp: expected tunnel, which alone has batches on a GPU")
+            raise ConfigError(f"{NO_BATCHES}; this one has no batches on a GPU")
         places = [place for part in parts for place in part]
         tasks = [work.tasks[place] for place in places]
-        work.batched(tasks, lambda i, result: emit(places[i], result), self._device)
+        work.batched(
+            tasks,
+            lambda i, result: emit(places[i], result),
+            lambda i, failure: fail(places[i], failure),
+            self._device,
+        )

@@ -66,6 +66,8 @@ class Trials(Generic[Config]):
             ends. The row depends on the configuration and the trial alone.
         most: How many may be run at once.
         row: Class of the rows, a dataclass; None if it is not told.
+        run_on_device: run_on_device(config, trials, emit, device) does as `run` does, in batches on
+            a GPU or another device of Warp; None if nothing does.
     """
 
     condition: str
@@ -73,6 +75,9 @@ class Trials(Generic[Config]):
     run: Callable[[Config, Sequence[Trial], Callable[[int, Any], None]], None]
     most: int = 1
     row: type | None = None
+    run_on_device: (
+        Callable[[Config, Sequence[Trial], Callable[[int, Any], None], str | None], None] | None
+    ) = None
 
 
 @dataclass(frozen=True)

@@ -37,6 +37,10 @@ Fail = Callable[[int, Failure], None]
 """Takes the place of a task and why it has no result."""
 
 
+def no_failure(place: int, failure: Failure) -> None:
+    """Take a failure where there cannot be one."""
+
+
 @dataclass(frozen=True)
 class Work:
     """Tasks of one kind.
@@ -48,7 +52,8 @@ class Work:
         together: Whether several tasks are carried out at once.
         timeout: Time after which a task that has not ended is given up [s].
         folder: Run directory that it belongs to, None without.
-        batched: batched(tasks, emit, device) does the same on a GPU, None if nothing does.
+        batched: batched(tasks, emit, fail, device) does the same on a GPU, None if nothing does;
+            fail(index, failure) tells of a task that has no result.
         shared: What workers must share with this process, as of `environment`; None for no more
             than this package.
     """

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from antennate.errors import ConfigError
+from antennate.errors import ConfigError, SceneError, SimulationError
 from antennate.experiments.study import measures
 from antennate.experiments.study.config import StudyConfig
 from antennate.experiments.study.rows import OF_STUDY
 from antennate.experiments.study.subject import (
     Columns,
+    EmitRows,
     Rows,
     Subject,
     among,
@@ -25,11 +26,14 @@ from antennate.messages import nearest, shortened
 from antennate.studies.experiment import OnRow, OnStep, Trial, no_row, no_step
 from antennate.studies.plan import Point
 from antennate.studies.pool import gather
-from antennate.studies.work import Failure
+from antennate.studies.work import Fail, Failure
 
 STATUS, REASON = "status", "reason"
 _Task = tuple[str, Sequence[str], int, Any, Trial]
 """What is run, what varies, number of the point, its configuration, the trial."""
+_Numbered = tuple[int, str, Sequence[str], int, Any, Trial]
+"""The same behind the place of the task."""
+_Emit = Callable[[int, tuple[int, Rows]], None]
 
 
 @dataclass(frozen=True)
@@ -148,7 +152,13 @@ def run(
     numbered = [(place, *task) for place, task in enumerate(tasks)]
     interrupted = False
     try:
-        gather(*(_run, numbered, workers, on_step, take), chunk=chunk, together=True, lost=lost)
+        gather(
+            *(_run, numbered, workers, on_step, take),
+            chunk=chunk,
+            together=True,
+            lost=lost,
+            batched=_run_batched,
+        )
     except KeyboardInterrupt:
         interrupted = True
     rows = _table(subject, [point for point, _ in points], tasks, found)
@@ -159,12 +169,37 @@ def run(
     )
 
 
-def _run(
-    tasks: Sequence[tuple[int, str, Sequence[str], int, Any, Trial]],
-    emit: Callable[[int, tuple[int, Rows]], None],
-) -> None:
+def _run(tasks: Sequence[_Numbered], emit: _Emit) -> None:
     """Run some trials, those of one point at once."""
     subject = find(tasks[0][1], tasks[0][2])
+    for _, config, trials, take in _by_point(tasks, emit):
+        subject.run(config, trials, take)
+
+
+def _run_batched(tasks: Sequence[_Numbered], emit: _Emit, fail: Fail, device: str | None) -> None:
+    """The same on a GPU, a batch for each point; a point that cannot be run fails alone.
+
+    Raises:
+        ConfigError: What is run has no batches, or there is no such device.
+    """
+    subject, ended = find(tasks[0][1], tasks[0][2]), set[int]()
+
+    def take(index: int, result: tuple[int, Rows]) -> None:
+        ended.add(index)
+        emit(index, result)
+
+    for indices, config, trials, keep in _by_point(tasks, take):
+        try:
+            subject.run_on_device(config, trials, keep, device)
+        except (SceneError, SimulationError) as error:
+            for index in [each for each in indices if each not in ended]:
+                fail(index, Failure("failed", str(error), error))
+
+
+def _by_point(
+    tasks: Sequence[_Numbered], emit: _Emit
+) -> Iterator[tuple[list[int], Any, list[Trial], EmitRows]]:
+    """For each point indices of its tasks, configuration, trials, and what takes their rows."""
     by_point: dict[int, list[int]] = {}
     for index, task in enumerate(tasks):
         by_point.setdefault(task[3], []).append(index)
@@ -173,8 +208,7 @@ def _run(
         def take(i: int, rows: Rows, indices: list[int] = indices) -> None:
             emit(indices[i], (tasks[indices[i]][0], [with_status(row) for row in rows]))
 
-        trials = [tasks[index][5] for index in indices]
-        subject.run(tasks[indices[0]][4], trials, take)
+        yield indices, tasks[indices[0]][4], [tasks[index][5] for index in indices], take
 
 
 def with_status(row: Mapping[str, Any], judged: Collection[str] = ()) -> dict[str, Any]:

@@ -18,6 +18,7 @@ from antennate.lookup import Registry
 from antennate.messages import shown
 from antennate.params.base import Params
 from antennate.params.reading import describe, put_over, with_bases
+from antennate.studies.engines import NO_BATCHES
 from antennate.studies.experiment import Experiment, Trial, no_row, no_step
 from antennate.studies.plan import Point
 
@@ -29,6 +30,9 @@ _LONGEST = 100
 """Most entries of a list in a result that have columns."""
 FUNCTIONS: Registry[Callable[..., Any]] = Registry("trial function", "antennate.trials", {})
 """Functions trial(config, seed) -> row: config holds the parameters by name, seed is a number."""
+
+
+EmitRows = Callable[[int, Rows], None]
 
 
 class Subject(Protocol):
@@ -56,8 +60,18 @@ class Subject(Protocol):
         """All trials of a configuration."""
         ...
 
-    def run(self, config: Any, trials: Sequence[Trial], emit: Callable[[int, Rows], None]) -> None:
+    def run(self, config: Any, trials: Sequence[Trial], emit: EmitRows) -> None:
         """Run some trials; emit the index and the rows of each."""
+        ...
+
+    def run_on_device(
+        self, config: Any, trials: Sequence[Trial], emit: EmitRows, device: str | None
+    ) -> None:
+        """The same on a GPU or another device of Warp.
+
+        Raises:
+            ConfigError: It has no batches, or there is no such device.
+        """
         ...
 
 
@@ -191,12 +205,19 @@ class _OfExperiment:
     def every(self, config: Any) -> Sequence[Trial]:
         return self._trials.every(config) if self._trials else [("", 0)]
 
-    def run(self, config: Any, trials: Sequence[Trial], emit: Callable[[int, Rows], None]) -> None:
+    def run(self, config: Any, trials: Sequence[Trial], emit: EmitRows) -> None:
         if self._trials is not None:
             self._trials.run(config, trials, lambda i, row: emit(i, [asdict(row)]))
             return
         outcome = self._experiment.run(config, 1, no_step, no_row)
         emit(0, [asdict(row) for row in outcome.rows] or [numbers(outcome.result())])
+
+    def run_on_device(
+        self, config: Any, trials: Sequence[Trial], emit: EmitRows, device: str | None
+    ) -> None:
+        if self._trials is None or self._trials.run_on_device is None:
+            raise ConfigError(f"{NO_BATCHES}; {self._experiment.name} has none")
+        self._trials.run_on_device(config, trials, lambda i, row: emit(i, [asdict(row)]), device)
 
 
 class _OfFunction:
@@ -216,10 +237,15 @@ class _OfFunction:
     def every(self, config: Mapping[str, Any]) -> Sequence[Trial]:
         return [("", seed) for seed in range(config.get("trials", 1))]
 
-    def run(self, config: Any, trials: Sequence[Trial], emit: Callable[[int, Rows], None]) -> None:
+    def run(self, config: Any, trials: Sequence[Trial], emit: EmitRows) -> None:
         given = {name: value for name, value in config.items() if name != "trials"}
         for i, (_, seed) in enumerate(trials):
             emit(i, [{"trial": seed, **own_row(self._function(given, seed), self._axes)}])
+
+    def run_on_device(
+        self, config: Any, trials: Sequence[Trial], emit: EmitRows, device: str | None
+    ) -> None:
+        raise ConfigError(f"{NO_BATCHES}; a function of your own has none")
 
 
 def _plain(value: Any) -> Any:

@@ -84,7 +84,9 @@ EXPERIMENT = Experiment.of_folder(
     filmed=True,
     failed=lambda result: bool(_none_valid(result)),
     logged=tunnel.run,
-    trials=Trials("controller", tunnel.every, tunnel.run_rows, BATCH, TrialResult),
+    trials=Trials(
+        *("controller", tunnel.every, tunnel.run_rows, BATCH, TrialResult, tunnel.run_on_device)
+    ),
     measures=measures.COLUMNS,
     viewed=lambda config, on_step, on_row, view, logs: tunnel.run(
         config, 1, on_step, on_row, logs, view

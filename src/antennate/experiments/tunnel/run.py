@@ -20,7 +20,7 @@ from antennate.sim.trial import check_start
 from antennate.sim.world import World
 from antennate.studies.experiment import OnRow, OnStep, Trial, no_row, no_step
 from antennate.studies.pool import gather
-from antennate.studies.work import Failure
+from antennate.studies.work import Fail, Failure, no_failure
 from antennate.telemetry.view.pace import Restart
 from antennate.telemetry.view.simulation import SimulationView
 from antennate.types import AntennaFrame, Controller, Maneuver
@@ -84,6 +84,21 @@ def run_rows(
     _run([(config, *trial, None) for trial in trials], lambda i, found: emit(i, found[0]))
 
 
+def run_on_device(
+    config: TunnelConfig,
+    trials: Sequence[Trial],
+    emit: Callable[[int, Any], None],
+    device: str | None,
+) -> None:
+    """As `run_rows`, on a GPU.
+
+    Raises:
+        ConfigError: There is none.
+    """
+    tasks: list[_Task] = [(config, *trial, None) for trial in trials]
+    _run_batched(tasks, lambda i, found: emit(i, found[0]), no_failure, device)
+
+
 RunTrials = Callable[[TunnelConfig, str, Sequence[int], Emit], None]
 """Runs trials of one controller, and emits each as it ends."""
 _Task = tuple[TunnelConfig, str, int, Path | None]
@@ -109,9 +124,9 @@ def _run(
 
 
 def _run_batched(
-    tasks: Sequence[_Task], emit: Callable[[int, _Found], None], device: str | None
+    tasks: Sequence[_Task], emit: Callable[[int, _Found], None], fail: Fail, device: str | None
 ) -> None:
-    """The same on a GPU.
+    """The same on a GPU; what fails is an invalid row, and nothing is told to `fail`.
 
     Raises:
         ConfigError: There is none, or logs are wanted.

@@ -7,6 +7,7 @@ from typing import Any
 
 from antennate.experiments.wall import measures
 from antennate.experiments.wall import run as wall
+from antennate.experiments.wall.config import WallConfig
 from antennate.experiments.wall.outcome import WallTrial
 from antennate.sim.chain import require_solver
 from antennate.studies.experiment import Experiment, Trials
@@ -48,9 +49,9 @@ def _border(result: Mapping[str, Any]) -> str:
 
 
 EXPERIMENT = Experiment.of_folder(
-    *(__name__, wall.WallConfig, wall.run, tables, sentence),
+    *(__name__, WallConfig, wall.run, tables, sentence),
     filmed=True,
-    trials=Trials("profile", wall.every, wall.run_rows, row=WallTrial),
+    trials=Trials("profile", wall.every, wall.run_rows, 1, WallTrial, wall.run_on_device),
     measures=measures.PROFILE,
     viewed=lambda config, on_step, on_row, view, logs: wall.run(config, 1, on_step, on_row, view),
     check=require_solver,

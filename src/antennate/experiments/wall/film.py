@@ -7,8 +7,9 @@ from functools import partial
 
 from antennate.antenna.statics import Profile
 from antennate.experiments.bench_film import BenchRecorder
+from antennate.experiments.wall.config import WallConfig
 from antennate.experiments.wall.outcome import classify
-from antennate.experiments.wall.run import WallConfig, passage
+from antennate.experiments.wall.passage import passage
 from antennate.telemetry.film import Film
 
 

@@ -101,6 +101,11 @@ def classify(wall: WallParams, seed: int, trial: int, profile: str, seen: Traver
     )
 
 
+def invalid(seed: int, trial: int, profile: str, reason: str) -> WallTrial:
+    """What is told of a trial that has no passage."""
+    return WallTrial(seed, trial, profile, "invalid", "invalid", *[math.nan] * 7, reason=reason)
+
+
 def least_advance(base: Floats, tip: Floats, travel: float) -> float:
     """Smallest advance of the tip over any such travel of the base; all in m, shapes (n,)."""
     ends = np.searchsorted(base, base + travel - 1e-9)

@@ -16,7 +16,8 @@ from antennate.robots.spec import RobotSpec
 from antennate.sim.bounds import broken, sound
 from antennate.sim.sim_robot import Disturbance
 from antennate.sim.warp.arenas import is_parked
-from antennate.sim.warp.worlds import Limits, WarpWorlds
+from antennate.sim.warp.robot_worlds import RobotWorlds
+from antennate.sim.warp.worlds import Limits
 from antennate.sim.world import World
 from antennate.types import AntennaFrame, Floats, JointCommand
 
@@ -111,7 +112,7 @@ class WarpRobot:
         self._missing = np.ones(batch, dtype=bool)
         self._noise: Floats = np.zeros((batch, 2))
         self._ticks = 0
-        self.worlds: WarpWorlds | None = None
+        self.worlds: RobotWorlds | None = None
         self._forces: Floats | None = None
         self.positions: Floats = np.zeros((batch, 0))
         self._controls: Floats = np.zeros((batch, 0))
@@ -211,9 +212,9 @@ class WarpRobot:
             return
         if self.worlds is None:
             first = next(iter(self._rows.values())).world
-            self.worlds = WarpWorlds(first, self._batch, self._limits, self._device)
+            self.worlds = RobotWorlds(first, self._batch, self._limits, self._device)
         for row in sorted(self._new):
-            self.worlds.put(row, self._rows[row].world)
+            self.worlds.put_world(row, self._rows[row].world)
         for row in sorted(self._ended - self._rows.keys()):
             self.worlds.rest(row)
             self._controls[row] = 0.0

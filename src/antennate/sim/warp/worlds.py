@@ -7,6 +7,7 @@ Warp holds by world: masses, springs, places, sizes, friction and so on.
 from __future__ import annotations
 
 import copy
+import warnings
 from dataclasses import dataclass, fields
 from typing import Any
 
@@ -15,7 +16,6 @@ import numpy as np
 
 from antennate.errors import ConfigError, SceneError, in_one_line
 from antennate.sim.warp.packages import require_device, require_warp
-from antennate.sim.world import World
 from antennate.types import Floats
 
 _STATE = ("qpos", "qvel", "ctrl", "qacc_warmstart", "actuator_force")
@@ -43,7 +43,7 @@ class WarpWorlds:
     """B worlds on a device.
 
     Args:
-        first: A world whose structure all have.
+        first: A model whose structure all have.
         batch: Number of worlds B.
         limits: Sizes on the device.
         device: Name of a device of Warp, as cuda:0 or cpu; a GPU if not given.
@@ -53,16 +53,19 @@ class WarpWorlds:
         MissingPackageError: Warp is not installed.
     """
 
-    def __init__(self, first: World, batch: int, limits: Limits, device: str | None = None) -> None:
+    def __init__(
+        self, first: mujoco.MjModel, batch: int, limits: Limits, device: str | None = None
+    ) -> None:
         self._wp, self._mjw = require_warp()
-        self._batch, self._first, self._limits = batch, first, limits
+        self._batch, self._rest, self._limits = batch, first.qpos0.copy(), limits
         self._device = require_device(device)
         try:
-            with self._wp.ScopedDevice(self._device):
-                self._make(_plain(first.model))
+            with self._wp.ScopedDevice(self._device), warnings.catch_warnings():
+                warnings.filterwarnings("ignore", r"geom \d+: friction")  # that of the pair counts
+                self._make(_plain(first))
         except Exception as error:
             raise ConfigError(f"--engine warp: {in_one_line(error)}") from error
-        self._base = _values(first.model)
+        self._base = _values(first)
         self._graph: Any = None
         self._runs = 0
         self._bits = sum(int(self._mjw.OverflowType[name]) for name in _DROPPED)
@@ -78,15 +81,6 @@ class WarpWorlds:
             if getattr(field.type, "shape", (None,))[0] == "*"
         }
         self._spread = dict[str, Any]()
-        self._hold("geom_friction")
-        places, gears = self._first.places, self._first.gears
-        self._loaded: tuple[Any, ...] = ()
-        if len(gears.dof):
-            self._hold("dof_frictionloss")
-            at = gears.drive, gears.dof
-            self._loaded = (*map(self._ints, at), *map(self._floats, _terms(self._first)))
-        self._kinds = self._ints(places.obstacles), self._ints(places.own)
-        self._force = self._wp.zeros(self._batch, dtype=float)
 
     def _ints(self, values: Any) -> Any:
         return self._wp.array(np.asarray(values, np.int32), dtype=int)
@@ -104,34 +98,30 @@ class WarpWorlds:
             self._graph = None
         return self._spread[name]
 
-    def put(self, row: int, world: World) -> None:
-        """Let a row be a world from now on, in the state that it is in.
+    def put(self, row: int, model: mujoco.MjModel, data: mujoco.MjData) -> None:
+        """Let a row be the world of a model from now on, in the state that it is in.
 
         Raises:
             SceneError: It differs from the first in what all have in common.
         """
-        values = _values(world.model)
-        differing = {n for n, value in values.items() if not _same(value, self._base.get(n))}
+        values = _values(model)
+        differing = {n for n, value in values.items() if not same(value, self._base.get(n))}
         if alien := sorted((differing | (self._base.keys() - values.keys())) - self._by_world):
             raise SceneError(
                 "--engine warp: expected scenes and robots that differ in numbers alone, found "
                 f"another {', '.join(alien[:5])}"
             )
-        if any(not _same(*pair) for pair in zip(_terms(world), _terms(self._first), strict=True)):
-            raise SceneError(
-                "--engine warp: expected the same friction of gears under load in all worlds"
-            )
         for name in sorted(differing | self._spread.keys()):
             self._write(self._hold(name), row, values[name])
-        mujoco.mj_kinematics(world.model, world.data)
+        mujoco.mj_kinematics(model, data)
         for name in (*_STATE, *_STATIC):
-            self._write(getattr(self._data, name), row, getattr(world.data, name))
+            self._write(getattr(self._data, name), row, getattr(data, name))
         self._write(self._data.overflow, row, np.zeros(1))
 
     def rest(self, row: int) -> None:
         """Let the world of a row stand still; its trial has ended."""
         for name in _STATE:
-            value = self._first.model.qpos0 if name == "qpos" else 0.0
+            value = self._rest if name == "qpos" else 0.0
             held = getattr(self._data, name)
             self._write(held, row, np.broadcast_to(value, held.shape[1:]))
 
@@ -139,10 +129,6 @@ class WarpWorlds:
         part = held[row : row + 1]
         shape = (*part.shape, *getattr(held.dtype, "_shape_", ()))
         part.assign(np.asarray(value).reshape(shape))
-
-    def set_friction(self, row: int, world: World) -> None:
-        """Take the friction of all geoms from a world."""
-        self._write(self._hold("geom_friction"), row, world.model.geom_friction)
 
     def command(self, controls: Floats) -> None:
         """Set the targets of all actuators of all worlds [rad], shape (B, n)."""
@@ -162,42 +148,16 @@ class WarpWorlds:
                 self._advance(count)
 
     def _advance(self, count: int) -> None:
-        from antennate.sim.warp.kernels import load_friction
-
-        data = self._data
         for _ in range(count):
-            if self._loaded:
-                torque = data.actuator_force, data.qvel
-                self._wp.launch(
-                    load_friction,
-                    dim=(self._batch, len(self._first.gears.dof)),
-                    inputs=[*torque, *self._loaded],
-                    outputs=[self._model.dof_frictionloss],
-                )
-            self._mjw.step(self._model, data)
+            self._before_step()
+            self._mjw.step(self._model, self._data)
+
+    def _before_step(self) -> None:
+        """What is computed on the device before each physics step; by default nothing."""
 
     def state(self) -> tuple[Floats, Floats]:
         """Positions, shape (B, nq), and speeds, shape (B, nv), of all worlds, from float32."""
         return self._data.qpos.numpy().astype(float), self._data.qvel.numpy().astype(float)
-
-    def forces(self) -> Floats:
-        """Summed normal force between robot and obstacles in the last step [N], shape (B,)."""
-        from antennate.sim.warp.kernels import obstacle_forces
-
-        data = self._data
-        with self._wp.ScopedDevice(self._device):
-            self._force.zero_()
-            contact = data.contact
-            self._wp.launch(
-                obstacle_forces,
-                dim=data.naconmax,
-                inputs=[
-                    *(data.nacon, contact.worldid, contact.geom, contact.efc_address),
-                    *(data.efc.force, *self._kinds),
-                ],
-                outputs=[self._force],
-            )
-        return self._force.numpy().astype(float)
 
     def overflows(self) -> dict[int, str]:
         """What was dropped, by world, since the world was put there."""
@@ -228,14 +188,10 @@ def _values(model: mujoco.MjModel) -> dict[str, Any]:
     }
 
 
-def _terms(world: World) -> tuple[Floats, Floats, Floats]:
-    """What friction under load is made of."""
-    return world.gears.share, world.gears.dry, world.gears.damping
-
-
 def _names(owner: Any) -> list[str]:
     return [name for name in dir(owner) if not name.startswith("_")]
 
 
-def _same(one: Any, other: Any) -> bool:
+def same(one: Any, other: Any) -> bool:
+    """Whether two numbers or arrays are equal in shape and values."""
     return bool(np.array_equal(one, other))
