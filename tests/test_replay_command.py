@@ -18,7 +18,7 @@ from antennate.cli import main
 from antennate.errors import LogError
 from antennate.params.control import ControlParams
 from antennate.robots.spec import RobotSpec
-from antennate.studies.run_directory import LOG
+from antennate.studies.run_files import LOG
 from antennate.telemetry.figure import Course
 from antennate.telemetry.figure import replay as draw
 from antennate.telemetry.header import Header

@@ -38,7 +38,7 @@ from antennate.robots.spec import require_antennae
 from antennate.studies.formats import to_json
 from antennate.studies.measures import Measure, Table
 from antennate.studies.report import View
-from antennate.studies.run_directory import LOG
+from antennate.studies.run_files import LOG
 from antennate.telemetry.feed import Feed
 from antennate.telemetry.header import Header
 from antennate.telemetry.parts import part, parts

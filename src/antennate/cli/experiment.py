@@ -25,7 +25,8 @@ from antennate.studies.formats import to_json
 from antennate.studies.identity import differences, environment, identity
 from antennate.studies.measures import Interim
 from antennate.studies.pool import ShardEnd, Workers
-from antennate.studies.run_directory import LOGS, SHARD, RunDirectory
+from antennate.studies.run_directory import RunDirectory
+from antennate.studies.run_files import LOGS, SHARD
 from antennate.telemetry.view.simulation import SimulationView
 
 

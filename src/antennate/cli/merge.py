@@ -16,7 +16,8 @@ from antennate.cli.run_options import Options
 from antennate.errors import BadInputError, ConfigError
 from antennate.params.base import Params
 from antennate.studies.identity import differences
-from antennate.studies.run_directory import SHARD, VERSIONS, RunDirectory
+from antennate.studies.run_directory import RunDirectory
+from antennate.studies.run_files import SHARD, VERSIONS
 from antennate.studies.store import STORE, read_store
 
 DESCRIPTION = """\

@@ -17,7 +17,8 @@ from antennate.errors import BadInputError, ConfigError
 from antennate.files import write_whole
 from antennate.params.base import Params
 from antennate.studies.report import View, command_of, compare, report
-from antennate.studies.run_directory import REPORT, RunDirectory
+from antennate.studies.run_directory import RunDirectory
+from antennate.studies.run_files import REPORT
 
 DESCRIPTION = """\
 Write a run as one HTML page that needs nothing else: what was run, what came out with its

@@ -18,7 +18,8 @@ from antennate.params.base import Params
 from antennate.studies.formats import to_json
 from antennate.studies.measures import Table
 from antennate.studies.report import View, write_report
-from antennate.studies.run_directory import LOG, LOGS, RunDirectory
+from antennate.studies.run_directory import RunDirectory
+from antennate.studies.run_files import LOG, LOGS
 from antennate.telemetry.recover import RECOVERED
 
 

@@ -23,7 +23,8 @@ from antennate.sim.scenes.registry import SHIPPED, make_scene
 from antennate.sim.trial import TrialConfig, draw_trial
 from antennate.sim.world import World
 from antennate.studies.report import command_of
-from antennate.studies.run_directory import LOGS, RunDirectory
+from antennate.studies.run_directory import RunDirectory
+from antennate.studies.run_files import LOGS
 from antennate.telemetry.header import Header
 from antennate.telemetry.reader import LogReader
 from antennate.telemetry.view import ports

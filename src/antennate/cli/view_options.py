@@ -13,7 +13,8 @@ from antennate.cli import view_server
 from antennate.cli.options import option
 from antennate.errors import ConfigError
 from antennate.params.base import Params
-from antennate.studies.run_directory import BY_HAND, RunDirectory
+from antennate.studies.run_directory import RunDirectory
+from antennate.studies.run_files import BY_HAND
 from antennate.telemetry.view import ports
 
 if TYPE_CHECKING:  # both import much, for a page that few runs want

@@ -20,7 +20,8 @@ from antennate.studies.experiment import Experiment, Outcome
 from antennate.studies.identity import environment, identity
 from antennate.studies.pool import Workers
 from antennate.studies.report import write_report
-from antennate.studies.run_directory import FILMS, RunDirectory
+from antennate.studies.run_directory import RunDirectory
+from antennate.studies.run_files import FILMS
 
 _PARTS = 100
 """Parts of the making of a film that are told."""

@@ -20,7 +20,8 @@ from antennate.params.base import Params
 from antennate.studies import page
 from antennate.studies.formats import to_toml
 from antennate.studies.measures import NONE, Table
-from antennate.studies.run_directory import (
+from antennate.studies.run_directory import RunDirectory
+from antennate.studies.run_files import (
     BY_HAND,
     COMMAND,
     CONFIG,
@@ -33,7 +34,6 @@ from antennate.studies.run_directory import (
     RESULT,
     TABLE,
     VERSIONS,
-    RunDirectory,
 )
 
 _MOST_REASONS = 20

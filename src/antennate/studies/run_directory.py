@@ -19,7 +19,6 @@ from __future__ import annotations
 import contextlib
 import itertools
 import json
-import os
 import shlex
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict
@@ -31,41 +30,27 @@ from antennate.files import decoded, read_limited, writing_whole
 from antennate.params.base import Params
 from antennate.params.reading import Config, read_file
 from antennate.studies.formats import from_csv, strict, to_csv, to_json, to_toml
+from antennate.studies.run_files import (
+    CALIBRATION,
+    COMMAND,
+    CONFIG,
+    ENDINGS,
+    FIGURES,
+    LARGEST,
+    LOGS,
+    PARTIAL,
+    RESULT,
+    ROOM,
+    TABLE,
+    VERSIONS,
+    files_of,
+    is_folder,
+)
 from antennate.studies.store import STORE, Store
 from antennate.telemetry.header import versions
-from antennate.telemetry.parts import MOST_PARTS, part
 
-RESULT, TABLE, PARTIAL = "result.json", "trials.csv", "trials.partial.jsonl"
-SHARD = "shard.json"
-"""File of a shard whose trials are all finished."""
-CONFIG, VERSIONS, COMMAND = "config.toml", "versions.json", "command.txt"
-FIGURES, FILMS, LOGS = "figures", "films", "logs"
-"""Folders of figures (svg, png), films (mp4) and logs of trials (mcap), which belong to the run."""
-_INNER = {FIGURES: (".svg", ".png"), FILMS: (".mp4",), LOGS: (".mcap",)}
-BY_HAND = "by-hand.txt"
-"""What a person changed while the run went on: it does not follow from its configuration then."""
-CALIBRATION, LOG, REPORT = "calibration.json", "drive.mcap", "report.html"
-LARGEST = 10**9
-"""No file of a run is longer [bytes]."""
-_LOGS = tuple(part(Path(LOG), number).name for number in range(1, MOST_PARTS + 1))
-_FILES = (
-    BY_HAND,
-    CALIBRATION,
-    "conditioning.toml",
-    "recording.csv",
-    "ticks.csv",
-    "bom.csv",
-    "points.csv",
-    "frames.csv",
-    REPORT,
-    *_LOGS,
-)
-ROOM = ".room"
-"""File that keeps room for the result."""
 _KEPT_FREE = 1 << 16
-"""Its size [bytes]: eight times the result of a drive."""
-_NAMES = (RESULT, PARTIAL, STORE, SHARD, TABLE, CONFIG, VERSIONS, COMMAND, ROOM, *_FILES)
-"""Every file that a run may write beside its figures."""
+"""Size of the file that keeps room for the result [bytes]: eight times that of a drive."""
 
 
 class RunDirectory:
@@ -118,10 +103,10 @@ class RunDirectory:
         with _writing(place):
             missing = [p for p in (place, *place.parents) if not p.exists()]
             place.mkdir(parents=True, exist_ok=path is not None)
-            for folder in _INNER:
+            for folder in ENDINGS:
                 if (place / folder).is_symlink():
                     raise OutputError(f"expected {place / folder} within its run, found a link")
-            held = _held(place)
+            held = files_of(place)
             goes_on = resume and not overwrite and (place / STORE) in held
             if held and not overwrite and not goes_on:
                 finished = resume and place / RESULT in held
@@ -247,7 +232,7 @@ class RunDirectory:
 
     def keep_logs(self) -> None:
         """Let it stay when the run ends if it holds logs, even if none of the trials has ended."""
-        self._kept = self._kept or any(path.parent.name == LOGS for path in _held(self.path))
+        self._kept = self._kept or any(path.parent.name == LOGS for path in files_of(self.path))
 
     def discard(self) -> None:
         """Let nothing that was kept so far stay when the run ends."""
@@ -316,10 +301,10 @@ class RunDirectory:
         with contextlib.suppress(OSError, OutputError):
             self._drop_partial()
             self._give_room()
-            for file in _held(self.path):
+            for file in files_of(self.path):
                 if file.name in (CONFIG, VERSIONS, COMMAND) or file.parent == self.path / LOGS:
                     file.unlink()
-            if _is(self.path / LOGS):
+            if is_folder(self.path / LOGS):
                 (self.path / LOGS).rmdir()
             for path in self._created:
                 path.rmdir()
@@ -339,21 +324,6 @@ def _store(place: Path, identity: Mapping[str, Any] | None, overwrite: bool) -> 
         store.close(remove=store.identity is None)
         raise
     return store
-
-
-def _held(place: Path) -> list[Path]:
-    """Files of a run that a directory holds."""
-    inner = [
-        path
-        for folder, endings in _INNER.items()
-        for path in (sorted((place / folder).iterdir()) if _is(place / folder) else ())
-        if path.suffix in endings
-    ]
-    return [place / name for name in _NAMES if os.path.lexists(place / name)] + inner
-
-
-def _is(folder: Path) -> bool:
-    return folder.is_dir() and not folder.is_symlink()
 
 
 def _sound_json(text: str) -> str:

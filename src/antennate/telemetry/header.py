@@ -5,9 +5,11 @@ from __future__ import annotations
 import contextlib
 import json
 import platform
+import re
 from collections.abc import Mapping
 from functools import lru_cache
 from importlib import metadata
+from pathlib import Path
 from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
@@ -21,6 +23,9 @@ from antennate.telemetry.topics import CALIBRATION, CONFIG, HEADER_TOPICS, VERSI
 
 TWIN = "twin"
 """The controller of a twin's log: what its client decides is not known."""
+_OLD = re.compile(rb"\x00.[\x01-\x09]\x01", re.S)
+"""How a log from before MCAP begins: its schema and the kind of its first record."""
+_OLD_VERSION = re.compile(rb'"version": "([\w.+-]{1,30})"')
 
 
 @lru_cache
@@ -130,3 +135,18 @@ def _checked(content: bytes | Mapping[str, Any]) -> Header:
         return read(content)  # type: ignore[arg-type]
     except ValidationError as error:
         raise LogError(f"expected a header of a log: {describe(error, Header)}") from None
+
+
+def refuse_old(path: Path, begin: bytes) -> None:
+    """Look whether a file that has no header is a log from before logs were MCAP.
+
+    Raises:
+        LogError: It is.
+    """
+    if _OLD.match(begin):
+        version = _OLD_VERSION.search(begin)
+        by = version[1].decode() if version else "of an unknown version"
+        raise LogError(
+            f"{path}: expected an MCAP file, found a log of antennate {by} from before logs were "
+            "MCAP; read it with the antennate that wrote it"
+        )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
@@ -14,7 +13,7 @@ from typing import NamedTuple
 from antennate.errors import LogError
 from antennate.files import open_regular
 from antennate.telemetry.chunks import Chunk, End, Fault, walk
-from antennate.telemetry.header import Header
+from antennate.telemetry.header import Header, refuse_old
 from antennate.telemetry.parts import parts
 from antennate.telemetry.survey import Survey, by_summary, span
 from antennate.telemetry.ticks import Tick
@@ -35,9 +34,6 @@ _BESIDE = (EVENTS, CONTACT_FORCES, COORDINATES)
 """Topics whose messages are no part of a tick."""
 _OURS = dict(enumerate(TOPICS, 1))
 """Channels of a file that declares none, as its first chunk is lost."""
-_OLD = re.compile(rb"\x00.[\x01-\x09]\x01", re.S)
-"""How a log from before MCAP begins: its schema and the kind of its first record."""
-_OLD_VERSION = re.compile(rb'"version": "([\w.+-]{1,30})"')
 
 
 class Damage(NamedTuple):
@@ -285,7 +281,8 @@ class LogReader:
                 return Header.of_messages(self._first)
             except LogError as error:
                 raise LogError(f"{self.path}: {error}") from None
-        self._refuse_old()
+        self._file.seek(0)
+        refuse_old(self.path, self._file.read(1 << 16))
         ticks = sum(1 for _ in self)
         found = f"no intact header, {ticks} intact ticks; damaged places: {self.bad}"
         if self.end is not None and not (self.bad or ticks):
@@ -322,17 +319,6 @@ class LogReader:
                 )
             named[channel] = topic
         return named
-
-    def _refuse_old(self) -> None:
-        self._file.seek(0)
-        begin = self._file.read(1 << 16)
-        if _OLD.match(begin):
-            version = _OLD_VERSION.search(begin)
-            by = version[1].decode() if version else "of an unknown version"
-            raise LogError(
-                f"{self.path}: expected an MCAP file, found a log of antennate {by} from before "
-                "logs were MCAP; read it with the antennate that wrote it"
-            )
 
     def _note(self, offset: int, reason: str) -> None:
         self.bad += 1

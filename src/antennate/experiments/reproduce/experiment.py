@@ -10,7 +10,7 @@ from antennate.experiments.reproduce.run import CLAIMS, ReproduceConfig, run
 from antennate.experiments.reproduce.verdict import VERDICTS
 from antennate.studies.experiment import Experiment
 from antennate.studies.measures import Table
-from antennate.studies.run_directory import REPORT
+from antennate.studies.run_files import REPORT
 
 
 def tables(result: Mapping[str, Any]) -> Sequence[Table]:

@@ -1,0 +1,56 @@
+"""The names of the files of a run, and which of them a folder holds."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from antennate.studies.store import STORE
+from antennate.telemetry.parts import MOST_PARTS, part
+
+RESULT, TABLE, PARTIAL = "result.json", "trials.csv", "trials.partial.jsonl"
+SHARD = "shard.json"
+"""File of a shard whose trials are all finished."""
+CONFIG, VERSIONS, COMMAND = "config.toml", "versions.json", "command.txt"
+FIGURES, FILMS, LOGS = "figures", "films", "logs"
+"""Folders of figures (svg, png), films (mp4) and logs of trials (mcap), which belong to the run."""
+ENDINGS = {FIGURES: (".svg", ".png"), FILMS: (".mp4",), LOGS: (".mcap",)}
+"""What the files of each of these folders end with."""
+BY_HAND = "by-hand.txt"
+"""What a person changed while the run went on: it does not follow from its configuration then."""
+CALIBRATION, LOG, REPORT = "calibration.json", "drive.mcap", "report.html"
+LARGEST = 10**9
+"""No file of a run is longer [bytes]."""
+_LOGS = tuple(part(Path(LOG), number).name for number in range(1, MOST_PARTS + 1))
+_FILES = (
+    BY_HAND,
+    CALIBRATION,
+    "conditioning.toml",
+    "recording.csv",
+    "ticks.csv",
+    "bom.csv",
+    "points.csv",
+    "frames.csv",
+    REPORT,
+    *_LOGS,
+)
+ROOM = ".room"
+"""File that keeps room for the result."""
+_NAMES = (RESULT, PARTIAL, STORE, SHARD, TABLE, CONFIG, VERSIONS, COMMAND, ROOM, *_FILES)
+"""Every file that a run may write beside its figures."""
+
+
+def files_of(place: Path) -> list[Path]:
+    """Files of a run that a directory holds."""
+    inner = [
+        path
+        for folder, endings in ENDINGS.items()
+        for path in (sorted((place / folder).iterdir()) if is_folder(place / folder) else ())
+        if path.suffix in endings
+    ]
+    return [place / name for name in _NAMES if os.path.lexists(place / name)] + inner
+
+
+def is_folder(folder: Path) -> bool:
+    """Whether it is a folder itself, and no link to one."""
+    return folder.is_dir() and not folder.is_symlink()
