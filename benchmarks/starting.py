@@ -2,7 +2,8 @@
 
 - `dask`: trials that compute for one second each, on processes of this machine and on a Dask
   cluster here.
-- `start`: time on the clock from the command to the first control tick, and to import the package.
+- `start`: time on the clock from the command to the first control tick, to import the package, and
+  from the command to the first trial that a study goes on with.
 """
 
 from __future__ import annotations
@@ -26,7 +27,16 @@ from antennate.types import AntennaFrame, Controller, JointCommand
 CONTROLLER = "closed"
 CORES = 2
 NOTE = "ANTENNATE_FIRST_TICK"
-"""Names the file in which `noting` keeps the time of its first step."""
+"""Names the file in which `noting` keeps the time of its first step, and `trial` that of each."""
+STUDY = f"""
+experiment = "{Path(__file__).resolve()}:trial"
+plan = "grid"
+trials = 1000
+[vary]
+x = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0]
+"""
+ALL, FINISHED = 10_000, 9_900
+"""Trials of the study, and how many of them it has when it goes on."""
 
 
 def compute(seconds: float) -> float:
@@ -103,6 +113,36 @@ def first_tick(workers: int) -> float:
         return min(map(float, note.read_text(encoding="utf-8").split())) - begin
 
 
+def trial(config: dict[str, float], seed: int) -> dict[str, float]:
+    """A trial that takes no time, and notes when it was run."""
+    with Path(os.environ[NOTE]).open("a", encoding="utf-8") as file:
+        file.write(f"{time.monotonic()}\n")
+    return {"value": seed * config["x"]}
+
+
+def go_on(folder: Path, finished: int) -> float:
+    """Time from the command to the first trial of a study that has so many finished ones [s]."""
+    run, note = folder / "run", folder / "note"
+    note.unlink(missing_ok=True)
+    if finished:
+        (run / "result.json").unlink()
+        store = run / "trials.store.jsonl"
+        lines = store.read_bytes().splitlines(keepends=True)
+        store.write_bytes(b"".join(lines[: 1 + finished]))
+    words = ["study", str(folder / "study.toml"), "--trust-code", "--no-figures"]
+    begin = time.monotonic()
+    subprocess.run(
+        [sys.executable, "-m", "antennate", *words, "--workers", str(CORES), "--out", str(run)],
+        env={**os.environ, NOTE: str(note)},
+        capture_output=True,
+        check=True,
+    )
+    times = [float(text) for text in note.read_text(encoding="utf-8").split()]
+    if len(times) != ALL - finished:
+        raise SystemExit(f"expected {ALL - finished} trials, found {len(times)}")
+    return min(times) - begin
+
+
 def python(code: str) -> float:
     """Time on the clock of a Python process [s]."""
     return wall_seconds(lambda: subprocess.run([sys.executable, "-c", code], check=True))
@@ -121,7 +161,13 @@ def measure_start(quick: bool) -> dict[str, Any]:
         "first tick, one worker": lambda: first_tick(1),
         "first tick, two workers": lambda: first_tick(CORES),
     }
-    found = in_turn(cases, 2 if quick else 5)
+    with tempfile.TemporaryDirectory() as folder:
+        Path(folder, "study.toml").write_text(STUDY, encoding="utf-8")
+        go_on(Path(folder), 0)
+        cases[f"first of the last {ALL - FINISHED} of {ALL:,} trials"] = lambda: go_on(
+            Path(folder), FINISHED
+        )
+        found = in_turn(cases, 2 if quick else 5)
     imported = [a - b for a, b in zip(found["import antennate"], found["python"], strict=True)]
     return {
         "seconds": {name: spread(values) for name, values in found.items()},

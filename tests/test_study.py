@@ -270,6 +270,23 @@ def test_W8_a_full_disk_is_one_line_and_loses_nothing(
     assert Path("run/trials.csv").read_bytes() == done.read_bytes()
 
 
+def test_W7_a_damaged_first_line_is_refused_and_costs_no_trial(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """The trials are sound, so a person may mend the line, or copy them elsewhere."""
+    plan()
+    assert study("--no-figures") == 0
+    Path("run/result.json").unlink()  # as if it was killed
+    store = Path("run", STORE)
+    damaged = bytearray(store.read_bytes())
+    damaged[30] ^= 1
+    store.write_bytes(damaged)
+    capsys.readouterr()
+    said = refusal(capsys, "study", "plan.toml", "--trust-code", "--out", "run")
+    assert "expected what is run in its first line, found that damaged, and" in said
+    assert store.read_bytes() == damaged
+
+
 def test_the_packages_that_are_installed_are_not_read_for_each_trial(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -78,6 +78,7 @@ def test_jobs_of_slurm_leave_the_same_table(alone: bytes) -> None:
 
 def test_a_job_that_begins_again_goes_on_and_its_driver_finds_what_it_did(tmp_path: Path) -> None:
     """SLURM begins a job again with the tasks that it was first given."""
+    pytest.importorskip("cloudpickle")
     notes = tmp_path / "notes.txt"
     os.environ["STUDY_NOTES"] = str(notes)
     try:
@@ -90,6 +91,22 @@ def test_a_job_that_begins_again_goes_on_and_its_driver_finds_what_it_did(tmp_pa
         assert sorted(read_store(tmp_path / "job.jsonl")[1]) == ["0", "1", "2"]
     finally:
         del os.environ["STUDY_NOTES"]
+
+
+def test_trials_of_a_job_of_slurm_crash_or_hang_as_on_one_machine(tmp_path: Path) -> None:
+    pytest.importorskip("cloudpickle")
+    tasks = {place: ({"x": 1.0, "mode": "hang"}, place) for place in (1, 2)}
+    part = Part(trial, tasks, together=False, timeout=1.0)
+    slurm.Resumable(str(tmp_path / "hung.jsonl"), environment(), part, {})()
+    found = read_store(tmp_path / "hung.jsonl")[1]
+    assert found["1"]["failure"] == ["hung", "no result within 1 s"]
+    assert found["2"]["result"]
+    signals = {0: (signal.SIGTERM,), 1: (signal.SIGUSR2,), 2: (signal.SIGKILL,)}
+    part = Part(signal.raise_signal, signals, together=False, timeout=60.0)
+    slurm.Resumable(str(tmp_path / "asked.jsonl"), environment(), part, {})()
+    found = read_store(tmp_path / "asked.jsonl")[1]
+    assert all("result" in found[place] for place in "01"), "asked to end, it goes on"
+    assert found["2"]["failure"] == ["crashed", "a worker process ended with code -9 in its work"]
 
 
 DRIVER = """
@@ -208,6 +225,16 @@ def test_a_scheduler_that_is_not_there_is_one_line(capsys: pytest.CaptureFixture
     assert said[-1].startswith("antennate study: error: dask: expected a scheduler at")
     assert main(["study", "plan.toml", "--slurm", "timeout_min=5", "--out", "run"]) == 2
     assert "expected --engine slurm beside it" in capsys.readouterr().err
+
+
+def test_a_name_that_submitit_does_not_know_is_one_line(capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("submitit")
+    Path("plan.toml").write_text('experiment = "springs"\n[vary]\ncoil_mm = [3.5, 4.0]\n')
+    words = ["--engine", "slurm-local", "--slurm", "timeout=5", "--out", "run"]
+    assert main(["study", "plan.toml", *words]) == 2
+    said = capsys.readouterr().err.strip().splitlines()[-1]
+    assert "--slurm: expected names of submitit, such as timeout_min" in said
+    assert said.endswith("Parameter 'timeout' need to be prefixed by an executor name.")
 
 
 @contextlib.contextmanager

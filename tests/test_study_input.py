@@ -124,6 +124,10 @@ def test_a_bad_range_is_named_as_it_stands_in_the_file(
             "[vary]\n" + "".join(f"{name} = {list(range(100))}\n" for name in "abcde"),
             "vary: expected at most 100000 points, found 10000000000",
         ),
+        (
+            f'trials = 20000\n[vary]\n"tunnel.strewn" = {list(range(100))}\n',
+            "trials: expected at most 1000000 at all points, found 2000000",
+        ),
         ("this is not toml\n", "bad.toml: expected TOML, found: Expected '=' after a key"),
         (OWN, "add --experiment own.py:trial"),
         (

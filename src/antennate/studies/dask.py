@@ -6,8 +6,6 @@ import contextlib
 import logging
 import math
 import multiprocessing
-import os
-import pickle
 import re
 import secrets
 import socket
@@ -20,8 +18,14 @@ from concurrent.futures import CancelledError
 from typing import Any
 
 from antennate.errors import WorkerError, in_one_line
-from antennate.studies.processes import Processes, take_added
-from antennate.studies.submitted import Submitted, folder_of, require_package, require_same
+from antennate.studies.processes import Processes
+from antennate.studies.submitted import (
+    Submitted,
+    folder_of,
+    require_package,
+    require_same,
+    work_apart,
+)
 from antennate.studies.work import Emit, Fail, Failure, Part, Work
 
 CONNECT = 10.0
@@ -215,13 +219,9 @@ def carry_out_apart(
     Raises:
         WorkerError: The driver has other versions or other code, or no process starts.
     """
-    import cloudpickle  # which Dask needs too; it sends what was typed at a prompt
-
     folder = folder_of(theirs)
     require_same(theirs, folder)
-    places = list(part.tasks)
-    function = _Carried(cloudpickle.dumps((part, str(folder), added)))
-    work = Work(function, [(place,) for place in places], part.together, part.timeout)
+    places, work = list(part.tasks), work_apart(part, folder, added)
     answers: list[tuple[int, Any]] = []
 
     def emit(index: int, result: Any) -> None:
@@ -233,32 +233,6 @@ def carry_out_apart(
     with _processes(run) as processes:
         processes.run(work, [range(len(places))], 1, emit, fail)
     return answers
-
-
-class _Carried:
-    """In the process beside the worker: what carries out tasks of a part, given by their places.
-
-    It is unpacked when it is received, so that no import counts as time of a trial.
-    """
-
-    def __init__(self, content: bytes) -> None:
-        self._content = content
-
-    def __getstate__(self) -> bytes:
-        return self._content
-
-    def __setstate__(self, content: bytes) -> None:
-        self._part, folder, added = pickle.loads(content)  # noqa: S301  (a worker of ours made it)
-        os.chdir(folder)
-        take_added(added)
-
-    def __call__(self, *told: Any) -> Any:
-        """Run one task, or some together and emit their results."""
-        part: Part = self._part
-        if not part.together:
-            return part.function(*part.tasks[told[0]])
-        chosen, emit = told
-        return part.function([part.tasks[place] for (place,) in chosen], emit)
 
 
 _IDLE: dict[Processes, tuple[str, threading.Timer]] = {}

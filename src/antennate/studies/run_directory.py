@@ -321,7 +321,7 @@ def _store(place: Path, identity: Mapping[str, Any] | None, overwrite: bool) -> 
             store.clear()
         store.begin(identity)
     except BaseException:
-        store.close(remove=store.identity is None)
+        store.close(remove=store.was_empty)
         raise
     return store
 

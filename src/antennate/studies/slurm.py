@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import faulthandler
 import getpass
 import hashlib
 import json
@@ -13,7 +12,7 @@ import platform
 import signal
 import subprocess
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -23,17 +22,17 @@ from antennate.files import write_whole
 from antennate.messages import shortened
 from antennate.studies.codec import decoded, dumped, encoded
 from antennate.studies.identity import environment
-from antennate.studies.processes import added_objects, take_added
+from antennate.studies.processes import Processes, added_objects
 from antennate.studies.store import Store, parsed, read_store
-from antennate.studies.submitted import require_package, require_same
+from antennate.studies.submitted import require_package, require_same, work_apart
 from antennate.studies.work import Emit, Fail, Failure, Part, Waiting, Work
 
 _LOOK = 0.5
 """How often the driver looks for what the jobs of SLURM have finished [s]."""
 _ANSWER = 60.0
 """Time within which squeue has to answer [s]."""
-_TOGETHER = 12
-"""Most tasks that run at once; of a longer list the first is what its job was at."""
+_LATER = (signal.SIGTERM, signal.SIGUSR1, signal.SIGUSR2)
+"""What SLURM may send to all processes of a job some time before it ends it."""
 
 
 class Slurm:
@@ -62,7 +61,8 @@ class Slurm:
         """Run the tasks on `count` jobs at once; see `Engine`."""
         if work.folder is None:
             raise WorkerError("slurm: expected a run directory that jobs can see, found none")
-        files = _Files(work.folder / self.name, work, emit, fail)
+        at_once = max(map(len, parts)) if work.together else 1
+        files = _Files(work.folder / self.name, work, at_once, emit, fail)
         executor = self._executor(files.folder)
         todo = [place for part in parts for place in part]
         running, todo = files.take_old(todo, earlier_jobs(files.folder))
@@ -81,14 +81,17 @@ class Slurm:
                     if ended:
                         del running[future]
                         job.note.unlink(missing_ok=True)
-                        self._end(future, job, work, waiting, fail)
+                        self._end(future, job, waiting, at_once, fail)
                 time.sleep(_LOOK if running else 0.0)
         finally:
             for future in running:
                 future.cancel()
 
-    def _end(self, future: Any, job: _Job, work: Work, waiting: Waiting, fail: Fail) -> None:
-        """What becomes of the tasks that an ended job did not finish."""
+    def _end(self, future: Any, job: _Job, waiting: Waiting, at_once: int, fail: Fail) -> None:
+        """What becomes of the tasks that an ended job did not finish.
+
+        Of more than run at once the first is what it was at.
+        """
         if not job.left:
             job.file.unlink(missing_ok=True)
             return
@@ -96,8 +99,7 @@ class Slurm:
         if WorkerError.__name__ in text:
             line = next(x for x in reversed(text.splitlines()) if WorkerError.__name__ in x)
             raise WorkerError(f"slurm: {line.partition(': ')[2]}")
-        together = work.together and len(job.left) <= _TOGETHER
-        if (given_up := waiting.lost(job.left, together)) is not None:
+        if (given_up := waiting.lost(job.left, len(job.left) <= at_once)) is not None:
             last = text.strip().splitlines()[-1] if text.strip() else "it was cancelled"
             fail(given_up, Failure("crashed", shortened(f"its job ended: {last}")))
 
@@ -107,7 +109,12 @@ class Slurm:
         try:
             executor = submitit.AutoExecutor(folder, cluster=self._cluster)
             executor.update_parameters(**self._options)
-        except (RuntimeError, ValueError, TypeError, NameError) as error:
+        except NameError as error:
+            raise WorkerError(
+                "--slurm: expected names of submitit, such as timeout_min, mem_gb or "
+                f"slurm_partition; it says: {str(error).partition(chr(10))[0]}"
+            ) from None
+        except (RuntimeError, ValueError, TypeError) as error:
             raise WorkerError(f"slurm: cannot be used: {in_one_line(error)}") from None
         return executor
 
@@ -115,8 +122,9 @@ class Slurm:
 class _Files:
     """The files that the jobs of one driver write, and those of an earlier one."""
 
-    def __init__(self, folder: Path, work: Work, emit: Emit, fail: Fail) -> None:
+    def __init__(self, folder: Path, work: Work, at_once: int, emit: Emit, fail: Fail) -> None:
         self.folder, self._work, self._emit, self._fail = folder, work, emit, fail
+        self._at_once = at_once
         content = pickle.dumps((work.function, list(work.tasks)))
         digest = hashlib.sha256(content).hexdigest()
         self._identity = {**(work.shared or environment()), "work": digest}
@@ -168,7 +176,8 @@ class _Files:
     def job(self, places: list[int]) -> _Job:
         """A new job for some tasks."""
         file = self.folder / f"{time.time_ns()}.jsonl"
-        call = Resumable(str(file), self._identity, self._work.part(places), added_objects())
+        part = self._work.part(places)
+        call = Resumable(str(file), self._identity, part, added_objects(), self._at_once)
         return _Job(file, places, call)
 
     def note(self, job: _Job, cluster: str, number: str) -> None:
@@ -284,27 +293,43 @@ class LocalJob:
 
 
 class Resumable:
-    """What a job calls; SLURM may begin it again, with what it was first given."""
+    """What a job calls; SLURM may begin it again, with what it was first given.
+
+    The trials run in a process beside it, so one that crashes or hangs is found as on one machine.
+    """
 
     def __init__(
-        self, file: str, identity: Mapping[str, Any], part: Part, added: Mapping[str, Any]
+        self,
+        file: str,
+        identity: Mapping[str, Any],
+        part: Part,
+        added: Mapping[str, Any],
+        at_once: int = 1,
     ) -> None:
         self._file, self._identity, self._part, self._added = file, identity, part, added
+        self._at_once = at_once
 
     def __call__(self) -> int:
         """Carry out what is not in its file yet; how many tasks that was."""
         require_same({k: v for k, v in self._identity.items() if k != "work"}, Path())
-        take_added(self._added)
         store = Store(Path(self._file))
         store.begin(self._identity)
         left = {k: task for k, task in self._part.tasks.items() if str(k) not in store.records}
 
-        def fail(place: int, failure: Failure) -> None:
-            store.append(str(place), {"failure": [failure.status, failure.reason]})
+        places = list(left)
+
+        def emit(index: int, result: Any) -> None:
+            store.append(str(places[index]), {"result": encoded(result)})
+
+        def fail(index: int, failure: Failure) -> None:
+            store.append(str(places[index]), {"failure": [failure.status, failure.reason]})
 
         part = Part(self._part.function, left, self._part.together, self._part.timeout)
-        with _watched(part):
-            part.carry_out(lambda p, r: store.append(str(p), {"result": encoded(r)}), fail)
+        indices, size = range(len(left)), self._at_once
+        parts = [indices[i : i + size] for i in indices[::size]]
+        if left:
+            work = work_apart(part, Path.cwd(), self._added, _LATER)
+            Processes().run(work, parts, 1, emit, fail)
         store.close()
         return len(left)
 
@@ -313,16 +338,6 @@ class Resumable:
         from submitit.helpers import DelayedSubmission
 
         return DelayedSubmission(self)
-
-
-@contextlib.contextmanager
-def _watched(part: Part) -> Iterator[None]:
-    """End this process if a part does not end in time, whatever it is doing."""
-    faulthandler.dump_traceback_later(part.timeout * max(1, len(part.tasks)), exit=True)
-    try:
-        yield
-    finally:
-        faulthandler.cancel_dump_traceback_later()
 
 
 def _setting(text: str) -> tuple[str, Any]:

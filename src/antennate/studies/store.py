@@ -39,6 +39,7 @@ class Store:
         records: What was kept before, by key; of a key that comes twice the last counts.
         holds_trials: Whether it holds any, kept before or now.
         damaged: Lines that failed their checksum.
+        was_empty: Whether the file held nothing before this process wrote to it.
 
     Raises:
         OutputError: It cannot be opened, or another process appends to it.
@@ -69,6 +70,7 @@ class Store:
     def _read(self) -> int:
         """Take what the file holds; how many lines are damaged."""
         data = _data(self.path)
+        self.was_empty = not data
         self.identity, self.records, damaged = parsed(data)
         self._end = len(data)
         if data and not data.endswith(b"\n"):
@@ -134,6 +136,7 @@ class Store:
         """Forget everything."""
         os.ftruncate(self._file, 0)
         self.identity, self.records, self.damaged, self._end = None, {}, 0, 0
+        self.was_empty = True
         self.holds_trials = False
 
     def close(self, remove: bool = False) -> None:

@@ -6,6 +6,9 @@ need the same versions and the same code.
 
 from __future__ import annotations
 
+import os
+import pickle
+import signal
 import time
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import BrokenExecutor
@@ -114,6 +117,53 @@ def carry_out(
 
     part.carry_out(lambda place, result: answers.append((place, result)), fail)
     return answers
+
+
+def work_apart(
+    part: Part, folder: Path, added: Mapping[str, Any], ignored: Sequence[int] = ()
+) -> Work:
+    """A part as work for a process beside this one, which needs nothing that this one imported.
+
+    Args:
+        part: Its tasks are named by their order, from 0.
+        folder: Where they are run.
+        added: Objects that were added to registries in the driver.
+        ignored: Signals that it ignores.
+    """
+    import cloudpickle  # which Dask and submitit need too; it sends what was typed at a prompt
+
+    content = cloudpickle.dumps((part, str(folder), added, ignored))
+    tasks = [(place,) for place in part.tasks]
+    return Work(_Carried(content), tasks, part.together, part.timeout)
+
+
+class _Carried:
+    """In the process beside the worker: what carries out tasks of a part, given by their places.
+
+    It is unpacked when it is received, so that no import counts as time of a trial.
+    """
+
+    def __init__(self, content: bytes) -> None:
+        self._content = content
+
+    def __getstate__(self) -> bytes:
+        return self._content
+
+    def __setstate__(self, content: bytes) -> None:
+        told = pickle.loads(content)  # noqa: S301  (a worker of ours made it)
+        self._part, folder, added, ignored = told
+        for number in ignored:
+            signal.signal(number, signal.SIG_IGN)
+        os.chdir(folder)
+        take_added(added)
+
+    def __call__(self, *told: Any) -> Any:
+        """Run one task, or some together and emit their results."""
+        part: Part = self._part
+        if not part.together:
+            return part.function(*part.tasks[told[0]])
+        chosen, emit = told
+        return part.function([part.tasks[place] for (place,) in chosen], emit)
 
 
 def folder_of(theirs: Mapping[str, Any]) -> Path:

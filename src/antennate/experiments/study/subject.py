@@ -25,6 +25,8 @@ from antennate.studies.plan import Point
 Rows = list[dict[str, Any]]
 OF_TRIALS = ("trials", "seed")
 """Parameters and columns that say which trials there are."""
+MOST_TRIALS = 1_000_000
+"""Most trials of a study: the driver has all of them in memory."""
 _MOST_NAMED = 12
 _LONGEST = 100
 """Most entries of a list in a result that have columns."""
@@ -96,13 +98,17 @@ def configurations(config: StudyConfig, subject: Subject) -> list[tuple[Point, A
     """Every point with its configuration.
 
     Raises:
-        ConfigError: A parameter is unknown, a value out of bounds, or the plan is empty.
+        ConfigError: A parameter is unknown, a value out of bounds, the plan is empty, or there are
+            too many trials.
     """
     settings = put_over(config.settings, {} if config.trials is None else {"trials": config.trials})
     for name in config.vary:
         _require_groups(settings, name)
     found: list[tuple[Point, Any]] = []
-    for point in config.points_of(subject.model):
+    points = config.points_of(subject.model)
+    if (count := len(points) * (config.trials or 1)) > MOST_TRIALS:
+        raise ConfigError(f"trials: expected at most {MOST_TRIALS} at all points, found {count}")
+    for point in points:
         try:
             found.append((point, subject.configured(put_over(settings, nested(point)))))
         except ConfigError as error:
