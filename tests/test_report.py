@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import json
 import math
+import os
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -100,6 +101,29 @@ def test_it_is_written_again_and_elsewhere(capsys: pytest.CaptureFixture[str]) -
     assert Path("page.html").read_bytes() == first
     assert "expected no such file" in refusal(capsys, "run", "--out", "page.html")
     assert main(["report", "run", "--out", "page.html", "--overwrite"]) == 0
+
+
+def test_a_pipe_or_a_device_is_never_replaced(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["springs", "--out", "run"]) == 0
+    os.mkfifo("pipe")
+    Path("null").symlink_to("/dev/null")
+    for name in ("pipe", "null"):
+        said = refusal(capsys, "run", "--out", name, "--overwrite")
+        assert f"{name}: expected a file or a new name, found a folder, a pipe or a device" in said
+    assert Path("pipe").is_fifo()
+    assert Path("null").is_char_device()
+    Path("run/report.html").unlink()
+    os.mkfifo("run/report.html")
+    assert "expected a file or a new name" in refusal(capsys, "run")
+
+
+def test_a_link_is_written_through() -> None:
+    assert main(["springs", "--out", "run"]) == 0
+    Path("page.html").write_text("old")
+    Path("link.html").symlink_to("page.html")
+    assert main(["report", "run", "--out", "link.html", "--overwrite"]) == 0
+    assert Path("link.html").is_symlink()
+    assert Path("page.html").read_bytes() == Path("run/report.html").read_bytes()
 
 
 def test_python_and_commands_of_the_robot_leave_one() -> None:

@@ -128,6 +128,14 @@ def test_a_bad_range_is_named_as_it_stands_in_the_file(
             f'trials = 20000\n[vary]\n"tunnel.strewn" = {list(range(100))}\n',
             "trials: expected at most 1000000 at all points, found 2000000",
         ),
+        (
+            '[vary]\n"tunnel.strewn" = [1, 2, 1]\n',
+            "vary.tunnel.strewn: expected each value once, found 1 twice",
+        ),
+        (
+            'plan = "list"\n[vary]\n"tunnel.strewn" = [1, 1]\nseed = [3, 3]\n',
+            "vary: expected each point once, found [1, 3] twice",
+        ),
         ("this is not toml\n", "bad.toml: expected TOML, found: Expected '=' after a key"),
         (OWN, "add --experiment own.py:trial"),
         (

@@ -121,16 +121,18 @@ def replacing(path: Path, overwrite: bool = False) -> Iterator[Path]:
     No file has that name before. After an error nothing of it is left.
 
     Raises:
-        OutputError: The other one exists and may not be replaced, or it cannot be written.
+        OutputError: The other one exists and may not be replaced, or is a folder, a pipe or a
+            device, or it cannot be written.
     """
-    fresh = path.with_name(f".{path.name}.{secrets.token_hex(_RANDOM)}")
     try:
+        place = _place(path) if overwrite else path
+        fresh = place.with_name(f".{place.name}.{secrets.token_hex(_RANDOM)}")
         try:
             yield fresh
             if overwrite:
-                fresh.replace(path)
+                fresh.replace(place)
             else:
-                os.link(fresh, path)  # unlike replace it fails if the file exists by now
+                os.link(fresh, place)  # unlike replace it fails if the file exists by now
         finally:
             fresh.unlink(missing_ok=True)
     except AntennateError:
@@ -143,6 +145,16 @@ def replacing(path: Path, overwrite: bool = False) -> Iterator[Path]:
     except (OSError, ValueError) as error:
         why = getattr(error, "strerror", None) or error
         raise OutputError(f"{path}: expected to write it, found: {why}") from None
+
+
+def _place(path: Path) -> Path:
+    """Where a file is replaced: a link stays one, and so do /dev/stdout and the like."""
+    place = Path(os.path.realpath(path))
+    if place.exists() and not place.is_file():
+        raise OutputError(
+            f"{path}: expected a file or a new name, found a folder, a pipe or a device"
+        )
+    return place
 
 
 def lock(file: BinaryIO) -> bool:
@@ -159,6 +171,7 @@ def lock(file: BinaryIO) -> bool:
 
 def remove_abandoned(path: Path) -> None:
     """Remove what killed processes left that wrote this file; one that lives holds its lock."""
+    path = Path(os.path.realpath(path))
     form = re.compile(rf"\.{re.escape(path.name)}\.[0-9a-f]{{{2 * _RANDOM}}}")
     with contextlib.suppress(OSError):
         for left in [each for each in path.parent.iterdir() if form.fullmatch(each.name)]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import itertools
+import json
 import math
 from collections.abc import Mapping, Sequence
 from typing import Any, Literal
@@ -138,11 +139,23 @@ def _of_lists(kind: Kind, axes: Axes) -> list[Point]:
     if kind == "grid":
         if (count := math.prod(map(len, lists))) > MOST_POINTS:
             raise ConfigError(f"vary: expected at most {MOST_POINTS} points, found {count}")
+        for name, values in zip(axes, lists, strict=True):
+            _require_each_once(f"vary.{name}: expected each value", values)
         return [dict(zip(axes, values, strict=True)) for values in itertools.product(*lists)]
     if len(lengths := {len(values) for values in lists}) > 1:
         found = ", ".join(map(str, sorted(lengths)))
         raise ConfigError(f"vary: expected lists of one length, found lengths {found}")
+    _require_each_once("vary: expected each point", list(zip(*lists, strict=True)))
     return [dict(zip(axes, values, strict=True)) for values in zip(*lists, strict=True)]
+
+
+def _require_each_once(expected: str, values: Sequence[Any]) -> None:
+    """Check that none comes twice: its trials would be counted twice."""
+    found: set[str] = set()
+    for value in values:
+        if (text := json.dumps(value, default=str)) in found:
+            raise ConfigError(f"{expected} once, found {text} twice")
+        found.add(text)
 
 
 def _value(axis: Sequence[Any] | Range, share: float) -> Any:
