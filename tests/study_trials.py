@@ -27,4 +27,5 @@ def trial(config: dict[str, Any], seed: int) -> dict[str, Any]:
         handle = os.open(notes, os.O_WRONLY | os.O_APPEND | os.O_CREAT)
         os.write(handle, f"{config['x']} {seed}\n".encode())
         os.close(handle)
-    return {"value": value, "outcome": "success" if seed % 3 else "timeout"}
+    said = {"said": "w" * 150_000} if mode == "\N{SNAIL} talks\x7f" else {}
+    return {"value": value, "outcome": "success" if seed % 3 else "timeout", **said}

@@ -12,6 +12,7 @@ import shutil
 import subprocess
 import sys
 import time
+import tomllib
 from collections.abc import Callable
 from importlib.metadata import PathDistribution
 from pathlib import Path
@@ -129,6 +130,17 @@ def test_a_trial_that_fails_is_a_row_and_can_be_run_again(
     before = Path("run/trials.csv").read_bytes()
     assert study("--no-figures") == 0  # nothing is left to do
     assert Path("run/trials.csv").read_bytes() == before
+
+
+def test_odd_letters_and_long_text_are_kept_and_read_again() -> None:
+    mode = "\N{SNAIL} talks\x7f"
+    file = Path(plan())
+    text = file.read_text().replace('mode = ""', 'mode = "\\U0001F40C talks\\u007f"')
+    file.write_text(text.replace("[0.5, 1.5]", "[0.5]"))
+    assert study("--no-figures") == 0
+    kept_text = Path("run/config.toml").read_text(encoding="utf-8")
+    assert tomllib.loads(kept_text)["settings"]["mode"] == mode
+    assert [len(row["said"]) for row in antennate.RunDirectory.open("run").rows()] == [150_000] * 6
 
 
 def test_a_child_that_a_trial_forks_says_nothing(capfd: pytest.CaptureFixture[str]) -> None:

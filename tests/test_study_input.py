@@ -77,7 +77,7 @@ def test_a_bad_range_is_named_as_it_stands_in_the_file(
         ),
         (
             drawn("[0.4, nan]"),
-            "vary: tunnel: tunnel.free_width: expected a finite number, found nan",
+            "vary.tunnel.free_width: expected finite numbers, found nan",
         ),
         (
             '[vary]\n"tunnel.free_width" = [0.4, -1.0]\n',
@@ -131,6 +131,10 @@ def test_a_bad_range_is_named_as_it_stands_in_the_file(
         (
             '[vary]\n"tunnel.strewn" = [1, 2, 1]\n',
             "vary.tunnel.strewn: expected each value once, found 1 twice",
+        ),
+        (
+            "[vary]\nx = [1.0, nan]\n",
+            "vary.x: expected finite numbers, found nan",
         ),
         (
             'plan = "list"\n[vary]\n"tunnel.strewn" = [1, 1]\nseed = [3, 3]\n',

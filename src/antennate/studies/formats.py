@@ -56,6 +56,7 @@ def from_csv(text: str) -> list[dict[str, Any]]:
     Raises:
         ValueError: It is no such table.
     """
+    usual = csv.field_size_limit(max(len(text), csv.field_size_limit()))
     try:
         return [
             {key: _value_of(cell) for key, cell in row.items()}
@@ -63,6 +64,8 @@ def from_csv(text: str) -> list[dict[str, Any]]:
         ]
     except csv.Error as error:
         raise ValueError(str(error)) from None
+    finally:
+        csv.field_size_limit(usual)
 
 
 def _cell(value: Any) -> Any:
@@ -116,6 +119,9 @@ def _toml(value: Any) -> str:
     if isinstance(value, BaseModel):
         value = value.model_dump(exclude_defaults=True)
     if isinstance(value, Mapping):
-        items = (f"{json.dumps(key)} = {_toml(item)}" for key, item in value.items())
+        items = (f"{_toml(key)} = {_toml(item)}" for key, item in value.items())
         return f"{{{', '.join(items)}}}"
-    return json.dumps(value) if isinstance(value, str | bool) else repr(value)
+    if isinstance(value, str | bool):
+        # unlike JSON, TOML takes no halves of a character, and no bare delete character
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    return repr(value)

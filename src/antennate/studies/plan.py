@@ -103,11 +103,14 @@ def make_points(kind: Kind, axes: Axes, count: int, seed: int) -> list[Point]:
         seed: Seed of what is drawn.
 
     Raises:
-        ConfigError: Nothing varies, or lists and ranges do not fit the kind.
+        ConfigError: Nothing varies, a value is not finite or given twice, or lists and ranges do
+            not fit the kind.
     """
     if not axes or not all(axes.values()):
         empty = [f"vary.{name}" for name, axis in axes.items() if not axis] or ["vary"]
         raise ConfigError(f"{empty[0]}: expected values, found none: the {kind} is empty")
+    for name, axis in axes.items():
+        _require_finite(name, axis)
     if kind in ("grid", "list"):
         return _of_lists(kind, axes)
     rng = np.random.default_rng(seed)
@@ -147,6 +150,14 @@ def _of_lists(kind: Kind, axes: Axes) -> list[Point]:
         raise ConfigError(f"vary: expected lists of one length, found lengths {found}")
     _require_each_once("vary: expected each point", list(zip(*lists, strict=True)))
     return [dict(zip(axes, values, strict=True)) for values in zip(*lists, strict=True)]
+
+
+def _require_finite(name: str, axis: Sequence[Any] | Range) -> None:
+    for value in () if isinstance(axis, Range) else axis:
+        try:
+            json.dumps(value, allow_nan=False, default=str)
+        except ValueError:
+            raise ConfigError(f"vary.{name}: expected finite numbers, found {value}") from None
 
 
 def _require_each_once(expected: str, values: Sequence[Any]) -> None:
