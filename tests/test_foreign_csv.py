@@ -94,8 +94,17 @@ def test_diameters_are_told_the_same(
     assert f"error: {file}: {why}" in capsys.readouterr().err
 
 
-def test_a_damaged_table_of_a_run_is_refused(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("table", "found"),
+    [
+        ("trial\n1\r2\n", "new-line character"),
+        ("trial,seed\n1,2\n3,4,5\n", "3 of 2 cells in row 2"),
+        ("trial,seed\n1\n", "1 of 2 cells in row 1"),
+        ('trial,reason\n1,"it st', "unexpected end of data"),
+    ],
+)
+def test_a_damaged_table_of_a_run_is_refused(table: str, found: str, tmp_path: Path) -> None:
     (tmp_path / "result.json").write_text("{}")
-    (tmp_path / "trials.csv").write_text("trial\n" + "9" * 200_000 + "\n")
-    with pytest.raises(BadInputError, match=r"trials\.csv: expected a whole file .* field larger"):
+    (tmp_path / "trials.csv").write_bytes(table.encode())
+    with pytest.raises(BadInputError, match=rf"trials\.csv: expected a whole file .*{found}"):
         RunDirectory.open(tmp_path).rows()

@@ -63,6 +63,10 @@ def test_a_function_is_studied_from_python() -> None:
     assert len(springs.rows) == 2
     with pytest.raises(antennate.BadInputError, match="did you mean"):
         antennate.study("springs", {"coil_m": [1.0]})
+    with pytest.raises(
+        antennate.BadInputError, match=r"assumed: .* whose parameters have no sources"
+    ):
+        antennate.study(trial, VARY, plan="sobol", assumed=0.2)
 
 
 @pytest.fixture(scope="module")
@@ -405,7 +409,7 @@ def test_the_commands_of_the_snakefile_leave_the_same_table() -> None:
     outputs = dict(re.findall(r'rule (\w+):(?:\n    .*?)*?\n    output: "(.*)"', text))
     assert outputs == {"shard": "shards/{i}/shard.json", "merge": "run/trials.csv"}
     for number in "12":
-        words = shard.replace("{STUDY}", "plan.toml").replace("{SHARDS}", "2")
+        words = shard.replace("{{input:q}}", "plan.toml").replace("{SHARDS}", "2")
         assert main(shlex.split(words.replace("{{wildcards.i}}", number))[1:]) == 0
         assert Path(outputs["shard"].replace("{i}", number)).is_file()
     words = merge.replace("{params.folders}", "shards/1 shards/2")

@@ -140,6 +140,29 @@ def test_a_bad_range_is_named_as_it_stands_in_the_file(
             'plan = "list"\n[vary]\n"tunnel.strewn" = [1, 1]\nseed = [3, 3]\n',
             "vary: expected each point once, found [1, 3] twice",
         ),
+        (
+            f"points = 8\n{GOOD}",
+            "points: expected plan random, sobol or morris beside it, found grid",
+        ),
+        (f"seed = 8\n{GOOD}", "seed: expected plan random, sobol or morris beside it, found grid"),
+        (f'leave_out = ["robot"]\n{GOOD}', "leave_out: expected assumed beside it, found none"),
+        (
+            f"trials = 2\n[settings]\ntrials = 3\n{GOOD}",
+            "settings.trials: expected none beside trials = 2",
+        ),
+        (
+            "trials = 2\n[vary]\ntrials = [2, 3]\n",
+            "vary.trials: expected none beside trials = 2",
+        ),
+        (
+            f"[settings.tunnel]\nstrewn = 3\n{GOOD}",
+            "settings.tunnel.strewn: expected a parameter that does not vary, found it in vary",
+        ),
+        (
+            'plan = "morris"\nassumed = 0.2\n[settings.tunnel]\nlining_gap = 0.03\n',
+            "settings.tunnel.lining_gap: expected a parameter that does not vary, found it in "
+            "assumed; leave_out keeps its value",
+        ),
         ("this is not toml\n", "bad.toml: expected TOML, found: Expected '=' after a key"),
         (OWN, "add --experiment own.py:trial"),
         (
@@ -177,7 +200,7 @@ def test_a_measure_that_a_function_has_not_is_found_at_its_first_row(
     )
     Path("own.toml").write_text(f'response = "valeu"\ntrials = 3\n{OWN}')
     words = ["study", "own.toml", "--trust-code", "--workers", workers]
-    assert "(did you mean value?), one of trial, value; found valeu" in refusal(capsys, *words)
+    assert "(did you mean value?), one of value; found valeu" in refusal(capsys, *words)
 
 
 @pytest.mark.parametrize("name", ["point", "trial", "seed", "status", "reason", "", "a\\nb"])

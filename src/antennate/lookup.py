@@ -103,8 +103,9 @@ class Registry(Generic[T]):
             return name
         forms = "FILE.xml, MODULE:NAME" if self._kind == "scene" else "MODULE:NAME"
         meant = f" (did you mean {name}:NAME?)" if name.endswith(".py") else ""
+        ours = f"one of {', '.join(self.names)}, or " if self.names else ""
         raise ConfigError(
-            f"expected one of {', '.join(self.names)}, or {forms} or FILE.py:NAME of your own "
+            f"expected {ours}{forms} or FILE.py:NAME of your own "
             f"{self._kind}, found {shown(name)}{meant or nearest(name, self.names)}"
         )
 

@@ -58,10 +58,14 @@ def from_csv(text: str) -> list[dict[str, Any]]:
     """
     usual = csv.field_size_limit(max(len(text), csv.field_size_limit()))
     try:
-        return [
-            {key: _value_of(cell) for key, cell in row.items()}
-            for row in csv.DictReader(io.StringIO(text))
-        ]
+        lines = csv.reader(io.StringIO(text), strict=True)
+        names = next(lines, [])
+        rows: list[dict[str, Any]] = []
+        for line in filter(None, lines):
+            if len(line) != len(names):
+                raise ValueError(f"{len(line)} of {len(names)} cells in row {len(rows) + 1}")
+            rows.append(dict(zip(names, map(_value_of, line), strict=True)))
+        return rows
     except csv.Error as error:
         raise ValueError(str(error)) from None
     finally:

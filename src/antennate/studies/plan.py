@@ -68,7 +68,7 @@ class Range(BaseModel):
             value = self.low + share * (self.high - self.low)
         if self.whole:
             return min(max(math.floor(value + 0.5), int(self.low)), int(self.high))
-        return value
+        return min(max(value, self.low), self.high)
 
 
 def _form(axis: Any) -> str | None:

@@ -63,7 +63,7 @@ def effects(
         names: Conditions.
         response: What is compared.
     """
-    if config.plan != "morris" or response is None:
+    if config.plan != "morris" or response is None or not by_cell:
         return []
     values = _values(by_cell, points, names, response)
     plan = (len(axes), config.points, config.seed)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, cast
 
 from antennate.errors import ConfigError, SceneError, SimulationError
 from antennate.experiments.study import measures
@@ -84,6 +84,7 @@ def check(config: StudyConfig) -> None:
     """
     subject = find(config.experiment)
     _require_names(config, subject)
+    _require_each_used(config, subject)
     (_, first), *_ = configurations(config, subject)
     try:
         subject.check(first)
@@ -99,6 +100,48 @@ def _require_names(config: StudyConfig, subject: Subject) -> None:
         if name in OF_STUDY or not (name and name.isprintable()):
             why = "as the study has this column" if name in OF_STUDY else "of letters that show"
             raise ConfigError(f"vary.{shortened(name)}: expected another name, {why}")
+
+
+def _require_each_used(config: StudyConfig, subject: Subject) -> None:
+    """Check that nothing is given that another value overrides or that the plan does not read."""
+    drawn = StudyConfig.model_fields
+    for name in ("points", "seed") if config.plan in ("grid", "list") else ():
+        if getattr(config, name) != drawn[name].default:
+            raise ConfigError(
+                f"{name}: expected plan random, sobol or morris beside it, found {config.plan}"
+            )
+    if config.assumed is None and config.leave_out:
+        raise ConfigError("leave_out: expected assumed beside it, found none")
+    if config.assumed is not None and subject.model is None:
+        raise ConfigError(
+            f"assumed: expected an experiment, found {config.experiment}, whose parameters have no "
+            "sources"
+        )
+    for table, names in (("settings", config.settings), ("vary", config.vary)):
+        if config.trials is not None and "trials" in names:
+            raise ConfigError(f"{table}.trials: expected none beside trials = {config.trials}")
+    axes = config.axes(subject.model)
+    for name in axes:
+        if within := [other for other in axes if other.startswith(f"{name}.")]:
+            raise ConfigError(
+                f"vary.{within[0]}: expected a parameter of no group that varies as a whole, "
+                f"found {name} too"
+            )
+        if _holds(config.settings, name):
+            also = "vary" if name in config.vary else "assumed; leave_out keeps its value"
+            raise ConfigError(
+                f"settings.{name}: expected a parameter that does not vary, found it in {also}"
+            )
+
+
+def _holds(settings: Mapping[str, Any], name: str) -> bool:
+    """Whether nested tables have a value at a dotted name."""
+    inner: Any = settings
+    for part in name.split("."):
+        if not isinstance(inner, Mapping) or part not in inner:
+            return False
+        inner = cast("Mapping[str, Any]", inner)[part]
+    return True
 
 
 def _require_response(config: StudyConfig, columns: Columns) -> None:

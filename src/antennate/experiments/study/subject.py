@@ -23,7 +23,7 @@ from antennate.studies.experiment import Experiment, Trial, no_row, no_step
 from antennate.studies.plan import Point
 
 Rows = list[dict[str, Any]]
-OF_TRIALS = ("trials", "seed")
+OF_TRIALS = ("trials", "trial", "seed")
 """Parameters and columns that say which trials there are."""
 MOST_TRIALS = 1_000_000
 """Most trials of a study: the driver has all of them in memory."""
