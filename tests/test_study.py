@@ -422,7 +422,7 @@ def study_of(shares: Callable[[dict[str, Any]], dict[str, float]], seed: int) ->
         for name, share in shares(point).items()
         for trial in range(10)
     ]
-    return StudyOutcome(config, points, "controller", list(names), rows, len(rows), len(rows))
+    return StudyOutcome(config, points, "controller", config.vary, rows, len(rows), len(rows))
 
 
 def test_where_nothing_has_an_effect_none_is_found() -> None:
@@ -464,6 +464,75 @@ def test_one_trial_a_point_tells_no_noise() -> None:
     assert "of 8 trials a point, the length depends on a." in many.sentence
     one = antennate.study(slope, vary=vary, plan="morris", points=6, trials=1, workers=1)
     assert "Of 1 trial a point no noise is known" in one.sentence
+
+
+def of_the_point(config: dict[str, Any], seed: int) -> dict[str, float]:
+    """A length that is known but for noise of 0.3; of `d` it does not depend."""
+    numbers = [abs(round(1e6 * v)) for v in config.values() if not isinstance(v, str)]
+    noise = 0.3 * np.random.default_rng([seed, *numbers]).normal()
+    of_k = {"x": 0.0, "y": 3.0, "z": 0.0}[config["k"]]
+    line = 2.0 * config["a"] - 5.0 * config["b"] + 0.5 * np.log10(config["l"])
+    return {"length_mm": line + of_k + 0.1 * config["w"] + noise}
+
+
+@pytest.mark.parametrize("kind", ["random", "sobol"])
+def test_slopes_of_a_random_plan_are_those_of_the_function(kind: str, tmp_path: Path) -> None:
+    """Slopes times width of the ranges, by hand; a choice against the first one."""
+    vary = {
+        "a": {"low": 0.0, "high": 1.0},
+        "b": {"low": 0.0, "high": 2.0},
+        "l": {"low": 0.01, "high": 1.0, "log": True},
+        "w": {"low": 1, "high": 6, "whole": True},
+        "k": ["x", "y", "z"],
+        "d": {"low": -1.0, "high": 1.0},
+    }
+    result = antennate.study(
+        of_the_point, vary, plan=kind, points=256, trials=1, workers=1, out=tmp_path / "run"
+    )
+    effects = {effect["parameter"]: effect for effect in result.summary["effects"]}
+    expected = {"a": 2.0, "b": -10.0, "l": 1.0, "w": 0.5, "k = y": 3.0, "k = z": 0.0, "d": 0.0}
+    assert {name: e["slope"] for name, e in effects.items()} == pytest.approx(expected, abs=0.25)
+    above = {name for name, effect in effects.items() if effect["above_noise"]}
+    assert above == {"a", "b", "l", "w", "k = y"}
+    assert "Above the noise of 256 points, the length depends on b, k = y, a and 2 more" in (
+        result.sentence
+    )
+    assert (tmp_path / "run" / "figures" / "effects.png").is_file()
+
+
+def test_slopes_and_intervals_are_those_of_least_squares_and_hc3() -> None:
+    """Against NumPy's least squares; HC3 is the jackknife but for the factor (n - 1) / n."""
+    rng = np.random.default_rng(3)
+    axes = {"a": Range(low=0.0, high=1.0), "b": Range(low=0.0, high=1.0)}
+    config = StudyConfig(plan="random", points=30, trials=1, vary=axes)
+    points = config.points_of(None)
+    design = np.array([[1.0, point["a"], point["b"]] for point in points])
+    response = design @ [0.5, 2.0, 0.0] + design[:, 1] * rng.normal(size=30)
+    rows = [
+        {"point": n, "trial": 0, "status": "ok", "length_mm": value}
+        for n, value in enumerate(response.tolist())
+    ]
+    outcome = StudyOutcome(config, points, "", axes, rows, 30, 30)
+    first, second = outcome.result()["effects"]
+
+    def solved(keep: Any) -> Any:
+        return np.linalg.lstsq(design[keep], response[keep], rcond=None)[0]
+
+    whole = solved(slice(None))
+    assert (first["slope"], second["slope"]) == pytest.approx(tuple(whole[1:]), rel=1e-9)
+    without = np.array([solved(np.arange(30) != left_out) for left_out in range(30)])
+    half = 2.0518 * np.sqrt(((without - whole) ** 2).sum(axis=0))  # Student's t of 27, 97.5 %
+    assert first["slope95"] == pytest.approx((whole[1] - half[1], whole[1] + half[1]), rel=1e-4)
+    assert second["slope95"] == pytest.approx((whole[2] - half[2], whole[2] + half[2]), rel=1e-4)
+
+
+def test_as_many_points_as_parameters_tell_nothing(tmp_path: Path) -> None:
+    vary = {name: {"low": 0.0, "high": 1.0} for name in "abcdefghij"}
+    result = antennate.study(
+        lambda config, seed: {"value": config["a"]}, vary, plan="random", points=11, trials=1
+    )
+    assert "Of 11 points no noise is known" in result.sentence
+    assert len(experiments.load("study").tables(result.summary)[0].columns) == 1
 
 
 def test_figures_stand_in_one_column_and_tell_counts_and_noise() -> None:

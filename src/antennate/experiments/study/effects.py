@@ -1,4 +1,4 @@
-"""Morris's effects of the parameters, and how large they come out where nothing has an effect."""
+"""Effects of the parameters, and how large they come out where nothing has an effect."""
 
 from __future__ import annotations
 
@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 
 from antennate.experiments.study.config import StudyConfig
+from antennate.experiments.study.regression import slopes
 from antennate.studies import statistics
-from antennate.studies.plan import elementary_effects
+from antennate.studies.plan import Axes, Point, elementary_effects
 from antennate.types import Floats
 
 SUCCESS = "success_share"
@@ -39,33 +40,39 @@ def value(row: Row, response: str | None) -> float:
 
 def effects(
     config: StudyConfig,
-    axes: Sequence[str],
+    axes: Axes,
     by_cell: Mapping[tuple[int, str], Sequence[Row]],
-    points: int,
+    points: Sequence[Point],
     names: Sequence[str],
     response: str | None,
 ) -> list[dict[str, Any]]:
-    """Of a Morris plan: the effects of each parameter, on conditions and on their differences.
+    """The effects of each parameter, on conditions and on their differences.
 
-    Each has `noise`: the size that the largest effect of a study stays below if nothing has an
-    effect, in all but `CHANCE` of such studies over all targets (Bonferroni). Then a trial comes
-    out alike at every point. So the trials of each number are shuffled between the points, those
-    of all conditions alike, and the largest mu* is taken of each shuffled study (permutation test
-    with the maximum, Westfall and Young, Resampling-Based Multiple Testing, 1993). A strong cause
-    raises the noise, so that weak ones may be missed; it finds none that is not there. From one
+    Of a random and a Sobol plan they are slopes (`regression.slopes`), of a grid and a list there
+    are none.
+
+    Of a Morris plan each has `noise`: the size that the largest effect of a study stays below if
+    nothing has an effect, in all but `CHANCE` of such studies over all targets (Bonferroni). Then a
+    trial comes out alike at every point. So the trials of each number are shuffled between the
+    points, those of all conditions alike, and the largest mu* is taken of each shuffled study
+    (permutation test with the maximum, Westfall and Young, Resampling-Based Multiple Testing,
+    1993). A strong cause raises the noise, so that weak ones may be missed; it finds none that is
+    not there. From one
     trial a point nothing can be said: `noise` and `above_noise` are None.
 
     Args:
         config: The study.
-        axes: Names of what varies.
+        axes: What varies.
         by_cell: Rows of each point and condition.
-        points: Number of points.
+        points: Values of what varies.
         names: Conditions.
         response: What is compared.
     """
-    if config.plan != "morris" or response is None or not by_cell:
+    if config.plan in ("grid", "list") or response is None or not by_cell:
         return []
-    values = _values(by_cell, points, names, response)
+    values = _values(by_cell, len(points), names, response)
+    if config.plan != "morris":
+        return slopes(axes, points, _targets(_mean(values), names), CHANCE)
     plan = (len(axes), config.points, config.seed)
     noise = _noise(values, names, plan)
     return [
@@ -73,6 +80,12 @@ def effects(
         for target, means in _targets(_mean(values), names).items()
         for name, found in zip(axes, elementary_effects(*plan, means), strict=True)
     ]
+
+
+def size(effect: Row) -> tuple[float | None, tuple[float, float] | None]:
+    """How large an effect is, with its interval: a slope, or Morris's mu*."""
+    name = "slope" if "slope" in effect else "mu_star"
+    return effect[name], effect[f"{name}95"]
 
 
 def _values(

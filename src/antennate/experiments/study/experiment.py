@@ -8,23 +8,45 @@ from typing import Any
 from antennate.experiments.study import labels, measures
 from antennate.experiments.study import run as study
 from antennate.experiments.study.config import StudyConfig
+from antennate.experiments.study.effects import size
 from antennate.studies.experiment import Experiment
-from antennate.studies.measures import NONE, Measure, Table, shown
+from antennate.studies.measures import NONE, Table, shown
 
 _MOST = 60
 """Most lines of a table."""
+_MOST_AXES = 8
+"""Most parameters whose values a table of points shows."""
 _NAMED = 3
 """Parameters that the sentence names."""
 
 
+_BELOW = "The largest stays below the noise in 95 % of studies without any effect, found from "
+_MORRIS = (
+    "Mean size of the change of the {} over the whole range of a parameter (Morris's mu*), with a "
+    "95 % interval over trajectories. Sizes cannot be negative: an interval above 0 is no effect. "
+    f"{_BELOW}these trials, shuffled between the points."
+)
+_SLOPES = (
+    "Change of the {} from one end of a parameter's range to the other, or from the first choice "
+    "to the one named (least squares over all parameters at once), with its 95 % interval. "
+    f"{_BELOW}what the fit leaves over, with random signs."
+)
+
+
 def tables(result: Mapping[str, Any]) -> Sequence[Table]:
     """What the response depends on, or the points one by one."""
-    found = [_effects(result)] if result["effects"] else [_points(result)]
+    found = [_effects(result)] if _known(result) else [_points(result)]
     return [table for table in found if table.rows]
+
+
+def _known(result: Mapping[str, Any]) -> bool:
+    """Whether any effect is known."""
+    return any(size(effect)[0] is not None for effect in result["effects"])
 
 
 def _points(result: Mapping[str, Any]) -> Table:
     cells, axes = result["points"], result["axes"]
+    shown_axes = axes if len(axes) <= _MOST_AXES else []
     names = list(dict.fromkeys(cell["condition"] for cell in cells))
     by_point: dict[int, list[Mapping[str, Any]]] = {}
     for cell in cells:
@@ -35,7 +57,7 @@ def _points(result: Mapping[str, Any]) -> Table:
         (
             str(number),
             [
-                *(_value(of[0]["values"][axis]) for axis in axes),
+                *(_value(of[0]["values"][axis]) for axis in shown_axes),
                 *(labels.cell(measure, c["response"], c["response95"]) for c in of),
             ],
         )
@@ -44,8 +66,10 @@ def _points(result: Mapping[str, Any]) -> Table:
     note = f"Mean of each point with its 95 % interval, {_ended(result)} in all."
     if len(rows) > _MOST:
         note += f" The first {_MOST} of {len(rows)} points; result.json has all."
-    columns = [*(labels.axis(result, axis) for axis in axes), *heads]
-    return Table("Points", columns, rows[:_MOST], note, leading=len(axes))
+    if not shown_axes:
+        note += f" The values of the {len(axes)} parameters of each point are in trials.csv."
+    columns = [*(labels.axis(result, axis) for axis in shown_axes), *heads]
+    return Table("Points", columns, rows[:_MOST], note, leading=len(shown_axes))
 
 
 def _ended(result: Mapping[str, Any]) -> str:
@@ -67,33 +91,25 @@ def _effects(result: Mapping[str, Any]) -> Table:
     by_name: dict[str, dict[str, Mapping[str, Any]]] = {}
     for effect in result["effects"]:
         by_name.setdefault(effect["parameter"], {})[effect["of"]] = effect
-    ranked = sorted(by_name.items(), key=lambda item: -(item[1][targets[-1]]["mu_star"] or 0.0))
+    ranked = sorted(by_name.items(), key=lambda item: -abs(size(item[1][targets[-1]])[0] or 0.0))
     measure = labels.measure(result)
-    rows = [(name, [*(_size(measure, of[t]) for t in targets), _above(of)]) for name, of in ranked]
+    rows = [
+        (name, [*(labels.cell(measure, *size(of[t])) for t in targets), _above(of)])
+        for name, of in ranked
+    ]
     floors = [labels.cell(measure, ranked[0][1][target].get("noise")) for target in targets]
+    note = _MORRIS if result["plan"] == "morris" else _SLOPES
     return Table(
         "Effects",
         [*(target or measure.title for target in targets), "above the noise"],
-        [(f"noise of {_trials(result)} a point", [*floors, ""]), *rows],
-        f"Mean size of the change of the {measure.title} over the whole range of a parameter "
-        "(Morris's mu*), with a 95 % interval over trajectories. Sizes cannot be negative: an "
-        "interval above 0 is no effect. The largest stays below the noise in 95 % of studies "
-        "without any effect, found from these trials, shuffled between the points.",
+        [(f"noise of {labels.sample(result)}", [*floors, ""]), *rows],
+        note.format(measure.title),
     )
-
-
-def _size(measure: Measure, effect: Mapping[str, Any]) -> str:
-    return labels.cell(measure, effect["mu_star"], effect["mu_star95"])
 
 
 def _above(of: Mapping[str, Mapping[str, Any]]) -> str:
     found = [target or "yes" for target, effect in of.items() if effect.get("above_noise")]
     return ", ".join(found) or NONE
-
-
-def _trials(result: Mapping[str, Any]) -> str:
-    most = max(cell["trials"] for cell in result["points"])
-    return f"{most} trial{'s' if most != 1 else ''}"
 
 
 def sentence(result: Mapping[str, Any]) -> str:
@@ -118,18 +134,17 @@ def sentence(result: Mapping[str, Any]) -> str:
 def _depends(result: Mapping[str, Any]) -> str:
     """What the response depends on, of the last target: the parameters above the noise."""
     last = result["effects"][-1]["of"]
-    found = [e for e in result["effects"] if e["of"] == last and e["mu_star"] is not None]
-    found.sort(key=lambda effect: -effect["mu_star"])
+    found = [e for e in result["effects"] if e["of"] == last and size(e)[0] is not None]
+    found.sort(key=lambda effect: -abs(size(effect)[0] or 0.0))
     what = "the " + " of ".join(filter(None, [labels.measure(result).label, last]))
     above = [effect["parameter"] for effect in found if effect.get("above_noise")]
+    of = labels.sample(result)
     if above:
         more = f" and {len(above) - _NAMED} more" if len(above) > _NAMED else ""
-        names = ", ".join(above[:_NAMED])
-        return f"Above the noise of {_trials(result)} a point, {what} depends on {names}{more}"
-    trials = _trials(result)
-    if any(effect.get("above_noise") is None for effect in found):
-        return f"Of {trials} a point no noise is known, so nothing tells what {what} depends on"
-    return f"Of {len(found)} parameters nothing moves {what} above the noise of {trials} a point"
+        return f"Above the noise of {of}, {what} depends on {', '.join(above[:_NAMED])}{more}"
+    if not found or any(effect.get("above_noise") is None for effect in found):
+        return f"Of {of} no noise is known, so nothing tells what {what} depends on"
+    return f"Of {len(found)} parameters nothing moves {what} above the noise of {of}"
 
 
 def _counted(counts: Mapping[str, int]) -> str:

@@ -14,13 +14,14 @@ from matplotlib.figure import Figure
 
 from antennate import figures as style
 from antennate.experiments.study import labels
+from antennate.experiments.study.effects import size
 from antennate.experiments.study.run import StudyOutcome
 from antennate.studies.measures import NONE, Measure, shown
 
 _WIDTH = 4.5
 """Width of a figure [inches]: its letters are then 8 pixels high on a phone."""
 _MOST_SIZES = 12
-"""Parameters drawn for each target of a Morris plan, the largest."""
+"""Effects drawn for each target, the largest."""
 _MOST_MAPS = 12
 _MOST_COLUMNS = 5
 """Columns of a map whose cells have room for interval and counts."""
@@ -32,7 +33,7 @@ Result = Mapping[str, Any]
 def figures(outcome: StudyOutcome) -> dict[str, Figure]:
     """The figure that suits the plan."""
     result = outcome.result()
-    if result["effects"]:
+    if any(size(effect)[0] is not None for effect in result["effects"]):
         return {"effects": effects(result)}
     if outcome.config.plan == "grid" and len(result["axes"]) > 1:
         return {"map": maps(result)}
@@ -41,41 +42,49 @@ def figures(outcome: StudyOutcome) -> dict[str, Figure]:
 
 @style.styled
 def effects(result: Result) -> Figure:
-    """Morris's mu* of the largest parameters and the noise; a panel for each target."""
+    """The largest effects and the noise; a panel for each target."""
     targets = list(dict.fromkeys(effect["of"] for effect in result["effects"]))
     parameters = len(result["effects"]) // len(targets)
     count = min(_MOST_SIZES, parameters)
     figure = style.canvas(_WIDTH, 1.0 + len(targets) * (0.75 + 0.32 * count))
     panels = figure.subplots(len(targets), 1, squeeze=False, sharex=True)[:, 0]
     measure = labels.measure(result)
+    signed = result["plan"] != "morris"
     for panel, target in zip(panels, targets, strict=True):
-        found = [e for e in result["effects"] if e["of"] == target and e["mu_star"] is not None]
-        found.sort(key=lambda effect: effect["mu_star"])
-        _sizes(panel, found[-count:], measure)
+        found = [e for e in result["effects"] if e["of"] == target and size(e)[0] is not None]
+        found.sort(key=lambda effect: abs(size(effect)[0] or 0.0))
+        _sizes(panel, found[-count:], measure, signed)
         some = f", the {count} largest of {parameters}" if count < parameters else ""
         panel.set_title(f"{target or measure.label}{some}")
-    panels[0].set_xlim(left=0.0)  # of all panels; only now, as it ends their scaling
+    if signed:
+        most = max(map(abs, panels[0].get_xlim()))
+        panels[0].set_xlim(-most, most)
+    else:
+        panels[0].set_xlim(left=0.0)  # of all panels; only now, as it ends their scaling
     unit = f" [{measure.unit}]" if measure.unit else ""
-    panels[-1].set_xlabel(f"mean size of the change of\n{measure.label}{unit}")
-    trials = max(cell["trials"] for cell in result["points"])
+    what = "change" if signed else "mean size of the change"
+    panels[-1].set_xlabel(f"{what} of\n{measure.label}{unit}")
     handles, names = panels[0].get_legend_handles_labels()
-    note = f"noise of {trials} trials a point" if names else "no noise known of 1 trial a point"
+    of = labels.sample(result)
+    note = f"noise of {of}" if names else f"no noise known of {of}"
     figure.legend(handles, [note], loc="outside upper left") if names else figure.suptitle(note)
     return figure
 
 
-def _sizes(panel: Axes, found: Sequence[Result], measure: Measure) -> None:
-    """Each mu* with its interval, its name above it; grey as far as noise alone would reach."""
+def _sizes(panel: Axes, found: Sequence[Result], measure: Measure, signed: bool) -> None:
+    """Each effect with its interval, its name above it; grey as far as noise alone would reach."""
     noise = found[0]["noise"] if found else None
     if noise is not None:
-        panel.axvspan(0.0, measure.scale * noise, color=style.FAINT, linewidth=0, label="noise")
+        ends = (-measure.scale * noise if signed else 0.0, measure.scale * noise)
+        panel.axvspan(*ends, color=style.FAINT, linewidth=0, label="noise")
     for place, effect in enumerate(found):
-        size, ends = effect["mu_star"], effect["mu_star95"] or (effect["mu_star"],) * 2
+        middle, interval = size(effect)
+        ends = measure.scale * np.array(interval or (middle, middle))
         colour = style.SERIES[0] if effect["above_noise"] else style.MUTED
-        panel.plot(measure.scale * np.array(ends), [place, place], color=colour, linewidth=1.0)
+        panel.plot(ends, [place, place], color=colour, linewidth=1.0)
         look = {"marker": "o", "markersize": 5, "color": colour}
         panel.plot(
-            [measure.scale * size],
+            measure.scale * np.array([middle]),
             [place],
             **look,
             markerfacecolor=colour if effect["above_noise"] else "white",

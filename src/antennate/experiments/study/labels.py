@@ -56,6 +56,14 @@ def cell(of: Measure, number: Any, interval: Any = None) -> str:
     return text if interval is None else f"{text} ({shown(interval, of.form, of.scale)})"
 
 
+def sample(result: Mapping[str, Any]) -> str:
+    """What the noise of the effects is of: trials a point, or points."""
+    if result["plan"] != "morris":
+        return f"{len({cell['point'] for cell in result['points']})} points"
+    most = max(cell["trials"] for cell in result["points"])
+    return f"{most} trial{'s' if most != 1 else ''} a point"
+
+
 def axis(result: Mapping[str, Any], path: str) -> str:
     """A parameter: the last part of its dotted name in words, with its unit."""
     name, unit = path.rpartition(".")[2], ""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -10,7 +10,7 @@ import numpy as np
 from antennate.experiments.study.config import StudyConfig
 from antennate.experiments.study.effects import SUCCESS, effects, value
 from antennate.studies import statistics
-from antennate.studies.plan import Point
+from antennate.studies.plan import Axes, Point
 
 _NO_MEASURE = ("point", "trial", "seed", "schema")
 NO_RESULT = frozenset({"failed", "crashed", "hung"})
@@ -21,7 +21,7 @@ Row = Mapping[str, Any]
 def summary(
     config: StudyConfig,
     points: Sequence[Point],
-    axes: Sequence[str],
+    axes: Axes,
     condition: str,
     rows: Sequence[Row],
 ) -> dict[str, Any]:
@@ -44,11 +44,11 @@ def summary(
             name: _whole([r for n in by_cell if n[1] == name for r in by_cell[n]]) for name in names
         },
         "points": cells,
-        "effects": effects(config, axes, by_cell, len(points), names, response),
+        "effects": effects(config, axes, by_cell, points, names, response),
     }
 
 
-def _default_response(rows: Sequence[Row], axes: Sequence[str]) -> str | None:
+def _default_response(rows: Sequence[Row], axes: Iterable[str]) -> str | None:
     """Share of successes, or else the first number of the rows."""
     if not rows or "outcome" in rows[0]:
         return SUCCESS if rows else None

@@ -24,7 +24,7 @@ from antennate.experiments.study.subject import (
 )
 from antennate.messages import nearest, shortened
 from antennate.studies.experiment import OnRow, OnStep, Trial, no_row, no_step
-from antennate.studies.plan import Point
+from antennate.studies.plan import Axes, Point
 from antennate.studies.pool import gather
 from antennate.studies.work import Fail, Failure
 
@@ -44,7 +44,7 @@ class StudyOutcome:
         config: What was run.
         points: The points of the plan.
         condition: Column that tells the condition of a row; empty without.
-        axes: Names of what varies.
+        axes: What varies.
         rows: One for each trial, all with the same keys.
         total: Trials of the whole plan.
         ended: Those of them that have ended.
@@ -54,7 +54,7 @@ class StudyOutcome:
     config: StudyConfig
     points: Sequence[Point]
     condition: str
-    axes: Sequence[str]
+    axes: Axes
     rows: Rows
     total: int
     ended: int
@@ -168,9 +168,9 @@ def run(
     """
     subject = find(config.experiment)
     points = configurations(config, subject)
-    axes = list(config.axes(subject.model))
+    axes = config.axes(subject.model)
     tasks: list[_Task] = [
-        (config.experiment, axes, number, configured, trial)
+        (config.experiment, list(axes), number, configured, trial)
         for number, (_, configured) in enumerate(points)
         for trial in subject.every(configured)
     ]
