@@ -55,9 +55,9 @@ def _columns(axes: Axes, points: Sequence[Point]) -> Iterator[tuple[str, Floats]
     for name, axis in axes.items():
         values = [point[name] for point in points]
         if isinstance(axis, Range):
-            shape = np.log if axis.log else np.asarray
-            low, high = shape(axis.low), shape(axis.high)
-            yield name, (shape(np.array(values, float)) - low) / (high - low)
+            ends = np.array([axis.low, axis.high, *values], float)
+            low, high, *spread = np.log(ends) if axis.log else ends
+            yield name, (np.array(spread) - low) / (high - low)
             continue
         texts = [_text(value) for value in values]
         for choice in axis[1:]:
@@ -76,7 +76,7 @@ def _fit(design: Floats, response: Floats, chance: float) -> list[dict[str, Any]
         return [unknown] * (width - 1)
     from scipy import special  # as Student's quantile needs it; scipy.stats takes a second
 
-    solve = np.linalg.pinv(design)
+    solve: Floats = np.linalg.pinv(design).astype(float)
     found = solve @ response
     leverage = np.einsum("ij,ji->i", design, solve)
     if (leverage > 1.0 - _ROUNDING).any():  # one point alone decides a slope: no spread is known
