@@ -37,6 +37,7 @@ PARTS: dict[str, Callable[[bool], dict[str, Any]]] = {
     "tick": trial.measure_ticks,
     "growth": growth.measure,
     "cores": cores.measure,
+    "whole": starting.measure_whole,
     "dask": starting.measure_dask,
     "start": starting.measure_start,
     "peers": peers.measure,

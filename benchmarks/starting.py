@@ -4,6 +4,8 @@
   cluster here.
 - `start`: time on the clock from the command to the first control tick, to import the package, and
   from the command to the first trial that a study goes on with.
+- `whole`: the main job, `antennate tunnel` as it is by default but for its figures, with one worker
+  and with two.
 """
 
 from __future__ import annotations
@@ -172,4 +174,22 @@ def measure_start(quick: bool) -> dict[str, Any]:
     return {
         "seconds": {name: spread(values) for name, values in found.items()},
         "import": spread(imported),
+    }
+
+
+def whole_run(workers: int, more: list[str]) -> float:
+    """Time on the clock of the command [s]."""
+    with tempfile.TemporaryDirectory() as folder:
+        words = [sys.executable, "-m", "antennate", "tunnel", "--out", f"{folder}/run", *more]
+        words += ["--no-figures", "--workers", str(workers)]
+        return wall_seconds(lambda: subprocess.run(words, check=True, capture_output=True))
+
+
+def measure_whole(quick: bool) -> dict[str, Any]:
+    """The main job on one worker and on two, once each: it takes minutes."""
+    more = ["--trials", "2", "--time-limit", "5"] if quick else []
+    found = in_turn({n: lambda n=n: whole_run(n, more) for n in (1, CORES)}, 1)
+    return {
+        "seconds": {str(n): spread(values) for n, values in found.items()},
+        "faster": spread(ratios(found[1], found[CORES])),
     }
