@@ -34,7 +34,7 @@ def _there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         ),
         (
             f"[search]\nantenna.friction = {{ low = 0.5, high = 0.1 }}\n{WALL}",
-            "search.antenna.friction.range: expected low < high, got low 0.5 and high 0.1",
+            "search.antenna.friction.range: expected low < high, found low 0.5 and high 0.1",
         ),
         (
             f"[search]\nantenna.friction = {{ low = 0.1, high = 0.5, rising = true }}\n{WALL}",

@@ -151,7 +151,7 @@ def test_a_traverse_that_blows_up_is_invalid_and_enters_nothing(monkeypatch):
 @pytest.mark.parametrize(
     ("values", "message"),
     [
-        ({"nearest": 0.8}, "nearest must not exceed from_place, 0.5, got 0.8"),
+        ({"nearest": 0.8}, "nearest must not exceed from_place, 0.5, found 0.8"),
         ({"profiles": ("stiff", "stiff")}, "profiles must differ"),
         ({"speeds": (0.1, 0.0)}, "speeds must be above 0"),
         ({"antenna": {"sensor": {"rate": 300.0}}}, "whole fraction of the physics rate 2000 Hz"),

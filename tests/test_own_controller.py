@@ -304,5 +304,5 @@ def test_the_reason_of_a_failure_names_the_line_of_the_user(tmp_path: Path) -> N
 
 
 def test_a_sensor_longer_than_its_antenna_is_refused() -> None:
-    with pytest.raises(ValueError, match=r"at most the length of 0\.14 m, got 0\.5 m"):
+    with pytest.raises(ValueError, match=r"at most the length of 0\.14 m, found 0\.5 m"):
         AntennaSpec.model_validate({"length": 0.14, "sensor": {"active_length": 0.5}})

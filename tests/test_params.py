@@ -143,7 +143,7 @@ def test_calibration_counts_in_the_wrong_order_are_refused() -> None:
 
 
 def test_a_tunnel_needs_one_turn_between_every_two_pieces() -> None:
-    with pytest.raises(ValidationError, match="expected 2, got 1"):
+    with pytest.raises(ValidationError, match="expected 2, found 1"):
         TunnelParams(segments=(1.0, 1.0, 1.0), turns_deg=(90.0,))
 
 

@@ -26,20 +26,20 @@ def drawn(axis: str, name: str = "tunnel.free_width") -> str:
     [
         ('{ low = "a", high = 3 }', ".range.low: expected a number, found 'a'"),
         ("{ low = 1.0 }", ".range.high: expected a value, found none"),
-        ("{ low = 0.5, high = 0.4 }", ".range: expected low < high, got low 0.5 and high 0.4"),
+        ("{ low = 0.5, high = 0.4 }", ".range: expected low < high, found low 0.5 and high 0.4"),
         ("{ low = nan, high = 0.5 }", ".range.low: expected a finite number, found nan"),
         ("{ low = 0.4, high = inf }", ".range.high: expected a finite number, found inf"),
         (
             "{ low = -1.0, high = 0.5, log = true }",
-            ".range: expected 0 < low < high, got low -1 and high 0.5",
+            ".range: expected 0 < low < high, found low -1 and high 0.5",
         ),
         (
             "{ low = 1.2, high = 1.8, whole = true }",
-            ".range: expected whole ends, got low 1.2 and high 1.8",
+            ".range: expected whole ends, found low 1.2 and high 1.8",
         ),
         (
             "{ low = -1e308, high = 1e308 }",
-            ".range: expected ends less far apart, got -1e+308 and 1e+308",
+            ".range: expected ends less far apart, found -1e+308 and 1e+308",
         ),
         ("{ low = 1, high = 2, hihg = 2 }", ".range.hihg: expected a known key"),
         ("0.4", f": {CHOICES}, found 0.4"),

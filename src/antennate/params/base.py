@@ -65,7 +65,7 @@ def require_different(name: str, values: Sequence[Any]) -> None:
         ValueError: One does.
     """
     if len(set(values)) < len(values):
-        raise ValueError(f"{name} must differ, got {', '.join(map(str, values))}")
+        raise ValueError(f"{name} must differ, found {', '.join(map(str, values))}")
 
 
 def require_whole_steps(name: str, rate: float, timestep: float, share: int = 1) -> None:
@@ -84,7 +84,7 @@ def require_whole_steps(name: str, rate: float, timestep: float, share: int = 1)
     if steps < 0.5 or abs(steps - round(steps)) > 1e-6:
         part = f" 1/{share} of" if share > 1 else ""
         raise ValueError(
-            f"{name} must be a whole fraction of{part} the physics rate {1 / timestep:g} Hz, got "
+            f"{name} must be a whole fraction of{part} the physics rate {1 / timestep:g} Hz, found "
             f"{rate:g} Hz"
         )
 

@@ -105,7 +105,7 @@ class CurveParams(Params):
     def _span(self) -> CurveParams:
         if self.counts_high - self.counts_low < 1:
             raise ValueError(
-                f"counts_high must exceed counts_low by at least 1 count, got {self.counts_low} "
+                f"counts_high must exceed counts_low by at least 1 count, found {self.counts_low} "
                 f"and {self.counts_high}"
             )
         return self

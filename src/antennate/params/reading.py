@@ -164,7 +164,8 @@ def describe(
     kind, path, context = first["type"], first["loc"], first.get("ctx", {})
     more = f" (and {len(faults) - 1} more)" if len(faults) > 1 else ""
     if kind == "value_error":
-        place = f"{where(path)}: " if path else ""
+        spell = dotted if _keys(model, path) else where  # a group is no flag
+        place = f"{spell(path)}: " if path else ""
         return f"{place}{context['error']}{more}"
     if kind == "extra_forbidden":
         key, group = str(path[-1]), dotted(path[:-1])

@@ -35,10 +35,10 @@ class RecordParams(Params):
     def _one_kind(self) -> RecordParams:
         if self.marks and self.speed is not None:
             raise ValueError(
-                f"expected marks or speed, got marks {_said(self.marks)} and speed {self.speed:g}"
+                f"expected marks or speed, found marks {_said(self.marks)} and speed {self.speed:g}"
             )
         if self.marks and len(set(self.marks)) < 2:
-            raise ValueError(f"marks must be two different values or more, got {_said(self.marks)}")
+            raise ValueError(f"marks must be two different values or more, found {_said(self.marks)}")
         return self
 
 

@@ -22,7 +22,7 @@ class TouchCheckParams(Params):
     @model_validator(mode="after")
     def _order(self) -> TouchCheckParams:
         if self.still >= self.level:
-            raise ValueError(f"still must be below level, got {self.still} and {self.level}")
+            raise ValueError(f"still must be below level, found {self.still} and {self.level}")
         return self
 
 
@@ -85,7 +85,7 @@ class SupervisorParams(Params):
     def _levels(self) -> SupervisorParams:
         if not self.supply_off < self.supply_hold < self.supply_warn:
             raise ValueError(
-                f"supply levels must fall from warn over hold to off, got {self.supply_warn}, "
+                f"supply levels must fall from warn over hold to off, found {self.supply_warn}, "
                 f"{self.supply_hold} and {self.supply_off} V"
             )
         return self

@@ -69,12 +69,12 @@ class TunnelParams(Params):
         if len(self.turns_deg) != len(self.segments) - 1:
             raise ValueError(
                 f"turns_deg needs one value between every two segments: expected "
-                f"{len(self.segments) - 1}, got {len(self.turns_deg)}"
+                f"{len(self.segments) - 1}, found {len(self.turns_deg)}"
             )
         if any(abs(turn) > 120 for turn in self.turns_deg):
-            raise ValueError(f"turns_deg must lie within -120 and 120, got {self.turns_deg}")
+            raise ValueError(f"turns_deg must lie within -120 and 120, found {self.turns_deg}")
         if any(s < 0.3 for s in self.segments):
-            raise ValueError(f"segments must be at least 0.3 m long, got {self.segments}")
+            raise ValueError(f"segments must be at least 0.3 m long, found {self.segments}")
         return self
 
 

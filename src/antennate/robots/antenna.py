@@ -115,7 +115,7 @@ class AntennaSpec(Params):
         ].default  # its end lies idle on a short one
         if sensed > self.length and sensed != usual:
             raise ValueError(
-                f"sensor.active_length must be at most the length of {self.length:g} m, got "
+                f"sensor.active_length must be at most the length of {self.length:g} m, found "
                 f"{sensed:g} m"
             )
         return self

@@ -103,7 +103,7 @@ class SensorParams(Params):
     def _creep_is_a_part(self) -> SensorParams:
         if min(self.creep) < 0 or sum(self.creep) >= 1 or min(self.creep_time) <= 0:
             raise ValueError(
-                f"creep must be at least 0 and below 1 in all with creep_time above 0, got "
+                f"creep must be at least 0 and below 1 in all with creep_time above 0, found "
                 f"{self.creep} and {self.creep_time}"
             )
         return self

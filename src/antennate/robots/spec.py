@@ -286,7 +286,7 @@ class RobotSpec(Params):
             if group.fastest > speed:
                 raise ValueError(
                     f"{name}.fastest must be at most {speed:.4g} rad/s, the unloaded speed of "
-                    f"{group.servo}, got {group.fastest:g}"
+                    f"{group.servo}, found {group.fastest:g}"
                 )
         if self.clear_bend <= 0:
             raise ValueError(
@@ -300,7 +300,7 @@ class RobotSpec(Params):
                 f"neighbouring links meet, found {self.yaw.limit:g}"
             )
         if len(set(self.release)) < len(self.release):
-            raise ValueError(f"release must name each group once, got {', '.join(self.release)}")
+            raise ValueError(f"release must name each group once, found {', '.join(self.release)}")
         ids = self.ids
         if doubled := sorted({i for i in ids if ids.count(i) > 1}):
             raise ValueError(
@@ -308,7 +308,7 @@ class RobotSpec(Params):
             )
         if self.link_mass <= 0.01:
             raise ValueError(
-                f"mass must leave more than 10 g a link beside legs and antennae, got {self.mass} "
+                f"mass must leave more than 10 g a link beside legs and antennae, found {self.mass} "
                 "kg"
             )
         if self.legs.reach is not None and self.hip < 0:
@@ -342,5 +342,5 @@ def _check_group(name: GroupName, group: JointParams, count: int) -> None:
         if not QUARTER <= zero <= STRAIGHT + QUARTER:
             raise ValueError(
                 f"{name}.zeros must leave a quarter turn to both sides, {QUARTER} to "
-                f"{STRAIGHT + QUARTER} ticks, got {zero}"
+                f"{STRAIGHT + QUARTER} ticks, found {zero}"
             )

@@ -99,7 +99,7 @@ class SimRobot:
         if abs(self._substeps * timestep - period) > 1e-9:
             raise ConfigError(
                 f"the control period must be a whole number of physics steps of {timestep:g} s, "
-                f"got {period:g} s"
+                f"found {period:g} s"
             )
         self._ticks = 0
         sensed = robot.antenna.sensed_hinges if robot.antenna_count else 0

@@ -49,12 +49,12 @@ class TrialConfig(Params):
         if self.scene != TUNNEL:
             if self.tunnel != TunnelParams():
                 raise ValueError(
-                    f"tunnel belongs to the scene {TUNNEL!r}, got the scene {self.scene!r}"
+                    f"tunnel belongs to the scene {TUNNEL!r}, found the scene {self.scene!r}"
                 )
         elif self.tunnel.free_width < self.robot.width:
             raise ValueError(
                 f"tunnel.free_width must be at least robot.width, {self.robot.width:g} m, "
-                f"got {self.tunnel.free_width:g} m"
+                f"found {self.tunnel.free_width:g} m"
             )
         return self
 

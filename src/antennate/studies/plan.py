@@ -47,12 +47,12 @@ class Range(BaseModel):
     def _in_order(self) -> Range:
         if self.low >= self.high or (self.log and self.low <= 0):
             what = "0 < low < high" if self.log else "low < high"
-            raise ValueError(f"expected {what}, got low {self.low:g} and high {self.high:g}")
+            raise ValueError(f"expected {what}, found low {self.low:g} and high {self.high:g}")
         if self.whole and not (self.low.is_integer() and self.high.is_integer()):
-            raise ValueError(f"expected whole ends, got low {self.low:g} and high {self.high:g}")
+            raise ValueError(f"expected whole ends, found low {self.low:g} and high {self.high:g}")
         width = self.high / self.low if self.log else self.high - self.low
         if not math.isfinite(width):
-            raise ValueError(f"expected ends less far apart, got {self.low:g} and {self.high:g}")
+            raise ValueError(f"expected ends less far apart, found {self.low:g} and {self.high:g}")
         return self
 
     def at(self, share: float) -> float | int:

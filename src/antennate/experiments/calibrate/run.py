@@ -108,11 +108,11 @@ class CalibrateConfig(Params):
         if self.rig.place + self.rig.rod_radius > self.antenna.length:
             raise ValueError(
                 f"rig.place must leave room for the rod on the antenna of {self.antenna.length:g} "
-                f"m, got {self.rig.place:g} m"
+                f"m, found {self.rig.place:g} m"
             )
         if self.rig.depth > 0.9 * self.rig.place:
             raise ValueError(
-                f"rig.depth must stay below 0.9 of rig.place, {0.9 * self.rig.place:g} m, got "
+                f"rig.depth must stay below 0.9 of rig.place, {0.9 * self.rig.place:g} m, found "
                 f"{self.rig.depth:g} m"
             )
         return self

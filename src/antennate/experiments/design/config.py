@@ -30,10 +30,10 @@ class Axis(Range):
     @model_validator(mode="after")
     def _of_lists(self) -> Axis:
         if self.rising and self.entries is None:
-            raise ValueError("expected entries beside rising, got none")
+            raise ValueError("expected entries beside rising, found none")
         if self.entries and not 1 <= self.entries[0] <= self.entries[1] <= _MOST_ENTRIES:
             raise ValueError(
-                f"expected the fewest and the most entries, 1 to {_MOST_ENTRIES}, got "
+                f"expected the fewest and the most entries, 1 to {_MOST_ENTRIES}, found "
                 f"{self.entries[0]} and {self.entries[1]}"
             )
         return self

@@ -66,11 +66,11 @@ class ForceConfig(Params):
         require_whole_steps("antenna.sensor.rate", self.antenna.sensor.rate, self.physics.timestep)
         if self.nearest > self.from_place:
             raise ValueError(
-                f"nearest must not exceed from_place, {self.from_place:g}, got {self.nearest:g}"
+                f"nearest must not exceed from_place, {self.from_place:g}, found {self.nearest:g}"
             )
         require_different("profiles", self.profiles)
         if min(self.speeds) <= 0:
-            raise ValueError(f"speeds must be above 0, got {min(self.speeds):g}")
+            raise ValueError(f"speeds must be above 0, found {min(self.speeds):g}")
         return self
 
     def places(self) -> Floats:

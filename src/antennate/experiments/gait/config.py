@@ -72,7 +72,7 @@ class GaitStudyConfig(Params):
         require_whole_steps("rate", self.rate, self.physics.timestep)
         for name in () if self.unknown else _OF_UNKNOWN:
             if getattr(self, name) != type(self).model_fields[name].default:
-                raise ValueError(f"{name}: expected the default, as all is known, got another")
+                raise ValueError(f"{name}: expected the default, as all is known, found another")
         unknowns = self.unknowns
         require_different("unknown", [one.name for one in unknowns])
         for one in unknowns:

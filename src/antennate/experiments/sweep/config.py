@@ -80,8 +80,8 @@ class SweepConfig(Params):
             if min(values) <= least:
                 raise ValueError(
                     f"{what} must exceed the antenna's radius, {least:g} of its length, "
-                    f"got {min(values):g}"
+                    f"found {min(values):g}"
                 )
         if not self.estimate.distance[0] < self.estimate.distance[1]:
-            raise ValueError(f"estimate.distance must rise, got {self.estimate.distance}")
+            raise ValueError(f"estimate.distance must rise, found {self.estimate.distance}")
         return self

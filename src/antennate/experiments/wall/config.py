@@ -46,18 +46,18 @@ class WallConfig(Params):
         reach = self.antenna.length * math.sin(self.wall.base_angle)
         if self.wall.overlap + self.variation.overlap >= reach / 2:
             raise ValueError(
-                f"wall.overlap must stay below half of the antenna's reach, {reach / 2:.4g} m, got "
+                f"wall.overlap must stay below half of the antenna's reach, {reach / 2:.4g} m, found "
                 f"{self.wall.overlap:g} m"
             )
         if self.wall.travel <= max(self.wall.start + self.wall.jam_travel, self.wall.jam_travel):
             raise ValueError(
                 f"wall.travel must exceed start and jam_travel together, "
-                f"{self.wall.start + self.wall.jam_travel:g} m, got {self.wall.travel:g} m"
+                f"{self.wall.start + self.wall.jam_travel:g} m, found {self.wall.travel:g} m"
             )
         ratio = COMMAND_PERIOD / self.physics.timestep
         if abs(ratio - round(ratio)) > 1e-6 or round(ratio) < 1:
             raise ValueError(
-                f"physics.timestep must divide {COMMAND_PERIOD:g} s, got {self.physics.timestep:g}"
+                f"physics.timestep must divide {COMMAND_PERIOD:g} s, found {self.physics.timestep:g}"
             )
         chain.require_read(self.solver, self.physics)
         return self

@@ -157,7 +157,7 @@ class ChannelDiagnosis:
         if not LOW_RAIL < band.low < band.high < HIGH_RAIL:
             raise CalibrationError(
                 f"a calibrated range must lie within {LOW_RAIL:g} and {HIGH_RAIL:g} "
-                f"counts, so that a broken wire can be told from a flex sensor; got {band.low:g} "
+                f"counts, so that a broken wire can be told from a flex sensor; found {band.low:g} "
                 f"to {band.high:g}; choose another divider resistor"
             )
         self._band = band

@@ -50,7 +50,7 @@ class TunnelScene:
         params = self._params
         if params.free_width < robot.width:
             raise SceneError(
-                f"tunnel.free_width must be at least the robot's width of {robot.width} m, got "
+                f"tunnel.free_width must be at least the robot's width of {robot.width} m, found "
                 f"{params.free_width} m"
             )
         mirrored = params.mirror == "always"
