@@ -38,7 +38,9 @@ class RecordParams(Params):
                 f"expected marks or speed, found marks {_said(self.marks)} and speed {self.speed:g}"
             )
         if self.marks and len(set(self.marks)) < 2:
-            raise ValueError(f"marks must be two different values or more, found {_said(self.marks)}")
+            raise ValueError(
+                f"marks must be two different values or more, found {_said(self.marks)}"
+            )
         return self
 
 

@@ -308,8 +308,8 @@ class RobotSpec(Params):
             )
         if self.link_mass <= 0.01:
             raise ValueError(
-                f"mass must leave more than 10 g a link beside legs and antennae, found {self.mass} "
-                "kg"
+                f"mass must leave more than 10 g a link beside legs and antennae, found "
+                f"{self.mass} kg"
             )
         if self.legs.reach is not None and self.hip < 0:
             raise ValueError(

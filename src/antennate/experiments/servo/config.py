@@ -50,7 +50,9 @@ class ServoConfig(Params):
         fields = type(self).model_fields
         for name in () if self.fit else _OF_THE_FIT:
             if getattr(self, name) != fields[name].default:
-                raise ValueError(f"{name}: expected the default, as nothing is fitted, found another")
+                raise ValueError(
+                    f"{name}: expected the default, as nothing is fitted, found another"
+                )
         for name, field in ServosParams.model_fields.items():
             if name != self.servo and getattr(self.servos, name) != field.default:
                 raise ValueError(

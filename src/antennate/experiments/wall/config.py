@@ -46,8 +46,8 @@ class WallConfig(Params):
         reach = self.antenna.length * math.sin(self.wall.base_angle)
         if self.wall.overlap + self.variation.overlap >= reach / 2:
             raise ValueError(
-                f"wall.overlap must stay below half of the antenna's reach, {reach / 2:.4g} m, found "
-                f"{self.wall.overlap:g} m"
+                f"wall.overlap must stay below half of the antenna's reach, {reach / 2:.4g} m, "
+                f"found {self.wall.overlap:g} m"
             )
         if self.wall.travel <= max(self.wall.start + self.wall.jam_travel, self.wall.jam_travel):
             raise ValueError(
@@ -57,7 +57,8 @@ class WallConfig(Params):
         ratio = COMMAND_PERIOD / self.physics.timestep
         if abs(ratio - round(ratio)) > 1e-6 or round(ratio) < 1:
             raise ValueError(
-                f"physics.timestep must divide {COMMAND_PERIOD:g} s, found {self.physics.timestep:g}"
+                f"physics.timestep must divide {COMMAND_PERIOD:g} s, found "
+                f"{self.physics.timestep:g}"
             )
         chain.require_read(self.solver, self.physics)
         return self
