@@ -26,7 +26,9 @@ if TYPE_CHECKING:  # both import much, for a page that few runs want
 class FoxgloveOptions:
     """Whether other tools may read along."""
 
-    foxglove: bool = option(False, "topics live for Foxglove and Lichtblick, without access control")
+    foxglove: bool = option(
+        False, "topics live for Foxglove and Lichtblick, without access control"
+    )
     foxglove_port: int = option(
         ports.FOXGLOVE, "port for these, 0 takes any", "PORT", ge=0, le=65535
     )
