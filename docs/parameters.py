@@ -16,8 +16,6 @@ HEAD = """\
 Every physical number of the project: its default, its unit, what it means and where it comes from.
 A source begins with `paper` (arXiv:2603.07795), `datasheet`, `measured`, `fitted` or `assumed` (the
 paper does not say).
-This page is generated: change `src/antennate/params/` or `robots/`, then run
-`python docs/parameters.py`.
 """
 ROBOTS = ("spec", "joints", "servos", "antenna", "sensor")
 """Modules of `antennate.robots` that describe robots."""
@@ -102,7 +100,7 @@ def main() -> None:
     modules = map(importlib.import_module, numbers + robots)
     parts = [table(group) for module in modules for group in groups(module)]
     page = "\n".join([HEAD, *parts, COMMANDS, *(table(group) for group in commands())])
-    finish(__file__, page)
+    finish(__file__, page.rstrip("\n") + "\n", source="`src/antennate/params/` and `robots/`")
 
 
 if __name__ == "__main__":

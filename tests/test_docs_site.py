@@ -61,18 +61,24 @@ def test_no_line_of_code_is_wider_than_a_page(page: str) -> None:
     assert wide == []
 
 
-def test_every_page_has_its_place_in_the_navigation() -> None:
+def test_every_page_has_its_place_in_the_navigation_by_its_own_name() -> None:
     site = tomllib.loads((DOCS.parent / "zensical.toml").read_text())
 
-    def pages(entry: Any) -> Iterator[str]:
-        if isinstance(entry, str):
-            yield entry
-        else:
-            for each in entry.values() if isinstance(entry, dict) else entry:
-                yield from pages(each)
+    def named(entries: list[dict[str, Any]]) -> Iterator[tuple[str, str]]:
+        for entry in entries:
+            for name, each in entry.items():
+                if isinstance(each, str):
+                    yield each, name
+                else:
+                    yield from named(each)
 
-    there = [str(path.relative_to(DOCS)) for path in DOCS.rglob("*.md")]
-    assert sorted(pages(site["project"]["nav"])) == sorted(there)
+    there = {
+        str(path.relative_to(DOCS)): re.findall("^# (.*)$", path.read_text(), re.MULTILINE)[0]
+        for path in DOCS.rglob("*.md")
+    }
+    found = [*named(site["project"]["nav"])]
+    assert len(found) == len(there)
+    assert dict(found) == there
 
 
 def test_every_command_is_linked_where_the_list_of_commands_begins() -> None:

@@ -241,12 +241,16 @@ def test_the_border_of_a_jam_lies_between_the_sticks_beside_it() -> None:
     border = outcome.result()["border"]
     assert border == pytest.approx({"at_mm": 19.0, "below_mm": 18.0, "above_mm": 24.0})
     said = EXPERIMENT.sentence(outcome.result())
-    assert "above 19 mm" in said
-    assert "18.0 and 24.0 mm" in said
+    assert "a jam if the base moves 19 mm" in said
+    assert "1.0 mm below and 5.0 mm above" in said
 
 
 def test_sticks_all_on_one_side_of_the_border_are_said_to_be() -> None:
-    rows = [WallTrial(1, 0, "stiff", "jam", "jam", 0, 30.0, 0, 0, 0, 0, 0)]
-    outcome = wall.WallOutcome(WallConfig(profiles=("stiff",)), rows, {})
-    assert outcome.result()["border"]["below_mm"] is None
-    assert "all above 19 mm" in EXPERIMENT.sentence(outcome.result())
+    for said, outcome, stick, side in (
+        ("In every trial the tip lagged more than 19 mm", "jam", 30.0, "below_mm"),
+        ("In no trial did the tip lag more than 19 mm", "success", 10.0, "above_mm"),
+    ):
+        rows = [WallTrial(1, 0, "stiff", outcome, outcome, 0, stick, 0, 0, 0, 0, 0)]
+        result = wall.WallOutcome(WallConfig(profiles=("stiff",)), rows, {}).result()
+        assert result["border"][side] is None
+        assert said in EXPERIMENT.sentence(result)

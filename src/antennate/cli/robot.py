@@ -98,8 +98,8 @@ def _cells(joints: dict[str, dict[str, Any]]) -> list[tuple[str, list[str]]]:
 
 def _note(power: Supply) -> str:
     return (
-        f"A plug of a servo's cable stands 3 A: feed the chain for each {power.per_feed} servos, "
-        f"at {power.feeds} places."
+        f"A plug of a servo's cable carries at most 3 A: feed the chain for each {power.per_feed} "
+        f"servos, at {power.feeds} places."
     )
 
 

@@ -24,7 +24,7 @@ class Options(ResultOptions):
     workers: int | None = option(None, "processes to use, else one for each core", "INT", ge=1)
     no_figures: bool = option(False, "draw no figures")
     resume: bool = option(False, "go on with the run that the folder holds")
-    retry: bool = option(False, "the same, and run trials again that crashed or hung")
+    retry: bool = option(False, "resume, and run crashed or hung trials again")
     engine: str = option(
         LOCAL,
         f"where the workers are: {', '.join(EVERYWHERE)}; for tunnel, wall and studies of them "
@@ -33,9 +33,7 @@ class Options(ResultOptions):
     )
     shard: str | None = option(None, "run one of N parts, for `antennate merge`", "I/N")
     slurm: tuple[str, ...] = option((), "what SLURM is asked for, as timeout_min=60", "NAME=VALUE")
-    trial_timeout: float = option(
-        TIMEOUT, "time after which a trial is given up that has not ended [s]", gt=0
-    )
+    trial_timeout: float = option(TIMEOUT, "give a trial up after this time [s]", gt=0)
 
 
 def workers_of(options: Options, closed: bool, apart: bool) -> Workers:

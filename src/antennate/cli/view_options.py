@@ -26,7 +26,9 @@ if TYPE_CHECKING:  # both import much, for a page that few runs want
 class FoxgloveOptions:
     """Whether other tools may read along."""
 
-    foxglove: bool = option(False, "serve its topics live for Foxglove and Lichtblick, unchecked")
+    foxglove: bool = option(
+        False, "topics live for Foxglove and Lichtblick, without access control"
+    )
     foxglove_port: int = option(
         ports.FOXGLOVE, "port for these, 0 takes any", "PORT", ge=0, le=65535
     )
@@ -44,7 +46,7 @@ class PageOptions(FoxgloveOptions):
 class ViewOptions(PageOptions):
     """The same where time is simulated."""
 
-    view_paused: bool = option(False, "--view begins paused, so that nothing is missed")
+    view_paused: bool = option(False, "start paused, so that nothing is missed")
     view_speed: float = option(
         1.0, "times real time at which --view begins, 0 as fast as it goes", "FLOAT", ge=0, le=100
     )

@@ -30,8 +30,8 @@ def tables(result: Mapping[str, Any]) -> Sequence[Table]:
         f"Body length {result['body_length_m']:g} m, {result['frequency_hz']:g} cycles a second.\n"
         f"Without the body wave {off['speed_m_s']:z.3f} m/s{share and f'{share} without slip'}.\n"
         f"The chosen lead of {chosen:.0f} deg gives {100 * cost['chosen_over_best']:.0f} % of the "
-        f"best speed of all leads, at {best:.0f} deg;\n"
-        f"the worst lead gives {100 * cost['worst_over_best']:.0f} %.",
+        f"fastest of the leads tried, {best:.0f} deg;\n"
+        f"the slowest one gives {100 * cost['worst_over_best']:.0f} %.",
     )
     return (maneuvers, *_unknown(result))
 

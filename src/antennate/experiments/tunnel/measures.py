@@ -32,7 +32,7 @@ CONTROLLER = (
     Measure("success_share", "  share", "%", form=".0f", scale=100.0),
     Measure("wilson95", "  Wilson 95 %", "%", form=".0f", scale=100.0),
     Measure("timeouts", "out of time", of=count("outcome", "timeout"), form="d"),
-    Measure("left", "left by the entrance", of=count("outcome", "left"), form="d"),
+    Measure("left", "left the scene", of=count("outcome", "left"), form="d"),
     Measure("invalid", "invalid", form="d"),
     Measure("speed_m_s", "speed over successes", "m/s", form=".3f"),
     Measure("progress_per_time_m_s", "progress over time", "m/s", form=".3f"),

@@ -41,10 +41,11 @@ def sentence(result: Mapping[str, Any]) -> str:
 def _border(result: Mapping[str, Any]) -> str:
     at, below, above = (result["border"][key] for key in ("at_mm", "below_mm", "above_mm"))
     if below is None or above is None:
-        return f"Longest sticks are all {'above' if below is None else 'up to'} {at:g} mm, the jam."
+        lagged = "every trial the tip lagged" if below is None else "no trial did the tip lag"
+        return f"In {lagged} more than {at:g} mm, the limit that counts as a jam."
     return (
-        f"A jam is a stick above {at:g} mm: the base moves so far and the tip does not. This "
-        f"border decides; the nearest longest sticks are {below:.1f} and {above:.1f} mm."
+        f"A trial is a jam if the base moves {at:g} mm while the tip stays. The nearest trials: "
+        f"{at - below:.1f} mm below and {above - at:.1f} mm above this limit."
     )
 
 

@@ -30,10 +30,10 @@ class DriveConfig(RobotConfig):
     touch_check: bool = number(
         True, "1", "assumed: swapped channels turn the robot towards what it touches"
     )
-    """Whether it is armed only after both antennae were bent by hand in the dry run."""
+    """The touch check in the dry run, in which both antennae are bent by hand."""
     touch: TouchCheckParams = TouchCheckParams()
     hold_to_run: bool = number(False, "1", "assumed: a script has no keys")
-    """Whether it walks only while a key of the terminal is held."""
+    """Walk only while a key of the terminal is held."""
     dead_man: DeadManParams = DeadManParams()
     drift: DriftParams = DriftParams()
     fault_time: float = number(
