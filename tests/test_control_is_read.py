@@ -144,7 +144,7 @@ def test_a_study_varies_assumptions_that_nothing_reads_but_only_those() -> None:
     named = {"control.rule.hold_time": {"low": 1.0, "high": 2.0}}
     left_out = ["robot.link_pitch", "robot.leg_radius", "robot.leg_eccentricity"]
     config = StudyConfig.model_validate(values | {"assumed": 0.1, "leave_out": left_out})
-    assert named.keys() < config.axes(load(TUNNEL).config).keys()
+    assert named.keys() < config.axes(load("tunnel").config).keys()
     study.check(config)
     with pytest.raises(ValueError, match=r"vary: .*hold_time: .* open and closed do not read it"):
         study.check(StudyConfig.model_validate(values | {"vary": named}))

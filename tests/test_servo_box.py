@@ -256,7 +256,7 @@ OF_A_ROBOT = (
 def test_what_is_for_a_robot_is_refused_without_one(flag: str) -> None:
     name = flag.partition("=")[0]
     with pytest.raises(ConfigError, match=f"^{name}.*: expected none .* it is for a robot"):
-        command(["--servos", "1:xl330-m288", flag])
+        command(["--servos", "1:xl330-m288", "--duration=0.1", flag])
 
 
 def test_only_what_servos_alone_read_is_taken_beside_them() -> None:
@@ -270,7 +270,7 @@ def test_a_file_for_a_robot_is_refused_without_one(tmp_path: Path) -> None:
     file = tmp_path / "twin.toml"
     file.write_text("[robot]\nmass = 3.0\n")
     with pytest.raises(ConfigError, match=r"^--robot\.mass: expected none .* found 3\.0"):
-        command(["--servos", "1:xl330-m288", "--config", str(file)])
+        command(["--servos", "1:xl330-m288", "--duration=0.1", "--config", str(file)])
 
 
 @pytest.mark.parametrize(
