@@ -16,7 +16,7 @@ from antennate.control.registry import make_controller
 from antennate.params.base import Params
 from antennate.params.control import ControlParams
 from antennate.robots.spec import RobotSpec
-from antennate.types import AntennaFrame
+from antennate.types import AntennaFrame, Controller
 
 
 @contextmanager
@@ -62,7 +62,11 @@ def leaves(model: type[Params], path: tuple[str, ...] = ()) -> Iterator[str]:
 
 def act(name: str, control: ControlParams, robot: RobotSpec) -> None:
     """Let a controller be pressed for longer than any of its times."""
-    controller = make_controller(name, control, robot, 1)
+    press(make_controller(name, control, robot, 1), control)
+
+
+def press(controller: Controller, control: ControlParams) -> None:
+    """Press a controller, with these numbers, for longer than any of its times."""
     controller.reset(np.zeros(1, dtype=np.int64))
     for tick in range(round(60.0 / control.period)):
         pressed = 1.0 < tick * control.period < 35.0

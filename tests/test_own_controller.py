@@ -121,16 +121,6 @@ def test_what_cannot_be_sent_to_workers_is_refused_in_one_line() -> None:
     assert "\n" not in str(e.value)
 
 
-@pytest.mark.parametrize("group", ["escape", "repetition"])
-def test_numbers_that_no_named_controller_reads_are_refused(group: str) -> None:
-    changes = {"escape": {"retry_time": 5.0}, "repetition": {"pressure": 0.3}}
-    told = {"control": {group: changes[group]}}
-    with pytest.raises(ValueError, match=f"control.{group}: .* open and paper do not read it"):
-        TunnelConfig.model_validate({"controllers": ["open", "paper"], **told})
-    for names in (["open", "closed"], ["open", EXAMPLE]):
-        assert TunnelConfig.model_validate({"controllers": names, **told})
-
-
 # the example
 
 

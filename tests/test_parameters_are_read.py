@@ -17,12 +17,9 @@ from servo_recordings import of_twin
 
 from antennate import experiments
 from antennate.cli import main
-from antennate.control.registry import BUILT_IN, UNREAD
 from antennate.experiments.force import loads
 from antennate.experiments.force import run as force
 from antennate.experiments.reproduce import run as reproduce
-from antennate.params.control import ControlParams
-from antennate.robots.spec import RobotSpec
 
 RECORDING = "time,counts,bend,trial,speed_m_s\n" + "".join(
     f"{0.01 * i:.2f},{1600 + 60 * np.log((k + 1) / (20 - k)):.0f},{k / 19},{trial},0.1\n"
@@ -211,16 +208,6 @@ def test_every_parameter_of_an_experiment_is_read_or_refused(
     every = set(leaves(experiment.config))
     assert every - read == set(experiment.config.unread) & every
     assert set(experiment.config.unread) <= every
-
-
-@pytest.mark.parametrize("name", BUILT_IN)
-def test_groups_that_a_controller_is_said_not_to_read_are_those(name: str) -> None:
-    control = ControlParams(rate=25.0)
-    groups = {leaf.partition(".")[0] for leaf in leaves(ControlParams) if "." in leaf}
-    with recorded(control) as read:
-        act(name, control, RobotSpec())
-    seen = {leaf.partition(".")[0] for leaf in read if "." in leaf}
-    assert groups - seen == UNREAD.get(name, set())
 
 
 def test_all_experiments_of_ours_are_walked() -> None:

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from recorded import leaves
 from servo_process import Served, served
 
 from antennate.cli.twin import command
@@ -241,10 +242,35 @@ def test_a_leg_turns_at_a_speed_in_velocity_mode_and_by_a_drive_in_pwm_mode() ->
 # the command
 
 
-@pytest.mark.parametrize("flag", ["--factory", "--touch=left@2s", "--pace=lockstep", "--udp=0"])
+OF_A_ROBOT = (
+    *("--scene=flat", "--seed=3", "--trial=2", "--robot.mass=3", "--robot=hexapod"),
+    *("--tunnel.strewn=1", "--physics.timestep=0.001", "--variation.slip-time=2"),
+    *("--control.rate=50", "--control.gait.amplitude=0.1", "--battery.voltage=10"),
+    *("--factory", "--touch=left@2s", "--pace=lockstep", "--udp=0", "--passed=gone"),
+    *("--log=a.mcap", "--video=a.mp4", "--view", "--view-port=0", "--foxglove"),
+    "--foxglove-port=0",
+)
+
+
+@pytest.mark.parametrize("flag", OF_A_ROBOT)
 def test_what_is_for_a_robot_is_refused_without_one(flag: str) -> None:
-    with pytest.raises(ConfigError, match="are for a robot"):
-        command(["--servos", "1:xl330-m288", flag])
+    name = flag.partition("=")[0]
+    with pytest.raises(ConfigError, match=f"^{name}.*: expected none .* it is for a robot"):
+        command(["--servos", "1:xl330-m288", "--duration=0.1", flag])
+
+
+def test_only_what_servos_alone_read_is_taken_beside_them() -> None:
+    """Everything that could be changed is refused, but for what the other tests here use."""
+    parameters = {path.partition(".")[0] for path in leaves(TwinConfig)}
+    refused = {flag.strip("-").partition("=")[0].partition(".")[0] for flag in OF_A_ROBOT}
+    assert parameters - refused == {"duration", "fault", "push", "plugged"}
+
+
+def test_a_file_for_a_robot_is_refused_without_one(tmp_path: Path) -> None:
+    file = tmp_path / "twin.toml"
+    file.write_text("[robot]\nmass = 3.0\n")
+    with pytest.raises(ConfigError, match=r"^--robot\.mass: expected none .* found 3\.0"):
+        command(["--servos", "1:xl330-m288", "--duration=0.1", "--config", str(file)])
 
 
 @pytest.mark.parametrize(

@@ -25,6 +25,7 @@ from antennate.cli.options import (
 )
 from antennate.errors import ConfigError
 from antennate.messages import shown
+from antennate.params.base import Params, changes
 from antennate.params.reading import Config, describe, group_of, put_over, read_file
 
 
@@ -95,7 +96,25 @@ def parse(
         config = read_file(chosen.config, model) if read is None else read(chosen.config)
         base = config.model_dump(exclude_unset=True)
         _refuse_code(chosen.config, base, values)
-    return _filled(model, base, {p: v for p, v in values.items() if p[0] not in names}), chosen
+    given = {p: v for p, v in values.items() if p[0] not in names}
+    config = _filled(model, base, given)
+    _refuse_unread(config, given)
+    return config, chosen
+
+
+def _refuse_unread(config: Params, flags: Mapping[tuple[str, ...], Any]) -> None:
+    """Refuse a flag that nothing reads, though a file for several commands may hold its value.
+
+    Raises:
+        ConfigError: There is one.
+    """
+    why = config.unread_here() if config.shared else {}
+    for path, default, value in changes(config, why):
+        parts = tuple(path.split("."))
+        if any(parts[:n] in flags for n in range(1, len(parts) + 1)):
+            raise ConfigError(
+                f"{flag_of(parts)}: expected {default}, as {why[path]}, found {found(value)}"
+            )
 
 
 _CODE = ("controller", "controllers", "scene", "experiment")

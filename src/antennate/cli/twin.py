@@ -16,13 +16,14 @@ from pydantic.dataclasses import dataclass
 
 from antennate.cli.arguments import FromFile, parse
 from antennate.cli.exit_codes import OK
-from antennate.cli.options import option
+from antennate.cli.options import fields_of, flag_of, found, option
 from antennate.cli.progress import stop_signals
 from antennate.cli.twin_kept import Kept, KeptOptions
 from antennate.cli.view_options import PageOptions, page_of
 from antennate.errors import ConfigError
 from antennate.hardware.driving.priority import LEVEL, urgent
 from antennate.hardware.ports.keys import read_key
+from antennate.params.base import changes, paths_of
 from antennate.sim.world import World
 from antennate.twin.config import TwinConfig, watched
 from antennate.twin.endpoints import Endpoint
@@ -40,6 +41,8 @@ if TYPE_CHECKING:
     from antennate.telemetry.view.process import ViewProcess
 
 _LAST_PORT = 65_534
+_OF_SERVOS = ("duration", "fault", "push", "plugged", "config", "servos", "tcp", "orders")
+"""What servos alone read."""
 
 DESCRIPTION = """\
 Serve the simulated robot in a scene on two serial ports (pseudo-terminals), which carry the same
@@ -175,12 +178,7 @@ def _serve_servos(
     config: TwinConfig, places: Places, entries: Sequence[ServoEntry], orders: Orders | None
 ) -> int:
     """Servos without a robot."""
-    robot = (places.udp, places.passed, places.pace != "real", places.view)
-    if any(robot) or places.log or places.video or config.touch or config.factory:
-        raise ConfigError(
-            "--servos: expected no --udp, --passed, --pace lockstep, --view, --log, --video, "
-            "--touch or --factory, as they are for a robot"
-        )
+    _require_of_servos(config, places)
     demands = [read(text) for text in config.fault]
     faults = Faults(demands, [entry.id for entry in entries], alone=True)
     box = ServoBox(entries, config.plugged, config.push)
@@ -188,6 +186,23 @@ def _serve_servos(
     with ServoServer(box, faults, bus, orders) as server, urgent(LEVEL + 1):
         server.run(_until(config, server.paths, lambda: True))
     return OK
+
+
+def _require_of_servos(config: TwinConfig, places: Places) -> None:
+    """Refuse what is for a robot.
+
+    Raises:
+        ConfigError: There is something.
+    """
+    options = [(name, getattr(places, name), field) for name, field in fields_of(Places).items()]
+    given = [(name, value) for name, value, field in options if value != field.default]
+    given += [(path, value) for path, _, value in changes(config, paths_of(TwinConfig))]
+    for path, value in given:
+        if path not in _OF_SERVOS:
+            raise ConfigError(
+                f"{flag_of(path.split('.'))}: expected none beside --servos, as it is for a robot, "
+                f"found {found(value)}"
+            )
 
 
 def _until(

@@ -56,8 +56,8 @@ class Rule(Protocol):
 class _OpenRule:
     """FORWARD, unless a reading cannot be used."""
 
-    def __init__(self, control: ControlParams) -> None:
-        self.turn_offset = control.gait.turn_offset
+    turn_offset = 0.0
+    """It never turns."""
 
     def reset(self, rows: Ints | Bools) -> None:
         pass
@@ -84,28 +84,34 @@ class _PaperRule:
 
 
 class _ClosedRule:
-    """FORWARD until readings repeat, then escape."""
+    """FORWARD until readings repeat, or the published table says REVERSE; then escape."""
 
     def __init__(self, control: ControlParams, batch: int) -> None:
         self.turn_offset = control.escape.turn_offset
         self._control = control
-        self._detector = RepetitionDetector(
-            control.repetition, batch, control.period, control.gait.frequency
-        )
+        self._detector = None
+        if control.escape.trigger == "repetition":
+            self._detector = RepetitionDetector(
+                control.repetition, batch, control.period, control.gait.frequency
+            )
         self._escape = Escape(control.escape, batch, control.period)
 
     def reset(self, rows: Ints | Bools) -> None:
-        self._detector.reset(rows)
+        if self._detector is not None:
+            self._detector.reset(rows)
         self._escape.reset(rows)
 
     def step(self, t: Floats, level: Floats, contact: Ints, flex: Floats) -> Ints:
-        unknown = np.isnan(level[:, LEFT] + level[:, RIGHT])
-        walking = (self._escape.maneuver == int(Maneuver.FORWARD)) & ~unknown
-        stuck = self._detector.step(flex, walking)
-        if self._control.escape.trigger == "contact":
-            stuck = decide(self._control.rule, contact, level) == Maneuver.REVERSE
+        stuck = self._stuck(level, contact, flex)
         left, right = (flex > self._control.repetition.pressure).T
         return self._escape.step(t, level, stuck, left | right)
+
+    def _stuck(self, level: Floats, contact: Ints, flex: Floats) -> Bools:
+        if self._detector is None:
+            return decide(self._control.rule, contact, level) == Maneuver.REVERSE
+        unknown = np.isnan(level[:, LEFT] + level[:, RIGHT])
+        walking = (self._escape.maneuver == int(Maneuver.FORWARD)) & ~unknown
+        return self._detector.step(flex, walking)
 
 
 class RuleController:
@@ -161,7 +167,7 @@ class RuleController:
 
 def open_loop(control: ControlParams, robot: RobotSpec, batch: int) -> RuleController:
     """`open`: always walks FORWARD."""
-    return RuleController(_OpenRule(control), control, robot, batch)
+    return RuleController(_OpenRule(), control, robot, batch)
 
 
 def paper(control: ControlParams, robot: RobotSpec, batch: int) -> RuleController:

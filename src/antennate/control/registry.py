@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 from antennate.control import controllers
 from antennate.errors import ConfigError, in_one_line
@@ -25,25 +25,6 @@ BUILT_IN: dict[str, ControllerFactory] = {
 
 CONTROLLERS: Registry[ControllerFactory] = Registry("controller", "antennate.controllers", BUILT_IN)
 """All controllers: ours, of installed packages, and one's own as MODULE:NAME or FILE.py:NAME."""
-
-
-UNREAD = {"open": {"repetition", "escape"}, "paper": {"repetition", "escape"}}
-"""Groups of `ControlParams` that a controller of ours does not read."""
-
-
-def require_read(names: Sequence[str], control: ControlParams) -> None:
-    """Check that some of these controllers reads each number that is not the default.
-
-    Raises:
-        ValueError: None of them reads it; a controller of one's own may read all.
-    """
-    default = ControlParams()
-    for group in sorted(set.intersection(*(UNREAD.get(name, set()) for name in names))):
-        if getattr(control, group) != getattr(default, group):
-            raise ValueError(
-                f"control.{group}: expected the defaults, as {' and '.join(names)} "
-                f"{'does' if len(names) == 1 else 'do'} not read it, found others"
-            )
 
 
 def make_controller(

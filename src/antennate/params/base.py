@@ -6,16 +6,18 @@ import ast
 import functools
 import inspect
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import pairwise
 from typing import Any, ClassVar, Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, model_validator
 
 GATHERED = "gathered"
 """Marks a list whose flag, given again, adds to it; of other flags the last one counts."""
 ROBOT = "robot"
 """This group is described whole: a file may hold what a command does not read, a flag may not."""
+ALLOWED = "allowed"
+"""In the context of a validation: parameters, dotted, that may differ though nothing reads them."""
 
 
 class Params(BaseModel):
@@ -31,26 +33,40 @@ class Params(BaseModel):
     unread: ClassVar[tuple[str, ...]] = ()
     shared: ClassVar[bool] = False
 
+    def unread_here(self) -> Mapping[str, str]:
+        """Further ones that nothing reads because of other values, and why. They are flags."""
+        return {}
+
     @model_validator(mode="after")
-    def _refuse_unread(self) -> Self:
-        for path in () if self.shared else self.unread:
-            *groups, name = path.split(".")
-            group: Any = self
-            for part in groups:
-                group = getattr(group, part)
-            default, found = type(group).model_fields[name].default, getattr(group, name)
-            if groups[0] != ROBOT and found != default:
-                raise ValueError(
-                    f"{path}: expected {default}, as it is not read here, found {found}"
-                )
+    def _refuse_unread(self, info: ValidationInfo) -> Self:
+        if self.shared:
+            return self
+        never = (path for path in self.unread if not path.startswith(f"{ROBOT}."))
+        why = {**dict.fromkeys(never, "it is not read here"), **self.unread_here()}
+        allowed = (info.context or {}).get(ALLOWED, ())
+        for path, default, found in changes(self, why):
+            if path not in allowed:
+                raise ValueError(f"{path}: expected {default}, as {why[path]}, found {found}")
         return self
 
 
-def paths_of(model: type[Params], path: str) -> tuple[str, ...]:
+def changes(config: Params, paths: Iterable[str]) -> Iterator[tuple[str, Any, Any]]:
+    """Those of these dotted parameters that differ from their default: path, default and value."""
+    for path in paths:
+        *groups, name = path.split(".")
+        group: Any = config
+        for part in groups:
+            group = getattr(group, part)
+        default, found = type(group).model_fields[name].default, getattr(group, name)
+        if found != default:
+            yield path, default, found
+
+
+def paths_of(model: type[Params], path: str = "") -> tuple[str, ...]:
     """Every parameter of a group that stands at a dotted path."""
     found: list[str] = []
     for name, field in model.model_fields.items():
-        kind, deeper = field.annotation, f"{path}.{name}"
+        kind, deeper = field.annotation, f"{path}.{name}".lstrip(".")
         if isinstance(kind, type) and issubclass(kind, Params):
             found += paths_of(kind, deeper)
         else:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from antennate.params.base import paths_of
 from antennate.robots.antenna import AntennaSpec
 from antennate.robots.servos import ServosParams
+from antennate.robots.spec import RobotSpec
 
 HARDWARE_ALONE = (
     *(
@@ -36,3 +37,11 @@ SIMULATION_ALONE = (
     *paths_of(AntennaSpec, "robot.antenna"),
 )
 """Parameters that only the simulation, or the twin, reads; the robot's hardware does not."""
+
+
+def unused_servos(robot: RobotSpec) -> dict[str, str]:
+    """Parameters of the servo models that a robot has none of, as `robot.servos...`, and why."""
+    used = {f"robot.servos.{name}" for name in robot.servo_names}
+    every = paths_of(ServosParams, "robot.servos")
+    paths = (path for path in every if path.rpartition(".")[0] not in used)
+    return dict.fromkeys(paths, "no joint of the robot has this servo")

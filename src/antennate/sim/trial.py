@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 
@@ -15,6 +15,7 @@ from antennate.errors import AntennateError, SceneError, in_one_line
 from antennate.params.base import Params, number
 from antennate.params.control import GaitParams
 from antennate.params.scene import PhysicsParams, TunnelParams, VariationParams
+from antennate.robots.readers import unused_servos
 from antennate.robots.spec import RobotSpec
 from antennate.sim.scenes.registry import TUNNEL, check_name, make_scene
 from antennate.sim.scenes.scene import Scene, SceneInstance
@@ -43,6 +44,10 @@ class TrialConfig(Params):
     @classmethod
     def _known(cls, name: str) -> str:
         return check_name(name)
+
+    def unread_here(self) -> Mapping[str, str]:
+        """The servos that this robot does not have."""
+        return unused_servos(self.robot)
 
     @model_validator(mode="after")
     def _scene_and_robot_agree(self) -> TrialConfig:

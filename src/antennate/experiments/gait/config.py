@@ -7,12 +7,13 @@ from typing import Annotated, ClassVar
 
 from pydantic import model_validator
 
+from antennate.control.readers import unread_lift
 from antennate.errors import ConfigError
 from antennate.experiments.gait.unknown import Unknown, changed
 from antennate.params.base import GATHERED, Params, number, require_different, require_whole_steps
 from antennate.params.control import GaitParams
 from antennate.params.scene import PhysicsParams
-from antennate.robots.readers import HARDWARE_ALONE
+from antennate.robots.readers import HARDWARE_ALONE, unused_servos
 from antennate.robots.spec import RobotSpec
 
 _OF_UNKNOWN = ("draws", "seed")
@@ -47,6 +48,10 @@ class GaitStudyConfig(Params):
     robot: RobotSpec = RobotSpec()
     gait: GaitParams = GaitParams()
     physics: PhysicsParams = PhysicsParams()
+
+    def unread_here(self) -> Mapping[str, str]:
+        """The servos that this robot does not have, and the step of legs that do not lift."""
+        return unused_servos(self.robot) | unread_lift(self.robot, "gait")
 
     @property
     def unknowns(self) -> list[Unknown]:

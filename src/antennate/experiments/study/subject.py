@@ -16,7 +16,7 @@ from antennate.experiments.study.config import StudyConfig
 from antennate.experiments.study.rows import own_row
 from antennate.lookup import Registry
 from antennate.messages import shown
-from antennate.params.base import Params
+from antennate.params.base import ALLOWED, Params
 from antennate.params.reading import describe, put_over, with_bases
 from antennate.studies.engines import NO_BATCHES
 from antennate.studies.experiment import Experiment, Trial, no_row, no_step
@@ -50,8 +50,12 @@ class Subject(Protocol):
     condition: str
     most: int
 
-    def configured(self, values: Mapping[str, Any]) -> Any:
-        """Its configuration from nested values."""
+    def configured(self, values: Mapping[str, Any], allowed: Collection[str] = ()) -> Any:
+        """Its configuration from nested values; those allowed may differ though nothing reads them.
+
+        Raises:
+            ConfigError: A value cannot be used.
+        """
         ...
 
     def check(self, config: Any) -> None:
@@ -105,12 +109,13 @@ def configurations(config: StudyConfig, subject: Subject) -> list[tuple[Point, A
     for name in config.vary:
         _require_groups(settings, name)
     found: list[tuple[Point, Any]] = []
+    assumed = config.axes(subject.model).keys() - config.vary.keys()
     points = config.points_of(subject.model)
     if (count := len(points) * (config.trials or 1)) > MOST_TRIALS:
         raise ConfigError(f"trials: expected at most {MOST_TRIALS} at all points, found {count}")
     for point in points:
         try:
-            found.append((point, subject.configured(put_over(settings, nested(point)))))
+            found.append((point, subject.configured(put_over(settings, nested(point)), assumed)))
         except ConfigError as error:
             raise ConfigError(f"{_table_of(str(error), settings, subject)}: {error}") from None
     return found
@@ -196,11 +201,11 @@ class _OfExperiment:
         self.condition = self._trials.condition if self._trials else ""
         self.most = self._trials.most if self._trials else 1
 
-    def configured(self, values: Mapping[str, Any]) -> Params:
+    def configured(self, values: Mapping[str, Any], allowed: Collection[str] = ()) -> Params:
         model = self._experiment.config
         text = json.dumps(with_bases(values, model, Path()), default=_plain)
         try:
-            config = model.model_validate_json(text, strict=True)
+            config = model.model_validate_json(text, strict=True, context={ALLOWED: allowed})
         except ValidationError as error:
             raise ConfigError(f"{self._experiment.name}: {describe(error, model)}") from None
         return config
@@ -234,7 +239,9 @@ class _OfFunction:
     def __init__(self, name: str, axes: Collection[str]) -> None:
         self._function, self._axes = FUNCTIONS.find(name), axes
 
-    def configured(self, values: Mapping[str, Any]) -> Mapping[str, Any]:
+    def configured(
+        self, values: Mapping[str, Any], allowed: Collection[str] = ()
+    ) -> Mapping[str, Any]:
         return values
 
     def check(self, config: Any) -> None:

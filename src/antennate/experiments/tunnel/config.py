@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import ClassVar
 
 from pydantic import field_validator, model_validator
 
-from antennate.control.registry import BUILT_IN, CONTROLLERS, require_read
+from antennate.control.readers import unread_by_all
+from antennate.control.registry import BUILT_IN, CONTROLLERS
 from antennate.params.base import number, require_different, require_whole_steps
 from antennate.params.control import ControlParams
 from antennate.robots.readers import HARDWARE_ALONE
@@ -40,9 +42,13 @@ class TunnelConfig(TrialConfig):
     def _names(cls, names: tuple[str, ...]) -> tuple[str, ...]:
         return tuple(map(CONTROLLERS.check, names))
 
+    def unread_here(self) -> Mapping[str, str]:
+        """The servos that this robot does not have, and what none of the controllers reads."""
+        control = unread_by_all(self.controllers, self.control, self.robot)
+        return {**super().unread_here(), **control}
+
     @model_validator(mode="after")
     def _agree(self) -> TunnelConfig:
         require_different("controllers", self.controllers)
-        require_read(self.controllers, self.control)
         require_whole_steps("control.rate", self.control.rate, self.physics.timestep)
         return self

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from pydantic import field_validator
 
+from antennate.control.readers import unread_by_all
 from antennate.control.registry import CONTROLLERS
 from antennate.hardware.robot import RobotConfig
 from antennate.params.base import number
@@ -53,3 +56,7 @@ class DriveConfig(RobotConfig):
     @classmethod
     def _known(cls, name: str) -> str:
         return CONTROLLERS.check(name)
+
+    def unread_here(self) -> Mapping[str, str]:
+        """What its controller does not read."""
+        return unread_by_all([self.controller], self.control, self.robot)

@@ -7,16 +7,17 @@ while.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
 
 from antennate.control.controllers import RuleController
+from antennate.control.readers import TELEOP, UNREAD, unread_by_all
 from antennate.hardware.driving.config import DriveConfig
 from antennate.params.base import paths_of
-from antennate.params.control import ControlParams, EscapeParams, RepetitionParams
+from antennate.params.control import ControlParams
 from antennate.params.dead_man import DeadManParams
 from antennate.params.setup import TeleopParams
 from antennate.robots.readers import SIMULATION_ALONE
@@ -50,11 +51,13 @@ class TeleopConfig(DriveConfig):
         *SIMULATION_ALONE,
         "controller",
         *paths_of(DeadManParams, "dead_man"),
-        *(f"control.rule.{name}" for name in ("strong", "similar", "hold_time")),
-        *paths_of(RepetitionParams, "control.repetition"),
-        *paths_of(EscapeParams, "control.escape"),
+        *(f"control.{path}" for path in UNREAD[TELEOP]),
     )
     teleop: TeleopParams = TeleopParams()
+
+    def unread_here(self) -> Mapping[str, str]:
+        """What its controller does not read."""
+        return unread_by_all([TELEOP], self.control, self.robot)
 
 
 @dataclass

@@ -2,29 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Any
 
-from antennate.control.registry import BUILT_IN
+from antennate.control.readers import unread
 from antennate.control.retunable import Retunable
 from antennate.params.base import Params
 from antennate.params.control import ControlParams
 from antennate.params.reading import from_values
 from antennate.types import Controller
 
-_PLACES = {
-    "threshold": ("rule", "threshold"),
-    "averaging_time": ("conditioning", "averaging_time"),
-    "hold_time": ("rule", "hold_time"),
-    "turn_offset": ("gait", "turn_offset"),
-}
-"""Where each of them stands in `ControlParams`."""
-_READ = {
-    "open": {name: _PLACES[name] for name in ("threshold", "averaging_time")},
-    "closed": {name: _PLACES[name] for name in ("threshold", "averaging_time")}
-    | {"turn_offset": ("escape", "turn_offset")},
-}
-"""What a controller of ours reads; all others are taken to read all."""
+_PLACES = ("rule.threshold", "conditioning.averaging_time", "rule.hold_time")
+_TURNS = ("gait.turn_offset", "escape.turn_offset")
+"""Of these the first that is read."""
 
 
 class Tuning:
@@ -43,9 +33,10 @@ class Tuning:
         self, name: str, control: ControlParams, make: Callable[[ControlParams], Controller]
     ) -> None:
         self.controller = Retunable(make, control)
-        self._places: Mapping[str, tuple[str, str]] = _PLACES
-        if name in BUILT_IN:
-            self._places = _READ.get(name, _PLACES)
+        read = [place for place in _PLACES + _TURNS if place not in unread(name, control)]
+        self._places: dict[str, tuple[str, str]] = {}
+        for group, _, field in (place.partition(".") for place in read):
+            self._places.setdefault(field, (group, field))
 
     @property
     def values(self) -> dict[str, float]:

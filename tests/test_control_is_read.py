@@ -1,0 +1,168 @@
+"""No command accepts a parameter of the control, or of a servo, that nothing in it reads."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from recorded import act, leaves, press, recorded
+
+from antennate.cli import main
+from antennate.control.readers import BY_CONTACT, TELEOP, UNREAD, unread_by_all
+from antennate.control.registry import BUILT_IN
+from antennate.experiments import load
+from antennate.experiments.gait.config import GaitStudyConfig
+from antennate.experiments.study import run as study
+from antennate.experiments.study.config import StudyConfig
+from antennate.experiments.tunnel.config import TunnelConfig
+from antennate.hardware.driving.teleop import KeyController
+from antennate.params.control import ControlParams
+from antennate.params.setup import TeleopParams
+from antennate.robots.spec import RobotSpec
+from antennate.telemetry.view.tuning import Tuning
+
+OWN = f"{Path(__file__).parents[1] / 'examples' / 'own_controller.py'}:OwnController"
+LIFTING = {"legs": {"kind": "lifting"}}
+
+
+def by_keys(control: ControlParams, robot: RobotSpec) -> None:
+    """As `act`, with the controller of `teleop`."""
+    press(KeyController(control, robot, TeleopParams(), lambda: ["w", "o"], lambda: 0.0), control)
+
+
+ACTS: dict[str, Callable[[ControlParams, RobotSpec], None]] = {
+    **{name: lambda c, r, name=name: act(name, c, r) for name in BUILT_IN},
+    TELEOP: by_keys,
+}
+
+
+@pytest.mark.parametrize("robot", [{}, LIFTING], ids=["rolling", "lifting"])
+@pytest.mark.parametrize("trigger", ["repetition", "contact"])
+@pytest.mark.parametrize("name", ACTS)
+def test_what_a_controller_is_said_not_to_read_is_that(
+    name: str, trigger: str, robot: dict[str, Any]
+) -> None:
+    control = ControlParams.model_validate({"rate": 25.0, "escape": {"trigger": trigger}})
+    spec = RobotSpec.model_validate(robot)
+    with recorded(control) as read:
+        ACTS[name](control, spec)
+    unread = {f"control.{leaf}" for leaf in set(leaves(ControlParams)) - read}
+    assert unread == set(unread_by_all([name], control, spec))
+
+
+def test_all_controllers_of_ours_are_told_of() -> None:
+    assert set(UNREAD) == {*ACTS, BY_CONTACT}
+
+
+SHORT = {
+    "tunnel": "--trials 1 --time-limit 0.1 --no-figures",
+    "gait": "--cycles 2 --no-figures",
+    "twin": "--duration 0.1",
+}
+"""In case that it runs."""
+NO_JOINT = "as no joint of the robot has this servo"
+ROLL = "as legs that roll do not read it"
+REFUSED = [
+    ("tunnel --controllers closed --control.rule.hold-time 3", "2.0, as closed does not read it"),
+    ("tunnel --controllers closed --control.rule.similar 0.2", "0.15, as closed does not read it"),
+    ("tunnel --controllers open closed --control.rule.strong 0.8", "0.7, as open and closed do"),
+    ("tunnel --controllers closed open --control.gait.turn-offset 0.2", "as closed and open do"),
+    ("tunnel --controllers open paper --control.escape.retry-time 5", "12.0, as open and paper do"),
+    ("tunnel --controllers paper --control.repetition.pressure 0.3", "0.2, as paper does not"),
+    ("tunnel --control.gait.lift.stance 1", f"0.0, {ROLL}"),
+    ("gait --gait.lift.lifted 0.2", f"0.5, {ROLL}"),
+    ("tunnel --robot.servos.xl430-w250.friction 0.05", f"0.0, {NO_JOINT}"),
+    ("gait --robot.servos.xl430-w250.p-gain 5", f"640.0, {NO_JOINT}"),
+    ("twin --robot.servos.xl430-w250.p-gain 5", f"640.0, {NO_JOINT}"),
+    ("drive --control.rule.hold-time 3", "2.0, as closed does not read it"),
+    ("drive --controller open --control.escape.turn-time 3", "2.2, as open does not read it"),
+    ("drive --control.gait in_phase", f"0.0, {ROLL}"),
+    ("teleop --control.gait.lift.share 0.4", f"0.5, {ROLL}"),
+]
+
+
+@pytest.mark.parametrize(("words", "expected"), REFUSED)
+def test_a_flag_that_nothing_reads_is_refused(
+    words: str,
+    expected: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    command, *_, flag, value = words.split()
+    assert main([*words.split(), *SHORT.get(command, "").split()]) == 2
+    err = capsys.readouterr().err
+    assert flag.strip("-").replace("-", "_") in err.replace("-", "_")
+    assert expected in err
+    assert (f"found {value}" in err) or value == "in_phase"
+    assert err.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("controllers", "control", "robot"),
+    [
+        (["open", "paper"], {"rule": {"hold_time": 3.0}}, {}),
+        (["closed", "paper"], {"gait": {"turn_offset": 0.2}}, {}),
+        (["closed"], {"rule": {"strong": 0.8}, "escape": {"trigger": "contact"}}, {}),
+        (["closed"], {"repetition": {"change": 0.1}}, {}),
+        (["open", OWN], {"rule": {"strong": 0.8}, "gait": {"lift": {"lag": 1.0}}}, {}),
+        (["open"], {"gait": {"lift": {"lag": 1.0}}}, LIFTING),
+        (["open"], {"rule": {"hold_time": 2.0}}, {"servos": {"xl430_w250": {"friction": 0.0}}}),
+        (["open"], {}, {"servos": {"xl330_m288": {"friction": 0.05}}}),
+    ],
+)
+def test_what_one_of_the_controllers_reads_or_is_the_default_is_taken(
+    controllers: list[str], control: dict[str, Any], robot: dict[str, Any]
+) -> None:
+    values = {"controllers": controllers, "control": control, "robot": robot}
+    assert TunnelConfig.model_validate(values)
+
+
+def test_an_unknown_number_of_a_servo_that_is_not_there_is_refused() -> None:
+    told = {"unknown": ["robot.servos.xl430_w250.friction=0.01:0.05"]}
+    with pytest.raises(ValueError, match="no joint of the robot has this servo"):
+        GaitStudyConfig.model_validate(told)
+
+
+def test_the_file_of_a_robot_may_hold_what_another_controller_reads(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "robot.toml"
+    file.write_text("[control.rule]\nhold_time = 3.0\n[robot.servos.xl430_w250]\nfriction = 0.05\n")
+    assert main(["drive", "--config", str(file), "--control.gait.frequency", "0.5"]) == 2
+    assert "--esp32: expected a serial port" in capsys.readouterr().err
+    assert main(["drive", "--config", str(file), "--control.rule.hold-time", "4"]) == 2
+    assert "--control.rule.hold-time: expected 2.0, as closed does" in capsys.readouterr().err
+
+
+def test_a_study_varies_assumptions_that_nothing_reads_but_only_those() -> None:
+    """`rule.hold_time` is read by none of them: its effect is chance."""
+    values: dict[str, Any] = {"plan": "random", "settings": {"controllers": ["open", "closed"]}}
+    named = {"control.rule.hold_time": {"low": 1.0, "high": 2.0}}
+    left_out = ["robot.link_pitch", "robot.leg_radius", "robot.leg_eccentricity"]
+    config = StudyConfig.model_validate(values | {"assumed": 0.1, "leave_out": left_out})
+    assert named.keys() < config.axes(load("tunnel").config).keys()
+    study.check(config)
+    with pytest.raises(ValueError, match=r"vary: .*hold_time: .* open and closed do not read it"):
+        study.check(StudyConfig.model_validate(values | {"vary": named}))
+
+
+@pytest.mark.parametrize(
+    ("name", "places"),
+    [
+        ("open", {}),
+        ("paper", {"hold_time": "rule", "turn_offset": "gait"}),
+        ("closed", {"turn_offset": "escape"}),
+        (OWN, {"hold_time": "rule", "turn_offset": "gait"}),
+    ],
+)
+def test_a_page_changes_only_what_the_controller_reads(name: str, places: dict[str, str]) -> None:
+    control = ControlParams()
+    tuning = Tuning(name, control, lambda values: BUILT_IN["open"](values, RobotSpec(), 1))
+    every = {"threshold": "rule", "averaging_time": "conditioning", **places}
+    assert tuning.values.keys() == every.keys()
+    for field, group in every.items():
+        assert tuning.set(field, 0.25) == f"control.{group}.{field} = 0.25"
