@@ -10,6 +10,7 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 from hardware_rig import Ticker
+from lockstep import SimulatedWire
 from servo_rig import IDS, Rig, positions, servos
 
 from antennate.hardware.dynamixel import packets
@@ -20,7 +21,6 @@ from antennate.hardware.dynamixel.packets import LONGEST, Packet
 from antennate.hardware.dynamixel.parser import Parser
 from antennate.hardware.safety.causes import Cause, State
 from antennate.twin.bus import ServoBus
-from antennate.twin.lockstep import SimulatedWire
 from antennate.twin.registers import Servo
 
 GOAL = 116
