@@ -169,7 +169,6 @@ def flood(size: int) -> tuple[float, int, int]:
     spent = time.process_time() - begin
     counters = parser.counters
     assert counters.packets > 1000
-    assert counters.packet_bytes + counters.skipped_bytes + parser.pending == fed
     assert most < 2 * LONGEST
     return fed / spent / 1e6, false, counters.bad_crc
 
