@@ -21,12 +21,10 @@ class Counters:
     """What a parser has seen.
 
     Attributes:
-        packets: Packets that were right.
         bad_crc: Packets with a wrong CRC.
         skipped_bytes: Bytes that belong to no right packet.
     """
 
-    packets: int = 0
     bad_crc: int = 0
     skipped_bytes: int = 0
 
@@ -87,7 +85,6 @@ class Parser:
 
     def _take(self, size: int) -> Packet:
         whole, self._kept = self._kept[:size], self._kept[size:]
-        self.counters.packets += 1
         body = whole[BEFORE_BODY : size - 2]
         servo, instruction = whole[4], body[0]
         if servo == BROADCAST and instruction == Instruction.STATUS:
