@@ -7,6 +7,7 @@ half a second, and `paper` decides again upon the log.
 import shutil
 import sys
 import tempfile
+from importlib import import_module
 from pathlib import Path
 
 from antennate.cli import main as antennate
@@ -17,9 +18,9 @@ from antennate.hardware.driving.session import Session
 from antennate.telemetry.header import Header
 from antennate.telemetry.ticks import Tick
 from antennate.telemetry.writer import LogWriter
-from antennate.twin.config import TwinConfig, build
-from antennate.twin.lockstep import BoardPort, LockstepClock
+from antennate.twin.config import TwinConfig, watched
 
+sys.path.append(str(Path(__file__).parents[1] / "tests"))
 PICTURE = Path(__file__).parent / "images" / "replay.png"
 CONFIG = DriveConfig(dry_run=6.0, duration=18.0)
 SILENT, AGAIN = 16.0, 16.5
@@ -28,9 +29,10 @@ SILENT, AGAIN = 16.0, 16.5
 
 def log(path: Path) -> None:
     """Write the log of the drive."""
-    robot = build(TwinConfig(touch=("left@1s", "right@3s"), trial=1))
-    clock = LockstepClock(robot)
-    session = prepare(CONFIG, BoardPort(robot, clock), clock, clock)
+    robot, _ = watched(TwinConfig(touch=("left@1s", "right@3s"), trial=1))
+    lockstep = import_module("lockstep")
+    clock = lockstep.LockstepClock(robot)
+    session = prepare(CONFIG, lockstep.BoardPort(robot, clock), clock, clock)
     header = Header(controller="closed", params=CONFIG.control, robot=CONFIG.robot)
     with LogWriter(path, header) as writer:
 

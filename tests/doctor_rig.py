@@ -5,14 +5,15 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Iterator
 
+from lockstep import BoardPort, LockstepClock
+
 from antennate.hardware.doctor.check import Row
 from antennate.hardware.doctor.checkup import Checkup, examine
 from antennate.hardware.doctor.fix import apply, plan
 from antennate.hardware.ports.port import Port
 from antennate.hardware.robot import DoctorConfig
-from antennate.twin.config import TwinConfig, build
+from antennate.twin.config import TwinConfig, watched
 from antennate.twin.faults import Faults, read
-from antennate.twin.lockstep import BoardPort, LockstepClock
 from antennate.twin.robot import TwinRobot
 
 ROBOT = DoctorConfig()
@@ -22,7 +23,7 @@ class Patient:
     """A robot with faults, and what opens its two ports."""
 
     def __init__(self, *faults: str) -> None:
-        self.robot: TwinRobot = build(TwinConfig())
+        self.robot: TwinRobot = watched(TwinConfig())[0]
         self.clock = LockstepClock(self.robot)
         self.board = BoardPort(self.robot, self.clock)
         Faults([read(text) for text in faults], ROBOT.robot.ids).apply(self.robot, 0.0)

@@ -21,6 +21,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
+from lockstep import BoardPort, LockstepClock
 from twin_rig import Watch
 
 from antennate.control.loop import run_loop
@@ -34,7 +35,6 @@ from antennate.hardware.esp32.board import Board
 from antennate.hardware.joints import Joints
 from antennate.robots.spec import RobotSpec
 from antennate.sim.sim_robot import SimRobot
-from antennate.twin.lockstep import BoardPort, LockstepClock
 from antennate.twin.robot import TwinRobot
 from antennate.types import AntennaFrame, Bools, Clock, Floats, Ints, JointCommand
 

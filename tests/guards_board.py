@@ -90,7 +90,7 @@ STREAM = [
     Guard(
         "room for text",
         put(decoder, "TEXT_KEPT", 1 << 30),
-        test_decoder.test_L5_a_flood_of_text_is_bounded_and_its_rest_counted,
+        test_decoder.test_L5_a_flood_of_text_is_bounded,
     ),
     Guard(
         "protocol version",

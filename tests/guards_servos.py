@@ -20,6 +20,7 @@ import test_turns
 import test_twin_bus
 import test_twin_robot
 from guard_tools import Guard, after, around, constant, put
+from lockstep import SimulatedWire
 
 from antennate.hardware import joints, settings
 from antennate.hardware.driving import session
@@ -31,7 +32,6 @@ from antennate.hardware.dynamixel.pending import PendingRequests
 from antennate.hardware.dynamixel.tables import XC430_W240
 from antennate.hardware.ports import serial_port
 from antennate.robots.spec import RobotSpec
-from antennate.twin.lockstep import SimulatedWire
 
 controller_fails = test_session.test_B8_servos_stop_within_120_ms_when_only_the_controller_fails
 

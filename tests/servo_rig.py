@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from lockstep import SimulatedWire
+
 from antennate.hardware.dynamixel.answers import MOTION, Answer, Span, Value
 from antennate.hardware.dynamixel.bus import Bus
 from antennate.hardware.dynamixel.tables import XC430_W240, XL330_M288
 from antennate.twin.bus import ServoBus
-from antennate.twin.lockstep import SimulatedWire
 from antennate.twin.registers import Servo
 
 IDS = list(range(1, 20))

@@ -7,12 +7,13 @@ import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
+from lockstep import SimulatedWire
+
 from antennate.errors import BadInputError
 from antennate.hardware.dynamixel.tables import BAUD_RATES, TABLES
 from antennate.hardware.ports.port import Port
 from antennate.robots.spec import RobotSpec
 from antennate.twin.bus import ServoBus
-from antennate.twin.lockstep import SimulatedWire
 from antennate.twin.registers import Servo
 
 ROBOT = RobotSpec()

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from antennate.control.conditioning import RunningMean, bending_level, flex_fraction
+from antennate.control.conditioning import RunningMean, bending_level, level_and_fraction
 from antennate.params.control import ConditioningParams
 
 PLAIN = ConditioningParams(counts_low=0.0, counts_high=1.0, polarity=1)
@@ -62,7 +62,8 @@ def test_deflection_is_zero_straight_and_one_fully_bent(polarity: int) -> None:
     params = ConditioningParams(counts_low=1000.0, counts_high=2000.0, polarity=polarity)
     ends = np.array([1000.0, 2000.0])
     straight, bent = ends if polarity > 0 else ends[::-1]
-    assert flex_fraction(params, np.array([straight, bent])).tolist() == [0.0, 1.0]
+    _, fraction = level_and_fraction(params, np.array([straight, bent]))
+    assert fraction.tolist() == [0.0, 1.0]
 
 
 def test_the_mean_runs_over_what_there_is_and_then_over_the_window() -> None:

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from lockstep import BoardPort, LockstepClock
 from twin_rig import Rig, rig
 
 from antennate.cli import main
@@ -21,9 +22,8 @@ from antennate.hardware.driving.session import Session
 from antennate.hardware.safety.causes import Cause, State
 from antennate.params.safety import TouchCheckParams
 from antennate.telemetry.feed import Feed
-from antennate.twin.config import TwinConfig, build
+from antennate.twin.config import TwinConfig, watched
 from antennate.twin.faults import Faults, read
-from antennate.twin.lockstep import BoardPort, LockstepClock
 from antennate.types import AntennaFrame, Contact, JointCommand
 
 CONFIG = DriveConfig(dry_run=0.5, duration=1.0, touch=TouchCheckParams(patience=2.0))
@@ -143,7 +143,7 @@ def test_L8_a_drive_that_sent_no_pose_ends_with_2_and_says_so(
 ) -> None:
     @contextlib.contextmanager
     def in_process(config: DriveConfig, *addresses: object) -> Iterator[Session]:
-        robot = build(TwinConfig(), 5)
+        robot = watched(TwinConfig(), 5)[0]
         clock = LockstepClock(robot, Faults([read(f"esp32=silent@{when}")], config.robot.ids))
         yield prepare(config, BoardPort(robot, clock), clock, clock)
 
@@ -202,7 +202,7 @@ def test_S1_S2_a_wire_that_broke_before_arming_is_named_while_one_waits_and_at_t
 ) -> None:
     @contextlib.contextmanager
     def in_process(config: DriveConfig, *addresses: object) -> Iterator[Session]:
-        robot = build(TwinConfig(), 5)
+        robot = watched(TwinConfig(), 5)[0]
         clock = LockstepClock(robot, Faults([read(f"esp32={fault}@0.3s")], config.robot.ids))
         yield prepare(config, BoardPort(robot, clock), clock, clock)
 
@@ -227,7 +227,7 @@ def test_a_drive_that_ends_before_its_first_tick_has_a_result(
 ) -> None:
     @contextlib.contextmanager
     def in_process(config: DriveConfig, *addresses: object) -> Iterator[Session]:
-        clock = LockstepClock(robot := build(TwinConfig(), 5))
+        clock = LockstepClock(robot := watched(TwinConfig(), 5)[0])
         session = prepare(config, BoardPort(robot, clock), clock, clock)
         monkeypatch.setattr(session, "read", interrupted)
         yield session
@@ -249,7 +249,7 @@ def test_a_drive_without_a_log_says_so(
 ) -> None:
     @contextlib.contextmanager
     def in_process(config: DriveConfig, *addresses: object) -> Iterator[Session]:
-        clock = LockstepClock(robot := build(TwinConfig(), 5))
+        clock = LockstepClock(robot := watched(TwinConfig(), 5)[0])
         yield prepare(config, BoardPort(robot, clock), clock, clock)
 
     monkeypatch.setattr("antennate.cli.drive.connect", in_process)

@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from antennate.twin.config import TwinConfig, build
+from antennate.twin.config import TwinConfig, watched
 from antennate.twin.driven_servo import DrivenServo
 from antennate.twin.robot import TwinRobot
 
@@ -40,7 +40,7 @@ def put(servo: DrivenServo, name: str, value: int) -> None:
 
 @pytest.mark.parametrize("drive", [265, -885])
 def test_an_antenna_that_is_driven_without_end_meets_a_stop(drive: int) -> None:
-    robot = build(TwinConfig())
+    robot = watched(TwinConfig())[0]
     servo = standing(robot, PWM, LEFT_BASE)
     put(servo, "goal_pwm", drive)
     robot.advance(4.0)
@@ -52,7 +52,7 @@ def test_an_antenna_that_is_driven_without_end_meets_a_stop(drive: int) -> None:
 @pytest.mark.parametrize("drive", [265, -885])
 def test_a_yaw_joint_that_is_driven_without_end_meets_the_legs_of_the_next_link(drive: int) -> None:
     """Legs may touch from the clear bend on; with their axles 184 mm apart, where axles meet."""
-    robot = build(TwinConfig())
+    robot = watched(TwinConfig())[0]
     servo = standing(robot, PWM)
     put(servo, "goal_pwm", drive)
     robot.advance(4.0)
@@ -64,7 +64,7 @@ def test_a_yaw_joint_that_is_driven_without_end_meets_the_legs_of_the_next_link(
 
 def test_a_position_needs_a_gain_and_a_current() -> None:
     """The same for the joint of a robot as for a servo alone: without either it stays."""
-    robot = build(TwinConfig.model_validate(XL330))
+    robot = watched(TwinConfig.model_validate(XL330))[0]
     servo = standing(robot, CURRENT_POSITION)
     start = servo.position
     put(servo, "goal_current", 0)

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 
 import numpy as np
 import pytest
+from lockstep import SimulatedWire
 from servo_rig import IDS, MODELS, Rig, positions
 
 from antennate.hardware.dynamixel import bringup, packets
@@ -27,7 +28,6 @@ from antennate.hardware.dynamixel.packets import Status, StatusError
 from antennate.hardware.dynamixel.tables import XL330_M288
 from antennate.hardware.ports.port import PortError
 from antennate.twin.bus import Fault, ServoBus, Trouble
-from antennate.twin.lockstep import SimulatedWire
 from antennate.twin.registers import Servo
 
 LIMIT = 0.010 + 1e-9

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from lockstep import BoardPort, LockstepClock
 
 from antennate.cli import main
 from antennate.control.controllers import RuleController, closed_loop, open_loop
@@ -24,8 +25,7 @@ from antennate.sim.scenes.registry import SCENES, make_scene
 from antennate.sim.scenes.scene import FlatScene
 from antennate.sim.trial import draw_trial
 from antennate.testing import check_controller
-from antennate.twin.config import TwinConfig, build
-from antennate.twin.lockstep import BoardPort, LockstepClock
+from antennate.twin.config import TwinConfig, watched
 from antennate.types import AntennaFrame, JointCommand, Maneuver
 
 EXAMPLE = f"{Path(__file__).parents[1] / 'examples/own_controller.py'}:OwnController"
@@ -146,7 +146,7 @@ def test_the_example_runs_in_the_tunnel_in_worker_processes(
 
 def test_the_example_drives_the_twin() -> None:
     """By the code of `drive`, all of it through bytes, in lock-step."""
-    robot = build(TwinConfig())
+    robot = watched(TwinConfig())[0]
     clock = LockstepClock(robot)
     config = DriveConfig(controller=EXAMPLE, dry_run=0.5, duration=3.0, touch_check=False)
     session = prepare(config, BoardPort(robot, clock), clock, clock)

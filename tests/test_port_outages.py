@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from lockstep import BoardPort
 from twin_rig import rig
 
 from antennate.control.loop import run_loop
@@ -22,7 +23,6 @@ from antennate.hardware.ports.port import Port, PortError
 from antennate.hardware.safety.causes import State
 from antennate.robots.spec import RobotSpec
 from antennate.twin.config import TwinConfig
-from antennate.twin.lockstep import BoardPort
 
 ARM, OUT, BACK, AGAIN = 0.5, 1.2, 1.7, 2.2
 """When torque comes on, a cable is pulled and put back, and an arm event comes [s]."""

@@ -14,6 +14,7 @@ from typing import Any
 
 import pytest
 from doctor_rig import Patient
+from lockstep import BoardPort, LockstepClock, SimulatedWire
 from log_ticks import HEADER
 from recorded import act, leaves, recorded
 from setup_rig import Box, Script
@@ -40,9 +41,8 @@ from antennate.robots.spec import RobotSpec
 from antennate.studies.run_directory import RunDirectory
 from antennate.telemetry.feed import Feed
 from antennate.telemetry.replay import ReplayConfig
-from antennate.twin.config import TwinConfig, build
+from antennate.twin.config import TwinConfig, watched
 from antennate.twin.faults import Faults, read
-from antennate.twin.lockstep import BoardPort, LockstepClock, SimulatedWire
 
 Patch = pytest.MonkeyPatch
 PORTS = {"bus": "the bus", "esp32": "the board"}
@@ -87,7 +87,7 @@ def connected(**of_twin: Any) -> Callable[..., Any]:
     @contextlib.contextmanager
     def connect(config: DriveConfig, *_: Any) -> Iterator[Session]:
         reach(config.network)
-        robot = build(TwinConfig(robot=fresh(config.robot), **of_twin))
+        robot = watched(TwinConfig(robot=fresh(config.robot), **of_twin))[0]
         clock = LockstepClock(robot)
         session = prepare(config, BoardPort(robot, clock), clock, clock)
         if fault:
@@ -216,7 +216,7 @@ def run_twin(patch: Patch, config: TwinConfig, tmp_path: Path) -> None:
     twin.command([])
     if config.factory or config.scene == "flat":
         return
-    robot = build(config)
+    robot = watched(config)[0]
     clock = LockstepClock(robot)
     orders = DriveConfig(
         dry_run=0.1, duration=0.3, touch_check=False, robot=fresh(config.robot), stand=0.0

@@ -15,7 +15,7 @@ from antennate.errors import AntennateError, BadInputError, ConfigError
 from antennate.hardware.dynamixel import packets
 from antennate.hardware.dynamixel.parser import Parser
 from antennate.robots.spec import RobotSpec
-from antennate.twin.config import TwinConfig, build
+from antennate.twin.config import TwinConfig, watched
 from antennate.twin.orders import Orders
 from antennate.twin.robot import TwinRobot
 from antennate.twin.servo_box import ServoBox, read_list
@@ -142,7 +142,7 @@ def test_orders_come_from_a_file_line_by_line(tmp_path: Path) -> None:
 
 @pytest.fixture
 def limp() -> TwinRobot:
-    return build(TwinConfig(push=("yaw1=20deg@1s", "leg_r2=-90deg@1s")))
+    return watched(TwinConfig(push=("yaw1=20deg@1s", "leg_r2=-90deg@1s")))[0]
 
 
 def test_a_joint_of_the_standing_robot_is_turned_to_an_angle(limp: TwinRobot) -> None:
@@ -179,9 +179,9 @@ def test_a_joint_that_lost_its_torque_is_turned_in_the_physics(limp: TwinRobot) 
 
 def test_straightening_a_robot_puts_all_its_joints_to_their_zeros() -> None:
     zeros = (2000, 2100, 1900, 2048, 2222)
-    robot = build(
+    robot = watched(
         TwinConfig(robot=RobotSpec.model_validate({"yaw": {"zeros": zeros}}), factory=True)
-    )
+    )[0]
     robot.plugging.order("push all=0deg", 0.0)
     robot.advance(1.0)
     assert tuple(servo.get("present_position") for servo in robot.servos[:5]) == zeros
@@ -192,7 +192,7 @@ def test_straightening_a_robot_puts_all_its_joints_to_their_zeros() -> None:
 
 def test_the_servos_tell_what_the_physics_does() -> None:
     """A yaw that is sent round tells speed, drive and load, and none of them at rest."""
-    robot = build(TwinConfig())
+    robot = watched(TwinConfig())[0]
     servo = robot.servos[0]
     robot.advance(0.1)
     for each in robot.servos:
@@ -221,7 +221,7 @@ def test_the_servos_tell_what_the_physics_does() -> None:
 
 def test_a_leg_turns_at_a_speed_in_velocity_mode_and_by_a_drive_in_pwm_mode() -> None:
     """XC430 at 11.1 V: 65 rev/min with the whole drive; a third of it gives about a third."""
-    robot = build(TwinConfig())
+    robot = watched(TwinConfig())[0]
     leg = robot.servos[5]
     for mode, register, value, expected in (
         (1, "goal_velocity", 60, 60),
@@ -312,8 +312,8 @@ def test_only_a_client_at_the_speed_of_a_servo_is_heard() -> None:
 def test_what_is_pushed_has_an_angle_with_its_unit() -> None:
     assert math.radians(45) == pytest.approx(512 * 2 * math.pi / 4096)
     with pytest.raises(BadInputError, match="--push: expected JOINT=ANGLE"):
-        build(TwinConfig(push=("yaw1=20",)))
+        watched(TwinConfig(push=("yaw1=20",)))
     with pytest.raises(BadInputError, match="--push: expected all or one of yaw1"):
-        build(TwinConfig(push=("knee=20deg",)))
+        watched(TwinConfig(push=("knee=20deg",)))
     with pytest.raises(BadInputError, match="--plugged: expected all or one of yaw1"):
-        build(TwinConfig(plugged=("knee",)))
+        watched(TwinConfig(plugged=("knee",)))

@@ -20,7 +20,7 @@ from antennate.hardware.esp32.wire import Sample
 from antennate.hardware.safety.causes import State
 from antennate.params.twin import BatteryParams
 from antennate.robots.spec import RobotSpec
-from antennate.twin.config import TwinConfig, build
+from antennate.twin.config import TwinConfig, watched
 from antennate.twin.faults import Faults, read
 from antennate.twin.noise import Noise
 from antennate.twin.robot import TwinRobot
@@ -53,7 +53,7 @@ def test_lost_bytes_leave_the_others_as_they_are_and_chance_has_a_seed() -> None
 
 
 def test_each_wire_has_the_noise_that_was_asked_for() -> None:
-    robot = build(TwinConfig())
+    robot = watched(TwinConfig())[0]
     broken(robot, "bus=ber:1e-3", "wire=loss:0.02", "esp32=ber:1e-4")
     assert (robot.bus.noise.ber, robot.bus.noise.loss) == (1e-3, 0.02)
     assert (robot.noise.ber, robot.noise.loss) == (1e-4, 0.02)
@@ -145,7 +145,7 @@ def test_L1_B3_bit_errors_are_counted_and_no_wrong_value_is_ever_used(
 
 
 def test_a_supply_sags_at_its_rate_and_servos_latch_when_it_is_below_their_limit() -> None:
-    robot = build(TwinConfig())
+    robot = watched(TwinConfig())[0]
     large, small = robot.servos[0], robot.servos[17]
     robot.advance(1.0)
     broken(robot, "bus=discharge:2")
@@ -162,7 +162,7 @@ def test_a_supply_sags_at_its_rate_and_servos_latch_when_it_is_below_their_limit
 
 def test_a_sagging_supply_gives_way_under_load() -> None:
     """Two servos blocked at full strength: 2 * 1.3 A through 0.5 ohm."""
-    robot = build(TwinConfig(battery=BatteryParams(resistance=0.5, stall_current=1.3)))
+    robot = watched(TwinConfig(battery=BatteryParams(resistance=0.5, stall_current=1.3)))[0]
     broken(robot, "bus=discharge:0")
     for servo in robot.servos[:2]:
         servo.set("torque_enable", 1)
@@ -172,7 +172,7 @@ def test_a_sagging_supply_gives_way_under_load() -> None:
 
 
 def test_a_fault_of_the_answers_is_taken_back() -> None:
-    robot = build(TwinConfig())
+    robot = watched(TwinConfig())[0]
     robot.advance(1.0)
     heard: list[bool] = []
     for what in ("silent", "none"):

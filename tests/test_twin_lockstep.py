@@ -9,15 +9,15 @@ import time
 import tty
 
 import numpy as np
+from lockstep import BoardPort, LockstepClock
 
 from antennate.hardware.dynamixel import packets
 from antennate.hardware.dynamixel.parser import Parser
 from antennate.hardware.esp32.decoder import FrameDecoder
 from antennate.hardware.esp32.wire import Sample
 from antennate.robots.spec import RobotSpec
-from antennate.twin.config import TwinConfig, build
+from antennate.twin.config import TwinConfig, watched
 from antennate.twin.faults import Faults, read
-from antennate.twin.lockstep import BoardPort, LockstepClock
 from antennate.twin.robot import TwinRobot
 from antennate.twin.serve import TwinServer
 
@@ -43,7 +43,7 @@ TORQUE = sync_write(64, 1, [1] * 19)
 
 
 def in_invented_time() -> bytes:
-    robot = build(TwinConfig(), boot_id=5)
+    robot = watched(TwinConfig(), boot_id=5)[0]
     plan = [goals_of(robot, step) for step in range(TICKS)]
     clock = LockstepClock(robot)
     board, came = BoardPort(robot, clock), b""
@@ -64,7 +64,7 @@ class Client:
     """Both pseudo-terminals of a twin in lock-step."""
 
     def __init__(self, *faults: str) -> None:
-        self.robot = build(TwinConfig(), boot_id=5)
+        self.robot = watched(TwinConfig(), boot_id=5)[0]
         self._over = threading.Event()
         self._server = TwinServer(self.robot, Faults([read(text) for text in faults], IDS))
         self._thread = threading.Thread(

@@ -11,7 +11,7 @@ import select
 import sys
 
 from antennate.hardware.driving.priority import LEVEL, urgent
-from antennate.twin.config import TwinConfig, build
+from antennate.twin.config import TwinConfig, watched
 from antennate.twin.faults import Faults, read
 from antennate.twin.robot import TwinRobot
 from antennate.twin.serve import TwinServer
@@ -30,7 +30,7 @@ class AskedFaults(Faults):
 
 if __name__ == "__main__":
     config = TwinConfig(scene=sys.argv[1]) if sys.argv[1:] else TwinConfig()
-    with TwinServer(build(config), AskedFaults([], ())) as server, urgent(LEVEL + 1):
+    with TwinServer(watched(config)[0], AskedFaults([], ())) as server, urgent(LEVEL + 1):
         sys.stdout.write(json.dumps(server.paths) + "\n")
         sys.stdout.flush()
         server.run(lambda t: True)

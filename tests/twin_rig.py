@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from lockstep import BoardPort, LockstepClock
 
 from antennate.control.loop import run_loop
 from antennate.control.registry import make_controller
@@ -32,8 +33,7 @@ from antennate.params.safety import SupervisorParams, TouchCheckParams
 from antennate.sim.scenes.registry import make_scene
 from antennate.sim.sim_robot import SimRobot
 from antennate.sim.trial import draw_trial
-from antennate.twin.config import TwinConfig, build
-from antennate.twin.lockstep import BoardPort, LockstepClock
+from antennate.twin.config import TwinConfig, watched
 from antennate.twin.robot import TwinRobot
 from antennate.types import AntennaFrame, Clock, Controller, JointCommand, Robot
 
@@ -175,7 +175,7 @@ def rig(
         touch: How it is checked by touch, None if it is not.
         cable: Wraps each port.
     """
-    robot = build(config)
+    robot = watched(config)[0]
     params = ControlParams(**dict(config.control))
     clock = LockstepClock(robot)
     board_port, bus_port = cable(BoardPort(robot, clock)), cable(clock)

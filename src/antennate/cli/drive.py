@@ -17,7 +17,7 @@ from antennate.antenna.calibration import Calibration
 from antennate.cli import viewer
 from antennate.cli.addresses import PortOptions, at_hand, key_of, parse_robot, require_two_ports
 from antennate.cli.exit_codes import BAD_INPUT, OK
-from antennate.cli.keyboard import pressed_keys
+from antennate.cli.keys import pressed_keys
 from antennate.cli.options import option
 from antennate.cli.results import ResultOptions, folder_for, tell
 from antennate.cli.view_options import PageOptions, page_of

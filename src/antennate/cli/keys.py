@@ -11,7 +11,7 @@ import termios
 import tty
 from collections.abc import Callable, Iterator
 
-from antennate.errors import BadInputError
+from antennate.errors import BadInputError, ConfigError
 
 _CHUNK = 1024
 _ARROWS = {b"A": "up", b"B": "down", b"C": "right", b"D": "left"}
@@ -61,6 +61,38 @@ def single_keys(handle: int) -> Iterator[None]:
             termios.tcsetattr(handle, termios.TCSAFLUSH, before)
         for number, handler in ignored.items():
             signal.signal(number, handler)
+
+
+@contextlib.contextmanager
+def pressed_keys(flag: str) -> Iterator[Callable[[], bool]]:
+    r"""Yield a function that says, without waiting, whether a key came since its last call.
+
+    Ctrl-C, Ctrl-\ and Ctrl-Z do what they always do. The terminal is as before afterwards.
+
+    Args:
+        flag: What needs the keys, for the error.
+
+    Raises:
+        ConfigError: Standard input is no terminal, or another program has it.
+    """
+    stdin = sys.stdin
+    if stdin is None or not stdin.isatty():
+        raise ConfigError(
+            f"{flag}: expected a terminal as standard input, whose keys can be held, found none"
+        )
+    handle = stdin.fileno()
+    if os.tcgetpgrp(handle) != os.getpgrp():
+        raise ConfigError(f"{flag}: expected to run in the foreground of its terminal, without &")
+    with single_keys(handle):
+        yield lambda: _came(handle)
+
+
+def _came(handle: int) -> bool:
+    """Whether something was typed; nothing comes from a terminal that is gone."""
+    try:
+        return bool(select.select([handle], [], [], 0.0)[0]) and bool(os.read(handle, _CHUNK))
+    except OSError:
+        return False
 
 
 def _read(handle: int, wait: float) -> list[str]:

@@ -48,10 +48,6 @@ _SHOWN = 10
 """Most events that `info` prints."""
 
 
-class LogConfig(Params):
-    """A log has no parameters."""
-
-
 @dataclass(frozen=True)
 class Options(ResultOptions):
     """What to do with which log."""
@@ -75,7 +71,7 @@ def command(argv: Sequence[str]) -> int:
     Raises:
         AntennateError: The log cannot be read, or the file not written.
     """
-    _, options = parse("log", DESCRIPTION, LogConfig, argv, Options)
+    _, options = parse("log", DESCRIPTION, Params, argv, Options)
     if not options.log:
         raise ConfigError("expected the name of a log or of a run, found none")
     path = log_of(Path(options.log))

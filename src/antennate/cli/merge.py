@@ -27,10 +27,6 @@ Each shard is the folder of the same command with --shard I/N. All of them must 
 same configuration, versions and code."""
 
 
-class Nothing(Params):
-    """A merge has no parameters."""
-
-
 @dataclass(frozen=True)
 class MergeOptions:
     """Which shards, and where the run goes."""
@@ -48,7 +44,7 @@ def command(argv: Sequence[str]) -> int:
     Raises:
         AntennateError: A folder is no shard, trials are missing, or nothing can be written.
     """
-    _, options = parse("merge", DESCRIPTION, Nothing, argv, MergeOptions)
+    _, options = parse("merge", DESCRIPTION, Params, argv, MergeOptions)
     if not options.shards:
         raise ConfigError("--shards: expected the folders of all shards, found none")
     identity, records = _gathered(options.shards)

@@ -32,10 +32,6 @@ _COMMANDS = ("drive", "teleop", "replay", "doctor", "robot")
 """Commands beside the experiments that leave runs."""
 
 
-class Nothing(Params):
-    """A report has no parameters."""
-
-
 @dataclass(frozen=True)
 class Options:
     """Which runs, and where the page goes."""
@@ -54,7 +50,7 @@ def command(argv: Sequence[str]) -> int:
     Raises:
         AntennateError: A folder is no run, the runs cannot be compared, or nothing can be written.
     """
-    _, options = parse("report", DESCRIPTION, Nothing, argv, Options)
+    _, options = parse("report", DESCRIPTION, Params, argv, Options)
     if options.compare and options.run is not None:
         raise ConfigError(f"--compare: expected no other run beside it, found {options.run}")
     if options.compare:

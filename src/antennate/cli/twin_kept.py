@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -13,6 +12,7 @@ from pydantic.dataclasses import dataclass
 
 from antennate.cli.options import option
 from antennate.cli.progress import progress, stop_signals
+from antennate.cli.status import write
 from antennate.errors import ConfigError
 from antennate.files import write_whole
 from antennate.sim.world import World
@@ -90,7 +90,7 @@ class Kept:
     ) -> None:
         if self._log is not None:
             wrong = self._log.close()
-            _say(f"log: {self._log.path}{f': {wrong}' if wrong else ''}")
+            write(f"log: {self._log.path}{f': {wrong}' if wrong else ''}\n")
         if self._film is not None and self._video is not None:
             _draw(self._film, self._video)
 
@@ -117,20 +117,15 @@ def _draw(kept: TwinFilm, path: Path) -> None:
 
     film = kept.film()
     if film is None:
-        _say("video: no servo had torque, so there is nothing to show")
+        write("video: no servo had torque, so there is nothing to show\n")
         return
     if kept.full:
-        _say(f"video: it ends after {MOST_PICTURES / RATE / 60:g} min, as long as a film may be")
+        write(f"video: it ends after {MOST_PICTURES / RATE / 60:g} min, as long as a film may be\n")
     try:
         with progress("pictures of the film") as step, stop_signals():
             data = encoded(film, step)
     except KeyboardInterrupt:
-        _say("video: interrupted: no film was written")
+        write("video: interrupted: no film was written\n")
         return
     write_whole(path, data)
-    _say(f"video: {path}")
-
-
-def _say(text: str) -> None:
-    sys.stderr.write(text + "\n")
-    sys.stderr.flush()
+    write(f"video: {path}\n")

@@ -39,10 +39,6 @@ read and decided, and a map. It works without a network; over ssh, forward the p
 A run with several logs wants the name of one. Ctrl-C ends it."""
 
 
-class ViewConfig(Params):
-    """A view has no parameters."""
-
-
 @dataclass(frozen=True)
 class Options(FoxgloveOptions):
     """What to show, and where."""
@@ -60,7 +56,7 @@ def command(argv: Sequence[str]) -> int:
     Raises:
         AntennateError: There is no such log, or the page cannot be served, or not any more.
     """
-    _, options = parse("view", DESCRIPTION, ViewConfig, argv, Options)
+    _, options = parse("view", DESCRIPTION, Params, argv, Options)
     if options.shown is None:
         raise ConfigError("expected a log or the folder of a run, found none")
     path = log_of(options.shown)

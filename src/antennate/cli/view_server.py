@@ -8,6 +8,7 @@ import socket
 import sys
 from typing import TYPE_CHECKING
 
+from antennate.cli.status import write
 from antennate.errors import AntennateError
 from antennate.messages import one_line
 from antennate.telemetry.view.channel import FAILED, READY, Channel
@@ -54,7 +55,7 @@ def _sink(port: int) -> Display:
     from antennate.telemetry.view.foxglove import FoxgloveSink, layout
 
     sink = FoxgloveSink(port)
-    _say(f"foxglove: {sink.address}, layout {layout()}; it does not check who reads it")
+    write(f"foxglove: {sink.address}, layout {layout()}; it does not check who reads it\n")
     return sink
 
 
@@ -65,17 +66,12 @@ def _page(channel: Channel, listener: socket.socket, stack: contextlib.ExitStack
     from antennate.telemetry.view.show import Page
 
     port = listener.getsockname()[1]
-    gate = Gate(port, *page.load(port), lambda: _say(f"view: for another browser: {gate.link}"))
+    gate = Gate(port, *page.load(port), lambda: write(f"view: for another browser: {gate.link}\n"))
     server = serve(listener, gate)
     stack.callback(server.stop)
     shown = Page(server, channel)
-    _say(f"view: {gate.link}")
+    write(f"view: {gate.link}\n")
     return shown
-
-
-def _say(text: str) -> None:
-    sys.stderr.write(text + "\n")
-    sys.stderr.flush()
 
 
 if __name__ == "__main__":

@@ -52,13 +52,8 @@ def bending_level(params: CurveParams | Curves, counts: Floats) -> Floats:
     return _level(params, _share(params, counts))
 
 
-def flex_fraction(params: CurveParams | Curves, counts: Floats) -> Floats:
-    """Flex as a fraction of the calibrated range: 0 straight, 1 fully bent, same shape."""
-    return _fraction(params, _share(params, counts))
-
-
 def level_and_fraction(params: CurveParams | Curves, counts: Floats) -> tuple[Floats, Floats]:
-    """`bending_level` and `flex_fraction` at once, which takes less than one after the other."""
+    """`bending_level`, and flex as a fraction of the calibrated range: 0 straight, 1 fully bent."""
     x = _share(params, counts)
     return _level(params, x), _fraction(params, x)
 

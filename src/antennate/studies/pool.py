@@ -139,7 +139,7 @@ class _Call:
     def fail(self, place: int, failure: Failure) -> None:
         """Keep a failure, if there is a result that stands for it."""
         if self._lost is None:
-            raise failure.error or WorkerError(_in_words(failure))
+            raise failure.raised()
         result = self._lost(place, failure)
         if self._workers.store is not None:
             content = {"failure": [failure.status, failure.reason]}
@@ -220,8 +220,3 @@ def gather(
     if workers.shard is not None:
         raise ShardEnd(sum(map(workers.mine, call.found)), len(tasks))
     return [call.found[place] for place in range(len(tasks))]
-
-
-def _in_words(failure: Failure) -> str:
-    """A failure as the reason why a run ends."""
-    return failure.reason if failure.status != "failed" else f"a worker failed: {failure.reason}"

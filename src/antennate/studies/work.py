@@ -32,6 +32,11 @@ class Failure:
     reason: str
     error: Exception | None = field(default=None, compare=False)
 
+    def raised(self) -> Exception:
+        """What ends a run in which it may not be."""
+        words = "a worker failed: " if self.status == "failed" else ""
+        return self.error or WorkerError(words + self.reason)
+
 
 Fail = Callable[[int, Failure], None]
 """Takes the place of a task and why it has no result."""

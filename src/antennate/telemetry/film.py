@@ -18,8 +18,10 @@ from antennate.colours import MANEUVER_COLOURS, MANEUVER_NAMES, SERIES, rgba
 from antennate.errors import BadInputError, MissingPackageError
 from antennate.messages import extra
 from antennate.robots.antenna import AntennaSpec
+from antennate.robots.spec import RobotSpec
 from antennate.sim import gl
 from antennate.sim.camera import Camera, Picture, Shot
+from antennate.sim.world import World
 from antennate.telemetry.strip import Band, Strip, Trace
 from antennate.types import Contact, Floats, Ints, Maneuver
 
@@ -125,6 +127,49 @@ class FilmRecorder:
         targets = _smooth(np.array([where for *_, where in self._kept]), RATE)
         positions = np.array([position for _, position, _ in self._kept])
         return Film(title, model, shot, self.t, positions, targets, traces, bands)
+
+
+class WalkRecorder(FilmRecorder):
+    """Keeps what a film of a walking robot needs.
+
+    Args:
+        robot: The robot.
+        speed: How many times faster than real time the film is.
+        width: Width of the picture over the length of the robot.
+    """
+
+    def __init__(self, robot: RobotSpec, speed: float = 1.0, width: float = 2.8) -> None:
+        super().__init__(speed)
+        self._shot, self._model = Shot(width * robot.length), None
+
+    def see(self, world: World, t: float, **values: Any) -> None:
+        """Offer a moment [s] with `counts` and whatever else is to be shown; see `take`."""
+        self._model = world.model
+        self.take(t, world.data.qpos, world.links().mean(axis=0), **values)
+
+    def walk(self, title: str, traces: Sequence[Trace], bands: Sequence[Band]) -> Film:
+        """The film: readings before the other traces."""
+        counts = counts_trace(self.values("counts"))
+        return self.film(title, self._model, self._shot, [counts, *traces], bands)
+
+    def decided(self, title: str, threshold: float | None) -> Film:
+        """The film of a walk with `level`, `contact` and `maneuver`, -1 where it is not known.
+
+        Raises:
+            BadInputError: Nothing was kept.
+        """
+        if not len(self):
+            raise nothing(title)
+        maneuver = self.values("maneuver")
+        known = bool((maneuver >= 0).any())
+        return self.walk(
+            title,
+            [level_trace(self.values("level"), threshold)],
+            [
+                *([maneuver_band(maneuver)] if known else ()),
+                *contact_bands(self.values("contact"), ("left", "right")),
+            ],
+        )
 
 
 def nothing(title: str) -> BadInputError:

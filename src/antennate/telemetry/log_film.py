@@ -4,14 +4,10 @@ from __future__ import annotations
 
 import math
 
-from antennate.sim.camera import Shot
 from antennate.sim.world import World
-from antennate.telemetry import film
-from antennate.telemetry.film import MOST_PICTURES, Film, FilmRecorder
-from antennate.telemetry.header import Header
+from antennate.telemetry.film import MOST_PICTURES, Film, WalkRecorder
 from antennate.telemetry.log_scene import LogScene
 from antennate.telemetry.reader import LogReader
-from antennate.telemetry.ticks import Tick
 from antennate.telemetry.topics import COORDINATES
 
 _LONGEST = 0.1
@@ -33,7 +29,8 @@ def film_of(log: LogReader, arena: World | None, title: str) -> Film:
     Raises:
         LogError: It has no ticks.
     """
-    recorder, scene, placed = FilmRecorder(), LogScene(log.header, None), False
+    robot, threshold = log.header.robot, log.header.params.rule.threshold
+    recorder, scene, placed = WalkRecorder(robot), LogScene(log.header, None), False
     t, before = 0.0, -math.inf
     for records, tick in log.groups():
         if tick is None:
@@ -43,7 +40,7 @@ def film_of(log: LogReader, arena: World | None, title: str) -> Film:
                 found = COORDINATES.decode(record.data)
                 if not placed:  # what was drawn before has another world
                     scene, placed = LogScene(log.header, arena, len(found["position"])), True
-                    recorder, t, before = FilmRecorder(), 0.0, -math.inf
+                    recorder, t, before = WalkRecorder(robot), 0.0, -math.inf
                 scene.take(tick.now, found["position"], found["robot"])
         t += min(max(0.0, tick.now - before), _LONGEST) if math.isfinite(before) else 0.0
         before = tick.now
@@ -52,36 +49,15 @@ def film_of(log: LogReader, arena: World | None, title: str) -> Film:
                 scene.place(tick.now)
             else:
                 scene.place_joints(tick)
-            _keep(recorder, scene.world, tick, t)
+            recorder.see(
+                scene.world,
+                t,
+                counts=tick.reading,
+                level=tick.level,
+                contact=tick.contact,
+                maneuver=tick.maneuver,
+            )
         if len(recorder) >= MOST_PICTURES:
             break
     log.require_ticks()
-    return _film(recorder, scene.world, log.header, title)
-
-
-def _keep(recorder: FilmRecorder, world: World, tick: Tick, t: float) -> None:
-    recorder.take(
-        *(t, world.data.qpos, world.links().mean(axis=0)),
-        counts=tick.reading,
-        level=tick.level,
-        contact=tick.contact,
-        maneuver=tick.maneuver,
-    )
-
-
-def _film(recorder: FilmRecorder, world: World, header: Header, title: str) -> Film:
-    maneuver = recorder.values("maneuver")
-    known = bool((maneuver >= 0).any())  # a twin does not know it
-    return recorder.film(
-        title,
-        world.model,
-        Shot(2.8 * header.robot.length),
-        [
-            film.counts_trace(recorder.values("counts")),
-            film.level_trace(recorder.values("level"), header.params.rule.threshold),
-        ],
-        [
-            *([film.maneuver_band(maneuver)] if known else ()),
-            *film.contact_bands(recorder.values("contact"), ("left", "right")),
-        ],
-    )
+    return recorder.decided(title, threshold)

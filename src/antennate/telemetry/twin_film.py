@@ -8,10 +8,9 @@ from __future__ import annotations
 import numpy as np
 
 from antennate.robots.spec import ANTENNA_PREFIXES
-from antennate.sim.camera import Shot
 from antennate.sim.world import World
 from antennate.telemetry import film
-from antennate.telemetry.film import MOST_PICTURES, Film, FilmRecorder
+from antennate.telemetry.film import MOST_PICTURES, Film, WalkRecorder
 from antennate.telemetry.strip import Band
 from antennate.twin.config import TwinConfig
 from antennate.twin.passage import Passage
@@ -32,7 +31,7 @@ class TwinFilm:
 
     def __init__(self, robot: TwinRobot, passage: Passage, config: TwinConfig) -> None:
         self._robot, self._passage, self._config = robot, passage, config
-        self._recorder, self._ticks = FilmRecorder(), 0
+        self._recorder, self._ticks = WalkRecorder(config.robot), 0
 
     @property
     def full(self) -> bool:
@@ -46,8 +45,9 @@ class TwinFilm:
         if self.full or not self._recorder.due(t):
             return
         _, names, _, _ = world.obstacle_contacts()
-        self._recorder.take(
-            *(t, world.data.qpos, world.links().mean(axis=0)),
+        self._recorder.see(
+            world,
+            t,
             counts=self._robot.counts,
             progress=[self._passage.progress],
             touches=[any(name.startswith(side) for name in names) for side in ANTENNA_PREFIXES],
@@ -60,14 +60,9 @@ class TwinFilm:
         if not len(kept):
             return None
         touches = kept.values("touches").astype(np.int64)
-        return kept.film(
+        return kept.walk(
             f"twin, trial {self._config.trial}",
-            self._robot.world.model,
-            Shot(2.8 * self._config.robot.length),
-            [
-                film.counts_trace(kept.values("counts")),
-                film.trace("way of the head [m]", kept.values("progress")),
-            ],
+            [film.trace("way of the head [m]", kept.values("progress"))],
             [
                 Band("torque", kept.values("torque").astype(np.int64), _TORQUES),
                 *(Band(side, touches[:, i], _TOUCHES) for i, side in enumerate(("left", "right"))),

@@ -67,13 +67,11 @@ class TwinConfig(TrialConfig):
     control: TwinControlParams = TwinControlParams()
 
 
-def build(config: TwinConfig, boot_id: int | None = None) -> TwinRobot:
-    """The robot at the start of its trial; each start of a real board has a boot id of its own."""
-    return watched(config, boot_id)[0]
-
-
 def watched(config: TwinConfig, boot_id: int | None = None) -> tuple[TwinRobot, Passage]:
-    """The same, and how far it comes."""
+    """The robot at the start of its trial, and how far it comes.
+
+    Each start of a real board has a boot id of its own.
+    """
     require_antennae(config.robot, "the twin")
     control, period = config.control, config.control.period
     scene = make_scene(config.scene, config.tunnel)

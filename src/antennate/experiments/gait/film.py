@@ -8,10 +8,9 @@ from functools import partial
 import numpy as np
 
 from antennate.experiments.gait.run import MANEUVERS, GaitStudyConfig, walk_flat
-from antennate.sim.camera import Shot
 from antennate.sim.world import World
 from antennate.telemetry import film
-from antennate.telemetry.film import Film, FilmRecorder
+from antennate.telemetry.film import Film, WalkRecorder
 from antennate.types import AntennaFrame, Maneuver
 
 
@@ -26,22 +25,15 @@ def record(config: GaitStudyConfig, maneuver: Maneuver) -> Film:
     Raises:
         SimulationError: The physics became invalid.
     """
-    recorder, models = FilmRecorder(), []
+    recorder = WalkRecorder(config.robot, width=2.2)
 
     def watch(world: World, frame: AntennaFrame) -> None:
-        models[:] = [world.model]
-        centre = world.links().mean(axis=0)
-        recorder.take(world.t, world.data.qpos, centre, counts=frame.counts[0], centre=centre)
+        recorder.see(world, world.t, counts=frame.counts[0], centre=world.links().mean(axis=0))
 
     walk_flat(config, maneuver.name.lower(), config.gait, maneuver, watch)
     way = recorder.values("centre") - recorder.values("centre")[0]
-    return recorder.film(
+    return recorder.walk(
         maneuver.name,
-        models[0],
-        Shot(2.2 * config.robot.length),
-        [
-            film.counts_trace(recorder.values("counts")),
-            film.trace("way of the middle: x, y [m]", way),
-        ],
+        [film.trace("way of the middle: x, y [m]", way)],
         [film.maneuver_band(np.full(len(recorder), int(maneuver)))],
     )

@@ -9,10 +9,8 @@ from antennate.experiments.tunnel.batch import run_trials
 from antennate.experiments.tunnel.config import TunnelConfig
 from antennate.experiments.tunnel.monitor import TrialResult
 from antennate.messages import short_names
-from antennate.sim.camera import Shot
 from antennate.sim.world import World
-from antennate.telemetry import film
-from antennate.telemetry.film import Film, FilmRecorder
+from antennate.telemetry.film import Film, WalkRecorder
 from antennate.types import AntennaFrame, Controller
 
 SPEED = 2.0
@@ -35,12 +33,12 @@ def record(
     Raises:
         BadInputError: The controller failed at its first tick.
     """
-    recorder, models, rows = FilmRecorder(speed), [], list[TrialResult]()
+    recorder, rows = WalkRecorder(config.robot, speed), list[TrialResult]()
 
     def watch(world: World, frame: AntennaFrame, control: Controller) -> tuple[()]:
-        models[:] = [world.model]
-        recorder.take(
-            *(world.t, world.data.qpos, world.links().mean(axis=0)),
+        recorder.see(
+            world,
+            world.t,
             counts=frame.counts[0],
             level=control.level[0],
             contact=control.contact[0],
@@ -50,18 +48,4 @@ def record(
 
     run_trials(config, controller, [trial], lambda found: rows.append(found[0]), watch=watch)
     title = f"{label}, trial {trial}: {rows[0].outcome} ({speed:g}×)"
-    if not models:
-        raise film.nothing(title)
-    return recorder.film(
-        title,
-        models[0],
-        Shot(2.8 * config.robot.length),
-        [
-            film.counts_trace(recorder.values("counts")),
-            film.level_trace(recorder.values("level"), config.control.rule.threshold),
-        ],
-        [
-            film.maneuver_band(recorder.values("maneuver")),
-            *film.contact_bands(recorder.values("contact"), ("left", "right")),
-        ],
-    )
+    return recorder.decided(title, config.control.rule.threshold)

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from antennate.control.registry import make_controller
-from antennate.errors import ConfigError, WorkerError
+from antennate.errors import ConfigError
 from antennate.experiments.tunnel import measures
 from antennate.experiments.tunnel.batch import BATCH, Emit, run_trials
 from antennate.experiments.tunnel.config import TunnelConfig
@@ -141,7 +141,7 @@ def _run_batched(
 def _lost(config: TunnelConfig, trial: Trial, failure: Failure) -> _Found:
     """What is told of a trial whose worker died, or that did not end."""
     if failure.status == "failed":
-        raise failure.error or WorkerError(f"a worker failed: {failure.reason}")
+        raise failure.raised()
     name, number = trial
     shares = {f"share_{m.name.lower()}": 0.0 for m in Maneuver}
     row = TrialResult(

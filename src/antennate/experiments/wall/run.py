@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from antennate.antenna.statics import Profile
-from antennate.errors import SimulationError, WorkerError
+from antennate.errors import SimulationError
 from antennate.experiments.wall import measures
 from antennate.experiments.wall.config import WallConfig
 from antennate.experiments.wall.outcome import Traverse, WallTrial, classify, invalid
@@ -160,7 +160,7 @@ def run(
 
     def lost(place: int, failure: Failure) -> tuple[WallTrial, Traverse | None]:
         if failure.status == "failed":
-            raise failure.error or WorkerError(f"a worker failed: {failure.reason}")
+            raise failure.raised()
         profile, trial = trials[place]
         return invalid(config.seed, trial, profile, failure.reason), None
 

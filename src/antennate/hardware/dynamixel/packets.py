@@ -204,24 +204,6 @@ def fast_reply_size(count: int, length: int) -> int:
     return 8 + count * (length + 4)
 
 
-def fast_reply(asked: int, answers: Sequence[Status], length: int) -> list[bytes]:
-    """What each servo adds to the one reply to a fast sync read.
-
-    The first sends the header for all `asked` servos. Each adds error, id, data and the CRC of all
-    bytes so far; nothing is stuffed.
-    """
-    pieces: list[bytes] = []
-    crc = 0
-    for answer in answers:
-        piece = b"" if pieces else _fast_header(asked, length)
-        piece += bytes([answer.error_byte, answer.id]) + answer.data.ljust(length, b"\0")
-        crc = crc16(piece, crc)
-        end = crc.to_bytes(2, "little")
-        crc = crc16(end, crc)
-        pieces.append(piece + end)
-    return pieces
-
-
 def split_fast_reply(received: bytes, ids: Sequence[int], length: int) -> list[Status]:
     """Answers in what came after a fast sync read, each proven by its CRC.
 

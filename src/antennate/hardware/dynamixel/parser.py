@@ -18,20 +18,14 @@ from antennate.hardware.dynamixel.packets import (
 
 @dataclass(slots=True)
 class Counters:
-    """What a parser has seen; skipped and packet bytes together are all that is not pending.
+    """What a parser has seen.
 
     Attributes:
-        packets: Packets that were right.
-        packet_bytes: Bytes of those.
         bad_crc: Packets with a wrong CRC.
-        bad_length: Headers with a length that cannot be.
         skipped_bytes: Bytes that belong to no right packet.
     """
 
-    packets: int = 0
-    packet_bytes: int = 0
     bad_crc: int = 0
-    bad_length: int = 0
     skipped_bytes: int = 0
 
 
@@ -67,7 +61,6 @@ class Parser:
                 return None
             size = BEFORE_BODY + int.from_bytes(self._kept[5:7], "little")
             if not BEFORE_BODY + 3 <= size <= LONGEST:
-                self.counters.bad_length += 1
                 self._skip(1)
             elif len(self._kept) < size:
                 return None
@@ -92,8 +85,6 @@ class Parser:
 
     def _take(self, size: int) -> Packet:
         whole, self._kept = self._kept[:size], self._kept[size:]
-        self.counters.packets += 1
-        self.counters.packet_bytes += size
         body = whole[BEFORE_BODY : size - 2]
         servo, instruction = whole[4], body[0]
         if servo == BROADCAST and instruction == Instruction.STATUS:

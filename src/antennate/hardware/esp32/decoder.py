@@ -24,7 +24,7 @@ _TEXT = re.compile(rb"[\t\n\r\x20-\x7e]{8,}")
 
 @dataclass(slots=True)
 class Counters:
-    """What became of every byte received; `accounted` and the bytes held add up to `received`.
+    """What became of every byte: delimiters, judged and held ones add up to those received.
 
     The bytes between two delimiters are one piece.
 
@@ -39,7 +39,6 @@ class Counters:
         oversize: Pieces longer than any frame.
         noise: Pieces shorter than any frame.
         text: Pieces that are printable text only.
-        text_lost: Printable bytes that found no room.
     """
 
     received: int = 0
@@ -52,12 +51,6 @@ class Counters:
     oversize: int = 0
     noise: int = 0
     text: int = 0
-    text_lost: int = 0
-
-    @property
-    def accounted(self) -> int:
-        """Bytes of which is known what became of them."""
-        return self.delimiters + self.judged
 
 
 class FrameDecoder:
@@ -144,9 +137,7 @@ class FrameDecoder:
 
     def _keep_text(self, chunk: bytes | bytearray) -> None:
         for run in _TEXT.findall(chunk):
-            room = TEXT_KEPT - len(self._text)
-            self._text += run[:room]
-            self.counters.text_lost += max(0, len(run) - room)
+            self._text += run[: TEXT_KEPT - len(self._text)]
 
 
 def _intact(content: bytes | bytearray) -> bool:

@@ -52,13 +52,11 @@ class Supervisor:
 
     Attributes:
         meter: Measures the rate of samples.
-        transitions: Changes of state so far.
     """
 
     def __init__(self, params: SupervisorParams) -> None:
         self._params = params
         self.state = State.OFF
-        self.transitions = 0
         self.meter = RateMeter(params.rate, params.rate_error, params.rate_time)
         self._active: dict[Cause, Active] = {}
         self._latched: set[Cause] = {Cause.NOT_ARMED}
@@ -233,7 +231,6 @@ class Supervisor:
             self._latched.add(cause)
             self._active[cause] = Active(cause, now, "", present=False)
             state = State.FAULT
-        self.transitions += state is not self.state
         self.state = state
         return state
 

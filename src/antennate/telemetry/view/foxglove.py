@@ -59,7 +59,7 @@ class FoxgloveSink:
 
     def __init__(self, port: int) -> None:
         require_foxglove()
-        self._sdk = sdk = import_module("foxglove")
+        sdk = import_module("foxglove")
         self._messages: Any = import_module("foxglove.messages")
         self._context = context = sdk.Context()  # channels close with it
         try:
