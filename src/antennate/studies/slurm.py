@@ -87,6 +87,10 @@ class Slurm:
                         self._end(future, job, waiting, files, fail)
                 queue.tell_waiting(running)
                 time.sleep(_LOOK if running else 0.0)
+        except KeyboardInterrupt:
+            for job in running.values():
+                files.take(job)
+            raise
         finally:
             if not queue.silent:
                 cancel(running)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import signal
 import time
 from collections.abc import Mapping
@@ -19,6 +20,8 @@ _LATER = (signal.SIGTERM, signal.SIGUSR1, signal.SIGUSR2)
 """What SLURM may send to all processes of a job some time before it ends it."""
 NOTED = 60.0
 """Time within which a network file system shows a job the note of its driver [s]."""
+_RESTARTS = "SLURM_RESTART_COUNT"
+"""Where SLURM tells a job how often it was begun again."""
 _POLL = 0.1
 """How often the note is looked for [s]."""
 
@@ -35,8 +38,8 @@ class Resumable:
         added: Objects that were added to registries in the driver.
         at_once: How many tasks run together.
         noted: Whether it does nothing without the note of its driver. A driver that was killed
-            before it wrote the note gives its tasks to another job, and so does one that was told
-            that this job has ended.
+            before it wrote the note gives its tasks to another job, and a driver removes the note
+            of a job that has ended; SLURM may begin that once more, if it was asked to before.
     """
 
     def __init__(
@@ -53,7 +56,8 @@ class Resumable:
 
     def __call__(self) -> int:
         """Carry out what is not in its file yet; how many tasks that was."""
-        if self._noted and not _comes(note_of(Path(self._file))):
+        again = int(os.environ.get(_RESTARTS, "0")) > 0
+        if self._noted and not _comes(note_of(Path(self._file)), 0.0 if again else NOTED):
             return 0
         require_same({k: v for k, v in self._identity.items() if k != "work"}, Path())
         store = Store(Path(self._file))
@@ -95,9 +99,9 @@ def show_new(folder: Path) -> None:
         folder.chmod(folder.stat().st_mode)
 
 
-def _comes(path: Path) -> bool:
-    """Whether a file is there, or comes within some time."""
-    end = time.monotonic() + NOTED
+def _comes(path: Path, within: float) -> bool:
+    """Whether a file is there, or comes within some time [s]."""
+    end = time.monotonic() + within
     while not path.exists():
         if time.monotonic() > end:
             return False
