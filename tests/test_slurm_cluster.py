@@ -199,31 +199,34 @@ def test_ctrl_c_cancels_the_jobs_and_the_same_command_goes_on(study: Study, tabl
     assert len(study.ended()) == len(set(study.ended())) == TRIALS
 
 
-@pytest.mark.parametrize(
-    ("asked", "found"),
-    [
-        ("slurm_partition=nowhere", "invalid partition specified: nowhere"),
-        ("slurm_colour=red", "Unknown argument 'colour' for executor 'slurm'"),
-        ("timeout_min=soon", 'Parameter "timeout_min" expected type'),
-        ("tasks_per_node=2", "expected jobs of one task, found 2"),
-        ('slurm_setup=["exit 1"]', "found 3 in a row that ended before: SLURM says FAILED"),
-    ],
-)
-def test_what_slurm_cannot_give_is_one_line(study: Study, asked: str, found: str) -> None:
-    study.start(asked)
-    code, said = study.wait()
-    assert code == 2
-    assert len(said) == 1
-    assert said[0].startswith("antennate study: error: ")
-    assert found in said[0]
+REFUSED = {
+    "slurm_partition=nowhere": "invalid partition specified: nowhere",
+    "slurm_colour=red": "Unknown argument 'colour' for executor 'slurm'",
+    "timeout_min=soon": 'Parameter "timeout_min" expected type',
+    "tasks_per_node=2": "expected jobs of one task, found 2",
+    'slurm_setup=["exit 1"]': "found 3 in a row that ended before: SLURM says FAILED",
+}
+"""What SLURM cannot give, and the reason that is told."""
 
 
-def test_a_time_limit_that_is_too_short_is_one_line(study: Study) -> None:
-    """SLURM counts minutes, so the end of a job that runs is brought forward."""
+def test_what_slurm_cannot_give_is_one_line(study: Study) -> None:
+    """The last is a time limit that is too short.
+
+    SLURM counts in minutes, so the end of a job that runs is brought forward. It looks at that
+    every 30 s; the others are asked for meanwhile.
+    """
     study.start("timeout_min=60", "slurm_signal_delay_s=0", sleep=300.0, workers=1)
     study.until(lambda: list(study.jobs.glob("*.jsonl")))
     (number,) = study.slurm.running()
     study.slurm.say("scontrol", "update", f"JobId={number}", "EndTime=now+1")
+    for place, (asked, found) in enumerate(REFUSED.items()):
+        other = Study(study.slurm, study.folder / str(place))
+        other.folder.mkdir()
+        other.start(asked)
+        code, said = other.wait()
+        assert (code, len(said)) == (2, 1), said
+        assert said[0].startswith("antennate study: error: ")
+        assert found in said[0]
     assert study.wait() == (
         2,
         [
