@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from slurm_cluster import Cluster, NoCluster, cluster
+from slurm_cluster import LIMIT, Cluster, NoCluster, cluster
 
 import antennate
 
@@ -204,6 +204,7 @@ REFUSED = {
     "slurm_colour=red": "Unknown argument 'colour' for executor 'slurm'",
     "timeout_min=soon": 'Parameter "timeout_min" expected type',
     "tasks_per_node=2": "expected jobs of one task, found 2",
+    f"timeout_min={LIMIT + 1}": "found that all wait: SLURM says PartitionTimeLimit",
     'slurm_setup=["exit 1"]': "found 3 in a row that ended before: SLURM says FAILED",
 }
 """What SLURM cannot give, and the reason that is told."""
