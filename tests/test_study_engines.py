@@ -154,6 +154,56 @@ def test_jobs_of_a_driver_that_was_killed_are_taken_over(tmp_path: Path) -> None
     assert not list(Path("run/slurm").glob("*.job"))
 
 
+def test_a_job_whose_driver_was_killed_before_it_noted_it_does_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The next driver does not know of it, and gives its tasks to another job."""
+    pytest.importorskip("cloudpickle")
+    monkeypatch.setattr("antennate.studies.slurm_job.NOTED", 0.3)
+    part = Part(trial, {0: ({"x": 1.0}, 0)}, together=False, timeout=60.0)
+    job = slurm.Resumable(str(tmp_path / "a.jsonl"), environment(), part, {}, noted=True)
+    assert job() == 0
+    assert not (tmp_path / "a.jsonl").exists()
+    (tmp_path / "a.job").touch()
+    assert job() == 1
+
+
+CURED = """
+from pathlib import Path
+
+
+def trial(config, seed):
+    with Path("notes.txt").open("a") as notes:
+        notes.write(f"{seed} ")
+    if seed == 1 and not Path("cured").exists():
+        raise ValueError("not yet")
+    return {"value": seed}
+"""
+
+
+def test_retry_runs_a_trial_again_that_a_job_of_an_earlier_driver_told_as_failed() -> None:
+    pytest.importorskip("submitit")
+    Path("run").mkdir()
+    Path("own.py").write_text(CURED)
+    code = DRIVER.replace("from study_trials", "from own").replace(', "sleep": 0.5', "")
+    first = subprocess.Popen([sys.executable, "-c", code])
+    try:
+        end = time.monotonic() + 120.0
+        while not list(Path("run/slurm").glob("*.job")):
+            assert time.monotonic() < end
+            time.sleep(0.001)
+    finally:
+        first.kill()
+        first.wait()
+    while not list(Path("run/slurm").glob("*_result.pkl")):
+        assert time.monotonic() < end
+        time.sleep(0.05)
+    Path("cured").touch()
+    code = code.replace("store=store", "store=store, retry=True")
+    assert subprocess.run([sys.executable, "-c", code]).returncode == 0
+    assert Path("notes.txt").read_text().split() == [*"012345", "1"]
+
+
 def test_a_trial_that_hangs_beside_a_worker_of_dask_is_found(tmp_path: Path) -> None:
     pytest.importorskip("distributed")
     from antennate.studies.dask import carry_out_apart

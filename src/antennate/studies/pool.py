@@ -215,7 +215,8 @@ def gather(
     parts = [todo[i : i + chunk] for i in range(0, len(todo), chunk)]
     if parts:
         folder = None if workers.store is None else workers.store.path.parent
-        work = Work(function, tasks, together, workers.timeout, folder, batched, workers.shared)
+        how = (workers.timeout, folder, batched, workers.shared, workers.retry)
+        work = Work(function, tasks, together, *how)
         workers.engine(len(parts)).run(work, parts, int(workers), call.emit, call.fail)
     if workers.shard is not None:
         raise ShardEnd(sum(map(workers.mine, call.found)), len(tasks))

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import contextlib
-import getpass
 import hashlib
+import io
 import json
-import os
+import logging
 import pickle
 import platform
-import signal
-import subprocess
 import time
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,19 +19,22 @@ from typing import Any
 from antennate.errors import BadInputError, ConfigError, OutputError, WorkerError, in_one_line
 from antennate.files import write_whole
 from antennate.messages import shortened
-from antennate.studies.codec import decoded, dumped, encoded
+from antennate.studies.codec import decoded, dumped
 from antennate.studies.identity import environment
-from antennate.studies.processes import Processes, added_objects
-from antennate.studies.store import Store, parsed, read_store
-from antennate.studies.submitted import require_package, require_same, work_apart
-from antennate.studies.work import Emit, Fail, Failure, Part, Waiting, Work
+from antennate.studies.processes import added_objects
+from antennate.studies.slurm_job import Resumable, note_of, show_new
+from antennate.studies.slurm_queue import Queue, QueuedJob, cancel, earlier_jobs
+from antennate.studies.store import parsed, read_store
+from antennate.studies.submitted import require_package
+from antennate.studies.work import Emit, Fail, Failure, Waiting, Work
 
 _LOOK = 0.5
 """How often the driver looks for what the jobs of SLURM have finished [s]."""
-_ANSWER = 60.0
-"""Time within which squeue has to answer [s]."""
-_LATER = (signal.SIGTERM, signal.SIGUSR1, signal.SIGUSR2)
-"""What SLURM may send to all processes of a job some time before it ends it."""
+_MOST_FAILED_STARTS = 3
+"""Jobs in a row that may end before they are at their first trial."""
+_TIME_LIMIT = ("SLURM says TIMEOUT", "timed-out too many times")
+"""How SLURM and submitit say that a job has reached its time limit."""
+_NOTE = logging.getLogger(__name__)
 
 
 class Slurm:
@@ -63,68 +65,114 @@ class Slurm:
             raise WorkerError("slurm: expected a run directory that jobs can see, found none")
         at_once = max(map(len, parts)) if work.together else 1
         files = _Files(work.folder / self.name, work, at_once, emit, fail)
-        executor = self._executor(files.folder)
+        executor, queue = self._executor(files.folder), Queue()
         todo = [place for part in parts for place in part]
-        running, todo = files.take_old(todo, earlier_jobs(files.folder))
+        running, todo = files.take_old(todo, earlier_jobs(files.folder, queue))
         size = max(1, -(-len(todo) // count))  # as many lists as jobs: each job waits in a queue
         waiting = Waiting([todo[i : i + size] for i in range(0, len(todo), size)])
         try:
             while waiting or running:
                 while waiting and len(running) < count:
                     job = files.job(waiting.next())
-                    future = executor.submit(job.call)
+                    future = self._submitted(executor, job.call, queue)
                     running[future] = job
                     files.note(job, self._cluster, future.job_id)
+                show_new(files.folder)
                 for future in list(running):
                     ended, job = future.done(), running[future]
                     files.take(job)
                     if ended:
                         del running[future]
-                        job.note.unlink(missing_ok=True)
-                        self._end(future, job, waiting, at_once, fail)
+                        files.forget(job)
+                        self._end(future, job, waiting, files, fail)
+                queue.tell_waiting(running)
                 time.sleep(_LOOK if running else 0.0)
+        except KeyboardInterrupt:
+            for job in running.values():
+                files.take(job)
+            raise
         finally:
-            for future in running:
-                future.cancel()
+            if not queue.silent:
+                cancel(running)
 
-    def _end(self, future: Any, job: _Job, waiting: Waiting, at_once: int, fail: Fail) -> None:
+    def _end(self, future: Any, job: _Job, waiting: Waiting, files: _Files, fail: Fail) -> None:
         """What becomes of the tasks that an ended job did not finish.
 
-        Of more than run at once the first is what it was at.
+        Of more than run at once the first is what it was at; of none, if it had not begun.
+
+        Raises:
+            WorkerError: No job will do better.
         """
         if not job.left:
-            job.file.unlink(missing_ok=True)
             return
         text = str(future.exception())
         if WorkerError.__name__ in text:
             line = next(x for x in reversed(text.splitlines()) if WorkerError.__name__ in x)
             raise WorkerError(f"slurm: {line.partition(': ')[2]}")
-        if (given_up := waiting.lost(job.left, len(job.left) <= at_once)) is not None:
-            last = text.strip().splitlines()[-1] if text.strip() else "it was cancelled"
-            fail(given_up, Failure("crashed", shortened(f"its job ended: {last}")))
+        if not job.held_trials and any(sign in text for sign in _TIME_LIMIT):
+            raise WorkerError(
+                "slurm: expected a job to end a trial within its time limit, found none; ask for "
+                "more with --slurm timeout_min=MINUTES, or for less with --trial-timeout"
+            )
+        if not job.read:
+            files.failed_starts += 1
+            if files.failed_starts >= _MOST_FAILED_STARTS:
+                raise WorkerError(
+                    f"slurm: expected jobs to begin, found {files.failed_starts} in a row that "
+                    f"ended before: {_last(text)}"
+                )
+            waiting.put_back(job.left)
+        elif (given_up := waiting.lost(job.left, len(job.left) <= files.at_once)) is not None:
+            fail(given_up, Failure("crashed", shortened(f"its job ended: {_last(text)}")))
 
     def _executor(self, folder: Path) -> Any:
         import submitit
 
         try:
-            executor = submitit.AutoExecutor(folder, cluster=self._cluster)
-            executor.update_parameters(**self._options)
-        except NameError as error:
+            with warnings.catch_warnings(record=True) as told:
+                warnings.simplefilter("always")
+                executor = submitit.AutoExecutor(folder, cluster=self._cluster)
+                executor.update_parameters(**self._options)
+        except (NameError, AssertionError) as error:
             raise WorkerError(
                 "--slurm: expected names of submitit, such as timeout_min, mem_gb or "
                 f"slurm_partition; it says: {str(error).partition(chr(10))[0]}"
             ) from None
         except (RuntimeError, ValueError, TypeError) as error:
             raise WorkerError(f"slurm: cannot be used: {in_one_line(error)}") from None
+        for warning in told:
+            _NOTE.warning("--slurm: submitit says: %s", warning.message)
         return executor
+
+    def _submitted(self, executor: Any, call: Any, queue: Queue) -> Any:
+        """A job that has been submitted.
+
+        Raises:
+            WorkerError: SLURM does not take it, or begins it more than once.
+        """
+        try:
+            with contextlib.redirect_stderr(io.StringIO()):  # submitit prints what it raises
+                job = executor.submit(call)
+        except (RuntimeError, OSError) as error:
+            text = "; ".join(str(error).replace("sbatch: error: ", "").splitlines())
+            raise WorkerError(f"slurm: expected a job to be taken, found: {text}") from None
+        if job.num_tasks > 1:
+            cancel([job])
+            raise WorkerError(f"--slurm: expected jobs of one task, found {job.num_tasks}")
+        return QueuedJob(job, queue) if self._cluster == self.name else job
 
 
 class _Files:
-    """The files that the jobs of one driver write, and those of an earlier one."""
+    """The files that the jobs of one driver write, and those of an earlier one.
+
+    Attributes:
+        at_once: How many tasks a job runs together.
+        failed_starts: Jobs that ended before they had begun, since one did begin.
+    """
 
     def __init__(self, folder: Path, work: Work, at_once: int, emit: Emit, fail: Fail) -> None:
         self.folder, self._work, self._emit, self._fail = folder, work, emit, fail
-        self._at_once = at_once
+        self.at_once, self.failed_starts = at_once, 0
         content = pickle.dumps((work.function, list(work.tasks)))
         digest = hashlib.sha256(content).hexdigest()
         self._identity = {**(work.shared or environment()), "work": digest}
@@ -150,16 +198,18 @@ class _Files:
         for file in sorted({*self.folder.glob("*.jsonl"), *noted}):
             future, places = noted.get(file, (None, sorted(left)))
             job = _Job(file, [place for place in places if place in left])
-            if self._is_ours(file):
+            if ours := self._is_ours(file):
                 left -= set(job.left)
-                self.take(job)
+                self.take(job, again=self._work.retry)
                 if future is not None and job.left:
                     running[future] = job
                     continue
                 left |= set(job.left)
             if future is not None:
-                future.cancel()
-                job.note.unlink(missing_ok=True)
+                cancel([future])
+                note_of(file).unlink(missing_ok=True)
+            elif ours:
+                file.unlink(missing_ok=True)
         return running, sorted(left)
 
     def _is_ours(self, file: Path) -> bool:
@@ -167,7 +217,7 @@ class _Files:
         with contextlib.suppress(BadInputError):
             return read_store(file)[0] == self._identity
         with contextlib.suppress(OSError, ValueError, KeyError):
-            return json.loads(_Job(file, []).note.read_text())["identity"] == self._checksum()
+            return json.loads(note_of(file).read_text())["identity"] == self._checksum()
         return False
 
     def _checksum(self) -> str:
@@ -176,17 +226,27 @@ class _Files:
     def job(self, places: list[int]) -> _Job:
         """A new job for some tasks."""
         file = self.folder / f"{time.time_ns()}.jsonl"
-        part = self._work.part(places)
-        call = Resumable(str(file), self._identity, part, added_objects(), self._at_once)
-        return _Job(file, places, call)
+        told = (self._identity, self._work.part(places), added_objects(), self.at_once)
+        return _Job(file, places, Resumable(str(file), *told, noted=True))
 
     def note(self, job: _Job, cluster: str, number: str) -> None:
         """Keep what a job was given, and its number, for a driver after this one."""
         told = {"cluster": cluster, "job": number, "host": platform.node(), "places": job.left}
-        write_whole(job.note, dumped({**told, "identity": self._checksum()}).encode())
+        content = {**told, "identity": self._checksum()}
+        write_whole(note_of(job.file), dumped(content).encode())
 
-    def take(self, job: _Job) -> None:
-        """Take the lines that have come to the file of a job since it was last read."""
+    def forget(self, job: _Job) -> None:
+        """Remove the files of a job that has ended; its results have been taken."""
+        note_of(job.file).unlink(missing_ok=True)
+        job.file.unlink(missing_ok=True)
+
+    def take(self, job: _Job, again: bool = False) -> None:
+        """Take the lines that have come to the file of a job since it was last read.
+
+        Args:
+            job: The job.
+            again: Whether those that failed are left, to be run again.
+        """
         if not job.file.exists() or job.file.stat().st_size == job.read:
             return
         with job.file.open("rb") as file:
@@ -195,13 +255,18 @@ class _Files:
         whole = data[: data.rfind(b"\n") + 1]
         job.read += len(whole)
         records = parsed(whole)[1]
+        if whole:
+            self.failed_starts = 0
+        job.held_trials |= bool(records)
         for place in [place for place in job.left if str(place) in records]:
-            job.left.remove(place)
             record = records[str(place)]
-            if "failure" in record:
+            if "failure" not in record:
+                self._emit(place, decoded(record["result"], self._packages))
+            elif not again:
                 self._fail(place, Failure(*record["failure"]))
             else:
-                self._emit(place, decoded(record["result"], self._packages))
+                continue
+            job.left.remove(place)
 
 
 @dataclass
@@ -212,132 +277,15 @@ class _Job:
     left: list[int]
     call: Resumable | None = None
     read: int = 0
-
-    @property
-    def note(self) -> Path:
-        """What says its number."""
-        return self.file.with_suffix(".job")
+    held_trials: bool = False
 
 
-def earlier_jobs(folder: Path) -> dict[Path, tuple[Any, list[int]]]:
-    """Jobs of an earlier driver that still wait or run, by their files, and what they were given.
-
-    Raises:
-        WorkerError: SLURM does not say which jobs there are.
-    """
-    found: dict[Path, tuple[Any, list[int]]] = {}
-    queue: set[str] | None = None
-    for note in sorted(folder.glob("*.job")):
-        try:
-            told = json.loads(note.read_text())
-            number, places = str(told["job"]), list(told["places"])
-            cluster, host = told["cluster"], told["host"]
-        except (OSError, ValueError, KeyError, TypeError):
-            continue  # torn: it was about to be written
-        if cluster == "local":
-            future: Any = LocalJob(int(number), host)
-            alive = not future.done()
-        else:
-            from submitit import SlurmJob
-
-            queue = _queue() if queue is None else queue
-            future, alive = SlurmJob(folder, number), number in queue
-        if alive:
-            found[note.with_suffix(".jsonl")] = future, places
-        else:
-            note.unlink(missing_ok=True)
-    return found
-
-
-def _queue() -> set[str]:
-    """Numbers of the jobs of this user that wait or run."""
-    words = ["squeue", "--noheader", "--format=%A", f"--user={getpass.getuser()}"]
-    try:
-        said = subprocess.run(  # noqa: S603  (fixed words)
-            words, capture_output=True, text=True, check=True, timeout=_ANSWER
-        )
-    except (OSError, subprocess.SubprocessError) as error:
-        raise WorkerError(
-            "slurm: expected squeue to say which jobs of an earlier command still run, found: "
-            f"{in_one_line(error)}"
-        ) from None
-    return set(said.stdout.split())
-
-
-class LocalJob:
-    """A job of this machine that another process began: submitit knows its own ones only."""
-
-    def __init__(self, process: int, host: str) -> None:
-        self._process, self._here = process, host == platform.node()
-
-    def done(self) -> bool:
-        """Whether its process has ended; one of another machine counts as ended."""
-        if not self._here:
-            return True
-        try:
-            os.kill(self._process, 0)
-            words = Path(f"/proc/{self._process}/cmdline")
-            return words.exists() and b"submitit" not in words.read_bytes()  # its number was reused
-        except OSError:
-            return True
-
-    def cancel(self) -> None:
-        """End it, and with it the process that it started."""
-        with contextlib.suppress(OSError):
-            if not self.done():
-                os.kill(self._process, signal.SIGINT)
-
-    def exception(self) -> str:
-        """Why it ended before its work."""
-        return "it ended"
-
-
-class Resumable:
-    """What a job calls; SLURM may begin it again, with what it was first given.
-
-    The trials run in a process beside it, so one that crashes or hangs is found as on one machine.
-    """
-
-    def __init__(
-        self,
-        file: str,
-        identity: Mapping[str, Any],
-        part: Part,
-        added: Mapping[str, Any],
-        at_once: int = 1,
-    ) -> None:
-        self._file, self._identity, self._part, self._added = file, identity, part, added
-        self._at_once = at_once
-
-    def __call__(self) -> int:
-        """Carry out what is not in its file yet; how many tasks that was."""
-        require_same({k: v for k, v in self._identity.items() if k != "work"}, Path())
-        store = Store(Path(self._file))
-        store.begin(self._identity)
-        left = {k: task for k, task in self._part.tasks.items() if str(k) not in store.records}
-
-        places = list(left)
-
-        def emit(index: int, result: Any) -> None:
-            store.append(str(places[index]), {"result": encoded(result)})
-
-        def fail(index: int, failure: Failure) -> None:
-            store.append(str(places[index]), {"failure": [failure.status, failure.reason]})
-
-        part = Part(self._part.function, left, self._part.together, self._part.timeout)
-        indices, size = range(len(left)), self._at_once
-        parts = [indices[i : i + size] for i in indices[::size]]
-        if left:
-            work = work_apart(part, Path.cwd(), self._added, _LATER)
-            Processes().run(work, parts, 1, emit, fail)
-        store.close()
-        return len(left)
-
-    def checkpoint(self) -> Any:
-        """What submitit submits when the job is preempted or has run out of time: the same."""
-        from submitit.helpers import DelayedSubmission
-
-        return DelayedSubmission(self)
+def _last(text: str) -> str:
+    """The last line of what submitit says of a job; of a trace that it quotes, if it does."""
+    lines = [line for line in text.splitlines() if line.strip()]
+    ruled = [i for i, line in enumerate(lines) if set(line) == {"-"}]
+    end = ruled[1] if len(ruled) > 1 else len(lines)
+    return shortened(lines[end - 1]) if lines else "it was cancelled"
 
 
 def _setting(text: str) -> tuple[str, Any]:

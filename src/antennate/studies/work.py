@@ -61,6 +61,7 @@ class Work:
             fail(index, failure) tells of a task that has no result.
         shared: What workers must share with this process, as of `environment`; None for no more
             than this package.
+        retry: Whether tasks are run again that failed in an earlier process.
     """
 
     function: Callable[..., Any]
@@ -70,6 +71,7 @@ class Work:
     folder: Path | None = None
     batched: Callable[..., Any] | None = None
     shared: Mapping[str, Any] | None = None
+    retry: bool = False
 
     def part(self, places: Sequence[int]) -> Part:
         """Some of it, to be sent to a worker."""
@@ -186,6 +188,10 @@ class Waiting:
     def next(self) -> list[int]:
         """The next part."""
         return self._parts.popleft()
+
+    def put_back(self, part: Sequence[int]) -> None:
+        """Put back a part that nobody has begun."""
+        self._parts.appendleft(list(part))
 
     def lost(self, left: Sequence[int], together: bool, final: bool = False) -> int | None:
         """Put back what a dead worker left; the task that is given up, if one is.
