@@ -204,7 +204,10 @@ def test_a_refusal_imports_nothing_that_it_does_not_need() -> None:
             ["antennate tunnel: error: --tunnel.free-width: expected a number above 0, found -0.4"],
         ),
         (["tunnel", "--tunnel.free-width", "nan"], ["expected a finite number, found nan"]),
-        (["tunnel", "--tunnel.turns-deg", "200"], ["error: tunnel: turns_deg must lie within -120 "]),
+        (
+            ["tunnel", "--tunnel.turns-deg", "200"],
+            ["error: tunnel: turns_deg must lie within -120 "],
+        ),
         (["tunnel", "--tunnel.free-width", "0.1"], ["at least robot.width, 0.2 m, found 0.1 m"]),
         (["tunnel", "--tunnel.strewn", "40"], ["tunnel.strewn asks for 40"]),
         (["tunnel", "--control.rate", "333"], ["whole fraction of the physics rate"]),
@@ -359,9 +362,9 @@ def test_a_run_leaves_a_folder_that_explains_itself(capsys, tmp_path):
         "trials.csv",
         "versions.json",
     ]
-    assert (run / "command.txt").read_text() == (
-        f"antennate {' '.join(SMALL)} --seed 5 --out deep/run\n"
-    )
+    command, *dates = (run / "command.txt").read_text().splitlines()
+    assert command == f"antennate {' '.join(SMALL)} --seed 5 --out deep/run"
+    assert [line.split()[:2] for line in dates] == [["#", "begun"], ["#", "ended"]]
     versions = json.loads((run / "versions.json").read_text())
     assert versions["antennate"] == antennate.__version__
     assert versions["numpy"] == np.__version__

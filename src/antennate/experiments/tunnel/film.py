@@ -10,6 +10,7 @@ from antennate.experiments.tunnel.config import TunnelConfig
 from antennate.experiments.tunnel.monitor import TrialResult
 from antennate.messages import short_names
 from antennate.sim.camera import Shot
+from antennate.sim.scenes.registry import TUNNEL
 from antennate.sim.world import World
 from antennate.telemetry import film
 from antennate.telemetry.film import Film, FilmRecorder
@@ -64,4 +65,17 @@ def record(
             film.maneuver_band(recorder.values("maneuver")),
             *film.contact_bands(recorder.values("contact"), ("left", "right")),
         ],
+        ending(rows[0], config),
     )
+
+
+def ending(row: TrialResult, config: TunnelConfig) -> str:
+    """A word on what came out, and when."""
+    there = "out" if config.scene == TUNNEL else "there"
+    words = {
+        "success": there,
+        "timeout": "stuck" if row.stuck > row.recovered else f"not {there}",
+        "left": "left the scene",
+        "invalid": "invalid",
+    }
+    return f"{words[row.outcome]} after {row.time_s:.3g} s"
