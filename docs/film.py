@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -23,8 +24,6 @@ EVERY = 2
 """Of the pictures every other one is shown."""
 LIMIT = 40.0
 """Time after which a robot is taken for stuck [s]."""
-AFTER = 2.0
-"""Time that is shown after the exit [s]."""
 WIDTH, HEIGHT = 430, 300
 LARGEST = 3_000_000
 """Most bytes of the file."""
@@ -34,10 +33,10 @@ def main() -> None:
     """Find the trial, record both, and write the image."""
     require_video()
     films = next(filter(None, map(_telling, itertools.count())))
-    end = films["closed"].t[-1] + AFTER
-    shown = [pictures(_cut(film, name, end), WIDTH, HEIGHT) for name, film in films.items()]
+    end = max(film.t[-1] for film in films.values())
+    shown = [pictures(_cut(film, name), WIDTH, HEIGHT) for name, film in films.items()]
     sides = [[Image.fromarray(picture) for picture in each] for each in shown]
-    frames = [_beside(*pair) for pair in zip(*sides, strict=True)]
+    frames = [_beside(*pair) for pair in _together(*sides)]
     frames[0].save(
         PLACE,
         save_all=True,
@@ -62,9 +61,15 @@ def _telling(trial: int) -> dict[str, Film] | None:
     return films if (blind, touching) == ("timeout", "success") else None
 
 
-def _cut(film: Film, name: str, end: float) -> Film:
-    """Some pictures of a film until a time [s], the last one held, with the level alone."""
-    shown = np.arange(0, round(end * RATE / SPEED), EVERY).clip(max=len(film.t) - 1)
+def _together(left: list[Image.Image], right: list[Image.Image]) -> Iterator[Sequence[Image.Image]]:
+    """Pictures of both films; the last one of the shorter, with its ending, stays."""
+    for i in range(max(len(left), len(right))):
+        yield [each[min(i, len(each) - 1)] for each in (left, right)]
+
+
+def _cut(film: Film, name: str) -> Film:
+    """Some pictures of a film, with the level alone."""
+    shown = np.arange(0, len(film.t), EVERY)
     return dataclasses.replace(
         film,
         title=f"{name}, {SPEED:g}×",

@@ -51,6 +51,8 @@ OPTIONAL = {
     "test_foxglove.py": "foxglove",
     "test_pages.py": "websockets",
     "test_view.py": "viser",
+    "test_view_charts.py": "viser",
+    "test_view_end.py": "viser",
     "test_view_gate.py": "viser",
     "test_view_program.py": "viser",
 }

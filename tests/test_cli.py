@@ -362,9 +362,9 @@ def test_a_run_leaves_a_folder_that_explains_itself(capsys, tmp_path):
         "trials.csv",
         "versions.json",
     ]
-    assert (run / "command.txt").read_text() == (
-        f"antennate {' '.join(SMALL)} --seed 5 --out deep/run\n"
-    )
+    command, *dates = (run / "command.txt").read_text().splitlines()
+    assert command == f"antennate {' '.join(SMALL)} --seed 5 --out deep/run"
+    assert [line.split()[:2] for line in dates] == [["#", "begun"], ["#", "ended"]]
     versions = json.loads((run / "versions.json").read_text())
     assert versions["antennate"] == antennate.__version__
     assert versions["numpy"] == np.__version__

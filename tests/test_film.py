@@ -11,6 +11,7 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import mujoco
 import numpy as np
 import pytest
 
@@ -26,9 +27,11 @@ from antennate.experiments.force.run import traverse
 from antennate.experiments.sweep.config import SweepConfig
 from antennate.experiments.sweep.run import map_cell
 from antennate.experiments.tunnel.config import TunnelConfig
-from antennate.experiments.tunnel.film import films
+from antennate.experiments.tunnel.film import ending, films
+from antennate.experiments.tunnel.monitor import TrialResult
 from antennate.params.sweep import SweepParams
-from antennate.sim import gl
+from antennate.sim import gl, layers
+from antennate.sim.camera import Camera
 from antennate.telemetry import film
 from antennate.telemetry.film import HEIGHT, RATE, STRIP, WIDTH, FilmRecorder
 from antennate.telemetry.strip import WINDOW, Band, Strip, Trace
@@ -93,6 +96,62 @@ def test_the_strip_shows_the_newest_state_and_value_at_its_right_end() -> None:
     line = np.flatnonzero(blue[40:].sum(axis=1) > 100)
     assert len(line) == 0, "no line but at the top of the chart"
     assert (blue[25:40].sum(axis=1) > 100).any()
+
+
+def test_what_stands_beside_a_chart_is_crossed_by_no_curve() -> None:
+    """The same picture of it whatever the curve is, at its top, in the middle and at its foot."""
+    t = np.arange(0.0, 20.0, 0.1)
+
+    def left(value: float) -> Any:
+        trace = Trace("x", np.full((len(t), 1), value), 0.0, 1.0, ".2f", 0.5, "θ = 0.5")
+        pixels = np.asarray(Strip("", t, [trace], [], 400, 150).picture(len(t) - 1)).astype(int)
+        blue = (pixels[30:, :200, 2] - pixels[30:, :200, 0]) > 100
+        return pixels[30:, : np.nonzero(blue)[1].min() - 1]
+
+    shown = [left(value) for value in (0.0, 0.5, 1.0)]
+    assert (shown[0] < 160).any(axis=2).sum() > 100, "there are words"
+    assert all(np.array_equal(shown[0], each) for each in shown[1:])
+
+
+@pytest.mark.parametrize(
+    ("outcome", "stuck", "recovered", "word"),
+    [
+        ("success", 1, 1, "out after 31.9 s"),
+        ("timeout", 2, 1, "stuck after 31.9 s"),
+        ("timeout", 1, 1, "not out after 31.9 s"),
+        ("left", 0, 0, "left the scene after 31.9 s"),
+    ],
+)
+def test_a_film_of_the_tunnel_ends_with_a_word_on_the_outcome(
+    outcome: Any, stuck: int, recovered: int, word: str
+) -> None:
+    shares = dict.fromkeys(("forward", "turn_l", "turn_r", "reverse", "hold"), 0.2)
+    row = TrialResult(
+        *(0, 0, "open", outcome, 31.92, 1.0, stuck, recovered),
+        **{f"share_{name}": share for name, share in shares.items()},
+        force_mean_n=1.0,
+        force_max_n=2.0,
+        reason="",
+    )
+    assert ending(row, TunnelConfig()) == word
+
+
+def test_a_thin_antenna_is_seen_and_the_physics_keeps_its_own() -> None:
+    """It is at least three pixels wide; a leg is as it is."""
+    require_drawing()
+    model = mujoco.MjModel.from_xml_string(
+        f"""<mujoco><worldbody>
+        <geom type="capsule" fromto="-1 0 0 1 0 0" size="1e-4" contype="{layers.ANTENNA}"/>
+        <geom type="capsule" fromto="-1 1 0 1 1 0" size="1e-4" contype="{layers.LEG}"/>
+        </worldbody></mujoco>"""
+    )
+    sides = ((0.0, 0.0, 1.0, 1.0), (1.0, 0.0, 0.0, 1.0))
+    shot = film.Shot(2.0, elevation=90.0, flat=True, grid=10.0)
+    with Camera(model, shot, (200, 200), sides) as camera:
+        picture = camera.picture(np.zeros(0), np.zeros(3)).astype(int)
+    blue = picture[60:140, 100, 2] - picture[60:140, 100, 0] > 60
+    assert 2 <= blue.sum() <= 5
+    assert model.geom_size[:, 0].tolist() == [1e-4, 1e-4]
 
 
 def test_values_that_are_missing_leave_a_gap_and_no_error() -> None:
@@ -195,7 +254,13 @@ def test_a_film_is_written_and_the_study_stays_as_it_is(
         assert (stream.width, stream.height) == (WIDTH, HEIGHT + STRIP)
         assert stream.average_rate == RATE
         frames = [frame.to_ndarray(format="rgb24") for frame in container.decode(stream)]
-    assert len(frames) == pytest.approx(1 + 0.5 * RATE / 2, abs=1), "twice as fast as the robot"
+    held = RATE  # the outcome is shown for a second
+    assert len(frames) == pytest.approx(1 + 0.5 * RATE / 2 + held, abs=1), "twice as fast"
+    before, end = (frames[k].astype(int) for k in (-held - 1, -1))
+    rows, columns = np.nonzero(np.abs(end - before).max(axis=2) > 60)
+    assert len(rows) > 500, "a word is there"
+    assert 0.75 * HEIGHT < rows.min() < rows.max() < HEIGHT
+    assert abs((columns.min() + columns.max()) / 2 - WIDTH / 2) < 20
     view, strip = frames[-1][:HEIGHT], frames[-1][HEIGHT:]
     assert view.std() > 10, "something is seen"
     assert (strip > 240).mean() > 0.5

@@ -1,15 +1,20 @@
 """The live sink for Foxglove and Lichtblick: our topics with our definitions, and their layout."""
 
+import contextlib
 import json
 import re
 import struct
 from pathlib import Path
 
+import mujoco
+import numpy as np
 from view_rig import shown
 from websockets.sync.client import ClientConnection, connect
 
+from antennate.sim.shapes import VisibleModel
 from antennate.telemetry.topics import ANTENNA, TICK_TOPICS, TOPICS
-from antennate.telemetry.view.foxglove import layout
+from antennate.telemetry.view.channel import POSES, SCENE, Poses
+from antennate.telemetry.view.foxglove import FoxgloveSink, layout
 
 PATIENCE = 60.0
 HEAD = struct.Struct("<BIQ")
@@ -48,6 +53,33 @@ def test_a_running_simulation_can_be_read_live(tmp_path: Path) -> None:
                     times.append(ANTENNA.type.decode(data[HEAD.size :])["t"])
             assert times == sorted(times)
             assert times[0] < times[-1]
+
+
+def test_a_force_of_zero_has_no_arrow() -> None:
+    """It has no direction. The scene is that without it; that of another force is longer."""
+    model = mujoco.MjModel.from_xml_string(
+        "<mujoco><worldbody><geom size='1'/></worldbody></mujoco>"
+    )
+    shapes = VisibleModel(model, ((0, 0, 1, 1), (1, 0, 0, 1))).shapes()
+    sink = FoxgloveSink(0)
+    sink.take(SCENE, shapes.pack())
+    poses = np.array([[0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1]], np.float32)
+    with connect(sink.address, subprotocols=["foxglove.sdk.v1"], proxy=None) as connection:  # type: ignore[list-item]
+        ask = {"id": 1, "channelId": advertised(connection)["/scene"]["id"]}
+        connection.send(json.dumps({"op": "subscribe", "subscriptions": [ask]}))
+
+        def scene(forces: list[list[float]]) -> bytes:
+            made = Poses(0.0, poses, np.array(forces, np.float32).reshape(-1, 6))
+            while True:
+                sink.take(POSES, made.pack())
+                with contextlib.suppress(TimeoutError):  # it was not subscribed yet
+                    while not isinstance(data := connection.recv(1.0), bytes):
+                        pass
+                    return data
+
+        bare = scene([])
+        assert scene([[1, 2, 3, 0, 0, 0]]) == bare
+        assert len(scene([[1, 2, 3, 0, 0, 0], [1, 2, 3, 0, 4, 0]])) > len(bare)
 
 
 def test_the_layout_shows_what_there_is() -> None:

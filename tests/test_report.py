@@ -6,12 +6,14 @@ import base64
 import json
 import math
 import os
+import re
 from html.parser import HTMLParser
 from pathlib import Path
 
 import pytest
 
 import antennate
+from antennate import experiments
 from antennate.cli import main
 from antennate.studies.measures import shown
 
@@ -89,6 +91,34 @@ def test_a_run_leaves_a_page_with_everything(capsys: pytest.CaptureFixture[str])
     assert "></pre>" not in page.source, "an empty box"
     changed = page.text.split("Parameters")[1]
     assert "coil_mm4.03.77" in changed.replace("\n", ""), "this run, then the default"
+
+
+def test_a_page_says_when_it_was_run_and_how_to_read_it() -> None:
+    """Its seed too; figures have sentences, and what is code in a note looks so."""
+    words = ["tunnel", "--trials", "2", "--scene", "flat", "--time-limit", "0.2", "--seed", "7"]
+    assert main([*words, "--controllers", "open", "closed", "--workers", "1", "--out", "run"]) == 0
+    page = Page(Path("run/report.html"))
+    assert re.search(
+        r"Run on 20\d\d-\d\d-\d\d at \d\d:\d\d UTC; it took \d+ s\. Seed 7\.", page.text
+    )
+    assert "# begun" not in page.text
+    _, _, reading = page.text.partition("How to read this")
+    for term in ("Wilson 95 %", "Restricted mean time", "McNemar", "Wilcoxon"):
+        assert f"{term}: " in reading
+    assert "Trials from above: a column for each trial" in page.text
+    assert "<code>invalid</code>" in page.source
+    assert "`" not in page.text.partition("Parameters")[0]
+
+
+def test_every_figure_has_a_sentence() -> None:
+    """As far as an experiment shows its figures; the page of claims has texts of its own."""
+    for name in experiments.names():
+        view = experiments.load(name).view
+        assert view.body is not None or view.captions, name
+        for figure, caption in view.captions.items():
+            assert view.caption(figure) == caption
+            assert caption.endswith(".")
+    assert view.caption("speed_over_time") == "Speed over time"
 
 
 def test_it_is_written_again_and_elsewhere(capsys: pytest.CaptureFixture[str]) -> None:

@@ -13,7 +13,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
-from view_rig import ANTENNATE, shown
+from view_rig import ANTENNATE, child_of, shown
 
 from antennate import simulate
 from antennate.control.registry import make_controller
@@ -284,12 +284,6 @@ def trial(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("trial") / "trial.mcap"
     simulate("open", scene="flat", time_limit=0.1, log=path)
     return path
-
-
-def child_of(process: int) -> int:
-    """The one process that another one has started."""
-    [child] = Path(f"/proc/{process}/task/{process}/children").read_text().split()
-    return int(child)
 
 
 def ended(process: int) -> bool:

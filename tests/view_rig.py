@@ -96,6 +96,12 @@ def shown(*words: str, folder: Path) -> Iterator[Shown]:
         process.stdout.close()
 
 
+def child_of(process: int) -> int:
+    """The one process that another one has started."""
+    [child] = Path(f"/proc/{process}/task/{process}/children").read_text().split()
+    return int(child)
+
+
 def ask(port: int, path: str = "/", host: str | None = "", **headers: str) -> tuple[int, str]:
     """Status and text of the answer to a request; underscores in names of headers are hyphens.
 

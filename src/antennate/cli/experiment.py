@@ -146,6 +146,8 @@ def carry_out(
         view_of(options) as view,
         folder_for(experiment.view, options, config, argv, what, resume, name) as run,
     ):
+        if view is not None:
+            view.results = str(run.path)
         run.keeps_store, workers.store = experiment.continued, run.store
         workers.shared = environment(kind, config)
         if shards and run.store is not None:

@@ -113,4 +113,7 @@ def _sentence(result: Mapping[str, Any]) -> str:
     )
 
 
-VIEW = View("robot", DESCRIPTION, RobotConfig, _tables, _sentence)
+_CAPTIONS = {
+    "wiring": "Servos in plan on their bus, head to the left, what feeds them, and the board."
+}
+VIEW = View("robot", DESCRIPTION, RobotConfig, _tables, _sentence, captions=_CAPTIONS)

@@ -11,6 +11,7 @@ from pydantic.dataclasses import dataclass
 
 from antennate.cli import view_server
 from antennate.cli.options import option
+from antennate.cli.status import write
 from antennate.errors import ConfigError
 from antennate.params.base import Params
 from antennate.studies.run_directory import RunDirectory
@@ -81,7 +82,12 @@ def page_of(options: PageOptions) -> ViewProcess | None:
         return None
     from antennate.telemetry.view.process import ViewProcess
 
-    return ViewProcess(options.view_port if options.view else None, view_server.__name__, foxglove)
+    port = options.view_port if options.view else None
+    return ViewProcess(port, view_server.__name__, foxglove, on_lost=_say)
+
+
+def _say(line: str) -> None:
+    write(f"{line}\n")
 
 
 @contextlib.contextmanager

@@ -83,9 +83,11 @@ class _Page:
 
     Args:
         file: Number of the file that leads there.
+        folder: That of the results.
     """
 
-    def __init__(self, file: int) -> None:
+    def __init__(self, file: int, folder: Path) -> None:
+        self._folder = folder
         self._channel = Channel(socket.socket(fileno=file))
         self._due = -math.inf
 
@@ -95,7 +97,7 @@ class _Page:
             header = Header.unpack(first.content)
             title = f"{header.controller} on the robot"
             theta = header.params.rule.threshold
-            self._channel.tell(STATE, title=title, theta=theta)
+            self._channel.tell(STATE, title=title, theta=theta, results=str(self._folder))
             self._channel.send(HEADER, first.content)
 
     def show(self, message: Message) -> None:
@@ -106,9 +108,9 @@ class _Page:
             self._channel.send(TICK, message.content)
 
 
-def _page_of(words: Sequence[str]) -> _Page | None:
+def _page_of(folder: Path, words: Sequence[str]) -> _Page | None:
     files = [word.removeprefix(PAGE) for word in words if word.startswith(PAGE)]
-    return _Page(int(files[0])) if files else None
+    return _Page(int(files[0]), folder) if files else None
 
 
 def main() -> int:
@@ -121,7 +123,7 @@ def main() -> int:
         signal.signal(number, signal.SIG_IGN)
     display = Display()
     kept, required = False, REQUIRED in sys.argv[2:]
-    page = _page_of(sys.argv[2:])
+    page = _page_of(Path(sys.argv[1]).parent, sys.argv[2:])
     log: LogWriter | None = None
     stream = messages(sys.stdin.buffer.raw, lambda: _settle(log))  # type: ignore[attr-defined]
     try:

@@ -12,7 +12,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from antennate.sim import gl
+from antennate.sim import gl, layers
 from antennate.sim.appearance import FLOOR, Colour, colours
 from antennate.types import Floats
 
@@ -20,6 +20,8 @@ Picture = NDArray[np.uint8]
 _LINE: Colour = (0.8, 0.8, 0.8, 1.0)
 _SAMPLES = 4
 """Samples of a pixel: thin antennae would flicker otherwise."""
+_THIN = 1.5
+"""Least radius of an antenna in the middle of a picture [pixels], so that it is seen (assumed)."""
 _GRID = 16
 """Grid lines to either side of the middle."""
 
@@ -73,6 +75,7 @@ class Camera:
         os.environ.setdefault("PYOPENGL_PLATFORM", name)
         self._model = copy.copy(model)
         _prepare(self._model, size, sides)
+        _thicken(self._model, shot, size[1])
         self._data = mujoco.MjData(self._model)
         self._rect = mujoco.MjrRect(0, 0, *size)
         self._scene = mujoco.MjvScene(self._model, maxgeom=2 * self._model.ngeom + 500)
@@ -142,6 +145,15 @@ def _prepare(model: mujoco.MjModel, size: tuple[int, int], sides: tuple[Colour, 
     visual.headlight.diffuse = [0.45] * 3
     visual.headlight.specular = [0.0] * 3
     model.geom_rgba[:] = colours(model, sides)
+
+
+def _thicken(model: mujoco.MjModel, shot: Shot, height: int) -> None:
+    """Draw thin antennae thicker than they are; the model is only drawn."""
+    angle = np.radians(model.vis.global_.fovy)
+    seen = 2 * shot.distance * (1.0 if shot.flat else np.tan(angle / 2))
+    thin = (model.geom_contype & layers.ANTENNA) != 0
+    thin &= model.geom_type == mujoco.mjtGeom.mjGEOM_CAPSULE.value
+    model.geom_size[thin, 0] = np.maximum(model.geom_size[thin, 0], _THIN * seen / height)
 
 
 def _add_floor(scene: mujoco.MjvScene, shot: Shot, target: Floats) -> None:

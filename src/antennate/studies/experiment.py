@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import importlib
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 
@@ -108,6 +108,7 @@ class Experiment(Generic[Config, Found]):
         trials: Its trials one by one, for studies; without them a study runs it as a whole.
         continued: Whether its folder is continued without being asked, and keeps its trials.
         measures: What it tells of its trials; studies take labels and units from them.
+        captions: What each figure shows, by its name, in one sentence.
     """
 
     name: str
@@ -128,6 +129,7 @@ class Experiment(Generic[Config, Found]):
     trials: Trials[Config] | None = None
     continued: bool = False
     measures: Sequence[Measure] = ()
+    captions: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def view(self) -> View:
@@ -135,6 +137,7 @@ class Experiment(Generic[Config, Found]):
         return View(
             *(self.name, self.description, self.config, self.tables, self.sentence),
             body=self.body,
+            captions=self.captions,
         )
 
     @classmethod

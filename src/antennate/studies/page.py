@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import re
 import struct
 from collections.abc import Iterable, Sequence
 from html import escape
@@ -15,6 +16,9 @@ _LEAST = 0.75
 """Letters of 9 points become no smaller than this share; a narrow screen scrolls instead."""
 _BROAD = 440
 """Pictures of a greater least width do not fit on a phone [px]."""
+_VAST = 1200
+"""Drawn broader than that [px], they take the whole window and are never made smaller."""
+_CODE = re.compile(r"`([^`]+)`")
 _STYLE = """
 :root { color-scheme: light dark; --ink: #222; --muted: #666; --line: #ddd; --page: #fff;
   --shade: #0004; --good: #00704d; --fair: #8a5a00; --bad: #a33a00; }
@@ -52,6 +56,9 @@ summary { cursor: pointer; } dl { margin: .4rem 0; } dd { margin: 0 0 .4rem; }
 .good, .fair, .bad { font-weight: 600; }
 @media (max-width: 44rem) { .pair, section { grid-template-columns: minmax(0, 1fr); }
   .wide { display: none; } }
+.vast { width: min(calc(100vw - 3rem), var(--drawn)); position: relative; left: 50%;
+  transform: translateX(-50%); }
+@media (max-width: 95rem) { .vast + figcaption::after { content: " (scroll it: it is wider)"; } }
 @media (max-width: 30rem) { .broad + figcaption::after { content: " (swipe: it is wider)"; } }
 @media print { body { max-width: none; padding: 0; font-size: 10pt; } pre { white-space: pre-wrap; }
   details::details-content { content-visibility: visible; display: block; block-size: auto; }
@@ -72,9 +79,10 @@ def page(title: str, body: str) -> str:
 
 
 def paragraphs(text: str, kind: str = "") -> str:
-    """A paragraph for each part of a text that an empty line ends."""
+    """A paragraph for each part of a text that an empty line ends; `words` are code."""
     head = f'<p class="{kind}">' if kind else "<p>"
-    return "".join(f"{head}{escape(part)}</p>" for part in text.strip().split("\n\n") if part)
+    parts = (_CODE.sub(r"<code>\1</code>", escape(part)) for part in text.strip().split("\n\n"))
+    return "".join(f"{head}{part}</p>" for part in parts if part)
 
 
 def grid(columns: Sequence[str], rows: Iterable[Sequence[str]], kind: str = "") -> str:
@@ -107,9 +115,11 @@ def picture(png: bytes, svg: bytes, described: str) -> str:
     kind, data = ("svg+xml", svg) if len(svg) < len(png) else ("png", png)
     width, height = struct.unpack(">II", png[16:24])
     width, height = (round(size * _CSS_DPI / _DPI) for size in (width, height))
-    least = round(_LEAST * width)
+    vast = width > _VAST
+    least = width if vast else round(_LEAST * width)
+    broad = " vast" if vast else " broad" if least > _BROAD else ""
     return (
-        f'<div class="scroll{" broad" if least > _BROAD else ""}">'
+        f'<div class="scroll{broad}" style="--drawn: {width}px">'
         f'<img alt="{escape(described)}" width="{width}" height="{height}" '
         f'style="min-width: {least}px; max-width: {width}px" '
         f'src="data:image/{kind};base64,{base64.b64encode(data).decode()}"></div>'

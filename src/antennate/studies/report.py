@@ -10,14 +10,14 @@ import json
 import shlex
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from antennate.errors import BadInputError
 from antennate.files import read_limited
 from antennate.params.base import Params
-from antennate.studies import page
+from antennate.studies import dates, page, terms
 from antennate.studies.formats import to_toml
 from antennate.studies.measures import NONE, Table
 from antennate.studies.run_directory import RunDirectory
@@ -56,6 +56,7 @@ class View:
         tables: Tables of a result.
         sentence: What came out, in one sentence.
         body: HTML in place of tables and figures; None for these.
+        captions: What each figure shows, by its name, in one sentence.
     """
 
     name: str
@@ -64,6 +65,12 @@ class View:
     tables: Callable[[Result], Sequence[Table]]
     sentence: Callable[[Result], str]
     body: Body | None = None
+    captions: Mapping[str, str] = field(default_factory=dict)
+
+    def caption(self, figure: str) -> str:
+        """What a figure shows: the sentence of its command, else its name in words."""
+        words = figure.replace("_", " ")
+        return self.captions.get(figure) or words[:1].upper() + words[1:]
 
 
 def command_of(run: RunDirectory) -> str:
@@ -101,6 +108,7 @@ def report(run: RunDirectory, view: View) -> str:
     parts = [f"<h1>antennate {page.escape(view.name)}</h1>"]
     parts.append(page.paragraphs(view.about.split("\n\n")[0], "muted"))
     parts.append(page.paragraphs(_sentence(run, result, view)))
+    parts.append(page.paragraphs(_when(run, result), "muted"))
     parts.append(page.block(_command(run, view), wrap=True))
     parts.append(page.block(run.text(BY_HAND), wrap=True))
     films = "".join(page.captioned(film, name) for name, film in _films(run).items())
@@ -118,16 +126,24 @@ def _sentence(run: RunDirectory, result: Result | None, view: View) -> str:
 
 
 def _command(run: RunDirectory, view: View) -> str:
-    return run.text(COMMAND) or f"antennate.run({view.name!r}, ...)  # from Python, with {CONFIG}"
+    words = run.text(COMMAND).partition("\n")[0]
+    return words or f"antennate.run({view.name!r}, ...)  # from Python, with {CONFIG}"
 
 
-def _images(run: RunDirectory) -> dict[str, str]:
+def _when(run: RunDirectory, result: Result | None) -> str:
+    """When it was run, how long it took, and its seed, as far as they are known."""
+    seed = (result or {}).get("seed", _table(run.text(CONFIG)).get("seed"))
+    told = dates.sentence(run.text(COMMAND))
+    return f"{told} Seed {seed}." if seed is not None else told
+
+
+def _images(run: RunDirectory, view: View) -> dict[str, str]:
     """The figures by name."""
     return {
         path.stem: page.picture(
             read_limited(path, LARGEST),
             read_limited(path.with_suffix(".svg"), LARGEST),
-            f"figure {path.stem.replace('_', ' ')}",
+            view.caption(path.stem),
         )
         for path in sorted((run.path / FIGURES).glob("*.png"))
     }
@@ -162,12 +178,12 @@ def _logs(run: RunDirectory) -> str:
 
 def _shown(run: RunDirectory, result: Result, view: View) -> str:
     """Tables and figures, or what the command shows in their place."""
-    images = _images(run)
+    images = _images(run, view)
     if view.body is not None:
         return view.body(result, images)
     tables = "".join(map(page.numbers, view.tables(result)))
-    figures = "".join(page.captioned(i, n.replace("_", " ")) for n, i in images.items())
-    return tables + ("<h2>Figures</h2>" + figures if figures else "")
+    figures = "".join(page.captioned(i, view.caption(n)) for n, i in images.items())
+    return tables + terms.explained(result) + ("<h2>Figures</h2>" + figures if figures else "")
 
 
 def _failures(run: RunDirectory) -> str:
@@ -258,8 +274,8 @@ def compare(runs: Sequence[RunDirectory], view: View) -> str:
     parts.append(_differing("Versions", names, [_known_versions(run) for run in runs]))
     parts += map(page.numbers, _side_by_side(names, [view.tables(r) for r in results]))
     parts += [
-        _pairs("Films", names, [_films(run) for run in runs], "pair"),
-        _pairs("Figures", names, [_images(run) for run in runs]),
+        _pairs("Films", names, [_films(run) for run in runs], str, "pair"),
+        _pairs("Figures", names, [_images(run, view) for run in runs], view.caption),
     ]
     return page.page(f"antennate {view.name}", "".join(parts))
 
@@ -311,13 +327,17 @@ def _cells(table: Table) -> dict[tuple[str, int], dict[str, str]]:
 
 
 def _pairs(
-    title: str, names: Sequence[str], found: Sequence[Mapping[str, str]], kind: str = ""
+    title: str,
+    names: Sequence[str],
+    found: Sequence[Mapping[str, str]],
+    caption: Callable[[str], str],
+    kind: str = "",
 ) -> str:
     """Pictures of the same name together: below one another, or side by side as a `pair`."""
     parts = []
     for key in dict.fromkeys(key for pictures in found for key in pictures):
         here = [
-            page.captioned(pictures[key], f"{key.replace('_', ' ')}, {name}")
+            page.captioned(pictures[key], f"{name}: {caption(key)}")
             for name, pictures in zip(names, found, strict=True)
             if key in pictures
         ]

@@ -17,7 +17,6 @@ RunDirectory.open("runs/mine").rows()
 from __future__ import annotations
 
 import contextlib
-import itertools
 import json
 import shlex
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -29,6 +28,7 @@ from antennate.errors import BadInputError, OutputError
 from antennate.files import decoded, read_limited, writing_whole
 from antennate.params.base import Params
 from antennate.params.reading import Config, read_file
+from antennate.studies import dates
 from antennate.studies.formats import from_csv, strict, to_csv, to_json, to_toml
 from antennate.studies.run_files import (
     CALIBRATION,
@@ -44,6 +44,7 @@ from antennate.studies.run_files import (
     TABLE,
     VERSIONS,
     files_of,
+    free,
     is_folder,
 )
 from antennate.studies.store import STORE, Store
@@ -99,7 +100,7 @@ class RunDirectory:
         """
         if path == "":
             raise OutputError("expected the name of a folder, found an empty one")
-        place = _free(command) if path is None else Path(path)
+        place = free(command) if path is None else Path(path)
         with _writing(place):
             missing = [p for p in (place, *place.parents) if not p.exists()]
             place.mkdir(parents=True, exist_ok=path is not None)
@@ -198,7 +199,8 @@ class RunDirectory:
         told = self.store.identity if self.store is not None else None
         self.write(VERSIONS, to_json(versions() if told is None else told["versions"]))
         if command:
-            self.write(COMMAND, shlex.join(command) + "\n")
+            resumed = self.store is not None and self.store.holds_trials
+            self.write(COMMAND, f"{shlex.join(command)}\n{dates.begun(resumed)}")
 
     def without_trials(self) -> None:
         """Say that this run has none, so that no empty file of them is left if it is killed.
@@ -225,6 +227,8 @@ class RunDirectory:
             self.write(TABLE, table)
         self._give_room()
         self.write(RESULT, to_json(result))
+        if text := self.text(COMMAND):
+            self.write(COMMAND, dates.ended(text))
         self._kept = True
         self._drop_partial()
         if not result.get("interrupted"):
@@ -333,11 +337,6 @@ def _sound_json(text: str) -> str:
 
 def _plain(row: Any) -> Mapping[str, Any]:
     return row if isinstance(row, Mapping) else asdict(row)
-
-
-def _free(command: str) -> Path:
-    runs = Path("runs")
-    return next(path for n in itertools.count(1) if not (path := runs / f"{command}-{n}").exists())
 
 
 @contextlib.contextmanager

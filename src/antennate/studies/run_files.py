@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 from pathlib import Path
 
@@ -54,3 +55,9 @@ def files_of(place: Path) -> list[Path]:
 def is_folder(folder: Path) -> bool:
     """Whether it is a folder itself, and no link to one."""
     return folder.is_dir() and not folder.is_symlink()
+
+
+def free(command: str) -> Path:
+    """The next folder for a run of a command that nobody has named."""
+    runs = Path("runs")
+    return next(path for n in itertools.count(1) if not (path := runs / f"{command}-{n}").exists())

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import importlib
 import io
+import itertools
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
@@ -22,7 +23,7 @@ from antennate.robots.spec import RobotSpec
 from antennate.sim import gl
 from antennate.sim.camera import Camera, Picture, Shot
 from antennate.sim.world import World
-from antennate.telemetry.strip import Band, Strip, Trace
+from antennate.telemetry.strip import Band, Strip, Trace, with_word
 from antennate.types import Contact, Floats, Ints, Maneuver
 
 RATE = 25
@@ -57,6 +58,7 @@ class Film:
         positions: Coordinates of the model, shape (n, nq).
         targets: What is in the middle [m], shape (n, 3).
         traces, bands: What the strip shows, with n entries each.
+        ending: A word on the outcome, shown at the end for a second; empty for none.
     """
 
     title: str
@@ -67,6 +69,12 @@ class Film:
     targets: Floats
     traces: Sequence[Trace]
     bands: Sequence[Band]
+    ending: str = ""
+
+    @property
+    def held(self) -> int:
+        """Pictures of its ending."""
+        return RATE if self.ending else 0
 
 
 class FilmRecorder:
@@ -115,7 +123,13 @@ class FilmRecorder:
         return np.array(self._values[name])
 
     def film(
-        self, title: str, model: Any, shot: Shot, traces: Sequence[Trace], bands: Sequence[Band]
+        self,
+        title: str,
+        model: Any,
+        shot: Shot,
+        traces: Sequence[Trace],
+        bands: Sequence[Band],
+        ending: str = "",
     ) -> Film:
         """The film of what was kept; the camera follows gently.
 
@@ -126,7 +140,7 @@ class FilmRecorder:
             raise nothing(title)
         targets = _smooth(np.array([where for *_, where in self._kept]), RATE)
         positions = np.array([position for _, position, _ in self._kept])
-        return Film(title, model, shot, self.t, positions, targets, traces, bands)
+        return Film(title, model, shot, self.t, positions, targets, traces, bands, ending)
 
 
 class WalkRecorder(FilmRecorder):
@@ -147,12 +161,14 @@ class WalkRecorder(FilmRecorder):
         self._model = world.model
         self.take(t, world.data.qpos, world.links().mean(axis=0), **values)
 
-    def walk(self, title: str, traces: Sequence[Trace], bands: Sequence[Band]) -> Film:
+    def walk(
+        self, title: str, traces: Sequence[Trace], bands: Sequence[Band], ending: str = ""
+    ) -> Film:
         """The film: readings before the other traces."""
         counts = counts_trace(self.values("counts"))
-        return self.film(title, self._model, self._shot, [counts, *traces], bands)
+        return self.film(title, self._model, self._shot, [counts, *traces], bands, ending)
 
-    def decided(self, title: str, threshold: float | None) -> Film:
+    def decided(self, title: str, threshold: float | None, ending: str = "") -> Film:
         """The film of a walk with `level`, `contact` and `maneuver`, -1 where it is not known.
 
         Raises:
@@ -169,6 +185,7 @@ class WalkRecorder(FilmRecorder):
                 *([maneuver_band(maneuver)] if known else ()),
                 *contact_bands(self.values("contact"), ("left", "right")),
             ],
+            ending,
         )
 
 
@@ -247,7 +264,7 @@ def _encoder() -> str:
 
 
 def pictures(film: Film, width: int = WIDTH, height: int = HEIGHT) -> Iterator[Picture]:
-    """Every picture of a film with its strip, shape (height + STRIP, width, 3).
+    """Every picture of a film with its strip, shape (height + STRIP, width, 3), then its ending.
 
     Raises:
         AntennateError: Nothing here can draw.
@@ -256,8 +273,11 @@ def pictures(film: Film, width: int = WIDTH, height: int = HEIGHT) -> Iterator[P
     sides = (rgba(SERIES[0]), rgba(SERIES[1]))
     with Camera(film.model, film.shot, (width, height), sides) as camera:
         for i, (position, target) in enumerate(zip(film.positions, film.targets, strict=True)):
-            view = camera.picture(position, target)
-            yield np.concatenate([view, np.asarray(strip.picture(i))])
+            view, below = camera.picture(position, target), np.asarray(strip.picture(i))
+            yield np.concatenate([view, below])
+    if film.held:
+        last = np.concatenate([with_word(view, film.ending), below])
+        yield from itertools.repeat(last, film.held)
 
 
 def encoded(film: Film, on_step: Callable[[int, int], None] = lambda done, total: None) -> bytes:
@@ -280,7 +300,7 @@ def encoded(film: Film, on_step: Callable[[int, int], None] = lambda done, total
             for done, picture in enumerate(pictures(film), start=1):
                 frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(picture), format="rgb24")
                 container.mux(stream.encode(frame))
-                on_step(done, len(film.t))
+                on_step(done, len(film.t) + film.held)
             container.mux(stream.encode())
     except av.FFmpegError as error:
         raise BadInputError(f"video: expected to encode it with {name}, found: {error}") from None

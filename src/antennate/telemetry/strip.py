@@ -22,8 +22,10 @@ _TEXT, _ROW, _EDGE = 13, 20, 10
 """Height of letters and of a row of text, and free space at the sides [pixels]."""
 _SMALL = 11
 """Height of the numbers of an axis [pixels]."""
-_NUMBERS = 42
-"""Room for those numbers [pixels]."""
+_LEAST_ROOM = 24
+"""Least room for those numbers, left of the chart [pixels]."""
+_WORD = 20
+"""Height of the letters of a word on the outcome, in a picture of 900 pixels [pixels]."""
 _SIDES = ("L ", "R ")
 """What stands before the newest values of two lines."""
 
@@ -116,6 +118,7 @@ class Strip:
         top, low = 1.6 * row, self._size[1] - 0.3 * edge - 1.2 * _FINE * _SMALL
         type_ = font(text)
         draw.text((left, row / 3), trace.label, INK, type_)
+        left += _room(draw, trace)
         x = right
         colours = SERIES[: trace.values.shape[1]]
         sides = _SIDES if len(colours) == len(_SIDES) else ("",) * len(colours)
@@ -134,8 +137,6 @@ class Strip:
         if trace.mark is not None:
             at = float(y(trace.mark))
             draw.line((left, at, right, at), MUTED, _FINE)
-            beside = left + _NUMBERS * _FINE  # the numbers of the axis
-            draw.text((beside, at - 1.1 * text), trace.mark_label, MUTED, type_)
         across = self._x(left, right, first, frame)
         for k, colour in enumerate(colours):
             height = y(trace.values[first : frame + 1, k])
@@ -148,13 +149,16 @@ class Strip:
     def _draw_ends(
         self, draw: ImageDraw, trace: Trace, frame: tuple[float, float, float, float]
     ) -> None:
-        """The numbers at the ends of both axes, over the curves."""
+        """The numbers at the ends of both axes, and what the mark is, beside the curves."""
         left, top, right, low = frame
-        small = font(_FINE * _SMALL)
-        for y, value, anchor in ((top, trace.high, "la"), (low, trace.low, "ld")):
-            place, words = (left + 2 * _FINE, y), f"{value:{trace.form}}"
-            draw.rectangle(draw.textbbox(place, words, small, anchor), fill="white")
-            draw.text(place, words, MUTED, small, anchor)
+        height = _FINE * _SMALL
+        small, beside = font(height), left - 3 * _FINE
+        for y, value, anchor in ((top, trace.high, "ra"), (low, trace.low, "rd")):
+            draw.text((beside, y), f"{value:{trace.form}}", MUTED, small, anchor)
+        if trace.mark is not None:
+            share = (trace.mark - trace.low) / (trace.high - trace.low)
+            at = np.clip(low - share * (low - top), top + 1.8 * height, low - 1.8 * height)
+            draw.text((beside, at), trace.mark_label, MUTED, small, "rm")
         draw.text((right, low + _FINE), f"last {self._window:.3g} s", MUTED, small, "ra")
 
     def _draw_words(self, draw: ImageDraw, start: float, first: int, frame: int) -> None:
@@ -178,3 +182,26 @@ class Strip:
                 if state in band.looks:
                     at = top + row, top + row + 0.35 * (room - row)
                     draw.rectangle((a, at[0], b, at[1]), fill=band.looks[state][1])
+
+
+def _room(draw: ImageDraw, trace: Trace) -> float:
+    """Room that the words beside a chart take."""
+    ends = (f"{value:{trace.form}}" for value in (trace.low, trace.high))
+    small = font(_FINE * _SMALL)
+    widest = max(draw.textlength(words, small) for words in (*ends, trace.mark_label))
+    return max(_LEAST_ROOM * _FINE, widest + 4 * _FINE)
+
+
+def with_word(picture: Any, word: str) -> Any:
+    """A picture of shape (height, width, 3) with a word on the outcome in it."""
+    from PIL import Image, ImageDraw
+
+    image = Image.fromarray(picture)
+    draw, size = ImageDraw.Draw(image), max(_TEXT, round(_WORD * image.width / 900))
+    type_, place = font(size), (image.width / 2, image.height - 1.6 * size)
+    left, top, right, low = draw.textbbox(place, word, type_, "mm")
+    draw.rounded_rectangle(
+        (left - size, top - size / 2, right + size, low + size / 2), size / 2, "white", FAINT
+    )
+    draw.text(place, word, INK, type_, "mm")
+    return np.asarray(image)

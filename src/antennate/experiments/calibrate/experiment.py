@@ -138,6 +138,11 @@ def _files(outcome: calibrate.CalibrateOutcome) -> Mapping[str, str]:
     }
 
 
+CAPTIONS = {
+    "calibrate": "Readings against bends with the fitted curve, what it leaves, loading "
+    "against unloading, and rival curves.",
+}
+
 EXPERIMENT = Experiment.of_folder(
     __name__,
     calibrate.CalibrateConfig,
@@ -148,4 +153,5 @@ EXPERIMENT = Experiment.of_folder(
     files=_files,
     check=require_solver,
     parts="pushes",
+    captions=CAPTIONS,
 )

@@ -129,8 +129,14 @@ def _called(each: Each) -> str:
     return each["name"] if each["reference"] else f"design {each['name']}"
 
 
+CAPTIONS = {
+    "tradeoff": "Every design by its objectives, with the front, the references, and "
+    "those run again with their intervals.",
+}
+
 EXPERIMENT = Experiment.of_folder(
     *(__name__, DesignConfig, design.run, tables, sentence),
     check=design.check,
     continued=True,
+    captions=CAPTIONS,
 )

@@ -54,6 +54,18 @@ def sentence(result: Mapping[str, Any]) -> str:
     )
 
 
+CAPTIONS = {
+    "force": "Force over flex, at rest and on the move, and the share of the force "
+    "that one reading explains.",
+}
+
 EXPERIMENT = Experiment.of_folder(
-    __name__, ForceConfig, force.run, tables, sentence, filmed=True, parts="profiles"
+    __name__,
+    ForceConfig,
+    force.run,
+    tables,
+    sentence,
+    filmed=True,
+    parts="profiles",
+    captions=CAPTIONS,
 )

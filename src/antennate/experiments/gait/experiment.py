@@ -90,6 +90,11 @@ def sentence(result: Mapping[str, Any]) -> str:
     )
 
 
+CAPTIONS = {
+    "gait": "The sweep over the lead of the body wave, and the maneuvers from above.",
+    "unknown": "FORWARD over all draws of the unknown numbers, and over each of them alone.",
+}
+
 EXPERIMENT = Experiment.of_folder(
     __name__,
     gait.GaitStudyConfig,
@@ -101,4 +106,5 @@ EXPERIMENT = Experiment.of_folder(
     parts="walks",
     logged=lambda config, workers, on_step, _, logs: gait.run(config, workers, on_step, logs=logs),
     viewed=lambda config, on_step, _, view, logs: gait.run(config, 1, on_step, view, logs),
+    captions=CAPTIONS,
 )

@@ -69,6 +69,17 @@ def sentence(result: Mapping[str, Any]) -> str:
     )
 
 
+CAPTIONS = {
+    "ringdown": "The swing of the antenna after it is let go, animals beside it, and a "
+    "cone as a chain.",
+}
+
 EXPERIMENT = Experiment.of_folder(
-    __name__, RingdownConfig, lambda config, *_: run(config), tables, sentence, filmed=True
+    __name__,
+    RingdownConfig,
+    lambda config, *_: run(config),
+    tables,
+    sentence,
+    filmed=True,
+    captions=CAPTIONS,
 )

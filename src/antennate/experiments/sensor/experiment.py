@@ -183,6 +183,16 @@ def sentence(result: Mapping[str, Any]) -> str:
     )
 
 
+CAPTIONS = {
+    "sensor": "Readings of one sensor over flex with the loop, a bend that is held, "
+    "and the choice of the divider.",
+}
+
 EXPERIMENT = Experiment.of_folder(
-    __name__, SensorConfig, lambda config, *_: run(config), tables, sentence
+    __name__,
+    SensorConfig,
+    lambda config, *_: run(config),
+    tables,
+    sentence,
+    captions=CAPTIONS,
 )

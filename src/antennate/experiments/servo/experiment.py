@@ -76,6 +76,10 @@ def sentence(result: Mapping[str, Any]) -> str:
     return f"{text} fitted and, fitted on the rest, by {held}."
 
 
+CAPTIONS = {
+    "servo": "Goals and measured positions of each recording, with those of two models.",
+}
+
 EXPERIMENT = Experiment.of_folder(
     __name__,
     ServoConfig,
@@ -83,4 +87,5 @@ EXPERIMENT = Experiment.of_folder(
     tables,
     sentence,
     parts="fits",
+    captions=CAPTIONS,
 )

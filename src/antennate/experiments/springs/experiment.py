@@ -172,6 +172,16 @@ def sentence(result: Mapping[str, Any]) -> str:
     )
 
 
+CAPTIONS = {
+    "springs": "Torque of each spring up to its yield, and the errors of what could "
+    "be wound in its place.",
+}
+
 EXPERIMENT = Experiment.of_folder(
-    __name__, SpringParams, lambda config, *_: run(config), tables, sentence
+    __name__,
+    SpringParams,
+    lambda config, *_: run(config),
+    tables,
+    sentence,
+    captions=CAPTIONS,
 )

@@ -151,9 +151,16 @@ def _counted(counts: Mapping[str, int]) -> str:
     return ", ".join(f"{n} {name}" for name, n in counts.items())
 
 
+CAPTIONS = {
+    "effects": "The largest effects with their intervals, and how far noise alone would reach.",
+    "map": "The response over two parameters, a map for each condition.",
+    "points": "The response against each parameter, with the interval of each point.",
+}
+
 EXPERIMENT = Experiment.of_folder(
     *(__name__, StudyConfig, study.run, tables, sentence),
     check=study.check,
     failed=lambda result: measures.NO_RESULT.issuperset(result["statuses"]),
     continued=True,
+    captions=CAPTIONS,
 )

@@ -76,10 +76,16 @@ def _files(outcome: sweep.SweepOutcome) -> Mapping[str, str]:
     return {"points.csv": outlines.to_csv(outcome.outlines)} if outcome.outlines else {}
 
 
+CAPTIONS = {
+    "sweep": "Shares of the time in each shape, with the base fixed and moving, and "
+    "the errors of the estimates.",
+}
+
 EXPERIMENT = Experiment.of_folder(
     *(__name__, SweepConfig, sweep.run, tables, sentence),
     filmed=True,
     files=_files,
     check=require_solver,
     parts="sweeps",
+    captions=CAPTIONS,
 )

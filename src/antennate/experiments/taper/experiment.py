@@ -175,6 +175,15 @@ def _coils(row: Mapping[str, Any]) -> str:
     return "-".join(f"{n:g}" for n in row["active_coils"])
 
 
+CAPTIONS = {
+    "taper": "Stiffness along the antenna of the animal, and along the springs of the robot.",
+}
+
 EXPERIMENT = Experiment.of_folder(
-    __name__, TaperConfig, lambda config, *_: run(config), tables, sentence
+    __name__,
+    TaperConfig,
+    lambda config, *_: run(config),
+    tables,
+    sentence,
+    captions=CAPTIONS,
 )

@@ -101,6 +101,14 @@ def sentence(result: Mapping[str, Any]) -> str:
     )
 
 
+CAPTIONS = {
+    "touch": "F1 by speed and by wall, and latencies by speed, a colour for each profile.",
+    "touch_roc": "True against false contacts for every threshold, with the default "
+    "one, and F1 over the threshold.",
+    "touch_trace": "One traverse: the wall with shapes of the antenna, flex, bending "
+    "level, and contact against truth.",
+}
+
 EXPERIMENT = Experiment.of_folder(
     __name__,
     TouchConfig,
@@ -109,4 +117,5 @@ EXPERIMENT = Experiment.of_folder(
     sentence,
     filmed=True,
     parts="traverses",
+    captions=CAPTIONS,
 )

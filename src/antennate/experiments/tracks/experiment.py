@@ -104,6 +104,11 @@ def sentence(result: Mapping[str, Any]) -> str:
     )
 
 
+CAPTIONS = {
+    "tracks": "Shares of the shapes in each trial and over all, outlines of each "
+    "shape, an angle over time, and what other criteria change.",
+}
+
 EXPERIMENT = Experiment.of_folder(
     __name__,
     TracksConfig,
@@ -113,4 +118,5 @@ EXPERIMENT = Experiment.of_folder(
     files=lambda outcome: {"frames.csv": outcome.frames_csv()},
     failed=lambda result: not result["trials_in_contact"],
     parts="files",
+    captions=CAPTIONS,
 )

@@ -74,6 +74,13 @@ def _none_valid(result: Mapping[str, Any]) -> dict[str, str]:
     }
 
 
+CAPTIONS = {
+    "trajectories": "Trials from above: a column for each trial, a row for each "
+    "controller, coloured by maneuver.",
+    "summary": "Success, time in the scene, and restricted mean time of each "
+    "controller, with 95 % intervals.",
+}
+
 EXPERIMENT = Experiment.of_folder(
     __name__,
     tunnel.TunnelConfig,
@@ -91,4 +98,5 @@ EXPERIMENT = Experiment.of_folder(
     viewed=lambda config, on_step, on_row, view, logs: tunnel.run(
         config, 1, on_step, on_row, logs, view
     ),
+    captions=CAPTIONS,
 )

@@ -9,6 +9,7 @@ from antennate.experiments.tunnel.batch import run_trials
 from antennate.experiments.tunnel.config import TunnelConfig
 from antennate.experiments.tunnel.monitor import TrialResult
 from antennate.messages import short_names
+from antennate.sim.scenes.registry import TUNNEL
 from antennate.sim.world import World
 from antennate.telemetry.film import Film, WalkRecorder
 from antennate.types import AntennaFrame, Controller
@@ -48,4 +49,16 @@ def record(
 
     run_trials(config, controller, [trial], lambda found: rows.append(found[0]), watch=watch)
     title = f"{label}, trial {trial}: {rows[0].outcome} ({speed:g}×)"
-    return recorder.decided(title, config.control.rule.threshold)
+    return recorder.decided(title, config.control.rule.threshold, ending(rows[0], config))
+
+
+def ending(row: TrialResult, config: TunnelConfig) -> str:
+    """A word on what came out, and when."""
+    there = "out" if config.scene == TUNNEL else "there"
+    words = {
+        "success": there,
+        "timeout": "stuck" if row.stuck > row.recovered else f"not {there}",
+        "left": "left the scene",
+        "invalid": "invalid",
+    }
+    return f"{words[row.outcome]} after {row.time_s:.3g} s"

@@ -49,6 +49,13 @@ def _border(result: Mapping[str, Any]) -> str:
     )
 
 
+CAPTIONS = {
+    "wall": "Outcomes of the trials of each profile, over the whole travel and after the start.",
+    "sticks": "The longest stick of every valid trial, and the border beyond which one is a jam.",
+    "passages": "The first trial of each profile: advance of the tip, and shapes of "
+    "the antenna along the wall.",
+}
+
 EXPERIMENT = Experiment.of_folder(
     *(__name__, WallConfig, wall.run, tables, sentence),
     filmed=True,
@@ -56,4 +63,5 @@ EXPERIMENT = Experiment.of_folder(
     measures=measures.PROFILE,
     viewed=lambda config, on_step, on_row, view, logs: wall.run(config, 1, on_step, on_row, view),
     check=require_solver,
+    captions=CAPTIONS,
 )

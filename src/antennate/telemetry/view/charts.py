@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import viser
@@ -18,29 +18,52 @@ from antennate.telemetry.ticks import Tick
 from antennate.telemetry.view.channel import Poses
 from antennate.types import Contact, Floats, Maneuver
 
-_KEPT = 600
-"""Ticks in a chart: 10 s of them at 60 Hz."""
+_WINDOW = 10.0
+"""Time that charts show [s]."""
+_KEPT = 1200
+"""Most ticks in a chart: more than that time has, even where every tick is shown."""
 _HEIGHT, _PADDING = 120, (10, 10, 0, 0)
 """Of a chart, and the room above and beside it for the halves of the outermost labels [pixels]."""
 _SIDES = ("left", "right")
+LABELS = {"missed": "missed ticks", "misses": "missed answers"}
+"""What counters are called where that is not their name in a log; as in the status line."""
 _COUNTERS = ("missed", "crc", "lost", "misses", "stale", "refused")
 """Counters of what went wrong; those of what went well only grow."""
 _STATE, _COUNTS = (9,), tuple(range(10, 10 + len(_COUNTERS)))
 """Columns of the supervisor's state and of these counters."""
+_OUTSIDE = 0.2
+"""How far the axis of a chart with words goes beyond them."""
+_NOTE = '<p style="font-size:0.8em;margin:0.4em">The last 10 s; 0 is now.</p>'
 _STEP = 100.0
 """Limits of the readings are multiples of this [counts], so that they seldom change."""
 _PATH = 400
 """Points of the path on the map; every second one goes when there are more."""
 _MARGIN, _PEN = 0.1, 0.006
 """Room around the map [m], and width of the path as a share of the map."""
-_SHORT = {Maneuver.TURN_L: "left", Maneuver.TURN_R: "right"}
+_CONTACTS = ("free", "contact", "unknown")
+"""Words for the values of `Contact`."""
+_WORDS = 72
+"""Room for them beside a chart [pixels]."""
 _MUTED = "#858585"
 """A grey that is read on white and on black."""
 _FAINT, _THIN = "#B09A6A", 0.45
 """Colour of obstacles, and how much of it covers the page."""
 
-_Look = tuple[str, Sequence[tuple[str, str]], tuple[float, float] | None]
-"""Title, names and colours of its lines, limits (None: as the values are) of a chart."""
+
+class _Look(NamedTuple):
+    """How a chart looks.
+
+    Attributes:
+        title: Its title.
+        lines: Names and colours of its lines.
+        limits: The ends of its axis, None for as the values are.
+        words: What the values 0, 1, 2 and so on mean, empty for numbers.
+    """
+
+    title: str
+    lines: Sequence[tuple[str, str]]
+    limits: tuple[float, float] | None = None
+    words: Sequence[str] = ()
 
 
 class Charts:
@@ -51,23 +74,22 @@ class Charts:
         self._limits = (0.0, _STEP)
         self._known = set[int]()
         pair = [(side, SERIES[i]) for i, side in enumerate(_SIDES)]
-        contact, one = "contact: 0 free, 1 touches, 2 unknown", [("maneuver", _MUTED)]
-        looks: dict[tuple[int, ...], _Look] = {
-            (1, 2): ("readings [counts]", pair, self._limits),
-            (3, 4, 8): ("level b, and θ", [*pair, ("θ", _MUTED)], (0.0, 1.0)),
-            (5, 6): (contact, pair, (-0.2, 2.2)),
-            (7,): (_maneuvers(), one, (-0.2, 4.2)),
-            _STATE: (_states(), [("supervisor", _MUTED)], (-0.2, 4.2)),
-            _COUNTS: (
-                "counted in these seconds",
-                list(zip(_COUNTERS, SERIES, strict=False)),
-                None,
-            ),
+        counters = [LABELS.get(name, name) for name in _COUNTERS]
+        maneuvers = [MANEUVER_NAMES[each] for each in Maneuver]
+        states = [each.name for each in State]
+        looks = {
+            (1, 2): _Look("readings [counts]", pair, self._limits),
+            (3, 4, 8): _Look("bending level, and θ", [*pair, ("θ", _MUTED)], (0.0, 1.0)),
+            (5, 6): _Look("contact", pair, words=_CONTACTS),
+            (7,): _Look("maneuver", [("maneuver", _MUTED)], words=maneuvers),
+            _STATE: _Look("supervisor", [("supervisor", _MUTED)], words=states),
+            _COUNTS: _Look("counted in these seconds", list(zip(counters, SERIES, strict=False))),
         }
-        begin = np.stack([np.arange(2.0), *np.zeros((_COUNTS[-1], 2))])
+        begin = np.stack([np.array([-_WINDOW, 0.0]), *np.zeros((_COUNTS[-1], 2))])
         with tab:
+            server.gui.add_html(_NOTE, order=0)
             self._charts = {
-                which: _chart(server, *look, _data(begin, which), which[0])
+                which: _chart(server, look, _data(begin, which), which[0])
                 for which, look in looks.items()
             }
 
@@ -88,12 +110,15 @@ class Charts:
         state = State.__members__.get(tick.state, np.nan)
         counts = (getattr(tick, name) for name in _COUNTERS)
         self._rows.append((tick.now, *map(float, (*values, state, *counts))))
+        while self._rows[0][0] < tick.now - _WINDOW:
+            self._rows.popleft()
 
     def show(self) -> None:
         """Draw what was kept; a chart of what nobody reads or decides here is not shown."""
         if not self._rows:
             return
         columns = np.array(self._rows).T
+        columns[0] -= columns[0, -1]
         columns[_COUNTS[0] :] -= columns[_COUNTS[0] :, :1]
         self._known |= _known(columns)
         for which, chart in self._charts.items():
@@ -133,33 +158,22 @@ def _limits(counts: Floats) -> tuple[float, float]:
     return float(low), float(max(high, low + _STEP))
 
 
-def _maneuvers() -> str:
-    return ", ".join(f"{int(m)} {_SHORT.get(m, MANEUVER_NAMES[m])}" for m in Maneuver)
-
-
-def _states() -> str:
-    return ", ".join(f"{int(state)} {state.name}" for state in State)
-
-
-def _chart(
-    server: viser.ViserServer,
-    title: str,
-    lines: Sequence[tuple[str, str]],
-    limits: tuple[float, float] | None,
-    data: tuple[Floats, ...],
-    order: float,
-) -> Any:
-    axis: Any = uplot.Axis(size=56)
+def _chart(server: viser.ViserServer, look: _Look, data: tuple[Floats, ...], order: float) -> Any:
+    axis: Any = uplot.Axis(size=_WORDS)
+    limits, words = look.limits, look.words
+    if words:
+        limits = -_OUTSIDE, len(words) - 1 + _OUTSIDE
+        axis |= uplot.Axis(splits=tuple(map(float, range(len(words)))), values=tuple(words))
     return server.gui.add_uplot(
         data,
         (
             uplot.Series(label="t [s]"),
-            *(uplot.Series(label=name, stroke=colour, width=1.5) for name, colour in lines),
+            *(uplot.Series(label=name, stroke=colour, width=1.5) for name, colour in look.lines),
         ),
-        title=title,
+        title=look.title,
         scales=_scales(limits),
         axes=(uplot.Axis(size=24), axis),
-        legend=uplot.Legend(show=len(lines) > len(_SIDES) + 1),
+        legend=uplot.Legend(show=len(look.lines) > len(_SIDES) + 1),
         height=_HEIGHT,
         padding=_PADDING,
         order=order,
@@ -167,8 +181,9 @@ def _chart(
 
 
 def _scales(limits: tuple[float, float] | None) -> dict[str, uplot.Scale]:
+    """Of both axes. That of time stays: the client loses one that follows the data."""
     y = uplot.Scale(auto=True) if limits is None else uplot.Scale(range=limits)
-    return {"x": uplot.Scale(time=False), "y": y}
+    return {"x": uplot.Scale(time=False, range=(-_WINDOW, 0.0)), "y": y}
 
 
 class Map:

@@ -98,6 +98,9 @@ class FoxgloveSink:
         """Nothing waits to be drawn."""
         return _IDLE
 
+    def end(self) -> None:
+        """What was sent stays with who reads."""
+
     def take(self, kind: bytes, content: bytes) -> None:
         """Send a message on."""
         if kind == TICK:
@@ -144,7 +147,7 @@ class FoxgloveSink:
             make = getattr(made, _PRIMITIVES[name])
             shape = make(pose=poses[i], size=_vector(made, full), color=colours[i], **more)
             entity[name].append(shape)
-        arrows = [_arrow(made, each) for each in now.forces]
+        arrows = [_arrow(made, each) for each in now.forces if each[3:].any()]
         stamp = made.Timestamp(sec=self._now // 10**9, nsec=self._now % 10**9)
         self._scene_channel.log(
             made.SceneUpdate(
@@ -187,8 +190,9 @@ def _primitive(kind: int, size: list[float]) -> tuple[str, list[float]]:
 
 
 def _arrow(made: Any, force: Any) -> Any:
+    """The arrow of a force, which has a direction only if it is not zero."""
     length = float(np.linalg.norm(force[3:]))
-    turned = Rotation.align_vectors([force[3:] / (length or 1.0)], [[1.0, 0.0, 0.0]])[0]
+    turned = Rotation.align_vectors([force[3:] / length], [[1.0, 0.0, 0.0]])[0]
     pose = made.Pose(
         position=_vector(made, force[:3].tolist()),
         orientation=_quaternion(made, turned.as_quat().tolist()),

@@ -14,6 +14,7 @@ from importlib import resources
 
 import numpy as np
 
+from antennate.colours import SERIES
 from antennate.errors import BadInputError
 from antennate.messages import extra
 from antennate.telemetry.view.gate import HOSTS
@@ -30,9 +31,12 @@ _DARK = """\
 history.replaceState(null, "", dark ? "?darkMode" : "/") }
 """
 """Dark where the browser is: the client looks for that word."""
+BLUE = SERIES[0]
+"""Colour of buttons."""
 _SHEET = '.mantine-Paper-root[style*="position: fixed"]'
 """The panel of the client in a window narrower than 36em, where it would lie over the scene."""
 _STYLE = f"""\
+.mantine-Button-root {{ background: {BLUE} !important; color: #fff !important }}
 @media (max-width: 36em) {{
   div:has(> {_SHEET}) {{ flex-direction: column }}
   div:has(> {_SHEET}) > div:has(canvas) {{ height: 0 !important; flex: 1 }}
@@ -40,7 +44,7 @@ _STYLE = f"""\
   {_SHEET} [style*="width: 20em"] {{ width: 100% !important }}
 }}
 """
-"""There the scene is above the panel."""
+"""There the scene is above the panel; and buttons whose text is read in the dark too."""
 
 
 def load(port: int) -> tuple[bytes, str]:

@@ -7,6 +7,8 @@ import select
 import socket
 import subprocess
 import sys
+import threading
+from collections.abc import Callable
 from importlib.util import find_spec
 
 from antennate.errors import BadInputError, MissingPackageError, WorkerError
@@ -29,6 +31,7 @@ class ViewProcess:
             socket, and the port for Foxglove, a hyphen for what is not wanted.
         foxglove: Port for Foxglove likewise, None without it.
         flag: The option that chooses the port of the page, for an error.
+        on_lost: Called, in a thread of its own, with a line if it ends although nobody told it to.
 
     Attributes:
         channel: To it.
@@ -45,6 +48,7 @@ class ViewProcess:
         module: str,
         foxglove: int | None = None,
         flag: str = "--view-port",
+        on_lost: Callable[[str], None] = lambda line: None,
     ) -> None:
         if port is not None:
             require_viser()
@@ -69,12 +73,14 @@ class ViewProcess:
                 pass_fds=files,
                 process_group=0,  # Ctrl-C in the terminal is for the program alone
             )
-        self.channel = Channel(ours)
+        self.channel, self._closing = Channel(ours), False
         try:
             self._wait()
         except BaseException:
             self.close()
             raise
+        self._name = "foxglove" if port is None else "view"
+        threading.Thread(target=self._watch, args=(on_lost,), daemon=True).start()
 
     def _wait(self) -> None:
         """Until it serves."""
@@ -85,6 +91,14 @@ class ViewProcess:
         if kind == FAILED:
             raise BadInputError(text.decode())
         raise BadInputError(f"view: expected its process to serve, found that it {self._found()}")
+
+    def _watch(self, on_lost: Callable[[str], None]) -> None:
+        self._process.wait()
+        if not self._closing:
+            on_lost(
+                f"{self._name}: expected its process to serve until the end, found that it "
+                f"{self._found()}; the run goes on without it"
+            )
 
     def lost(self) -> WorkerError:
         """What is raised when it ended although nobody told it to."""
@@ -102,6 +116,7 @@ class ViewProcess:
 
     def close(self) -> None:
         """End it."""
+        self._closing = True
         self.channel.finish(END)
         self.channel.close()
         with contextlib.suppress(subprocess.TimeoutExpired):

@@ -83,8 +83,7 @@ class SceneView:
         with self._server.atomic():
             for group in self.groups:
                 group.place(places, turned)
-            ends = now.forces[:, :3] + self.arrow_scale * now.forces[:, 3:]
-            self._arrows.points = np.stack([now.forces[:, :3], ends], axis=1)
+            self._arrows.points = arrows(now.forces, self.arrow_scale, 2 * self._arrows.head_length)
             self.middle = np.array([-target[0], -target[1], 0.0]) if self.follow else np.zeros(3)
             self._root.position = self.middle
         if not self._aimed:
@@ -100,6 +99,20 @@ class SceneView:
         camera = self._server.initial_camera
         camera.position = (-0.7 * reach, -0.9 * reach, 1.3 * reach)
         camera.look_at = (0.0, 0.0, 0.0)
+
+
+def arrows(forces: NDArray[np.float32], scale: float, least: float) -> NDArray[np.float32]:
+    """Both ends of each arrow [m], shape (k, 2, 3): none of a force of zero.
+
+    Args:
+        forces: Place [m] and force [N] of each, shape (n, 6).
+        scale: Length for each unit of force [m/N].
+        least: Length of the arrow of a weak force, so that it is seen [m].
+    """
+    size = np.linalg.norm(forces[:, 3:], axis=1, keepdims=True)
+    some = size[:, 0] > 0
+    at, force, size = forces[some, :3], forces[some, 3:], size[some]
+    return np.stack([at, at + np.maximum(scale, least / size) * force], axis=1)
 
 
 def _thickness(scale: float) -> dict[str, Any]:

@@ -35,7 +35,7 @@ from antennate.telemetry.view.channel import (
     Step,
     read,
 )
-from antennate.telemetry.view.charts import Charts, Map
+from antennate.telemetry.view.charts import LABELS, Charts, Map
 from antennate.telemetry.view.controls import Controls
 from antennate.telemetry.view.pace import RATE
 from antennate.telemetry.view.scene import SceneView
@@ -46,6 +46,9 @@ _SLOW = 0.1
 _ARROW_ROBOT, _ARROW_BENCH = 20, 100
 """Length of an arrow at first [mm/N]: robots push with newtons, antennae with tenths of one."""
 _LINES = 6
+_ENDED = "The run has ended", "The replay has ended"
+_SENDING = 0.5
+"""Time for the last messages to leave [s]; assumed."""
 _SIDES = (rgba(SERIES[0]), rgba(SERIES[1]))
 _COUNTERS = ("missed", "frames", "crc", "lost", "misses", "stale", "sent", "refused")
 
@@ -61,17 +64,24 @@ class Display(Protocol):
         """Draw what is due at a time [s]; the time until more may be due [s]."""
         ...
 
+    def end(self) -> None:
+        """Show that the program has ended."""
+        ...
+
 
 def run(channel: Channel, displays: Sequence[Display]) -> None:
-    """Show what comes until the program has ended."""
-    while not channel.closed:
+    """Show what comes until the program has ended, and that it has."""
+    ended = False
+    while not (ended or channel.closed):
         wait = min(each.draw(time.monotonic()) for each in displays)
         time.sleep(min(wait, 1.0 / RATE))  # waking up for each message would cost the program time
         for kind, content in channel.receive():
-            if kind == END:
-                return
+            if ended := kind == END:
+                break
             for each in displays:
                 each.take(kind, content)
+    for each in displays:
+        each.end()
 
 
 class Page:
@@ -115,6 +125,22 @@ class Page:
             self._due_slow = now + _SLOW
             self._draw_slow()
         return max(0.0, self._due - now) if self._new else _SLOW
+
+    def end(self) -> None:
+        """Show the last picture, and that the program has ended; the browser keeps both."""
+        clients = self._server.get_clients().values()
+        if not clients:
+            return
+        self._draw()
+        if results := str(self._state.get("results", "")):
+            results = f"Results: {results}"
+        ended = _ENDED["again" in self._state]
+        self._lines.append(f"{ended}. {results}".strip())
+        self._draw_slow()
+        for client in clients:
+            client.add_notification(ended, results)
+        self._server.flush()
+        time.sleep(_SENDING)
 
     @property
     def _new(self) -> bool:
@@ -226,7 +252,7 @@ def _status(tick: Tick | None, state: Mapping[str, Any], lines: tuple[str, ...])
             rows.append(("supervisor", tick.state))
             rows += [("", cause) for cause in tick.causes[:3]]
             rows += [("note", tick.note)] if tick.note else []
-            counts = (f"{name} {getattr(tick, name)}" for name in _COUNTERS)
+            counts = (f"{LABELS.get(n, n)} {getattr(tick, n)}" for n in _COUNTERS)
             rows.append(("counters", ", ".join(counts)))
     rows += [("event", line) for line in lines]
     cells = "".join(

@@ -42,6 +42,7 @@ class SimulationView(Pace):
 
     Attributes:
         by_hand: What was changed by hand, in order.
+        results: The folder that is to hold the results, empty if there is none.
     """
 
     def __init__(
@@ -53,6 +54,7 @@ class SimulationView(Pace):
         if not steered:
             self.state = {"speed": None, "paused": False}
         self.by_hand: list[str] = []
+        self.results = ""
         self._fresh: list[str] = []
         self._tuning: Tuning | None = None
         self._seen: Any = None
@@ -65,7 +67,7 @@ class SimulationView(Pace):
         """A trial begins; `seed` is the one that it has, None where there is no chance."""
         self._title, self._number, self._seen = title, 0, None
         self._tuning = None
-        self.state |= {"title": title, "values": {}}
+        self.state |= {"title": title, "values": {}, "results": self.results}
         self.state.pop("seed", None)
         if seed is not None:
             self.state["seed"] = seed
