@@ -275,9 +275,9 @@ def pictures(film: Film, width: int = WIDTH, height: int = HEIGHT) -> Iterator[P
         for i, (position, target) in enumerate(zip(film.positions, film.targets, strict=True)):
             view, below = camera.picture(position, target), np.asarray(strip.picture(i))
             yield np.concatenate([view, below])
-    if film.held:
-        last = np.concatenate([with_word(view, film.ending), below])
-        yield from itertools.repeat(last, film.held)
+            if film.held and i == len(film.t) - 1:
+                last = np.concatenate([with_word(view, film.ending), below])
+                yield from itertools.repeat(last, film.held)
 
 
 def encoded(film: Film, on_step: Callable[[int, int], None] = lambda done, total: None) -> bytes:
