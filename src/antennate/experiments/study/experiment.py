@@ -97,12 +97,15 @@ def _effects(result: Mapping[str, Any]) -> Table:
         (name, [*(labels.cell(measure, *size(of[t])) for t in targets), _above(of)])
         for name, of in ranked
     ]
-    floors = [labels.cell(measure, ranked[0][1][target].get("noise")) for target in targets]
-    note = _MORRIS if result["plan"] == "morris" else _SLOPES
+    note = _SLOPES
+    if result["plan"] == "morris":
+        note = _MORRIS
+        floors = [labels.cell(measure, ranked[0][1][target].get("noise")) for target in targets]
+        rows.insert(0, (f"noise of {labels.sample(result)}", [*floors, ""]))
     return Table(
         "Effects",
         [*(target or measure.title for target in targets), "above the noise"],
-        [(f"noise of {labels.sample(result)}", [*floors, ""]), *rows],
+        rows,
         note.format(measure.title),
     )
 

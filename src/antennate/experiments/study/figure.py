@@ -75,10 +75,14 @@ def effects(result: Result) -> Figure:
 
 def _sizes(panel: Axes, found: Sequence[Result], measure: Measure, signed: bool) -> None:
     """Each effect with its interval, its name above it; grey as far as noise alone would reach."""
-    noise = found[0]["noise"] if found else None
-    if noise is not None:
-        ends = (-measure.scale * noise if signed else 0.0, measure.scale * noise)
-        panel.axvspan(*ends, color=style.FAINT, linewidth=0, label="noise")
+    noises = [effect["noise"] for effect in found]
+    if noises and not signed and noises[0] is not None:
+        end = measure.scale * noises[0]
+        panel.axvspan(0.0, end, color=style.FAINT, linewidth=0, label="noise")
+    elif signed:
+        wide = measure.scale * np.array(noises)
+        look = {"color": style.FAINT, "linewidth": 0, "label": "noise"}
+        panel.barh(range(len(found)), 2 * wide, 0.3, -wide, **look)
     for place, effect in enumerate(found):
         middle, interval = size(effect)
         ends = measure.scale * np.array(interval or (middle, middle))

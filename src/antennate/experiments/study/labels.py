@@ -59,7 +59,8 @@ def cell(of: Measure, number: Any, interval: Any = None) -> str:
 def sample(result: Mapping[str, Any]) -> str:
     """What the noise of the effects is of: trials a point, or points."""
     if result["plan"] != "morris":
-        return f"{len({cell['point'] for cell in result['points']})} points"
+        known = {cell["point"] for cell in result["points"] if cell["response"] is not None}
+        return f"{len(known)} points"
     most = max(cell["trials"] for cell in result["points"])
     return f"{most} trial{'s' if most != 1 else ''} a point"
 

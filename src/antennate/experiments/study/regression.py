@@ -25,10 +25,11 @@ def slopes(
 
     A choice is compared with the first one of its list. The interval holds also where the spread
     differs from point to point (HC3: MacKinnon and White, Journal of Econometrics 29 (1985) 305).
-    `noise` is the size that the largest change of a study stays below if nothing has an effect:
-    what the fit leaves over is given random signs, and the largest change that it makes is taken
-    each time (wild bootstrap: Davidson and Flachaire, Journal of Econometrics 146 (2008) 162). So a
-    strong cause hides no weak one. What goes up and down within one range is not seen.
+    `noise` is what the changes of a study stay below, all of them, if nothing has an effect: what
+    the fit leaves over is given random signs, and the largest change that it makes is taken each
+    time, each over its own standard error (wild bootstrap: Davidson and Flachaire, Journal of
+    Econometrics 146 (2008) 162; maximum: Romano and Wolf, Econometrica 73 (2005) 1237). So a strong
+    cause hides no weak one. What goes up and down within one range is not seen.
 
     Args:
         axes: What varies.
@@ -82,25 +83,30 @@ def _fit(design: Floats, response: Floats, chance: float) -> list[dict[str, Any]
     if (leverage > 1.0 - _ROUNDING).any():  # one point alone decides a slope: no spread is known
         return [unknown] * (width - 1)
     errors = (response - design @ found) / (1.0 - leverage)
-    half = special.stdtrit(count - width, 0.975) * np.sqrt((solve**2) @ errors**2)
-    noise = _noise(solve[1:], errors, chance)
-    least = max(noise, float(np.abs(response).max()) * _ROUNDING) * (1.0 + _ROUNDING)
+    error = np.sqrt((solve**2) @ errors**2)
+    half = special.stdtrit(count - width, 0.975) * error
+    noise = _largest(solve[1:], errors, error[1:], chance) * error
+    least = np.maximum(noise, np.abs(response).max() * _ROUNDING)
     return [
         {
             "slope": float(slope),
             "slope95": (float(slope - h), float(slope + h)),
-            "noise": noise,
-            "above_noise": abs(float(slope)) > least,
+            "noise": float(n),
+            "above_noise": bool(abs(slope) > at_least),
         }
-        for slope, h in zip(found[1:], half[1:], strict=True)
+        for slope, h, n, at_least in zip(found[1:], half[1:], noise[1:], least[1:], strict=True)
     ]
 
 
-def _noise(solve: Floats, errors: Floats, chance: float) -> float:
-    """What the largest slope of errors with random signs stays below, but for a share of them."""
-    rng, largest = np.random.default_rng(0), []
+def _largest(solve: Floats, errors: Floats, error: Floats, chance: float) -> float:
+    """What the largest slope over its error stays below, errors with random signs; but a share."""
+    if not error.any():
+        return 0.0
+    rng, largest = np.random.default_rng(0), list[float]()
+    scale = np.where(error > 0.0, error, np.inf)[:, None]
     block = max(1, min(_DRAWS, _AT_ONCE // len(errors)))
     for first in range(0, _DRAWS, block):
         signs = rng.choice((-1.0, 1.0), (len(errors), min(block, _DRAWS - first)))
-        largest += np.abs(solve @ (signs * errors[:, None])).max(axis=0).tolist()
+        found = np.abs(solve @ (signs * errors[:, None])) / scale
+        largest += found.max(axis=0).tolist()
     return float(np.quantile(largest, 1.0 - chance, method="higher"))
