@@ -271,13 +271,15 @@ def pictures(film: Film, width: int = WIDTH, height: int = HEIGHT) -> Iterator[P
     """
     strip = Strip(film.title, film.t, film.traces, film.bands, width, STRIP)
     sides = (rgba(SERIES[0]), rgba(SERIES[1]))
+    last: tuple[Picture, Picture] | None = None
     with Camera(film.model, film.shot, (width, height), sides) as camera:
         for i, (position, target) in enumerate(zip(film.positions, film.targets, strict=True)):
-            view, below = camera.picture(position, target), np.asarray(strip.picture(i))
-            yield np.concatenate([view, below])
-            if film.held and i == len(film.t) - 1:
-                last = np.concatenate([with_word(view, film.ending), below])
-                yield from itertools.repeat(last, film.held)
+            last = camera.picture(position, target), np.asarray(strip.picture(i))
+            yield np.concatenate(last)
+    if film.ending and last:
+        view, below = last
+        ending = np.concatenate([with_word(view, film.ending), below])
+        yield from itertools.repeat(ending, film.held)
 
 
 def encoded(film: Film, on_step: Callable[[int, int], None] = lambda done, total: None) -> bytes:
