@@ -123,7 +123,8 @@ from antennate.studies.store import Store
 
 store = Store(Path("run/trials.store.jsonl"))
 store.begin({"study": "of six trials"})
-config = {"x": 1.0, "sleep": 0.5, "study": StudyConfig(trials=3, points=4, vary={"x": [1.0]})}
+model = StudyConfig(experiment="wall", plan="sobol", points=4, seed=1, trials=2, vary={"x": [1.0]})
+config = {"x": 1.0, "sleep": 0.5, "model": model}
 tasks = [(config, seed) for seed in range(6)]
 workers = Workers(1, make_engine("slurm-local"), store=store)
 gather(trial, tasks, workers, lambda done, total: None)
