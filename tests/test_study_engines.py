@@ -116,21 +116,27 @@ def test_trials_of_a_job_of_slurm_crash_or_hang_as_on_one_machine(tmp_path: Path
 DRIVER = """
 from pathlib import Path
 from study_trials import trial
+from antennate.experiments.study.config import StudyConfig
 from antennate.studies.engines import make_engine
 from antennate.studies.pool import Workers, gather
 from antennate.studies.store import Store
 
 store = Store(Path("run/trials.store.jsonl"))
 store.begin({"study": "of six trials"})
-tasks = [({"x": 1.0, "sleep": 0.5}, seed) for seed in range(6)]
+model = StudyConfig(experiment="wall", plan="sobol", points=4, seed=1, trials=2, vary={"x": [1.0]})
+config = {"x": 1.0, "sleep": 0.5, "model": model}
+tasks = [(config, seed) for seed in range(6)]
 workers = Workers(1, make_engine("slurm-local"), store=store)
 gather(trial, tasks, workers, lambda done, total: None)
 """
 
 
-def driver(notes: Path) -> subprocess.Popen[bytes]:
-    """A driver of six trials in one job, in a process that may be killed."""
-    there = {**os.environ, "STUDY_NOTES": str(notes)}
+def driver(notes: Path, seed: int) -> subprocess.Popen[bytes]:
+    """A driver of six trials in one job, in a process that may be killed.
+
+    Its sets are in an order of their own, as those of each process are.
+    """
+    there = {**os.environ, "STUDY_NOTES": str(notes), "PYTHONHASHSEED": str(seed)}
     return subprocess.Popen([sys.executable, "-c", DRIVER], env=there)
 
 
@@ -139,7 +145,7 @@ def test_jobs_of_a_driver_that_was_killed_are_taken_over(tmp_path: Path) -> None
     pytest.importorskip("submitit")
     notes = tmp_path / "notes.txt"
     Path("run").mkdir()
-    first = driver(notes)
+    first = driver(notes, 1)
     try:
         end = time.monotonic() + 120.0
         while not notes.exists():
@@ -149,7 +155,7 @@ def test_jobs_of_a_driver_that_was_killed_are_taken_over(tmp_path: Path) -> None
         first.kill()
         first.wait()
     assert list(Path("run/slurm").glob("*.job"))
-    assert driver(notes).wait() == 0
+    assert driver(notes, 2).wait() == 0
     assert sorted(notes.read_text().split()[1::2]) == list("012345")
     assert not list(Path("run/slurm").glob("*.job"))
 

@@ -19,7 +19,7 @@ from typing import Any
 from antennate.errors import BadInputError, ConfigError, OutputError, WorkerError, in_one_line
 from antennate.files import write_whole
 from antennate.messages import shortened
-from antennate.studies.codec import decoded, dumped
+from antennate.studies.codec import decoded, dumped, encoded
 from antennate.studies.identity import environment
 from antennate.studies.processes import added_objects
 from antennate.studies.slurm_job import Resumable, note_of, show_new
@@ -173,9 +173,7 @@ class _Files:
     def __init__(self, folder: Path, work: Work, at_once: int, emit: Emit, fail: Fail) -> None:
         self.folder, self._work, self._emit, self._fail = folder, work, emit, fail
         self.at_once, self.failed_starts = at_once, 0
-        content = pickle.dumps((work.function, list(work.tasks)))
-        digest = hashlib.sha256(content).hexdigest()
-        self._identity = {**(work.shared or environment()), "work": digest}
+        self._identity = {**(work.shared or environment()), "work": _digest(work)}
         self._packages = {"antennate", work.function.__module__.partition(".")[0]}
         try:
             folder.mkdir(exist_ok=True)
@@ -278,6 +276,30 @@ class _Job:
     call: Resumable | None = None
     read: int = 0
     held_trials: bool = False
+
+
+def _digest(work: Work) -> str:
+    """A checksum of what is run that is the same in each process.
+
+    It is no pickle where that can be: the sets in one are in another order in each process.
+    """
+    known: dict[int, bytes] = {}  # points have many trials, which share a configuration
+
+    def told(value: Any) -> bytes:
+        if isinstance(value, tuple):
+            return b"(%b)" % b",".join(map(told, value))
+        if id(value) not in known:
+            try:
+                known[id(value)] = dumped(encoded(value)).encode()
+            except TypeError:
+                known[id(value)] = pickle.dumps(value)
+        return known[id(value)]
+
+    name = f"{work.function.__module__}:{work.function.__qualname__}"
+    content = hashlib.sha256(name.encode())
+    for task in work.tasks:
+        content.update(told(task))
+    return content.hexdigest()
 
 
 def _last(text: str) -> str:
