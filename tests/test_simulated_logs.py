@@ -244,7 +244,7 @@ def test_a_twin_and_its_log_are_filmed(tmp_path: Path) -> None:
         (["--video", "a.mcap"], "--video: expected a name with .mp4, found a.mcap"),
         (["--log", "here.mcap"], "--log: expected no such file yet, found here.mcap"),
         (["--video", "nowhere/a.mp4"], "--video: expected a folder for nowhere/a.mp4"),
-        (["--servos", "1:xl330-m288", "--log", "a.mcap"], "--servos: expected no"),
+        (["--servos", "1:xl330-m288", "--log", "a.mcap"], "--log: expected none beside --servos"),
     ],
 )
 def test_what_a_twin_cannot_keep_is_refused_in_one_line(

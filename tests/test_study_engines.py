@@ -13,6 +13,7 @@ import subprocess
 import sys
 import threading
 import time
+import types
 from collections.abc import Iterator
 from concurrent.futures import Future, ProcessPoolExecutor
 from importlib import metadata
@@ -67,6 +68,21 @@ def test_a_function_is_studied_from_python() -> None:
         antennate.BadInputError, match=r"assumed: .* whose parameters have no sources"
     ):
         antennate.study(trial, VARY, plan="sobol", assumed=0.2)
+
+
+def test_a_function_that_workers_cannot_import_costs_no_other_study(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """As one of a module that the program itself has made."""
+    module = types.ModuleType("made_here")
+    exec("def own(config, seed):\n    return {'value': config['x']}", module.__dict__)  # noqa: S102
+    monkeypatch.setitem(sys.modules, "made_here", module)
+    here = antennate.study(module.own, {"x": [1.0, 2.0]}, trials=1, workers=1)
+    assert [row["value"] for row in here.rows] == [1.0, 2.0]
+    springs = antennate.study("springs", {"coil_mm": [3.5, 4.0]}, workers=2)
+    assert springs.summary["statuses"] == {"ok": 2}
+    there = antennate.study(module.own, {"x": [1.0, 2.0]}, trials=1, workers=2)
+    assert all("workers can import, found " in row["reason"] for row in there.rows), there.rows
 
 
 @pytest.fixture(scope="module")

@@ -36,6 +36,10 @@ _MOST_FAILED_STARTS = 10
 """Workers in a row that may end before they are ready, as somebody kills them."""
 _READY, _BEGUN, _FAILED, _RESULT = range(4)
 """Kinds of messages of a worker."""
+_LAST_WORDS = 1.0
+"""Time that a worker whose connection has ended has to end by itself, with its own code [s]."""
+_Packed = Mapping[str, Mapping[str, bytes]]
+"""Added objects by registry and name, each pickled."""
 
 
 class Processes:
@@ -58,7 +62,7 @@ class Processes:
         checked = sendable(work.tasks)
         if isinstance(checked, NotSent):
             raise WorkerError(checked.reason)
-        pool = _Pool(work, parts, added_objects(), emit, fail, self._left)
+        pool = _Pool(work, parts, _packed(added_objects()), emit, fail, self._left)
         self._left = []
         try:
             pool.run(min(count, len(parts)))
@@ -81,7 +85,7 @@ class _Pool:
         self,
         work: Work,
         parts: Sequence[Sequence[int]],
-        added: Mapping[str, Any],
+        added: _Packed,
         emit: Emit,
         fail: Fail,
         workers: Sequence[_Worker] = (),
@@ -118,6 +122,7 @@ class _Pool:
             while worker.connection.poll():
                 self._take(worker, *worker.connection.recv())
         except (EOFError, OSError):
+            worker.process.join(_LAST_WORDS)
             ended = True
         if ended:
             self._remove(worker)
@@ -177,7 +182,7 @@ class _Worker:
         deadline: When it is given up.
     """
 
-    def __init__(self, added: Mapping[str, Any]) -> None:
+    def __init__(self, added: _Packed) -> None:
         context = multiprocessing.get_context("spawn")
         self.connection, theirs = context.Pipe()
         # a parent that ends ends those that are daemons; others it would wait for
@@ -221,6 +226,24 @@ def take_added(added: Mapping[str, Mapping[str, Any]]) -> None:
         ADDED.setdefault(group, {}).update(objects)
 
 
+def _packed(added: Mapping[str, Mapping[str, Any]]) -> _Packed:
+    """Each object apart, so that one that a worker cannot read costs no other."""
+    return {
+        group: {name: pickle.dumps(each) for name, each in objects.items()}
+        for group, objects in added.items()
+    }
+
+
+def _read(content: bytes) -> Any:
+    """In a worker: an object that was sent, or what says why it cannot be read here."""
+    try:
+        return pickle.loads(content)  # noqa: S301  (the driver wrote it)
+    except Exception as error:  # noqa: BLE001  (an object's own module may raise anything)
+        return NotSent(
+            f"expected an object of your own that workers can import, found {in_one_line(error)}"
+        )
+
+
 def sendable(each: Any) -> Any:
     """The same object if it can be sent to a worker, else what says why not."""
     try:
@@ -246,10 +269,10 @@ def _without_ctrl_c() -> Iterator[None]:
         signal.signal(signal.SIGINT, before)
 
 
-def _serve(connection: Connection, added: Mapping[str, Any]) -> None:
+def _serve(connection: Connection, added: _Packed) -> None:
     """What a worker process does until it is ended."""
     multiprocessing.current_process().daemon = False  # so that a trial may start processes too
-    take_added(added)
+    take_added({k: {n: _read(c) for n, c in of.items()} for k, of in added.items()})
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, daemon=True).start()
     connection.send((_READY, 0, None))
