@@ -75,7 +75,7 @@ def test_a_function_that_workers_cannot_import_costs_no_other_study(
 ) -> None:
     """As one of a module that the program itself has made."""
     module = types.ModuleType("made_here")
-    exec("def own(config, seed):\n    return {'value': config['x']}", module.__dict__)  # noqa: S102
+    exec("def own(config, seed):\n    return {'value': config['x']}", module.__dict__)
     monkeypatch.setitem(sys.modules, "made_here", module)
     here = antennate.study(module.own, {"x": [1.0, 2.0]}, trials=1, workers=1)
     assert [row["value"] for row in here.rows] == [1.0, 2.0]
