@@ -30,8 +30,8 @@ from antennate.studies.work import Emit, Fail, Failure, Waiting, Work
 
 _LOOK = 0.5
 """How often the driver looks for what the jobs of SLURM have finished [s]."""
-_MOST_FAILED_STARTS = 3
-"""Jobs in a row that may end before they are at their first trial."""
+_FAILED_STARTS = 3
+"""So many jobs in a row that end before they have begun end the run."""
 _TIME_LIMIT = ("SLURM says TIMEOUT", "timed-out too many times")
 """How SLURM and submitit say that a job has reached its time limit."""
 _NOTE = logging.getLogger(__name__)
@@ -80,7 +80,7 @@ class Slurm:
                 show_new(files.folder)
                 for future in list(running):
                     ended, job = future.done(), running[future]
-                    files.take(job)
+                    files.take(job, ended)
                     if ended:
                         del running[future]
                         files.forget(job)
@@ -116,7 +116,7 @@ class Slurm:
             )
         if not job.read:
             files.failed_starts += 1
-            if files.failed_starts >= _MOST_FAILED_STARTS:
+            if files.failed_starts >= _FAILED_STARTS:
                 raise WorkerError(
                     f"slurm: expected jobs to begin, found {files.failed_starts} in a row that "
                     f"ended before: {_last(text)}"
@@ -238,14 +238,15 @@ class _Files:
         note_of(job.file).unlink(missing_ok=True)
         job.file.unlink(missing_ok=True)
 
-    def take(self, job: _Job, again: bool = False) -> None:
+    def take(self, job: _Job, ended: bool = False, again: bool = False) -> None:
         """Take the lines that have come to the file of a job since it was last read.
 
         Args:
             job: The job.
-            again: Whether those that failed are left, to be run again.
+            ended: Whether it has; a network file system shows the last lines once it is opened.
+            again: Whether tasks that failed are left, to be run again.
         """
-        if not job.file.exists() or job.file.stat().st_size == job.read:
+        if not job.file.exists() or (job.file.stat().st_size == job.read and not ended):
             return
         with job.file.open("rb") as file:
             file.seek(job.read)

@@ -13,7 +13,7 @@ import platform
 import signal
 import subprocess
 import time
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from pathlib import Path
 from typing import Any
 
@@ -40,7 +40,7 @@ _NEVER = {
 }
 """Why jobs wait that no other job's end lets begin."""
 _GONE = "GONE"
-"""The same of a job that SLURM lists no more."""
+"""The state of a job that SLURM lists no more."""
 _LOG = 4096
 """Most that is read of the end of what a job wrote to stderr [bytes]."""
 _NOTE = logging.getLogger(__name__)
@@ -191,7 +191,7 @@ class LocalJob:
         return "it ended"
 
 
-def cancel(jobs: Iterable[Any]) -> None:
+def cancel(jobs: Collection[Any]) -> None:
     """End jobs; a line says so if SLURM does not."""
     queued = [job.job_id for job in jobs if isinstance(job, QueuedJob)]
     for job in jobs:
