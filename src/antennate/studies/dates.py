@@ -33,12 +33,16 @@ def sentence(text: str) -> str:
         if what in found:
             took = found["ended"] - found[what] if "ended" in found else None
             day = f"{told} {found[what]:%Y-%m-%d at %H:%M} UTC"
-            return f"{day}; it took {_span(took.total_seconds())}." if took else f"{day}."
+            return (
+                f"{day}; it took {_span(took.total_seconds())}." if took is not None else f"{day}."
+            )
     return ""
 
 
 def _span(seconds: float) -> str:
     minutes, hours = seconds / 60, seconds / 3600
+    if seconds < 1:
+        return "less than 1 s"
     if seconds < 100:
         return f"{seconds:.0f} s"
     return f"{minutes:.0f} min" if minutes < 100 else f"{hours:.1f} h"
