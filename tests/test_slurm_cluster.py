@@ -117,6 +117,12 @@ class Study:
         said = self.driver.communicate(timeout=100.0)[1].splitlines()
         return self.driver.returncode, [x for x in said if not x.startswith(PROGRESS)]
 
+    def end(self) -> None:
+        """Kill the driver if it still runs."""
+        if self.driver is not None and self.driver.poll() is None:
+            self.driver.kill()
+            self.driver.communicate()
+
     def table(self) -> bytes:
         return (self.folder / "run" / "trials.csv").read_bytes()
 
@@ -126,9 +132,7 @@ def study(slurm: Cluster, tmp_path: Path) -> Iterator[Study]:
     """A study whose driver and jobs end with the test."""
     made = Study(slurm, tmp_path)
     yield made
-    if made.driver is not None and made.driver.poll() is None:
-        made.driver.kill()
-        made.driver.communicate()
+    made.end()
     slurm.end_jobs()
 
 
@@ -214,20 +218,23 @@ def test_what_slurm_cannot_give_is_one_line(study: Study) -> None:
     """The last is a time limit that is too short.
 
     SLURM counts in minutes, so the end of a job that runs is brought forward. It looks at that
-    every 30 s; the others are asked for meanwhile.
+    every 30 s; the others run meanwhile.
     """
     study.start("timeout_min=60", "slurm_signal_delay_s=0", sleep=300.0, workers=1)
     study.until(lambda: list(study.jobs.glob("*.jsonl")))
     (number,) = study.slurm.running()
     study.slurm.say("scontrol", "update", f"JobId={number}", "EndTime=now+1")
-    for place, (asked, found) in enumerate(REFUSED.items()):
-        other = Study(study.slurm, study.folder / str(place))
-        other.folder.mkdir()
-        other.start(asked)
-        code, said = other.wait()
-        assert (code, len(said)) == (2, 1), said
-        assert said[0].startswith("antennate study: error: ")
-        assert found in said[0]
+    others = [Study(study.slurm, study.folder / str(place)) for place in range(len(REFUSED))]
+    with contextlib.ExitStack() as stack:
+        for other, asked in zip(others, REFUSED, strict=True):
+            other.folder.mkdir()
+            other.start(asked)
+            stack.callback(other.end)
+        for other, found in zip(others, REFUSED.values(), strict=True):
+            code, said = other.wait()
+            assert (code, len(said)) == (2, 1), said
+            assert said[0].startswith("antennate study: error: ")
+            assert found in said[0]
     assert study.wait() == (
         2,
         [
