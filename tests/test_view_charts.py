@@ -57,9 +57,10 @@ def test_every_chart_shows_the_last_ten_seconds_of_each_trial(panel: Panel) -> N
             if number in (1, 30, 2500):
                 charts.show()
                 for chart in panel.charts:
-                    assert chart.scales["x"]["range"] == (-WINDOW, 0.0), chart.title
-                    assert chart.data[0][-1] == 0.0
-                    assert chart.data[0][0] == pytest.approx(-min(WINDOW, 0.01 * number - 0.01))
+                    first, oldest, last = chart.data[0][[0, 1, -1]]
+                    assert last == 0.0, chart.title
+                    assert first == pytest.approx(-WINDOW), "the axis ends there"
+                    assert oldest == pytest.approx(-min(WINDOW, 0.01 * number - 0.01))
                 low, high = panel.charts[0].scales["y"]["range"]
                 assert low <= counts <= high == low + 100.0
 

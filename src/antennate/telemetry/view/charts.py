@@ -31,6 +31,8 @@ _COUNTERS = ("missed", "crc", "lost", "misses", "stale", "refused")
 """Counters of what went wrong; those of what went well only grow."""
 _STATE, _COUNTS = (9,), tuple(range(10, 10 + len(_COUNTERS)))
 """Columns of the supervisor's state and of these counters."""
+_UNSEEN = 1e-6
+"""How far the left end of the charts moves [s]."""
 _OUTSIDE = 0.2
 """How far the axis of a chart with words goes beyond them."""
 _NOTE = '<p style="font-size:0.8em;margin:0.4em">The last 10 s; 0 is now.</p>'
@@ -73,6 +75,7 @@ class Charts:
         self._rows = deque[tuple[float, ...]](maxlen=_KEPT)
         self._limits = (0.0, _STEP)
         self._known = set[int]()
+        self._nudge = 0.0
         pair = [(side, SERIES[i]) for i, side in enumerate(_SIDES)]
         counters = [LABELS.get(name, name) for name in _COUNTERS]
         maneuvers = [MANEUVER_NAMES[each] for each in Maneuver]
@@ -124,12 +127,26 @@ class Charts:
         for which, chart in self._charts.items():
             if chart.visible != (which[0] in self._known):
                 chart.visible = which[0] in self._known
+        columns = np.concatenate([self._begin(), columns], axis=1)
         limits = _limits(columns[1:3])
         if limits != self._limits:  # a chart finds none itself where a reading is missing
             self._limits = limits
             self._charts[1, 2].scales = _scales(limits)
         for which, chart in self._charts.items():
             chart.data = _data(columns, which)
+
+    def _begin(self) -> Floats:
+        """A column at the left end, of which lines show nothing.
+
+        So all charts have the same axis of time at any time: where limits and the ends of the data
+        change at once, the client would put the axis far off. The end moves by what nobody sees,
+        as the client numbers an axis only when it moves.
+        """
+        self._nudge = _UNSEEN - self._nudge
+        begin = np.full((_COUNTS[-1] + 1, 1), np.nan)
+        begin[_COUNTS[0] :] = 0.0  # limits of these are as the values are
+        begin[0] = -_WINDOW - self._nudge
+        return begin
 
 
 def _data(columns: Floats, which: tuple[int, ...]) -> tuple[Floats, ...]:
@@ -181,9 +198,9 @@ def _chart(server: viser.ViserServer, look: _Look, data: tuple[Floats, ...], ord
 
 
 def _scales(limits: tuple[float, float] | None) -> dict[str, uplot.Scale]:
-    """Of both axes. That of time stays: the client loses one that follows the data."""
+    """Of both axes."""
     y = uplot.Scale(auto=True) if limits is None else uplot.Scale(range=limits)
-    return {"x": uplot.Scale(time=False, range=(-_WINDOW, 0.0)), "y": y}
+    return {"x": uplot.Scale(time=False), "y": y}
 
 
 class Map:
