@@ -137,14 +137,20 @@ def test_the_sdk_registers_a_write_and_lets_both_act_at_once(
 def test_the_sdk_resets_a_servo_to_what_it_was_delivered_with(
     sdk: tuple[Any, Any, Any, Moving], option: int, left: tuple[int, int]
 ) -> None:
-    module, port, handler, server = sdk
+    _, port, handler, server = sdk
     with server.lock:
         server.bus.servos[0].set("id", 7)
         server.bus.servos[0].set("baud_rate", 3)
         server.bus.servos[0].set("return_delay_time", 9)
         del server.bus.servos[1:]
     assert port.setBaudRate(1_000_000)
-    eventually(lambda: handler.factoryReset(port, 7, option), lambda r: r[0] == module.COMM_SUCCESS)
+
+    def is_reset(_: object) -> bool:
+        with server.lock:
+            return server.bus.servos[0].get("return_delay_time") == 250
+
+    # its answer may come too late for the client; a servo that is reset answers no second time
+    eventually(lambda: handler.factoryReset(port, 7, option), is_reset)
     time.sleep(0.3)
     servo, code = left
     assert port.setBaudRate({1: FACTORY_BAUD, 3: 1_000_000}[code])
