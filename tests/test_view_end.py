@@ -50,8 +50,8 @@ def test_a_page_of_two_trials_shows_ten_seconds_of_each_and_stays_when_they_have
     ):
         tab.open(view.link)
         tab.until(SECOND)
-        tab.until(f"{SCALES}.length > 10")
-        assert json.loads(tab.run(SCALES)) == [[-10, 0, "-10,-5,0"]] * 4
+        wanted = json.dumps([[-10, 0, "-10,-5,0"]] * 4, separators=(",", ":"))
+        tab.until(f"{SCALES} === {json.dumps(wanted)}")
         assert view.process.wait(PATIENCE) == 0
         tab.until("document.body.innerText.includes('The run has ended')")
         tab.until("document.body.innerText.includes('Results: run')")
