@@ -10,6 +10,7 @@ import shutil
 import signal
 import subprocess
 import sys
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -170,3 +171,40 @@ def test_a_disk_that_takes_no_trial_does_not_promise_more_than_it_holds(
     assert f"expected to write {store}, found: No space left on device" in line
     assert ("what was finished is kept, and the run can be resumed" in line) == bool(kept)
     assert store.exists() == bool(kept)
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("springs", ["--shard", "1/2"]),
+        ("springs", ["--engine", "slurm-local"]),
+        ("springs", ["--trial-timeout", "3"]),
+        ("design", ["--shard", "1/2"]),
+    ],
+)
+def test_a_refused_command_leaves_a_finished_run_as_it_is(
+    name: str, words: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run, plan = tmp_path / "run", tmp_path / "plan.toml"
+    plan.write_text(
+        '[search]\n"antenna.length" = { low = 0.1, high = 0.2 }\n'
+        '[evaluate.wall]\nmaximize = ["success_share"]\nsettings = { profiles = ["stiff"] }\n'
+    )
+    if name == "design":
+        pytest.importorskip("optuna")
+    assert main(["springs", "--out", str(run)]) == 0
+    before = {path: path.read_bytes() for path in run.rglob("*") if path.is_file()}
+    capsys.readouterr()
+    file = [str(plan)] if name == "design" else []
+    assert main([name, *file, "--out", str(run), "--overwrite", *words]) == 2
+    assert f"{words[0]}: expected " in capsys.readouterr().err
+    assert {path: path.read_bytes() for path in run.rglob("*") if path.is_file()} == before
+
+
+def test_walls_of_which_none_is_valid_end_with_2(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["wall", "--trials", "2", "--profiles", "stiff", "--trial-timeout", "0.01"]
+    more = ["--workers", "2", "--no-figures", "--out", str(tmp_path / "run")]
+    assert main([*words, *more]) == 2
+    assert "No trial is valid" in capsys.readouterr().out

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import os
 import re
 import shlex
@@ -83,6 +84,15 @@ def test_a_function_that_workers_cannot_import_costs_no_other_study(
     assert springs.summary["statuses"] == {"ok": 2}
     there = antennate.study(module.own, {"x": [1.0, 2.0]}, trials=1, workers=2)
     assert all("workers can import, found " in row["reason"] for row in there.rows), there.rows
+
+
+def test_what_is_no_function_of_its_own_is_refused() -> None:
+    def tunnel(config: dict[str, Any], seed: int) -> dict[str, float]:
+        raise AssertionError
+
+    for other in (tunnel, functools.partial(trial), 3):
+        with pytest.raises(antennate.BadInputError, match="name that no experiment has, found"):
+            antennate.study(other, VARY, trials=1)
 
 
 @pytest.fixture(scope="module")

@@ -11,7 +11,7 @@ from pydantic.dataclasses import dataclass
 
 from antennate.cli.arguments import parse
 from antennate.cli.exit_codes import BAD_INPUT, INTERRUPTED, OK
-from antennate.cli.options import option
+from antennate.cli.options import fields_of, flag_of, option
 from antennate.cli.progress import progress, stop_signals
 from antennate.cli.results import drawn_table, folder_for, tell
 from antennate.cli.run_options import Options, go_on, workers_of
@@ -132,6 +132,7 @@ def carry_out(
             what was measured is kept and shown first.
     """
     require_viewable(options, config)
+    _require_trials(experiment, options)
     workers = workers_of(options, closed=shards is not None, apart=experiment.continued)
     logs = isinstance(options, LogOptions) and options.log
     kind = f"{experiment.name} --log" if logs else experiment.name
@@ -168,6 +169,26 @@ def carry_out(
             raise ConfigError(f"--shard: expected trials on workers, found {experiment.name}")
         say_by_hand(() if view is None else view.by_hand, run)
         return _end(experiment, config, options, run, outcome, None if shards else argv)
+
+
+def _require_trials(experiment: Experiment[Any, Any], options: Options) -> None:
+    """Refuse what is for trials on workers, before a folder is touched.
+
+    Raises:
+        ConfigError: The experiment has none, or they cannot be divided.
+    """
+    if options.shard is not None and not (experiment.on_workers and experiment.in_shards):
+        raise ConfigError(
+            "--shard: expected a run whose trials are known from the start, found "
+            f"{experiment.name}"
+        )
+    for name in ("engine", "slurm", "trial_timeout") if not experiment.on_workers else ():
+        value, field = getattr(options, name), fields_of(type(options))[name]
+        if value != field.default:
+            raise ConfigError(
+                f"{flag_of((name,))}: expected an experiment that runs trials on workers, found "
+                f"{experiment.name}"
+            )
 
 
 def _outcome(

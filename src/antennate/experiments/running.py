@@ -13,6 +13,7 @@ from antennate import experiments
 from antennate.control.registry import CONTROLLERS, ControllerFactory
 from antennate.dataframe import from_rows
 from antennate.errors import BadInputError, ConfigError
+from antennate.messages import shown
 from antennate.params.base import Params
 from antennate.params.reading import from_values
 from antennate.studies.engines import LOCAL, make_engine
@@ -246,8 +247,13 @@ def study(
     from antennate.experiments.study.subject import FUNCTIONS, plain
 
     if not isinstance(experiment, str):
-        name, function = experiment.__name__, experiment
-        FUNCTIONS.add(name, function)
+        name = getattr(experiment, "__name__", "")
+        if not name or name in experiments.names():
+            raise BadInputError(
+                "study: expected an experiment, or a function with a name that no experiment has, "
+                f"found {shown(name) if name else f'a {type(experiment).__name__}'}"
+            )
+        FUNCTIONS.add(name, experiment)
         experiment = name
     values = {"vary": plain(vary), "settings": plain(settings or {})}
     return run("study", experiment=experiment, **values, **more)

@@ -109,6 +109,8 @@ class Experiment(Generic[Config, Found]):
         continued: Whether its folder is continued without being asked, and keeps its trials.
         measures: What it tells of its trials; studies take labels and units from them.
         captions: What each figure shows, by its name, in one sentence.
+        on_workers: Whether it runs trials on workers; without them there is no engine to choose.
+        in_shards: Whether its trials are known from the start, so that shards can divide them.
     """
 
     name: str
@@ -130,6 +132,8 @@ class Experiment(Generic[Config, Found]):
     continued: bool = False
     measures: Sequence[Measure] = ()
     captions: Mapping[str, str] = field(default_factory=dict)
+    on_workers: bool = True
+    in_shards: bool = True
 
     @property
     def view(self) -> View:

@@ -139,4 +139,5 @@ EXPERIMENT = Experiment.of_folder(
     check=design.check,
     continued=True,
     captions=CAPTIONS,
+    in_shards=False,
 )

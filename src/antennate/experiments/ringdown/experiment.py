@@ -82,4 +82,5 @@ EXPERIMENT = Experiment.of_folder(
     sentence,
     filmed=True,
     captions=CAPTIONS,
+    on_workers=False,
 )

@@ -88,4 +88,5 @@ EXPERIMENT = Experiment.of_folder(
     sentence,
     parts="fits",
     captions=CAPTIONS,
+    on_workers=False,
 )

@@ -186,4 +186,5 @@ EXPERIMENT = Experiment.of_folder(
     tables,
     sentence,
     captions=CAPTIONS,
+    on_workers=False,
 )

@@ -119,4 +119,5 @@ EXPERIMENT = Experiment.of_folder(
     failed=lambda result: not result["trials_in_contact"],
     parts="files",
     captions=CAPTIONS,
+    on_workers=False,
 )

@@ -40,6 +40,8 @@ def sentence(result: Mapping[str, Any]) -> str:
 
 def _border(result: Mapping[str, Any]) -> str:
     at, below, above = (result["border"][key] for key in ("at_mm", "below_mm", "above_mm"))
+    if below is None and above is None:
+        return "No trial is valid, so nothing is known of jams."
     if below is None or above is None:
         lagged = "every trial the tip lagged" if below is None else "no trial did the tip lag"
         return f"In {lagged} more than {at:g} mm, the limit that counts as a jam."
@@ -47,6 +49,11 @@ def _border(result: Mapping[str, Any]) -> str:
         f"A trial is a jam if the base moves {at:g} mm while the tip stays. The nearest trials: "
         f"{at - below:.1f} mm below and {above - at:.1f} mm above this limit."
     )
+
+
+def _none_valid(result: Mapping[str, Any]) -> bool:
+    """Whether a profile has trials, and all of them are invalid."""
+    return any(0 < p["trials"] == p["invalid"] for p in result["profiles"].values())
 
 
 CAPTIONS = {
@@ -63,5 +70,6 @@ EXPERIMENT = Experiment.of_folder(
     measures=measures.PROFILE,
     viewed=lambda config, on_step, on_row, view, logs: wall.run(config, 1, on_step, on_row, view),
     check=require_solver,
+    failed=_none_valid,
     captions=CAPTIONS,
 )
