@@ -216,6 +216,7 @@ def cores(figures: Figures) -> str:
     rows = [(way, told(figures["seconds"][n]), faster[n]) for n, way in WAYS.items()]
     seconds = figures["seconds"]
     start = seconds["two workers"]["median"] - seconds["two started"]["median"]
+    saved = f"{start:.2g} s a command here" if start > 0 else "too short to be seen here"
     steps = [
         (way, told(found["faster"]), "yes" if found["same"] else "**no**")
         for way, found in figures["stepping"].items()
@@ -233,7 +234,7 @@ Stepping alone: twelve tunnels, filled up to one number of cylinders, tick by ti
 {table(("way", "faster than in turn", "same bits"), steps)}
 **Processes stay the way in which the program uses its cores.** A process that crashes, hangs or
 runs out of memory loses its own trials alone, and a controller of yours need not be safe for
-threads. What threads could save is the start of the processes, {start:.2g} s a command here. Within
+threads. What threads could save is the start of the processes, {saved}. Within
 a process, each control tick ends in Python, which one thread at a time runs. The engine's own
 batch does not take the tunnels as they are drawn, with different numbers of cylinders
 (`{figures["refused"]}`).

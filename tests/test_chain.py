@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import math
+import os
+import shlex
+import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -306,6 +309,32 @@ def test_a_folder_that_cannot_be_written_is_named(monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr(fast.importlib, "import_module", refuse)
     with pytest.raises(OutputError, match="NUMBA_CACHE_DIR"):
         fast.kernel()
+
+
+@pytest.mark.slow  # it compiles, 20 s
+def test_a_disk_without_room_for_what_is_compiled_and_a_damaged_file_are_named(
+    tmp_path: Path,
+) -> None:
+    kept = tmp_path / "kept"
+    words = [sys.executable, "-m", "antennate", "wall", "--solver", "chain", "--trials", "1"]
+    there = {**os.environ, "NUMBA_CACHE_DIR": str(kept), "PYTHONDONTWRITEBYTECODE": "1"}
+
+    def refused(begin: str = "") -> str:
+        script = f"{begin} exec {shlex.join([*words, '--out', str(tmp_path / 'run')])}"
+        done = subprocess.run(
+            ["bash", "-c", script], env=there, capture_output=True, text=True, check=False
+        )
+        assert done.returncode == 2
+        assert "Traceback" not in done.stderr
+        return done.stderr
+
+    assert f"keep the compiled chain in {kept}" in refused("ulimit -f 40;")
+    subprocess.run([*words, "--out", str(tmp_path / "whole")], env=there, check=True)
+    for index in kept.rglob("*.nbi"):
+        index.write_bytes(index.read_bytes()[:-40])
+    said = refused()
+    assert f"keep the compiled chain in {kept}" in said
+    assert "NUMBA_CACHE_DIR" in said
 
 
 def test_what_the_chain_does_not_read_or_draw_is_refused() -> None:

@@ -80,6 +80,17 @@ REFUSED = [
     ("drive --controller open --control.escape.turn-time 3", "2.2, as open does not read it"),
     ("drive --control.gait in_phase", f"0.0, {ROLL}"),
     ("teleop --control.gait.lift.share 0.4", f"0.5, {ROLL}"),
+    ("tunnel --robot.legs.reach 0.05", "only legs of the kind lifting have it"),
+    ("drive --robot.legs.limit 1.2", "as only legs of the kind lifting have it"),
+    (
+        "twin --robot.pitch.kind actuated --robot.pitch.stiffness 20",
+        "30.0, as only pitch joints of the kind locked have it",
+    ),
+    (
+        "tunnel --controllers open --robot.antennae.kind none --robot.antenna.length 0.2",
+        "as the robot has no antennae",
+    ),
+    ("drive --robot.antennae.kind none --robot.antennae.limit 1.0", "the robot has no antennae"),
 ]
 
 

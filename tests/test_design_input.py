@@ -76,6 +76,19 @@ def _there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
             'minimize = ["spring_index"]\n',
             "evaluate.springs.trials: expected none, as springs has no seed, found 2",
         ),
+        (
+            f"[search]\n{GOOD}\nwall.gravity = ['down']\ngravity = ['down']\n{WALL}",
+            "search.gravity: expected each parameter of wall once, found wall.gravity as "
+            "search.wall.gravity too",
+        ),
+        (
+            f"[search]\n{GOOD}\n{WALL.replace('{ ', '{ antenna.friction = 0.4, ')}",
+            "evaluate.wall.settings.antenna.friction: expected none, as search.antenna.friction",
+        ),
+        (
+            f"[search]\n{GOOD}\n{WALL.replace('{ ', '{ trials = 4, ')}trials = 3\n",
+            "evaluate.wall.settings.trials: expected none beside evaluate.wall.trials",
+        ),
     ],
 )
 def test_bad_searches_are_one_line(

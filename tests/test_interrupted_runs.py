@@ -201,10 +201,26 @@ def test_a_refused_command_leaves_a_finished_run_as_it_is(
     assert {path: path.read_bytes() for path in run.rglob("*") if path.is_file()} == before
 
 
+@pytest.mark.parametrize("workers", ["1", "2"])
 def test_walls_of_which_none_is_valid_end_with_2(
+    workers: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """One worker gives a trial up too, in a process of its own."""
+    words = ["wall", "--trials", "2", "--profiles", "stiff", "--trial-timeout", "0.01"]
+    more = ["--workers", workers, "--no-figures", "--out", str(tmp_path / "run")]
+    assert main([*words, *more]) == 2
+    assert "no result within 0.01 s" in (tmp_path / "run" / "trials.csv").read_text()
+    assert "No trial is valid" in capsys.readouterr().out
+
+
+def test_a_shard_of_a_finished_study_leaves_it_as_it_is(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    words = ["wall", "--trials", "2", "--profiles", "stiff", "--trial-timeout", "0.01"]
-    more = ["--workers", "2", "--no-figures", "--out", str(tmp_path / "run")]
-    assert main([*words, *more]) == 2
-    assert "No trial is valid" in capsys.readouterr().out
+    plan, run = tmp_path / "plan.toml", tmp_path / "run"
+    plan.write_text('experiment = "springs"\nplan = "grid"\n[vary]\ncoil_mm = [3.0, 4.0]\n')
+    assert main(["study", str(plan), "--out", str(run), "--workers", "1"]) == 0
+    before = {path: path.read_bytes() for path in run.rglob("*") if path.is_file()}
+    capsys.readouterr()
+    assert main(["study", str(plan), "--out", str(run), "--shard", "1/2"]) == 2
+    assert "--shard: expected a folder without a finished run" in capsys.readouterr().err
+    assert {path: path.read_bytes() for path in run.rglob("*") if path.is_file()} == before

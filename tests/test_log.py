@@ -23,7 +23,7 @@ from mcap.exceptions import McapError
 from mcap.reader import NonSeekingReader, make_reader
 from mcap.records import Chunk
 from mcap.stream_reader import StreamReader
-from mcap.writer import Writer
+from mcap.writer import CompressionType, Writer
 
 import antennate
 from antennate.errors import AntennateError, LogError
@@ -367,14 +367,21 @@ def test_the_readers_of_mcap_read_all_of_it(tmp_path: Path) -> None:
     assert all(crcs)
 
 
-@pytest.mark.parametrize("size", [500, 20_000, 1 << 30])
+@pytest.mark.parametrize(
+    ("size", "packed"),
+    [
+        *((size, CompressionType.ZSTD) for size in (500, 20_000, 1 << 30)),
+        (20_000, CompressionType.LZ4),
+        (20_000, CompressionType.NONE),
+    ],
+)
 def test_a_log_that_another_program_has_written_anew_is_read_whole(
-    tmp_path: Path, size: int
+    tmp_path: Path, size: int, packed: CompressionType
 ) -> None:
     """Header and ticks share chunks, or channels and their schemas stand in several."""
     written(tmp_path / "log", 30)
     with (tmp_path / "log").open("rb") as file, (tmp_path / "new").open("wb") as copy:
-        writer, schemas, channels = Writer(copy, chunk_size=size), {}, {}
+        writer, schemas, channels = Writer(copy, chunk_size=size, compression=packed), {}, {}
         writer.start()
         for schema, channel, message in make_reader(file).iter_messages(log_time_order=False):
             assert schema is not None

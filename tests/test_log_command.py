@@ -19,6 +19,7 @@ import numpy as np
 import pytest
 from log_ticks import HEADER, chunks, tick, unclosed
 from mcap.reader import make_reader
+from mcap.writer import Writer
 from worlds import recorded, session
 
 from antennate import simulate
@@ -283,6 +284,36 @@ def test_export_to_parquet(log: Path, capsys: pytest.CaptureFixture[str]) -> Non
         assert table["phase"].tolist() == pytest.approx(
             [t.phase for t in reader], abs=0, nan_ok=True
         )
+
+
+@pytest.mark.parametrize("order", ["by topic", "backwards"])
+def test_a_closed_log_in_another_order_is_not_called_sound(
+    order: str, log: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Other programs may sort the messages of a valid MCAP file."""
+    with log.open("rb") as file, Path("new.mcap").open("wb") as copy:
+        found = [*make_reader(file).iter_messages(log_time_order=False)]
+        head = [each for each in found if each[1].topic in ("/config", "/versions")]
+        rest = [each for each in found if each not in head]
+        rest = sorted(rest, key=lambda each: each[1].topic) if order == "by topic" else rest[::-1]
+        writer, known = Writer(copy, chunk_size=2000), dict[str, int]()
+        writer.start()
+        for schema, channel, message in [*head, *rest]:
+            assert schema is not None
+            if channel.topic not in known:
+                number = writer.register_schema(schema.name, schema.encoding, schema.data)
+                known[channel.topic] = writer.register_channel(channel.topic, "cdr", number)
+            about = (message.log_time, message.data, message.publish_time, message.sequence)
+            writer.add_message(known[channel.topic], *about)
+        writer.finish()
+    code, told = info(Path("new.mcap"), capsys)
+    assert code == 2
+    assert told["damaged"] + told["missing"] > 0
+    assert told["duration_s"] >= 0
+    assert main(["log", "plot", "new.mcap", "--out", "new.png"]) == 2
+    err = capsys.readouterr().err
+    assert err.count("\n") == 1
+    assert ("expected a log with ticks, found none: tick without /" in err) == (order == "by topic")
 
 
 def test_plot_draws_it(log: Path) -> None:

@@ -149,6 +149,10 @@ def test_an_own_class_of_a_module_runs_in_workers() -> None:
         ({"experiment": "tunnel", "controllers": ("opne",)}, "opne"),
         ({"experiment": SpringParams(), "wire_mm": 0.4}, "settings only beside a name"),
         ({"experiment": antennate.run}, "expected a name or the configuration"),
+        *(
+            ({"experiment": "wall", "workers": workers}, "workers: expected a whole number")
+            for workers in (0, -1, 1.5, None, True)
+        ),
     ],
 )
 def test_a_wrong_word_is_one_line(wrong: dict[str, object], why: str) -> None:

@@ -69,6 +69,55 @@ def test_one_that_cannot_be_loaded_is_named_and_does_not_hide_the_others(
     assert "tunnel" in out
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        ('[Table.of("Dice", {"throws": result}, MEASURES)]', "1 / 0", "ZeroDivisionError"),
+        ('[Table.of("Dice", {"throws": result}, MEASURES)]', '["dice"]', "found list and str"),
+        ("f\"Dice show {result['eyes']:.1f} eyes.\"", "6", "found list and int"),
+    ],
+)
+def test_tables_and_a_sentence_of_another_form_are_one_line(
+    old: str, new: str, told: str, dice: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The rows are kept."""
+    assert old in DICE
+    (dice / "site" / "dice_study.py").write_text(DICE.replace(old, new))
+    assert main(["dice", "--trials", "2", "--out", "run"]) == 2
+    err = capsys.readouterr().err
+    assert "dice: expected tables to return a list of Table and sentence a text" in err
+    assert told in err
+    assert "Traceback" not in err
+    assert len(RunDirectory.open(dice / "run").rows()) == 2
+
+
+def test_numbers_of_numpy_are_kept_and_other_objects_refused(
+    dice: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = DICE.replace("int(rng.integers(1, 7))", "rng.integers(1, 7)")
+    (dice / "site" / "dice_study.py").write_text(text.replace('"schema": 1', '"a": np.eye(1)'))
+    assert main(["dice", "--trials", "2", "--out", "run"]) == 0
+    run = RunDirectory.open(dice / "run")
+    assert {row["eyes"] for row in run.rows()} <= set(range(1, 7))
+    assert run.result()["a"] == [[1.0]]
+    sys.modules.pop("dice_study")
+    (dice / "site" / "dice_study.py").write_text(DICE.replace("int(rng.integers(1, 7))", "{i}"))
+    assert main(["dice", "--trials", "2", "--out", "other"]) == 2
+    err = capsys.readouterr().err
+    assert "in a result or row, found set" in err
+    assert "Traceback" not in err
+
+
+def test_a_module_that_ends_the_program_hides_no_other(
+    dice: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (dice / "site" / "dice_study.py").write_text("raise SystemExit('needs a licence')\n")
+    assert main(["--help"]) == 0
+    out = capsys.readouterr().out
+    assert "needs a licence" in out
+    assert "tunnel" in out
+
+
 def test_each_of_ours_has_one_object_of_its_own_name() -> None:
     for name in experiments.names():
         experiment = experiments.load(name)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 
 import mujoco
@@ -20,6 +21,7 @@ from antennate.sim.scenes.registry import make_scene
 from antennate.sim.scenes.scene import FlatScene, Route
 from antennate.sim.scenes.tunnel import TunnelScene
 from antennate.sim.trial import TrialConfig, check_start, make_world, place_at_start
+from antennate.studies.run_directory import RunDirectory
 from antennate.testing import check_scene
 
 EXAMPLE = Path(__file__).parent.parent / "examples" / "own_scene.py"
@@ -278,6 +280,7 @@ BAD = {
     "no exit": ('<site name="start"/>', "", "'exit'.*found start"),
     "no start": ('<site name="exit"/>', "", "'start'"),
     "no sites": (WALL, "", "'start'.*no site"),
+    "a gap": (SITES + '<site name="via1" pos="1 1 0"/>', "", "named 'via0' before 'via1'"),
     "same place": ('<site name="start"/><site name="exit"/>', "", "1 mm apart"),
     "option": (SITES, '<option timestep="0.01"/>', "no <option>.*timestep"),
     "flag": (SITES, '<option><flag gravity="disable"/></option>', "no <flag>"),
@@ -381,6 +384,31 @@ def test_an_error_in_ones_own_scene_names_it(tmp_path):
     )
     with pytest.raises(AntennateError, match=r"mine\.py:Mine.*ZeroDivisionError"):
         check_start(TrialConfig(scene=f"{tmp_path / 'mine.py'}:Mine"))
+
+
+@pytest.mark.parametrize(
+    ("answer", "told"),
+    [
+        ("progress(self, head): return 1 / 0", r"progress raised ZeroDivisionError.*mine\.py:\d+"),
+        ("progress(self, head): return 'far'", "progress to return a finite number"),
+        ("progress(self, head): return float('nan')", "progress to return a finite number"),
+        ("succeeded(self, head): return head > 1", "succeeded to return True or False"),
+        ("left(self, head): return None", "left to return True or False, found None"),
+    ],
+)
+def test_a_scene_that_answers_wrongly_makes_invalid_rows(tmp_path, answer, told):
+    (tmp_path / "mine.py").write_text(
+        "from antennate.sim.scenes.scene import Route\n"
+        "class Mine:\n    random = False\n"
+        "    def draw(self, robot, rng): return Line([[0.0, 0.0], [1.0, 0.0]])\n"
+        f"class Line(Route):\n    def {answer}\n"
+    )
+    words = ["tunnel", "--scene", f"{tmp_path / 'mine.py'}:Mine", "--trials", "2"]
+    more = ["--controllers", "open", "--time-limit", "0.3", "--no-figures", "--workers", "1"]
+    assert main([*words, *more, "--out", str(tmp_path / "run")]) == 2
+    rows = RunDirectory.open(tmp_path / "run").rows()
+    assert [row["outcome"] for row in rows] == ["invalid"] * 2
+    assert all(re.search(told, row["reason"]) for row in rows)
 
 
 def test_a_scene_that_draws_nothing_is_told_with_what_is_missing(tmp_path, capsys):

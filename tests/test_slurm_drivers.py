@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import sys
@@ -71,6 +72,32 @@ def test_jobs_of_a_driver_that_was_killed_are_taken_over(tmp_path: Path) -> None
     assert driver(notes, 2).wait() == 0
     assert sorted(notes.read_text().split()[1::2]) == list("012345")
     assert not list(Path("run/slurm").glob("*.job"))
+
+
+def test_jobs_of_a_driver_in_the_background_end_with_it(tmp_path: Path) -> None:
+    """A shell lets what it starts with `&` ignore Ctrl-C, by which submitit ends jobs."""
+    pytest.importorskip("submitit")
+    notes = tmp_path / "notes.txt"
+    Path("run").mkdir()
+    Path("driver.py").write_text(
+        "import signal\nsignal.signal(signal.SIGTERM, signal.default_int_handler)\n"
+        + DRIVER.replace('"sleep": 0.5', '"sleep": 20.0')
+    )
+    script = f"trap '' INT; exec {sys.executable} driver.py"
+    there = {**os.environ, "STUDY_NOTES": str(notes)}
+    background = subprocess.Popen(["bash", "-c", script], env=there)
+    end = time.monotonic() + 120.0
+    while not notes.exists():
+        assert time.monotonic() < end
+        time.sleep(0.05)
+    (note,) = Path("run/slurm").glob("*.job")
+    job = int(json.loads(note.read_text())["job"])
+    background.terminate()
+    assert background.wait(60.0) != 0
+    end = time.monotonic() + 15.0
+    while Path(f"/proc/{job}").exists():
+        assert time.monotonic() < end, "its trials take two minutes"
+        time.sleep(0.05)
 
 
 def test_a_job_whose_driver_was_killed_before_it_noted_it_does_nothing(

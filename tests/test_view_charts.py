@@ -58,9 +58,11 @@ def test_every_chart_shows_the_last_ten_seconds_of_each_trial(panel: Panel) -> N
                 charts.show()
                 for chart in panel.charts:
                     first, oldest, last = chart.data[0][[0, 1, -1]]
-                    assert last == 0.0, chart.title
-                    assert first == pytest.approx(-WINDOW), "the axis ends there"
-                    assert oldest == pytest.approx(-min(WINDOW, 0.01 * number - 0.01))
+                    assert last == 1.0, chart.title
+                    assert first == pytest.approx(0.0, abs=1e-6), "the axis ends there"
+                    assert oldest == pytest.approx(1 - min(1, (0.01 * number - 0.01) / WINDOW))
+                    assert chart.axes[0]["splits"] == (0.0, 0.5, 1.0)
+                    assert chart.axes[0]["values"] == ("-10", "-5", "0")
                 low, high = panel.charts[0].scales["y"]["range"]
                 assert low <= counts <= high == low + 100.0
 

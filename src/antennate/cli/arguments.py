@@ -97,6 +97,10 @@ def parse(
         base = config.model_dump(exclude_unset=True)
         _refuse_code(chosen.config, base, values)
     given = {p: v for p, v in values.items() if p[0] not in names}
+    for path, value in given.items():
+        text = " ".join(map(str, value)) if isinstance(value, list | tuple) else str(value)
+        if text != text.encode(errors="replace").decode():
+            raise ConfigError(f"{flag_of(path)}: expected text in UTF-8, found {shown(text)}")
     config = _filled(model, base, given)
     _refuse_unread(config, given)
     return config, chosen

@@ -16,17 +16,25 @@ from antennate.cli.progress import progress, stop_signals
 from antennate.cli.results import drawn_table, folder_for, tell
 from antennate.cli.run_options import Options, go_on, workers_of
 from antennate.cli.view_options import ViewOptions, require_viewable, say_by_hand, view_of
-from antennate.errors import BadInputError, ConfigError, LogError, OutputError, WorkerError
+from antennate.errors import (
+    BadInputError,
+    ConfigError,
+    LogError,
+    OutputError,
+    WorkerError,
+    in_one_line,
+    where,
+)
 from antennate.experiments.running import keep, require_films, write_films
 from antennate.params.base import Params
 from antennate.studies.engines import WARP
 from antennate.studies.experiment import Experiment, Outcome
 from antennate.studies.formats import to_json
 from antennate.studies.identity import differences, environment, identity
-from antennate.studies.measures import Interim
+from antennate.studies.measures import Interim, Table
 from antennate.studies.pool import ShardEnd, Workers
 from antennate.studies.run_directory import RunDirectory
-from antennate.studies.run_files import LOGS, SHARD
+from antennate.studies.run_files import LOGS, RESULT, SHARD
 from antennate.telemetry.view.simulation import SimulationView
 
 
@@ -139,7 +147,8 @@ def carry_out(
     kind += " --engine warp" if options.engine.partition(":")[0] == WARP else ""
     what = identity(kind, config)
     if shards and (changes := differences(shards.identity, what)):
-        raise BadInputError(f"expected shards of this version and code, found {changes}")
+        hint = "; merge in the folder where the shards were run" if " is gone" in changes else ""
+        raise BadInputError(f"expected shards of this version and code, found {changes}{hint}")
     resume = options.resume or options.retry or experiment.continued
     name = "merge" if shards else experiment.name
     with (
@@ -181,6 +190,11 @@ def _require_trials(experiment: Experiment[Any, Any], options: Options) -> None:
         raise ConfigError(
             "--shard: expected a run whose trials are known from the start, found "
             f"{experiment.name}"
+        )
+    finished = options.out is not None and (options.out / RESULT).exists()
+    if options.shard is not None and finished and not options.overwrite:
+        raise ConfigError(
+            f"--shard: expected a folder without a finished run, found {RESULT} in {options.out}"
         )
     for name in ("engine", "slurm", "trial_timeout") if not experiment.on_workers else ():
         value, field = getattr(options, name), fields_of(type(options))[name]
@@ -238,7 +252,7 @@ def _end(
         sys.stderr.write(f"to go on: {again}\n" if again else "")
         raise KeyboardInterrupt
     failure = _keep(experiment, outcome, options, run)
-    tell(result, options, experiment.tables(result), experiment.sentence(result))
+    tell(result, options, *_words(experiment, result))
     if failure is not None:
         raise failure
     if interrupted:
@@ -249,6 +263,25 @@ def _end(
     elif _film(experiment, config, options, run):
         return BAD_INPUT if experiment.failed(result) else OK
     return INTERRUPTED
+
+
+def _words(experiment: Experiment[Any, Any], result: Any) -> tuple[Sequence[Table], str]:
+    """Tables and sentence of a result, checked, as an experiment may be anybody's code.
+
+    Raises:
+        BadInputError: It has others.
+    """
+    try:
+        tables, sentence = experiment.tables(result), experiment.sentence(result)
+        if isinstance(sentence, str) and all(isinstance(table, Table) for table in tables):
+            return tables, sentence
+        found = f"{type(tables).__name__} and {type(sentence).__name__}"
+    except Exception as error:  # noqa: BLE001
+        found = f"{in_one_line(error)}{where(error)}"
+    raise BadInputError(
+        f"{experiment.name}: expected tables to return a list of Table and sentence a text, "
+        f"found {found}; what was measured is kept"
+    )
 
 
 def _film(

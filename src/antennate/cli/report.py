@@ -78,6 +78,10 @@ def _compared(paths: Sequence[Path]) -> str:
             f"--compare: expected two runs of one command, found {names[0]} in {first.path} and "
             f"{names[1]} in {second.path}"
         )
+    for run in (first, second):  # so that the one that cannot be shown is named
+        _made(
+            run, lambda view, run=run: str([view.tables(run.result()), view.sentence(run.result())])
+        )
     return _made(first, lambda view: compare([first, second], view))
 
 

@@ -40,15 +40,10 @@ def workers_of(options: Options, closed: bool, apart: bool) -> Workers:
     """The workers that are asked for; see `Workers`. They are given the store later.
 
     Raises:
-        ConfigError: The engine or the shard is nothing of the kind, or a view shows the trials.
+        ConfigError: The engine or the shard is nothing of the kind.
         MissingPackageError: The package of the engine is not installed.
     """
     shard, engine = _shard(options.shard), make_engine(options.engine, options.slurm)
-    for name in ("shard", "resume", "retry") if getattr(options, "view", False) else ():
-        if getattr(options, name):
-            raise ConfigError(f"--{name}: expected no --view beside it, found one")
-    if engine is not None and getattr(options, "view", False):
-        raise ConfigError(f"--engine: expected {LOCAL} beside --view, found {options.engine}")
     how: dict[str, Any] = {"timeout": options.trial_timeout, "retry": options.retry}
     count = options.workers or core_count()
     return Workers(count, engine, shard=shard, closed=closed, apart=apart, **how)

@@ -11,7 +11,7 @@ import importlib
 import pkgutil
 from typing import TYPE_CHECKING, Any
 
-from antennate.errors import BadInputError
+from antennate.errors import BadInputError, in_one_line
 from antennate.messages import shortened
 
 if TYPE_CHECKING:
@@ -61,10 +61,9 @@ def load(name: str) -> Experiment[Any, Any]:
         raise BadInputError(unknown(name))
     try:
         return entries[name].load()
-    except Exception as error:
+    except (Exception, SystemExit) as error:  # a module may end the program when it is imported
         raise BadInputError(
-            f"{name}: expected an experiment at {entries[name].value}, found: "
-            f"{type(error).__name__}: {error}"
+            f"{name}: expected an experiment at {entries[name].value}, found: {in_one_line(error)}"
         ) from error
 
 

@@ -6,6 +6,7 @@ import re
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from numbers import Integral
 from pathlib import Path
 from typing import Any
 
@@ -128,6 +129,8 @@ def run(
         OutputError: The directory cannot be written, or holds another run.
         AntennateError: The run failed.
     """
+    if not isinstance(workers, Integral) or isinstance(workers, bool) or workers < 1:
+        raise ConfigError(f"workers: expected a whole number of at least 1, found {workers!r}")
     found, config = _configured(name_or_config, settings, workers)
     found.check(config)
     if video is not None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from antennate.params.base import paths_of
 from antennate.robots.antenna import AntennaSpec
+from antennate.robots.joints import BaseParams
 from antennate.robots.servos import ServosParams
 from antennate.robots.spec import RobotSpec
 
@@ -39,9 +40,19 @@ SIMULATION_ALONE = (
 """Parameters that only the simulation, or the twin, reads; the robot's hardware does not."""
 
 
-def unused_servos(robot: RobotSpec) -> dict[str, str]:
-    """Parameters of the servo models that a robot has none of, as `robot.servos...`, and why."""
+def unused(robot: RobotSpec) -> dict[str, str]:
+    """Parameters of what a robot does not have, as `robot.servos...`, and why."""
     used = {f"robot.servos.{name}" for name in robot.servo_names}
     every = paths_of(ServosParams, "robot.servos")
-    paths = (path for path in every if path.rpartition(".")[0] not in used)
-    return dict.fromkeys(paths, "no joint of the robot has this servo")
+    servos = (path for path in every if path.rpartition(".")[0] not in used)
+    found = dict.fromkeys(servos, "no joint of the robot has this servo")
+    if robot.legs.kind == "rolling":
+        lifting = ("robot.legs.limit", "robot.legs.reach")
+        found |= dict.fromkeys(lifting, "only legs of the kind lifting have it")
+    if robot.pitch.kind == "actuated":
+        found["robot.pitch.stiffness"] = "only pitch joints of the kind locked have it"
+    if not robot.antenna_count:
+        bases = (f"robot.antennae.{name}" for name in BaseParams.model_fields if name != "kind")
+        paths = (*bases, *paths_of(AntennaSpec, "robot.antenna"))
+        found |= dict.fromkeys(paths, "the robot has no antennae")
+    return found

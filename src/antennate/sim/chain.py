@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from antennate.antenna.dynamics import link_inertia
-from antennate.errors import MissingPackageError, OutputError, SimulationError
+from antennate.errors import MissingPackageError, OutputError, SimulationError, in_one_line
 from antennate.messages import extra
 from antennate.params.bench import Solver
 from antennate.params.scene import PhysicsParams
@@ -96,11 +96,18 @@ def warm_up(solver: Solver) -> None:
 
     Raises:
         MissingPackageError: numba is not installed.
-        OutputError: What numba compiles cannot be kept.
+        OutputError: What numba compiles cannot be kept, or what it kept cannot be read.
     """
-    if solver == "chain":
-        bench = ChainBench(PhysicsParams(), AntennaSpec(), [Ball(1.0, 0.0, 0.1)])
+    if solver != "chain":
+        return
+    bench = ChainBench(PhysicsParams(), AntennaSpec(), [Ball(1.0, 0.0, 0.1)])
+    try:
         bench.drive(bench.commands(np.zeros((1, 2)), np.zeros(2), 0.0), 1)
+    except Exception as error:  # numba reads what it kept without care
+        raise OutputError(
+            f"solver: expected to keep the compiled chain in {kernel().drive.stats.cache_path}, "
+            f"found {in_one_line(error)}; empty it, or name another in the variable NUMBA_CACHE_DIR"
+        ) from error
 
 
 @dataclass(frozen=True, slots=True)

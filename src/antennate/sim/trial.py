@@ -3,24 +3,28 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
+from numbers import Real
+from typing import Any, Literal
 
 import numpy as np
 from pydantic import field_validator, model_validator
 
 from antennate.control.gait import targets
-from antennate.errors import AntennateError, SceneError, in_one_line
+from antennate.errors import AntennateError, SceneError, in_one_line, where
+from antennate.messages import shortened
 from antennate.params.base import Params, number
 from antennate.params.control import GaitParams
 from antennate.params.scene import PhysicsParams, TunnelParams, VariationParams
-from antennate.robots.readers import unused_servos
+from antennate.robots.readers import unused
 from antennate.robots.spec import RobotSpec
 from antennate.sim.scenes.registry import TUNNEL, check_name, make_scene
 from antennate.sim.scenes.scene import Scene, SceneInstance
 from antennate.sim.sim_robot import Disturbance
 from antennate.sim.world import World, compile_world
+from antennate.types import Floats
 
 MOST_OVERLAP = 0.005
 """Deepest that the robot may be in an obstacle at the start [m]: legs stand on edges."""
@@ -46,8 +50,8 @@ class TrialConfig(Params):
         return check_name(name)
 
     def unread_here(self) -> Mapping[str, str]:
-        """The servos that this robot does not have."""
-        return unused_servos(self.robot)
+        """What this robot does not have."""
+        return unused(self.robot)
 
     @model_validator(mode="after")
     def _scene_and_robot_agree(self) -> TrialConfig:
@@ -155,6 +159,48 @@ def _errors_of(name: str) -> Iterator[None]:
         raise
     except Exception as error:
         raise SceneError(f"scene {name!r} failed: {in_one_line(error)}") from error
+
+
+def progress_of(scene: SceneInstance, head: Floats) -> float:
+    """What a scene says of how far a head at this position, shape (2,), has come [m].
+
+    Raises:
+        SceneError: It raises an exception, or does not say a finite number.
+    """
+    return _answer(scene, "progress", head, "a finite number [m]", _is_finite)
+
+
+def end_of(scene: SceneInstance, head: Floats) -> Literal["success", "left"] | None:
+    """Whether a trial has ended by what a scene says of a head at this position, shape (2,).
+
+    Raises:
+        SceneError: It raises an exception, or does not say True or False.
+    """
+    if _answer(scene, "succeeded", head, "True or False", _is_bool):
+        return "success"
+    return "left" if _answer(scene, "left", head, "True or False", _is_bool) else None
+
+
+def _answer(
+    scene: SceneInstance, name: str, head: Floats, wanted: str, fits: Callable[[Any], bool]
+) -> Any:
+    try:
+        found = getattr(scene, name)(head.copy())
+    except Exception as error:
+        raise SceneError(f"scene: {name} raised {in_one_line(error)}{where(error)}") from error
+    if not fits(found):
+        raise SceneError(
+            f"scene: expected {name} to return {wanted}, found {shortened(repr(found))}"
+        )
+    return found
+
+
+def _is_finite(value: Any) -> bool:
+    return isinstance(value, Real) and math.isfinite(value)
+
+
+def _is_bool(value: Any) -> bool:
+    return isinstance(value, bool | np.bool_)
 
 
 def require_room(world: World) -> None:

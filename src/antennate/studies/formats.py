@@ -10,8 +10,10 @@ import re
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
+import numpy as np
 from pydantic import BaseModel
 
+from antennate.errors import BadInputError
 from antennate.params.base import Params, meaning
 
 _CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f]+")
@@ -19,17 +21,39 @@ _FORMULA = ("=", "+", "-", "@")
 
 
 def strict(value: Any) -> Any:
-    """The value with every NaN and infinity as None, fit for strict JSON."""
+    """The value with every NaN and infinity as None, and arrays as lists, fit for strict JSON."""
     if isinstance(value, Mapping):
         return {key: strict(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
         return [strict(item) for item in value]
+    if isinstance(value, np.ndarray | np.generic):
+        return strict(value.tolist())
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def to_json(value: Any) -> str:
-    """Strict JSON, indented, as result.json holds it."""
-    return json.dumps(strict(value), indent=2, allow_nan=False) + "\n"
+    """Strict JSON, indented, as result.json holds it.
+
+    Raises:
+        BadInputError: It holds an object of another kind.
+    """
+    return json.dumps(strict(value), indent=2, allow_nan=False, default=_refuse) + "\n"
+
+
+def to_line(row: Mapping[str, Any]) -> str:
+    """A row as strict JSON on one line.
+
+    Raises:
+        BadInputError: It holds an object of another kind.
+    """
+    return json.dumps(strict(row), allow_nan=False, default=_refuse) + "\n"
+
+
+def _refuse(value: Any) -> Any:
+    raise BadInputError(
+        "expected numbers, texts, lists and dictionaries in a result or row, found "
+        f"{type(value).__name__}"
+    )
 
 
 def to_csv(rows: Iterable[Mapping[str, Any]]) -> str:

@@ -54,7 +54,8 @@ class Workers(int):
         engine: Where they are; processes of this machine if not given.
         store: Where finished tasks are kept, None to keep none.
         shard: (i, n): carry out the i-th of n parts of the tasks, from 1, and raise ShardEnd.
-        timeout: Time after which a task that has not ended is given up [s].
+        timeout: Time after which a task that has not ended is given up [s]; where it is not the
+            usual one, even one worker is a process of its own.
         retry: Whether tasks that failed before are run again.
         closed: Whether all tasks must have been finished before.
         apart: Whether even one worker is a process of its own, which may crash or be killed.
@@ -104,7 +105,7 @@ class Workers(int):
         """Where so many parts are carried out."""
         if self._engine is not None:
             return self._engine
-        if not self.apart and (self == 1 or parts <= 1):
+        if not self.apart and self.timeout == TIMEOUT and (self == 1 or parts <= 1):
             return Here()
         return self._staying or Processes()
 

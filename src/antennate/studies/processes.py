@@ -187,7 +187,7 @@ class _Worker:
         self.connection, theirs = context.Pipe()
         # a parent that ends ends those that are daemons; others it would wait for
         self.process = context.Process(target=_serve, args=(theirs, added), daemon=True)
-        with _without_ctrl_c():
+        with on_ctrl_c(signal.SIG_IGN):  # they inherit it, so that none dies half begun
             self.process.start()
         theirs.close()
         self.ready = False
@@ -257,12 +257,12 @@ def sendable(each: Any) -> Any:
 
 
 @contextlib.contextmanager
-def _without_ctrl_c() -> Iterator[None]:
-    """Start workers that ignore Ctrl-C, which they inherit, so that none dies half begun."""
+def on_ctrl_c(handler: Any) -> Iterator[None]:
+    """Handle Ctrl-C in this way for a while; programs that begin then inherit if it is ignored."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    before = signal.signal(signal.SIGINT, handler)
     try:
         yield
     finally:

@@ -29,7 +29,7 @@ from antennate.files import decoded, read_limited, writing_whole
 from antennate.params.base import Params
 from antennate.params.reading import Config, read_file
 from antennate.studies import dates
-from antennate.studies.formats import from_csv, strict, to_csv, to_json, to_toml
+from antennate.studies.formats import from_csv, to_csv, to_json, to_line, to_toml
 from antennate.studies.run_files import (
     CALIBRATION,
     COMMAND,
@@ -216,7 +216,7 @@ class RunDirectory:
         if self._partial is None:
             raise OutputError(f"{self.path}: expected a run that goes on, found a finished one")
         with _writing(self.path / PARTIAL):
-            self._partial.write(json.dumps(strict(_plain(row))) + "\n")
+            self._partial.write(to_line(_plain(row)))
             self._partial.flush()
         self._kept = True
 

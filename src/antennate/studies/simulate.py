@@ -16,7 +16,7 @@ from antennate.params.control import ControlParams
 from antennate.params.reading import from_values
 from antennate.sim.scenes.registry import make_scene
 from antennate.sim.sim_robot import SimRobot
-from antennate.sim.trial import Trial, TrialConfig, draw_trial
+from antennate.sim.trial import Trial, TrialConfig, draw_trial, end_of
 from antennate.telemetry.header import Header
 from antennate.telemetry.simulated import Decisions, SimulatedLog
 from antennate.telemetry.time_series import TimeSeries, TimeSeriesRecorder
@@ -114,7 +114,4 @@ def _name(factory: ControllerFactory) -> str:
 
 def _seen(trial: Trial) -> str:
     """How the trial has ended by what the scene says of the head; `timeout` if it goes on."""
-    head = trial.world.head[:2]
-    if trial.scene.succeeded(head):
-        return "success"
-    return "left" if trial.scene.left(head) else "timeout"
+    return end_of(trial.scene, trial.world.head[:2]) or "timeout"

@@ -9,6 +9,7 @@ import json
 import logging
 import pickle
 import platform
+import signal
 import time
 import warnings
 from collections.abc import Mapping, Sequence
@@ -21,7 +22,7 @@ from antennate.files import write_whole
 from antennate.messages import shortened
 from antennate.studies.codec import decoded, dumped, encoded
 from antennate.studies.identity import environment
-from antennate.studies.processes import added_objects
+from antennate.studies.processes import added_objects, on_ctrl_c
 from antennate.studies.slurm_job import Resumable, note_of, show_new
 from antennate.studies.slurm_queue import Queue, QueuedJob, cancel, earlier_jobs
 from antennate.studies.store import parsed, read_store
@@ -151,7 +152,9 @@ class Slurm:
             WorkerError: SLURM does not take it, or begins it more than once.
         """
         try:
-            with contextlib.redirect_stderr(io.StringIO()):  # submitit prints what it raises
+            # submitit prints what it raises, and ends jobs of this machine by Ctrl-C, which they
+            # would ignore if they came from a driver that a shell has started with `&`
+            with contextlib.redirect_stderr(io.StringIO()), on_ctrl_c(signal.default_int_handler):
                 job = executor.submit(call)
         except (RuntimeError, OSError) as error:
             text = "; ".join(str(error).replace("sbatch: error: ", "").splitlines())

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import pickle
+import platform
 import signal
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -191,7 +192,10 @@ def require_same(theirs: Mapping[str, Any], folder: Path) -> None:
     """
     theirs = {key: value for key, value in theirs.items() if key != _FOLDER}
     if changes := differences(theirs, environment_here(theirs, folder)):
-        raise WorkerError(f"expected workers with the driver's versions and code, found {changes}")
+        raise WorkerError(
+            f"expected workers with the driver's versions and code, found {changes} "
+            f"(worker {os.getpid()} of {platform.node()})"
+        )
 
 
 def require_package(package: str, name: str) -> None:

@@ -118,6 +118,8 @@ def _record(file: BinaryIO, at: int, size: int) -> tuple[Chunk | Fault | None, i
         return Fault(at, "cut record"), None
     kind, length = _RECORD.unpack(head)
     end = at + _RECORD.size + length
+    if kind in (_SCHEMA, _CHANNEL, _MESSAGE) and end <= size:
+        return Fault(at, "record outside of a chunk, so without a CRC"), end
     if kind not in (_HEADER, _CHUNK, _INDEX, _DATA_END) or length > _LONGEST:
         return Fault(at, "damaged record"), None
     if end > size:
@@ -178,22 +180,41 @@ def _chunk(at: int, content: bytes) -> Chunk | None:
 
 
 def _unpacked(content: bytes) -> bytes | None:
-    """The records of a chunk, None if it is damaged."""
+    """The records of a chunk, None if it is damaged; other programs compress in other ways."""
+    try:
+        _, _, wanted, crc, word = _PREFIX.unpack_from(content)
+        begin = _PREFIX.size + word
+        (length,) = struct.unpack_from("<Q", content, begin)
+    except struct.error:
+        return None
+    packed = content[begin + 8 :]
+    unpack = _UNPACKED.get(content[_PREFIX.size : begin])
+    if unpack is None or length != len(packed) or wanted > _LARGEST:
+        return None
+    data = unpack(packed, wanted + 1)
+    return data if len(data) == wanted and zlib.crc32(data) == crc else None
+
+
+def _of_zstd(packed: bytes, most: int) -> bytes:
     from zstandard import ZstdDecompressor, ZstdError  # slow to import
 
-    begin = _PREFIX.size + len(_ZSTD)
     try:
-        _, _, wanted, crc, _ = _PREFIX.unpack_from(content)
-        (length,) = struct.unpack_from("<Q", content, begin)
-        packed = content[begin + 8 :]
-        if content[begin - len(_MARK) : begin] != _MARK or length != len(packed):
-            return None
-        if wanted > _LARGEST:
-            return None
-        data = ZstdDecompressor().stream_reader(packed).read(wanted + 1)
-    except (struct.error, ZstdError):
-        return None
-    return data if len(data) == wanted and zlib.crc32(data) == crc else None
+        return ZstdDecompressor().stream_reader(packed).read(most)
+    except ZstdError:
+        return b""
+
+
+def _of_lz4(packed: bytes, most: int) -> bytes:
+    from lz4.frame import LZ4FrameDecompressor
+
+    try:
+        return LZ4FrameDecompressor().decompress(packed, most)
+    except RuntimeError:
+        return b""
+
+
+_UNPACKED = {_ZSTD: _of_zstd, b"lz4": _of_lz4, b"": lambda packed, most: packed[:most]}
+"""What unpacks at most so many bytes, by the word for it."""
 
 
 def _contents(at: int, data: bytes) -> Chunk:

@@ -88,7 +88,9 @@ def drawn(path: Path) -> tuple[LogReader, Figure]:
         log.require_ticks()
         count = log.ticks
     with LogReader(path) as log:
-        return log, replay(Course.of(log, count))
+        course = Course.of(log, count)
+        log.require_ticks()
+        return log, replay(course)
 
 
 @style.styled

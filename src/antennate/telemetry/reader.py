@@ -122,7 +122,8 @@ class LogReader:
             LogError: There are none.
         """
         if not self.ticks:
-            raise LogError(f"{self.path}: expected a log with ticks, found none")
+            why = f": {self.damage[0].reason} at byte {self.damage[0].offset}" if self.bad else ""
+            raise LogError(f"{self.path}: expected a log with ticks, found none{why}")
 
     def groups(self) -> Iterator[tuple[list[Record], Tick | None]]:
         """All messages as they are: those of one tick, with it, then those of none, one by one.
@@ -285,6 +286,8 @@ class LogReader:
         refuse_old(self.path, self._file.read(1 << 16))
         ticks = sum(1 for _ in self)
         found = f"no intact header, {ticks} intact ticks; damaged places: {self.bad}"
+        if self.bad:
+            found += f", the first at byte {self.damage[0].offset}: {self.damage[0].reason}"
         if self.end is not None and not (self.bad or ticks):
             found = "one of another program"
         raise LogError(f"{self.path}: expected a log of antennate, an MCAP file, found {found}")

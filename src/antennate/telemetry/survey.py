@@ -48,29 +48,47 @@ def by_summary(file: BinaryIO, topics: Mapping[int, Topic]) -> Survey | None:
     counts = {topics[channel]: n for channel, n in end.counts.items()}
     if len({counts.get(topic, 0) for topic in TICK_TOPICS}) != 1:
         return None  # a tick is not whole
-    events, ends = list[tuple[int, bytes]](), list[Place]()
     try:
-        for place in places(file):
-            held = {topics[channel] for channel in place.channels if channel in topics}
-            chunk = chunk_at(file, place) if EVENTS in held else None
-            if chunk is None and (EVENTS in held or not is_sound(file, place)):
-                return None
-            messages = () if chunk is None else chunk.messages
-            of_chunk = [(m.time, m.data) for m in messages if topics.get(m.channel) is EVENTS]
-            for _, data in of_chunk:
-                EVENTS.decode(data)
-            events += of_chunk
-            if MANEUVER in held:
-                ends = [*ends[:1], place]
+        events, ends = _looked_through(file, topics)
         chunks = [chunk for place in ends if (chunk := chunk_at(file, place)) is not None]
     except ValueError:  # also of an event that is none
         return None
     ticks = [m for chunk in chunks for m in chunk.messages if topics.get(m.channel) is MANEUVER]
+    numbers, times = [m.number for m in ticks], [m.time for m in ticks]
+    if numbers != sorted(numbers) or times != sorted(times):
+        return None
     kept = {topic: counts[topic] for topic in TOPICS if counts.get(topic)}
     for topic in HEADER_TOPICS:
         kept.pop(topic, None)
-    number = max((m.number for m in ticks), default=0)
-    return Survey(kept, events, *span([m.time for m in ticks]), number)
+    return Survey(kept, events, *span(times), numbers[-1] if numbers else 0)
+
+
+def _looked_through(
+    file: BinaryIO, topics: Mapping[int, Topic]
+) -> tuple[list[tuple[int, bytes]], list[Place]]:
+    """The events, and the places of the first and the last chunk with ticks.
+
+    Raises:
+        OSError: It cannot be read.
+        ValueError: A chunk is damaged, or has parts of ticks alone, as where messages are sorted by
+            their topic: then it is to be seen which ticks are whole.
+    """
+    events, ends = list[tuple[int, bytes]](), list[Place]()
+    for place in places(file):
+        held = {topics[channel] for channel in place.channels if channel in topics}
+        chunk = chunk_at(file, place) if EVENTS in held else None
+        if chunk is None and (EVENTS in held or not is_sound(file, place)):
+            raise ValueError("a damaged chunk")
+        messages = () if chunk is None else chunk.messages
+        of_chunk = [(m.time, m.data) for m in messages if topics.get(m.channel) is EVENTS]
+        for _, data in of_chunk:
+            EVENTS.decode(data)
+        events += of_chunk
+        if not held.isdisjoint(TICK_TOPICS):
+            if not held.issuperset(TICK_TOPICS):
+                raise ValueError("parts of ticks")
+            ends = [*ends[:1], place]
+    return events, ends
 
 
 def span(times: Sequence[int]) -> tuple[int, int]:

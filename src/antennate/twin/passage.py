@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable
 
 from antennate.sim.scenes.scene import SceneInstance
+from antennate.sim.trial import end_of, progress_of
 from antennate.sim.world import World
 
 _EVERY = 10
@@ -38,14 +39,18 @@ class Passage:
         self.passed = math.inf
 
     def watch(self, world: World) -> None:
-        """Look at the world after a tick."""
+        """Look at the world after a tick.
+
+        Raises:
+            SceneError: The scene does not answer as its protocol says.
+        """
         self.on_tick(world)
         self._ticks += 1
         if self._ticks % _EVERY:
             return
-        head = world.head[:2].copy()
-        self.progress = self._scene.progress(head)
-        if self.passed == math.inf and self._scene.succeeded(head):
+        head = world.head[:2]
+        self.progress = progress_of(self._scene, head)
+        if self.passed == math.inf and end_of(self._scene, head) == "success":
             self.passed = world.t
             self.on_pass()
 

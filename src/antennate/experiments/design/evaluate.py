@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from antennate import experiments
@@ -69,7 +69,8 @@ class Evaluator:
         reads: Names among those that are parameters of this experiment.
 
     Raises:
-        BadInputError: There is no such experiment, or a name could mean several parameters.
+        BadInputError: There is no such experiment, a name could mean several parameters, or a
+            parameter is set twice.
     """
 
     def __init__(self, label: str, asked: Evaluation, names: Sequence[str]) -> None:
@@ -94,6 +95,7 @@ class Evaluator:
         paths = None if model is None else [p for p in _leaves(model) if p not in model.unread]
         found = {name: name if paths is None else self._path(name, paths) for name in names}
         self._paths = {name: path for name, path in found.items() if path is not None}
+        self._require_once()
 
     @property
     def reads(self) -> Sequence[str]:
@@ -104,6 +106,26 @@ class Evaluator:
     def most(self) -> int:
         """Trials that may be run at once."""
         return self._subject.most
+
+    def _require_once(self) -> None:
+        names: dict[str, str] = {}
+        for name, path in self._paths.items():
+            if path in names:
+                raise ConfigError(
+                    f"search.{name}: expected each parameter of {self.name} once, found {path} as "
+                    f"search.{names[path]} too"
+                )
+            names[path] = name
+            if _holds(self._asked.settings, path):
+                raise ConfigError(
+                    f"evaluate.{self.label}.settings.{path}: expected none, as search.{name} sets "
+                    "it, found one"
+                )
+        if self._asked.trials is not None and "trials" in self._asked.settings:
+            raise ConfigError(
+                f"evaluate.{self.label}.settings.trials: expected none beside "
+                f"evaluate.{self.label}.trials, found one"
+            )
 
     def _path(self, name: str, paths: Sequence[str]) -> str | None:
         """The parameter of a name: the whole path, or the end of one alone."""
@@ -195,6 +217,15 @@ class Evaluator:
         changes |= {} if start is None else {"seed": start + first}
         config = config.model_copy(update=changes)
         return [(config, trial) for trial in self._subject.every(config)]
+
+
+def _holds(settings: Any, path: str) -> bool:
+    """Whether settings have a value at a path."""
+    for part in path.split("."):
+        if not isinstance(settings, Mapping) or part not in settings:
+            return False
+        settings = settings[part]
+    return True
 
 
 def evaluators(config: DesignConfig) -> list[Evaluator]:

@@ -13,7 +13,7 @@ from antennate.experiments.gait.unknown import Unknown, changed
 from antennate.params.base import GATHERED, Params, number, require_different, require_whole_steps
 from antennate.params.control import GaitParams
 from antennate.params.scene import PhysicsParams
-from antennate.robots.readers import HARDWARE_ALONE, unused_servos
+from antennate.robots.readers import HARDWARE_ALONE, unused
 from antennate.robots.spec import RobotSpec
 
 _OF_UNKNOWN = ("draws", "seed")
@@ -50,8 +50,8 @@ class GaitStudyConfig(Params):
     physics: PhysicsParams = PhysicsParams()
 
     def unread_here(self) -> Mapping[str, str]:
-        """The servos that this robot does not have, and the step of legs that do not lift."""
-        return unused_servos(self.robot) | unread_lift(self.robot, "gait")
+        """What this robot does not have, and the step of legs that do not lift."""
+        return unused(self.robot) | unread_lift(self.robot, "gait")
 
     @property
     def unknowns(self) -> list[Unknown]:

@@ -12,7 +12,7 @@ import numpy as np
 from antennate.control.checked import CheckedController
 from antennate.control.loop import run_loop
 from antennate.control.registry import ControllerMaker, make_controller
-from antennate.errors import ConfigError, ControllerError, SimulationError
+from antennate.errors import ConfigError, ControllerError, SceneError, SimulationError
 from antennate.experiments.tunnel.config import TunnelConfig
 from antennate.experiments.tunnel.monitor import (
     LOOK_EVERY,
@@ -242,8 +242,12 @@ class _Rows:
             if (ticks - begun) % LOOK_EVERY and times[row] < limit:
                 continue
             world, maneuver = self._robot.world(row), maneuvers.item(row)
-            if (outcome := self._monitors[row].look(world, times[row], maneuver)) is not None:
-                self.end(row, outcome)
+            try:
+                outcome, reason = self._monitors[row].look(world, times[row], maneuver), ""
+            except SceneError as error:
+                outcome, reason = "invalid", str(error)
+            if outcome is not None:
+                self.end(row, outcome, reason)
                 ended.append(row)
         return ended
 

@@ -43,7 +43,7 @@ class TunnelConfig(TrialConfig):
         return tuple(map(CONTROLLERS.check, names))
 
     def unread_here(self) -> Mapping[str, str]:
-        """The servos that this robot does not have, and what none of the controllers reads."""
+        """What this robot does not have, and what none of the controllers reads."""
         control = unread_by_all(self.controllers, self.control, self.robot)
         return {**super().unread_here(), **control}
 

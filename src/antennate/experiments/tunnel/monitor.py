@@ -12,7 +12,9 @@ from typing import Literal, Protocol
 
 import numpy as np
 
+from antennate.errors import SceneError
 from antennate.sim.scenes.scene import SceneInstance
+from antennate.sim.trial import end_of, progress_of
 from antennate.types import Floats, Ints, Maneuver
 
 Outcome = Literal["success", "timeout", "left", "invalid"]
@@ -144,17 +146,17 @@ class TrialMonitor:
     _samples: list[tuple[float, float, float, int]] = field(default_factory=list)
 
     def look(self, world: Watched, t: float, maneuver: int) -> Outcome | None:
-        """Look at the world at time t [s]; the outcome once there is one."""
-        head = world.head[:2].copy()
+        """Look at the world at time t [s]; the outcome once there is one.
+
+        Raises:
+            SceneError: The scene does not answer as its protocol says.
+        """
+        head = world.head[:2]
         x, y = head.tolist()
         self._samples.append((t, x, y, maneuver))
         self._forces.append(world.obstacle_force())
-        self._note_progress(self.scene.progress(head), t)
-        if self.scene.succeeded(head):
-            return "success"
-        if self.scene.left(head):
-            return "left"
-        return "timeout" if t >= self.time_limit else None
+        self._note_progress(progress_of(self.scene, head), t)
+        return end_of(self.scene, head) or ("timeout" if t >= self.time_limit else None)
 
     def _note_progress(self, progress: float, t: float) -> None:
         if progress > self._best + STUCK_GAIN:
@@ -169,8 +171,9 @@ class TrialMonitor:
         """The row of a trial that ended so, with `ticks` in each maneuver, shape (5,)."""
         share = ticks / max(1, ticks.sum())
         forces = np.array(self._forces) if self._forces else np.zeros(1)
-        progress = self.scene.progress(world.head[:2].copy())
-        if not np.isfinite(progress):
+        try:
+            progress = progress_of(self.scene, world.head[:2])
+        except SceneError:  # as after a simulation that became invalid
             progress = self._best
         return TrialResult(
             seed=self.seed,

@@ -13,6 +13,7 @@ from antennate.params.base import number
 from antennate.params.dead_man import DeadManParams
 from antennate.params.endurance import DriftParams
 from antennate.params.safety import TouchCheckParams
+from antennate.robots.readers import unused
 
 
 class DriveConfig(RobotConfig):
@@ -58,5 +59,5 @@ class DriveConfig(RobotConfig):
         return CONTROLLERS.check(name)
 
     def unread_here(self) -> Mapping[str, str]:
-        """What its controller does not read."""
-        return unread_by_all([self.controller], self.control, self.robot)
+        """What this robot does not have, and what its controller does not read."""
+        return unused(self.robot) | unread_by_all([self.controller], self.control, self.robot)

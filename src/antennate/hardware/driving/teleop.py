@@ -20,7 +20,7 @@ from antennate.params.base import paths_of
 from antennate.params.control import ControlParams
 from antennate.params.dead_man import DeadManParams
 from antennate.params.setup import TeleopParams
-from antennate.robots.readers import SIMULATION_ALONE
+from antennate.robots.readers import SIMULATION_ALONE, unused
 from antennate.robots.spec import RobotSpec
 from antennate.types import AntennaFrame, Bools, Contact, Floats, Ints, JointCommand, Maneuver
 
@@ -56,8 +56,8 @@ class TeleopConfig(DriveConfig):
     teleop: TeleopParams = TeleopParams()
 
     def unread_here(self) -> Mapping[str, str]:
-        """What its controller does not read."""
-        return unread_by_all([TELEOP], self.control, self.robot)
+        """What this robot does not have, and what its controller does not read."""
+        return unused(self.robot) | unread_by_all([TELEOP], self.control, self.robot)
 
 
 @dataclass

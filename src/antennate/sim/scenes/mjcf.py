@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import re
 from pathlib import Path
 
 import mujoco
@@ -21,6 +22,7 @@ _PLANE = int(mujoco.mjtGeom.mjGEOM_PLANE)
 _OWN_BITS = 8
 """The file's collision bits are moved up by so many, past those of the robot and the floor."""
 _MOST_BITS = 1 << 20
+_VIA = re.compile("via[0-9]+")
 
 
 class MjcfScene:
@@ -61,11 +63,14 @@ class MjcfScene:
 
     def _read_route(self, model: mujoco.MjModel, data: mujoco.MjData) -> Floats:
         names = [model.site(i).name for i in range(model.nsite)]
-        vias = itertools.takewhile(names.__contains__, (f"via{i}" for i in itertools.count()))
+        every = (f"via{i}" for i in itertools.count())
+        vias = [*itertools.takewhile(names.__contains__, every)]
         for name in ("start", "exit"):
             if name not in names:
                 found = ", ".join(filter(None, names)) or "no site with a name"
                 raise self._error(f"a site named {name!r}", found)
+        if gap := [name for name in names if _VIA.fullmatch(name) and name not in vias]:
+            raise self._error(f"a site named 'via{len(vias)}' before {gap[0]!r}", "none")
         route = np.array([data.site_xpos[names.index(n), :2] for n in ("start", *vias, "exit")])
         if (np.hypot(*np.diff(route, axis=0).T) < 1e-3).any():
             raise self._error("sites at least 1 mm apart from start to exit", "two at one place")

@@ -31,8 +31,10 @@ _COUNTERS = ("missed", "crc", "lost", "misses", "stale", "refused")
 """Counters of what went wrong; those of what went well only grow."""
 _STATE, _COUNTS = (9,), tuple(range(10, 10 + len(_COUNTERS)))
 """Columns of the supervisor's state and of these counters."""
-_UNSEEN = 1e-6
-"""How far the left end of the charts moves [s]."""
+_UNSEEN = 1e-7
+"""How far the left end of the charts moves, as a share of that time."""
+_SPLITS, _NUMBERS = (0.0, 0.5, 1.0), (f"-{_WINDOW:g}", f"-{_WINDOW / 2:g}", "0")
+"""Where the axis of time has numbers, and which [s]."""
 _OUTSIDE = 0.2
 """How far the axis of a chart with words goes beyond them."""
 _NOTE = '<p style="font-size:0.8em;margin:0.4em">The last 10 s; 0 is now.</p>'
@@ -88,7 +90,7 @@ class Charts:
             _STATE: _Look("supervisor", [("supervisor", _MUTED)], words=states),
             _COUNTS: _Look("counted in these seconds", list(zip(counters, SERIES, strict=False))),
         }
-        begin = np.stack([np.array([-_WINDOW, 0.0]), *np.zeros((_COUNTS[-1], 2))])
+        begin = np.stack([np.array([0.0, 1.0]), *np.zeros((_COUNTS[-1], 2))])
         with tab:
             server.gui.add_html(_NOTE, order=0)
             self._charts = {
@@ -121,7 +123,7 @@ class Charts:
         if not self._rows:
             return
         columns = np.array(self._rows).T
-        columns[0] -= columns[0, -1]
+        columns[0] = 1.0 + (columns[0] - columns[0, -1]) / _WINDOW
         columns[_COUNTS[0] :] -= columns[_COUNTS[0] :, :1]
         self._known |= _known(columns)
         for which, chart in self._charts.items():
@@ -138,14 +140,14 @@ class Charts:
     def _begin(self) -> Floats:
         """A column at the left end, of which lines show nothing.
 
-        So all charts have the same axis of time at any time: where limits and the ends of the data
-        change at once, the client would put the axis far off. The end moves by what nobody sees,
-        as the client numbers an axis only when it moves.
+        So all charts have the same axis of time at any time, from 0 to 1: where the client loses
+        the ends of an axis, as it may while it draws a chart anew, it takes these. The end moves by
+        what nobody sees, as the client numbers an axis only when it moves.
         """
         self._nudge = _UNSEEN - self._nudge
         begin = np.full((_COUNTS[-1] + 1, 1), np.nan)
         begin[_COUNTS[0] :] = 0.0  # limits of these are as the values are
-        begin[0] = -_WINDOW - self._nudge
+        begin[0] = -self._nudge
         return begin
 
 
@@ -184,12 +186,12 @@ def _chart(server: viser.ViserServer, look: _Look, data: tuple[Floats, ...], ord
     return server.gui.add_uplot(
         data,
         (
-            uplot.Series(label="t [s]"),
+            uplot.Series(label="place in time"),
             *(uplot.Series(label=name, stroke=colour, width=1.5) for name, colour in look.lines),
         ),
         title=look.title,
         scales=_scales(limits),
-        axes=(uplot.Axis(size=24), axis),
+        axes=(uplot.Axis(size=24, splits=_SPLITS, values=_NUMBERS), axis),
         legend=uplot.Legend(show=len(look.lines) > len(_SIDES) + 1),
         height=_HEIGHT,
         padding=_PADDING,
