@@ -21,6 +21,12 @@ MANEUVER_NAMES = {
     Maneuver.HOLD: "hold",
 }
 
+
+def called(maneuver: int) -> str:
+    """A maneuver in words; a number that is none of ours, as a controller may say, stays one."""
+    return MANEUVER_NAMES[Maneuver(maneuver)] if maneuver in set(Maneuver) else str(maneuver)
+
+
 SERIES = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#D55E00", "#56B4E9", "#332288")
 """For whatever has no colour of its own; after Okabe and Ito."""
 

@@ -33,7 +33,7 @@ _RAIL = (
 )
 
 
-class RobotConfig(Params):
+class DescribedRobot(Params):
     """The robot that is described."""
 
     robot: RobotSpec = RobotSpec()
@@ -45,7 +45,7 @@ def command(argv: Sequence[str]) -> int:
     Raises:
         AntennateError: The robot or the folder cannot be used.
     """
-    config, options = parse("robot", DESCRIPTION, RobotConfig, argv, ResultOptions)
+    config, options = parse("robot", DESCRIPTION, DescribedRobot, argv, ResultOptions)
     robot = config.robot
     with folder_for(VIEW, options, config, argv) as folder:
         from antennate.robots.wiring import wiring  # slow to import
@@ -116,4 +116,4 @@ def _sentence(result: Mapping[str, Any]) -> str:
 _CAPTIONS = {
     "wiring": "Servos in plan on their bus, head to the left, what feeds them, and the board."
 }
-VIEW = View("robot", DESCRIPTION, RobotConfig, _tables, _sentence, captions=_CAPTIONS)
+VIEW = View("robot", DESCRIPTION, DescribedRobot, _tables, _sentence, captions=_CAPTIONS)

@@ -25,7 +25,7 @@ def tables(result: Mapping[str, Any]) -> Sequence[Table]:
     share = "" if off["ratio"] is None else f", {100 * off['ratio']:.0f} % of legs that roll"
     maneuvers = Table.of(
         "Maneuvers",
-        result["maneuvers"],
+        {name.upper(): row for name, row in result["maneuvers"].items()},
         MANEUVER,
         f"Body length {result['body_length_m']:g} m, {result['frequency_hz']:g} cycles a second.\n"
         f"Without the body wave {off['speed_m_s']:z.3f} m/s{share and f'{share} without slip'}.\n"

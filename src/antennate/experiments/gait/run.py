@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from antennate.colours import called
 from antennate.control.gait import Gait
 from antennate.control.loop import run_loop
 from antennate.experiments.gait.config import GaitStudyConfig
@@ -299,7 +300,8 @@ def _walk_viewed(
         def watch(world: World, frame: AntennaFrame, maneuver: Maneuver = maneuver) -> None:
             view.tick(world.model, world.data, frame, maneuver=int(maneuver))
 
-        view.begin(name.replace("_", " "))
+        known = {each.name.lower(): called(each) for each in MANEUVERS}
+        view.begin(known.get(name, name.replace("_", " ")))
         yield walk_flat(config, name, gait, maneuver, watch, logs)
         on_step(done, len(tasks))
 

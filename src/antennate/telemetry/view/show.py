@@ -15,7 +15,7 @@ from typing import Any, Protocol
 import numpy as np
 import viser
 
-from antennate.colours import SERIES, rgba
+from antennate.colours import SERIES, called, rgba
 from antennate.sim.shapes import Shapes, VisibleModel, picture
 from antennate.telemetry.header import Header
 from antennate.telemetry.log_scene import LogScene
@@ -39,7 +39,6 @@ from antennate.telemetry.view.charts import LABELS, Charts, Map
 from antennate.telemetry.view.controls import Controls
 from antennate.telemetry.view.pace import RATE
 from antennate.telemetry.view.scene import SceneView
-from antennate.types import Maneuver
 
 _SLOW = 0.1
 """Time between two pictures of charts, map and status [s]: they are read, not watched."""
@@ -247,7 +246,7 @@ def _status(tick: Tick | None, state: Mapping[str, Any], lines: tuple[str, ...])
     if tick is not None:
         rows.append(("time", f"{tick.now:.2f} s"))
         if tick.maneuver >= 0:
-            rows.append(("maneuver", Maneuver.label(tick.maneuver).replace("_", " ")))
+            rows.append(("maneuver", called(tick.maneuver)))
         if tick.state:
             rows.append(("supervisor", tick.state))
             rows += [("", cause) for cause in tick.causes[:3]]
