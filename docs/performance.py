@@ -1,6 +1,6 @@
 """Write docs/performance.md from docs/performance.json and .toml; --check only looks.
 
-`python benchmarks/performance.py` measures and writes that file, part by part.
+`uv run python benchmarks/performance.py` measures and writes that file, part by part.
 """
 
 import json
@@ -12,7 +12,7 @@ from typing import Any
 from generated import finish, heads, row
 
 RESULT = Path(__file__).with_name("performance.json")
-COMMAND = "python benchmarks/performance.py"
+COMMAND = "uv run python benchmarks/performance.py"
 IDLE = 0.1
 """Cores that other programs may have kept busy where a machine counts as idle."""
 HEAD = f"""\
@@ -26,8 +26,8 @@ the nearest job. These commands measure it:
 {COMMAND} --parts trial start
 ```
 
-All ratios of a part are taken in one run on one machine, the cases in turn, so that a
-change of its load or speed meets all of them. A figure is the median over repetitions, with the
+All ratios of a part are taken in one run on one machine. The cases alternate, so that a change of
+load or speed affects all of them equally. A figure is the median over repetitions, with the
 smallest and the largest in brackets. Compare ratios between machines, not seconds.
 """
 Figures = Mapping[str, Any]
@@ -41,7 +41,7 @@ def short(value: float, digits: int = 3) -> str:
 def told(found: Mapping[str, float], digits: int = 3) -> str:
     """A median with its smallest and largest."""
     median, low, high = (short(found[name], digits) for name in ("median", "low", "high"))
-    return f"{median} ({low}–{high})"
+    return median if low == high else f"{median} ({low}–{high})"
 
 
 def table(names: tuple[str, ...], rows: Sequence[tuple[object, ...]]) -> str:
@@ -84,7 +84,7 @@ def machines(parts: Mapping[str, Any]) -> str:
 
 
 def aims(parts: Mapping[str, Any]) -> str:
-    """What was asked, and whether it is so."""
+    """What was aimed at, and whether it is so."""
     rows = list[tuple[object, ...]]()
 
     def add(part: str, what: str, found: Mapping[str, float], bound: float, most: bool) -> None:
@@ -121,7 +121,9 @@ def aims(parts: Mapping[str, Any]) -> str:
         add("start", "`import antennate` [s]", figures["import"], 0.3, True)
         name = [*figures["seconds"]][-1]
         add("start", f"{name}, from the command [s]", figures["seconds"][name], 2.0, True)
-    return "## What was asked\n\n" + table(("what", "asked", "measured", ""), rows)
+    return "## Aims and what is measured\n\nThe aims are the project's own.\n\n" + table(
+        ("what", "aim", "measured", ""), rows
+    )
 
 
 def trial(figures: Figures) -> str:
@@ -141,14 +143,14 @@ def trial(figures: Figures) -> str:
 
 CPU time of whole trials of the closed loop (sensing, control, recording) over that of the bare
 engine, which replays their commands on the same models, one trial after the other, and must end on
-the same bits. 1 would be a controller for nothing. {figures["trials"]} trials,
+the same bits. 1 would mean that control costs no time. {figures["trials"]} trials,
 {figures["simulated_s"]:g} simulated seconds.
 
 {table(columns, rows)}
 The program steps up to {most} trials of a process in lockstep; of the default 30 a controller, 15
 on each of two cores. They share each NumPy call, but their worlds push one another out of the
 cache, and that counts against us: the bare engine alone takes {told(figures["bare_at_once"])} times
-as long if it steps {most} in turn.
+as long if it steps {most} in turn. An own time below 0 is one that is too short to be seen here.
 
 A physics step of the tunnel takes {told(figures["step_us"])} µs, one of a humanoid that falls on a
 floor {told(figures["humanoid_step_us"])} µs: **{told(figures["step_over_humanoid"])} times** as

@@ -46,7 +46,8 @@ what it says.
 
 """
 BEST = (
-    "*Conditional*: the paper does not publish all numbers, so most claims can be judged no better."
+    "*Conditional*: the paper does not publish all numbers that a claim needs, so most claims can "
+    "at best be conditional."
 )
 FOOT = """\
 ## Run it yourself

@@ -56,6 +56,30 @@ def written(path: Path, ticks: int) -> bytes:
     return path.read_bytes()
 
 
+def anew(log: Path, copy: Path, size: int, packed: CompressionType) -> bytes:
+    """The same messages in chunks of about this size, as another program writes them."""
+    with log.open("rb") as file, copy.open("wb") as target:
+        writer, schemas, channels = Writer(target, chunk_size=size, compression=packed), {}, {}
+        writer.start()
+        for schema, channel, message in make_reader(file).iter_messages(log_time_order=False):
+            assert schema is not None
+            if channel.topic not in channels:
+                if schema.name not in schemas:
+                    about = (schema.name, schema.encoding, schema.data)
+                    schemas[schema.name] = writer.register_schema(*about)
+                about = (channel.topic, channel.message_encoding, schemas[schema.name])
+                channels[channel.topic] = writer.register_channel(*about)
+            writer.add_message(
+                channels[channel.topic],
+                message.log_time,
+                message.data,
+                message.publish_time,
+                message.sequence,
+            )
+        writer.finish()
+    return copy.read_bytes()
+
+
 def found(path: Path, data: bytes) -> tuple[list[int], LogReader] | None:
     """Numbers of the ticks read, each compared with what was written; None if refused."""
     path.write_bytes(data)
@@ -160,6 +184,39 @@ def test_G2_flipped_bits_cost_the_chunks_they_hit_and_no_other(
             assert log.damage[0].offset > 0
             damaged += 1
     assert damaged > 0.5 * logs
+
+
+@pytest.mark.parametrize("packed", list(CompressionType))
+def test_G2_damage_costs_other_programs_logs_no_more(
+    tmp_path: Path, packed: CompressionType
+) -> None:
+    """A chunk that is damaged anywhere, its head included, hides none of those that follow."""
+    written(tmp_path / "log", 40)
+    data = anew(tmp_path / "log", tmp_path / "new", 1000, packed)
+    places = chunks(data)
+    begin, end = places[len(places) // 2]
+    assert len(places) > 20
+    for place in (begin, begin + 3, begin + 12, begin + 45, end - 1):
+        spoiled = bytearray(data)
+        spoiled[place] ^= 0x55
+        result = found(tmp_path / "spoiled", bytes(spoiled))
+        assert result is not None
+        numbers, log = result
+        assert 36 <= len(numbers) < 40 or place == begin + 12  # the end time of a chunk is not read
+        assert numbers[-1] == 40
+        assert log.bad >= 40 - len(numbers) > 0 or place == begin + 12
+
+
+def test_G2_a_chunk_without_a_crc_is_called_so(tmp_path: Path) -> None:
+    """MCAP lets a program leave it out; what cannot be checked is not read."""
+    data = written(tmp_path / "log", 4)
+    begin, _ = chunks(data)[2]
+    bare = bytearray(data)
+    bare[begin + 9 + 24 : begin + 9 + 28] = bytes(4)
+    result = found(tmp_path / "bare", bytes(bare))
+    assert result is not None
+    assert result[0] == [1, 3, 4]
+    assert [damage.reason for damage in result[1].damage] == ["chunk without a CRC"]
 
 
 def test_G2_a_damaged_summary_costs_no_tick(tmp_path: Path) -> None:
@@ -380,25 +437,7 @@ def test_a_log_that_another_program_has_written_anew_is_read_whole(
 ) -> None:
     """Header and ticks share chunks, or channels and their schemas stand in several."""
     written(tmp_path / "log", 30)
-    with (tmp_path / "log").open("rb") as file, (tmp_path / "new").open("wb") as copy:
-        writer, schemas, channels = Writer(copy, chunk_size=size, compression=packed), {}, {}
-        writer.start()
-        for schema, channel, message in make_reader(file).iter_messages(log_time_order=False):
-            assert schema is not None
-            if channel.topic not in channels:
-                if schema.name not in schemas:
-                    about = (schema.name, schema.encoding, schema.data)
-                    schemas[schema.name] = writer.register_schema(*about)
-                about = (channel.topic, channel.message_encoding, schemas[schema.name])
-                channels[channel.topic] = writer.register_channel(*about)
-            writer.add_message(
-                channels[channel.topic],
-                message.log_time,
-                message.data,
-                message.publish_time,
-                message.sequence,
-            )
-        writer.finish()
+    anew(tmp_path / "log", tmp_path / "new", size, packed)
     read = found(tmp_path / "copy", (tmp_path / "new").read_bytes())
     assert read is not None
     numbers, reader = read

@@ -309,7 +309,7 @@ def test_a_closed_log_in_another_order_is_not_called_sound(
     code, told = info(Path("new.mcap"), capsys)
     assert code == 2
     assert told["damaged"] + told["missing"] > 0
-    assert told["duration_s"] >= 0
+    assert told["duration_s"] <= 0.01 * TICKS
     assert main(["log", "plot", "new.mcap", "--out", "new.png"]) == 2
     err = capsys.readouterr().err
     assert err.count("\n") == 1

@@ -158,6 +158,14 @@ def test_a_damaged_directory_is_one_line(tmp_path: Path, name: str, text: str, a
     assert "\n" not in str(error.value)
 
 
+def test_text_that_looks_like_a_number_stays_text(tmp_path: Path) -> None:
+    texts = ["1_000", "007", "1e", "+3", "0x10", "- 1", "infinity", " 1", "1.", "Nan"]
+    rows = [{"n": -12, "x": -1.5e-07, "y": 3.0, "z": float("inf"), "t": text} for text in texts]
+    with RunDirectory.create("wall", tmp_path / "a") as run:
+        run.finish({}, rows)
+    assert RunDirectory.open(tmp_path / "a").rows() == rows
+
+
 def test_what_is_no_run_is_refused(tmp_path: Path) -> None:
     with pytest.raises(BadInputError, match=r"expected the folder of a run, found no result\.json"):
         RunDirectory.open(tmp_path)

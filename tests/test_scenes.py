@@ -386,6 +386,20 @@ def test_an_error_in_ones_own_scene_names_it(tmp_path):
         check_start(TrialConfig(scene=f"{tmp_path / 'mine.py'}:Mine"))
 
 
+def test_a_trial_that_starts_inside_a_wall_is_invalid(tmp_path):
+    """Chance may move the start of a trial, though the first one has room."""
+    walls = [f'<geom type="box" size="2 .02 .1" pos="0 {y} .1"/>' for y in (-0.4, 0.4)]
+    path = mjcf(tmp_path, SITES + "".join(walls))
+    words = ["tunnel", "--scene", str(path), "--variation.start-lateral", "0.35", "--trials", "4"]
+    more = ["--controllers", "open", "--time-limit", "0.2", "--no-figures", "--workers", "1"]
+    main([*words, *more, "--out", str(tmp_path / "run")])
+    rows = RunDirectory.open(tmp_path / "run").rows()
+    invalid = [row for row in rows if row["outcome"] == "invalid"]
+    assert 0 < len(invalid) < 4
+    assert all("expected room for the robot at the start" in row["reason"] for row in invalid)
+    assert all(row["force_max_n"] < 1e3 for row in rows if row not in invalid)
+
+
 @pytest.mark.parametrize(
     ("answer", "told"),
     [

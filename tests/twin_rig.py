@@ -15,7 +15,7 @@ from lockstep import BoardPort, LockstepClock
 
 from antennate.control.loop import run_loop
 from antennate.control.registry import make_controller
-from antennate.experiments.tunnel.monitor import LOOK_EVERY, TrialMonitor
+from antennate.experiments.tunnel.monitor import TrialMonitor
 from antennate.experiments.tunnel.run import TunnelConfig
 from antennate.hardware.driving.connect import LATEST
 from antennate.hardware.driving.hardware_robot import HardwareRobot
@@ -32,7 +32,7 @@ from antennate.params.control import ControlParams
 from antennate.params.safety import SupervisorParams, TouchCheckParams
 from antennate.sim.scenes.registry import make_scene
 from antennate.sim.sim_robot import SimRobot
-from antennate.sim.trial import draw_trial
+from antennate.sim.trial import LOOK_EVERY, draw_trial
 from antennate.twin.config import TwinConfig, watched
 from antennate.twin.robot import TwinRobot
 from antennate.types import AntennaFrame, Clock, Controller, JointCommand, Robot

@@ -252,9 +252,11 @@ def _end(
         sys.stderr.write(f"to go on: {again}\n" if again else "")
         raise KeyboardInterrupt
     failure = _keep(experiment, outcome, options, run)
-    tell(result, options, *_words(experiment, result))
-    if failure is not None:
-        raise failure
+    try:
+        tell(result, options, *_words(experiment, result))
+    finally:
+        if failure is not None:
+            raise failure
     if interrupted:
         sys.stderr.write(
             f"antennate {experiment.name}: interrupted: kept {len(outcome.rows)} trials, all "
@@ -272,7 +274,7 @@ def _words(experiment: Experiment[Any, Any], result: Any) -> tuple[Sequence[Tabl
         BadInputError: It has others.
     """
     try:
-        tables, sentence = experiment.tables(result), experiment.sentence(result)
+        tables, sentence = [*experiment.tables(result)], experiment.sentence(result)
         if isinstance(sentence, str) and all(isinstance(table, Table) for table in tables):
             return tables, sentence
         found = f"{type(tables).__name__} and {type(sentence).__name__}"

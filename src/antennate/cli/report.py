@@ -78,11 +78,18 @@ def _compared(paths: Sequence[Path]) -> str:
             f"--compare: expected two runs of one command, found {names[0]} in {first.path} and "
             f"{names[1]} in {second.path}"
         )
-    for run in (first, second):  # so that the one that cannot be shown is named
-        _made(
-            run, lambda view, run=run: str([view.tables(run.result()), view.sentence(run.result())])
-        )
+    _require_shown(first)
+    _require_shown(second)
     return _made(first, lambda view: compare([first, second], view))
+
+
+def _require_shown(run: RunDirectory) -> None:
+    """Check that a run can be shown, so that the one of two that cannot is named.
+
+    Raises:
+        BadInputError: It cannot.
+    """
+    _made(run, lambda view: f"{view.tables(run.result())} {view.sentence(run.result())}")
 
 
 def _made(run: RunDirectory, make: Callable[[View], str]) -> str:

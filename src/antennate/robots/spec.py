@@ -105,7 +105,7 @@ class RobotSpec(Params):
                 f"--robot: expected {', '.join(ROBOTS)} or a TOML file, found nothing"
             )
         path = folder / text
-        if not str(text) or (path.suffix != ".toml" and not path.exists()):
+        if path.suffix != ".toml" and not path.exists():
             known = ", ".join(ROBOTS)
             raise ConfigError(
                 f"--robot: expected {known} or a TOML file{nearest(str(text), ROBOTS)}, found "

@@ -26,6 +26,8 @@ from antennate.sim.sim_robot import Disturbance
 from antennate.sim.world import World, compile_world
 from antennate.types import Floats
 
+LOOK_EVERY = 10
+"""Ticks between two looks at a trial: 10 Hz at the usual rate."""
 MOST_OVERLAP = 0.005
 """Deepest that the robot may be in an obstacle at the start [m]: legs stand on edges."""
 _MEMBERS = ("start", "length", "exit", "build", "progress", "succeeded", "left")

@@ -17,6 +17,11 @@ from antennate.errors import BadInputError
 from antennate.params.base import Params, meaning
 
 _CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f]+")
+_NUMBERS = {
+    int: re.compile(r"0|-?[1-9][0-9]*"),
+    float: re.compile(r"-?(0|[1-9][0-9]*)(\.[0-9]+)?(e[+-]?[0-9]+)?|-?inf|nan"),
+}
+"""Numbers as they are written."""
 _FORMULA = ("=", "+", "-", "@")
 
 
@@ -108,11 +113,9 @@ def _value_of(cell: str | None) -> Any:
         return None
     if cell in ("True", "False"):
         return cell == "True"
-    for kind in (int, float):
-        try:
+    for kind, form in _NUMBERS.items():
+        if form.fullmatch(cell):
             return kind(cell)
-        except ValueError:
-            pass
     return cell[1:] if cell.startswith("'") and cell[1:].startswith(_FORMULA) else cell
 
 

@@ -16,14 +16,11 @@ from antennate.params.control import ControlParams
 from antennate.params.reading import from_values
 from antennate.sim.scenes.registry import make_scene
 from antennate.sim.sim_robot import SimRobot
-from antennate.sim.trial import Trial, TrialConfig, draw_trial, end_of
+from antennate.sim.trial import LOOK_EVERY, Trial, TrialConfig, draw_trial, end_of
 from antennate.telemetry.header import Header
 from antennate.telemetry.simulated import Decisions, SimulatedLog
 from antennate.telemetry.time_series import TimeSeries, TimeSeriesRecorder
 from antennate.types import AntennaFrame, JointCommand
-
-_EVERY = 10
-"""Ticks between two looks at the scene: 10 Hz at the usual rate, as in the experiments."""
 
 
 def simulate(
@@ -78,7 +75,7 @@ def simulate(
             kept.take(decisions.take(frame, command))
         ticks += 1
         outcome = "invalid" if robot.failures else "timeout"
-        if outcome == "timeout" and ticks % _EVERY == 0:
+        if outcome == "timeout" and ticks % LOOK_EVERY == 0:
             outcome = _seen(start)
         return outcome == "timeout" and start.world.t < time_limit
 

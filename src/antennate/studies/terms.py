@@ -8,8 +8,9 @@ from typing import Any
 from antennate.studies import page
 
 _TERMS = {
-    "wilson95": "Wilson 95 %: the shares of success that fit what was counted. Few trials make it "
-    "wide; where the intervals of two conditions overlap much, their order is not known.",
+    "wilson95": "Wilson 95 %: the true shares of success that could have given this count. Few "
+    "trials make it wide; where the intervals of two conditions overlap much, their order is not "
+    "known.",
     "restricted_mean_time_s": "Restricted mean time: the mean over all valid trials, where one "
     "that fails counts as the whole time limit. So giving up early does not look fast.",
     "mcnemar_p": "McNemar: two conditions meet the same trials, and only those trials count that "

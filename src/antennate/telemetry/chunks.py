@@ -8,6 +8,7 @@ next one is searched for; what lies between chunks is not needed. Nothing is dec
 from __future__ import annotations
 
 import io
+import re
 import struct
 import zlib
 from collections.abc import Iterator, Mapping
@@ -19,9 +20,12 @@ _CHUNK_INDEX, _STATISTICS, _DATA_END = 8, 11, 15
 _RECORD = struct.Struct("<BQ")
 _PREFIX = struct.Struct("<QQQII")
 """Of a chunk: first and last time, size and CRC of its content, length of the next word."""
-_ZSTD = b"zstd"
-_MARK = struct.pack("<I", len(_ZSTD)) + _ZSTD
-_BEFORE_MARK = _RECORD.size + _PREFIX.size - 4
+_BEGIN = re.compile(
+    rb"\x06.{%d}(?:\x04\0\0\0zstd|\x03\0\0\0lz4|\0\0\0\0)" % (_RECORD.size + _PREFIX.size - 5),
+    re.DOTALL,
+)
+"""How a chunk begins, up to the word for its compression."""
+_LONGEST_BEGIN = _RECORD.size + _PREFIX.size + 4
 _ENTRY = struct.Struct("<HIQQ")
 _FOOT = struct.Struct("<BQQQI")
 _PLACE = struct.Struct("<QQQQI")
@@ -126,7 +130,7 @@ def _record(file: BinaryIO, at: int, size: int) -> tuple[Chunk | Fault | None, i
         return Fault(at, "cut record"), None
     content = file.read(length)
     if kind == _CHUNK:
-        return _chunk(at, content) or Fault(at, "damaged chunk"), end
+        return _chunk(at, content) or Fault(at, _fault_of(content)), end
     sound = {
         _INDEX: len(content) >= 6 and int.from_bytes(content[2:6], "little") == length - 6,
         _DATA_END: length == 4,
@@ -144,28 +148,29 @@ def _damaged(file: BinaryIO, at: int, size: int) -> bool:
 
 def _next_chunk(file: BinaryIO, at: int) -> int | None:
     """Where the next chunk begins that says the same length twice, from a place on."""
-    at += _BEFORE_MARK
     while True:
         file.seek(at)
         block = file.read(_BLOCK)
-        place = block.find(_MARK)
-        while place >= 0:
-            if _frames_a_chunk(file, at + place - _BEFORE_MARK):
-                return at + place - _BEFORE_MARK
-            place = block.find(_MARK, place + 1)
+        found = _BEGIN.search(block)
+        while found is not None:
+            if _frames_a_chunk(file, at + found.start()):
+                return at + found.start()
+            found = _BEGIN.search(block, found.start() + 1)
         if len(block) < _BLOCK:
             return None
-        at += _BLOCK - len(_MARK) + 1
+        at += _BLOCK - _LONGEST_BEGIN + 1
 
 
 def _frames_a_chunk(file: BinaryIO, at: int) -> bool:
-    before = _PREFIX.size + len(_ZSTD) + 8
     file.seek(at)
-    head = file.read(_RECORD.size + before)
-    if len(head) < _RECORD.size + before:
+    head = file.read(_RECORD.size + _LONGEST_BEGIN + 8)
+    try:
+        kind, length = _RECORD.unpack_from(head)
+        word = _PREFIX.unpack_from(head, _RECORD.size)[-1]
+        (packed,) = struct.unpack_from("<Q", head, _RECORD.size + _PREFIX.size + word)
+    except struct.error:
         return False
-    kind, length = _RECORD.unpack_from(head)
-    return kind == _CHUNK and length - before == int.from_bytes(head[-8:], "little")
+    return kind == _CHUNK and length - _PREFIX.size - word - 8 == packed
 
 
 def _chunk(at: int, content: bytes) -> Chunk | None:
@@ -179,6 +184,12 @@ def _chunk(at: int, content: bytes) -> Chunk | None:
         return None
 
 
+def _fault_of(content: bytes) -> str:
+    """What is wrong with a chunk; MCAP lets a program leave its CRC out."""
+    without = len(content) >= _PREFIX.size and _PREFIX.unpack_from(content)[3] == 0
+    return "chunk without a CRC" if without else "damaged chunk"
+
+
 def _unpacked(content: bytes) -> bytes | None:
     """The records of a chunk, None if it is damaged; other programs compress in other ways."""
     try:
@@ -188,7 +199,7 @@ def _unpacked(content: bytes) -> bytes | None:
     except struct.error:
         return None
     packed = content[begin + 8 :]
-    unpack = _UNPACKED.get(content[_PREFIX.size : begin])
+    unpack = _UNPACK.get(content[_PREFIX.size : begin])
     if unpack is None or length != len(packed) or wanted > _LARGEST:
         return None
     data = unpack(packed, wanted + 1)
@@ -213,7 +224,7 @@ def _of_lz4(packed: bytes, most: int) -> bytes:
         return b""
 
 
-_UNPACKED = {_ZSTD: _of_zstd, b"lz4": _of_lz4, b"": lambda packed, most: packed[:most]}
+_UNPACK = {b"zstd": _of_zstd, b"lz4": _of_lz4, b"": lambda packed, most: packed[:most]}
 """What unpacks at most so many bytes, by the word for it."""
 
 

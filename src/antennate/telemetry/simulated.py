@@ -11,6 +11,7 @@ import numpy as np
 
 from antennate.robots.spec import RobotSpec
 from antennate.sim.contacts import Contacts
+from antennate.sim.trial import LOOK_EVERY
 from antennate.sim.world import World
 from antennate.telemetry.cdr import Form
 from antennate.telemetry.header import Header
@@ -18,9 +19,6 @@ from antennate.telemetry.rows import HEAD, RowLog, Rows
 from antennate.telemetry.ticks import numbers_of
 from antennate.telemetry.topics import CONTACT_FORCES, COORDINATES, Topic
 from antennate.types import AntennaFrame, Floats, JointCommand
-
-_LOOK_EVERY = 10
-"""Ticks from one look at the contacts to the next: 10 Hz at the usual rate, as in experiments."""
 
 
 class Decisions:
@@ -104,7 +102,7 @@ class TickRows:
     def take(self, decided: bytes) -> TakenTick:
         """One tick, of which `Decisions` says this."""
         self._ticks += 1
-        look = (self._ticks - 1) % _LOOK_EVERY == 0
+        look = (self._ticks - 1) % LOOK_EVERY == 0
         world = self._world
         return TakenTick(decided, world.snapshot(), Contacts.of(world.data) if look else None)
 

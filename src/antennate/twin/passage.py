@@ -6,11 +6,8 @@ import math
 from collections.abc import Callable
 
 from antennate.sim.scenes.scene import SceneInstance
-from antennate.sim.trial import end_of, progress_of
+from antennate.sim.trial import LOOK_EVERY, end_of, progress_of
 from antennate.sim.world import World
-
-_EVERY = 10
-"""Ticks between two looks: 10 Hz at the usual rate, as in a trial."""
 
 
 class Passage:
@@ -46,7 +43,7 @@ class Passage:
         """
         self.on_tick(world)
         self._ticks += 1
-        if self._ticks % _EVERY:
+        if self._ticks % LOOK_EVERY:
             return
         head = world.head[:2]
         self.progress = progress_of(self._scene, head)

@@ -48,7 +48,7 @@ def effects(result: Result) -> Figure:
     targets = list(dict.fromkeys(effect["of"] for effect in result["effects"]))
     parameters = len(result["effects"]) // len(targets)
     count = min(_MOST_SIZES, parameters)
-    figure = style.canvas(_WIDTH, 1.0 + len(targets) * (0.75 + 0.32 * count))
+    figure = style.canvas(_WIDTH, 1.0 + len(targets) * (0.75 + 0.35 * count))
     panels = figure.subplots(len(targets), 1, squeeze=False, sharex=True)[:, 0]
     measure = labels.measure(result)
     signed = result["plan"] != "morris"
@@ -82,7 +82,7 @@ def _sizes(panel: Axes, found: Sequence[Result], measure: Measure, signed: bool)
     elif signed:
         wide = measure.scale * np.array(noises)
         look = {"color": style.FAINT, "linewidth": 0, "label": "noise"}
-        panel.barh(range(len(found)), 2 * wide, 0.3, -wide, **look)
+        panel.barh(range(len(found)), 2 * wide, 0.22, -wide, **look)
     for place, effect in enumerate(found):
         middle, interval = size(effect)
         ends = measure.scale * np.array(interval or (middle, middle))
@@ -98,7 +98,7 @@ def _sizes(panel: Axes, found: Sequence[Result], measure: Measure, signed: bool)
         panel.annotate(
             effect["parameter"],
             (0.0, place),
-            xytext=(4, 5),
+            xytext=(4, 6),
             xycoords=("axes fraction", "data"),
             textcoords="offset points",
             fontsize=8,

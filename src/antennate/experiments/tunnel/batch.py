@@ -15,7 +15,6 @@ from antennate.control.registry import ControllerMaker, make_controller
 from antennate.errors import ConfigError, ControllerError, SceneError, SimulationError
 from antennate.experiments.tunnel.config import TunnelConfig
 from antennate.experiments.tunnel.monitor import (
-    LOOK_EVERY,
     Outcome,
     TrialMonitor,
     TrialPath,
@@ -25,7 +24,7 @@ from antennate.experiments.tunnel.monitor import (
 from antennate.sim.scenes.registry import make_scene
 from antennate.sim.scenes.scene import Scene
 from antennate.sim.sim_robot import Disturbance, SimRobot
-from antennate.sim.trial import draw_trial
+from antennate.sim.trial import LOOK_EVERY, draw_trial, require_room
 from antennate.sim.world import World
 from antennate.telemetry.header import Header
 from antennate.telemetry.simulated import Decisions, SimulatedLog
@@ -133,7 +132,7 @@ class _Rows:
         self._scene, self._robot = made
         self._monitors: dict[int, TrialMonitor] = {}
         self._every: Ints = np.arange(batch)
-        self._ticks, self._begun = 0, dict[int, int]()
+        self._ticks, self._begun, self._blocked = 0, dict[int, int](), dict[int, str]()
         self._maneuvers: Ints = np.zeros((batch, len(Maneuver)), np.int64)
 
     @property
@@ -187,6 +186,10 @@ class _Rows:
         self._monitors[row] = TrialMonitor(
             config.seed, trial, self._name, start.scene, before, config.time_limit
         )
+        try:
+            require_room(start.world)
+        except SceneError as error:
+            self._blocked[row] = str(error)
         return start.phase
 
     def log_of(self, trial: int) -> Path:
@@ -228,7 +231,8 @@ class _Rows:
     def _watch(self, t: Floats, control: CheckedController) -> list[int]:
         """Watch all rows after a tick at times t [s], shape (B,); those whose trials have ended."""
         maneuvers, ended = control.maneuver, list[int]()
-        broken = {row: str(error) for row, error in self._robot.failures.items()}
+        broken = {row: str(error) for row, error in self._robot.failures.items()} | self._blocked
+        self._blocked.clear()
         if control.faults:
             broken |= {row: f"controller: {fault}" for row, fault in control.faults.items()}
             maneuvers = np.clip(maneuvers, 0, max(Maneuver))

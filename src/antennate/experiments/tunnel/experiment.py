@@ -78,7 +78,7 @@ CAPTIONS = {
     "trajectories": "Trials from above: a column for each trial, a row for each "
     "controller, coloured by maneuver.",
     "summary": "Success, time in the scene, and restricted mean time of each "
-    "controller, with 95 % intervals.",
+    "controller, with 95 % intervals from five trials on.",
 }
 
 EXPERIMENT = Experiment.of_folder(

@@ -23,8 +23,6 @@ STUCK_GAIN = 0.02
 """Gain of progress that counts as getting on [m]."""
 STUCK_TIME = 5.0
 """Time without such a gain after which the robot is stuck [s]."""
-LOOK_EVERY = 10
-"""Ticks between two looks: 10 Hz at the usual rate."""
 
 
 class Watched(Protocol):
