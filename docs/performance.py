@@ -22,7 +22,7 @@ What a trial costs, how the cost grows, what a second core brings, and how other
 the nearest job. These commands measure it:
 
 ```sh
-{COMMAND}            # ten minutes on an idle machine; --quick takes two
+{COMMAND} # ten minutes on an idle machine; --quick: two
 {COMMAND} --parts trial start
 ```
 

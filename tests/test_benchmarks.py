@@ -173,6 +173,6 @@ def test_the_page_says_what_is_missed_not_measured_and_busy(page):
     assert run_page(page).returncode == 0
     text = (page / "performance.md").read_text()
     assert "| 1.5 (1.4–1.6) | **not met**, machine not idle |" in text
-    assert "Not measured yet: `python benchmarks/performance.py --parts start`." in text
+    assert "Not measured yet: `uv run python benchmarks/performance.py --parts start`." in text
     assert "**The machine was not idle** while trial" in text
     assert "not measured: no wheel &#124; found" in text

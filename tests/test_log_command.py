@@ -316,6 +316,36 @@ def test_a_closed_log_in_another_order_is_not_called_sound(
     assert ("expected a log with ticks, found none: tick without /" in err) == (order == "by topic")
 
 
+def test_a_name_that_grows_too_long_is_one_line(
+    log: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    name = log.rename(f"{'n' * 245}.mcap")
+    assert main(["log", "recover", str(name)]) == 2
+    err = capsys.readouterr().err
+    assert "--out: expected a name that can be written" in err
+    assert err.count("\n") == 1
+
+
+def test_info_finds_ticks_that_cannot_be_read_in_a_sound_file(
+    log: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Every CRC is right, but the readings have another form."""
+    with log.open("rb") as file, Path("new.mcap").open("wb") as copy:
+        writer, known = Writer(copy), dict[str, int]()
+        writer.start()
+        for schema, channel, message in make_reader(file).iter_messages(log_time_order=False):
+            assert schema is not None
+            if channel.topic not in known:
+                number = writer.register_schema(schema.name, schema.encoding, schema.data)
+                known[channel.topic] = writer.register_channel(channel.topic, "cdr", number)
+            data = message.data[:20] if channel.topic == "/antenna" else message.data
+            about = (message.log_time, data, message.publish_time, message.sequence)
+            writer.add_message(known[channel.topic], *about)
+        writer.finish()
+    code, told = info(Path("new.mcap"), capsys)
+    assert (code, told["ticks"]) == (2, 0)
+
+
 def test_plot_draws_it(log: Path) -> None:
     assert main(["log", "plot", str(log)]) == 0
     assert log.with_suffix(".png").read_bytes().startswith(b"\x89PNG")
@@ -331,6 +361,7 @@ def test_plot_draws_it(log: Path) -> None:
         (["info", "nothing.mcap"], "nothing.mcap: No such file"),
         (["info", "text"], "no intact header, 0 intact ticks; damaged places: 1"),
         (["info", "drive.mcap", "--out", "a"], "--out: expected no file for `info`"),
+        (["info", "drive.mcap", "--overwrite"], "--overwrite: expected no file for `info`"),
         (["export", "drive.mcap", "--json"], "--json: expected `info`"),
         (["export", "drive.mcap", "--out", "a.xls"], "a name with .csv or .parquet, found a.xls"),
         (["recover", "drive.mcap", "--out", "drive.mcap"], "expected another file than the log"),

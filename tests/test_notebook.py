@@ -149,6 +149,8 @@ def test_an_own_class_of_a_module_runs_in_workers() -> None:
         ({"experiment": "tunnel", "controllers": ("opne",)}, "opne"),
         ({"experiment": SpringParams(), "wire_mm": 0.4}, "settings only beside a name"),
         ({"experiment": antennate.run}, "expected a name or the configuration"),
+        ({"experiment": "springs", "engine": "dask"}, "that runs trials on workers, found springs"),
+        ({"experiment": "springs", "out": "a\0b"}, "found one with a zero byte"),
         *(
             ({"experiment": "wall", "workers": workers}, "workers: expected a whole number")
             for workers in (0, -1, 1.5, None, True)
@@ -193,6 +195,9 @@ def test_wrong_settings_of_a_trial_are_one_line() -> None:
         antennate.simulate("open", scen="flat")
     with pytest.raises(antennate.BadInputError, match="opne"):
         antennate.simulate("opne")
+    for trial in (-1, 1.5):
+        with pytest.raises(antennate.BadInputError, match="trial: expected a whole number"):
+            antennate.simulate("open", trial=trial)  # pyright: ignore[reportArgumentType]
 
 
 @pytest.mark.parametrize("kept", [False, True])

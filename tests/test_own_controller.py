@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import json
+import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -202,6 +205,18 @@ class NoManeuver(Clumsy):
         return command
 
 
+class NoContact(Clumsy):
+    def fail(self, command: JointCommand, bad: Any) -> JointCommand:
+        self.contact = np.where(bad[:, None], 7, self.inner.contact)
+        return command
+
+
+class Complex(Clumsy):
+    def fail(self, command: JointCommand, bad: Any) -> JointCommand:
+        yaw = command.yaw * (1j if bad.any() else 1)
+        return JointCommand(yaw, command.leg, command.antenna)
+
+
 class Raises(Clumsy):
     def fail(self, command: JointCommand, bad: Any) -> JointCommand:
         if bad.any():
@@ -233,6 +248,8 @@ def sound() -> list[Any]:
     [
         (NotFinite, "controller: expected finite angles in yaw, found"),
         (NoManeuver, "controller: expected a maneuver of 0 to 4, found -1"),
+        (NoContact, "controller: expected contacts of 0 to 2, found [7 7]"),
+        (Complex, "controller: expected real numbers as yaw, found an array of complex128"),
         (Raises, "controller: step raised SystemExit: of my own"),
         (WrongShape, "controller: expected yaw of shape (1, 5), found (1, 4)"),
         (BadReset, "controller: reset raised KeyError: 'of my own'"),
@@ -270,6 +287,33 @@ def test_a_failing_controller_is_named_by_its_path_and_its_invalid_trials_are_to
     assert "my file" not in out
     assert out.endswith("Invalid trials: 1; trials.csv gives the reason of each.\n")
     assert "ZeroDivisionError" in (tmp_path / "run" / "trials.csv").read_text()
+
+
+def test_one_worker_survives_a_controller_that_ends_its_process_and_prints(
+    tmp_path: Path,
+) -> None:
+    """Both in a process beside the command, whose output holds its own words alone."""
+    (tmp_path / "my_file.py").write_text(
+        "import os\nfrom antennate.control.controllers import open_loop\n"
+        "def Ends(control, robot, batch):\n"
+        "    made = open_loop(control, robot, batch)\n"
+        "    made.step = lambda frame: print('my own words', flush=True) or os._exit(0)\n"
+        "    return made\n"
+    )
+    words = ["tunnel", "--trials", "1", "--workers", "1", "--no-figures", "--json", "--controllers"]
+    done = subprocess.run(
+        [sys.executable, "-m", "antennate", *words, "open", "my_file.py:Ends", "--time-limit", "1"],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    result = json.loads(done.stdout)
+    assert result["controllers"]["my_file.py:Ends"]["invalid"] == 1
+    assert (
+        "a worker process ended with code 0" in (tmp_path / "runs/tunnel-1/trials.csv").read_text()
+    )
+    assert "my own words" in done.stderr
 
 
 def test_the_reason_of_a_failure_names_the_line_of_the_user(tmp_path: Path) -> None:

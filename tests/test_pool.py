@@ -139,9 +139,9 @@ def test_workers_end_when_the_program_is_killed(tmp_path: Path) -> None:
     path = {**os.environ, "PYTHONPATH": str(Path(__file__).parent)}
     path["PYTHONPATH"] += os.pathsep + os.environ.get("PYTHONPATH", "")
     command = [sys.executable, str(tmp_path / "killed.py")]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=path) as program:
-        assert program.stdout is not None
-        workers = [int(program.stdout.readline()) for _ in range(2)]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, env=path) as program:
+        assert program.stderr is not None  # to which workers print
+        workers = [int(program.stderr.readline()) for _ in range(2)]
         assert all(Path(f"/proc/{worker}").exists() for worker in workers)
         program.kill()
     limit = time.monotonic() + 60.0

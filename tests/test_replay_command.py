@@ -144,6 +144,41 @@ def test_it_leaves_a_table_and_a_figure(tmp_path: Path, capsys: pytest.CaptureFi
     assert "--overwrite" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(
+    ("answer", "code", "said"),
+    [
+        ("1 / 0", 2, "of 180 ticks, first by this: ZeroDivisionError"),
+        ("replace(command, yaw=command.yaw * np.nan)", 2, "by this: expected finite angles in yaw"),
+        ("replace(command, leg=command.leg[:, :1])", 2, "by this: expected leg of shape"),
+        ("replace(command, yaw=command.yaw * 1j)", 2, "by this: expected finite angles in yaw"),
+        (
+            "replace(command, yaw=command.yaw + 0.01)",
+            0,
+            "in all 180 ticks, but its commands differ",
+        ),
+    ],
+)
+def test_a_controller_that_fails_or_commands_otherwise_is_told_in_the_sentence(
+    answer: str, code: int, said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """It decides as the recorded one, and begins to differ after 10 steps."""
+    path = recorded(session(tmp_path, "open", 1), tmp_path / "log", 180)
+    own = tmp_path / "own.py"
+    own.write_text(
+        "from dataclasses import replace\nimport numpy as np\n"
+        "from antennate.control.controllers import open_loop\n"
+        "class Own:\n"
+        "    def __init__(self, *given): self.sound, self.count = open_loop(*given), 0\n"
+        "    def __getattr__(self, name): return getattr(self.sound, name)\n"
+        "    def step(self, frame):\n"
+        "        command = self.sound.step(frame)\n"
+        "        self.count += 1\n"
+        f"        return command if self.count <= 10 else {answer}\n"
+    )
+    assert main(["replay", str(path), "--controller", f"{own}:Own"]) == code
+    assert said in capsys.readouterr().out.replace("\n", " ")
+
+
 def test_G2_a_damaged_log_is_replayed_as_far_as_it_goes(
     log: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -27,6 +27,7 @@ from study_trials import trial
 
 import antennate
 from antennate.cli import main
+from antennate.control.registry import CONTROLLERS
 from antennate.errors import WorkerError
 from antennate.experiments.study.config import StudyConfig
 from antennate.studies import slurm
@@ -69,6 +70,19 @@ def test_a_function_is_studied_from_python() -> None:
         antennate.BadInputError, match=r"assumed: .* whose parameters have no sources"
     ):
         antennate.study(trial, VARY, plan="sobol", assumed=0.2)
+
+
+@pytest.mark.parametrize("engine", ["dask", "slurm-local"])
+def test_a_class_that_workers_cannot_import_costs_no_study(
+    engine: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """An earlier run of the same program had it as its controller."""
+    pytest.importorskip("distributed" if engine == "dask" else "submitit")
+    nowhere = types.ModuleType("nowhere_to_be_found")
+    exec("class Own: pass", vars(nowhere))
+    monkeypatch.setitem(sys.modules, "nowhere_to_be_found", nowhere)
+    CONTROLLERS.add("Own", nowhere.Own)
+    assert table("here", workers=1, engine=engine).count(b",ok,") == 16
 
 
 def test_a_function_that_workers_cannot_import_costs_no_other_study(

@@ -15,7 +15,13 @@ from antennate.cli.options import fields_of, flag_of, option
 from antennate.cli.progress import progress, stop_signals
 from antennate.cli.results import drawn_table, folder_for, tell
 from antennate.cli.run_options import Options, go_on, workers_of
-from antennate.cli.view_options import ViewOptions, require_viewable, say_by_hand, view_of
+from antennate.cli.view_options import (
+    OF_WORKERS,
+    ViewOptions,
+    require_viewable,
+    say_by_hand,
+    view_of,
+)
 from antennate.errors import (
     BadInputError,
     ConfigError,
@@ -30,7 +36,7 @@ from antennate.params.base import Params
 from antennate.studies.engines import WARP
 from antennate.studies.experiment import Experiment, Outcome
 from antennate.studies.formats import to_json
-from antennate.studies.identity import differences, environment, identity
+from antennate.studies.identity import code_named, differences, environment, identity
 from antennate.studies.measures import Interim, Table
 from antennate.studies.pool import ShardEnd, Workers
 from antennate.studies.run_directory import RunDirectory
@@ -141,7 +147,8 @@ def carry_out(
     """
     require_viewable(options, config)
     _require_trials(experiment, options)
-    workers = workers_of(options, closed=shards is not None, apart=experiment.continued)
+    apart = experiment.continued or bool(code_named(config.model_dump(mode="json")))
+    workers = workers_of(options, closed=shards is not None, apart=apart)
     logs = isinstance(options, LogOptions) and options.log
     kind = f"{experiment.name} --log" if logs else experiment.name
     kind += " --engine warp" if options.engine.partition(":")[0] == WARP else ""
@@ -196,9 +203,10 @@ def _require_trials(experiment: Experiment[Any, Any], options: Options) -> None:
         raise ConfigError(
             f"--shard: expected a folder without a finished run, found {RESULT} in {options.out}"
         )
-    for name in ("engine", "slurm", "trial_timeout") if not experiment.on_workers else ():
+    of_workers = () if experiment.on_workers else OF_WORKERS
+    for name in of_workers:
         value, field = getattr(options, name), fields_of(type(options))[name]
-        if value != field.default:
+        if value != field.default and (name, value) != ("workers", 1):
             raise ConfigError(
                 f"{flag_of((name,))}: expected an experiment that runs trials on workers, found "
                 f"{experiment.name}"

@@ -18,7 +18,7 @@ from antennate.cli.replay import complain
 from antennate.cli.results import ResultOptions, log_of, tell
 from antennate.errors import ConfigError, MissingPackageError, OutputError
 from antennate.files import remove_abandoned, require_room, write_whole, writing_whole
-from antennate.messages import extra, one_line, typed
+from antennate.messages import extra, one_line, shortened, typed
 from antennate.params.base import Params
 from antennate.studies.formats import csv_lines
 from antennate.studies.measures import Table
@@ -78,6 +78,8 @@ def command(argv: Sequence[str]) -> int:
     if options.action == "info":
         if options.out is not None:
             raise ConfigError("--out: expected no file for `info`, found one")
+        if options.overwrite:
+            raise ConfigError("--overwrite: expected no file for `info`, found one")
         return _info(path, options)
     if options.json:
         raise ConfigError(f"--json: expected `info` beside it, found {options.action}")
@@ -109,10 +111,16 @@ def _target(path: Path, options: Options) -> Path:
     target = options.out or path.with_name(stem + endings[0])
     if target.suffix not in endings:
         raise ConfigError(f"--out: expected a name with {' or '.join(endings)}, found {target}")
-    if target.is_dir():
-        raise ConfigError(f"--out: expected the name of a file, found the folder {target}")
-    if target.exists() and path.exists() and target.samefile(path):
-        raise ConfigError(f"--out: expected another file than the log, found {target}")
+    try:
+        if target.is_dir():
+            raise ConfigError(f"--out: expected the name of a file, found the folder {target}")
+        if target.exists() and path.exists() and target.samefile(path):
+            raise ConfigError(f"--out: expected another file than the log, found {target}")
+    except OSError as error:
+        raise OutputError(
+            f"--out: expected a name that can be written, found {shortened(str(target))}: "
+            f"{error.strerror}"
+        ) from None
     return target
 
 

@@ -16,7 +16,7 @@ from antennate.cli.options import option
 from antennate.cli.results import ResultOptions, folder_for, log_of, tell
 from antennate.cli.view_options import ViewOptions, page_of, say_by_hand
 from antennate.errors import ConfigError
-from antennate.messages import one_line, short_names
+from antennate.messages import one_line, short_names, shortened
 from antennate.studies.formats import csv_lines
 from antennate.studies.measures import Measure, Table
 from antennate.studies.report import View
@@ -28,14 +28,14 @@ from antennate.types import Maneuver
 DESCRIPTION = """\
 Let the controller of a log decide upon the recorded readings again, or another one in its place,
 and compare. The same code decides the same, bit by bit. Damaged parts of a log are left out and
-named; the exit code is 2 then."""
+named; the exit code is 2 then, and where the controller fails."""
 TICKS = "ticks.csv"
 _NO_STATE = "none"
 """State of ticks without a supervisor, as in a simulation."""
 COUNTS = (
     Measure("different", "maneuvers that differ", form="d"),
     Measure("different_commands", "commands that differ", form="d"),
-    Measure("failures", "exceptions", form="d"),
+    Measure("failures", "failures", form="d"),
     Measure("missing", "ticks missing", form="d"),
 )
 
@@ -60,6 +60,8 @@ def command(argv: Sequence[str]) -> int:
     if not options.log:
         raise ConfigError("expected the name of a log or of a run, found none")
     path = log_of(Path(options.log))
+    if options.out is None and options.overwrite:
+        raise ConfigError("--overwrite: expected --out beside it, found none")
     log, found, by_hand = _replayed(path, config, options)
     log.require_ticks()
     result = _result(log, found, config.controller)
@@ -69,7 +71,7 @@ def command(argv: Sequence[str]) -> int:
             say_by_hand(by_hand, folder)
             folder.finish(result)
     tell(result, options, VIEW.tables(result), VIEW.sentence(result))
-    return complain("replay", log)
+    return max(complain("replay", log), BAD_INPUT if found.failures else OK)
 
 
 def _replayed(
@@ -142,6 +144,7 @@ def _result(log: LogReader, found: Replayed, controller: str | None) -> dict[str
         },
         "different_commands": found.commands,
         "failures": found.failures,
+        "failure": found.failure,
         "missing": log.missing,
         "damaged": log.bad,
         "closed": log.end is not None,
@@ -173,13 +176,22 @@ def _tables(result: Mapping[str, Any]) -> Sequence[Table]:
 def _sentence(result: Mapping[str, Any]) -> str:
     """What came out, in one sentence."""
     ticks, different = result["ticks"], result["different"]
-    if not different:
-        return f"The controller decided as recorded in all {ticks} ticks."
-    first = result["first_difference"]
-    return (
-        f"The controller decided otherwise in {different} of {ticks} ticks, first in tick "
-        f"{first['tick']} at {first['time_s']:.2f} s: {first['replayed']} for {first['recorded']}."
-    )
+    if failures := result["failures"]:
+        why = shortened(result.get("failure", "") or "an exception")
+        return f"The controller failed in {failures} of {ticks} ticks, first by this: {why}."
+    if different:
+        first = result["first_difference"]
+        return (
+            f"The controller decided otherwise in {different} of {ticks} ticks, first in tick "
+            f"{first['tick']} at {first['time_s']:.2f} s: {first['replayed']} for "
+            f"{first['recorded']}."
+        )
+    if commands := result["different_commands"]:
+        return (
+            f"The controller decided as recorded in all {ticks} ticks, but its commands differ in "
+            f"{commands} of them."
+        )
+    return f"The controller decided as recorded in all {ticks} ticks."
 
 
 VIEW = View("replay", DESCRIPTION, ReplayConfig, _tables, _sentence)

@@ -18,7 +18,7 @@ from antennate.studies.run_directory import RunDirectory
 from antennate.studies.run_files import BY_HAND
 from antennate.telemetry.view import ports
 
-_OF_WORKERS = ("workers", "engine", "slurm", "shard", "resume", "retry", "trial_timeout")
+OF_WORKERS = ("workers", "engine", "slurm", "shard", "resume", "retry", "trial_timeout")
 """Names of what is for trials that run at any place, in any order."""
 
 if TYPE_CHECKING:  # both import much, for a page that few runs want
@@ -118,7 +118,7 @@ def require_viewable(options: Any, config: Params) -> None:
         ConfigError: It cannot.
     """
     shown = getattr(options, "view", False) or getattr(options, "foxglove", False)
-    for name in _OF_WORKERS if shown else ():
+    for name in OF_WORKERS if shown else ():
         field, value = fields_of(type(options)).get(name), getattr(options, name, None)
         if field is not None and value != field.default and (name, value) != ("workers", 1):
             raise ConfigError(

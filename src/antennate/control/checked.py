@@ -8,9 +8,18 @@ import numpy as np
 
 from antennate.errors import ControllerError, in_one_line, where
 from antennate.robots.spec import RobotSpec
-from antennate.types import AntennaFrame, Bools, Controller, Floats, Ints, JointCommand, Maneuver
+from antennate.types import (
+    AntennaFrame,
+    Bools,
+    Contact,
+    Controller,
+    Floats,
+    Ints,
+    JointCommand,
+    Maneuver,
+)
 
-_LAST = max(Maneuver)
+_LAST, _MOST_CONTACT = max(Maneuver), max(Contact)
 _KINDS = (
     ("maneuver", "whole numbers", "iu"),
     ("contact", "whole numbers", "iu"),
@@ -93,6 +102,9 @@ class CheckedController:
                     )
                 if value.shape != shape:
                     raise ControllerError(f"expected {name} of shape {shape}, found {value.shape}")
+        for name in self._shapes:
+            if (kind := getattr(command, name).dtype).kind not in "fiu":
+                raise ControllerError(f"expected real numbers as {name}, found an array of {kind}")
         for name, words, kinds in _KINDS:
             kind = getattr(self._controller, name).dtype
             if kind.kind not in kinds:
@@ -100,10 +112,11 @@ class CheckedController:
 
     def _all_sound(self, command: JointCommand) -> bool:
         """Whether no row has a fault. A product that is finite has finite factors."""
-        maneuvers = self.maneuver.tolist()
+        maneuvers, contacts = self.maneuver.tolist(), self._controller.contact.ravel().tolist()
         angles = [getattr(command, name) for name in self._shapes]
         squares = sum(float(np.vdot(a, a)) for a in angles)
-        return math.isfinite(squares) and min(maneuvers) >= 0 and max(maneuvers) <= _LAST
+        known = min(contacts) >= 0 and max(contacts) <= _MOST_CONTACT
+        return known and math.isfinite(squares) and min(maneuvers) >= 0 and max(maneuvers) <= _LAST
 
     def _find_faults(self, command: JointCommand) -> None:
         for name in self._shapes:
@@ -112,3 +125,6 @@ class CheckedController:
                 self.faults[int(row)] = f"expected finite angles in {name}, found {angles[row]}"
         for row in np.flatnonzero((self.maneuver < 0) | (self.maneuver > _LAST)):
             self.faults[int(row)] = f"expected a maneuver of 0 to 4, found {self.maneuver[row]}"
+        contact = self._controller.contact
+        for row in np.flatnonzero(((contact < 0) | (contact > _MOST_CONTACT)).any(axis=1)):
+            self.faults[int(row)] = f"expected contacts of 0 to 2, found {contact[row]}"

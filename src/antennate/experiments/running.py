@@ -133,6 +133,10 @@ def run(
         raise ConfigError(f"workers: expected a whole number of at least 1, found {workers!r}")
     found, config = _configured(name_or_config, settings, workers)
     found.check(config)
+    if engine != LOCAL and not found.on_workers:
+        raise ConfigError(
+            f"engine: expected an experiment that runs trials on workers, found {found.name}"
+        )
     if video is not None:
         require_films(found, config, video, out)
     pool = Workers(workers, make_engine(engine))

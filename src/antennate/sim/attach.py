@@ -53,10 +53,12 @@ def attach_antenna(
         The name.
 
     Raises:
-        ConfigError: There is no such body, the name is taken, the side is unknown, or the position
-            or the angle is not finite.
+        ConfigError: There is no such body, the name is taken, the side is unknown, the position or
+            the angle is not finite, or the antenna is none.
     """
     name = f"antenna_{side}" if name is None else name
+    if not isinstance(antenna, AntennaSpec):  # pyright: ignore[reportUnnecessaryIsInstance]
+        raise ConfigError(f"antenna: expected an AntennaSpec, found {shown(antenna)}")
     outwards = antenna.base_angle if angle is None else angle
     carrier = _carrier(spec, body, name)
     _require_place(position, outwards)

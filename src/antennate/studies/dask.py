@@ -18,7 +18,7 @@ from concurrent.futures import CancelledError
 from typing import Any
 
 from antennate.errors import WorkerError, in_one_line
-from antennate.studies.processes import Processes
+from antennate.studies.processes import Packed, Processes
 from antennate.studies.submitted import (
     Submitted,
     folder_of,
@@ -210,7 +210,7 @@ def _quiet() -> Iterator[None]:
 
 
 def carry_out_apart(
-    part: Part, theirs: Mapping[str, Any], added: Mapping[str, Any], run: str
+    part: Part, theirs: Mapping[str, Any], added: Packed, run: str
 ) -> list[tuple[int, Any]]:
     """In a worker: results and failures by place, of trials that run in a process beside it.
 

@@ -14,7 +14,7 @@ import pickle
 import signal
 import threading
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from multiprocessing.connection import Connection, wait
 from typing import Any
 
@@ -38,7 +38,7 @@ _READY, _BEGUN, _FAILED, _RESULT = range(4)
 """Kinds of messages of a worker."""
 _LAST_WORDS = 1.0
 """Time that a worker whose connection has ended has to end by itself, with its own code [s]."""
-_Packed = Mapping[str, Mapping[str, bytes]]
+Packed = Mapping[str, Mapping[str, bytes]]
 """Added objects by registry and name, each pickled."""
 
 
@@ -62,7 +62,7 @@ class Processes:
         checked = sendable(work.tasks)
         if isinstance(checked, NotSent):
             raise WorkerError(checked.reason)
-        pool = _Pool(work, parts, _packed(added_objects()), emit, fail, self._left)
+        pool = _Pool(work, parts, added_objects(), emit, fail, self._left)
         self._left = []
         try:
             pool.run(min(count, len(parts)))
@@ -85,7 +85,7 @@ class _Pool:
         self,
         work: Work,
         parts: Sequence[Sequence[int]],
-        added: _Packed,
+        added: Packed,
         emit: Emit,
         fail: Fail,
         workers: Sequence[_Worker] = (),
@@ -182,7 +182,7 @@ class _Worker:
         deadline: When it is given up.
     """
 
-    def __init__(self, added: _Packed) -> None:
+    def __init__(self, added: Packed) -> None:
         context = multiprocessing.get_context("spawn")
         self.connection, theirs = context.Pipe()
         # a parent that ends ends those that are daemons; others it would wait for
@@ -212,26 +212,25 @@ class _Worker:
         self.connection.close()
 
 
-def added_objects() -> dict[str, dict[str, Any]]:
-    """Objects that were added to registries here, for workers; what cannot be sent says so."""
+def added_objects(dumps: Callable[[Any], bytes] = pickle.dumps) -> Packed:
+    """Objects that were added to registries here, for workers; what cannot be sent says so.
+
+    Each is packed apart, so that one that a worker cannot read costs no other.
+
+    Args:
+        dumps: What packs one: `cloudpickle.dumps` also packs what was typed at a prompt.
+    """
     return {
-        group: {name: sendable(each) for name, each in objects.items()}
+        group: {name: dumps(sendable(each)) for name, each in objects.items()}
         for group, objects in ADDED.items()
     }
 
 
-def take_added(added: Mapping[str, Mapping[str, Any]]) -> None:
+def take_added(added: Packed) -> None:
     """In a worker: know the objects that were added in the driver."""
     for group, objects in added.items():
-        ADDED.setdefault(group, {}).update(objects)
-
-
-def _packed(added: Mapping[str, Mapping[str, Any]]) -> _Packed:
-    """Each object apart, so that one that a worker cannot read costs no other."""
-    return {
-        group: {name: pickle.dumps(each) for name, each in objects.items()}
-        for group, objects in added.items()
-    }
+        found = {name: _read(content) for name, content in objects.items()}
+        ADDED.setdefault(group, {}).update(found)
 
 
 def _read(content: bytes) -> Any:
@@ -269,11 +268,13 @@ def on_ctrl_c(handler: Any) -> Iterator[None]:
         signal.signal(signal.SIGINT, before)
 
 
-def _serve(connection: Connection, added: _Packed) -> None:
+def _serve(connection: Connection, added: Packed) -> None:
     """What a worker process does until it is ended."""
     multiprocessing.current_process().daemon = False  # so that a trial may start processes too
-    take_added({k: {n: _read(c) for n, c in of.items()} for k, of in added.items()})
+    take_added(added)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    with contextlib.suppress(OSError):
+        os.dup2(2, 1)  # what a user's code prints belongs to no result of the driver's
     threading.Thread(target=_end_with_parent, daemon=True).start()
     connection.send((_READY, 0, None))
 

@@ -98,8 +98,9 @@ class RunDirectory:
             OutputError: It cannot be made or written to, it holds another run, or another process
                 works on it.
         """
-        if path == "":
-            raise OutputError("expected the name of a folder, found an empty one")
+        if path == "" or "\0" in str(path):
+            found = "one with a zero byte" if path else "an empty one"
+            raise OutputError(f"expected the name of a folder, found {found}")
         place = free(command) if path is None else Path(path)
         with _writing(place):
             missing = [p for p in (place, *place.parents) if not p.exists()]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+from numbers import Integral
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,7 @@ import numpy as np
 from antennate.control.checked import CheckedController
 from antennate.control.loop import run_loop
 from antennate.control.registry import ControllerFactory, make_controller
-from antennate.errors import ControllerError
+from antennate.errors import ConfigError, ControllerError
 from antennate.params.control import ControlParams
 from antennate.params.reading import from_values
 from antennate.sim.scenes.registry import make_scene
@@ -53,6 +54,8 @@ def simulate(
         ControllerError: The controller raised an exception, or what it answers is no command.
         LogError: The log cannot be written.
     """
+    if not isinstance(trial, Integral) or trial < 0:
+        raise ConfigError(f"trial: expected a whole number of at least 0, found {trial!r}")
     config, control = from_values(TrialConfig, settings), control or ControlParams()
     scene = make_scene(config.scene, config.tunnel)
     start = draw_trial(config, scene, trial, control.gait, control.period)

@@ -227,7 +227,9 @@ class _Files:
     def job(self, places: list[int]) -> _Job:
         """A new job for some tasks."""
         file = self.folder / f"{time.time_ns()}.jsonl"
-        told = (self._identity, self._work.part(places), added_objects(), self.at_once)
+        from cloudpickle import dumps  # submitit brings it
+
+        told = (self._identity, self._work.part(places), added_objects(dumps), self.at_once)
         return _Job(file, places, Resumable(str(file), *told, noted=True))
 
     def note(self, job: _Job, cluster: str, number: str) -> None:

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from antennate.studies.codec import encoded
-from antennate.studies.processes import Processes
+from antennate.studies.processes import Packed, Processes
 from antennate.studies.store import Store
 from antennate.studies.submitted import require_same, work_apart
 from antennate.studies.work import Failure, Part
@@ -47,7 +47,7 @@ class Resumable:
         file: str,
         identity: Mapping[str, Any],
         part: Part,
-        added: Mapping[str, Any],
+        added: Packed,
         at_once: int = 1,
         noted: bool = False,
     ) -> None:

@@ -20,7 +20,7 @@ from typing import Any
 from antennate.errors import MissingPackageError, WorkerError, in_one_line
 from antennate.messages import extra
 from antennate.studies.identity import differences, environment, environment_here
-from antennate.studies.processes import added_objects, take_added
+from antennate.studies.processes import Packed, added_objects, take_added
 from antennate.studies.work import Emit, Fail, Failure, Part, Waiting, Work
 
 _FOLDER = "folder"
@@ -56,7 +56,8 @@ class Submitted:
     ) -> None:
         """Run the tasks at these places; see `Engine`."""
         waiting, running = Waiting(parts), dict[Any, list[int]]()
-        told = ({**(work.shared or environment()), _FOLDER: _folder()}, added_objects())
+        theirs = {**(work.shared or environment()), _FOLDER: _folder()}
+        told = (theirs, added_objects(_by_value()))
         try:
             while waiting or running:
                 count = self._workers() if self._workers is not None else count
@@ -101,9 +102,16 @@ class Submitted:
             (fail if isinstance(answer, Failure) else emit)(place, answer)
 
 
-def carry_out(
-    part: Part, theirs: Mapping[str, Any], added: Mapping[str, Any]
-) -> list[tuple[int, Any]]:
+def _by_value() -> Callable[[Any], bytes]:
+    """What packs an object typed at a prompt too, where the engine brings it."""
+    try:
+        from cloudpickle import dumps
+    except ImportError:
+        return pickle.dumps
+    return dumps
+
+
+def carry_out(part: Part, theirs: Mapping[str, Any], added: Packed) -> list[tuple[int, Any]]:
     """In a worker: results and failures by place.
 
     Raises:
@@ -120,9 +128,7 @@ def carry_out(
     return answers
 
 
-def work_apart(
-    part: Part, folder: Path, added: Mapping[str, Any], ignored: Sequence[int] = ()
-) -> Work:
+def work_apart(part: Part, folder: Path, added: Packed, ignored: Sequence[int] = ()) -> Work:
     """A part as work for a process beside this one, which needs nothing that this one imported.
 
     Args:

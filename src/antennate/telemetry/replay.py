@@ -12,8 +12,9 @@ from pydantic import field_validator
 
 from antennate.control.loop import run_loop
 from antennate.control.registry import BUILT_IN, CONTROLLERS, make_controller
-from antennate.errors import LogError
+from antennate.errors import LogError, in_one_line, where
 from antennate.hardware.driving.decision import Decision, decision_of, no_command
+from antennate.messages import shortened
 from antennate.params.base import Params, number
 from antennate.robots.spec import RobotSpec
 from antennate.telemetry.header import TWIN, Header
@@ -94,13 +95,14 @@ class ReplayRobot:
 class _Guarded:
     """A controller that is asked in the ticks in which it was asked then.
 
-    Its exceptions give a command of NaN, as in a session.
+    Its exceptions, and answers of another form, give a command of NaN, as in a session.
     """
 
     def __init__(self, controller: Controller, log: ReplayRobot, robot: RobotSpec) -> None:
         self._controller, self._log, self._robot = controller, log, robot
         self._kept: JointCommand | None = None
         self._refused = self.failures = 0
+        self.failure = ""
         self.decision = Decision()
 
     def step(self, frame: AntennaFrame) -> JointCommand:
@@ -112,14 +114,31 @@ class _Guarded:
         try:
             command = self._controller.step(frame)
             self.decision = decision_of(self._controller)
+            if wrong := _wrong(command, self._robot):
+                self._note(wrong)
             if self._refused <= refused:
                 self._kept = command
             return command
         except KeyboardInterrupt:
             raise
-        except BaseException:  # noqa: BLE001 a plugged-in controller may raise anything
-            self.failures += 1
+        except BaseException as error:  # noqa: BLE001 a plugged-in controller may raise anything
+            self._note(f"{in_one_line(error)}{where(error)}")
             return no_command(self._robot)
+
+    def _note(self, failure: str) -> None:
+        self.failures += 1
+        self.failure = self.failure or failure
+
+
+def _wrong(command: JointCommand, robot: RobotSpec) -> str:
+    """What is wrong with the angles of a command; empty if nothing is."""
+    for name, shape in robot.command_shapes().items():
+        found = np.shape(angles := getattr(command, name))
+        if found != shape:
+            return f"expected {name} of shape {shape}, found {found}"
+        if np.iscomplexobj(angles) or not np.isfinite(np.asarray(angles, float)).all():
+            return f"expected finite angles in {name}, found {shortened(str(angles))}"
+    return ""
 
 
 class Difference(NamedTuple):
@@ -143,7 +162,8 @@ class Replayed:
         end: The loop's time at the last tick [s].
         different: Ticks whose maneuver differs.
         commands: Ticks whose command differs in any bit of its value.
-        failures: Ticks in which the controller raised an exception.
+        failures: Ticks in which the controller raised an exception or gave a wrong answer.
+        failure: The first of them.
         first: The first tick whose maneuver differs, None if none does.
     """
 
@@ -155,6 +175,7 @@ class Replayed:
     different: int = 0
     commands: int = 0
     failures: int = 0
+    failure: str = ""
     first: Difference | None = None
 
     def note(self, tick: Tick, maneuver: int, command: JointCommand) -> None:
@@ -202,7 +223,7 @@ def replay(
 
     if log.tick is not None:
         run_loop(log, control, header.params.period, go_on)
-    found.failures = control.failures
+    found.failures, found.failure = control.failures, control.failure
     return found
 
 

@@ -9,7 +9,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import BinaryIO, NamedTuple
 
-from antennate.telemetry.chunks import Place, chunk_at, is_sound, places, summary
+from antennate.errors import LogError
+from antennate.telemetry.chunks import Chunk, Place, chunk_at, is_sound, places, summary
+from antennate.telemetry.ticks import Tick
 from antennate.telemetry.topics import EVENTS, HEADER_TOPICS, MANEUVER, TICK_TOPICS, TOPICS, Topic
 
 
@@ -51,7 +53,9 @@ def by_summary(file: BinaryIO, topics: Mapping[int, Topic]) -> Survey | None:
     try:
         events, ends = _looked_through(file, topics)
         chunks = [chunk for place in ends if (chunk := chunk_at(file, place)) is not None]
-    except ValueError:  # also of an event that is none
+        for chunk in chunks:
+            _require_ticks(chunk, topics)
+    except (ValueError, LogError):  # also of an event that is none
         return None
     ticks = [m for chunk in chunks for m in chunk.messages if topics.get(m.channel) is MANEUVER]
     numbers, times = [m.number for m in ticks], [m.time for m in ticks]
@@ -61,6 +65,22 @@ def by_summary(file: BinaryIO, topics: Mapping[int, Topic]) -> Survey | None:
     for topic in HEADER_TOPICS:
         kept.pop(topic, None)
     return Survey(kept, events, *span(times), numbers[-1] if numbers else 0)
+
+
+def _require_ticks(chunk: Chunk, topics: Mapping[int, Topic]) -> None:
+    """Check that the ticks of a chunk can be read.
+
+    Raises:
+        LogError: One cannot.
+    """
+    ticks: dict[int, dict[Topic, bytes]] = {}
+    for message in chunk.messages:
+        if (topic := topics.get(message.channel)) in TICK_TOPICS and topic is not None:
+            ticks.setdefault(message.number, {})[topic] = message.data
+    for found in ticks.values():
+        if len(found) < len(TICK_TOPICS):
+            raise LogError("a tick that is not whole")
+        Tick.of_messages(found)
 
 
 def _looked_through(

@@ -27,6 +27,7 @@ _HARDWARE = {"voltage": 1, "overheat": 4, "encoder": 8, "shock": 16, "overload":
 NONE = "none"
 """Takes back what was wrong; a latched hardware error stays until a reboot."""
 _SIDES = ("left", "right")
+_MOST_COUNTS = 4095
 _BOARD = ("silent", "reset", *(f"{kind}_{side}" for kind in ("open", "short") for side in _SIDES))
 _KNOWN = {
     "servo": (*_SERVO, *_HARDWARE, "reboot", NONE),
@@ -85,6 +86,8 @@ def read(text: str) -> Demand:
         raise BadInputError(
             f"--fault: expected numbers for size and time, found {text!r}"
         ) from None
+    if match["what"] in _SIDES and size > _MOST_COUNTS:
+        raise BadInputError(f"--fault: expected a reading of 0 to {_MOST_COUNTS}, found {text!r}")
     if match["what"] in _SHARES and not 0.0 <= size <= 1.0:
         raise BadInputError(f"--fault: expected a share of 0 to 1, found {text!r}")
     if register:

@@ -78,7 +78,7 @@ class Esp32Recording:
         )
 
 
-def read_esp32(source: str | Path | bytes) -> Esp32Recording:
+def read_esp32(source: str | Path | bytes | bytearray | memoryview) -> Esp32Recording:
     """Decode a recorded stream of the antenna board.
 
     Damaged frames are skipped and counted; duplicates are dropped; samples that arrived late are
@@ -91,6 +91,8 @@ def read_esp32(source: str | Path | bytes) -> Esp32Recording:
         BadInputError: The file cannot be read, or there is no usable sample in it.
     """
     decoder, hellos, samples, refused = FrameDecoder(), {}, {}, ""
+    if isinstance(source, bytearray | memoryview):
+        source = bytes(source)
     data = source if isinstance(source, bytes) else read_limited(Path(source), _LARGEST)
     for frame in decoder.feed(data):
         if isinstance(frame, Hello):
