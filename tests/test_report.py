@@ -103,6 +103,10 @@ def test_a_page_says_when_it_was_run_and_how_to_read_it() -> None:
         page.text,
     )
     assert "# begun" not in page.text
+    told = Path("run/command.txt").read_text()
+    Path("run/command.txt").write_text(told.replace("# begun", "# resumed"))
+    assert main(["report", "run"]) == 0
+    assert "UTC; the rest took " in Page(Path("run/report.html")).text
     _, _, reading = page.text.partition("How to read this")
     for term in ("Wilson 95 %", "Restricted mean time", "McNemar", "Wilcoxon"):
         assert f"{term}: " in reading

@@ -29,12 +29,12 @@ def sentence(text: str) -> str:
         }
     except ValueError:
         return ""
-    for what, told in (("begun", "Run on"), ("resumed", "Resumed on")):
+    for what, told, it in (("begun", "Run on", "it"), ("resumed", "Resumed on", "the rest")):
         if what in found:
             took = found["ended"] - found[what] if "ended" in found else None
             day = f"{told} {found[what]:%Y-%m-%d at %H:%M} UTC"
             return (
-                f"{day}; it took {_span(took.total_seconds())}." if took is not None else f"{day}."
+                f"{day}; {it} took {_span(took.total_seconds())}." if took is not None else f"{day}."
             )
     return ""
 
