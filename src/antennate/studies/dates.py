@@ -33,9 +33,7 @@ def sentence(text: str) -> str:
         if what in found:
             took = found["ended"] - found[what] if "ended" in found else None
             day = f"{told} {found[what]:%Y-%m-%d at %H:%M} UTC"
-            return (
-                f"{day}; {it} took {_span(took.total_seconds())}." if took is not None else f"{day}."
-            )
+            return f"{day}." if took is None else f"{day}; {it} took {_span(took.total_seconds())}."
     return ""
 
 
