@@ -294,10 +294,11 @@ def test_one_worker_survives_a_controller_that_ends_its_process_and_prints(
 ) -> None:
     """Both in a process beside the command, whose output holds its own words alone."""
     (tmp_path / "my_file.py").write_text(
-        "import os\nfrom antennate.control.controllers import open_loop\n"
+        "import signal\nfrom antennate.control.controllers import open_loop\n"
         "def Ends(control, robot, batch):\n"
         "    made = open_loop(control, robot, batch)\n"
-        "    made.step = lambda frame: print('my own words', flush=True) or os._exit(0)\n"
+        "    end = signal.raise_signal\n"
+        "    made.step = lambda frame: print('my own words', flush=True) or end(9)\n"
         "    return made\n"
     )
     words = ["tunnel", "--trials", "1", "--workers", "1", "--no-figures", "--json", "--controllers"]
@@ -311,7 +312,7 @@ def test_one_worker_survives_a_controller_that_ends_its_process_and_prints(
     result = json.loads(done.stdout)
     assert result["controllers"]["my_file.py:Ends"]["invalid"] == 1
     assert (
-        "a worker process ended with code 0" in (tmp_path / "runs/tunnel-1/trials.csv").read_text()
+        "a worker process ended with code -9" in (tmp_path / "runs/tunnel-1/trials.csv").read_text()
     )
     assert "my own words" in done.stderr
 

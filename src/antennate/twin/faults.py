@@ -27,7 +27,8 @@ _HARDWARE = {"voltage": 1, "overheat": 4, "encoder": 8, "shock": 16, "overload":
 NONE = "none"
 """Takes back what was wrong; a latched hardware error stays until a reboot."""
 _SIDES = ("left", "right")
-_MOST_COUNTS = 4095
+_MOST_COUNTS = 65535
+"""Largest reading that a frame can hold; those above 4095 are none of its converter."""
 _BOARD = ("silent", "reset", *(f"{kind}_{side}" for kind in ("open", "short") for side in _SIDES))
 _KNOWN = {
     "servo": (*_SERVO, *_HARDWARE, "reboot", NONE),
