@@ -278,7 +278,7 @@ def test_X23_a_drive_and_its_twin_are_shown(tab: Tab, keep: Keep, tmp_path: Path
                 assert not tab.run(
                     "/pause|one step|restart|θ: level/.test(document.body.innerText)"
                 )
-                walks = "/maneuver\\s+(FORWARD|TURN|REVERSE)/.test(document.body.innerText)"
+                walks = "/maneuver\\s+(forward|turn|reverse)/.test(document.body.innerText)"
                 if name == "drive":
                     keep(tab, name, walks)
                 stays_here(tab, view)
