@@ -13,6 +13,8 @@ from importlib.util import find_spec
 import pytest
 from hypothesis import settings
 
+from antennate.lookup import ADDED
+
 settings.register_profile("any machine", deadline=None)  # how long an example takes says nothing
 settings.load_profile("any machine")
 
@@ -41,6 +43,16 @@ def _signals_stay_as_they_are() -> Iterator[None]:
     yield
     for number, handler in before.items():
         signal.signal(number, handler)
+
+
+@pytest.fixture(autouse=True)
+def _registries_stay_as_they_are() -> Iterator[None]:
+    """What a test adds to a registry is known in its process from then on."""
+    before = {group: dict(objects) for group, objects in ADDED.items()}
+    yield
+    for group, objects in ADDED.items():
+        objects.clear()
+        objects.update(before.get(group, {}))
 
 
 OPTIONAL = {

@@ -10,6 +10,7 @@ import mujoco
 import numpy as np
 import pytest
 
+from antennate import simulate
 from antennate.cli import main
 from antennate.errors import AntennateError, ConfigError, SceneError
 from antennate.params.control import GaitParams
@@ -386,7 +387,7 @@ def test_an_error_in_ones_own_scene_names_it(tmp_path):
         check_start(TrialConfig(scene=f"{tmp_path / 'mine.py'}:Mine"))
 
 
-def test_a_trial_that_starts_inside_a_wall_is_invalid(tmp_path):
+def test_a_trial_that_starts_inside_a_wall_is_invalid(tmp_path, capsys):
     """Chance may move the start of a trial, though the first one has room."""
     walls = [f'<geom type="box" size="2 .02 .1" pos="0 {y} .1"/>' for y in (-0.4, 0.4)]
     path = mjcf(tmp_path, SITES + "".join(walls))
@@ -398,6 +399,12 @@ def test_a_trial_that_starts_inside_a_wall_is_invalid(tmp_path):
     assert 0 < len(invalid) < 4
     assert all("expected room for the robot at the start" in row["reason"] for row in invalid)
     assert all(row["force_max_n"] < 1e3 for row in rows if row not in invalid)
+    blocked, settings = invalid[0]["trial"], {"start_lateral": 0.35}
+    with pytest.raises(SceneError, match="expected room for the robot at the start"):
+        simulate("open", blocked, scene=str(path), variation=settings)
+    words = ["twin", "--scene", str(path), "--variation.start-lateral", "0.35", "--duration", "1"]
+    assert main([*words, "--trial", str(blocked)]) == 2
+    assert "expected room for the robot at the start" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

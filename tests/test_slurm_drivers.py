@@ -86,14 +86,17 @@ def test_jobs_of_a_driver_in_the_background_end_with_it(tmp_path: Path) -> None:
     script = f"trap '' INT; exec {sys.executable} driver.py"
     there = {**os.environ, "STUDY_NOTES": str(notes)}
     background = subprocess.Popen(["bash", "-c", script], env=there)
-    end = time.monotonic() + 120.0
-    while not notes.exists():
-        assert time.monotonic() < end
-        time.sleep(0.05)
-    (note,) = Path("run/slurm").glob("*.job")
-    job = int(json.loads(note.read_text())["job"])
-    background.terminate()
-    assert background.wait(60.0) != 0
+    try:
+        end = time.monotonic() + 120.0
+        while not notes.exists():
+            assert time.monotonic() < end
+            time.sleep(0.05)
+        (note,) = Path("run/slurm").glob("*.job")
+        job = int(json.loads(note.read_text())["job"])
+        background.terminate()
+        assert background.wait(60.0) != 0
+    finally:
+        background.kill()
     end = time.monotonic() + 15.0
     while Path(f"/proc/{job}").exists():
         assert time.monotonic() < end, "its trials take two minutes"

@@ -11,18 +11,13 @@ from pydantic.dataclasses import dataclass
 
 from antennate.cli.arguments import parse
 from antennate.cli.exit_codes import BAD_INPUT, INTERRUPTED, OK
-from antennate.cli.options import fields_of, flag_of, option
+from antennate.cli.options import option
 from antennate.cli.progress import progress, stop_signals
 from antennate.cli.results import drawn_table, folder_for, tell
-from antennate.cli.run_options import Options, go_on, workers_of
-from antennate.cli.view_options import (
-    OF_WORKERS,
-    ViewOptions,
-    require_viewable,
-    say_by_hand,
-    view_of,
-)
+from antennate.cli.run_options import Options, go_on, refuse_workers, workers_of
+from antennate.cli.view_options import ViewOptions, require_viewable, say_by_hand, view_of
 from antennate.errors import (
+    AntennateError,
     BadInputError,
     ConfigError,
     LogError,
@@ -203,14 +198,8 @@ def _require_trials(experiment: Experiment[Any, Any], options: Options) -> None:
         raise ConfigError(
             f"--shard: expected a folder without a finished run, found {RESULT} in {options.out}"
         )
-    of_workers = () if experiment.on_workers else OF_WORKERS
-    for name in of_workers:
-        value, field = getattr(options, name), fields_of(type(options))[name]
-        if value != field.default and (name, value) != ("workers", 1):
-            raise ConfigError(
-                f"{flag_of((name,))}: expected an experiment that runs trials on workers, found "
-                f"{experiment.name}"
-            )
+    if not experiment.on_workers:
+        refuse_workers(options, f"none, as {experiment.name} runs no trials on workers")
 
 
 def _outcome(
@@ -262,9 +251,11 @@ def _end(
     failure = _keep(experiment, outcome, options, run)
     try:
         tell(result, options, *_words(experiment, result))
-    finally:
-        if failure is not None:
-            raise failure
+    except AntennateError:
+        if failure is None:
+            raise
+    if failure is not None:
+        raise failure
     if interrupted:
         sys.stderr.write(
             f"antennate {experiment.name}: interrupted: kept {len(outcome.rows)} trials, all "
@@ -286,7 +277,7 @@ def _words(experiment: Experiment[Any, Any], result: Any) -> tuple[Sequence[Tabl
         if isinstance(sentence, str) and all(isinstance(table, Table) for table in tables):
             return tables, sentence
         found = f"{type(tables).__name__} and {type(sentence).__name__}"
-    except Exception as error:  # noqa: BLE001
+    except Exception as error:  # noqa: BLE001 an experiment of anybody may raise anything
         found = f"{in_one_line(error)}{where(error)}"
     raise BadInputError(
         f"{experiment.name}: expected tables to return a list of Table and sentence a text, "

@@ -9,7 +9,7 @@ from typing import Any
 
 from pydantic.dataclasses import dataclass
 
-from antennate.cli.options import option
+from antennate.cli.options import fields_of, flag_of, found, option
 from antennate.cli.results import ResultOptions
 from antennate.errors import ConfigError
 from antennate.messages import shortened, typed
@@ -33,7 +33,9 @@ class Options(ResultOptions):
     )
     shard: str | None = option(None, "run one of N parts, for `antennate merge`", "I/N")
     slurm: tuple[str, ...] = option((), "what SLURM is asked for, as timeout_min=60", "NAME=VALUE")
-    trial_timeout: float = option(TIMEOUT, "give a trial up after this time [s]", gt=0)
+    trial_timeout: float = option(
+        TIMEOUT, "give a trial up after this time [s]; unless said, one worker waits on", gt=0
+    )
 
 
 def workers_of(options: Options, closed: bool, apart: bool) -> Workers:
@@ -49,6 +51,24 @@ def workers_of(options: Options, closed: bool, apart: bool) -> Workers:
     return Workers(count, engine, shard=shard, closed=closed, apart=apart, **how)
 
 
+def refuse_workers(options: Any, expected: str) -> None:
+    """Refuse what is for trials that run at any place, in any order; one worker is none.
+
+    Args:
+        options: What was said; it may have no such options at all.
+        expected: What is expected in place of it.
+
+    Raises:
+        ConfigError: Something of the kind was said.
+    """
+    for name, field in fields_of(type(options)).items():
+        value = getattr(options, name)
+        if name in _OF_WORKERS and value != field.default and (name, value) != ("workers", 1):
+            told = "one" if value is True else found(value)
+            raise ConfigError(f"{flag_of((name,))}: expected {expected}, found {told}")
+
+
+_OF_WORKERS = ("workers", "engine", "slurm", "shard", "resume", "retry", "trial_timeout")
 _SAID_ANEW = {"--out": 1, "--overwrite": 0, "--no-overwrite": 0, "--resume": 0, "--no-resume": 0}
 """Flags that are left out of the words that go on, and how many values each has."""
 

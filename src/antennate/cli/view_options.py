@@ -10,16 +10,14 @@ from typing import TYPE_CHECKING, Any
 from pydantic.dataclasses import dataclass
 
 from antennate.cli import view_server
-from antennate.cli.options import fields_of, flag_of, found, option
+from antennate.cli.options import option
+from antennate.cli.run_options import refuse_workers
 from antennate.cli.status import write
 from antennate.errors import ConfigError
 from antennate.params.base import Params
 from antennate.studies.run_directory import RunDirectory
 from antennate.studies.run_files import BY_HAND
 from antennate.telemetry.view import ports
-
-OF_WORKERS = ("workers", "engine", "slurm", "shard", "resume", "retry", "trial_timeout")
-"""Names of what is for trials that run at any place, in any order."""
 
 if TYPE_CHECKING:  # both import much, for a page that few runs want
     from antennate.telemetry.view.process import ViewProcess
@@ -118,13 +116,10 @@ def require_viewable(options: Any, config: Params) -> None:
         ConfigError: It cannot.
     """
     shown = getattr(options, "view", False) or getattr(options, "foxglove", False)
-    for name in OF_WORKERS if shown else ():
-        field, value = fields_of(type(options)).get(name), getattr(options, name, None)
-        if field is not None and value != field.default and (name, value) != ("workers", 1):
-            raise ConfigError(
-                f"{flag_of((name,))}: expected none beside --view or --foxglove, which show one "
-                f"trial after the other, found {'one' if value is True else found(value)}"
-            )
+    if shown:
+        refuse_workers(
+            options, "none beside --view or --foxglove, which show one trial after the other"
+        )
     if shown and getattr(config, "solver", "mujoco") != "mujoco":
         raise ConfigError(
             "--solver: expected mujoco beside --view or --foxglove, as nothing else draws, "

@@ -103,6 +103,8 @@ def warm_up(solver: Solver) -> None:
     bench = ChainBench(PhysicsParams(), AntennaSpec(), [Ball(1.0, 0.0, 0.1)])
     try:
         bench.drive(bench.commands(np.zeros((1, 2)), np.zeros(2), 0.0), 1)
+    except SimulationError:
+        raise
     except Exception as error:  # numba reads what it kept without care
         raise OutputError(
             f"solver: expected to keep the compiled chain in {kernel().drive.stats.cache_path}, "

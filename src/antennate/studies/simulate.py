@@ -17,7 +17,7 @@ from antennate.params.control import ControlParams
 from antennate.params.reading import from_values
 from antennate.sim.scenes.registry import make_scene
 from antennate.sim.sim_robot import SimRobot
-from antennate.sim.trial import LOOK_EVERY, Trial, TrialConfig, draw_trial, end_of
+from antennate.sim.trial import LOOK_EVERY, Trial, TrialConfig, draw_trial, end_of, require_room
 from antennate.telemetry.header import Header
 from antennate.telemetry.simulated import Decisions, SimulatedLog
 from antennate.telemetry.time_series import TimeSeries, TimeSeriesRecorder
@@ -50,7 +50,7 @@ def simulate(
 
     Raises:
         ConfigError: A setting is unknown or out of bounds, or there is no such controller.
-        SceneError: The scene cannot be built.
+        SceneError: The scene cannot be built, or the robot starts inside an obstacle.
         ControllerError: The controller raised an exception, or what it answers is no command.
         LogError: The log cannot be written.
     """
@@ -59,6 +59,7 @@ def simulate(
     config, control = from_values(TrialConfig, settings), control or ControlParams()
     scene = make_scene(config.scene, config.tunnel)
     start = draw_trial(config, scene, trial, control.gait, control.period)
+    require_room(start.world)
     controlling = make_controller(controller, control, config.robot, 1)
     robot = SimRobot(1, config.robot, control.period, config.physics.timestep)
     robot.load(0, start.world, start.chance)

@@ -226,9 +226,9 @@ class _Files:
 
     def job(self, places: list[int]) -> _Job:
         """A new job for some tasks."""
-        file = self.folder / f"{time.time_ns()}.jsonl"
         from cloudpickle import dumps  # submitit brings it
 
+        file = self.folder / f"{time.time_ns()}.jsonl"
         told = (self._identity, self._work.part(places), added_objects(dumps), self.at_once)
         return _Job(file, places, Resumable(str(file), *told, noted=True))
 

@@ -11,7 +11,7 @@ from antennate.params.twin import BatteryParams
 from antennate.robots.spec import RobotSpec, require_antennae
 from antennate.sim.scenes.registry import make_scene
 from antennate.sim.sim_robot import SimRobot
-from antennate.sim.trial import TrialConfig, draw_trial
+from antennate.sim.trial import TrialConfig, draw_trial, require_room
 from antennate.twin.driven_servo import factory_new
 from antennate.twin.passage import Passage
 from antennate.twin.robot import TwinRobot
@@ -71,11 +71,15 @@ def watched(config: TwinConfig, boot_id: int | None = None) -> tuple[TwinRobot, 
     """The robot at the start of its trial, and how far it comes.
 
     Each start of a real board has a boot id of its own.
+
+    Raises:
+        SceneError: The scene cannot be built, or the robot starts inside an obstacle.
     """
     require_antennae(config.robot, "the twin")
     control, period = config.control, config.control.period
     scene = make_scene(config.scene, config.tunnel)
     start = draw_trial(config, scene, config.trial, control.gait, period)
+    require_room(start.world)
     body = SimRobot(1, config.robot, period, config.physics.timestep)
     body.load(0, start.world, start.chance)
     boot = config.trial + 1 if boot_id is None else boot_id

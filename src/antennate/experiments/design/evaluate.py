@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple
 
 from antennate import experiments
 from antennate.errors import BadInputError, ConfigError
 from antennate.experiments.design.config import OF_SUCCESSES, Axis, DesignConfig, Evaluation
 from antennate.experiments.study.measures import SUCCESS
-from antennate.experiments.study.run import with_status
+from antennate.experiments.study.run import holds, with_status
 from antennate.experiments.study.subject import (
     OF_TRIALS,
     Columns,
@@ -116,7 +116,7 @@ class Evaluator:
                     f"search.{names[path]} too"
                 )
             names[path] = name
-            if _holds(self._asked.settings, path):
+            if holds(self._asked.settings, path):
                 raise ConfigError(
                     f"evaluate.{self.label}.settings.{path}: expected none, as search.{name} sets "
                     "it, found one"
@@ -217,15 +217,6 @@ class Evaluator:
         changes |= {} if start is None else {"seed": start + first}
         config = config.model_copy(update=changes)
         return [(config, trial) for trial in self._subject.every(config)]
-
-
-def _holds(settings: Any, path: str) -> bool:
-    """Whether settings have a value at a path."""
-    for part in path.split("."):
-        if not isinstance(settings, Mapping) or part not in settings:
-            return False
-        settings = settings[part]
-    return True
 
 
 def evaluators(config: DesignConfig) -> list[Evaluator]:

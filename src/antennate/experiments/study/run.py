@@ -127,14 +127,14 @@ def _require_each_used(config: StudyConfig, subject: Subject) -> None:
                 f"vary.{within[0]}: expected a parameter of no group that varies as a whole, "
                 f"found {name} too"
             )
-        if _holds(config.settings, name):
+        if holds(config.settings, name):
             also = "vary" if name in config.vary else "assumed; leave_out keeps its value"
             raise ConfigError(
                 f"settings.{name}: expected a parameter that does not vary, found it in {also}"
             )
 
 
-def _holds(settings: Mapping[str, Any], name: str) -> bool:
+def holds(settings: Mapping[str, Any], name: str) -> bool:
     """Whether nested tables have a value at a dotted name."""
     inner: Any = settings
     for part in name.split("."):

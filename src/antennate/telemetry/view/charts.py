@@ -186,7 +186,7 @@ def _chart(server: viser.ViserServer, look: _Look, data: tuple[Floats, ...], ord
     return server.gui.add_uplot(
         data,
         (
-            uplot.Series(label="place in time"),
+            uplot.Series(label=f"share of {_WINDOW:g} s"),
             *(uplot.Series(label=name, stroke=colour, width=1.5) for name, colour in look.lines),
         ),
         title=look.title,
