@@ -252,7 +252,7 @@ def _title_panels(rate: Axes, inside: Axes, mean: Axes, time_limit: float, trial
     mean.set(
         xlim=(0, 1.02 * time_limit),
         xlabel="restricted mean time [s]",
-        title=style.interval_note("Failures as the limit; 95 %", trials).capitalize(),
+        title=style.interval_note("Time to the exit; 95 %", trials).capitalize(),
     )
     inside.set(
         xlim=(0, time_limit),
