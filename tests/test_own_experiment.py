@@ -50,6 +50,16 @@ def test_it_runs_and_leaves_a_directory_like_ours(
     assert "trials = 3" in (dice / "run" / "config.toml").read_text()
 
 
+def test_it_is_told_how_many_workers_are_asked_for(
+    dice: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (dice / "site" / "dice_study.py").write_text(
+        DICE.replace("int(rng.integers(1, 7))", "workers.count")
+    )
+    assert main(["dice", "--trials", "2", "--workers", "5", "--out", "run"]) == 0
+    assert [row["eyes"] for row in RunDirectory.open(dice / "run").rows()] == [5, 5]
+
+
 def test_help_and_errors_know_it(dice: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert "Throw dice" in experiments.load("dice").description
     assert main(["dise"]) == 2

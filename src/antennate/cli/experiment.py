@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -160,8 +161,8 @@ def carry_out(
     ):
         if view is not None:
             view.results = str(run.path)
-        run.keeps_store, workers.store = experiment.continued, run.store
-        workers.shared = environment(kind, config)
+        run.keeps_store = experiment.continued
+        workers = replace(workers, store=run.store, shared=environment(kind, config))
         if shards and run.store is not None:
             run.store.take(shards.records)
         try:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from numbers import Integral
 from pathlib import Path
 from typing import Any
@@ -139,15 +139,14 @@ def run(
         )
     if video is not None:
         require_films(found, config, video, out)
-    pool = Workers(workers, make_engine(engine))
-    pool.shared = environment(found.name, config)
+    pool = Workers(int(workers), make_engine(engine), shared=environment(found.name, config))
     if out is None:
         return Result(found, config, found.run(config, pool, on_step, lambda row: None))
     place = (found.name, out, overwrite, identity(found.name, config), resume or found.continued)
     with RunDirectory.create(*place) as directory:
         directory.keeps_store = found.continued
         directory.describe(config)
-        pool.store = directory.store
+        pool = replace(pool, store=directory.store)
         outcome = found.run(config, pool, on_step, directory.append)
         keep(found, outcome, directory)
         if video is not None:

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 
 from antennate.params.base import Params
 from antennate.studies.measures import Measure, Table
+from antennate.studies.pool import Workers
 from antennate.studies.report import Body, View
 
 if TYPE_CHECKING:
@@ -116,7 +117,7 @@ class Experiment(Generic[Config, Found]):
     name: str
     description: str
     config: type[Config]
-    run: Callable[[Config, int, OnStep, OnRow], Found]
+    run: Callable[[Config, Workers, OnStep, OnRow], Found]
     tables: Callable[[Mapping[str, Any]], Sequence[Table]]
     sentence: Callable[[Mapping[str, Any]], str]
     figures: Callable[[Found], Mapping[str, Figure]] = lambda outcome: {}
@@ -124,7 +125,7 @@ class Experiment(Generic[Config, Found]):
     check: Callable[[Config], None] = lambda config: None
     failed: Callable[[Mapping[str, Any]], bool] = lambda result: False
     parts: str = "trials"
-    logged: Callable[[Config, int, OnStep, OnRow, Path], Found] | None = None
+    logged: Callable[[Config, Workers, OnStep, OnRow, Path], Found] | None = None
     viewed: Callable[[Config, OnStep, OnRow, SimulationView, Path | None], Found] | None = None
     films: Callable[[Config, int], Mapping[str, Callable[[], Film]]] | None = None
     body: Body | None = None
@@ -149,7 +150,7 @@ class Experiment(Generic[Config, Found]):
         cls,
         module: str,
         config: type[Config],
-        run: Callable[[Config, int, OnStep, OnRow], Found],
+        run: Callable[[Config, Workers, OnStep, OnRow], Found],
         tables: Callable[[Mapping[str, Any]], Sequence[Table]],
         sentence: Callable[[Mapping[str, Any]], str],
         filmed: bool = False,

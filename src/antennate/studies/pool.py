@@ -8,8 +8,10 @@ from __future__ import annotations
 
 import contextlib
 import itertools
+import math
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any, TypeVar
 
 from antennate.errors import WorkerError
@@ -43,13 +45,11 @@ def core_count() -> int:
     return os.cpu_count() or 1
 
 
-class Workers(int):
+@dataclass(frozen=True)
+class Workers:
     """How many workers there are, where they are, and what they have finished before.
 
-    It is a number, so that an experiment of another package may use it as one. Its `shared` is the
-    environment that workers must share with this process.
-
-    Args:
+    Attributes:
         count: How many.
         engine: Where they are; processes of this machine if not given.
         store: Where finished tasks are kept, None to keep none.
@@ -59,59 +59,52 @@ class Workers(int):
         retry: Whether tasks that failed before are run again.
         closed: Whether all tasks must have been finished before.
         apart: Whether even one worker is a process of its own, which may crash or be killed.
+        shared: The environment that workers must share with this process.
+        calls: Numbers the calls of `gather`, by which their tasks are kept.
     """
 
-    def __new__(
-        cls,
-        count: int,
-        engine: Engine | None = None,
-        store: Store | None = None,
-        shard: tuple[int, int] | None = None,
-        timeout: float = TIMEOUT,
-        retry: bool = False,
-        closed: bool = False,
-        apart: bool = False,
-    ) -> Workers:
-        """As the class says."""
-        self = super().__new__(cls, count)
-        self._engine, self.store, self.shard, self.timeout = engine, store, shard, timeout
-        self.retry, self.closed, self.apart = retry, closed, apart
-        self.shared, self.calls = None, itertools.count()
-        self._staying = None
-        return self
-
-    _engine: Engine | None
-    store: Store | None
-    shard: tuple[int, int] | None
-    timeout: float
-    retry: bool
-    closed: bool
-    apart: bool
-    shared: Mapping[str, Any] | None
-    calls: Iterator[int]
-    _staying: Processes | None
+    count: int
+    engine: Engine | None = None
+    store: Store | None = None
+    shard: tuple[int, int] | None = None
+    timeout: float = TIMEOUT
+    retry: bool = False
+    closed: bool = False
+    apart: bool = False
+    shared: Mapping[str, Any] | None = None
+    calls: Iterator[int] = field(default_factory=itertools.count)
+    _staying: Processes | None = None
 
     @contextlib.contextmanager
-    def stay(self) -> Iterator[None]:
-        """Let processes of this machine serve one call after the other; the last one ends them."""
-        self._staying = Processes(stay=True)
+    def stay(self) -> Iterator[Workers]:
+        """The same, whose processes of this machine serve one call after the other."""
+        staying = Processes(stay=True)
         try:
-            yield
+            yield replace(self, _staying=staying)
         finally:
-            self._staying.end()
-            self._staying = None
+            staying.end()
 
-    def engine(self, parts: int) -> Engine:
+    def engine_for(self, parts: int) -> Engine:
         """Where so many parts are carried out."""
-        if self._engine is not None:
-            return self._engine
-        if not self.apart and self.timeout == TIMEOUT and (self == 1 or parts <= 1):
+        if self.engine is not None:
+            return self.engine
+        if not self.apart and self.timeout == TIMEOUT and (self.count == 1 or parts <= 1):
             return Here()
         return self._staying or Processes()
 
     def mine(self, place: int) -> bool:
         """Whether a task belongs to this shard."""
         return self.shard is None or place % self.shard[1] == self.shard[0] - 1
+
+
+def workers_from(given: int | Workers) -> Workers:
+    """Workers from their number, or as they are given."""
+    return given if isinstance(given, Workers) else Workers(given)
+
+
+def chunk_of(total: int, workers: int | Workers, most: int) -> int:
+    """How many of so many tasks a worker is given at once, so that each is given some thrice."""
+    return max(1, min(most, math.ceil(total / (3 * workers_from(workers).count))))
 
 
 class _Call:
@@ -177,7 +170,7 @@ class _Call:
 def gather(
     function: Callable[..., Any],
     tasks: Sequence[tuple[Any, ...]],
-    workers: int,
+    workers: int | Workers,
     on_step: Callable[[int, int], None],
     on_result: Callable[[Any], None] = lambda result: None,
     chunk: int = 1,
@@ -204,7 +197,7 @@ def gather(
         ShardEnd: All tasks of this shard are finished.
         KeyboardInterrupt: After the results that had arrived by then were given to `on_result`.
     """
-    workers = workers if isinstance(workers, Workers) else Workers(workers)
+    workers = workers_from(workers)
     package = function.__module__.partition(".")[0]
     call = _Call(workers, len(tasks), package, on_result, on_step, lost)
     call.resume()
@@ -218,7 +211,7 @@ def gather(
         folder = None if workers.store is None else workers.store.path.parent
         how = (workers.timeout, folder, batched, workers.shared, workers.retry)
         work = Work(function, tasks, together, *how)
-        workers.engine(len(parts)).run(work, parts, int(workers), call.emit, call.fail)
+        workers.engine_for(len(parts)).run(work, parts, workers.count, call.emit, call.fail)
     if workers.shard is not None:
         raise ShardEnd(sum(map(workers.mine, call.found)), len(tasks))
     return [call.found[place] for place in range(len(tasks))]

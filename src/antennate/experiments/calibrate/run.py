@@ -31,7 +31,7 @@ from antennate.robots.antenna import AntennaSpec
 from antennate.sim.bench import Watch
 from antennate.sim.chain import require_read, warm_up
 from antennate.studies.experiment import OnStep, Outcome, no_step
-from antennate.studies.pool import gather
+from antennate.studies.pool import Workers, gather
 from antennate.types import Floats
 
 _OF_THE_RIG = ("rig", "antenna", "variation", "physics", "solver")
@@ -203,7 +203,7 @@ def push(config: CalibrateConfig, trial: int, watch: Watch | None = None) -> Rec
 
 def record(
     config: CalibrateConfig,
-    workers: int = 1,
+    workers: int | Workers = 1,
     on_step: OnStep = no_step,
 ) -> Recording:
     """All pushes of the rig, as one recording.
@@ -236,7 +236,7 @@ def averaged(recording: Recording, averaging_time: float) -> Recording:
 
 def run(
     config: CalibrateConfig,
-    workers: int = 1,
+    workers: int | Workers = 1,
     on_step: OnStep = no_step,
 ) -> CalibrateOutcome:
     """Calibrate from the recording, or from the rig if there is none.

@@ -13,7 +13,7 @@ from antennate.experiments.design.propose import package
 from antennate.experiments.design.search import Search
 from antennate.studies.experiment import OnRow, OnStep, no_row, no_step
 from antennate.studies.plan import Point
-from antennate.studies.pool import Workers
+from antennate.studies.pool import Workers, workers_from
 
 
 def check(config: DesignConfig) -> None:
@@ -66,7 +66,7 @@ def _named(where: str, configure: Callable[[Point], Any], point: Point) -> None:
 
 def run(
     config: DesignConfig,
-    workers: int = 1,
+    workers: int | Workers = 1,
     on_step: OnStep = no_step,
     on_row: OnRow = no_row,
 ) -> DesignOutcome:
@@ -76,11 +76,10 @@ def run(
         BadInputError: As for `check`; or the store was begun with another version of Optuna.
         WorkerError: The workers cannot run anything.
     """
-    workers = workers if isinstance(workers, Workers) else Workers(workers)
-    search = Search(config, workers, on_step, on_row)
+    search = Search(config, workers_from(workers), on_step, on_row)
     interrupted = False
     try:
-        with workers.stay():
+        with search.workers.stay() as search.workers:
             search.begin()
             while len(search.asked) < config.proposals:
                 search.proceed()

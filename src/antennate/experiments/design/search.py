@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import functools
 import json
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -19,7 +18,7 @@ from antennate.experiments.study.run import REASON, STATUS, cells
 from antennate.experiments.study.subject import columns_in
 from antennate.studies.experiment import OnRow, OnStep
 from antennate.studies.plan import Point
-from antennate.studies.pool import Workers, gather
+from antennate.studies.pool import Workers, chunk_of, gather
 from antennate.studies.work import Failure
 
 SEARCH, VALIDATION = "search", "validation"
@@ -160,7 +159,7 @@ class Search:
         self.each = self.each or len(tasks) // max(1, len(designs))
         total = self.before + len(tasks) + self._to_come(phase)
         most = max(evaluator.most for evaluator in self.evaluators)
-        chunk = max(1, min(most, math.ceil(len(tasks) / (3 * self.workers))))
+        chunk = chunk_of(len(tasks), self.workers, most)
         try:
             if tasks:
                 how: dict[str, Any] = {"chunk": chunk, "together": True, "lost": lost}

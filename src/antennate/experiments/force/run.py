@@ -26,7 +26,7 @@ from antennate.experiments.force.post_traverse import Traverse, drag
 from antennate.experiments.reading import between
 from antennate.sim.bench import Watch
 from antennate.studies.experiment import OnRow, OnStep, no_row, no_step
-from antennate.studies.pool import gather
+from antennate.studies.pool import Workers, gather
 from antennate.studies.regression import by_group, explained
 from antennate.types import Floats, Ints
 
@@ -207,7 +207,7 @@ def closed_form(chain: Chain, points: Points, config: ForceConfig, largest: floa
 
 def run(
     config: ForceConfig,
-    workers: int = 1,
+    workers: int | Workers = 1,
     on_step: OnStep = no_step,
     on_row: OnRow = no_row,
 ) -> ForceOutcome:

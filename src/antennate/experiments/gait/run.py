@@ -32,7 +32,7 @@ from antennate.sim.sim_robot import Disturbance, SimRobot
 from antennate.sim.trial import place_at_start
 from antennate.sim.world import World, compile_world
 from antennate.studies.experiment import OnStep, Outcome, no_step
-from antennate.studies.pool import gather
+from antennate.studies.pool import Workers, gather
 from antennate.telemetry.header import Header
 from antennate.telemetry.simulated import Decisions, SimulatedLog
 from antennate.telemetry.view.simulation import SimulationView
@@ -308,7 +308,7 @@ def _walk_viewed(
 
 def run(
     config: GaitStudyConfig,
-    workers: int = 1,
+    workers: int | Workers = 1,
     on_step: OnStep = no_step,
     view: SimulationView | None = None,
     logs: Path | None = None,

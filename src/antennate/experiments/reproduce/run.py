@@ -15,6 +15,7 @@ from antennate.experiments.reproduce.verdict import VERDICTS, Claim, Finding, Ro
 from antennate.experiments.reproduce.wall_claims import WALL
 from antennate.params.base import Params, number
 from antennate.studies.experiment import OnRow, OnStep, no_row, no_step
+from antennate.studies.pool import Workers, workers_from
 
 CLAIMS: tuple[Claim, ...] = (*ANTENNA, *WALL, *ROBOT)
 """All claims, in the order of the page."""
@@ -107,7 +108,7 @@ def _flags(told: Mapping[str, Any], prefix: str = "--") -> list[str]:
 
 def run(
     config: ReproduceConfig,
-    workers: int = 1,
+    workers: int | Workers = 1,
     on_step: OnStep = no_step,
     on_row: OnRow = no_row,
 ) -> ReproduceOutcome:
@@ -126,7 +127,7 @@ def run(
 
         told = experiment.config.model_validate(settings(name, config))
         try:
-            result = experiment.run(told, workers, step, no_row).result()
+            result = experiment.run(told, workers_from(workers), step, no_row).result()
         except KeyboardInterrupt:
             return ReproduceOutcome(config, tuple(judged), interrupted=True)
         if result.get("interrupted"):

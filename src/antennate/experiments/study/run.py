@@ -25,7 +25,7 @@ from antennate.experiments.study.subject import (
 from antennate.messages import nearest, shortened
 from antennate.studies.experiment import OnRow, OnStep, Trial, no_row, no_step
 from antennate.studies.plan import Axes, Point
-from antennate.studies.pool import gather
+from antennate.studies.pool import Workers, chunk_of, gather
 from antennate.studies.work import Fail, Failure
 
 STATUS, REASON = "status", "reason"
@@ -156,7 +156,7 @@ def _require_response(config: StudyConfig, columns: Columns) -> None:
 
 def run(
     config: StudyConfig,
-    workers: int = 1,
+    workers: int | Workers = 1,
     on_step: OnStep = no_step,
     on_row: OnRow = no_row,
 ) -> StudyOutcome:
@@ -191,7 +191,7 @@ def run(
                 checked = True
             on_row({"point": tasks[item[0]][2], **row})
 
-    chunk = max(1, min(subject.most, math.ceil(len(tasks) / (3 * workers))))
+    chunk = chunk_of(len(tasks), workers, subject.most)
     numbered = [(place, *task) for place, task in enumerate(tasks)]
     interrupted = False
     try:

@@ -21,6 +21,7 @@ from antennate.params.reading import describe, put_over, with_bases
 from antennate.studies.engines import NO_BATCHES
 from antennate.studies.experiment import Experiment, Trial, no_row, no_step
 from antennate.studies.plan import Point
+from antennate.studies.pool import Workers
 
 Rows = list[dict[str, Any]]
 OF_TRIALS = ("trials", "trial", "seed")
@@ -220,7 +221,7 @@ class _OfExperiment:
         if self._trials is not None:
             self._trials.run(config, trials, lambda i, row: emit(i, [asdict(row)]))
             return
-        outcome = self._experiment.run(config, 1, no_step, no_row)
+        outcome = self._experiment.run(config, Workers(1), no_step, no_row)
         emit(0, [asdict(row) for row in outcome.rows] or [numbers(outcome.result())])
 
     def run_on_device(

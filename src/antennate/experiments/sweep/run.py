@@ -19,7 +19,7 @@ from antennate.params.sweep import SweepParams
 from antennate.sim import chain
 from antennate.sim.bench import Watch
 from antennate.studies.experiment import OnRow, OnStep, no_row, no_step
-from antennate.studies.pool import gather
+from antennate.studies.pool import Workers, gather
 from antennate.studies.statistics import mean95
 
 MOTIONS = ("fixed", "moving")
@@ -185,7 +185,7 @@ def _sweep(function: Callable[..., Any], *arguments: Any) -> Any:
 
 def run(
     config: SweepConfig,
-    workers: int = 1,
+    workers: int | Workers = 1,
     on_step: OnStep = no_step,
     on_row: OnRow = no_row,
 ) -> SweepOutcome:

@@ -17,7 +17,7 @@ from antennate.experiments.touch.measures import Pool, roc
 from antennate.experiments.touch.sensing import Comparison, compare
 from antennate.experiments.touch.traverse import Traverse, run_traverse
 from antennate.studies.experiment import OnStep, no_step
-from antennate.studies.pool import gather
+from antennate.studies.pool import Workers, gather
 
 _FLEX = np.linspace(0.0, 2.0 * np.pi, 20001)
 _STRONGEST = 1.0
@@ -104,7 +104,7 @@ def _row(one: Traverse, found: Comparison | None) -> TouchRow:
     )
 
 
-def run(config: TouchConfig, workers: int = 1, on_step: OnStep = no_step) -> TouchOutcome:
+def run(config: TouchConfig, workers: int | Workers = 1, on_step: OnStep = no_step) -> TouchOutcome:
     """Run all traverses, then let the control read them.
 
     Raises:

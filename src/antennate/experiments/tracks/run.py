@@ -21,6 +21,7 @@ from antennate.experiments.tracks.readers import read
 from antennate.experiments.tracks.track import Track
 from antennate.experiments.tracks.walls import Wall, wall_of
 from antennate.studies.experiment import OnRow, OnStep, no_row, no_step
+from antennate.studies.pool import Workers
 from antennate.types import Ints
 
 _RATES_AGREE = 0.02
@@ -138,7 +139,7 @@ class TracksOutcome:
 
 def run(
     config: TracksConfig,
-    workers: int = 1,
+    workers: int | Workers = 1,
     on_step: OnStep = no_step,
     on_row: OnRow = no_row,
 ) -> TracksOutcome:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,7 +18,7 @@ from antennate.sim.scenes.registry import TUNNEL
 from antennate.sim.trial import check_start
 from antennate.sim.world import World
 from antennate.studies.experiment import OnRow, OnStep, Trial, no_row, no_step
-from antennate.studies.pool import gather
+from antennate.studies.pool import Workers, chunk_of, gather
 from antennate.studies.work import Fail, Failure, no_failure
 from antennate.telemetry.view.pace import Restart
 from antennate.telemetry.view.simulation import SimulationView
@@ -181,7 +180,7 @@ def _run_viewed(
 
 def run(
     config: TunnelConfig,
-    workers: int = 1,
+    workers: int | Workers = 1,
     on_step: OnStep = no_step,
     on_row: OnRow = no_row,
     logs: Path | None = None,
@@ -197,7 +196,7 @@ def run(
         WorkerError: A worker process failed.
     """
     trials = every(config)
-    size = max(1, min(BATCH, math.ceil(len(trials) / (3 * workers))))
+    size = chunk_of(len(trials), workers, BATCH)
     found: list[_Found] = []
 
     def take(item: _Found) -> None:

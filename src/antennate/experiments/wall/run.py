@@ -22,7 +22,7 @@ from antennate.experiments.wall.passage import passage
 from antennate.sim import chain
 from antennate.sim.bench import Bench, Watch, unwatched
 from antennate.studies.experiment import OnRow, OnStep, Trial, no_row, no_step
-from antennate.studies.pool import gather
+from antennate.studies.pool import Workers, gather
 from antennate.studies.work import Fail, Failure, no_failure
 from antennate.telemetry.view.pace import Restart
 from antennate.telemetry.view.simulation import SimulationView
@@ -141,7 +141,7 @@ def _run_viewed(
 
 def run(
     config: WallConfig,
-    workers: int = 1,
+    workers: int | Workers = 1,
     on_step: OnStep = no_step,
     on_row: OnRow = no_row,
     view: SimulationView | None = None,
