@@ -111,10 +111,10 @@ def test_a_job_whose_driver_was_killed_before_it_noted_it_does_nothing(
     monkeypatch.setattr("antennate.studies.slurm_job.NOTED", 0.3)
     part = Part(trial, {0: ({"x": 1.0}, 0)}, together=False, timeout=60.0)
     job = slurm.Resumable(str(tmp_path / "a.jsonl"), environment(), part, {}, noted=True)
-    assert job() == 0
+    assert job.carry_out() == 0
     assert not (tmp_path / "a.jsonl").exists()
     (tmp_path / "a.job").touch()
-    assert job() == 1
+    assert job.carry_out() == 1
 
 
 CURED = """
@@ -151,3 +151,60 @@ def test_retry_runs_a_trial_again_that_a_job_of_an_earlier_driver_told_as_failed
     code = code.replace("store=store", "store=store, retry=True")
     assert subprocess.run([sys.executable, "-c", code]).returncode == 0
     assert Path("notes.txt").read_text().split() == [*"012345", "1"]
+
+
+KILLS_ITS_JOB = """
+import os
+import signal
+from pathlib import Path
+
+
+def trial(config, seed):
+    if seed == 1 and not Path("killed").exists():
+        Path("killed").touch()
+        os.kill(os.getppid(), signal.SIGKILL)
+    return {"value": seed}
+"""
+
+
+def own_study(text: str, out: str, *slurm: str) -> subprocess.CompletedProcess[str]:
+    """A study of a function of its own on jobs of this machine."""
+    Path("own.py").write_text(text)
+    Path("plan.toml").write_text('experiment = "own.py:trial"\ntrials = 3\n[vary]\nx = [1.0]\n')
+    words = ["study", "plan.toml", "--trust-code", "--no-figures", "--workers", "1", "--out", out]
+    words += ["--engine", "slurm-local", *(["--slurm", *slurm] if slurm else [])]
+    command = [sys.executable, "-m", "antennate", *words]
+    return subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+
+
+def test_no_word_in_what_a_killed_job_leaves_tells_why_it_ended() -> None:
+    """submitit names the folder when it says that a job has left nothing."""
+    pytest.importorskip("submitit")
+    done = own_study(KILLS_ITS_JOB, "WorkerError: timed-out too many times")
+    assert done.returncode == 0, done.stderr
+    assert Path("killed").exists()
+    table = Path("WorkerError: timed-out too many times/trials.csv").read_text()
+    assert table.count(",ok,") == 3
+
+
+TOLD_OF_THE_END = """
+import os
+import signal
+import time
+
+
+def trial(config, seed):
+    os.kill(os.getppid(), signal.SIGUSR2)
+    time.sleep(60)
+"""
+
+
+def test_a_job_that_is_told_of_its_time_limit_once_too_often_ends_the_run() -> None:
+    """submitit begins it again three times."""
+    pytest.importorskip("submitit")
+    done = own_study(TOLD_OF_THE_END, "run")
+    assert done.returncode == 2
+    assert done.stderr.splitlines()[-1] == (
+        "antennate study: error: slurm: expected a job to end a trial within its time limit, found "
+        "none; ask for more with --slurm timeout_min=MINUTES, or for less with --trial-timeout"
+    )

@@ -33,8 +33,6 @@ _LOOK = 0.5
 """How often the driver looks for what the jobs of SLURM have finished [s]."""
 _FAILED_STARTS = 3
 """So many jobs in a row that end before they have begun end the run."""
-_TIME_LIMIT = ("SLURM says TIMEOUT", "timed-out too many times")
-"""How SLURM and submitit say that a job has reached its time limit."""
 _NOTE = logging.getLogger(__name__)
 
 
@@ -106,11 +104,11 @@ class Slurm:
         """
         if not job.left:
             return
-        text = str(future.exception())
-        if WorkerError.__name__ in text:
-            line = next(x for x in reversed(text.splitlines()) if WorkerError.__name__ in x)
-            raise WorkerError(f"slurm: {line.partition(': ')[2]}")
-        if not job.held_trials and any(sign in text for sign in _TIME_LIMIT):
+        error = future.exception()
+        error = future.result() if error is None else error
+        if isinstance(error, WorkerError):
+            raise WorkerError(f"slurm: {error}")
+        if not job.held_trials and isinstance(error, TimeoutError):
             raise WorkerError(
                 "slurm: expected a job to end a trial within its time limit, found none; ask for "
                 "more with --slurm timeout_min=MINUTES, or for less with --trial-timeout"
@@ -120,11 +118,11 @@ class Slurm:
             if files.failed_starts >= _FAILED_STARTS:
                 raise WorkerError(
                     f"slurm: expected jobs to begin, found {files.failed_starts} in a row that "
-                    f"ended before: {_last(text)}"
+                    f"ended before: {_last(error)}"
                 )
             waiting.put_back(job.left)
         elif (given_up := waiting.lost(job.left, len(job.left) <= files.at_once)) is not None:
-            fail(given_up, Failure("crashed", shortened(f"its job ended: {_last(text)}")))
+            fail(given_up, Failure("crashed", shortened(f"its job ended: {_last(error)}")))
 
     def _executor(self, folder: Path) -> Any:
         import submitit
@@ -308,9 +306,9 @@ def _digest(work: Work) -> str:
     return content.hexdigest()
 
 
-def _last(text: str) -> str:
+def _last(error: object) -> str:
     """The last line of what submitit says of a job; of a trace that it quotes, if it does."""
-    lines = [line for line in text.splitlines() if line.strip()]
+    lines = [line for line in str(error).splitlines() if line.strip()]
     ruled = [i for i, line in enumerate(lines) if set(line) == {"-"}]
     end = ruled[1] if len(ruled) > 1 else len(lines)
     return shortened(lines[end - 1]) if lines else "it was cancelled"

@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from antennate.errors import WorkerError
 from antennate.studies.codec import encoded
 from antennate.studies.processes import Packed, Processes
 from antennate.studies.store import Store
@@ -54,8 +55,26 @@ class Resumable:
         self._file, self._identity, self._part, self._added = file, identity, part, added
         self._at_once, self._noted = at_once, noted
 
-    def __call__(self) -> int:
-        """Carry out what is not in its file yet; how many tasks that was."""
+    def __call__(self) -> int | Exception:
+        """Carry out what is not in its file yet; how many tasks that was.
+
+        What no job will do better is returned, as submitit tells of what is raised its text alone.
+        """
+        from submitit.core.utils import UncompletedJobError
+
+        try:
+            return self.carry_out()
+        except WorkerError as error:
+            return error
+        except UncompletedJobError:  # raised in the handler of the signal that says so
+            return TimeoutError()
+
+    def carry_out(self) -> int:
+        """Carry out what is not in its file yet; how many tasks that was.
+
+        Raises:
+            WorkerError: The driver has other versions or other code, or nothing can be run here.
+        """
         again = int(os.environ.get(_RESTARTS, "0")) > 0
         if self._noted and not _comes(note_of(Path(self._file)), 0.0 if again else NOTED):
             return 0

@@ -28,9 +28,11 @@ _ANSWER = 30.0
 """Time within which a command of SLURM has to answer [s]."""
 _QUIET = 15.0
 """How long all jobs may wait before it is said why [s]."""
+_TIMEOUT = "TIMEOUT"
+"""The state of a job that has reached its time limit."""
 _ENDED = {
     *("BOOT_FAIL", "CANCELLED", "COMPLETED", "DEADLINE", "FAILED", "NODE_FAIL"),
-    *("OUT_OF_MEMORY", "PREEMPTED", "REVOKED", "TIMEOUT"),
+    *("OUT_OF_MEMORY", "PREEMPTED", "REVOKED", _TIMEOUT),
 }
 """States of jobs that have ended; one that SLURM begins again is PENDING."""
 _NEVER = {
@@ -144,13 +146,18 @@ class QueuedJob:
         """Whether it has left a result, or SLURM says that it has ended."""
         return self._has_result() or bool(self._queue.ended(self.job_id, self._since))
 
-    def exception(self) -> Any:
+    def exception(self) -> Exception | None:
         """Why it ended before its work, None if it did not."""
         if self._has_result():
             return self._job.exception()
         state = self._queue.ended(self.job_id, self._since)
         told = "SLURM lists it no more" if state == _GONE else f"SLURM says {state}"
-        return f"{told}{self._last_words()}"
+        kind = TimeoutError if state == _TIMEOUT else RuntimeError
+        return kind(f"{told}{self._last_words()}")
+
+    def result(self) -> Any:
+        """What it returned, if it ended with its work."""
+        return self._job.result()
 
     def _has_result(self) -> bool:
         return self._job.paths.result_pickle.exists()
@@ -186,9 +193,9 @@ class LocalJob:
             if not self.done():
                 os.kill(self._process, signal.SIGINT)
 
-    def exception(self) -> str:
+    def exception(self) -> Exception:
         """Why it ended before its work."""
-        return "it ended"
+        return RuntimeError("it ended")
 
 
 def cancel(jobs: Collection[Any]) -> None:
