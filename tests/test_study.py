@@ -223,6 +223,28 @@ def test_W2_a_second_driver_is_refused(tmp_path: Path, capsys: pytest.CaptureFix
     assert study("--no-figures") == 0  # the lock went with its process
 
 
+def test_a_finished_study_that_is_repeated_leaves_its_files_alone(done: Path) -> None:
+    """What is missing is written again, and then the report, which tells of all."""
+    del done
+    assert study() == 0  # with figures
+
+    def written() -> dict[Path, int]:
+        return {path: path.stat().st_mtime_ns for path in Path("run").rglob("*") if path.is_file()}
+
+    before, content = written(), Path("run/trials.csv").read_bytes()
+    assert study() == 0
+    assert written() == before
+    Path("run/trials.csv").unlink()
+    assert study() == 0
+    assert Path("run/trials.csv").read_bytes() == content
+    after = written()
+    assert {path.name for path in after if after[path] != before[path]} == {
+        *("trials.csv", "report.html"),
+    }
+    assert study("--retry") == 0
+    assert written()[Path("run/result.json")] != before[Path("run/result.json")]
+
+
 def test_W7_damaged_and_torn_lines_are_run_again(done: Path, tmp_path: Path) -> None:
     before = Path("run/trials.csv").read_bytes()
     path = Path("run", STORE)

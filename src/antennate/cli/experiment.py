@@ -152,12 +152,12 @@ def carry_out(
     if shards and (changes := differences(shards.identity, what)):
         hint = "; merge in the folder where the shards were run" if " is gone" in changes else ""
         raise BadInputError(f"expected shards of this version and code, found {changes}{hint}")
-    resume = options.resume or options.retry or experiment.continued
+    again = (options.resume or options.retry or experiment.continued, options.retry)
     name = "merge" if shards else experiment.name
     with (
         stop_signals(),
         view_of(options) as view,
-        folder_for(experiment.view, options, config, argv, what, resume, name) as run,
+        folder_for(experiment.view, options, config, argv, what, *again, name) as run,
     ):
         if view is not None:
             view.results = str(run.path)

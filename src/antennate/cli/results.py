@@ -40,6 +40,7 @@ def folder_for(
     argv: Sequence[str],
     identity: Mapping[str, Any] | None = None,
     resume: bool = False,
+    retry: bool = False,
     command: str = "",
 ) -> Iterator[RunDirectory]:
     """A run directory with its configuration.
@@ -53,13 +54,14 @@ def folder_for(
         argv: Words of the command.
         identity: What is run, if it can be resumed.
         resume: Go on with the run that the folder holds, if there is one.
+        retry: Run its trials again that failed.
         command: Name of the command, if it is not that of the view.
 
     Raises:
         BadInputError: The run that is to go on is another one.
         OutputError: It cannot be written, or it holds another run.
     """
-    place = (view.name, options.out, options.overwrite, identity, resume)
+    place = (view.name, options.out, options.overwrite, identity, resume, retry)
     with RunDirectory.create(*place) as folder:
         folder.describe(config, ["antennate", command or view.name, *argv])
         yield folder

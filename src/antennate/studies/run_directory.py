@@ -31,7 +31,6 @@ from antennate.params.reading import Config, read_file
 from antennate.studies import dates
 from antennate.studies.formats import from_csv, to_csv, to_json, to_line, to_toml
 from antennate.studies.run_files import (
-    CALIBRATION,
     COMMAND,
     CONFIG,
     ENDINGS,
@@ -39,15 +38,19 @@ from antennate.studies.run_files import (
     LARGEST,
     LOGS,
     PARTIAL,
+    REPORT,
     RESULT,
     ROOM,
     TABLE,
     VERSIONS,
     files_of,
     free,
+    holds_run,
+    is_finished,
     is_folder,
+    outdated,
 )
-from antennate.studies.store import STORE, Store
+from antennate.studies.store import STORE, Store, open_store
 from antennate.telemetry.header import versions
 
 _KEPT_FREE = 1 << 16
@@ -69,8 +72,10 @@ class RunDirectory:
         created: Sequence[Path] = (),
         partial: IO[str] | None = None,
         store: Store | None = None,
+        finished: bool = False,
     ):
         self.path, self.store, self.keeps_store = path, store, False
+        self._finished, self._completed = finished, False
         self._created = created
         self._partial = partial
         self._kept = partial is None
@@ -83,6 +88,7 @@ class RunDirectory:
         overwrite: bool = False,
         identity: Mapping[str, Any] | None = None,
         resume: bool = False,
+        retry: bool = False,
     ) -> RunDirectory:
         """Claim a directory for a run of `command`.
 
@@ -91,7 +97,9 @@ class RunDirectory:
             path: The directory; the next free `runs/COMMAND-N` if not given.
             overwrite: Remove the run that it holds.
             identity: What is run, by `antennate.studies.identity`, for a run that can be resumed.
-            resume: Go on with the run that it holds, if there is one.
+            resume: Go on with the run that it holds, if there is one. Of one that is finished only
+                files that are missing are written, and the report with them.
+            retry: Whether trials that failed are run again, so that no run is finished.
 
         Raises:
             BadInputError: The run that is to go on is another one.
@@ -111,24 +119,19 @@ class RunDirectory:
             held = files_of(place)
             goes_on = resume and not overwrite and (place / STORE) in held
             if held and not overwrite and not goes_on:
-                finished = resume and place / RESULT in held
-                found = "a finished one" if finished else held[0]
-                raise OutputError(
-                    f"expected {'an unfinished run' if resume else 'a folder without a run'}, "
-                    f"found {found}; choose another or give --overwrite"
-                    + (" or --resume" if place / STORE in held and not resume else "")
-                )
+                raise holds_run(place, held, resume)
             try:
-                store = _store(place, identity, overwrite)
+                store = open_store(place, identity, overwrite)
             except BaseException:
                 for path in missing:
                     path.rmdir()
                 raise
-            for file in held:
-                kept = (file.parent == place / LOGS and goes_on) or file.name == STORE
-                if not kept and (command, file.name) != ("calibrate", CALIBRATION):
-                    file.unlink()
-            return cls(place, missing, (place / PARTIAL).open("x", encoding="utf-8"), store)
+            sound = store is not None and not store.damaged
+            finished = goes_on and not retry and sound and is_finished(place)
+            for file in outdated(held, command, goes_on, finished):
+                file.unlink()
+            partial = None if finished else (place / PARTIAL).open("x", encoding="utf-8")
+            return cls(place, missing, partial, store, finished)
 
     @classmethod
     def open(cls, path: str | Path) -> RunDirectory:
@@ -214,6 +217,8 @@ class RunDirectory:
 
     def append(self, row: Any) -> None:
         """Keep one finished trial, a dataclass or a mapping, at once."""
+        if self._finished:
+            return
         if self._partial is None:
             raise OutputError(f"{self.path}: expected a run that goes on, found a finished one")
         with _writing(self.path / PARTIAL):
@@ -248,10 +253,15 @@ class RunDirectory:
     def write(self, name: str, content: str | bytes | Iterator[str]) -> None:
         """Put one file into the directory, whole or not at all; a long text comes in pieces.
 
+        Of a finished run, one that is there stays; but the report tells of those that were missing.
+
         Raises:
             OutputError: It cannot be written.
         """
         path = self.path / name
+        if self._finished and path.exists() and not (name == REPORT and self._completed):
+            return
+        self._completed = True
         with _writing(path):
             path.parent.mkdir(exist_ok=True)
         with writing_whole(path, overwrite=True) as file:
@@ -313,22 +323,6 @@ class RunDirectory:
                 (self.path / LOGS).rmdir()
             for path in self._created:
                 path.rmdir()
-
-
-def _store(place: Path, identity: Mapping[str, Any] | None, overwrite: bool) -> Store | None:
-    """The finished trials of a run that can be resumed; nobody else may work on them."""
-    if identity is None:
-        (place / STORE).unlink(missing_ok=True)
-        return None
-    store = Store(place / STORE)
-    try:
-        if overwrite:
-            store.clear()
-        store.begin(identity)
-    except BaseException:
-        store.close(remove=store.was_empty)
-        raise
-    return store
 
 
 def _sound_json(text: str) -> str:

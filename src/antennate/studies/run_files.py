@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import itertools
+import json
 import os
+from collections.abc import Sequence
 from pathlib import Path
 
+from antennate.errors import OutputError
 from antennate.studies.store import STORE
 from antennate.telemetry.parts import MOST_PARTS, part
 
@@ -50,6 +53,44 @@ def files_of(place: Path) -> list[Path]:
         if path.suffix in endings
     ]
     return [place / name for name in _NAMES if os.path.lexists(place / name)] + inner
+
+
+def holds_run(place: Path, held: Sequence[Path], resume: bool) -> OutputError:
+    """The error of a directory that holds another run, whose files are given."""
+    found = "a finished one" if resume and place / RESULT in held else held[0]
+    return OutputError(
+        f"expected {'an unfinished run' if resume else 'a folder without a run'}, found {found}; "
+        "choose another or give --overwrite"
+        + (" or --resume" if place / STORE in held and not resume else "")
+    )
+
+
+def outdated(held: Sequence[Path], command: str, goes_on: bool, finished: bool) -> list[Path]:
+    """Which of the files that a directory holds go before a run of a command begins.
+
+    Args:
+        held: Those files.
+        command: Its name; a calibration stays until `calibrate` replaces it.
+        goes_on: Whether it goes on with the run that is there.
+        finished: Whether that one is finished, so that its files stay.
+    """
+    if finished:
+        return [file for file in held if file.name in (PARTIAL, ROOM)]
+    return [
+        file
+        for file in held
+        if not (goes_on and file.parent.name == LOGS)
+        and file.name != STORE
+        and (command, file.name) != ("calibrate", CALIBRATION)
+    ]
+
+
+def is_finished(place: Path) -> bool:
+    """Whether a directory holds the whole result of a run that was not interrupted."""
+    try:
+        return not json.loads((place / RESULT).read_bytes()).get("interrupted")
+    except (OSError, ValueError, AttributeError):
+        return False
 
 
 def is_folder(folder: Path) -> bool:

@@ -150,6 +150,32 @@ class Store:
             os.close(self._file)
 
 
+def open_store(place: Path, identity: Mapping[str, Any] | None, overwrite: bool) -> Store | None:
+    """The finished trials of a run that can be resumed; nobody else may work on them.
+
+    Args:
+        place: The run directory.
+        identity: What is run; None for a run that cannot be resumed.
+        overwrite: Whether what was kept is forgotten.
+
+    Raises:
+        BadInputError: They are of another run.
+        OutputError: They cannot be opened, or another process appends to them.
+    """
+    if identity is None:
+        (place / STORE).unlink(missing_ok=True)
+        return None
+    store = Store(place / STORE)
+    try:
+        if overwrite:
+            store.clear()
+        store.begin(identity)
+    except BaseException:
+        store.close(remove=store.was_empty)
+        raise
+    return store
+
+
 def _data(path: Path) -> bytes:
     try:
         with open_regular(path) as file:
