@@ -169,3 +169,40 @@ def test_a_missing_extra_is_told_as_pip_and_uv_take_it() -> None:
     uv, pip = re.findall(r"`([^`]*)`", extra("video"))
     assert uv.removesuffix(" ...") in pages
     assert pip in pages
+
+
+TALKS = """
+import os
+
+from antennate.control.controllers import open_loop
+
+print("imported")
+os.write(1, b"by the system\\n")
+
+
+def Talks(control, robot, batch):
+    print("made")
+    return open_loop(control, robot, batch)
+"""
+
+
+@pytest.mark.parametrize("workers", ["1", "2"])
+def test_what_a_controller_prints_does_not_stand_beside_the_json(
+    workers: str, tmp_path: Path
+) -> None:
+    """With `--json` it goes to standard error, from workers too; without, it stays where it was."""
+    (tmp_path / "talks.py").write_text(TALKS)
+    words = ["tunnel", "--controllers", "talks.py:Talks", "--trials", "2", "--time-limit", "0.1"]
+    words += ["--workers", workers, "--no-figures"]
+    command = [sys.executable, "-m", "antennate", *words]
+
+    def run(*more: str) -> subprocess.CompletedProcess[str]:
+        return subprocess.run(
+            [*command, *more], cwd=tmp_path, capture_output=True, text=True, timeout=120, check=True
+        )
+
+    done = run("--json", "--out", "one")
+    assert json.loads(done.stdout) == json.loads((tmp_path / "one" / "result.json").read_text())
+    for said in ("imported", "by the system"):
+        assert said in done.stderr
+    assert "imported" in run("--out", "two").stdout

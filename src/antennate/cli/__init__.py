@@ -46,7 +46,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     keep_wish()
     words = list(sys.argv[1:] if argv is None else argv)
     name = f"antennate {words[0]}" if words and _known(words[0]) else "antennate"
-    with safe_streams() as output:
+    with safe_streams(result_alone="--json" in words) as output:
         try:
             code = _run(words, name)
         except KeyboardInterrupt:
@@ -92,6 +92,7 @@ def _run(words: Sequence[str], name: str) -> int:
         sys.stdout.write(f"antennate {__version__}\n")
         return OK
     from antennate.cli.arguments import HelpRequest
+    from antennate.cli.output import write_result
     from antennate.errors import AntennateError, BadInputError
     from antennate.messages import nearest, one_line, shortened
 
@@ -106,7 +107,7 @@ def _run(words: Sequence[str], name: str) -> int:
             raise BadInputError(f"expected a command{known}, found {shortened(words[0])}")
         return carry_out(words[0], words[1:])
     except HelpRequest as page:
-        sys.stdout.write(str(page))
+        write_result(str(page))
         return OK
     except AntennateError as error:
         sys.stderr.write(f"{name}: error: {one_line(str(error))}\n")

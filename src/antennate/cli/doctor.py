@@ -13,6 +13,7 @@ from pydantic.dataclasses import dataclass
 from antennate.cli.addresses import PortOptions, at_hand, key_of, parse_robot, require_two_ports
 from antennate.cli.exit_codes import BAD_INPUT, OK
 from antennate.cli.options import option
+from antennate.cli.output import write_result
 from antennate.cli.progress import stop_signals
 from antennate.cli.results import ResultOptions, folder_for
 from antennate.errors import ConfigError
@@ -64,7 +65,7 @@ def command(argv: Sequence[str]) -> int:
         if folder is not None:
             folder.finish(result)
         if orders.json:
-            sys.stdout.write(to_json(result))
+            write_result(to_json(result))
         else:
             show_rows(checkup.rows)
     return BAD_INPUT if checkup.grade == "bad" else OK

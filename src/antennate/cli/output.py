@@ -27,11 +27,13 @@ class Output(io.TextIOBase):
 
     Attributes:
         error: What went wrong first, None if nothing did.
+        result: The stream of the result: this one, but with --json.
     """
 
     def __init__(self, file: TextIO | None) -> None:
         self._file = file
         self.error: OSError | None = None
+        self.result = self
         if isinstance(file, io.TextIOWrapper):
             file.reconfigure(errors=_PLAIN)
 
@@ -67,6 +69,11 @@ class Output(io.TextIOBase):
             except OSError as error:
                 self._fail(error)
 
+    def move(self, descriptor: int) -> None:
+        """Write to this file descriptor from now on, if the stream was standard output."""
+        if self._file is not None and self._file is sys.__stdout__:
+            self._file = os.fdopen(descriptor, "w", encoding=self.encoding, errors=_PLAIN)
+
     def _fail(self, error: OSError) -> None:
         """Keep the error; what is still in the buffer is written to the null device."""
         self.error = error
@@ -76,18 +83,49 @@ class Output(io.TextIOBase):
 
 
 @contextlib.contextmanager
-def safe_streams() -> Iterator[Output]:
-    """Let nothing that is written to the standard streams raise; yield standard output."""
+def safe_streams(result_alone: bool = False) -> Iterator[Output]:
+    """Let nothing that is written to the standard streams raise; yield standard output.
+
+    Args:
+        result_alone: Whether nothing but the result goes to standard output. What users' code
+            prints, here and in workers, goes to standard error then.
+    """
     _occupy()
     before = sys.stdout, sys.stderr
     out = Output(sys.stdout)
     sys.stdout, sys.stderr = out, Output(sys.stderr)
     try:
-        yield out
+        with _aside(out, before[1]) if result_alone else contextlib.nullcontext():
+            yield out
     finally:
         sys.stdout.flush()
         sys.stderr.flush()
         sys.stdout, sys.stderr = before
+
+
+@contextlib.contextmanager
+def _aside(out: Output, other: TextIO | None) -> Iterator[None]:
+    """Let what is printed, also by processes and libraries, go to standard error."""
+    out.flush()
+    kept = os.dup(1)
+    os.dup2(2, 1)
+    out.move(os.dup(kept))
+    sys.stdout = Output(other)
+    sys.stdout.result = out
+    try:
+        yield
+    finally:
+        sys.stdout.flush()
+        sys.stdout = out
+        if sys.__stdout__ is not None:
+            sys.__stdout__.flush()
+        os.dup2(kept, 1)
+        os.close(kept)
+
+
+def write_result(text: str) -> None:
+    """Write to standard output, also where users' code cannot."""
+    getattr(sys.stdout, "result", sys.stdout).write(text)
 
 
 def _occupy() -> None:

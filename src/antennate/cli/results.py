@@ -13,6 +13,7 @@ from pydantic.dataclasses import dataclass
 
 from antennate.cli.arguments import FromFile
 from antennate.cli.options import option
+from antennate.cli.output import write_result
 from antennate.errors import BadInputError
 from antennate.params.base import Params
 from antennate.studies.formats import to_json
@@ -103,7 +104,7 @@ def tell(
 ) -> None:
     """Print the result: as JSON, or as tables and one closing sentence."""
     if options.json:
-        sys.stdout.write(to_json(result))
+        write_result(to_json(result))
         return
     for table in tables:
         print_table(table)
