@@ -118,6 +118,16 @@ class Own:
     assert all(map(math.isnan, phases))
 
 
+@pytest.mark.parametrize("name", ["log.txt", "log", "mcap"])
+def test_a_log_with_another_ending_is_refused_before_anything_is_run(
+    name: str, tmp_path: Path
+) -> None:
+    log = tmp_path / name
+    with pytest.raises(antennate.BadInputError, match=r"log: expected a name with \.mcap, found "):
+        antennate.simulate("open", scene="flat", time_limit=0.1, log=str(log))
+    assert not log.exists()
+
+
 def test_a_trial_that_was_killed_is_logged_anew(tmp_path: Path) -> None:
     """Half a log of it is in the folder of a run that goes on."""
     (tmp_path / "open-0.mcap").write_bytes(b"half")

@@ -42,20 +42,23 @@ def simulate(
         time_limit: Time after which it ends [s]; it ends earlier at the exit, or when the robot has
             left the scene or the physics failed.
         control: Parameters of the controller, the defaults if not given.
-        log: A file that does not exist yet, for the log of the trial as an MCAP file.
+        log: A file that does not exist yet, with the ending .mcap, for the log of the trial.
         settings: Fields of the trial: seed, scene, robot, tunnel, variation, physics.
 
     Returns:
         The series; `meta["outcome"]` is success, timeout, left or invalid.
 
     Raises:
-        ConfigError: A setting is unknown or out of bounds, or there is no such controller.
+        ConfigError: A setting is unknown or out of bounds, there is no such controller, or the log
+            has another ending.
         SceneError: The scene cannot be built, or the robot starts inside an obstacle.
         ControllerError: The controller raised an exception, or what it answers is no command.
         LogError: The log cannot be written.
     """
     if not isinstance(trial, Integral) or trial < 0:
         raise ConfigError(f"trial: expected a whole number of at least 0, found {trial!r}")
+    if log is not None and Path(log).suffix != ".mcap":
+        raise ConfigError(f"log: expected a name with .mcap, found {log}")
     config, control = from_values(TrialConfig, settings), control or ControlParams()
     scene = make_scene(config.scene, config.tunnel)
     start = draw_trial(config, scene, trial, control.gait, control.period)
