@@ -4,10 +4,14 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
+from matplotlib.colors import to_hex
 
 from antennate import figures as style
 from antennate.control.registry import BUILT_IN
 from antennate.experiments.gait import figure as gait
+from antennate.experiments.taper import figure as taper
+from antennate.experiments.taper.experiment import TaperConfig
+from antennate.experiments.taper.experiment import run as run_taper
 from antennate.experiments.tunnel import figure as tunnel
 from antennate.experiments.tunnel.batch import SHOWN_TRIALS, run_trials
 from antennate.experiments.tunnel.config import TunnelConfig
@@ -146,13 +150,37 @@ def test_trajectories_are_a_grid_with_the_verdict_of_each_trial():
     figure = trajectories()
     titles = [panel.get_title(loc="left") for panel in figure.axes]
     assert len(titles) == len(BUILT_IN) * 4
-    assert titles[:4] == [
+    assert titles[:: len(BUILT_IN)] == [
         "trial 0: out after 10.0 s",
         "trial 1: out after 20.0 s",
         "trial 2: out of time, 50 s",
         "trial 3: left the scene",
     ]
     assert len(figure.legends) == 1
+    named = [text.get_text() for panel in figure.axes for text in panel.texts]
+    assert named == list(BUILT_IN)
+
+
+def test_trajectories_of_different_extent_have_the_same_ticks():
+    """A small scene alone would have closer ones than a large one."""
+    small = path(0.5)
+    small.fixed, small.exit = [0.3 * wall for wall in WALLS], 0.3 * small.exit
+    small.before, small.after = [], []
+    paths, found = {("open", 0): small, ("open", 1): path(2.0)}, rows()
+    figure = tunnel.trajectories(paths, ("open",), found, range(2))
+    figure.draw_without_rendering()
+    for axis in (panel.xaxis for panel in figure.axes):
+        assert {float(each) for each in np.diff(axis.get_majorticklocs())} == {1.0}
+
+
+def test_lines_of_the_taper_have_four_colours_and_the_ladder_that_of_its_profile():
+    panel = taper.taper(run_taper(TaperConfig()).result()).axes[0]
+    stretches, ladder, suggested = (to_hex(each.get_edgecolor()) for each in panel.patches)
+    colours = {to_hex(panel.lines[0].get_color()), stretches, ladder, suggested}
+    assert len(colours) == 4
+    assert ladder == to_hex(style.PROFILE_LOOKS["descending"][0])
+    profiles = {to_hex(colour) for colour, _, _ in style.PROFILE_LOOKS.values()}
+    assert colours & profiles == {ladder}
 
 
 def test_robots_far_outside_do_not_stretch_the_panels():

@@ -12,6 +12,10 @@ from matplotlib.figure import Figure
 from antennate import figures as style
 from antennate.experiments.taper.experiment import TaperOutcome
 
+_ANIMAL, _STRETCHES = style.INK, style.MUTED
+_LADDER, _SUGGESTED = style.PROFILE_LOOKS["descending"][0], "#56B4E9"
+"""The ladder is that of the descending profile, unless told otherwise; no profile has the other."""
+
 
 def figures(outcome: TaperOutcome) -> dict[str, Figure]:
     """The figure of a run."""
@@ -25,22 +29,21 @@ def taper(result: Mapping[str, Any]) -> Figure:
     Args:
         result: The content of result.json.
     """
-    figure = style.canvas(7.0, 4.2)
+    figure = style.canvas(5.2, 3.8)
     panel = figure.subplots()
     segments = np.array([row["proxy"] for row in result["segments"]])
     places = (np.arange(len(segments)) + 0.5) / len(segments)
-    animal, robot, best = style.series(3)
     panel.plot(
         places,
         segments,
-        color=animal,
+        color=_ANIMAL,
         marker="o",
         markersize=4,
         label=f"animal, {len(segments)} segments: {result['base_over_tip']:.0f} : 1",
     )
-    _steps(panel, result["stretches"], animal, (0, (2, 1.5)), "animal, one stretch a spring")
-    for key, colour, name in (("ladder", robot, "ladder"), ("suggested", best, "suggested")):
-        row = result[key]
+    _steps(panel, result["stretches"], _STRETCHES, (0, (2, 1.5)), "animal, one stretch a spring")
+    for name, colour in (("ladder", _LADDER), ("suggested", _SUGGESTED)):
+        row = result[name]
         coils = "-".join(f"{n:g}" for n in row["active_coils"])
         label = f"{name} {coils}: {row['base_over_tip']:.3g} : 1"
         _steps(panel, row["proxy"], colour, "solid", label)
@@ -56,6 +59,6 @@ def taper(result: Mapping[str, Any]) -> Figure:
 
 def _steps(panel: Axes, values: list[float], colour: Any, line: Any, label: str) -> None:
     edges = np.linspace(0.0, 1.0, len(values) + 1)
-    panel.stairs(
-        values, edges, baseline=None, color=colour, linestyle=line, linewidth=1.8, label=label
-    )
+    look = {"color": colour, "linestyle": line, "linewidth": 1.8}
+    above = 3 if line != "solid" else 2  # dashes show a line below them
+    panel.stairs(values, edges, baseline=None, label=label, zorder=above, **look)

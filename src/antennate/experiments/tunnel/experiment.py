@@ -75,7 +75,7 @@ def _none_valid(result: Mapping[str, Any]) -> dict[str, str]:
 
 
 CAPTIONS = {
-    "trajectories": "Trials from above: a column for each trial, a row for each "
+    "trajectories": "Trials from above: a row for each trial, a column for each "
     "controller, coloured by maneuver.",
     "summary": "Success, time in the scene, and restricted mean time of each "
     "controller, with 95 % intervals from five trials on.",

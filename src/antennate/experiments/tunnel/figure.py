@@ -12,7 +12,7 @@ from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from matplotlib.ticker import MaxNLocator, PercentFormatter
+from matplotlib.ticker import MaxNLocator, MultipleLocator, PercentFormatter
 
 from antennate import figures as style
 from antennate.experiments.tunnel.batch import SHOWN_TRIALS
@@ -53,64 +53,57 @@ def trajectories(
     rows: Sequence[TrialResult],
     trials: Sequence[int],
 ) -> Figure:
-    """Trials from above: a column for each trial, a row for each controller.
+    """Trials from above: a row for each trial, a column for each controller.
 
-    A single trial is drawn larger, with the controllers side by side.
+    A single trial is drawn larger.
 
     Args:
         paths: Courses by controller and trial; a missing one leaves its panel empty.
-        controllers: Names from top to bottom.
+        controllers: Names from left to right.
         rows: The table.
-        trials: Trials from left to right.
+        trials: Trials from top to bottom.
     """
     table = {(row.controller, row.trial): row for row in rows}
     boxes = {t: _box([paths[a, t] for a in controllers if (a, t) in paths]) for t in trials}
-    alone = len(trials) == 1
-    figure, panels = _panels(len(controllers), len(trials), [b for b in boxes.values() if b])
+    sides = [high - low for low, high in filter(None, boxes.values())] or [np.ones(2)]
+    figure, panels = _panels(len(trials), len(controllers), sides)
+    step = float(np.diff(MaxNLocator(4, steps=[1, 2, 5, 10]).tick_values(0, np.max(sides)))[0])
     for i, (controller, label) in enumerate(short_names(controllers).items()):
         for j, trial in enumerate(trials):
-            panel, place = (panels[0, i] if alone else panels[i, j]), (controller, trial)
-            _frame(panel, boxes[trial])
+            panel, place = panels[j, i], (controller, trial)
+            _frame(panel, boxes[trial], step)
             said = "not run"
             if place in paths:
                 _draw_trial(panel, paths[place])
                 said = _OUTCOMES[table[place].outcome].format(table[place].time_s)
-            panel.set_title(f"{label}\n" * alone + f"trial {trial}: {said}", fontsize=8.5)
-        if not alone:
-            _name_row(panels[i, 0], label)
+            panel.set_title(f"trial {trial}: {said}", fontsize=9)
+        _name_column(panels[0, i], label)
     for panel in panels[-1]:
         panel.set_xlabel("x [m]")
     for panel in panels[:, 0]:
         panel.set_ylabel("y [m]")
     handles = _handles(list(paths.values()))
-    columns = min(5, 2 + panels.shape[1])
+    columns = int(figure.get_figwidth() // 2)
     figure.legend(handles=handles, loc="outside lower center", ncols=columns)
     return figure
 
 
-def _panels(
-    controllers: int, trials: int, boxes: Sequence[tuple[Floats, Floats]]
-) -> tuple[Figure, Any]:
+def _panels(rows: int, columns: int, sides: Sequence[Floats]) -> tuple[Figure, Any]:
     """An empty figure and its panels, shape (rows, columns), as high as the boxes need."""
-    rows, columns = (1, controllers) if trials == 1 else (controllers, trials)
-    sides = [high - low for low, high in boxes] or [np.ones(2)]
     aspect = float(max(side[1] for side in sides) / max(side[0] for side in sides))
-    width = min(max(2.3, 7.0 / trials), 5.5 if columns == 1 else 3.5)
-    height = (width - 0.3) * aspect + (0.7 if trials == 1 else 0.35)
-    figure = style.canvas(max(0.5 + width * columns, 6.4), 0.9 + rows * height)
+    width = 2.1 if rows > 1 and columns > 1 else 5.5 if columns == rows else 3.5
+    height = (width - 0.3) * aspect + 0.35
+    figure = style.canvas(max(0.5 + width * columns, 6.4), 1.25 + rows * height)
     return figure, figure.subplots(rows, columns, squeeze=False)
 
 
-def _name_row(panel: Axes, label: str) -> None:
+def _name_column(panel: Axes, label: str) -> None:
     panel.annotate(
         label,
-        (0.0, 0.5),
-        (-54.0, 0.0),
+        (0.0, 1.0),
+        (0.0, 18.0),
         xycoords="axes fraction",
         textcoords="offset points",
-        rotation=90,
-        ha="center",
-        va="center",
         fontsize=11,
         fontweight="bold",
     )
@@ -132,11 +125,11 @@ def _box(paths: Sequence[TrialPath]) -> tuple[Floats, Floats] | None:
     return np.minimum(low, pushed.min(axis=0)), np.maximum(high, pushed.max(axis=0))
 
 
-def _frame(panel: Axes, box: tuple[Floats, Floats] | None) -> None:
+def _frame(panel: Axes, box: tuple[Floats, Floats] | None, step: float) -> None:
     panel.set_aspect("equal", adjustable="box")
     panel.grid(visible=False)
     for axis in (panel.xaxis, panel.yaxis):
-        axis.set_major_locator(MaxNLocator(4, steps=[1, 2, 5, 10]))
+        axis.set_major_locator(MultipleLocator(step))
     if box is not None:
         panel.set_xlim(box[0][0], box[1][0])
         panel.set_ylim(box[0][1], box[1][1])

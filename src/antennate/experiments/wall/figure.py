@@ -37,14 +37,16 @@ def outcomes(result: Mapping[str, Any]) -> Figure:
     Args:
         result: The content of result.json.
     """
-    figure = style.canvas(10.0, 3.6)
-    whole, late = figure.subplots(1, 2, sharey=True)
+    figure = style.canvas(5.6, 5.0)
+    whole, late = figure.subplots(2, 1)
     profiles = result["profiles"]
-    _draw_outcomes(whole, profiles, "Whole travel")
+    trials = min(profile["trials"] for profile in profiles.values())
+    note = style.interval_note("bars: Wilson 95 % of success", trials)
+    _draw_outcomes(whole, profiles, f"Whole travel; {note}")
     after = {name: profile["after_start"] for name, profile in profiles.items()}
-    _draw_outcomes(late, after, f"Without the first {1e3 * result['start_m']:g} mm")
-    whole.set_ylabel("share of trials")
-    whole.legend(loc="lower center", bbox_to_anchor=(1.05, -0.42), ncols=4, fontsize=8)
+    start = f"first {1e3 * result['start_m']:g} mm"
+    _draw_outcomes(late, after, f"After the {start}, in which the antenna bows from its approach")
+    figure.legend(*whole.get_legend_handles_labels(), loc="outside lower center", ncols=4)
     return figure
 
 
@@ -66,9 +68,7 @@ def _draw_outcomes(panel: Axes, profiles: Mapping[str, Mapping[str, Any]], title
         f"{name.replace('_', chr(10))}\n{profile['trials']}" for name, profile in profiles.items()
     ]
     panel.set_xticks(places, labels)
-    trials = min(profile["trials"] for profile in profiles.values())
-    note = style.interval_note("bars: Wilson 95 % of success", trials)
-    panel.set(title=f"{title}; {note}", ylim=(0, 1.02))
+    panel.set(title=title, ylabel="share of trials", ylim=(0, 1.02))
     panel.grid(axis="x", visible=False)
 
 
