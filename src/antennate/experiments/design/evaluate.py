@@ -24,6 +24,7 @@ from antennate.params.base import Params
 from antennate.params.reading import group_of, put_over
 from antennate.studies.experiment import Trial, no_row, no_step
 from antennate.studies.plan import Point
+from antennate.studies.pool import Workers
 
 FRESH = 1_000_000
 """Added to a seed, it gives one that no trial of a search has."""
@@ -280,7 +281,7 @@ def run_tasks(tasks: Sequence[Task], emit: Callable[[int, tuple[int, Row]], None
 
 def _run_whole(task: Task) -> Row:
     """An experiment without trials of its own, as one row: what is judged, or all if that lacks."""
-    outcome = experiments.load(task.experiment).run(task.config, 1, no_step, no_row)
+    outcome = experiments.load(task.experiment).run(task.config, Workers(1), no_step, no_row)
     found = numbers(outcome.result())
     judged = {name: found[name] for name in task.judged if name in found}
     row = judged if len(judged) == len(set(task.judged)) else found
