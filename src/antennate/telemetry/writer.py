@@ -176,9 +176,8 @@ class LogWriter:
     def event(self, text: str, source: str = "antennate", t: float = 0.0) -> None:
         """Add an event at a time of the loop [s], not before the last tick."""
         stamp = self._stamp(t)
-        data = EVENTS.type.encode(
-            *divmod(stamp, 10**9), _LEVELS["DEGRADED"], source, text, "", "", 0
-        )
+        time = divmod(min(stamp, _LATEST), 10**9)
+        data = EVENTS.type.encode(*time, _LEVELS["DEGRADED"], source, text, "", "", 0)
         self.add(EVENTS, self.written, stamp, data)
 
     def settle(self) -> None:
