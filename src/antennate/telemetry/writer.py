@@ -24,6 +24,7 @@ from antennate import __version__
 from antennate.errors import LogError
 from antennate.files import require_room
 from antennate.telemetry.cdr import Form
+from antennate.telemetry.chunks import LIBRARY
 from antennate.telemetry.header import Header
 from antennate.telemetry.ticks import Tick
 from antennate.telemetry.topics import EVENTS, TOPICS, Topic
@@ -88,7 +89,7 @@ class LogWriter:
         self._called = called or path
         require_room(self._called, least_free, LogError)
         self._file = _NewFile(path, self._called)
-        self._container = Container(self._file, f"antennate {__version__}")
+        self._container = Container(self._file, f"{LIBRARY}{__version__}")
         self._channels = self._register()
         for topic, data in header.messages().items():
             self.add(topic, 0, header.start, data)
