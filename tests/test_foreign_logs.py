@@ -104,7 +104,7 @@ def test_a_summary_may_leave_out_what_it_likes(
     log: Path, how: dict[str, Any], capsys: pytest.CaptureFixture[str]
 ) -> None:
     wanted = info(log, capsys)
-    found = info(anew(log, chunk_size=2000, **how), capsys)
+    found = info(anew(log, chunk_size=50_000, **how), capsys)
     for each in (wanted, found):
         del each[1]["log"], each[1]["parts"]
     assert found == wanted
@@ -145,15 +145,14 @@ def test_a_log_without_crcs_is_read_and_said_to_be_unguarded(
 
 
 def test_a_long_log_without_chunks_keeps_the_parts_of_a_tick_together(tmp_path: Path) -> None:
-    """More than can be held at once; what is measured of the joints comes last of a tick."""
-    joints = len(HEADER.robot.joint_names)
-    long = tmp_path / "long.mcap"
+    """More than is held at once, and nearly all of it right before the last message of a tick."""
+    long, count = tmp_path / "long.mcap", 250
     with LogWriter(long, HEADER, 0.0) as out:
-        for number in range(1, 3001):
-            measured = (float(number),) * joints
-            out.write(replace(tick(number % 50), number=number, positions=measured))
+        for number in range(1, count + 1):
+            more = {"angles": (0.5,) * 2000, "positions": (float(number),)}
+            out.write(replace(tick(number), **more))
     with LogReader(anew(long, use_chunking=False)) as log:
-        assert [each.positions[0] for each in log] == list(range(1, 3001))
+        assert [each.positions for each in log] == [(number,) for number in range(1, count + 1)]
         assert (log.bad, log.missing, log.guarded) == (0, 0, False)
 
 
