@@ -60,8 +60,6 @@ def command(argv: Sequence[str]) -> int:
     if not options.log:
         raise ConfigError("expected the name of a log or of a run, found none")
     path = log_of(Path(options.log))
-    if options.out is None and options.overwrite:
-        raise ConfigError("--overwrite: expected --out beside it, found none")
     log, found, by_hand = _replayed(path, config, options)
     log.require_ticks()
     result = _result(log, found, config.controller)
