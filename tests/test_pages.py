@@ -55,8 +55,7 @@ CUT_OFF = """(() => {
     ...diagrams.flatMap(e => [...e.querySelectorAll('span')])].filter(e => {
       const box = e.getBoundingClientRect();
       return box.width && (box.left < 0 || box.right > width); }).map(e => e.textContent); })()"""
-"""What is beyond the borders of the page, be it in a box that scrolls. Lines of code may be: they are
-never broken."""
+"""What is beyond the borders of the page, also in a box that scrolls. Lines of code may be."""
 
 
 @contextmanager
