@@ -35,8 +35,10 @@ class Options(ResultOptions):
     slurm: tuple[str, ...] = option(
         (), "what SLURM is asked for, as timeout_min=60", "NAME=VALUE", needs=["--engine slurm"]
     )
-    trial_timeout: float = option(
-        TIMEOUT, "give a trial up after this time [s]; unless said, one worker waits on", gt=0
+    trial_timeout: float | None = option(
+        None,
+        f"give a trial up after this time [s], else {TIMEOUT:g}; unless said, one worker waits on",
+        gt=0,
     )
 
 

@@ -54,8 +54,8 @@ class Workers(int):
         engine: Where they are; processes of this machine if not given.
         store: Where finished tasks are kept, None to keep none.
         shard: (i, n): carry out the i-th of n parts of the tasks, from 1, and raise ShardEnd.
-        timeout: Time after which a task that has not ended is given up [s]; where it is not the
-            usual one, even one worker is a process of its own.
+        timeout: Time after which a task that has not ended is given up [s], so that even one worker
+            is a process of its own; None for an hour, where one worker waits on.
         retry: Whether tasks that failed before are run again.
         closed: Whether all tasks must have been finished before.
         apart: Whether even one worker is a process of its own, which may crash or be killed.
@@ -67,14 +67,15 @@ class Workers(int):
         engine: Engine | None = None,
         store: Store | None = None,
         shard: tuple[int, int] | None = None,
-        timeout: float = TIMEOUT,
+        timeout: float | None = None,
         retry: bool = False,
         closed: bool = False,
         apart: bool = False,
     ) -> Workers:
         """As the class says."""
         self = super().__new__(cls, count)
-        self._engine, self.store, self.shard, self.timeout = engine, store, shard, timeout
+        self._engine, self.store, self.shard = engine, store, shard
+        self.timeout, self._waits_on = TIMEOUT if timeout is None else timeout, timeout is None
         self.retry, self.closed, self.apart = retry, closed, apart
         self.shared, self.calls = None, itertools.count()
         self._staying = None
@@ -84,6 +85,7 @@ class Workers(int):
     store: Store | None
     shard: tuple[int, int] | None
     timeout: float
+    _waits_on: bool
     retry: bool
     closed: bool
     apart: bool
@@ -105,7 +107,7 @@ class Workers(int):
         """Where so many parts are carried out."""
         if self._engine is not None:
             return self._engine
-        if not self.apart and self.timeout == TIMEOUT and (self == 1 or parts <= 1):
+        if not self.apart and self._waits_on and (self == 1 or parts <= 1):
             return Here()
         return self._staying or Processes()
 
