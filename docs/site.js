@@ -1,4 +1,24 @@
+// A table that is too wide for the page shows its rows one below the other, each cell with its head.
+const stack = () => {
+  for (const table of document.querySelectorAll(".md-typeset table:not([class])")) {
+    delete table.dataset.stacked;
+    const room = table.closest(".md-content__inner");
+    if (room && table.getBoundingClientRect().right > room.getBoundingClientRect().right) {
+      table.dataset.stacked = "";
+    }
+  }
+};
+window.addEventListener("load", stack);
+window.addEventListener("resize", stack);
+
 document.addEventListener("DOMContentLoaded", () => {
+  for (const table of document.querySelectorAll(".md-typeset table:not([class])")) {
+    const heads = [...table.querySelectorAll("thead th")].map((head) => head.textContent);
+    for (const line of table.querySelectorAll("tbody tr")) {
+      [...line.cells].forEach((cell, i) => (cell.dataset.head = heads[i] ?? ""));
+    }
+  }
+
   // Each figure links to its full picture.
   for (const figure of document.querySelectorAll(".md-typeset p > img")) {
     const link = document.createElement("a");

@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+import antennate
+from antennate.errors import AntennateError
 from antennate.testing import check_controller
 from antennate.types import AntennaFrame, Contact, JointCommand, Maneuver
 
@@ -123,6 +125,13 @@ class LevelInPercent(Around):
         return command
 
 
+class InfiniteLevel(Around):
+    def step(self, frame: AntennaFrame) -> JointCommand:
+        command = super().step(frame)
+        self.level = np.where(np.arange(2) == 0, -np.inf, self.inner.level)
+        return command
+
+
 class NotFinite(Around):
     def step(self, frame: AntennaFrame) -> JointCommand:
         command = super().step(frame)
@@ -229,6 +238,7 @@ BROKEN = {
     FloatManeuver: "expected whole numbers as maneuver, found an array of float64",
     NoContact: "expected contacts of 0 to 2",
     LevelInPercent: "expected levels of 0 to 1",
+    InfiniteLevel: "expected levels of 0 to 1, or NaN",
     NotFinite: "expected finite angles in leg",
     Raises: "step raised ZeroDivisionError: of my own",
     ByChance: "expected the same answers to the same readings, found another antenna",
@@ -256,3 +266,22 @@ def test_a_broken_controller_is_told_what_is_broken(kind: Any) -> None:
 def test_a_controller_that_is_not_there_fails_the_check(name: str) -> None:
     with pytest.raises(AssertionError, match=name):
         check_controller(name)
+
+
+class UnknownLevel(Around):
+    def step(self, frame: AntennaFrame) -> JointCommand:
+        command = super().step(frame)
+        self.level = np.full_like(self.inner.level, math.nan)
+        return command
+
+
+def test_an_infinite_level_makes_a_trial_invalid_and_an_unknown_one_does_not() -> None:
+    kinds: list[Any] = [InfiniteLevel, UnknownLevel]
+    found = antennate.run("tunnel", trials=2, time_limit=0.3, controllers=kinds).rows
+    told = {(row.controller, row.outcome, row.reason[:47]) for row in found}
+    assert told == {
+        ("InfiniteLevel", "invalid", "controller: expected levels of 0 to 1, or NaN, "),
+        ("UnknownLevel", "timeout", ""),
+    }
+    with pytest.raises(AntennateError, match="tick 1: expected levels of 0 to 1, or NaN, found"):
+        antennate.simulate(kinds[0], time_limit=0.1)

@@ -179,6 +179,7 @@ def test_a_disk_that_takes_no_trial_does_not_promise_more_than_it_holds(
         ("springs", ["--shard", "1/2"]),
         ("springs", ["--engine", "slurm-local"]),
         ("springs", ["--trial-timeout", "3"]),
+        ("springs", ["--trial-timeout", "3600"]),
         ("springs", ["--workers", "3"]),
         ("springs", ["--retry"]),
         ("design", ["--shard", "1/2"]),

@@ -21,6 +21,8 @@ pytestmark = pytest.mark.skipif(
 )
 ROOT = Path(__file__).parent.parent
 LOOKS = [(width, scheme) for width in (1280, 390) for scheme in ("light", "dark")]
+PAGES = (*("", "log/", "commands/", "performance/", "reliability/", "hardware/", "tutorials/log/"),)
+"""Pages of the docs that are looked at."""
 READABLE = 4.5
 """Least contrast of text (WCAG 2.2, level AA)."""
 LEAST = 0.75
@@ -44,6 +46,16 @@ CONTRAST = """((selector) => {
 FIGURES = """[...document.images].map(e => [e.clientWidth / parseFloat(e.getAttribute('width')),
   getComputedStyle(e).backgroundColor, getComputedStyle(e).filter])"""
 """Of each figure: its width as part of the drawn one, what is behind it, what changes it."""
+
+CUT_OFF = """(() => {
+  const width = document.documentElement.clientWidth;
+  const diagrams = [...document.querySelectorAll('article .language-text code')].filter(
+    e => /[▲▼►→]/.test(e.textContent));
+  return [...document.querySelectorAll('article :is(h1, h2, h3, p, li, td, th, img, td code)'),
+    ...diagrams.flatMap(e => [...e.querySelectorAll('span')])].filter(e => {
+      const box = e.getBoundingClientRect();
+      return box.width && (box.left < 0 || box.right > width); }).map(e => e.textContent); })()"""
+"""What is beyond the borders of the page, also in a box that scrolls. Lines of code may be."""
 
 
 @contextmanager
@@ -110,8 +122,28 @@ class Quiet(http.server.SimpleHTTPRequestHandler):
 
 def test_the_docs_are_read_on_a_screen_and_on_a_phone(site: str, tmp_path: Path) -> None:
     with browser(tmp_path / "browser") as tab:
-        for page in ("", "log/", "commands/", "performance/", "tutorials/log/"):
+        for page in PAGES:
             for width, scheme in LOOKS:
                 with looked_at(tab, f"{site}/{page}", width, scheme):
                     text = tab.run(f"{CONTRAST}('article p, article li, article td, article h1')")
                     assert text >= READABLE, (page, width, scheme)
+                    assert tab.run(CUT_OFF) == [], (page, width, scheme)
+
+
+def test_a_table_too_wide_for_a_phone_shows_each_cell_with_its_head(
+    site: str, tmp_path: Path
+) -> None:
+    """The first row of the aims: what, aim, measured, and whether it is met; turned to a screen,
+    it is a table again."""
+    first = "document.querySelector('article table')"
+    cells = f"[...{first}.querySelectorAll('tbody tr:first-child td')]"
+    tops = f"new Set({cells}.map(e => e.getBoundingClientRect().top)).size"
+    heads = f"{cells}.map(e => getComputedStyle(e, '::before').content)"
+    with browser(tmp_path / "browser") as tab:
+        with looked_at(tab, f"{site}/performance/", 390, "light"):
+            assert tab.run(tops) == 4
+            assert tab.run(heads) == ["none", '"aim: "', '"measured: "', "none"]
+        size = {"width": 1280, "height": 900, "deviceScaleFactor": 1, "mobile": False}
+        tab.call("Emulation.setDeviceMetricsOverride", **size)
+        assert tab.until(f"{tops} == 1")
+        assert tab.run(heads) == ["none"] * 4

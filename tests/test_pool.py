@@ -40,6 +40,13 @@ def test_a_failing_task_is_named() -> None:
         gather(halves, [(1, 0), (2, 0)], 1, no_step)
 
 
+def test_one_worker_with_any_time_limit_is_a_process_of_its_own() -> None:
+    """Also with the usual hour: only such a process can be given up."""
+    for workers, own in ((Workers(1), True), (Workers(1, timeout=3600.0), False)):
+        found = gather(os.getpid, [()], workers, no_step)
+        assert (found == [os.getpid()]) == own
+
+
 def lost(place: int, failure: Failure) -> Any:
     return (failure.status, failure.reason)
 

@@ -6,7 +6,7 @@ The file must be valid on its own; flags override it. Values are checked once, b
 from __future__ import annotations
 
 import shlex
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -15,6 +15,7 @@ from pydantic.dataclasses import dataclass
 
 from antennate.cli.help import Command, long_page, short_page
 from antennate.cli.options import (
+    Option,
     fields_of,
     flag_of,
     found,
@@ -91,6 +92,7 @@ def parse(
     values = read_words(argv, [*others, *parameters])
     names = fields_of(options)
     chosen = _filled(options, {}, {p: v for p, v in values.items() if p[0] in names})
+    _refuse_alone([each for each in [*others, *parameters] if each.path in values], chosen)
     base: Mapping[str, Any] = {}
     if isinstance(chosen, FromFile) and chosen.config is not None:
         config = read_file(chosen.config, model) if read is None else read(chosen.config)
@@ -104,6 +106,18 @@ def parse(
     config = _filled(model, base, given)
     _refuse_unread(config, given)
     return config, chosen
+
+
+def _refuse_alone(given: Iterable[Option], options: Any) -> None:
+    """Refuse an option that says nothing without another one.
+
+    Raises:
+        ConfigError: One of those given is without what it needs.
+    """
+    for each in given:
+        if not each.is_beside(options):
+            needed = " or ".join(each.needs)
+            raise ConfigError(f"{each.flag}: expected {needed} beside it, found none")
 
 
 def _refuse_unread(config: Params, flags: Mapping[tuple[str, ...], Any]) -> None:

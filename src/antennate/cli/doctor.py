@@ -45,7 +45,7 @@ class Orders(ResultOptions, PortOptions):
     """What to do about it."""
 
     fix: bool = option(False, "put right what can be, asking before each change")
-    yes: bool = option(False, "answer yes to all that --fix asks")
+    yes: bool = option(False, "answer yes to all that --fix asks", needs=["--fix"])
     out: Path | None = option(None, "folder for result.json; none if not given", "FOLDER")
 
 
@@ -77,8 +77,6 @@ def _check(orders: Orders) -> None:
     require_two_ports(orders)
     if orders.fix and not orders.bus:
         raise ConfigError("--fix: expected --bus PORT with it, found none")
-    if orders.yes and not orders.fix:
-        raise ConfigError("--yes: expected --fix with it, found none")
     if orders.fix and not orders.yes and not sys.stdin.isatty():
         raise ConfigError("--fix: expected a terminal to ask on, found none; or give --yes")
 

@@ -63,7 +63,7 @@ class FilmOptions(Options):
 class TrialFilmOptions(FilmOptions):
     """The same where there are trials to film."""
 
-    video_trial: int = option(0, "trial that --video films", "INT", ge=0)
+    video_trial: int = option(0, "trial that --video films", "INT", needs=["--video"], ge=0)
 
 
 @dataclass(frozen=True)
@@ -91,17 +91,9 @@ def _options(experiment: Experiment[Any, Any]) -> type[Options]:
 
 
 def _filmed(options: Options) -> int | None:
-    """The trial to film, None for none.
-
-    Raises:
-        ConfigError: A trial is named, but no film is wanted.
-    """
-    trial = getattr(options, "video_trial", 0)
-    if isinstance(options, FilmOptions) and options.video:
-        return trial
-    if trial:
-        raise ConfigError("--video-trial: expected --video beside it, found none")
-    return None
+    """The trial to film, None for none."""
+    wanted = isinstance(options, FilmOptions) and options.video
+    return getattr(options, "video_trial", 0) if wanted else None
 
 
 def command(experiment: Experiment[Any, Any], argv: Sequence[str]) -> int:

@@ -14,7 +14,7 @@ from antennate.cli.arguments import parse
 from antennate.cli.exit_codes import OK
 from antennate.cli.options import option
 from antennate.cli.progress import progress, stop_signals
-from antennate.cli.replay import complain
+from antennate.cli.replay import complain, say_unguarded
 from antennate.cli.results import ResultOptions, log_of, tell
 from antennate.errors import ConfigError, MissingPackageError, OutputError
 from antennate.files import remove_abandoned, require_room, write_whole, writing_whole
@@ -97,7 +97,10 @@ def command(argv: Sequence[str]) -> int:
     recovered = options.action == "recover"
     more = f"; {left_out(log)}" if recovered else ""
     tell({}, options, (), f"{log.ticks} ticks were written to {target}{more}.")
-    return OK if recovered else complain("log", log)
+    if recovered:
+        say_unguarded("log", log)
+        return OK
+    return complain("log", log)
 
 
 def _target(path: Path, options: Options) -> Path:
@@ -222,6 +225,7 @@ def _result(log: LogReader, found: Survey) -> dict[str, Any]:
         "missing": log.missing,
         "damaged": log.bad,
         "closed": log.end is not None,
+        "guarded": log.guarded,
     }
 
 

@@ -33,7 +33,7 @@ class MergeOptions:
 
     shards: tuple[Path, ...] = option((), "folders of all shards", "SHARD")
     out: Path | None = option(None, "folder for the run, else runs/COMMAND-N", "FOLDER")
-    overwrite: bool = option(False, "replace the results that the folder holds")
+    overwrite: bool = option(False, "replace the results that the folder holds", needs=["--out"])
     json: bool = option(False, "print the content of result.json and nothing else")
     no_figures: bool = option(False, "draw no figures")
 

@@ -25,18 +25,24 @@ _METAVARS = {int: "INT", float: "FLOAT", str: "TEXT", Path: "FILE"}
 _BOUNDS = {"gt": "above", "ge": "at least", "lt": "below", "le": "at most"}
 
 
-def option(default: Any, meaning: str, metavar: str = "", **more: Any) -> Any:
+def option(
+    default: Any, meaning: str, metavar: str = "", needs: Sequence[str] = (), **more: Any
+) -> Any:
     """Declare one option of a command that is no physical number.
 
     Args:
         default: Its default.
         meaning: What it does.
         metavar: What stands for its value in the help, such as FILE.
+        needs: Flags of which one must be given beside it, as `--video`; with the begin of its value
+            where not all do, as `--engine slurm`.
         more: As for pydantic's Field; `positional` is for a value without a flag.
     """
     extra: dict[str, Any] = {"metavar": metavar} if metavar else {}
     if more.pop("positional", False):
         extra["positional"] = True
+    if needs:
+        extra["needs"] = list(needs)
     return Field(default, description=meaning, json_schema_extra=extra, **more)
 
 
@@ -56,6 +62,7 @@ class Option:
         limits: Bounds in words, such as `at least 1`.
         default: Its default in words, empty if there is none to tell.
         positional: Whether it is given without a flag.
+        needs: Flags of which one must be given beside it.
     """
 
     path: tuple[str, ...]
@@ -69,6 +76,16 @@ class Option:
     limits: str = ""
     default: str = ""
     positional: bool = False
+    needs: tuple[str, ...] = ()
+
+    def is_beside(self, options: Any) -> bool:
+        """Whether these options have one that it needs, if it needs any."""
+        for need in self.needs:
+            flag, _, begin = need.partition(" ")
+            value = getattr(options, flag.removeprefix("--").replace("-", "_"))
+            if value and str(value).startswith(begin):
+                return True
+        return not self.needs
 
     @property
     def flag(self) -> str:
@@ -175,6 +192,7 @@ def _option(path: tuple[str, ...], model: type, default: Any) -> Option | None:
         default=_words(default),
         kinds=kinds,
         positional=bool(extra.get("positional")),
+        needs=tuple(map(str, needs)) if isinstance(needs := extra.get("needs"), list) else (),
     )
 
 

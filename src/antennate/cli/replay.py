@@ -60,8 +60,6 @@ def command(argv: Sequence[str]) -> int:
     if not options.log:
         raise ConfigError("expected the name of a log or of a run, found none")
     path = log_of(Path(options.log))
-    if options.out is None and options.overwrite:
-        raise ConfigError("--overwrite: expected --out beside it, found none")
     log, found, by_hand = _replayed(path, config, options)
     log.require_ticks()
     result = _result(log, found, config.controller)
@@ -103,6 +101,7 @@ def _replayed(
 
 def complain(command: str, log: LogReader) -> int:
     """Say on stderr what of a log could not be read: the exit code of the command."""
+    say_unguarded(command, log)
     if not log.bad and not log.missing:
         return OK
     place = f"; first at {_place(log.damage[0])}" if log.bad else ""
@@ -111,6 +110,15 @@ def complain(command: str, log: LogReader) -> int:
         f"damaged places: {log.bad}; ticks missing: {log.missing}; ticks read: {log.ticks}{place}\n"
     )
     return BAD_INPUT
+
+
+def say_unguarded(command: str, log: LogReader) -> None:
+    """Say on stderr that bytes of a log may have changed unnoticed."""
+    if not log.guarded:
+        sys.stderr.write(
+            f"antennate {command}: {log.path}: written by another program without CRCs, so damage "
+            "to its numbers is not noticed\n"
+        )
 
 
 def _place(damage: Damage) -> str:

@@ -41,7 +41,7 @@ class Options:
     out: Path | None = option(
         None, f"the page; else {REPORT} in the run, {COMPARISON} here of two", "FILE"
     )
-    overwrite: bool = option(False, "replace another file")
+    overwrite: bool = option(False, "replace another file", needs=["--out", "--compare"])
 
 
 def command(argv: Sequence[str]) -> int:

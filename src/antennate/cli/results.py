@@ -29,7 +29,7 @@ class ResultOptions(FromFile):
     """Where the results go."""
 
     out: Path | None = option(None, "folder for the results, else runs/COMMAND-N", "FOLDER")
-    overwrite: bool = option(False, "replace the results that the folder holds")
+    overwrite: bool = option(False, "replace the results that the folder holds", needs=["--out"])
     json: bool = option(False, "print the content of result.json and nothing else")
 
 

@@ -23,8 +23,8 @@ class Options(ResultOptions):
 
     workers: int | None = option(None, "processes to use, else one for each core", "INT", ge=1)
     no_figures: bool = option(False, "draw no figures")
-    resume: bool = option(False, "go on with the run that the folder holds")
-    retry: bool = option(False, "resume, and run crashed or hung trials again")
+    resume: bool = option(False, "go on with the run that the folder holds", needs=["--out"])
+    retry: bool = option(False, "resume, and run crashed or hung trials again", needs=["--out"])
     engine: str = option(
         LOCAL,
         f"where the workers are: {', '.join(EVERYWHERE)}; for tunnel, wall and studies of them "
@@ -32,9 +32,13 @@ class Options(ResultOptions):
         "ENGINE",
     )
     shard: str | None = option(None, "run one of N parts, for `antennate merge`", "I/N")
-    slurm: tuple[str, ...] = option((), "what SLURM is asked for, as timeout_min=60", "NAME=VALUE")
-    trial_timeout: float = option(
-        TIMEOUT, "give a trial up after this time [s]; unless said, one worker waits on", gt=0
+    slurm: tuple[str, ...] = option(
+        (), "what SLURM is asked for, as timeout_min=60", "NAME=VALUE", needs=["--engine slurm"]
+    )
+    trial_timeout: float | None = option(
+        None,
+        f"give a trial up after this time [s], else {TIMEOUT:g}; unless said, one worker waits on",
+        gt=0,
     )
 
 

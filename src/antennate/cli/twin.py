@@ -79,7 +79,10 @@ class Places(FromFile, KeptOptions, PageOptions):
     )
     udp: str | None = option(None, "the board on a UDP port instead, likewise", "[HOST:]PORT")
     key: Path | None = option(
-        None, "file with the key for --udp, mode 0600; else ANTENNATE_KEY", "FILE"
+        None,
+        "file with the key for --udp, mode 0600; else ANTENNATE_KEY",
+        "FILE",
+        needs=["--udp"],
     )
     servos: str | None = option(
         None, "these servos alone, without a robot; or a TOML file", "ID:MODEL[@BAUD][xCOUNT],..."
@@ -103,8 +106,6 @@ def command(argv: Sequence[str]) -> int:
         AntennateError: Something given cannot be used.
     """
     config, places = parse("twin", DESCRIPTION, TwinConfig, argv, Places)
-    if places.key is not None and places.udp is None:
-        raise ConfigError("--key: expected --udp beside it, found none")
     orders = None if places.orders is None else Orders(str(places.orders), _say)
     if places.servos is None:
         return _serve_robot(config, places, orders)

@@ -82,6 +82,8 @@ def _complain(player: LogPlayer, log: LogReader) -> None:
     """Say on the page what of a log could not be read."""
     if log.bad or log.missing:
         player.say(f"damaged places in this log: {log.bad}; ticks missing: {log.missing}")
+    if not log.guarded:
+        player.say("no CRC guards this log: damage to its numbers is not noticed")
 
 
 def arena_of(path: Path, header: Header) -> World | None:

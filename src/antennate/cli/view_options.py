@@ -32,7 +32,12 @@ class FoxgloveOptions:
         False, "topics live for Foxglove and Lichtblick, without access control"
     )
     foxglove_port: int = option(
-        ports.FOXGLOVE, "port for these, 0 takes any", "PORT", ge=0, le=65535
+        ports.FOXGLOVE,
+        "port for these, 0 takes any",
+        "PORT",
+        needs=["--foxglove"],
+        ge=0,
+        le=65535,
     )
 
 
@@ -41,27 +46,28 @@ class PageOptions(FoxgloveOptions):
     """Where the page is."""
 
     view: bool = option(False, "show it on a page of this computer while it runs")
-    view_port: int = option(ports.PAGE, "port of that page, 0 takes any", "PORT", ge=0, le=65535)
+    view_port: int = option(
+        ports.PAGE, "port of that page, 0 takes any", "PORT", needs=["--view"], ge=0, le=65535
+    )
 
 
 @dataclass(frozen=True)
 class ViewOptions(PageOptions):
     """The same where time is simulated."""
 
-    view_paused: bool = option(False, "start paused, so that nothing is missed")
+    view_paused: bool = option(False, "start paused, so that nothing is missed", needs=["--view"])
     view_speed: float = option(
-        1.0, "times real time at which --view begins, 0 as fast as it goes", "FLOAT", ge=0, le=100
+        1.0,
+        "times real time at which --view begins, 0 as fast as it goes",
+        "FLOAT",
+        needs=["--view", "--foxglove"],
+        ge=0,
+        le=100,
     )
 
 
 def foxglove_of(options: FoxgloveOptions) -> int | None:
-    """The port for Foxglove, None without it.
-
-    Raises:
-        ConfigError: A port is named, but it is not wanted.
-    """
-    if not options.foxglove and options.foxglove_port != ports.FOXGLOVE:
-        raise ConfigError("--foxglove-port: expected --foxglove beside it, found none")
+    """The port for Foxglove, None without it."""
     return options.foxglove_port if options.foxglove else None
 
 
@@ -69,16 +75,9 @@ def page_of(options: PageOptions) -> ViewProcess | None:
     """The process of the page that is wanted, None of none; it is to be closed.
 
     Raises:
-        ConfigError: Something is said of a page that is not wanted.
         AntennateError: It cannot be served.
     """
     foxglove = foxglove_of(options)
-    if not options.view and options.view_port != ports.PAGE:
-        raise ConfigError("--view-port: expected --view beside it, found none")
-    if not options.view and getattr(options, "view_paused", False):
-        raise ConfigError("--view-paused: expected --view beside it, found none")
-    if not (options.view or options.foxglove) and getattr(options, "view_speed", 1.0) != 1.0:
-        raise ConfigError("--view-speed: expected --view or --foxglove beside it, found none")
     if not options.view and foxglove is None:
         return None
     from antennate.telemetry.view.process import ViewProcess

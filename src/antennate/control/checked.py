@@ -32,8 +32,8 @@ class CheckedController:
     """A controller, and what is wrong with its last step.
 
     An exception, an array of another shape or a decision that is no integer affects all rows and
-    raises `ControllerError`. An angle that is not finite, or a number that is no `Maneuver`,
-    affects one row and is listed in `faults`.
+    raises `ControllerError`. An angle that is not finite, an infinite level, or a number that is no
+    `Maneuver` or `Contact`, affects one row and is listed in `faults`.
 
     Args:
         controller: The controller of `batch` robots.
@@ -116,6 +116,7 @@ class CheckedController:
         angles = [getattr(command, name) for name in self._shapes]
         squares = sum(float(np.vdot(a, a)) for a in angles)
         known = min(contacts) >= 0 and max(contacts) <= _MOST_CONTACT
+        known = known and not np.isinf(self._controller.level).any()
         return known and math.isfinite(squares) and min(maneuvers) >= 0 and max(maneuvers) <= _LAST
 
     def _find_faults(self, command: JointCommand) -> None:
@@ -128,3 +129,6 @@ class CheckedController:
         contact = self._controller.contact
         for row in np.flatnonzero(((contact < 0) | (contact > _MOST_CONTACT)).any(axis=1)):
             self.faults[int(row)] = f"expected contacts of 0 to 2, found {contact[row]}"
+        level = self._controller.level
+        for row in np.flatnonzero(np.isinf(level).any(axis=1)):
+            self.faults[int(row)] = f"expected levels of 0 to 1, or NaN, found {level[row]}"

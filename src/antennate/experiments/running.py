@@ -131,6 +131,9 @@ def run(
     """
     if not isinstance(workers, Integral) or isinstance(workers, bool) or workers < 1:
         raise ConfigError(f"workers: expected a whole number of at least 1, found {workers!r}")
+    for name, given in {"overwrite": overwrite, "resume": resume}.items():
+        if given and out is None:
+            raise ConfigError(f"{name}: expected out beside it, found none")
     found, config = _configured(name_or_config, settings, workers)
     found.check(config)
     if engine != LOCAL and not found.on_workers:

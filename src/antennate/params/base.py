@@ -105,16 +105,20 @@ def require_whole_steps(name: str, rate: float, timestep: float, share: int = 1)
         )
 
 
-def number(default: Any, unit: str, source: str, **bounds: Any) -> Any:
+def number(default: Any, unit: str, source: str, needs: Sequence[str] = (), **bounds: Any) -> Any:
     """Declare one parameter with its unit and source; the docstring below it is its meaning.
 
     Args:
         default: Its default.
         unit: Its unit, "1" if it has none.
         source: Where the default comes from.
+        needs: Flags of which one must be given beside its own.
         bounds: As for pydantic's Field.
     """
-    return Field(default, json_schema_extra={"unit": unit, "source": source}, **bounds)
+    extra: dict[str, Any] = {"unit": unit, "source": source}
+    if needs:
+        extra["needs"] = list(needs)
+    return Field(default, json_schema_extra=extra, **bounds)
 
 
 def meaning(model: Any, name: str, unit: bool = True) -> str:

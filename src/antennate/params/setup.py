@@ -71,6 +71,7 @@ class TeleopParams(Params):
         2.0,
         "s",
         "assumed: a thumb on a stick moves more often; a lost radio is silent",
+        needs=["--gamepad"],
         gt=0,
         le=10,
     )

@@ -54,8 +54,8 @@ class Workers:
         engine: Where they are; processes of this machine if not given.
         store: Where finished tasks are kept, None to keep none.
         shard: (i, n): carry out the i-th of n parts of the tasks, from 1, and raise ShardEnd.
-        timeout: Time after which a task that has not ended is given up [s]; where it is not the
-            usual one, even one worker is a process of its own.
+        timeout: Time after which a task that has not ended is given up [s], so that even one worker
+            is a process of its own; None for an hour, where one worker waits on.
         retry: Whether tasks that failed before are run again.
         closed: Whether all tasks must have been finished before.
         apart: Whether even one worker is a process of its own, which may crash or be killed.
@@ -67,7 +67,7 @@ class Workers:
     engine: Engine | None = None
     store: Store | None = None
     shard: tuple[int, int] | None = None
-    timeout: float = TIMEOUT
+    timeout: float | None = None
     retry: bool = False
     closed: bool = False
     apart: bool = False
@@ -88,7 +88,7 @@ class Workers:
         """Where so many parts are carried out."""
         if self.engine is not None:
             return self.engine
-        if not self.apart and self.timeout == TIMEOUT and (self.count == 1 or parts <= 1):
+        if not self.apart and self.timeout is None and (self.count == 1 or parts <= 1):
             return Here()
         return self._staying or Processes()
 
@@ -209,7 +209,8 @@ def gather(
     parts = [todo[i : i + chunk] for i in range(0, len(todo), chunk)]
     if parts:
         folder = None if workers.store is None else workers.store.path.parent
-        how = (workers.timeout, folder, batched, workers.shared, workers.retry)
+        timeout = TIMEOUT if workers.timeout is None else workers.timeout
+        how = (timeout, folder, batched, workers.shared, workers.retry)
         work = Work(function, tasks, together, *how)
         workers.engine_for(len(parts)).run(work, parts, workers.count, call.emit, call.fail)
     if workers.shard is not None:

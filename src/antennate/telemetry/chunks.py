@@ -3,6 +3,9 @@
 The readers of `mcap` end at the first damage. Here a chunk whose CRC is wrong is left out and the
 next one is searched for; what lies between chunks is not needed. Nothing is decompressed beyond
 `_LARGEST`, whatever a file says.
+
+MCAP lets a program leave out chunks and CRCs. antennate never does, so in its files that is damage;
+what another program wrote is read all the same, and said to be unguarded.
 """
 
 from __future__ import annotations
@@ -11,30 +14,31 @@ import io
 import re
 import struct
 import zlib
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from typing import BinaryIO, NamedTuple
 
-MAGIC = b"\x89MCAP0\r\n"
-_HEADER, _FOOTER, _SCHEMA, _CHANNEL, _MESSAGE, _CHUNK, _INDEX = range(1, 8)
-_CHUNK_INDEX, _STATISTICS, _DATA_END = 8, 11, 15
-_RECORD = struct.Struct("<BQ")
+from antennate.telemetry.summary import MAGIC, RECORD, End, Place, summary
+
+_HEADER, _, _SCHEMA, _CHANNEL, _MESSAGE, _CHUNK, _INDEX = range(1, 8)
+_DATA_END = 15
+_LOOSE = (_SCHEMA, _CHANNEL, _MESSAGE)
+"""Kinds of records that are found outside of chunks where there are none."""
+LIBRARY = "antennate "
+"""How the program is named that writes the logs of antennate, before its version."""
 _PREFIX = struct.Struct("<QQQII")
 """Of a chunk: first and last time, size and CRC of its content, length of the next word."""
 _BEGIN = re.compile(
-    rb"\x06.{%d}(?:\x04\0\0\0zstd|\x03\0\0\0lz4|\0\0\0\0)" % (_RECORD.size + _PREFIX.size - 5),
+    rb"\x06.{%d}(?:\x04\0\0\0zstd|\x03\0\0\0lz4|\0\0\0\0)" % (RECORD.size + _PREFIX.size - 5),
     re.DOTALL,
 )
 """How a chunk begins, up to the word for its compression."""
-_LONGEST_BEGIN = _RECORD.size + _PREFIX.size + 4
+_LONGEST_BEGIN = RECORD.size + _PREFIX.size + 4
 _ENTRY = struct.Struct("<HIQQ")
-_FOOT = struct.Struct("<BQQQI")
-_PLACE = struct.Struct("<QQQQI")
-"""Of an index of a chunk: first and last time, begin, length, bytes of the list of channels."""
 _LARGEST = 1 << 26
 """Most bytes of a chunk's content."""
 _LONGEST = 1 << 24
 """Most bytes of a record, compressed."""
-_LONGEST_SUMMARY = 1 << 28
 _BLOCK = 1 << 20
 
 
@@ -51,13 +55,15 @@ class Chunk(NamedTuple):
     """An intact chunk: its messages, and what it declares.
 
     A channel has its topic, the number of its schema and the encoding of its messages; a schema has
-    the name of a type and its definition, and may stand in an earlier chunk.
+    the name of a type and its definition, and may stand in an earlier chunk. Without a CRC nothing
+    guards it: it may not be as it was written.
     """
 
     offset: int
     messages: tuple[Message, ...]
     channels: Mapping[int, tuple[str, int, str]]
     schemas: Mapping[int, tuple[str, str]]
+    guarded: bool = True
 
 
 class Fault(NamedTuple):
@@ -65,25 +71,6 @@ class Fault(NamedTuple):
 
     offset: int
     reason: str
-
-
-class End(NamedTuple):
-    """The summary of a closed file: messages of each channel."""
-
-    counts: Mapping[int, int]
-
-
-class Place(NamedTuple):
-    """Where a chunk of a closed file is.
-
-    Attributes:
-        offset, length: Its begin and its length [bytes].
-        channels: Those of its messages.
-    """
-
-    offset: int
-    length: int
-    channels: frozenset[int]
 
 
 def walk(file: BinaryIO) -> Iterator[Chunk | Fault | End]:
@@ -95,34 +82,60 @@ def walk(file: BinaryIO) -> Iterator[Chunk | Fault | End]:
     size = file.seek(0, io.SEEK_END)
     file.seek(0)
     at: int | None = len(MAGIC)
+    foreign, counts = _is_foreign(file), Counter[int]()
+    file.seek(0)
     if file.read(len(MAGIC)) != MAGIC:
         yield Fault(0, "no MCAP file")
         at = _next_chunk(file, 0)
     closed = False
     while at is not None and at < size and not closed:
-        found, then = _record(file, at, size)
+        found, then = _record(file, at, size, foreign)
         closed = then is None and not isinstance(found, Fault)
+        if isinstance(found, Chunk):
+            counts.update(message.channel for message in found.messages)
         if found is not None:
             yield found
-        if isinstance(found, Fault) and (then is None or _damaged(file, then, size)):
+        if isinstance(found, Fault) and (then is None or _damaged(file, then, size, foreign)):
             then = _next_chunk(file, at + 1)
         at = then
     end = summary(file)
     if end is not None:
-        yield end
+        yield end if end.told else End(counts)
     elif closed:
         yield Fault(size, "damaged summary")
 
 
-def _record(file: BinaryIO, at: int, size: int) -> tuple[Chunk | Fault | None, int | None]:
+def _is_foreign(file: BinaryIO) -> bool:
+    """Whether a file says that another program wrote it."""
+    from mcap.data_stream import ReadDataStream  # slow to import
+    from mcap.exceptions import McapError
+    from mcap.records import Header
+
+    file.seek(len(MAGIC))
+    head = file.read(RECORD.size)
+    if len(head) < RECORD.size or head[0] != _HEADER:
+        return False
+    try:
+        content = file.read(min(RECORD.unpack(head)[1], _LONGEST))
+        library = Header.read(ReadDataStream(io.BytesIO(content))).library
+    except (struct.error, ValueError, McapError):
+        return False
+    return not library.startswith(LIBRARY)
+
+
+def _record(
+    file: BinaryIO, at: int, size: int, foreign: bool
+) -> tuple[Chunk | Fault | None, int | None]:
     """What one record is and where it ends: None and no end for that of all data."""
     file.seek(at)
-    head = file.read(_RECORD.size)
-    if len(head) < _RECORD.size:
+    head = file.read(RECORD.size)
+    if len(head) < RECORD.size:
         return Fault(at, "cut record"), None
-    kind, length = _RECORD.unpack(head)
-    end = at + _RECORD.size + length
-    if kind in (_SCHEMA, _CHANNEL, _MESSAGE) and end <= size:
+    kind, length = RECORD.unpack(head)
+    end = at + RECORD.size + length
+    if kind in _LOOSE and end <= size:
+        if foreign:
+            return _loose(file, at, size)
         return Fault(at, "record outside of a chunk, so without a CRC"), end
     if kind not in (_HEADER, _CHUNK, _INDEX, _DATA_END) or length > _LONGEST:
         return Fault(at, "damaged record"), None
@@ -130,7 +143,7 @@ def _record(file: BinaryIO, at: int, size: int) -> tuple[Chunk | Fault | None, i
         return Fault(at, "cut record"), None
     content = file.read(length)
     if kind == _CHUNK:
-        return _chunk(at, content) or Fault(at, _fault_of(content)), end
+        return _chunk(at, content, foreign) or Fault(at, _fault_of(content)), end
     sound = {
         _INDEX: len(content) >= 6 and int.from_bytes(content[2:6], "little") == length - 6,
         _DATA_END: length == 4,
@@ -141,9 +154,34 @@ def _record(file: BinaryIO, at: int, size: int) -> tuple[Chunk | Fault | None, i
     return None, None if kind == _DATA_END else end
 
 
-def _damaged(file: BinaryIO, at: int, size: int) -> bool:
+def _loose(file: BinaryIO, at: int, size: int) -> tuple[Chunk | Fault, int]:
+    """Records outside of chunks that follow one another, and where they end.
+
+    Of very many some at a time, but never a part of those with one number.
+    """
+    end, last = at, None
+    while True:
+        file.seek(end)
+        head = file.read(RECORD.size + _ENTRY.size)
+        if len(head) < RECORD.size:
+            break
+        kind, length = RECORD.unpack_from(head)
+        if kind not in _LOOSE or length > _LONGEST or end + RECORD.size + length > size:
+            break
+        if kind == _MESSAGE and len(head) == RECORD.size + _ENTRY.size:
+            number = _ENTRY.unpack_from(head, RECORD.size)[1]
+            if end - at > _BLOCK and number != last:
+                break
+            last = number
+        end += RECORD.size + length
+    file.seek(at)
+    found = _read_contents(at, file.read(end - at))
+    return Fault(at, "damaged record") if found is None else found._replace(guarded=False), end
+
+
+def _damaged(file: BinaryIO, at: int, size: int, foreign: bool) -> bool:
     """Whether what begins at a place is no record."""
-    return at < size and isinstance(_record(file, at, size)[0], Fault)
+    return at < size and isinstance(_record(file, at, size, foreign)[0], Fault)
 
 
 def _next_chunk(file: BinaryIO, at: int) -> int | None:
@@ -163,34 +201,44 @@ def _next_chunk(file: BinaryIO, at: int) -> int | None:
 
 def _frames_a_chunk(file: BinaryIO, at: int) -> bool:
     file.seek(at)
-    head = file.read(_RECORD.size + _LONGEST_BEGIN + 8)
+    head = file.read(RECORD.size + _LONGEST_BEGIN + 8)
     try:
-        kind, length = _RECORD.unpack_from(head)
-        word = _PREFIX.unpack_from(head, _RECORD.size)[-1]
-        (packed,) = struct.unpack_from("<Q", head, _RECORD.size + _PREFIX.size + word)
+        kind, length = RECORD.unpack_from(head)
+        word = _PREFIX.unpack_from(head, RECORD.size)[-1]
+        (packed,) = struct.unpack_from("<Q", head, RECORD.size + _PREFIX.size + word)
     except struct.error:
         return False
     return kind == _CHUNK and length - _PREFIX.size - word - 8 == packed
 
 
-def _chunk(at: int, content: bytes) -> Chunk | None:
-    """An intact chunk, None if it is damaged."""
+def _chunk(at: int, content: bytes, foreign: bool = False) -> Chunk | None:
+    """An intact chunk, None if it is damaged; one of another program may be without a CRC."""
+    guarded = not (foreign and _lacks_crc(content))
+    data = _unpacked(content, guarded)
+    found = None if data is None else _read_contents(at, data)
+    return None if found is None else found._replace(guarded=guarded)
+
+
+def _read_contents(at: int, data: bytes) -> Chunk | None:
+    """What some records say, None if they are none."""
     from mcap.exceptions import McapError  # slow to import
 
     try:
-        data = _unpacked(content)
-        return None if data is None else _contents(at, data)
+        return _contents(at, data)
     except (struct.error, ValueError, McapError):
         return None
 
 
 def _fault_of(content: bytes) -> str:
-    """What is wrong with a chunk; MCAP lets a program leave its CRC out."""
-    without = len(content) >= _PREFIX.size and _PREFIX.unpack_from(content)[3] == 0
-    return "chunk without a CRC" if without else "damaged chunk"
+    """What is wrong with a chunk."""
+    return "chunk without a CRC" if _lacks_crc(content) else "damaged chunk"
 
 
-def _unpacked(content: bytes) -> bytes | None:
+def _lacks_crc(content: bytes) -> bool:
+    return len(content) >= _PREFIX.size and _PREFIX.unpack_from(content)[3] == 0
+
+
+def _unpacked(content: bytes, guarded: bool = True) -> bytes | None:
     """The records of a chunk, None if it is damaged; other programs compress in other ways."""
     try:
         _, _, wanted, crc, word = _PREFIX.unpack_from(content)
@@ -203,7 +251,8 @@ def _unpacked(content: bytes) -> bytes | None:
     if unpack is None or length != len(packed) or wanted > _LARGEST:
         return None
     data = unpack(packed, wanted + 1)
-    return data if len(data) == wanted and zlib.crc32(data) == crc else None
+    sound = len(data) == wanted and (zlib.crc32(data) == crc or not guarded)
+    return data if sound else None
 
 
 def _of_zstd(packed: bytes, most: int) -> bytes:
@@ -242,8 +291,8 @@ def _contents(at: int, data: bytes) -> Chunk:
     channels: dict[int, tuple[str, int, str]] = {}
     place = 0
     while place < len(data):
-        kind, length = _RECORD.unpack_from(data, place)
-        place += _RECORD.size
+        kind, length = RECORD.unpack_from(data, place)
+        place += RECORD.size
         end = place + length
         if end > len(data):
             raise ValueError("cut record")
@@ -258,45 +307,6 @@ def _contents(at: int, data: bytes) -> Chunk:
             channels[found.id] = (found.topic, found.schema_id, found.message_encoding)
         place = end
     return Chunk(at, tuple(messages), channels, schemas)
-
-
-def summary(file: BinaryIO) -> End | None:
-    """The summary at the end of a closed file, None of any other.
-
-    Raises:
-        OSError: The file cannot be read.
-    """
-    from mcap.data_stream import ReadDataStream
-    from mcap.exceptions import McapError
-    from mcap.records import Statistics
-
-    try:
-        for kind, body in _summarised(file):
-            if kind == _STATISTICS:
-                found = Statistics.read(ReadDataStream(io.BytesIO(body)))
-                return End(found.channel_message_counts)
-    except (struct.error, ValueError, McapError):
-        pass
-    return None
-
-
-def places(file: BinaryIO) -> Iterator[Place]:
-    """Where the chunks of a closed file are, in its order.
-
-    Raises:
-        OSError: The file cannot be read.
-        ValueError: Its summary says something else.
-    """
-    known: dict[frozenset[int], frozenset[int]] = {}
-    for kind, body in _summarised(file):
-        if kind == _CHUNK_INDEX:
-            try:
-                _, _, offset, length, size = _PLACE.unpack_from(body)
-                listed = struct.iter_unpack("<HQ", body[_PLACE.size : _PLACE.size + size])
-                channels = frozenset(channel for channel, _ in listed)
-            except struct.error as error:
-                raise ValueError(str(error)) from None
-            yield Place(offset, length, known.setdefault(channels, channels))
 
 
 def is_sound(file: BinaryIO, place: Place) -> bool:
@@ -321,27 +331,5 @@ def _content(file: BinaryIO, place: Place) -> bytes:
     """What stands in the record of a chunk; empty where there is none."""
     file.seek(place.offset)
     record = file.read(min(place.length, _LONGEST))
-    head = _RECORD.pack(_CHUNK, max(0, place.length - _RECORD.size))
+    head = RECORD.pack(_CHUNK, max(0, place.length - RECORD.size))
     return record[len(head) :] if record.startswith(head) else b""
-
-
-def _summarised(file: BinaryIO) -> Iterator[tuple[int, bytes]]:
-    """Kind and content of each record of the summary; none of a file that has no intact one."""
-    foot = file.seek(0, io.SEEK_END) - _FOOT.size - len(MAGIC)
-    if foot < 0:
-        return
-    file.seek(foot)
-    last = file.read()
-    kind, length, start, _, crc = _FOOT.unpack_from(last)
-    sound = kind == _FOOTER and length == _FOOT.size - _RECORD.size and last.endswith(MAGIC)
-    if not sound or not 0 < start < foot or foot - start > _LONGEST_SUMMARY:
-        return
-    file.seek(start)
-    data = file.read(foot - start)
-    if zlib.crc32(last[: _FOOT.size - 4], zlib.crc32(data)) != crc:
-        return
-    at = 0
-    while at + _RECORD.size <= len(data):
-        kind, length = _RECORD.unpack_from(data, at)
-        at += _RECORD.size + length
-        yield kind, data[at - length : at]

@@ -12,9 +12,10 @@ from typing import NamedTuple
 
 from antennate.errors import LogError
 from antennate.files import open_regular
-from antennate.telemetry.chunks import Chunk, End, Fault, walk
+from antennate.telemetry.chunks import Chunk, Fault, walk
 from antennate.telemetry.header import Header, refuse_old
 from antennate.telemetry.parts import parts
+from antennate.telemetry.summary import End
 from antennate.telemetry.survey import Survey, by_summary, span
 from antennate.telemetry.ticks import Tick
 from antennate.telemetry.topics import (
@@ -26,6 +27,7 @@ from antennate.telemetry.topics import (
     TICK_TOPICS,
     TOPICS,
     Topic,
+    by_channel,
 )
 
 _LISTED = 100
@@ -67,6 +69,7 @@ class LogReader:
         last: Number of the last tick read, 0 before the first.
         bad: Damaged places so far.
         damage: The first of them.
+        guarded: Whether all that was read so far has a CRC, as antennate writes it.
         end: Ticks that were written, if the log was closed and its end is read; else None.
 
     Raises:
@@ -77,6 +80,7 @@ class LogReader:
         self.path = path
         self.ticks = self.last = self.bad = 0
         self.damage: list[Damage] = []
+        self.guarded = True
         self.end: int | None = None
         try:
             self._file = open_regular(path)
@@ -243,6 +247,7 @@ class LogReader:
                         )
                         self.end = self._before + sum(ticks)
                     elif self._is_of_this_log(place):
+                        self.guarded = self.guarded and place.guarded
                         yield place
                     else:
                         self._note(place.offset, "a file of another log")
@@ -293,35 +298,16 @@ class LogReader:
         raise LogError(f"{self.path}: expected a log of antennate, an MCAP file, found {found}")
 
     def _learn(self, chunk: Chunk) -> None:
-        """Take note of the channels that a chunk declares."""
-        self._schemas |= chunk.schemas
-        if chunk.channels:
-            self._declared |= self._named(chunk)
-
-    def _named(self, chunk: Chunk) -> dict[int, Topic]:
-        """The topics by their channel.
+        """Take note of the channels that a chunk declares.
 
         Raises:
             LogError: A topic of ours has messages of another definition.
         """
-        ours = {topic.name: topic for topic in TOPICS}
-        named: dict[int, Topic] = {}
-        for channel, (name, about, encoding) in chunk.channels.items():
-            topic = ours.get(name)
-            if topic is None:
-                continue
-            kind, schema = self._schemas.get(about, ("nothing", ""))
-            if (kind, schema) != (topic.type.name, topic.type.schema):
-                raise LogError(
-                    f"{self.path}: expected {topic.type.name} as now defined in {name}, found "
-                    f"{kind} of another definition; read it with the version that wrote it"
-                )
-            if encoding != "cdr":
-                raise LogError(
-                    f"{self.path}: expected messages in {name} encoded as cdr, found {encoding}"
-                )
-            named[channel] = topic
-        return named
+        self._schemas |= chunk.schemas
+        try:
+            self._declared |= by_channel(chunk.channels, self._schemas)
+        except LogError as error:
+            raise LogError(f"{self.path}: {error}") from None
 
     def _note(self, offset: int, reason: str) -> None:
         self.bad += 1

@@ -9,12 +9,10 @@ from antennate import __version__
 from antennate.errors import LogError
 from antennate.files import lock, replacing
 from antennate.telemetry.reader import LogReader
-from antennate.telemetry.topics import EVENTS
 from antennate.telemetry.writer import LogWriter
 
 RECOVERED = "-recovered"
 """What the name of a recovered log has behind that of the log."""
-_WARN = 30
 
 
 def recover(path: Path, target: Path, overwrite: bool = False) -> LogReader:
@@ -37,18 +35,14 @@ def recover(path: Path, target: Path, overwrite: bool = False) -> LogReader:
     with LogReader(path) as log, replacing(target, overwrite) as fresh:
         room = 1.5 * sum(part.stat().st_size for part in log.parts)
         out = LogWriter(fresh, log.header, room, flush=math.inf, called=target)
-        last = 0
         with fresh.open("rb") as file:
             lock(file)
             for records, _ in log.groups():
                 for record in records:
                     out.add(*record)
-                    last = max(last, record.time)
                 out.settle()
             words = f"recovered by antennate {__version__}: {log.ticks} ticks; {left_out(log)}"
-            time = divmod(last, 10**9)
-            event = EVENTS.type.encode(*time, _WARN, "antennate log recover", words, "", "", 0)
-            out.add(EVENTS, 0, last, event)
+            out.event(words, "antennate log recover")
             out.close()
         if not log.ticks and log.bad:
             raise LogError(f"{path}: expected intact ticks, found none; {left_out(log)}")

@@ -10,7 +10,8 @@ from collections.abc import Mapping, Sequence
 from typing import BinaryIO, NamedTuple
 
 from antennate.errors import LogError
-from antennate.telemetry.chunks import Chunk, Place, chunk_at, is_sound, places, summary
+from antennate.telemetry.chunks import Chunk, chunk_at, is_sound
+from antennate.telemetry.summary import Place, places, summary
 from antennate.telemetry.ticks import Tick
 from antennate.telemetry.topics import EVENTS, HEADER_TOPICS, MANEUVER, TICK_TOPICS, TOPICS, Topic
 
@@ -43,7 +44,7 @@ def by_summary(file: BinaryIO, topics: Mapping[int, Topic]) -> Survey | None:
         OSError: It cannot be read.
     """
     end = summary(file)
-    if end is None:
+    if end is None or not end.told:
         return None
     if not topics.keys() >= end.counts.keys():
         return None  # channels that later chunks declare, as other programs may
@@ -57,6 +58,8 @@ def by_summary(file: BinaryIO, topics: Mapping[int, Topic]) -> Survey | None:
             _require_ticks(chunk, topics)
     except (ValueError, LogError):  # also of an event that is none
         return None
+    if counts.get(MANEUVER) and not chunks:
+        return None  # it does not tell where they are
     ticks = [m for chunk in chunks for m in chunk.messages if topics.get(m.channel) is MANEUVER]
     numbers, times = [m.number for m in ticks], [m.time for m in ticks]
     if numbers != sorted(numbers) or times != sorted(times):

@@ -7,6 +7,7 @@ written from here.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from antennate.errors import LogError
@@ -186,3 +187,33 @@ TICK = _own(
     + _SUPERVISOR,
 )
 """A whole tick, on its way from the loop to the process that writes the log."""
+
+
+def by_channel(
+    channels: Mapping[int, tuple[str, int, str]], schemas: Mapping[int, tuple[str, str]]
+) -> dict[int, Topic]:
+    """The topics of a log by their channel.
+
+    Args:
+        channels: Topic, number of the schema and encoding of each channel.
+        schemas: Type and definition of each schema.
+
+    Raises:
+        LogError: A topic has messages of another definition.
+    """
+    ours = {topic.name: topic for topic in TOPICS}
+    named: dict[int, Topic] = {}
+    for channel, (name, about, encoding) in channels.items():
+        topic = ours.get(name)
+        if topic is None:
+            continue
+        kind, schema = schemas.get(about, ("nothing", ""))
+        if (kind, schema) != (topic.type.name, topic.type.schema):
+            raise LogError(
+                f"expected {topic.type.name} as now defined in {name}, found {kind} of another "
+                "definition; read it with the version that wrote it"
+            )
+        if encoding != "cdr":
+            raise LogError(f"expected messages in {name} encoded as cdr, found {encoding}")
+        named[channel] = topic
+    return named

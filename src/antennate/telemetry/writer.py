@@ -24,6 +24,7 @@ from antennate import __version__
 from antennate.errors import LogError
 from antennate.files import require_room
 from antennate.telemetry.cdr import Form
+from antennate.telemetry.chunks import LIBRARY
 from antennate.telemetry.header import Header
 from antennate.telemetry.ticks import Tick
 from antennate.telemetry.topics import EVENTS, TOPICS, Topic
@@ -88,7 +89,7 @@ class LogWriter:
         self._called = called or path
         require_room(self._called, least_free, LogError)
         self._file = _NewFile(path, self._called)
-        self._container = Container(self._file, f"antennate {__version__}")
+        self._container = Container(self._file, f"{LIBRARY}{__version__}")
         self._channels = self._register()
         for topic, data in header.messages().items():
             self.add(topic, 0, header.start, data)
@@ -176,9 +177,8 @@ class LogWriter:
     def event(self, text: str, source: str = "antennate", t: float = 0.0) -> None:
         """Add an event at a time of the loop [s], not before the last tick."""
         stamp = self._stamp(t)
-        data = EVENTS.type.encode(
-            *divmod(stamp, 10**9), _LEVELS["DEGRADED"], source, text, "", "", 0
-        )
+        time = divmod(min(stamp, _LATEST), 10**9)
+        data = EVENTS.type.encode(*time, _LEVELS["DEGRADED"], source, text, "", "", 0)
         self.add(EVENTS, self.written, stamp, data)
 
     def settle(self) -> None:

@@ -1,0 +1,110 @@
+"""Options that say nothing without another one are refused alone, whatever their value."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import antennate
+from antennate.cli import carry_out, commands, main
+from antennate.cli.arguments import OptionsRequest
+from antennate.cli.help import Command
+from antennate.cli.options import Option
+from antennate.errors import ConfigError
+
+NEEDS = {
+    "--foxglove-port": ["--foxglove"],
+    "--key": ["--udp"],
+    "--overwrite": ["--out"],
+    "--resume": ["--out"],
+    "--retry": ["--out"],
+    "--slurm": ["--engine slurm"],
+    "--teleop.gamepad-silence": ["--gamepad"],
+    "--video-trial": ["--video"],
+    "--view-paused": ["--view"],
+    "--view-port": ["--view"],
+    "--view-speed": ["--view", "--foxglove"],
+    "--yes": ["--fix"],
+}
+"""What stands for nothing alone; `--overwrite` of `log` has a file of its own, and with `--key` of
+the robot's commands its robot.toml may name the port."""
+ELSEWHERE = {("report", "--overwrite"): ["--out", "--compare"]}
+
+
+def page(name: str) -> Command:
+    """The options of a command."""
+    try:
+        carry_out(name, [OptionsRequest.WORD])
+    except OptionsRequest as request:
+        return request.command
+    raise AssertionError(name)
+
+
+def dependents() -> Iterator[tuple[str, Option]]:
+    """Every option of every command that needs another one."""
+    for name in sorted(commands()):
+        found = page(name)
+        yield from ((name, each) for each in [*found.others, *found.parameters] if each.needs)
+
+
+EVERY = list(dependents())
+
+
+def test_the_options_that_need_another_one_are_these() -> None:
+    assert {each.flag for _, each in EVERY} == NEEDS.keys()
+    for name, each in EVERY:
+        assert list(each.needs) == ELSEWHERE.get((name, each.flag), NEEDS[each.flag])
+
+
+@pytest.mark.parametrize("name", sorted(commands()))
+def test_what_is_needed_is_there_and_a_longer_name_needs_the_shorter(name: str) -> None:
+    others = page(name).others
+    flags = {each.flag for each in others}
+    for each in others:
+        assert {need.partition(" ")[0] for need in each.needs} <= flags
+        shorter = [flag for flag in flags if each.flag.startswith(f"{flag}-")]
+        assert set(shorter) <= set(each.needs), each.flag
+
+
+@pytest.mark.parametrize(
+    ("name", "option"), EVERY, ids=[f"{name} {each.flag}" for name, each in EVERY]
+)
+def test_each_is_refused_alone(
+    name: str,
+    option: Option,
+    capsys: pytest.CaptureFixture[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """With its own default, too: it was said, and nothing would come of it."""
+    monkeypatch.chdir(tmp_path)
+    value = {"TEXT": "x", "FILE": "x", "NAME=VALUE": "a=1"}.get(option.metavar, option.default)
+    words = [option.offered, *([value] if option.metavar else [])]
+    assert main([name, *words]) == 2
+    out, err = capsys.readouterr()
+    needed = " or ".join(option.needs)
+    assert out == ""
+    assert err == (
+        f"antennate {name}: error: {option.offered}: expected {needed} beside it, found none\n"
+    )
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    "words", [["--video", "--no-video"], ["--engine", "dask"], ["--engine=local"]]
+)
+def test_what_is_needed_is_given_only_where_it_holds(
+    words: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    option = ["--video-trial", "0"] if "--video" in words else ["--slurm", "timeout_min=1"]
+    assert main(["tunnel", *option, *words]) == 2
+    assert "beside it, found none" in capsys.readouterr().err
+
+
+def test_python_refuses_what_is_for_a_run_directory_without_one() -> None:
+    with pytest.raises(ConfigError, match="overwrite: expected out beside it, found none"):
+        antennate.run("springs", overwrite=True)
+    with pytest.raises(ConfigError, match="resume: expected out beside it, found none"):
+        antennate.run("springs", resume=True)

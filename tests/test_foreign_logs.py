@@ -1,0 +1,184 @@
+"""Logs that another program wrote anew, as the specification of MCAP allows."""
+
+from __future__ import annotations
+
+import json
+import struct
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+from log_ticks import HEADER, MAGIC, chunks, records, tick
+from mcap.reader import make_reader
+from mcap.writer import CompressionType, IndexType, Writer
+
+from antennate.cli import main
+from antennate.telemetry.reader import LogReader
+from antennate.telemetry.writer import LogWriter
+
+TICKS = 30
+LAST = 2**64 - 1
+"""Latest time [ns] that MCAP can tell."""
+
+
+@pytest.fixture
+def log(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A log of antennate in an empty folder."""
+    monkeypatch.chdir(tmp_path)
+    with LogWriter(Path("log.mcap"), HEADER, 0.0, flush=0.0) as out:
+        for number in range(1, TICKS + 1):
+            out.write(tick(number))
+    return Path("log.mcap")
+
+
+def anew(log: Path, time: int | None = None, **how: Any) -> Path:
+    """The same messages, written by the package `mcap`.
+
+    Args:
+        log: The log.
+        time: Time of all messages [ns], None for their own.
+        how: What its writer is told.
+    """
+    copy = log.with_name("new.mcap")
+    with log.open("rb") as file, copy.open("wb") as target:
+        writer, channels = Writer(target, **how), dict[str, int]()
+        writer.start()
+        for schema, channel, message in make_reader(file).iter_messages(log_time_order=False):
+            assert schema is not None
+            if channel.topic not in channels:
+                kind = writer.register_schema(schema.name, schema.encoding, schema.data)
+                channels[channel.topic] = writer.register_channel(channel.topic, "cdr", kind)
+            at = message.log_time if time is None else time
+            writer.add_message(channels[channel.topic], at, message.data, at, message.sequence)
+        writer.finish()
+    return copy
+
+
+def info(path: Path, capsys: pytest.CaptureFixture[str]) -> tuple[int, dict[str, Any], str]:
+    """Exit code and findings of `info`, and what it says beside them."""
+    code = main(["log", "info", str(path), "--json"])
+    said = capsys.readouterr()
+    return code, json.loads(said.out), said.err
+
+
+def ticks_of(path: Path) -> list[bytes]:
+    with LogReader(path) as log:
+        return [each.pack() for each in log]
+
+
+WRITTEN = [tick(number).pack() for number in range(1, TICKS + 1)]
+
+
+def test_recover_takes_messages_of_the_latest_time(
+    log: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Its own event has the time of the last one; ROS 2 knows none after 2038."""
+    late = anew(log, time=LAST)
+    assert main(["log", "recover", str(late), "--out", "whole.mcap"]) == 0
+    assert f"{TICKS} ticks were written" in capsys.readouterr().out
+    with Path("whole.mcap").open("rb") as file:
+        found = [*make_reader(file).iter_messages(log_time_order=False)]
+    assert {m.log_time for _, c, m in found if c.topic not in ("/config", "/versions")} == {LAST}
+    event = [m.data for _, c, m in found if c.topic == "/events"][-1]
+    assert struct.unpack_from("<iI", event, 4) == (2**31 - 1, 0)
+    assert ticks_of(Path("whole.mcap")) == WRITTEN
+    assert info(Path("whole.mcap"), capsys)[0] == 0
+
+
+@pytest.mark.parametrize(
+    "how",
+    [
+        {"use_statistics": False},
+        {"index_types": IndexType.NONE},
+        {
+            "use_statistics": False,
+            "index_types": IndexType.NONE,
+            "repeat_channels": False,
+            "repeat_schemas": False,
+        },
+    ],
+    ids=["without statistics", "without places", "without a summary"],
+)
+def test_a_summary_may_leave_out_what_it_likes(
+    log: Path, how: dict[str, Any], capsys: pytest.CaptureFixture[str]
+) -> None:
+    wanted = info(log, capsys)
+    found = info(anew(log, chunk_size=50_000, **how), capsys)
+    for each in (wanted, found):
+        del each[1]["log"], each[1]["parts"]
+    assert found == wanted
+    assert found[0] == 0
+    assert found[1]["closed"]
+    assert ticks_of(Path("new.mcap")) == WRITTEN
+
+
+@pytest.mark.parametrize(
+    "how",
+    [
+        {"use_chunking": False},
+        {"enable_crcs": False, "chunk_size": 2000},
+        {"enable_crcs": False, "compression": CompressionType.LZ4},
+        {"use_chunking": False, "enable_crcs": False, "use_statistics": False},
+    ],
+    ids=["no chunks", "no CRCs", "one chunk", "neither"],
+)
+def test_a_log_without_crcs_is_read_and_said_to_be_unguarded(
+    log: Path, how: dict[str, Any], capsys: pytest.CaptureFixture[str]
+) -> None:
+    wanted = info(log, capsys)[1]
+    new = anew(log, **how)
+    code, found, said = info(new, capsys)
+    assert code == 0
+    assert said.count("\n") == 1
+    assert f"{new}: written by another program without CRCs" in said
+    assert (wanted.pop("guarded"), found.pop("guarded")) == (True, False)
+    for each in (wanted, found):
+        del each["log"], each["parts"]
+    assert found == wanted
+    assert ticks_of(new) == WRITTEN
+    for words in (["export"], ["recover", "--out", "whole.mcap"]):
+        assert main(["log", words[0], str(new), *words[1:]]) == 0
+        assert "without CRCs" in capsys.readouterr().err
+    assert ticks_of(Path("whole.mcap")) == WRITTEN
+    assert info(Path("whole.mcap"), capsys)[2] == ""
+
+
+def test_a_long_log_without_chunks_keeps_the_parts_of_a_tick_together(tmp_path: Path) -> None:
+    """More than is held at once, and nearly all of it right before the last message of a tick."""
+    long, count = tmp_path / "long.mcap", 250
+    with LogWriter(long, HEADER, 0.0) as out:
+        for number in range(1, count + 1):
+            more = {"angles": (0.5,) * 2000, "positions": (float(number),)}
+            out.write(replace(tick(number), **more))
+    with LogReader(anew(long, use_chunking=False)) as log:
+        assert [each.positions for each in log] == [(number,) for number in range(1, count + 1)]
+        assert (log.bad, log.missing, log.guarded) == (0, 0, False)
+
+
+def test_damage_to_an_unguarded_log_is_named_where_it_shows(
+    log: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The kind of a record in its middle is none that there is."""
+    new = anew(log, use_chunking=False)
+    data = bytearray(new.read_bytes())
+    places = [begin for _, begin, _ in records(bytes(data))]
+    data[places[len(places) // 2]] = 0x7F
+    new.write_bytes(data)
+    code, found, said = info(new, capsys)
+    assert code == 2
+    assert 0 < found["ticks"] < TICKS
+    assert found["damaged"] == 1
+    assert found["missing"] == TICKS - found["ticks"]
+    assert "damaged record" in said
+
+
+def test_a_log_of_antennate_without_a_crc_is_damaged_whatever_follows_it(log: Path) -> None:
+    """Only a file that names another program may be without; a damaged name is none."""
+    data = bytearray(log.read_bytes())
+    begin, _ = chunks(bytes(data))[2]
+    data[begin + 9 + 24 : begin + 9 + 28] = bytes(4)
+    for name in (data[len(MAGIC)], 0x55):
+        data[len(MAGIC)] = name
+        log.write_bytes(data)
+        assert ticks_of(log) == WRITTEN[:1] + WRITTEN[2:]
