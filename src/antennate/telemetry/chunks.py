@@ -5,7 +5,8 @@ next one is searched for; what lies between chunks is not needed. Nothing is dec
 `_LARGEST`, whatever a file says.
 
 MCAP lets a program leave out chunks and CRCs. antennate never does, so in its files that is damage;
-what another program wrote is read all the same, and said to be unguarded.
+what another program wrote is read all the same, and said to be unguarded. Attachments and metadata,
+which anybody may add to a file, are read past.
 """
 
 from __future__ import annotations
@@ -15,13 +16,14 @@ import re
 import struct
 import zlib
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Container, Iterator, Mapping
 from typing import BinaryIO, NamedTuple
 
-from antennate.telemetry.summary import MAGIC, RECORD, End, Place, summary
+from antennate.telemetry.summary import MAGIC, RECORD, End, summary
 
 _HEADER, _, _SCHEMA, _CHANNEL, _MESSAGE, _CHUNK, _INDEX = range(1, 8)
-_DATA_END = 15
+_ATTACHMENT, _METADATA, _DATA_END = 9, 12, 15
+_KINDS = (_HEADER, _CHUNK, _INDEX, _ATTACHMENT, _METADATA, _DATA_END)
 _LOOSE = (_SCHEMA, _CHANNEL, _MESSAGE)
 """Kinds of records that are found outside of chunks where there are none."""
 LIBRARY = "antennate "
@@ -56,7 +58,7 @@ class Chunk(NamedTuple):
 
     A channel has its topic, the number of its schema and the encoding of its messages; a schema has
     the name of a type and its definition, and may stand in an earlier chunk. Without a CRC nothing
-    guards it: it may not be as it was written.
+    guards it: it may not be as it was written. One of another program may end within a tick.
     """
 
     offset: int
@@ -64,6 +66,7 @@ class Chunk(NamedTuple):
     channels: Mapping[int, tuple[str, int, str]]
     schemas: Mapping[int, tuple[str, str]]
     guarded: bool = True
+    foreign: bool = False
 
 
 class Fault(NamedTuple):
@@ -73,29 +76,41 @@ class Fault(NamedTuple):
     reason: str
 
 
-def walk(file: BinaryIO) -> Iterator[Chunk | Fault | End]:
+class _Source(NamedTuple):
+    """A file: its size, whether another program wrote it, where its chunks are to be read."""
+
+    file: BinaryIO
+    size: int
+    foreign: bool
+    wanted: Container[int] | None
+
+
+def walk(file: BinaryIO, wanted: Container[int] | None = None) -> Iterator[Chunk | Fault | End]:
     """What a file holds, in order; the summary comes last, if the file was closed.
+
+    Args:
+        file: The file.
+        wanted: Where chunks begin that are read, None for all; of others only the CRC is checked.
 
     Raises:
         OSError: The file cannot be read.
     """
     size = file.seek(0, io.SEEK_END)
-    file.seek(0)
     at: int | None = len(MAGIC)
-    foreign, counts = _is_foreign(file), Counter[int]()
+    source, counts = _Source(file, size, is_foreign(file), wanted), Counter[int]()
     file.seek(0)
     if file.read(len(MAGIC)) != MAGIC:
         yield Fault(0, "no MCAP file")
         at = _next_chunk(file, 0)
     closed = False
     while at is not None and at < size and not closed:
-        found, then = _record(file, at, size, foreign)
+        found, then = _record(source, at)
         closed = then is None and not isinstance(found, Fault)
         if isinstance(found, Chunk):
             counts.update(message.channel for message in found.messages)
         if found is not None:
             yield found
-        if isinstance(found, Fault) and (then is None or _damaged(file, then, size, foreign)):
+        if isinstance(found, Fault) and (then is None or _damaged(source, then)):
             then = _next_chunk(file, at + 1)
         at = then
     end = summary(file)
@@ -105,8 +120,12 @@ def walk(file: BinaryIO) -> Iterator[Chunk | Fault | End]:
         yield Fault(size, "damaged summary")
 
 
-def _is_foreign(file: BinaryIO) -> bool:
-    """Whether a file says that another program wrote it."""
+def is_foreign(file: BinaryIO) -> bool:
+    """Whether a file says that another program wrote it.
+
+    Raises:
+        OSError: The file cannot be read.
+    """
     from mcap.data_stream import ReadDataStream  # slow to import
     from mcap.exceptions import McapError
     from mcap.records import Header
@@ -123,10 +142,9 @@ def _is_foreign(file: BinaryIO) -> bool:
     return not library.startswith(LIBRARY)
 
 
-def _record(
-    file: BinaryIO, at: int, size: int, foreign: bool
-) -> tuple[Chunk | Fault | None, int | None]:
+def _record(source: _Source, at: int) -> tuple[Chunk | Fault | None, int | None]:
     """What one record is and where it ends: None and no end for that of all data."""
+    file, size, foreign, _ = source
     file.seek(at)
     head = file.read(RECORD.size)
     if len(head) < RECORD.size:
@@ -137,21 +155,36 @@ def _record(
         if foreign:
             return _loose(file, at, size)
         return Fault(at, "record outside of a chunk, so without a CRC"), end
-    if kind not in (_HEADER, _CHUNK, _INDEX, _DATA_END) or length > _LONGEST:
+    if kind not in _KINDS or (length > _LONGEST and kind != _ATTACHMENT):
         return Fault(at, "damaged record"), None
     if end > size:
         return Fault(at, "cut record"), None
-    content = file.read(length)
+    content = file.read(min(length, _LONGEST))
     if kind == _CHUNK:
-        return _chunk(at, content, foreign) or Fault(at, _fault_of(content)), end
-    sound = {
-        _INDEX: len(content) >= 6 and int.from_bytes(content[2:6], "little") == length - 6,
-        _DATA_END: length == 4,
-        _HEADER: at == len(MAGIC),
-    }[kind]
-    if not sound:
+        return _chunk(at, content, source) or Fault(at, _fault_of(content)), end
+    if not _is_sound(kind, at, content, length):
         return Fault(at, "damaged record"), None
     return None, None if kind == _DATA_END else end
+
+
+def _is_sound(kind: int, at: int, content: bytes, length: int) -> bool:
+    """Whether a record of which nothing is used looks sound, by its place or the lengths in it."""
+    try:
+        if kind == _INDEX:
+            return _after(content, 2) == length
+        if kind == _METADATA:
+            return _after(content, _after(content, 0)) == length
+        if kind == _ATTACHMENT:
+            data = _after(content, _after(content, 16))
+            return data + 8 + struct.unpack_from("<Q", content, data)[0] + 4 == length
+    except struct.error:
+        return False
+    return at == len(MAGIC) if kind == _HEADER else length == 4
+
+
+def _after(content: bytes, at: int) -> int:
+    """Where a text or a table ends that begins with its length."""
+    return at + 4 + struct.unpack_from("<I", content, at)[0]
 
 
 def _loose(file: BinaryIO, at: int, size: int) -> tuple[Chunk | Fault, int]:
@@ -176,12 +209,14 @@ def _loose(file: BinaryIO, at: int, size: int) -> tuple[Chunk | Fault, int]:
         end += RECORD.size + length
     file.seek(at)
     found = _read_contents(at, file.read(end - at))
-    return Fault(at, "damaged record") if found is None else found._replace(guarded=False), end
+    return Fault(at, "damaged record") if found is None else found._replace(
+        guarded=False, foreign=True
+    ), end
 
 
-def _damaged(file: BinaryIO, at: int, size: int, foreign: bool) -> bool:
+def _damaged(source: _Source, at: int) -> bool:
     """Whether what begins at a place is no record."""
-    return at < size and isinstance(_record(file, at, size, foreign)[0], Fault)
+    return at < source.size and isinstance(_record(source, at)[0], Fault)
 
 
 def _next_chunk(file: BinaryIO, at: int) -> int | None:
@@ -211,12 +246,14 @@ def _frames_a_chunk(file: BinaryIO, at: int) -> bool:
     return kind == _CHUNK and length - _PREFIX.size - word - 8 == packed
 
 
-def _chunk(at: int, content: bytes, foreign: bool = False) -> Chunk | None:
+def _chunk(at: int, content: bytes, source: _Source) -> Chunk | None:
     """An intact chunk, None if it is damaged; one of another program may be without a CRC."""
-    guarded = not (foreign and _lacks_crc(content))
+    guarded = not (source.foreign and _lacks_crc(content))
     data = _unpacked(content, guarded)
+    if data is not None and source.wanted is not None and at not in source.wanted:
+        data = b""
     found = None if data is None else _read_contents(at, data)
-    return None if found is None else found._replace(guarded=guarded)
+    return None if found is None else found._replace(guarded=guarded, foreign=source.foreign)
 
 
 def _read_contents(at: int, data: bytes) -> Chunk | None:
@@ -238,7 +275,7 @@ def _lacks_crc(content: bytes) -> bool:
     return len(content) >= _PREFIX.size and _PREFIX.unpack_from(content)[3] == 0
 
 
-def _unpacked(content: bytes, guarded: bool = True) -> bytes | None:
+def _unpacked(content: bytes, guarded: bool) -> bytes | None:
     """The records of a chunk, None if it is damaged; other programs compress in other ways."""
     try:
         _, _, wanted, crc, word = _PREFIX.unpack_from(content)
@@ -307,29 +344,3 @@ def _contents(at: int, data: bytes) -> Chunk:
             channels[found.id] = (found.topic, found.schema_id, found.message_encoding)
         place = end
     return Chunk(at, tuple(messages), channels, schemas)
-
-
-def is_sound(file: BinaryIO, place: Place) -> bool:
-    """Whether a chunk is there with the right CRC; nothing of it is decoded.
-
-    Raises:
-        OSError: The file cannot be read.
-    """
-    return _unpacked(_content(file, place)) is not None
-
-
-def chunk_at(file: BinaryIO, place: Place) -> Chunk | None:
-    """The chunk of a place, None if it is damaged.
-
-    Raises:
-        OSError: The file cannot be read.
-    """
-    return _chunk(place.offset, _content(file, place))
-
-
-def _content(file: BinaryIO, place: Place) -> bytes:
-    """What stands in the record of a chunk; empty where there is none."""
-    file.seek(place.offset)
-    record = file.read(min(place.length, _LONGEST))
-    head = RECORD.pack(_CHUNK, max(0, place.length - RECORD.size))
-    return record[len(head) :] if record.startswith(head) else b""

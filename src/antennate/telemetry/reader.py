@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from itertools import chain
 from pathlib import Path
@@ -78,7 +78,7 @@ class LogReader:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self.ticks = self.last = self.bad = 0
+        self.ticks = self.last = self.bad = self._repeated = 0
         self.damage: list[Damage] = []
         self.guarded = True
         self.end: int | None = None
@@ -106,7 +106,7 @@ class LogReader:
     @property
     def missing(self) -> int:
         """Ticks known to have been written or to have happened that were not read."""
-        after = 0 if self.end is None else max(0, self.end - self.ticks)
+        after = 0 if self.end is None else max(0, self.end - self._repeated - self.ticks)
         return max(after, self.last - self.ticks)
 
     def __iter__(self) -> Iterator[Tick]:
@@ -143,22 +143,39 @@ class LogReader:
                 if topic is None or topic in HEADER_TOPICS:
                     continue
                 record = Record(topic, message.number, message.time, message.data)
-                if held and held[0].number != record.number:
-                    yield from self._grouped(begin, held)
+                if held and held[0].time != record.time:
+                    yield from self._apart(begin, held)
                     held = []
                 begin = begin if held else chunk.offset
                 held.append(record)
-            if held and not _is_part_of_a_tick(held):
-                yield from self._grouped(begin, held)
+            if held and not chunk.foreign:
+                yield from self._apart(begin, held)
                 held = []
-        if held:
-            yield from self._grouped(begin, held)
+        yield from self._apart(begin, held)
+
+    def _apart(self, offset: int, held: list[Record]) -> Iterator[tuple[list[Record], Tick | None]]:
+        """The messages of one time, each once, tick by tick.
+
+        Their number matters only where several ticks have one time: other programs may count the
+        messages of each topic, or none.
+        """
+        if _repeats(held):
+            once = [*dict.fromkeys(held)]
+            self._repeated += sum(each.topic is MANEUVER for each in held)
+            self._repeated -= sum(each.topic is MANEUVER for each in once)
+            held = once
+        ticks = dict[int, list[Record]]()
+        several = _repeats(held)
+        for record in held:
+            ticks.setdefault(record.number if several else 0, []).append(record)
+        for tick in ticks.values():
+            yield from self._grouped(offset, tick)
 
     def survey(self) -> Survey:
         """What all of it holds, and what is damaged or missing.
 
-        Of a closed log in one file nothing but events is decoded: its summary tells the rest, and
-        the CRC of each chunk is checked. All others are read as by `groups`.
+        Of a log of antennate, closed, in one file, little but events is decoded: its summary tells
+        the rest, and the CRC of each chunk is checked. All others are read as by `groups`.
 
         Raises:
             LogError: The disk fails.
@@ -188,7 +205,7 @@ class LogReader:
     def _grouped(
         self, offset: int, held: list[Record]
     ) -> Iterator[tuple[list[Record], Tick | None]]:
-        """The messages of one number in one chunk, as their tick if it is whole and new.
+        """The messages of one tick, with it if it is whole and new.
 
         Those beside the tick that are not of their type are left out.
         """
@@ -202,6 +219,8 @@ class LogReader:
             missing = [topic.name for topic in TICK_TOPICS if topic not in found]
             if missing:
                 raise LogError(f"tick without {missing[0]}")
+            if _repeats(held):
+                raise LogError("tick with two messages in a topic")
             tick = Tick.of_messages(found)
         except LogError as error:
             self._note(offset, str(error))
@@ -315,10 +334,10 @@ class LogReader:
             self.damage.append(Damage(offset, reason, self._part))
 
 
-def _is_part_of_a_tick(held: list[Record]) -> bool:
-    """Whether more of it may follow in the next chunk, as other programs divide them."""
-    found = {record.topic for record in held}.intersection(TICK_TOPICS)
-    return 0 < len(found) < len(TICK_TOPICS)
+def _repeats(held: Iterable[Record]) -> bool:
+    """Whether there are more messages in a topic than a tick has."""
+    parts = [record.topic.name for record in held if record.topic not in _BESIDE]
+    return len(parts) > len(set(parts))
 
 
 def count(path: Path) -> int:

@@ -34,12 +34,11 @@ class Place(NamedTuple):
     """Where a chunk of a closed file is.
 
     Attributes:
-        offset, length: Its begin and its length [bytes].
+        offset: Its begin [bytes].
         channels: Those of its messages.
     """
 
     offset: int
-    length: int
     channels: frozenset[int]
 
 
@@ -77,12 +76,12 @@ def places(file: BinaryIO) -> Iterator[Place]:
     for kind, body in _records(_summary(file) or b""):
         if kind == _CHUNK_INDEX:
             try:
-                _, _, offset, length, size = _PLACE.unpack_from(body)
+                _, _, offset, _, size = _PLACE.unpack_from(body)
                 listed = struct.iter_unpack("<HQ", body[_PLACE.size : _PLACE.size + size])
                 channels = frozenset(channel for channel, _ in listed)
             except struct.error as error:
                 raise ValueError(str(error)) from None
-            yield Place(offset, length, known.setdefault(channels, channels))
+            yield Place(offset, known.setdefault(channels, channels))
 
 
 def _summary(file: BinaryIO) -> bytes | None:
