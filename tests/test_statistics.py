@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import math
 import subprocess
 import sys
+from collections.abc import Sequence
+from itertools import product
 from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.stats import binomtest, t
+from scipy.stats import binomtest, t, wilcoxon
 
 from antennate.antenna.rivals import student
 from antennate.studies import statistics
@@ -60,11 +63,35 @@ def test_no_trials_say_nothing() -> None:
     assert all(np.isnan(statistics.mean95(np.array([]))))
 
 
-def test_a_bootstrap_interval_is_about_two_standard_errors_wide() -> None:
-    values = np.random.default_rng(1).normal(5.0, 2.0, 400)
+@pytest.mark.parametrize(
+    ("count", "quantile"),
+    [(2, 12.706), (3, 4.303), (5, 2.776), (10, 2.262), (21, 2.086), (121, 1.980)],
+)
+def test_the_interval_of_a_mean_has_the_printed_quantiles_of_student(
+    count: int, quantile: float
+) -> None:
+    """Table III of Fisher and Yates (1963), P = 0.05, for count - 1 degrees of freedom."""
+    values = np.random.default_rng(count).normal(5.0, 2.0, count)
     mean, low, high = statistics.mean95(values)
-    assert mean == pytest.approx(values.mean())
-    assert high - low == pytest.approx(2 * 1.96 * values.std() / 20, rel=0.1)
+    error = math.sqrt(sum((v - mean) ** 2 for v in values) / (count - 1) / count)
+    assert mean == pytest.approx(sum(values) / count)
+    assert (high - mean) / error == pytest.approx(quantile, abs=6e-4)
+    assert (mean - low) / error == pytest.approx(quantile, abs=6e-4)
+
+
+@pytest.mark.parametrize("count", [3, 5, 10])
+def test_19_of_20_intervals_of_few_values_hold_the_true_mean(count: int) -> None:
+    rng = np.random.default_rng(count)
+    found = [statistics.mean95(rng.normal(5.0, 2.0, count)) for _ in range(4000)]
+    held = np.mean([low < 5.0 < high for _, low, high in found])
+    assert held == pytest.approx(0.95, abs=4 * math.sqrt(0.05 * 0.95 / 4000))
+
+
+def test_one_value_has_a_mean_and_no_interval() -> None:
+    mean, low, high = statistics.mean95(np.array([3.0]))
+    assert mean == 3.0
+    assert math.isnan(low)
+    assert math.isnan(high)
 
 
 def test_mcnemar_counts_the_trials_on_which_the_arms_differ() -> None:
@@ -81,3 +108,58 @@ def test_equal_arms_do_not_differ() -> None:
     same = np.array([True, False])
     found = statistics.compare(same, same, np.array([5.0, 9.0]), np.array([5.0, 9.0]))
     assert (found.mcnemar_p, found.wilcoxon_p, found.time_difference_s) == (1.0, 1.0, 0.0)
+
+
+def signed_rank(difference: list[float]) -> float | None:
+    """p of trials that differ by so much."""
+    ok = np.ones(len(difference), bool)
+    first = np.array(difference)
+    return statistics.compare(ok, ok, first, np.zeros_like(first)).wilcoxon_p
+
+
+@pytest.mark.parametrize("count", [2, 3, 5, 10, 50])
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_pairs_of_one_sign_are_two_of_all_patterns_of_signs(count: int, sign: float) -> None:
+    assert signed_rank([sign * n for n in range(1, count + 1)]) == 2 / 2**count
+    assert signed_rank([sign] * count) == 2 / 2**count
+
+
+@pytest.mark.parametrize(
+    ("ranks", "p"),
+    # T is the sum of the ranks given; of the 2**n patterns 2 * (those with a sum of T or less)
+    [([1], 2 * 2 / 2**6), ([3], 2 * 5 / 2**6), ([2, 3], 2 * 10 / 2**6), ([1, 4, 5], 1.0)],
+)
+def test_the_signed_ranks_of_six_pairs_as_counted_by_hand(ranks: list[int], p: float) -> None:
+    assert signed_rank([-n if n in ranks else n for n in range(1, 7)]) == pytest.approx(p)
+
+
+@pytest.mark.parametrize(
+    "difference",
+    [
+        [1, 1, -1, 2, 2, 3],
+        [0, 0, 1, 2, 3, 4, 5],
+        [0, -1, 1, 1, 4, 4, -4, 7],
+        [0, 0, 0, 5],
+        [-100, 0, 0, 0, 30, 30, 30, 30, 2, 2],
+    ],
+)
+def test_ties_and_zeros_as_all_patterns_of_signs_have_them(difference: list[float]) -> None:
+    """Zeros have half of their ranks on either side (Pratt's ranks, zeros split)."""
+    sizes = [abs(d) for d in difference]
+    ranks = [sum(s < own for s in sizes) + (sizes.count(own) + 1) / 2 for own in sizes]
+    middle = sum(ranks) / 2
+
+    def off(signs: Sequence[float]) -> float:
+        above = sum(r * (s + 1) / 2 for r, s in zip(ranks, signs, strict=True))
+        return abs(above - middle)
+
+    signs = [(1, -1) if d else (0,) for d in difference]
+    own = off(list(np.sign(difference)))
+    every = [off(pattern) >= own for pattern in product(*signs)]
+    assert signed_rank(difference) == pytest.approx(sum(every) / len(every), rel=1e-12)
+
+
+def test_many_pairs_are_tested_by_the_normal_approximation() -> None:
+    difference = np.random.default_rng(3).normal(0.2, 1.0, 51).tolist()
+    _, p = np.asarray(wilcoxon(difference, method="exact"))
+    assert signed_rank(difference) == pytest.approx(p, rel=0.02)

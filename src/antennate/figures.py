@@ -49,8 +49,7 @@ SHAPE_COLOURS = {
 """Shapes of an antenna that touches, and no contact."""
 
 ENOUGH_TRIALS = 5
-"""Fewest trials for which an interval is drawn: of four, a bootstrap has only 35 different draws,
-so that 2.5 % of them are less than one."""
+"""Fewest trials for which an interval is drawn: of fewer it is so wide that it dwarfs the rest."""
 
 _RC: dict[Any, Any] = {
     "figure.dpi": 100,

@@ -62,7 +62,8 @@ def tables(result: Mapping[str, Any]) -> Sequence[Table]:
             profiles,
             PROFILE,
             f"{result['trials']} trials of every wall and speed, {result['invalid']} traverses "
-            "invalid. Intervals are 95 %, over trials;\nlatencies are medians.",
+            "invalid. Intervals are 95 %: of counts per\nmetre those of chance counts, of all else "
+            "over trials. Latencies are medians.",
         ),
         _grid("F1 by speed [m/s]", result["by_speed"], "speed_m_s", "g", profiles),
         _grid("F1 by wall", result["by_wall"], "wall", "", profiles),

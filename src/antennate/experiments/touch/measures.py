@@ -6,20 +6,22 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from antennate.experiments.touch.sensing import Comparison
 from antennate.studies import statistics
 from antennate.types import Floats, Ints
 
-_DRAWS = 2000
 _BINS = 500
 _LEVELS = np.arange(-13.0, 13.01, 0.25)
 """Logits of the thresholds on the ROC curve."""
 
 
 class Pool:
-    """Measures of groups of comparisons; intervals resample trials, the same way in every group.
+    """Measures of groups of comparisons, with 95 % intervals.
+
+    Those of counts per metre are the exact ones of Poisson counts. All others are over trials:
+    jackknife (each trial left out in turn) and Student's t, in every group the same way. Ends are
+    cut where the measure ends, latencies nowhere.
 
     Args:
         comparisons: All valid traverses.
@@ -29,9 +31,7 @@ class Pool:
 
     def __init__(self, comparisons: Sequence[Comparison], trials: int, rate: float) -> None:
         self._trials, self._tick_ms = trials, 1e3 / rate
-        rng = np.random.default_rng(0)
-        draws = rng.multinomial(trials, np.full(trials, 1.0 / trials), _DRAWS)
-        self._weights = draws.astype(float)
+        self._others = 1.0 - np.eye(trials)  # one trial left out in each row
         self._level_edges = _edges([v.level for v in comparisons])
         self._flex_edges = _edges([abs(v.flex) for v in comparisons])
 
@@ -41,22 +41,21 @@ class Pool:
         contacts = sum(len(m.contacts) for m in matches)
         missed = sum(int((~m.found).sum()) for m in matches)
         lost = np.concatenate([v.missed_flex for v in group]) if group else np.zeros(0)
-        metres = self._sum(group, lambda v: v.metres)
+        false = sum(m.false for m in matches)
+        metres = float(self._sum(group, lambda v: v.metres).sum())
         return {
             "traverses": len(group),
             "ticks": sum(len(v.truth) for v in group),
-            "metres": float(metres.sum()),
+            "metres": metres,
             **self._per_tick(group),
             "contacts": contacts,
             "missed": missed,
             "missed_wilson95": statistics.wilson95(missed, contacts),
             "carried": sum(m.carried for m in matches),
             "alarms": sum(m.alarms for m in matches),
-            "false": sum(m.false for m in matches),
-            **self._ratio(
-                "missed_per_m", self._sum(group, lambda v: (~v.matches.found).sum()), metres
-            ),
-            **self._ratio("false_per_m", self._sum(group, lambda v: v.matches.false), metres),
+            "false": false,
+            **_rate("missed_per_m", missed, metres),
+            **_rate("false_per_m", false, metres),
             "missed_flex_rad": float(np.median(lost)) if len(lost) else None,
             "onset": self._latency(group, [m.onset for m in matches]),
             "release": self._latency(group, [m.release for m in matches]),
@@ -85,15 +84,14 @@ class Pool:
     def f1_difference(
         self, first: Sequence[Comparison], second: Sequence[Comparison]
     ) -> dict[str, Any]:
-        """F1 of the first group less that of the second, trials resampled in both at once."""
-        ends = []
-        for group in (first, second):
-            hit, wrong, lost = self._ticks(group)
-            ends.append(self._drawn(2 * hit, 2 * hit + wrong + lost))
-        (one, ones), (two, twos) = ends
+        """F1 of the first group less that of the second, a trial left out of both at once."""
+        (one, ones), (two, twos) = (
+            self._left_out(2 * hit, 2 * hit + wrong + lost)
+            for hit, wrong, lost in map(self._ticks, (first, second))
+        )
         return {
             "f1_difference": _finite(one - two),
-            "f1_difference_95": self._interval(ones - twos),
+            "f1_difference_95": _interval(one - two, ones - twos, -1.0, 1.0),
         }
 
     def _sum(self, group: Sequence[Comparison], value: Any) -> Floats:
@@ -103,23 +101,19 @@ class Pool:
             total[comparison.trial] += value(comparison)
         return total
 
-    def _drawn(self, part: Floats, whole: Floats) -> tuple[float, Floats]:
-        """A ratio of sums over trials, and the same of every resample, shape (draws,)."""
+    def _left_out(self, part: Floats, whole: Floats) -> tuple[float, Floats]:
+        """A ratio of sums over trials, and the same without each trial, shape (trials,).
+
+        NaN for a trial that adds nothing to the whole.
+        """
         with np.errstate(invalid="ignore", divide="ignore"):
-            drawn = (self._weights @ part) / (self._weights @ whole)
-            return float(np.divide(part.sum(), whole.sum())), drawn
+            left = (self._others @ part) / (self._others @ whole)
+            value = float(np.divide(part.sum(), whole.sum()))
+        return value, np.where(whole > 0, left, np.nan)
 
     def _ratio(self, name: str, part: Floats, whole: Floats) -> dict[str, Any]:
-        value, drawn = self._drawn(part, whole)
-        return {name: _finite(value), f"{name}_95": self._interval(drawn)}
-
-    def _interval(self, drawn: NDArray[Any]) -> tuple[float, float] | None:
-        """Percentile interval of what exists; None with one trial or too little."""
-        drawn = drawn[np.isfinite(drawn)]
-        if self._trials < 2 or len(drawn) < _DRAWS / 2:
-            return None
-        low, high = np.percentile(drawn, [2.5, 97.5])
-        return float(low), float(high)
+        value, left = self._left_out(part, whole)
+        return {name: _finite(value), f"{name}_95": _interval(value, left, 0.0, 1.0)}
 
     def _latency(self, group: Sequence[Comparison], ticks: Sequence[Ints]) -> dict[str, Any]:
         """Median with its interval and 90th percentile [ms], and the median way meanwhile [mm]."""
@@ -133,14 +127,13 @@ class Pool:
         way = np.concatenate(
             [v.speed * t * self._tick_ms for v, t in zip(group, ticks, strict=True)]
         )
-        order = np.argsort(values, kind="stable")
-        weight = self._weights[:, trials[order]].cumsum(axis=1)
-        drawn = weight[:, -1] > 0
-        half = (weight[drawn] >= weight[drawn, -1:] / 2).argmax(axis=1)
+        median = float(np.median(values)) * self._tick_ms
+        others = [values[trials != one] for one in np.unique(trials)]
+        left = np.array([np.median(v) if len(v) else np.nan for v in others]) * self._tick_ms
         return {
             "n": len(values),
-            "median_ms": float(np.median(values)) * self._tick_ms,
-            "median_95_ms": self._interval(values[order][half] * self._tick_ms),
+            "median_ms": median,
+            "median_95_ms": _interval(median, left),
             "p90_ms": float(np.percentile(values, 90)) * self._tick_ms,
             "median_mm": float(np.median(way)),
         }
@@ -158,12 +151,49 @@ class Pool:
         below = np.cumsum(free, axis=1) - free / 2
         order = touching @ below.T  # ordered pairs of a trial's touching and another's free
         pairs = np.outer(touching.sum(axis=1), free.sum(axis=1))
-        weights = self._weights
+        others = self._others
         with np.errstate(invalid="ignore", divide="ignore"):
-            whole = np.divide(order.sum(), pairs.sum())
-            drawn = ((weights @ order) * weights).sum(axis=1)
-            drawn = drawn / ((weights @ pairs) * weights).sum(axis=1)
-        return {name: _finite(float(whole)), f"{name}_95": self._interval(drawn)}
+            whole = float(np.divide(order.sum(), pairs.sum()))
+            left = ((others @ order) * others).sum(axis=1)
+            left = left / ((others @ pairs) * others).sum(axis=1)
+        left[touching.sum(axis=1) + free.sum(axis=1) == 0] = np.nan
+        return {name: _finite(whole), f"{name}_95": _interval(whole, left, 0.0, 1.0)}
+
+
+def _interval(
+    value: float, left: Floats, least: float = -np.inf, most: float = np.inf
+) -> tuple[float, float] | None:
+    """Jackknife interval by Student's t, within the bounds.
+
+    Args:
+        value: Of all trials.
+        left: The same without each trial, NaN where that does not exist, shape (trials,).
+        least: Where the measure ends below.
+        most: Where it ends above.
+
+    Returns:
+        None with fewer than two trials, or when it does not matter which one is left out: that
+        tells nothing of the next.
+    """
+    from scipy.special import stdtrit  # scipy.stats takes a second longer
+
+    left = left[np.isfinite(left)]
+    if not np.isfinite(value) or len(left) < 2 or np.ptp(left) == 0.0:
+        return None
+    count = len(left)
+    half = stdtrit(count - 1, 0.975) * np.sqrt((count - 1) * left.var())
+    return max(least, float(value - half)), min(most, float(value + half))
+
+
+def _rate(name: str, count: int, metres: float) -> dict[str, Any]:
+    """Counts per metre with their exact interval (Garwood 1936, Biometrika 28, 437-442)."""
+    from scipy.special import gammaincinv  # scipy.stats takes a second longer
+
+    if metres == 0.0:
+        return {name: None, f"{name}_95": None}
+    low = float(gammaincinv(count, 0.025)) if count else 0.0
+    high = float(gammaincinv(count + 1, 0.975))
+    return {name: count / metres, f"{name}_95": (low / metres, high / metres)}
 
 
 def _finite(value: float) -> float | None:

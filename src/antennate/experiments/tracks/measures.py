@@ -115,10 +115,10 @@ def by_trial(criteria: CriteriaParams, antennae: Sequence[Seen]) -> Floats:
 
 
 def over_trials(criteria: CriteriaParams, antennae: Sequence[Seen]) -> dict[str, Any]:
-    """Mean share of each shape over trials, with its bootstrap 95 % interval.
+    """Mean share of each shape over trials, with its 95 % interval (Student's t).
 
-    The interval is None with fewer than two trials, as one says nothing about the next. With two
-    points along the antenna straight cannot be seen: its share is None.
+    It may reach below 0 or beyond 1. It is None with fewer than two trials, as one says nothing
+    about the next. With two points along the antenna straight cannot be seen: its share is None.
     """
     table = by_trial(criteria, antennae)
     found = {}

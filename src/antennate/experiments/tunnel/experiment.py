@@ -29,7 +29,7 @@ def tables(result: Mapping[str, Any]) -> Sequence[Table]:
         measures.CONTROLLER,
         f"{many} a controller, seed {result['seed']}. A failure counts as the time limit, "
         f"{result['time_limit_s']:g} s.\nInvalid trials do not count in the rows below "
-        "`invalid`. Intervals of means are bootstrapped.",
+        "`invalid`. Intervals of means are Student's.",
     )
     two_by_two = Table.of(
         "Pairs, trial by trial",
