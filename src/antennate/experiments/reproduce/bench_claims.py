@@ -128,8 +128,8 @@ def _shapes(result: Mapping[str, Any]) -> Finding:
         ", ".join(f"{name} {share:.1f} %" for name, share in shares.items()),
         judged(False, min(shares.values()) > 0),
         "With limits of straight and of bent that are ours. Shares of time beside a wall, a mean "
-        "over a grid of walls and sweeps that we chose, the larger of those with the base fixed and "
-        "moving, so they do not add up to 100 %.",
+        "over a grid of walls and sweeps that we chose, the larger of those with the base fixed "
+        "and moving, so they do not add up to 100 %.",
         tuple(Bar(name, share) for name, share in shares.items()),
     )
 

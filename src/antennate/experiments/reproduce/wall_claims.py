@@ -102,8 +102,8 @@ def _bend(result: Mapping[str, Any]) -> Finding:
         "undecided" if ours is None else judged(False, stays),
         "The limit is held against the antenna that passes; one that jams is bent further."
         if stays
-        else "The springs near the tip are the softest and bend furthest. Angle, overlap and length "
-        "are unpublished; ours are assumed.",
+        else "The springs near the tip are the softest and bend furthest. Angle, overlap and "
+        "length are unpublished; ours are assumed.",
         (Bar("paper", _LIMIT_DEG), *(Bar(f"ours, {n}", angle) for n, angle in angles.items())),
     )
 
@@ -154,8 +154,8 @@ WALL = (
         "bend",
         "Springs bend by less than 30° in use",
         "below 30°",
-        "Conditional if no spring of the antenna that passes, the descending one, reaches 30° in any "
-        "trial; no more, as we chose the base angle.",
+        "Conditional if no spring of the antenna that passes, the descending one, reaches 30° in "
+        "any trial; no more, as we chose the base angle.",
         "wall",
         "deg, one spring",
         _bend,
