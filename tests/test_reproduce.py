@@ -35,12 +35,26 @@ def springs(*stiffness: float) -> dict[str, Any]:
 
 def profile(**counts: int) -> dict[str, Any]:
     usual = {"trials": 20, "invalid": 0, "successes": 0, "jams": 0, "slips": 0}
-    return usual | {"flex_max_deg": 20.0} | counts
+    return usual | counts
 
 
-def passing(descending: int, controls: int = 0) -> dict[str, Any]:
-    others = {name: profile(successes=controls) for name in ("matched_uniform", "ascending")}
-    return {"profiles": {"descending": profile(successes=descending), **others}}
+def passing(descending: int, controls: int = 0, both: int | None = None) -> dict[str, Any]:
+    """The descending antenna against both controls; `both` walls were passed by either."""
+    both = min(descending, controls) if both is None else both
+    names = ("matched_uniform", "ascending")
+    pair = {"trials": 20, "only_first": descending - both, "only_second": controls - both}
+    return {
+        "profiles": {
+            "descending": profile(successes=descending),
+            **{name: profile(successes=controls) for name in names},
+        },
+        "paired": {f"descending-{name}": pair for name in names},
+    }
+
+
+def bent(descending: float | None, stiff: float) -> dict[str, Any]:
+    rows = {"descending": descending, "stiff": stiff}
+    return {"profiles": {name: {"hinge_max_deg": angle} for name, angle in rows.items()}}
 
 
 def times(low: float, high: float) -> dict[str, Any]:
@@ -50,8 +64,10 @@ def times(low: float, high: float) -> dict[str, Any]:
     return {"controllers": rows, "paired": {"open-closed": {"time_difference_95": [low, high]}}}
 
 
-def tunnel(name: str, successes: int, blind: int, p: float) -> dict[str, Any]:
-    row = {"trials": 100, "invalid": 0, "speed_m_s": 0.12}
+def tunnel(
+    name: str, successes: int, blind: int, p: float, trials: int = 100, invalid: int = 0
+) -> dict[str, Any]:
+    row = {"trials": trials, "invalid": invalid, "speed_m_s": 0.12}
     pair = {"only_first": 1, "only_second": 1 + successes - blind, "mcnemar_p": p}
     controllers = {"open": row | {"successes": blind}, name: row | {"successes": successes}}
     return {"controllers": controllers, "paired": {f"open-{name}": pair}}
@@ -79,8 +95,8 @@ def sigmoid(slope: float, half: float, midpoint: float) -> dict[str, Any]:
     return {"calibration": {"slope": slope, "midpoint": midpoint, **ends}}
 
 
-def swept(rarest: list[float]) -> dict[str, Any]:
-    share = {name: [0.3, 0.2, 0.4] for name in ("forward", "straight", "transition")}
+def swept(rarest: list[float | None]) -> dict[str, Any]:
+    share: dict[str, Any] = {n: [0.3, 0.2, 0.4] for n in ("forward", "straight", "transition")}
     return {"shapes": {"descending": {"fixed": {"share": share | {"backward": rarest}}}}}
 
 
@@ -98,13 +114,25 @@ def swept(rarest: list[float]) -> dict[str, Any]:
         ("descending_passes", passing(12), "not_reproduced"),  # Wilson: 39 to 78 %
         ("descending_passes", passing(17), "undecided"),  # 64 to 95 %
         ("descending_passes", passing(20), "conditional"),  # 84 to 100 %
-        ("taper_decides", passing(20, 3), "conditional"),  # Newcombe: 59 to 95 points more
-        ("taper_decides", passing(20, 6), "undecided"),  # 43 points at least
-        ("taper_decides", passing(10, 8), "not_reproduced"),
+        ("taper_decides", passing(20, 3), "conditional"),  # Bonett and Price: 56 to 99 points
+        ("taper_decides", passing(20, 6), "undecided"),  # 40 to 87 points
+        ("taper_decides", passing(10, 8), "not_reproduced"),  # -8 to 26 points
+        ("taper_decides", passing(18, 2), "conditional"),  # 50.3 to 95 points
+        ("taper_decides", passing(18, 2, both=0), "undecided"),  # the same lead: 44 to 101 points
+        ("taper_decides", {**passing(20, 3), "paired": {}}, "undecided"),  # no pair is valid
+        ("bend", bent(29.9, 60.0), "conditional"),
+        ("bend", bent(30.0, 60.0), "not_reproduced"),
+        ("bend", bent(None, 60.0), "undecided"),  # no trial is valid
         ("published_rule", tunnel("paper", 95, 50, 1e-9), "conditional"),
         ("published_rule", tunnel("paper", 94, 50, 1e-9), "undecided"),  # Wilson: 88 to 97 %
         ("published_rule", tunnel("paper", 90, 50, 1e-9), "not_reproduced"),  # 83 to 94 %
-        ("feedback", tunnel("closed", 95, 50, 1e-9), "conditional"),
+        ("feedback", tunnel("closed", 95, 50, 1e-9), "conditional"),  # Wilson: 89 to 98 %
+        ("feedback", tunnel("closed", 1, 0, 1.0, 1), "undecided"),  # 21 to 100 %
+        ("feedback", tunnel("closed", 10, 6, 0.1, 10), "undecided"),  # 72 to 100 %
+        ("feedback", tunnel("closed", 30, 20, 0.01, 30), "undecided"),  # 89 to 100 %
+        ("feedback", tunnel("closed", 40, 20, 1e-6, 40), "conditional"),  # 91 to 100 %
+        ("feedback", tunnel("closed", 0, 0, 1.0, 1, invalid=1), "undecided"),
+        ("published_rule", tunnel("paper", 5, 5, 1.0, 10), "not_reproduced"),  # 24 to 76 %
         ("speed", tunnel("closed", 95, 50, 1e-9), "conditional"),
         ("blind_speed", tunnel("closed", 95, 50, 1e-9), "not_reproduced"),
         ("faster", times(26.0, 31.0), "conditional"),
@@ -124,8 +152,9 @@ def swept(rarest: list[float]) -> dict[str, Any]:
         ("slope", sigmoid(4.5, 0.1, 0.3), "not_reproduced"),
         ("slope", sigmoid(18.0, 9.0, 0.3), "undecided"),
         ("shapes", swept([0.01, 0.002, 0.02]), "conditional"),
-        ("shapes", swept([1e-6, 0.0, 1e-5]), "undecided"),
+        ("shapes", swept([1e-6, 0.0, 1e-5]), "conditional"),  # chosen cells are no sample
         ("shapes", swept([0.0, 0.0, 0.0]), "not_reproduced"),
+        ("shapes", swept([None, None, None]), "not_reproduced"),  # no cell is valid
     ],
 )
 def test_a_verdict_follows_its_rule(name: str, result: dict[str, Any], verdict: str) -> None:

@@ -207,11 +207,27 @@ def test_conditions_share_their_chance_and_splits_do_not():
     assert one.exact != one.noisy
 
 
-def test_a_trial_that_blows_up_is_invalid_and_enters_no_estimate(monkeypatch):
-    def burst(self, count=1, watch=None):
+@pytest.fixture
+def burst(monkeypatch):
+    """Let every sweep end at once: what was drawn for it is known all the same."""
+
+    def step(self, count=1, watch=None):
         raise SimulationError(7, "engine warning")
 
-    monkeypatch.setattr(Bench, "step", burst)
+    monkeypatch.setattr(Bench, "step", step)
+
+
+@pytest.mark.parametrize("seed", [0, 7])
+@pytest.mark.parametrize("side", estimates.SIDES)
+def test_the_sweep_and_the_distance_of_a_wall_are_drawn_apart(burst, seed, side):
+    config = SMALL.model_copy(update={"seed": seed})
+    trials = [estimates.run_trial(config, "varied", "test", n, side) for n in range(200)]
+    drawn = [(t.distance, t.sweep.centre, t.sweep.amplitude) for t in trials]
+    apart = np.corrcoef(np.array(drawn).T)
+    assert abs(apart[np.triu_indices(3, 1)]).max() < 3 / math.sqrt(200)  # of chance, 99.7 %
+
+
+def test_a_trial_that_blows_up_is_invalid_and_enters_no_estimate(burst):
     outcome = sweep.run(SMALL)
     assert {row.status for row in outcome.rows} == {"invalid"}
     result = outcome.result()

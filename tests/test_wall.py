@@ -103,6 +103,15 @@ def test_a_tip_that_stands_for_over_19_mm_jams_and_early_jams_are_told_apart() -
     assert outcome_of(short, [True] * 100) == ("success", "success")
 
 
+def test_the_largest_angle_of_a_hinge_is_over_all_hinges_and_to_both_sides() -> None:
+    """The flex sensor ends before the sixth hinge, so its flex does not hold that angle."""
+    seen = passed(list(range(100)), [True] * 100)
+    seen.hinges[40] = np.radians([20.0, 20.0, 5.0, 5.0, 5.0, -31.0])
+    seen.flex[40] = np.radians(55.0)
+    row = classify(WallConfig().wall, 1, 0, "stiff", seen)
+    assert (row.flex_max_deg, row.hinge_max_deg) == (pytest.approx(55.0), pytest.approx(31.0))
+
+
 def test_contact_lost_for_over_800_ms_is_a_slip_and_a_jam_counts_before_it() -> None:
     tip = [float(i) for i in range(200)]
     lost = [True] * 90 + [False] * 85 + [True] * 25
@@ -234,7 +243,7 @@ def test_the_border_of_a_jam_lies_between_the_sticks_beside_it() -> None:
     """Made trials with sticks of 17, 18 and 24 mm; an invalid one of 20 mm does not count."""
     sticks = {17.0: "success", 24.0: "jam", 18.0: "slip", 20.0: "invalid"}
     rows = [
-        WallTrial(1, k, "stiff", outcome, outcome, 0, stick, 0, 0, 0, 0, 0)
+        WallTrial(1, k, "stiff", outcome, outcome, 0, stick, 0, 0, 0, 0, 0, 0)
         for k, (stick, outcome) in enumerate(sticks.items())
     ]
     outcome = wall.WallOutcome(WallConfig(), rows, {})
@@ -250,7 +259,7 @@ def test_sticks_all_on_one_side_of_the_border_are_said_to_be() -> None:
         ("In every trial the tip lagged more than 19 mm", "jam", 30.0, "below_mm"),
         ("In no trial did the tip lag more than 19 mm", "success", 10.0, "above_mm"),
     ):
-        rows = [WallTrial(1, 0, "stiff", outcome, outcome, 0, stick, 0, 0, 0, 0, 0)]
+        rows = [WallTrial(1, 0, "stiff", outcome, outcome, 0, stick, 0, 0, 0, 0, 0, 0)]
         result = wall.WallOutcome(WallConfig(profiles=("stiff",)), rows, {}).result()
         assert result["border"][side] is None
         assert said in EXPERIMENT.sentence(result)

@@ -119,22 +119,18 @@ def _contact(result: Mapping[str, Any]) -> Finding:
 
 
 def _shapes(result: Mapping[str, Any]) -> Finding:
-    shares = {}
-    for name in ("forward", "backward", "straight", "transition"):
-        found = [kind["share"][name] for kind in result["shapes"]["descending"].values()]
-        shares[name] = max(found, key=lambda share: (share[1], share[0]))
-    seen = all(low > 0 for _, low, _ in shares.values())
-    absent = any(high == 0 for _, _, high in shares.values())
+    motions = result["shapes"]["descending"].values()
+    shares = {
+        name: max(100 * (kind["share"][name][0] or 0.0) for kind in motions)
+        for name in ("forward", "backward", "straight", "transition")
+    }
     return Finding(
-        ", ".join(
-            f"{name} {100 * share:.1f} % ({100 * low:.1f} to {100 * high:.1f})"
-            for name, (share, low, high) in shares.items()
-        ),
-        "undecided" if not seen and not absent else judged(False, seen),
-        "With limits of straight and of bent that are ours. Shares of ticks beside a wall, fixed "
-        "or moving; each shape at the wall where the lower end of its interval is highest, so they "
-        "do not add up to 100 %.",
-        tuple(Bar(n, 100 * s[0], (100 * s[1], 100 * s[2])) for n, s in shares.items()),
+        ", ".join(f"{name} {share:.1f} %" for name, share in shares.items()),
+        judged(False, min(shares.values()) > 0),
+        "With limits of straight and of bent that are ours. Shares of time beside a wall, a mean "
+        "over a grid of walls and sweeps that we chose, the larger of those with the base fixed "
+        "and moving, so they do not add up to 100 %.",
+        tuple(Bar(name, share) for name, share in shares.items()),
     )
 
 
@@ -211,8 +207,9 @@ ANTENNA = (
         "shapes",
         "Sweeping beside a wall the antenna points forward, backward, lies straight, or changes",
         "all four are seen",
-        "Conditional if the 95 % interval of each share lies above 0; no more, as the limits are "
-        "ours. Undecided if an interval begins at 0, not reproduced if a shape is never seen.",
+        "Conditional if each shape is seen; no more, as the limits and the grid are ours. Never "
+        "undecided: the grid is no sample, so an interval over its cells would say nothing of "
+        "chance.",
         "sweep",
         "% of time",
         _shapes,

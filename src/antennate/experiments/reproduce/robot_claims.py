@@ -9,6 +9,7 @@ from antennate.experiments.reproduce.verdict import (
     Bar,
     Claim,
     Finding,
+    Verdict,
     above,
     agrees,
     counted,
@@ -73,6 +74,14 @@ def _blind(result: Mapping[str, Any]) -> Finding:
     )
 
 
+def _all_cross(share: float, interval: tuple[float, float]) -> Verdict:
+    """The verdict on a share of which the paper says all [%]; few trials are undecided."""
+    few = interval[1] - interval[0] > 2 * (100.0 - _ALL)
+    if interval[1] >= _ALL and (few or share < _ALL):
+        return "undecided"
+    return judged(False, share >= _ALL)
+
+
 def _touch(name: str, reason: str) -> Any:
     def judge(result: Mapping[str, Any]) -> Finding:
         row, blind = result["controllers"][name], result["controllers"]["open"]
@@ -81,7 +90,7 @@ def _touch(name: str, reason: str) -> Any:
         better = pair["only_second"] > pair["only_first"] and pair["mcnemar_p"] < 0.05
         return Finding(
             f"{counted(row)}, blind {counted(blind)}, McNemar p {pair['mcnemar_p']:.2g}",
-            "undecided" if share < _ALL <= interval[1] else judged(False, share >= _ALL),
+            _all_cross(share, interval),
             reason + ("" if better else " At this number of trials it is not told from blind."),
             (
                 _of_ten(10),
@@ -169,7 +178,8 @@ ROBOT = (
         "With the published rule all robots cross",
         "10 of 10",
         "Conditional if at least 95 % cross by that rule; no more, as its margins and times are "
-        "ours. Undecided if fewer cross, and the interval of the share reaches 95 %.",
+        "ours. Undecided if the interval of the share reaches 95 %, and fewer cross or it is wider "
+        "than 10 points.",
         "tunnel",
         "% of trials",
         _touch(
@@ -182,8 +192,8 @@ ROBOT = (
         "feedback",
         "Two antennae are enough to cross the tunnel",
         "10 of 10",
-        "Conditional if at least 95 % cross; no more, as the rule is ours. Undecided if fewer "
-        "cross, and the interval of the share reaches 95 %.",
+        "Conditional if at least 95 % cross; no more, as the rule is ours. Undecided if the "
+        "interval of the share reaches 95 %, and fewer cross or it is wider than 10 points.",
         "tunnel",
         "% of trials",
         _touch(

@@ -71,7 +71,9 @@ def run_trial(config: SweepConfig, condition: str, split: str, number: int, side
     rub, lean = rng.uniform(-1.0, 1.0, 2)
     zero = float(rng.normal(0.0, params.base_zero))
     gain = float(rng.normal(0.0, params.gain))
-    both = np.random.default_rng(key[:3]).uniform(-1.0, 1.0, 2)  # one sweep for both antennae
+    # One sweep for both antennae. A key without its last number would be that of side 0: NumPy pads
+    # keys with zeros.
+    both = np.random.default_rng([*key[:3], len(SIDES)]).uniform(-1.0, 1.0, 2)
     sweep = config.sweep
     if condition == "varied":
         sweep = SweepParams(

@@ -25,12 +25,14 @@ def tables(result: Mapping[str, Any]) -> Sequence[Table]:
         if profile == result["profile"] or result["profile"] not in result["shapes"]
     }
     shapes = Table(
-        "Share of time of each shape, mean over the map (95 %)",
+        "Share of time of each shape, mean over the map (spread over cells)",
         list(columns),
         [
             (name, [_with_interval(*row["share"][name]) for row in columns.values()])
             for name in (*sweep.SHAPES, "free")
         ],
+        "The map is a grid that was chosen. The spread over its cells, a bootstrap of their mean, "
+        "is no interval of chance.",
     )
     return shapes, *(_errors(name, noise) for name, noise in result["estimates"].items())
 

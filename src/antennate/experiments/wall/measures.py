@@ -33,6 +33,7 @@ PROFILE = (
     Measure("force_mean_n", "contact force, mean", "N", of=median, form=".3f"),
     Measure("force_max_n", "contact force, largest", "N", of=largest),
     Measure("flex_max_deg", "flex, largest", "deg", of=largest, form=".0f"),
+    Measure("hinge_max_deg", "angle of a hinge, largest", "deg", of=largest, form=".0f"),
 )
 _TEST = (
     ("only_first", "only the first succeeded", "d"),

@@ -31,6 +31,7 @@ class WallTrial:
         touched: Share of samples that touch.
         force_mean_n: Mean contact force [N]; `force_max_n` the largest.
         flex_max_deg: Largest flex under the flex sensor.
+        hinge_max_deg: Largest angle of any one hinge, also of those beyond the flex sensor.
         reason: Why it is invalid.
     """
 
@@ -46,6 +47,7 @@ class WallTrial:
     force_mean_n: float
     force_max_n: float
     flex_max_deg: float
+    hinge_max_deg: float
     reason: str = ""
 
 
@@ -98,12 +100,13 @@ def classify(wall: WallParams, seed: int, trial: int, profile: str, seen: Traver
         force_mean_n=float(seen.force.mean()),
         force_max_n=float(seen.force.max()),
         flex_max_deg=math.degrees(abs(seen.flex).max()),
+        hinge_max_deg=math.degrees(abs(seen.hinges).max()),
     )
 
 
 def invalid(seed: int, trial: int, profile: str, reason: str) -> WallTrial:
     """What is told of a trial that has no passage."""
-    return WallTrial(seed, trial, profile, "invalid", "invalid", *[math.nan] * 7, reason=reason)
+    return WallTrial(seed, trial, profile, "invalid", "invalid", *[math.nan] * 8, reason=reason)
 
 
 def least_advance(base: Floats, tip: Floats, travel: float) -> float:
