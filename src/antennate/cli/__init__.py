@@ -41,12 +41,13 @@ def main(argv: Sequence[str] | None = None) -> int:
         The exit code.
     """
     from antennate.cli.output import safe_streams
+    from antennate.sim.engine_warnings import dropped
     from antennate.sim.gl import keep_wish
 
     keep_wish()
     words = list(sys.argv[1:] if argv is None else argv)
     name = f"antennate {words[0]}" if words and _known(words[0]) else "antennate"
-    with safe_streams(result_alone="--json" in words) as output:
+    with dropped(), safe_streams(result_alone="--json" in words) as output:
         try:
             code = _run(words, name)
         except KeyboardInterrupt:

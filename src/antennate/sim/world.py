@@ -19,6 +19,7 @@ from antennate.robots.spec import RobotSpec
 from antennate.sim import layers, robot_part
 from antennate.sim.bounds import ANGLE_LIMIT, DISTANCE_LIMIT, HEIGHT_LIMIT, SPEED_LIMIT, broken
 from antennate.sim.contacts import Contacts
+from antennate.sim.engine_warnings import drop_if_asked
 from antennate.sim.gears import Gears
 from antennate.sim.outline import outline
 from antennate.sim.places import ROBOT_AND_OBSTACLE, Places
@@ -26,8 +27,7 @@ from antennate.sim.scenes.scene import SceneInstance, add_floor
 from antennate.sim.servo_drives import ServoDrives
 from antennate.types import Bools, Floats, Ints
 
-mujoco.set_mju_user_warning(lambda message: None)
-"""The engine prints its warnings and writes them to a file; we read its counters instead."""
+drop_if_asked()
 
 PREFIX = "robot/"
 _PLANE = int(mujoco.mjtGeom.mjGEOM_PLANE)

@@ -20,6 +20,7 @@ from typing import Any
 
 from antennate.errors import WorkerError, in_one_line
 from antennate.lookup import ADDED, NotSent
+from antennate.sim.engine_warnings import dropped
 from antennate.studies.work import Emit, Fail, Failure, Part, Waiting, Work
 
 _GUARD = (
@@ -287,7 +288,7 @@ def _serve(connection: Connection, added: Packed) -> None:
     def fail(place: int, failure: Failure) -> None:
         connection.send((_FAILED, place, Failure(failure.status, failure.reason)))
 
-    with contextlib.suppress(EOFError):
+    with dropped(), contextlib.suppress(EOFError):
         while True:
             part: Part = connection.recv()
             connection.send((_BEGUN, 0, None))  # what it needs is imported by now
