@@ -23,6 +23,9 @@ R = TypeVar("R")
 
 Keys = tuple[str, str]
 
+WIDTH = 4.5
+"""Width of a figure [inches]: panels stand below one another, so that a phone shows its letters."""
+
 INK, MUTED, FAINT = "#222222", "#6E6E6E", "#D5D5D5"
 """Text and robots; secondary lines; things in the background."""
 

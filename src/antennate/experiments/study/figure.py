@@ -18,8 +18,6 @@ from antennate.experiments.study.effects import size
 from antennate.experiments.study.run import StudyOutcome
 from antennate.studies.measures import NONE, Measure, shown
 
-_WIDTH = 4.5
-"""Width of a figure [inches]: its letters are then 8 pixels high on a phone."""
 _MOST_SIZES = 12
 """Effects drawn for each target, the largest."""
 _MOST_MAPS = 12
@@ -48,7 +46,7 @@ def effects(result: Result) -> Figure:
     targets = list(dict.fromkeys(effect["of"] for effect in result["effects"]))
     parameters = len(result["effects"]) // len(targets)
     count = min(_MOST_SIZES, parameters)
-    figure = style.canvas(_WIDTH, 1.0 + len(targets) * (0.75 + 0.35 * count))
+    figure = style.canvas(style.WIDTH, 1.0 + len(targets) * (0.75 + 0.35 * count))
     panels = figure.subplots(len(targets), 1, squeeze=False, sharex=True)[:, 0]
     measure = labels.measure(result)
     signed = result["plan"] != "morris"
@@ -122,7 +120,7 @@ def maps(result: Result) -> Figure:
     steps = [len(dict.fromkeys(_text(cell["values"][axis]) for cell in cells)) for axis in (x, y)]
     full = steps[0] <= _MOST_COLUMNS
     height = steps[1] * ((3.6 if full else 1.6) * _LINE) + 0.35
-    figure = style.canvas(_WIDTH, 1.5 + height * len(drawn))
+    figure = style.canvas(style.WIDTH, 1.5 + height * len(drawn))
     panels = figure.subplots(len(drawn), 1, squeeze=False, sharex=True)[:, 0]
     measure = labels.measure(result)
     known = [c["response"] for c in cells if c["response"] is not None]
@@ -193,7 +191,7 @@ def lines(result: Result) -> Figure:
     """The response against each parameter, with the interval of each point."""
     axes, cells = result["axes"], result["points"]
     names = list(dict.fromkeys(cell["condition"] for cell in cells))
-    figure = style.canvas(_WIDTH, 0.4 + 2.4 * len(axes))
+    figure = style.canvas(style.WIDTH, 0.4 + 2.4 * len(axes))
     panels = figure.subplots(len(axes), 1, squeeze=False, sharey=True)[:, 0]
     measure = labels.measure(result)
     scaled = [

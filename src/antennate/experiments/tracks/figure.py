@@ -38,24 +38,20 @@ def study(outcome: TracksOutcome, result: Mapping[str, Any]) -> Figure:
         outcome: The antennae.
         result: The content of result.json.
     """
-    figure = style.canvas(10.0, 8.0)
-    panels = figure.subplot_mosaic(
-        [["shares", "outlines"], ["time", "time"], ["vary", "vary"]],
-        height_ratios=(1.25, 0.9, 0.9),
-        width_ratios=(1.7, 1),
-    )
+    figure = style.canvas(style.WIDTH, 11.5)
+    shares, outlines, angle, change = figure.subplots(4, 1, height_ratios=(1.2, 1.4, 0.9, 0.9))
     shapes = [measures.shapes_of(outcome.config.criteria, one) for one in outcome.antennae]
-    _draw_shares(panels["shares"], outcome, result)
-    _draw_outlines(panels["outlines"], outcome, shapes)
+    _draw_shares(shares, outcome, result)
+    _draw_outlines(outlines, outcome, shapes)
     contact = [int((found >= 0).sum()) for found in shapes]
     most = int(np.argmax(contact))
-    _draw_angle(panels["time"], outcome.antennae[most], shapes[most])
-    _draw_change(panels["vary"], result)
+    _draw_angle(angle, outcome.antennae[most], shapes[most])
+    _draw_change(change, result)
     handles = [
-        panels["shares"].plot([], [], _MARKS.get(shape, "s"), color=colour, label=shape)[0]
+        shares.plot([], [], _MARKS.get(shape, "s"), color=colour, label=shape)[0]
         for shape, colour in style.SHAPE_COLOURS.items()
     ]
-    figure.legend(handles=handles, loc="outside upper center", ncols=len(handles))
+    figure.legend(handles=handles, loc="outside upper center", ncols=3)
     return figure
 
 
@@ -85,7 +81,7 @@ def _draw_shares(panel: Axes, outcome: TracksOutcome, result: Mapping[str, Any])
     ticks = [*range(len(bars)), left + 1.5]
     names = [str(at + 1) for at in range(len(bars))]
     panel.set_xticks(
-        ticks, [*names, f"mean of {len(table)}, {style.interval_note('95 %', len(table))}"]
+        ticks, [*names, f"mean of {len(table)},\n{style.interval_note('95 %', len(table))}"]
     )
     panel.set_ylim(-0.02, 1.02)
     panel.set_ylabel("share of frames in contact")
