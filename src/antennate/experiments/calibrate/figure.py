@@ -106,7 +106,7 @@ def _draw_loop(panel: Axes, found: Mapping[str, Any], loop: tuple[Floats, Floats
     panel.axvline(found["at_bend"], color=style.MUTED, linewidth=0.8)
     panel.set(xlabel="bend", ylabel="mean reading [counts]")
     panel.set_title(
-        f"Hysteresis: mean {100 * abs(found['mean']):.1f} %, largest "
+        f"Hysteresis: mean {100 * abs(found['mean']):.1f} %,\nlargest "
         f"{100 * abs(found['largest']):.1f} % of the span"
     )
     panel.legend()
@@ -134,7 +134,7 @@ def _draw_rivals(panel: Axes, known: Mapping[str, Any]) -> None:
     panel.set_yticks(-np.arange(len(checks)) - 0.1, checks)
     panel.set_xlabel("gain: error of the sigmoid minus the rival's")
     named = " and ".join(known["named"]) or "none"
-    panel.set_title(f"Beats the sigmoid under every check: {named}")
+    panel.set_title(f"Beats the sigmoid under every check:\n{named}")
     panel.set_ylim(-len(checks) + 0.2, 0.9)
     panel.legend(loc="upper center", ncols=2)
 
