@@ -64,19 +64,11 @@ def study(result: Mapping[str, Any]) -> Figure:
         (panels[1], "gap", "Width of a gap"),
     ):
         _draw_errors(panel, result["estimates"], quantity)
-        panel.set_title(f"{what}, with sensor noise (95 %)")
         panel.set_ylabel("mean absolute error [%]")
-        key, note = ("gap", "") if quantity == "gap" else ("base_to_tip", ",\nbase to tip")
+        key, note = ("gap", "") if quantity == "gap" else ("base_to_tip", ", base to tip")
         published = result["published_percent"][key]
         panel.axhline(published, color=style.INK, linewidth=1, linestyle=(0, (4, 2)))
-        panel.annotate(
-            f"CITRAS {published:g} %{note}",
-            (2.3, published),
-            (0, -2),
-            textcoords="offset points",
-            va="top",
-            fontsize=8,
-        )
+        panel.set_title(f"{what}, with sensor noise (95 %);\ndashed: CITRAS, {published:g} %{note}")
     handles, labels = panels[0].get_legend_handles_labels()
     lower.legend(handles, labels, loc="outside lower center", ncols=1)
     return figure
