@@ -121,6 +121,11 @@ def canvas(width: float, height: float) -> Figure:
     return Figure(figsize=(width, height), layout="constrained")
 
 
+def above(figure: Figure) -> dict[str, Any]:
+    """Place of a bar of colours: above all panels, near the first title."""
+    return {"location": "top", "aspect": 40, "pad": 0.12 / figure.get_figheight()}
+
+
 def categories(panel: Axes, labels: Sequence[str]) -> None:
     """Let x = 0, 1, 2, ... be categories of these names."""
     panel.set_xticks(range(len(labels)), labels)

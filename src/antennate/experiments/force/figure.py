@@ -40,9 +40,8 @@ def study(result: Mapping[str, Any], profiles: Sequence[ProfileOutcome]) -> Figu
     title = f"{shown.profile}: at rest, normal to the link"
     _scatter(rest, shown.statics, scale, result, title)
     _scatter(move, shown.traverses, scale, result, f"Dragged past a post, {moved} traverses")
-    figure.colorbar(
-        scale, ax=[rest, move], label="place of contact / length", location="top", aspect=40
-    )
+    label = "place of contact / length"
+    figure.colorbar(scale, ax=[rest, move], label=label, **style.above(figure))
     _draw_ranges(ranges, result)
     _draw_shares(shares, result)
     return figure

@@ -25,8 +25,6 @@ _MOST_COLUMNS = 5
 """Columns of a map whose cells have room for interval and counts."""
 _LINE = 0.135
 """Height of a line of small text [inches]."""
-_ABOVE = 0.12
-"""Between the bar of colours and the first map with its title [inches]."""
 Result = Mapping[str, Any]
 
 
@@ -138,8 +136,7 @@ def maps(result: Result) -> Figure:
         title += "\nwith its 95 % interval and how many trials it is of"
     if len(drawn) < len(every):
         title += f"\nthe first {len(drawn)} of {len(every)} maps"
-    pad = _ABOVE / figure.get_figheight()  # of the first title
-    bar = figure.colorbar(image, ax=panels, location="top", label=title, aspect=40, pad=pad)
+    bar = figure.colorbar(image, ax=panels, label=title, **style.above(figure))
     bar.ax.xaxis.set_major_formatter(lambda value, _: f"{measure.scale * value:.3g}")
     return figure
 
