@@ -22,7 +22,7 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
 from antennate.experiments.tunnel.run import TunnelConfig, run
-from antennate.figures import INK, canvas, render, styled
+from antennate.figures import INK, WIDTH, above, canvas, render, styled
 from antennate.messages import short_names
 from antennate.studies.pool import core_count
 
@@ -148,12 +148,12 @@ def success_map(cells: Sequence[Mapping[str, Any]], controllers: Sequence[str]) 
     Args:
         cells: One a tunnel: `turn_deg`, `free_width_m`, and per name in `controllers` the numbers
             `trials`, `successes` and `wilson95`.
-        controllers: Panels, left to right.
+        controllers: Panels, top to bottom.
     """
     angles = sorted({cell["turn_deg"] for cell in cells})
     widths = sorted({cell["free_width_m"] for cell in cells})
-    figure = canvas(1.4 + 3.4 * len(controllers), 1.2 + 0.75 * len(angles))
-    axes = np.atleast_1d(np.array(figure.subplots(1, len(controllers), sharey=True)))
+    figure = canvas(WIDTH, 0.9 + (0.6 + 0.5 * len(angles)) * len(controllers))
+    axes = np.atleast_1d(np.array(figure.subplots(len(controllers), 1)))
     scale = ScalarMappable(Normalize(0.0, 1.0), "cividis")
     for panel, (controller, label) in zip(axes, short_names(controllers).items(), strict=True):
         share = np.full((len(angles), len(widths)), np.nan)
@@ -177,8 +177,8 @@ def success_map(cells: Sequence[Mapping[str, Any]], controllers: Sequence[str]) 
         panel.set_xticks(range(len(widths)), [f"{w:.2f}" for w in widths])
         panel.set_yticks(range(len(angles)), [f"{a:.0f}" for a in angles])
         panel.set_xlabel("free width [m]")
-    axes[0].set_ylabel("corner angle [deg]")
-    figure.colorbar(scale, ax=list(axes), label="share of successes", shrink=0.9)
+        panel.set_ylabel("corner angle [deg]")
+    figure.colorbar(scale, ax=list(axes), label="share of successes", **above(figure))
     return figure
 
 

@@ -214,7 +214,7 @@ def stick_lines(rows: Sequence[Mapping[str, Any]], limit_mm: float) -> Figure:
         rows: `base_angle_deg`, `profile`, and `sticks_mm`, one for each trial.
         limit_mm: Travel from which a stick counts as a jam [mm].
     """
-    figure = style.canvas(7.0, 4.2)
+    figure = style.canvas(style.WIDTH, 4.2)
     panel = figure.subplots()
     profiles = list(dict.fromkeys(row["profile"] for row in rows))
     for k, profile in enumerate(profiles):
@@ -249,56 +249,65 @@ def stick_lines(rows: Sequence[Mapping[str, Any]], limit_mm: float) -> Figure:
 
 @style.styled
 def outcome_map(cells: Sequence[Mapping[str, Any]]) -> Figure:
-    """Successes after the start, a column for each profile.
+    """Successes after the start, one profile below the other.
 
-    Over link mass and overlap with a row for each angle and gravity; if all masses are equal, over
-    angle and overlap with a row for each gravity.
+    Over link mass and base angle, with a column for each overlap and a row for each gravity; if all
+    masses are equal, over base angle and overlap, with a column for each gravity.
 
     Args:
         cells: Cells with `link_mass_g`, `overlap_mm`, `base_angle_deg`, `gravity` and `profiles`.
     """
-    profiles = list(cells[0]["profiles"])
-    one_mass = len({cell["link_mass_g"] for cell in cells}) == 1
-    across, label = ("base_angle_deg", "base angle [deg]") if one_mass else _MASS
-    apart = ("gravity",) if one_mass else ("gravity", "base_angle_deg")
-    rows = sorted({tuple(cell[key] for key in apart) for cell in cells})
-    figure = style.canvas(2.1 * len(profiles) + 1.2, 1.55 * len(rows) + 0.6)
-    panels = figure.subplots(len(rows), len(profiles), squeeze=False, sharex=True, sharey=True)
+    window = len({cell["link_mass_g"] for cell in cells}) == 1
+    axes = ("base_angle_deg", "overlap_mm") if window else ("link_mass_g", "base_angle_deg")
+    beside, apart = ("gravity", None) if window else ("overlap_mm", "gravity")
+    columns = sorted({cell[beside] for cell in cells})
+    rests = sorted({cell[apart] for cell in cells}) if apart else [None]
+    rows = list(itertools.product(cells[0]["profiles"], rests))
+    height = 0.45 + 0.17 * len({cell[axes[1]] for cell in cells})
+    figure = style.canvas(style.WIDTH, 1.4 + height * len(rows))
+    panels = figure.subplots(len(rows), len(columns), squeeze=False, sharex=True, sharey=True)
     image = None
-    for row, line in zip(rows, panels, strict=True):
-        held = [cell for cell in cells if tuple(cell[key] for key in apart) == row]
-        for profile, panel in zip(profiles, line, strict=True):
-            image = _draw_map(panel, held, profile, across)
-        place = "\n".join([f"gravity {row[0]}", *(f"{angle:g} deg" for angle in row[1:])])
-        line[0].set_ylabel(f"{place}\noverlap [mm]")
-    for profile, panel in zip(profiles, panels[0], strict=True):
-        panel.set_title(profile.replace("_", " "))
-    for panel in panels[-1]:
-        panel.set_xlabel(label)
-    figure.suptitle("In each cell: successes/jams/slips", x=0.01, ha="left", fontsize=9)
+    for (profile, rest), line in zip(rows, panels, strict=True):
+        for column, panel in zip(columns, line, strict=True):
+            held = [
+                cell
+                for cell in cells
+                if cell[beside] == column and (apart is None or cell[apart] == rest)
+            ]
+            image = _draw_map(panel, held, profile, axes)
+        line[0].set_title(profile.replace("_", " ") + (f", gravity {rest}" if apart else ""))
+        line[0].set_ylabel(_AXES[axes[1]])
+    for column, low in zip(columns, panels[-1], strict=True):
+        told = f"gravity {column}" if window else f"overlap {column:g} mm"
+        low.set_xlabel(f"{_AXES[axes[0]]}\n{told}")
     if image is not None:
-        name = "share of successes\nafter the start"
-        figure.colorbar(image, ax=panels, label=name, shrink=0.8 if one_mass else 0.3)
+        name = "share of successes after the start;\nin each cell: successes/jams/slips"
+        figure.colorbar(image, ax=panels, label=name, **style.above(figure))
     return figure
 
 
-_MASS = ("link_mass_g", "link mass [g]")
+_AXES = {
+    "base_angle_deg": "angle [deg]",
+    "overlap_mm": "overlap [mm]",
+    "link_mass_g": "mass [g]",
+}
 
 
-def _draw_map(panel: Axes, cells: Sequence[Mapping[str, Any]], profile: str, across: str) -> Any:
-    columns = sorted({cell[across] for cell in cells})
-    overlaps = sorted({cell["overlap_mm"] for cell in cells})
-    grid = np.full((len(overlaps), len(columns)), np.nan)
+def _draw_map(
+    panel: Axes, cells: Sequence[Mapping[str, Any]], profile: str, axes: tuple[str, str]
+) -> Any:
+    columns, rows = (sorted({cell[axis] for cell in cells}) for axis in axes)
+    grid = np.full((len(rows), len(columns)), np.nan)
     for cell in cells:
         counts = cell["profiles"][profile]["after_start"]
-        at = overlaps.index(cell["overlap_mm"]), columns.index(cell[across])
+        at = rows.index(cell[axes[1]]), columns.index(cell[axes[0]])
         grid[at] = counts["successes"] / counts["trials"]
         mark = f"{counts['successes']}/{counts['jams']}/{counts['slips']}"
         ink = "white" if grid[at] < 0.6 else style.INK
         panel.text(at[1], at[0], mark, ha="center", va="center", fontsize=7, color=ink)
     image = panel.imshow(grid, origin="lower", cmap="cividis", vmin=0, vmax=1, aspect="auto")
     panel.set_xticks(range(len(columns)), [f"{value:g}" for value in columns])
-    panel.set_yticks(range(len(overlaps)), [f"{o:g}" for o in overlaps])
+    panel.set_yticks(range(len(rows)), [f"{value:g}" for value in rows])
     panel.grid(visible=False)
     return image
 

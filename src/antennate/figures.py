@@ -23,6 +23,9 @@ R = TypeVar("R")
 
 Keys = tuple[str, str]
 
+WIDTH = 4.5
+"""Width of a figure [inches]: panels stand below one another, so that a phone shows its letters."""
+
 INK, MUTED, FAINT = "#222222", "#6E6E6E", "#D5D5D5"
 """Text and robots; secondary lines; things in the background."""
 
@@ -115,6 +118,11 @@ def font(size: int) -> Any:
 def canvas(width: float, height: float) -> Figure:
     """An empty figure of this size [inches] whose parts keep clear of one another."""
     return Figure(figsize=(width, height), layout="constrained")
+
+
+def above(figure: Figure) -> dict[str, Any]:
+    """Place of a bar of colours: above all panels, near the first title."""
+    return {"location": "top", "aspect": 40, "pad": 0.12 / figure.get_figheight()}
 
 
 def categories(panel: Axes, labels: Sequence[str]) -> None:

@@ -16,13 +16,20 @@ from antennate.robots.supply import Supply, servos_of, supply
 
 Place = tuple[float, float]
 
-_PITCH, _SIDE, _RAIL, _GROUND = 2.5, 1.35, -2.55, -2.85
-"""Distance of links, of legs from the middle, and heights of the two power lines, in boxes."""
-_HEIGHT = 0.62
-"""Of a box."""
-_CONVERTER = -1.9
-"""Height of the line of the lower voltage."""
-_LEFT = -4.9
+_ROW = 0.56
+"""From a row of servos to the next; all lengths are in inches."""
+_LEFT, _MIDDLE, _RIGHT = 1.2, 2.45, 3.7
+"""Columns of servos."""
+_GROUND, _RAIL = 0.1, 0.25
+"""Places of the two power lines."""
+_SUPPLY, _ADAPTER, _BOARD = 0.9, 2.15, 3.6
+"""Columns above the servos: battery to converter, computer and adapter, antenna board."""
+_TOP, _STEP = -0.35, 0.72
+"""Height of the first boxes above the servos, and from one to the next."""
+_ANTENNAE, _CONVERTER, _FIRST = -2.8, -3.3, -3.95
+"""Heights of the antennae's servos, of the converter and of the first row of legs."""
+_HEIGHT, _LETTERS = 0.3, 8
+"""Of a box, and of its letters [points]."""
 _DATA, _MAIN, _LOW = style.SERIES[0], "#C80000", "#FF8C00"
 """Blue, red and orange, as the legend calls them."""
 
@@ -31,42 +38,43 @@ _DATA, _MAIN, _LOW = style.SERIES[0], "#C80000", "#FF8C00"
 def wiring(robot: RobotSpec) -> Figure:
     """The diagram; the order of the bus is that of the cable, head first."""
     power, places = supply(robot), _places(robot)
-    left, right = _LEFT - 0.9, (robot.links - 1) * _PITCH + 0.8
-    low, high = -3.4, 2.9
-    figure = Figure(figsize=(0.8 * (right - left), 0.8 * (high - low)))
+    end = _FIRST - 2 * (robot.links - 1) * _ROW
+    told = _told(power)
+    low = end - 0.5 - 0.16 * told.count("\n") - 0.2
+    figure = Figure(figsize=(style.WIDTH, -low))
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
     axes.set_axis_off()
-    axes.set_aspect("equal")
-    axes.set_xlim(left, right)
-    axes.set_ylim(low, high)
+    axes.set_xlim(0.0, style.WIDTH)
+    axes.set_ylim(low, 0.0)
     servos = dict(zip(robot.joint_names, servos_of(robot), strict=True))
     order = _cable(robot)
     _bus(axes, [places[name] for name in order])
-    _feeds(axes, robot, power, order, places, servos)
+    _feeds(axes, power, order, places, servos)
     for name, servo_id in zip(robot.joint_names, robot.ids, strict=True):
         kind = servos[name]
         colour = _MAIN if kind.voltage == power.rails[0].voltage else _LOW
-        width = 0.9 if colour == _MAIN else 1.15
+        width = 0.92 if not name.startswith(ANTENNA_PREFIXES) else 1.24
         _box(axes, places[name], f"{servo_id}  {name}\n{kind.product}", colour, width)
     _electronics(axes, power, bool(robot.antenna_count))
-    _legend(axes, power)
+    axes.text(0.1, end - 0.45, told, fontsize=_LETTERS, va="top", linespacing=1.4)
     return figure
 
 
 def _places(robot: RobotSpec) -> dict[str, Place]:
-    """Where each joint stands in the picture, head to the left."""
+    """Where each joint stands in the picture, head to the top."""
     found: dict[str, Place] = {}
-    for side, prefix, y in zip(SIDES, ANTENNA_PREFIXES, (0.7, -0.7), strict=True):
+    antennae = (_ADAPTER, _ANTENNAE), (_BOARD, _ANTENNAE)
+    for side, prefix, antenna in zip(SIDES, ANTENNA_PREFIXES, antennae, strict=True):
         for name in robot.joint_names:
             if name.startswith(prefix):
-                found[name] = (-1.35, y)
+                found[name] = antenna
             elif name.startswith(f"leg_{side}"):
                 link = int(name.removeprefix(f"leg_{side}"))
-                found[name] = (link * _PITCH, _SIDE if y > 0 else -_SIDE)
-    shift = 0.4 if robot.pitch_count else 0.0
+                found[name] = (_LEFT if side == SIDES[0] else _RIGHT, _FIRST - 2 * link * _ROW)
+    shift = 0.57 if robot.pitch_count else 0.0
     for j in range(1, robot.links):
-        found[f"yaw{j}"] = ((j - 0.5) * _PITCH, shift)
-        found[f"pitch{j}"] = ((j - 0.5) * _PITCH, -shift)
+        found[f"yaw{j}"] = (_MIDDLE - shift, _FIRST - (2 * j - 1) * _ROW)
+        found[f"pitch{j}"] = (_MIDDLE + shift, _FIRST - (2 * j - 1) * _ROW)
     return found
 
 
@@ -81,110 +89,132 @@ def _cable(robot: RobotSpec) -> list[str]:
 
 
 def _bus(axes: Axes, places: Sequence[Place]) -> None:
-    start = (_LEFT + 2.05, 0.0)
-    x, y = zip(start, *places, strict=True)
+    x, y = zip((_ADAPTER, _TOP - _STEP), *places, strict=True)
     axes.plot(x, y, color=_DATA, linewidth=1.6, zorder=1)
 
 
 def _feeds(
     axes: Axes,
-    robot: RobotSpec,
     power: Supply,
     order: Sequence[str],
     places: dict[str, Place],
     servos: dict[str, ServoParams],
 ) -> None:
     """The lines of both voltages and of ground, and where they reach the cable."""
-    end = (robot.links - 1) * _PITCH
+    end, below = min(y for _, y in places.values()) + 0.24, _TOP - 2 * _STEP - 0.35
+    _line(axes, [(_SUPPLY, _TOP), (_SUPPLY, below), (_RAIL, below), (_RAIL, end)], _MAIN, 2.5)
+    _line(axes, [(_SUPPLY, _TOP), (_GROUND, _TOP), (_GROUND, end)], style.INK, 2.5)
+    _voltage(axes, (_RAIL + 0.06, below - 0.2), power.rails[0].voltage, _MAIN)
     main = [name for name in order if servos[name].voltage == power.rails[0].voltage]
-    axes.plot([_LEFT, end], [_RAIL, _RAIL], color=_MAIN, linewidth=2.5, zorder=1)
-    axes.plot([_LEFT, end], [_GROUND, _GROUND], color=style.INK, linewidth=2.5, zorder=1)
-    _voltage(axes, (_LEFT + 0.1, _RAIL + 0.04), power.rails[0].voltage, _MAIN)
     for name in main[:: power.per_feed]:
-        x, y = places[name]
-        _feed(axes, (x - 0.64, _RAIL), (x, y + 0.1), _MAIN)
-        _feed(axes, (x - 0.57, _GROUND), (x, y - 0.1), style.INK)
-    for name in order:
-        x, y = places[name]
-        if servos[name].voltage != power.rails[0].voltage:
-            _feed(axes, (x - 0.76, _CONVERTER), (x, y + 0.1), _LOW)
-            _feed(axes, (x - 0.69, _GROUND), (x, y - 0.1), style.INK)
+        _feed(axes, _RAIL, places[name], _MAIN)
+    for name in [*main[:: power.per_feed], *(name for name in order if name not in main)]:
+        _feed(axes, _GROUND, places[name], style.INK)
+    for x, y in (places[name] for name in order if name not in main):
+        _line(axes, [(_SUPPLY, _CONVERTER), (x, _CONVERTER), (x, y)], _LOW, 1.4)
 
 
-def _feed(axes: Axes, start: Place, end: Place, colour: str) -> None:
-    """A wire that leaves a line upwards, then goes to the right."""
-    (at, line), (x, y) = start, end
-    axes.plot([at, at, x], [line, y, y], color=colour, linewidth=0.9, zorder=0)
-    axes.plot([at], [line], "o", color=colour, markersize=4)
+def _feed(axes: Axes, line: float, place: Place, colour: str) -> None:
+    """A wire that leaves a power line to the right, then goes down to a servo."""
+    x, y = place
+    aside, above = (0.1, 0.29) if line == _RAIL else (-0.1, 0.24)
+    _line(axes, [(line, y + above), (x + aside, y + above), (x + aside, y)], colour, 0.9)
+    _joint(axes, (line, y + above), colour)
+
+
+def _line(axes: Axes, places: Sequence[Place], colour: str, width: float) -> None:
+    x, y = zip(*places, strict=True)
+    axes.plot(x, y, color=colour, linewidth=width, zorder=1 if width > 1 else 0)
+
+
+def _joint(axes: Axes, place: Place, colour: str) -> None:
+    axes.plot(*place, "o", color=colour, markersize=4)
 
 
 def _voltage(axes: Axes, place: Place, voltage: float, colour: str) -> None:
-    """The voltage of a line, written on it."""
+    """The voltage of a line, written beside it."""
     x, y = place
-    axes.text(x, y, f"{voltage:g} V", color=colour, fontsize=7, weight="bold", va="bottom")
+    axes.text(x, y, f"{voltage:g} V", color=colour, fontsize=_LETTERS, weight="bold", va="bottom")
 
 
-def _box(axes: Axes, place: Place, text: str, colour: str, width: float) -> None:
+def _box(
+    axes: Axes, place: Place, text: str, colour: str, width: float, height: float = _HEIGHT
+) -> None:
     x, y = place
     shape = FancyBboxPatch(
-        (x - width / 2, y - _HEIGHT / 2),
+        (x - width / 2, y - height / 2),
         width,
-        _HEIGHT,
-        boxstyle="round,pad=0.05",
+        height,
+        boxstyle="round,pad=0.04",
         edgecolor=colour,
         facecolor="white",
         linewidth=1.3,
         zorder=2,
     )
     axes.add_patch(shape)
-    axes.text(x, y, text, ha="center", va="center", fontsize=6.5, zorder=3)
+    axes.text(x, y, text, ha="center", va="center", fontsize=_LETTERS, zorder=3)
 
 
 def _electronics(axes: Axes, power: Supply, antennae: bool) -> None:
-    """Battery, fuse, stop, converter and adapter at the left, and the board of the antennae."""
-    main, ink = power.rails[0].voltage, style.INK
-    x, mid, right = _LEFT, _LEFT + 0.0, _LEFT + 1.75
-    for y, text, colour in (
-        (2.4, f"battery {main:g} V\n{power.least_capacity:.1f} Ah or more", _MAIN),
-        (1.3, f"fuse {power.fuse:g} A", _MAIN),
-        (0.2, f"emergency stop\n{power.stall:.0f} A", _MAIN),
+    """Battery, fuse, stop, converter and adapter above, and the board of the antennae."""
+    main = power.rails[0].voltage
+    for step, text in enumerate(
+        (
+            f"battery {main:g} V\n{power.least_capacity:.1f} Ah or more",
+            f"fuse {power.fuse:g} A",
+            f"emergency stop\n{power.stall:.0f} A",
+        )
     ):
-        _box(axes, (x, y), text, colour, 1.4)
-    axes.plot([mid, mid], [2.4, _RAIL], color=_MAIN, linewidth=2.5, zorder=1)
-    axes.plot([x - 0.8, x - 0.8, x], [2.4, _GROUND, _GROUND], color=ink, linewidth=2.5, zorder=1)
-    axes.plot([x - 0.8, x - 0.7], [2.4, 2.4], color=ink, linewidth=2.5, zorder=1)
-    _box(axes, (right, 0.0), "USB adapter\n(U2D2)", _DATA, 1.2)
-    _box(axes, (right, 2.4), "computer", ink, 1.2)
-    axes.plot([right, right], [0.0, 2.4], color=_DATA, linewidth=1.6, zorder=1)
+        _box(axes, (_SUPPLY, _TOP - step * _STEP), text, _MAIN, 1.06)
+    _line(axes, [(_ADAPTER, _TOP), (_ADAPTER, _TOP - _STEP)], _DATA, 1.6)
+    _box(axes, (_ADAPTER, _TOP), "computer", style.INK, 0.9)
+    _box(axes, (_ADAPTER, _TOP - _STEP), "USB adapter\n(U2D2)", _DATA, 0.9)
     if antennae:
-        _board(axes, right)
+        _board(axes)
     for rail in power.rails[1:]:
-        at, text = right - 0.15, f"converter {rail.voltage:g} V\n{rail.stall:.1f} A"
-        _box(axes, (at, _CONVERTER), text, _LOW, 1.3)
-        axes.plot([at, at], [_RAIL, _CONVERTER], color=_MAIN, linewidth=1.4, zorder=1)
-        axes.plot([at, -2.11], [_CONVERTER, _CONVERTER], color=_LOW, linewidth=1.4, zorder=1)
-        _voltage(axes, (-2.56, _CONVERTER + 0.06), rail.voltage, _LOW)
-        axes.plot([at + 0.4] * 2, [_GROUND, _CONVERTER], color=ink, linewidth=0.9, zorder=0)
-        axes.plot([at + 0.4], [_GROUND], "o", color=ink, markersize=4)
+        text = f"converter {rail.voltage:g} V\n{rail.stall:.1f} A"
+        _box(axes, (_SUPPLY, _CONVERTER), text, _LOW, 1.0)
+        for line, y, colour in ((_RAIL, 0.07, _MAIN), (_GROUND, -0.07, style.INK)):
+            _line(axes, [(line, _CONVERTER + y), (_SUPPLY, _CONVERTER + y)], colour, 1.4)
+            _joint(axes, (line, _CONVERTER + y), colour)
+        _voltage(axes, (_SUPPLY + 0.62, _CONVERTER + 0.04), rail.voltage, _LOW)
+        _warning(axes, main, rail.voltage)
 
 
-def _board(axes: Axes, x: float) -> None:
-    """The board of the antennae and their dividers, right of the computer at x."""
-    ink = style.INK
-    _box(axes, (x + 1.8, 2.4), "ESP32 board\n3V3, GPIO34, 35", ink, 1.4)
-    _box(axes, (x + 4.0, 2.4), "two dividers:\nflex sensor above,\nresistor to ground", ink, 1.7)
-    axes.plot([x, x + 4.0], [2.4, 2.4], color=ink, linewidth=1.0, zorder=1)
-    axes.plot([x + 0.85, x + 0.85], [2.4, _GROUND], color=ink, linewidth=0.9, zorder=0)
-    axes.plot([x + 0.85], [_GROUND], "o", color=ink, markersize=4)
+def _board(axes: Axes) -> None:
+    """The board of the antennae and their dividers, right of the computer."""
+    ink, above = style.INK, _TOP + 0.27
+    _line(axes, [(_ADAPTER, _TOP), (_BOARD, _TOP), (_BOARD, _TOP - _STEP)], ink, 1.1)
+    _line(axes, [(_BOARD, _TOP), (_BOARD, above), (_GROUND, above), (_GROUND, _TOP)], ink, 0.9)
+    _joint(axes, (_GROUND, _TOP), ink)
+    _box(axes, (_BOARD, _TOP), "antenna board (ESP32)\n3V3, GPIO34, 35", ink, 1.38)
+    dividers = "two dividers:\nflex sensor above,\nresistor to ground"
+    _box(axes, (_BOARD, _TOP - _STEP), dividers, ink, 1.2, 0.42)
 
 
-def _legend(axes: Axes, power: Supply) -> None:
+def _warning(axes: Axes, high: float, low: float) -> None:
+    """What must not be joined, in letters that nobody overlooks."""
+    axes.text(
+        (_ADAPTER + style.WIDTH) / 2,
+        (_TOP - _STEP + _ANTENNAE) / 2 - 0.05,
+        f"{high:g} V destroys the\n{low:g} V servos (orange). No\nsupply wire between them!",
+        ha="center",
+        va="center",
+        fontsize=_LETTERS + 1,
+        weight="bold",
+        color="white",
+        bbox={"boxstyle": "round,pad=0.4", "facecolor": _MAIN, "edgecolor": "none"},
+    )
+
+
+def _told(power: Supply) -> str:
+    """What the colours mean."""
     main, *others = power.rails
-    lines = [f"red: {main.voltage:g} V, a feed for each {power.per_feed} servos of the chain"]
-    lines += [
-        f"orange: {rail.voltage:g} V; {main.voltage:g} V destroys the servos on it: no wire of the "
-        "supply between the two"
-        for rail in others
-    ]
-    lines += ["blue: data of the servo bus", "black: ground, common to all"]
-    axes.text(_LEFT - 0.8, -3.05, "     ".join(lines), fontsize=7, color=style.MUTED, va="top")
+    return "\n".join(
+        [
+            f"red: {main.voltage:g} V, a feed for each {power.per_feed} servos of the chain",
+            *(f"orange: {rail.voltage:g} V" for rail in others),
+            "blue: data of the servo bus",
+            "black: ground, common to all",
+        ]
+    )

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from itertools import groupby, islice
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -28,6 +29,16 @@ _STATES = {
 }
 _CONTACTS: dict[int, str] = {Contact.CONTACT: style.INK, Contact.UNKNOWN: "#CC79A7"}
 _MANEUVERS: dict[int, str] = {int(m): colour for m, colour in style.MANEUVER_COLOURS.items()}
+
+_BESIDE_THE_TITLE: dict[str, Any] = {
+    "loc": "lower right",
+    "bbox_to_anchor": (1.0, 1.0),
+    "borderaxespad": 0.0,
+    "ncols": 2,
+}
+"""Place of a short legend, above its panel."""
+_COLUMNS = 4
+"""Of a long one, below all panels."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,7 +115,7 @@ def replay(course: Course) -> Figure:
     if any(course.state) or (course.recorded >= 0).any() or course.replayed is not None:
         parts.append((1.8, _draw_decisions))
     heights = [height for height, _ in parts]
-    figure = style.canvas(9.0, 1.0 + 0.6 * sum(heights))
+    figure = style.canvas(style.WIDTH, 1.0 + 0.75 * sum(heights))
     panels = figure.subplots(len(parts), 1, sharex=True, height_ratios=heights, squeeze=False)
     for panel, (_, draw) in zip(panels[:, 0], parts, strict=True):
         draw(panel, course)
@@ -116,7 +127,7 @@ def _draw_readings(panel: Axes, course: Course) -> None:
     for side, (name, colour) in enumerate(zip(_SIDES, style.series(2), strict=True)):
         panel.plot(course.t, course.reading[:, side], color=colour, linewidth=1, label=name)
     panel.set(ylabel="reading [counts]", title="Readings")
-    panel.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=7)
+    panel.legend(**_BESIDE_THE_TITLE)
 
 
 def _draw_levels(panel: Axes, course: Course) -> None:
@@ -132,7 +143,9 @@ def _draw_contact(panel: Axes, course: Course) -> None:
         colours = [_CONTACTS.get(value) for value in course.contact[:, side].tolist()]
         _band(panel, course.t, colours, 1 - side)
     panel.set(yticks=[1, 0], yticklabels=_SIDES, ylim=(-0.6, 1.6), title="Contact")
-    _legend(panel, {Contact(kind).name.lower(): colour for kind, colour in _CONTACTS.items()})
+    contacts = {Contact(kind).name.lower(): colour for kind, colour in _CONTACTS.items()}
+    panel.legend(handles=_patches(contacts), **_BESIDE_THE_TITLE)
+    panel.grid(visible=False)
 
 
 def _draw_decisions(panel: Axes, course: Course) -> None:
@@ -153,7 +166,9 @@ def _draw_decisions(panel: Axes, course: Course) -> None:
     )
     seen = {value for values in shown.values() for value in values.tolist()}
     key = {style.MANEUVER_NAMES[m]: style.MANEUVER_COLOURS[m] for m in Maneuver if m in seen}
-    _legend(panel, key | {name: _STATES[name] for name in _STATES if name in course.state})
+    key |= {name: _STATES[name] for name in _STATES if name in course.state}
+    panel.figure.legend(handles=_patches(key), loc="outside lower center", ncols=_COLUMNS)
+    panel.grid(visible=False)
 
 
 def _band(panel: Axes, t: Floats, colours: Iterable[str | None], height: float) -> None:
@@ -167,11 +182,5 @@ def _band(panel: Axes, t: Floats, colours: Iterable[str | None], height: float) 
             panel.broken_barh([span], (height - 0.4, 0.8), color=colour, linewidth=0)
 
 
-def _legend(panel: Axes, colours: dict[str, str]) -> None:
-    panel.legend(
-        handles=[Patch(color=colour, label=name) for name, colour in colours.items()],
-        loc="center left",
-        bbox_to_anchor=(1.0, 0.5),
-        fontsize=7,
-    )
-    panel.grid(visible=False)
+def _patches(colours: dict[str, str]) -> list[Patch]:
+    return [Patch(color=colour, label=name) for name, colour in colours.items()]

@@ -42,10 +42,10 @@ def calibrate(
     """
     known = result["assessment"]
     drawn = [part for part in ("hysteresis", "rivals") if _has(known, part)]
-    figure = style.canvas(6.4 + 4.8 * bool(drawn), 5.6)
-    widths = (6.4, 4.8)[: 1 + bool(drawn)]
-    left, *right = figure.subfigures(1, len(widths), width_ratios=widths, squeeze=False)[0]
-    above, below = left.subplots(2, 1, sharex=True, height_ratios=(2, 1))
+    heights = (5.2, 2.6 * len(drawn))[: 1 + bool(drawn)]
+    figure = style.canvas(style.WIDTH, sum(heights))
+    upper, *lower = figure.subfigures(len(heights), 1, height_ratios=heights, squeeze=False)[:, 0]
+    above, below = upper.subplots(2, 1, sharex=True, height_ratios=(2, 1))
     _draw_speeds(above, below, samples, level)
     _draw_curve(above, result["calibration"])
     if known["new_push"] is not None:
@@ -55,7 +55,7 @@ def calibrate(
     below.axhline(0, color=style.MUTED, linewidth=0.8)
     below.set(xlabel="reading [counts]", ylabel="level − bend")
     if drawn:
-        panels = right[0].subplots(len(drawn), 1, squeeze=False)[:, 0]
+        panels = lower[0].subplots(len(drawn), 1, squeeze=False)[:, 0]
         for panel, part in zip(panels, drawn, strict=True):
             if part == "hysteresis":
                 _draw_loop(panel, known[part], loop)
@@ -93,7 +93,7 @@ def _draw_curve(panel: Axes, found: Mapping[str, Any]) -> None:
     )
     panel.set_ylabel("bend, 0 straight, 1 full")
     panel.set_title(
-        f"{found['sensor_id']}: {found['trials']} pushes; mean ± standard deviation of each bin"
+        f"{found['sensor_id']}: {found['trials']} pushes;\nmean ± standard deviation of each bin"
     )
     panel.legend(fontsize=8)
 
@@ -106,7 +106,7 @@ def _draw_loop(panel: Axes, found: Mapping[str, Any], loop: tuple[Floats, Floats
     panel.axvline(found["at_bend"], color=style.MUTED, linewidth=0.8)
     panel.set(xlabel="bend", ylabel="mean reading [counts]")
     panel.set_title(
-        f"Hysteresis: mean {100 * abs(found['mean']):.1f} %, largest "
+        f"Hysteresis: mean {100 * abs(found['mean']):.1f} %,\nlargest "
         f"{100 * abs(found['largest']):.1f} % of the span"
     )
     panel.legend()
@@ -134,7 +134,7 @@ def _draw_rivals(panel: Axes, known: Mapping[str, Any]) -> None:
     panel.set_yticks(-np.arange(len(checks)) - 0.1, checks)
     panel.set_xlabel("gain: error of the sigmoid minus the rival's")
     named = " and ".join(known["named"]) or "none"
-    panel.set_title(f"Beats the sigmoid under every check: {named}")
+    panel.set_title(f"Beats the sigmoid under every check:\n{named}")
     panel.set_ylim(-len(checks) + 0.2, 0.9)
     panel.legend(loc="upper center", ncols=2)
 

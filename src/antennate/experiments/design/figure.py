@@ -15,8 +15,6 @@ from antennate import figures as style
 from antennate.experiments.design.designs import DesignOutcome
 
 _MOST_PANELS = 6
-_WIDTH = 4.6
-"""Width of a figure [inches]: panels stand below one another, so that a telephone shows them."""
 _MARKERS = "*^vDsPX<>"
 """The first reference is a star."""
 Each = Mapping[str, Any]
@@ -33,7 +31,7 @@ def tradeoff(result: Mapping[str, Any]) -> Figure:
     """All designs, the front, the references, and those that were run again with intervals."""
     objectives = result["objectives"]
     pairs = list(combinations(objectives, 2))[:_MOST_PANELS] or [(None, objectives[0])]
-    figure = style.canvas(_WIDTH, 1.0 + 3.1 * len(pairs))
+    figure = style.canvas(style.WIDTH, 1.0 + 3.1 * len(pairs))
     panels = figure.subplots(len(pairs), 1, squeeze=False)[:, 0]
     for panel, (x, y) in zip(panels, pairs, strict=True):
         _panel(panel, result["designs"], x, y)

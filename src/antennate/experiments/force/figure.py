@@ -32,15 +32,16 @@ def study(result: Mapping[str, Any], profiles: Sequence[ProfileOutcome]) -> Figu
         result: The content of result.json.
         profiles: The points of every profile; those of `descending`, or of the first, are drawn.
     """
-    figure = style.canvas(10.0, 7.4)
-    (rest, move), (ranges, shares) = figure.subplots(2, 2, height_ratios=(1.1, 1))
+    figure = style.canvas(style.WIDTH, 12.0)
+    rest, move, ranges, shares = figure.subplots(4, 1)
     shown = next((p for p in profiles if p.profile == "descending"), profiles[0])
     scale = ScalarMappable(Normalize(result["from_place"], 1.0), "viridis")
     moved = result["profiles"][shown.profile]["traverses"]["trials"]
     title = f"{shown.profile}: at rest, normal to the link"
     _scatter(rest, shown.statics, scale, result, title)
     _scatter(move, shown.traverses, scale, result, f"Dragged past a post, {moved} traverses")
-    figure.colorbar(scale, ax=[rest, move], label="place of contact / length", shrink=0.9)
+    label = "place of contact / length"
+    figure.colorbar(scale, ax=[rest, move], label=label, **style.above(figure))
     _draw_ranges(ranges, result)
     _draw_shares(shares, result)
     return figure
@@ -61,7 +62,7 @@ def _scatter(
     panel.set(
         xlabel="flex under the flex sensor [deg]",
         ylabel="contact force [N]",
-        title=f"{title} (n = {within.sum()})",
+        title=f"{title}\n(n = {within.sum()})",
         xlim=(0, None),
         ylim=(0, None),
     )
@@ -79,7 +80,7 @@ def _draw_ranges(panel: Axes, result: Mapping[str, Any]) -> None:
     panel.set(
         xlabel="nearest place where the contact may be / length",
         ylabel="R² of force, place unknown",
-        title="One curve for all places from there to the tip, at rest",
+        title="One curve for all places\nfrom there to the tip, at rest",
         ylim=(0, 1.02),
     )
     panel.legend(loc="lower right")
@@ -106,7 +107,7 @@ def _draw_shares(panel: Axes, result: Mapping[str, Any]) -> None:
     style.categories(panel, [name.replace("_", "\n") for name in profiles])
     panel.set(
         ylabel="R² of force",
-        title=f"Share of force that flex explains ({style.interval_note('95 %', trials)})",
+        title=f"Share of force that flex explains\n({style.interval_note('95 %', trials)})",
     )
     bottom, top = panel.get_ylim()
     panel.set_ylim(min(bottom, 0.0), top + 0.35)

@@ -31,8 +31,8 @@ def study(result: Mapping[str, Any], walks: Mapping[str, Walk]) -> Figure:
         result: The content of result.json.
         walks: The four maneuvers by name.
     """
-    figure = style.canvas(10.0, 4.2)
-    sweep, plan = figure.subplots(1, 2, width_ratios=(1.15, 1))
+    figure = style.canvas(style.WIDTH, 7.2)
+    sweep, plan = figure.subplots(2, 1)
     _draw_sweep(sweep, result)
     _draw_plan(plan, result, walks)
     return figure
@@ -99,8 +99,10 @@ def unknown(result: Mapping[str, Any]) -> Figure:
     Args:
         result: The content of result.json.
     """
-    figure = style.canvas(10.0, 0.36 * len(result["unknown"]["parameters"]) + 2.2)
-    draws, alone = figure.subplots(1, 2, width_ratios=(1, 1.1), sharex=True)
+    heights = 2.8, 0.36 * len(result["unknown"]["parameters"]) + 1.2
+    figure = style.canvas(style.WIDTH, sum(heights))
+    draws, alone = figure.subplots(2, 1, height_ratios=heights)
+    alone.sharex(draws)
     _draw_draws(draws, result)
     _draw_alone(alone, result)
     measured = result["measured_body_lengths_per_cycle"]
@@ -129,10 +131,18 @@ def _draw_alone(panel: Axes, result: Mapping[str, Any]) -> None:
         panel.plot([low, high], [i, i], color=style.INK, linewidth=2.2, zorder=2)
         panel.plot(low, i, "o", color=style.SERIES[0], zorder=3, label="" if i else "lower end")
         panel.plot(high, i, "s", color=style.SERIES[1], zorder=3, label="" if i else "upper end")
+        ends = " to ".join(f"{end:g}" for end in rows[name]["range"])
+        panel.annotate(
+            f"{name}: {ends}",
+            (0.0, i),
+            xytext=(4, 6),
+            xycoords=("axes fraction", "data"),
+            textcoords="offset points",
+            fontsize=8,
+        )
     forward = result["maneuvers"]["forward"]["body_lengths_per_cycle"]
-    panel.axvline(forward, color=style.MUTED, linewidth=1.0)
-    ticks = [f"{n}\n{rows[n]['range'][0]:g} to {rows[n]['range'][1]:g}" for n in order]
-    panel.set_yticks(range(len(order)), ticks)
-    panel.set_ylim(-0.6, len(order) + 0.5)
-    panel.set_title("Each alone; the grey line is the run as configured")
+    panel.axvline(forward, color=style.MUTED, linewidth=1.0, zorder=1)
+    panel.set_yticks([])
+    panel.set_ylim(-0.6, len(order) + 0.6)
+    panel.set_title("Each alone;\nthe grey line is the run as configured")
     panel.legend(loc="upper right", ncols=2, frameon=True, facecolor="white", edgecolor="none")

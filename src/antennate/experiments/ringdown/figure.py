@@ -28,8 +28,8 @@ def ringdown(result: Mapping[str, Any], t: Floats, tip: Floats) -> Figure:
         t: Times [s], shape (m,).
         tip: Place of the tip over that at the start, shape (m,).
     """
-    figure = style.canvas(11.5, 3.8)
-    swing, beside, cones = figure.subplots(1, 3)
+    figure = style.canvas(style.WIDTH, 9.6)
+    swing, beside, cones = figure.subplots(3, 1)
     _draw_swing(swing, result, t, tip)
     _draw_animals(beside, result)
     _draw_cones(cones, result)

@@ -33,8 +33,8 @@ def sensor(
         resistors: Fixed resistors [Ohm], shape (r,).
         spread: Spread of readings with each [counts], shape (r,).
     """
-    figure = style.canvas(11.0, 3.8)
-    curve, held, choice = figure.subplots(1, 3)
+    figure = style.canvas(style.WIDTH, 8.7)
+    curve, held, choice = figure.subplots(3, 1)
     _draw_curve(curve, result, loop)
     _draw_hold(held, hold)
     _draw_choice(choice, result, resistors, spread)

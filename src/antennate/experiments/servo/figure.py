@@ -13,7 +13,6 @@ from antennate.types import Floats
 
 _MOST = 8
 """Recordings drawn."""
-_COLUMNS = 2
 
 
 def figures(outcome: ServoOutcome) -> dict[str, Figure]:
@@ -25,20 +24,14 @@ def figures(outcome: ServoOutcome) -> dict[str, Figure]:
 def servo(outcome: ServoOutcome) -> Figure:
     """Each recording with two models, the simplest and that of the simulation or of its form."""
     count = min(_MOST, len(outcome.recordings))
-    columns = min(_COLUMNS, count)
-    rows = -(-count // columns)
-    figure = style.canvas(10.0 if columns > 1 else 6.4, 1.2 + 2.2 * rows)
-    panels = figure.subplots(rows, columns, squeeze=False, sharex=True).ravel()
+    figure = style.canvas(style.WIDTH, 1.0 + 1.6 * count)
+    panels = figure.subplots(count, 1, squeeze=False, sharex=True)[:, 0]
     traces = np.degrees(outcome.traces())
     for i, panel in enumerate(panels):
-        if i < count:
-            _draw(panel, outcome, i, traces[:, :, i])
-        else:
-            panel.set_axis_off()
-    for panel in panels[max(0, count - columns) : count]:
-        panel.set_xlabel("time [s]")
+        _draw(panel, outcome, i, traces[:, :, i])
+    panels[-1].set_xlabel("time [s]")
     handles, labels = panels[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=4)
+    figure.legend(handles, labels, loc="outside upper center", ncols=2)
     return figure
 
 

@@ -28,8 +28,8 @@ def springs(result: Mapping[str, Any]) -> Figure:
     Args:
         result: The content of result.json.
     """
-    figure = style.canvas(10.0, 4.0)
-    torque, wound = figure.subplots(1, 2)
+    figure = style.canvas(style.WIDTH, 7.4)
+    torque, wound = figure.subplots(2, 1)
     _draw_torque(torque, result)
     _draw_windings(wound, result)
     return figure
@@ -47,7 +47,7 @@ def _draw_torque(panel: Axes, result: Mapping[str, Any]) -> None:
     panel.set(
         xlabel="angle [deg]",
         ylabel="torque [N·mm]",
-        title=f"{result['wire']}, wire {result['wire_mm']:g} mm, coil {result['coil_mm']:g} mm; "
+        title=f"{result['wire']}, wire {result['wire_mm']:g} mm, \ncoil {result['coil_mm']:g} mm; "
         "× yields",
     )
     panel.set_xlim(0, end)

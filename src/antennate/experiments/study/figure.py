@@ -18,8 +18,6 @@ from antennate.experiments.study.effects import size
 from antennate.experiments.study.run import StudyOutcome
 from antennate.studies.measures import NONE, Measure, shown
 
-_WIDTH = 4.5
-"""Width of a figure [inches]: its letters are then 8 pixels high on a phone."""
 _MOST_SIZES = 12
 """Effects drawn for each target, the largest."""
 _MOST_MAPS = 12
@@ -27,8 +25,6 @@ _MOST_COLUMNS = 5
 """Columns of a map whose cells have room for interval and counts."""
 _LINE = 0.135
 """Height of a line of small text [inches]."""
-_ABOVE = 0.12
-"""Between the bar of colours and the first map with its title [inches]."""
 Result = Mapping[str, Any]
 
 
@@ -48,7 +44,7 @@ def effects(result: Result) -> Figure:
     targets = list(dict.fromkeys(effect["of"] for effect in result["effects"]))
     parameters = len(result["effects"]) // len(targets)
     count = min(_MOST_SIZES, parameters)
-    figure = style.canvas(_WIDTH, 1.0 + len(targets) * (0.75 + 0.35 * count))
+    figure = style.canvas(style.WIDTH, 1.0 + len(targets) * (0.75 + 0.35 * count))
     panels = figure.subplots(len(targets), 1, squeeze=False, sharex=True)[:, 0]
     measure = labels.measure(result)
     signed = result["plan"] != "morris"
@@ -122,7 +118,7 @@ def maps(result: Result) -> Figure:
     steps = [len(dict.fromkeys(_text(cell["values"][axis]) for cell in cells)) for axis in (x, y)]
     full = steps[0] <= _MOST_COLUMNS
     height = steps[1] * ((3.6 if full else 1.6) * _LINE) + 0.35
-    figure = style.canvas(_WIDTH, 1.5 + height * len(drawn))
+    figure = style.canvas(style.WIDTH, 1.5 + height * len(drawn))
     panels = figure.subplots(len(drawn), 1, squeeze=False, sharex=True)[:, 0]
     measure = labels.measure(result)
     known = [c["response"] for c in cells if c["response"] is not None]
@@ -140,8 +136,7 @@ def maps(result: Result) -> Figure:
         title += "\nwith its 95 % interval and how many trials it is of"
     if len(drawn) < len(every):
         title += f"\nthe first {len(drawn)} of {len(every)} maps"
-    pad = _ABOVE / figure.get_figheight()  # of the first title
-    bar = figure.colorbar(image, ax=panels, location="top", label=title, aspect=40, pad=pad)
+    bar = figure.colorbar(image, ax=panels, label=title, **style.above(figure))
     bar.ax.xaxis.set_major_formatter(lambda value, _: f"{measure.scale * value:.3g}")
     return figure
 
@@ -193,7 +188,7 @@ def lines(result: Result) -> Figure:
     """The response against each parameter, with the interval of each point."""
     axes, cells = result["axes"], result["points"]
     names = list(dict.fromkeys(cell["condition"] for cell in cells))
-    figure = style.canvas(_WIDTH, 0.4 + 2.4 * len(axes))
+    figure = style.canvas(style.WIDTH, 0.4 + 2.4 * len(axes))
     panels = figure.subplots(len(axes), 1, squeeze=False, sharey=True)[:, 0]
     measure = labels.measure(result)
     scaled = [

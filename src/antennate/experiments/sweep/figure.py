@@ -41,44 +41,36 @@ def study(result: Mapping[str, Any]) -> Figure:
     Args:
         result: The content of result.json; the map of its `profile`, or of the first, is drawn.
     """
-    figure = style.canvas(10.0, 8.2)
-    upper, lower = np.array(figure.subfigures(2, 1, height_ratios=(1.35, 1)))
+    figure = style.canvas(style.WIDTH, 14.0)
+    upper, lower = np.array(figure.subfigures(2, 1, height_ratios=(1.25, 1)))
     name = (
         result["profile"] if result["profile"] in result["shapes"] else next(iter(result["shapes"]))
     )
     shapes = result["shapes"][name]
-    axes = upper.subplots(1, len(shapes), sharey=True)
+    axes = upper.subplots(len(shapes), 1)
     for panel, (motion, row) in zip(np.atleast_1d(np.array(axes)), shapes.items(), strict=True):
         _draw_map(panel, row["map"])
         panel.set_title(f"{name}, base {motion} ({row['cells']} cells)")
         panel.set_xlabel("amplitude of the sweep [deg]")
-    upper.axes[0].set_ylabel("distance of the wall / length")
+        panel.set_ylabel("distance of the wall / length")
     handles = [
         upper.axes[0].plot([], [], marker="s", linestyle="", color=colour, label=shape)[0]
         for shape, colour in style.SHAPE_COLOURS.items()
     ]
-    upper.legend(handles=handles, loc="outside lower center", ncols=len(handles))
-    panels = lower.subplots(1, 2, sharey=True)
+    upper.legend(handles=handles, loc="outside lower center", ncols=3)
+    panels = lower.subplots(2, 1, sharey=True)
     for panel, quantity, what in (
         (panels[0], "distance", "Distance to a wall"),
         (panels[1], "gap", "Width of a gap"),
     ):
         _draw_errors(panel, result["estimates"], quantity)
-        panel.set_title(f"{what}, with sensor noise (95 %)")
-        key, note = ("gap", "") if quantity == "gap" else ("base_to_tip", ",\nbase to tip")
+        panel.set_ylabel("mean absolute error [%]")
+        key, note = ("gap", "") if quantity == "gap" else ("base_to_tip", ", base to tip")
         published = result["published_percent"][key]
         panel.axhline(published, color=style.INK, linewidth=1, linestyle=(0, (4, 2)))
-        panel.annotate(
-            f"CITRAS {published:g} %{note}",
-            (2.3, published),
-            (0, -2),
-            textcoords="offset points",
-            va="top",
-            fontsize=8,
-        )
-    panels[0].set_ylabel("mean absolute error [%]")
+        panel.set_title(f"{what}, with sensor noise (95 %);\ndashed: CITRAS, {published:g} %{note}")
     handles, labels = panels[0].get_legend_handles_labels()
-    lower.legend(handles, labels, loc="outside lower center", ncols=3)
+    lower.legend(handles, labels, loc="outside lower center", ncols=1)
     return figure
 
 

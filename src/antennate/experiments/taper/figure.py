@@ -29,7 +29,7 @@ def taper(result: Mapping[str, Any]) -> Figure:
     Args:
         result: The content of result.json.
     """
-    figure = style.canvas(5.2, 3.8)
+    figure = style.canvas(style.WIDTH, 3.8)
     panel = figure.subplots()
     segments = np.array([row["proxy"] for row in result["segments"]])
     places = (np.arange(len(segments)) + 0.5) / len(segments)

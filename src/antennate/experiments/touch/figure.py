@@ -39,8 +39,8 @@ def measures(result: Mapping[str, Any]) -> Figure:
     Args:
         result: The content of result.json.
     """
-    figure = style.canvas(10.0, 6.6)
-    (by_speed, by_wall), latencies = figure.subplots(2, 2)
+    figure = style.canvas(style.WIDTH, 11.5)
+    by_speed, by_wall, *latencies = figure.subplots(4, 1)
     speeds, walls = result["by_speed"], result["by_wall"]
     for panel, rows, part in ((by_speed, speeds, "speed_m_s"), (by_wall, walls, "wall")):
         _draw(panel, rows, part, rows, (F1.name, "f1_95"), trials=result["trials"])
@@ -48,7 +48,7 @@ def measures(result: Mapping[str, Any]) -> Figure:
         over = "walls" if part == "speed_m_s" else "speeds"
         count = f"{low}" if low == high else f"{low} to {high}"
         note = style.interval_note("95 %", result["trials"])
-        panel.set_title(f"All {over}, n = {count} traverses a point, {note}")
+        panel.set_title(f"All {over}, n = {count} traverses a point,\n{note}")
         panel.set(ylim=(-0.03, 1.02), ylabel=f"{F1.label} of contact, 0 to 1")
     for panel, measure in zip(latencies, (ONSET, RELEASE), strict=True):
         key = measure.name.partition(".")[0]
@@ -58,12 +58,12 @@ def measures(result: Mapping[str, Any]) -> Figure:
         _draw(panel, speeds, "speed_m_s", found, ("p90_ms", ""), **_BAR)
         low, high = (end(row["n"] for row in found) for end in (min, max))
         note = style.interval_note("95 %", result["trials"])
-        panel.set_title(f"Median, {note}, 90th percentile (bar), n = {low} to {high} contacts")
+        panel.set_title(f"Median, {note}, 90th percentile (bar),\nn = {low} to {high} contacts")
         panel.set_ylabel(measure.title)
         bottom, top = panel.get_ylim()
         panel.set_ylim(min(0.0, bottom), max(1.05 * top, 10.0))
     handles, labels = by_speed.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=len(labels))
+    figure.legend(handles, labels, loc="outside upper center", ncols=3)
     return figure
 
 
@@ -99,8 +99,8 @@ def curves(result: Mapping[str, Any]) -> Figure:
     Args:
         result: The content of result.json.
     """
-    figure = style.canvas(10.0, 4.4)
-    roc, over = figure.subplots(1, 2)
+    figure = style.canvas(style.WIDTH, 8.4)
+    roc, over = figure.subplots(2, 1, height_ratios=(1.25, 1))
     roc.plot([0, 100], [0, 100], color=style.MUTED, linewidth=1.0, linestyle=(0, (2, 2)))
     roc.annotate("chance", (60, 60), (63, 55), color=style.MUTED, rotation=38, fontsize=8)
     for name, found in result["roc"].items():
@@ -114,9 +114,9 @@ def curves(result: Mapping[str, Any]) -> Figure:
     over.set_xticks([1e-5, 1e-3, 0.5, 1 - 1e-3], ["1e-5", "1e-3", "0.5", "0.999"])
     over.set(
         ylim=(0, 1.02),
-        xlabel="theta, bending level that counts as contact [0 to 1, logit scale]",
+        xlabel="theta, bending level that counts as contact \n[0 to 1, logit scale]",
         ylabel="F1 of contact, 0 to 1",
-        title="F1 over theta, no hysteresis; rings: best on these data",
+        title="F1 over theta, no hysteresis;\nrings: best on these data",
     )
     ticks = sum(row["ticks"] for row in result["profiles"].values())
     roc.set(
@@ -124,7 +124,7 @@ def curves(result: Mapping[str, Any]) -> Figure:
         ylim=(-2, 102),
         xlabel="free time taken for contact [%]",
         ylabel="contact time found [%]",
-        title=f"ROC over theta, all walls and speeds, n = {ticks:,} ticks",
+        title=f"ROC over theta, all walls and speeds,\nn = {ticks:,} ticks",
     )
     roc.set_aspect("equal")
     if roc.get_legend_handles_labels()[0]:
@@ -157,7 +157,7 @@ def _draw_curve(
 @style.styled
 def trace(one: Traverse, found: Comparison) -> Figure:
     """One traverse: the wall with shapes of the antenna, flex, b, and contact against truth."""
-    figure = style.canvas(10.0, 7.2)
+    figure = style.canvas(style.WIDTH, 7.2)
     plan, flex, level, state = figure.subplots(4, 1, height_ratios=(2.0, 1.2, 1.2, 0.7))
     config = one.plan.config
     t = np.arange(len(one.flex)) / config.antenna.sensor.rate
@@ -196,7 +196,7 @@ def _draw_bounds(panel: Axes, rule: RuleParams) -> None:
             *(name, (0.0, bound), (4, lift)),
             textcoords="offset points",
             va=side,
-            fontsize=7,
+            fontsize=8,
             color=_SENSED,
         )
     panel.set(ylim=(-0.05, 1.05), ylabel="b, 0 to 1")
@@ -215,7 +215,7 @@ def _draw_plan(panel: Axes, one: Traverse) -> None:
     panel.plot(*shown[:, 0].T, color=style.INK, marker="o", markersize=3, linestyle="")
     panel.set_aspect("equal", adjustable="datalim")
     panel.set_title(
-        f"Wall {plan.wall}, {plan.profile} antenna, {plan.speed:g} m/s, trial 0; "
+        f"Wall {plan.wall}, {plan.profile} antenna, {plan.speed:g} m/s, trial 0;\n"
         f"the base moves to the right along y = 0"
     )
     panel.set(xlabel="x [m]", ylabel="y [m]")

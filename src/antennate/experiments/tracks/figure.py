@@ -38,24 +38,20 @@ def study(outcome: TracksOutcome, result: Mapping[str, Any]) -> Figure:
         outcome: The antennae.
         result: The content of result.json.
     """
-    figure = style.canvas(10.0, 8.0)
-    panels = figure.subplot_mosaic(
-        [["shares", "outlines"], ["time", "time"], ["vary", "vary"]],
-        height_ratios=(1.25, 0.9, 0.9),
-        width_ratios=(1.7, 1),
-    )
+    figure = style.canvas(style.WIDTH, 13.0)
+    shares, outlines, angle, change = figure.subplots(4, 1, height_ratios=(1.2, 1.4, 0.9, 1.5))
     shapes = [measures.shapes_of(outcome.config.criteria, one) for one in outcome.antennae]
-    _draw_shares(panels["shares"], outcome, result)
-    _draw_outlines(panels["outlines"], outcome, shapes)
+    _draw_shares(shares, outcome, result)
+    _draw_outlines(outlines, outcome, shapes)
     contact = [int((found >= 0).sum()) for found in shapes]
     most = int(np.argmax(contact))
-    _draw_angle(panels["time"], outcome.antennae[most], shapes[most])
-    _draw_change(panels["vary"], result)
+    _draw_angle(angle, outcome.antennae[most], shapes[most])
+    _draw_change(change, result)
     handles = [
-        panels["shares"].plot([], [], _MARKS.get(shape, "s"), color=colour, label=shape)[0]
+        shares.plot([], [], _MARKS.get(shape, "s"), color=colour, label=shape)[0]
         for shape, colour in style.SHAPE_COLOURS.items()
     ]
-    figure.legend(handles=handles, loc="outside upper center", ncols=len(handles))
+    figure.legend(handles=handles, loc="outside upper center", ncols=3)
     return figure
 
 
@@ -85,7 +81,7 @@ def _draw_shares(panel: Axes, outcome: TracksOutcome, result: Mapping[str, Any])
     ticks = [*range(len(bars)), left + 1.5]
     names = [str(at + 1) for at in range(len(bars))]
     panel.set_xticks(
-        ticks, [*names, f"mean of {len(table)}, {style.interval_note('95 %', len(table))}"]
+        ticks, [*names, f"mean of {len(table)},\n{style.interval_note('95 %', len(table))}"]
     )
     panel.set_ylim(-0.02, 1.02)
     panel.set_ylabel("share of frames in contact")
@@ -137,10 +133,10 @@ def _draw_change(panel: Axes, result: Mapping[str, Any]) -> None:
         if usual is None or math.isnan(usual):
             continue
         colour = style.SHAPE_COLOURS[name]
-        panel.axhline(usual, color=colour, linewidth=1.0)
+        panel.axvline(usual, color=colour, linewidth=1.0)
         panel.plot(
-            np.arange(len(rows)) + 0.15 * (k - 1.5),
             [row["share"][name] for row in rows],
+            np.arange(len(rows)) + 0.15 * (k - 1.5),
             marker=_MARKS[name],
             linestyle="",
             color=colour,
@@ -148,9 +144,11 @@ def _draw_change(panel: Axes, result: Mapping[str, Any]) -> None:
         )
     percent = f"{100 * result['vary']:g} %"
     signs = ("−", "+") * len(rows)
-    labels = [f"{row['criterion']}\n{s}{percent}" for row, s in zip(rows, signs, strict=False)]
-    style.categories(panel, labels)
-    panel.margins(y=0.12)
-    panel.set_ylim(bottom=-0.03)
-    panel.set_ylabel("share, mean over trials")
+    labels = [f"{row['criterion']} {s}{percent}" for row, s in zip(rows, signs, strict=False)]
+    panel.set_yticks(range(len(rows)), labels)
+    panel.set_ylim(len(rows) - 0.4, -0.6)
+    panel.margins(x=0.12)
+    panel.set_xlim(left=-0.03)
+    panel.set_xlabel("share, mean over trials")
     panel.set_title("With one criterion changed; lines: with none changed")
+    panel.grid(visible=False, axis="y")

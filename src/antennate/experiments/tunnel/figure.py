@@ -55,7 +55,7 @@ def trajectories(
 ) -> Figure:
     """Trials from above: a row for each trial, a column for each controller.
 
-    A single trial is drawn larger.
+    Of a single trial the panels are larger and stand below one another.
 
     Args:
         paths: Courses by controller and trial; a missing one leaves its panel empty.
@@ -76,7 +76,7 @@ def trajectories(
             if place in paths:
                 _draw_trial(panel, paths[place])
                 said = _OUTCOMES[table[place].outcome].format(table[place].time_s)
-            panel.set_title(f"trial {trial}: {said}", fontsize=9)
+            panel.set_title(f"trial {trial}: {said}", fontsize=8)
         _name_column(panels[0, i], label)
     for panel in panels[-1]:
         panel.set_xlabel("x [m]")
@@ -91,9 +91,12 @@ def trajectories(
 def _panels(rows: int, columns: int, sides: Sequence[Floats]) -> tuple[Figure, Any]:
     """An empty figure and its panels, shape (rows, columns), as high as the boxes need."""
     aspect = float(max(side[1] for side in sides) / max(side[0] for side in sides))
-    width = 2.1 if rows > 1 and columns > 1 else 5.5 if columns == rows else 3.5
+    width = 1.6 if rows > 1 and columns > 1 else style.WIDTH - 0.5
     height = (width - 0.3) * aspect + 0.35
-    figure = style.canvas(max(0.5 + width * columns, 6.4), 1.25 + rows * height)
+    if rows == 1:
+        figure = style.canvas(style.WIDTH, 1.5 + columns * (height + 0.3))
+        return figure, figure.subplots(columns, 1, squeeze=False).T
+    figure = style.canvas(max(0.5 + width * columns, style.WIDTH), 1.5 + rows * height)
     return figure, figure.subplots(rows, columns, squeeze=False)
 
 
@@ -196,8 +199,9 @@ def summary(
         rows: The table.
         time_limit: Time after which a trial has failed [s].
     """
-    figure = style.canvas(10.5, 3.4)
-    rate, inside, mean = figure.subplots(1, 3, width_ratios=(1, 1.5, 1))
+    figure = style.canvas(style.WIDTH, 2.6 + 2 * (1.0 + 0.4 * len(controllers)))
+    heights = 1.0 + 0.4 * len(controllers), 2.6, 1.0 + 0.4 * len(controllers)
+    rate, inside, mean = figure.subplots(3, 1, height_ratios=heights)
     colours, short = style.controller_colours(list(controllers)), short_names(controllers)
     for i, (name, found) in enumerate(controllers.items()):
         valid, colour = found["trials"] - found["invalid"], colours[name]

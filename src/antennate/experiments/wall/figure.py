@@ -37,7 +37,7 @@ def outcomes(result: Mapping[str, Any]) -> Figure:
     Args:
         result: The content of result.json.
     """
-    figure = style.canvas(5.6, 5.0)
+    figure = style.canvas(style.WIDTH, 6.0)
     whole, late = figure.subplots(2, 1)
     profiles = result["profiles"]
     trials = min(profile["trials"] for profile in profiles.values())
@@ -45,8 +45,10 @@ def outcomes(result: Mapping[str, Any]) -> Figure:
     _draw_outcomes(whole, profiles, f"Whole travel; {note}")
     after = {name: profile["after_start"] for name, profile in profiles.items()}
     start = f"first {1e3 * result['start_m']:g} mm"
-    _draw_outcomes(late, after, f"After the {start}, in which the antenna bows from its approach")
-    figure.legend(*whole.get_legend_handles_labels(), loc="outside lower center", ncols=4)
+    _draw_outcomes(late, after, f"After the {start}, in which the\nantenna bows from its approach")
+    figure.legend(
+        *whole.get_legend_handles_labels(), loc="outside lower center", ncols=4, columnspacing=1.2
+    )
     return figure
 
 
@@ -80,7 +82,7 @@ def sticks(rows: Sequence[WallTrial], border: float) -> Figure:
         rows: Trials of all profiles.
         border: Longest stick that is no jam [mm].
     """
-    figure = style.canvas(6.4, 3.6)
+    figure = style.canvas(style.WIDTH, 3.6)
     panel = figure.subplots()
     profiles = list(dict.fromkeys(row.profile for row in rows))
     for place, profile in enumerate(profiles):
@@ -124,23 +126,21 @@ def passages(examples: Mapping[str, Traverse]) -> Figure:
     Args:
         examples: Passages by profile.
     """
-    figure = style.canvas(2.2 * len(examples) + 0.8, 5.2)
-    panels = figure.subplots(2, len(examples), squeeze=False, height_ratios=(1, 1.3))
-    for (profile, seen), (above, below) in zip(examples.items(), panels.T, strict=True):
+    figure = style.canvas(style.WIDTH, 2.3 * len(examples))
+    panels = figure.subplots(len(examples), 2, squeeze=False, sharex="col", sharey="col")
+    for (profile, seen), (advance, along) in zip(examples.items(), panels, strict=True):
         colour = style.PROFILE_LOOKS[profile][0]
-        above.plot(1e3 * seen.base, 1e3 * seen.tip, color=colour)
-        above.plot([0, 1e3 * seen.base[-1]], [0, 1e3 * seen.base[-1]], color=style.FAINT, zorder=0)
-        above.set(title=profile.replace("_", " "), xlabel="travel of the base [mm]")
+        advance.plot(1e3 * seen.base, 1e3 * seen.tip, color=colour)
+        end = 1e3 * seen.base[-1]
+        advance.plot([0, end], [0, end], color=style.FAINT, zorder=0)
+        advance.set(title=profile.replace("_", " "), ylabel="advance of the tip [mm]")
         for shape in seen.shapes:
-            below.plot(*(1e3 * shape.T), color=colour, linewidth=1.0)
-        _draw_boulders(below, seen)
-        below.set_aspect("equal")
-        below.set(xlabel="from the crests [mm]")
-    panels[0, 0].set_ylabel("advance of the tip [mm]")
-    panels[1, 0].set_ylabel("along the wall [mm]")
-    for row in panels:
-        low = min(panel.get_ylim()[0] for panel in row)
-        high = max(panel.get_ylim()[1] for panel in row)
-        for panel in row:
-            panel.set_ylim(low, high)
+            along.plot(*(1e3 * shape.T), color=colour, linewidth=1.0)
+        _draw_boulders(along, seen)
+        along.set_aspect("equal")
+        along.set(ylabel="along the wall [mm]")
+    for panel, words in zip(
+        panels[-1], ("travel of the base [mm]", "from the crests [mm]"), strict=True
+    ):
+        panel.set_xlabel(words)
     return figure
