@@ -31,6 +31,8 @@ TRACKS = "frame,time,a_x,a_y,b_x,b_y\n" + "".join(
     f"{i},{0.02 * i:.2f},{i},5,{i + 3},4\n" for i in range(30)
 )
 OTHER_SENSOR = {"kind": "fsr"}
+RISING = {"polarity": 1}
+"""What the curve of the other sensor needs."""
 TINY: dict[str, list[dict[str, Any]]] = {
     "study": [
         {
@@ -69,7 +71,12 @@ TINY: dict[str, list[dict[str, Any]]] = {
         }
     ],
     "tunnel": [
-        {"trials": 1, "time_limit": 0.1, "robot": {"antenna": {"sensor": OTHER_SENSOR}}},
+        {
+            "trials": 1,
+            "time_limit": 0.1,
+            "robot": {"antenna": {"sensor": OTHER_SENSOR}},
+            "control": {"conditioning": RISING},
+        },
         {
             "trials": 1,
             "time_limit": 0.1,
@@ -115,6 +122,7 @@ TINY: dict[str, list[dict[str, Any]]] = {
             "profiles": ["stiff"],
             "averaging_times": [0.1],
             "antenna": {"sensor": sensor},
+            "conditioning": RISING if sensor else {},
         }
         for sensor in (OTHER_SENSOR, {})
     ],
@@ -127,6 +135,7 @@ TINY: dict[str, list[dict[str, Any]]] = {
             "speeds": [0.5],
             "hinge_limit_deg": 5.0,
             "antenna": {"sensor": sensor},
+            "conditioning": RISING if sensor else {},
         }
         for sensor in (OTHER_SENSOR, {})
     ],

@@ -3,11 +3,20 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
+from pydantic import ValidationError
 
+from antennate import simulate
 from antennate.antenna import sensor
+from antennate.cli import main
+from antennate.errors import ConfigError
+from antennate.experiments.tunnel.config import TunnelConfig
+from antennate.hardware.robot_file import RobotFile
+from antennate.params.control import ControlParams, CurveParams
+from antennate.params.reading import read_file
 from antennate.robots.sensor import SensorParams
 
 FLAT, GAIN = 10e3, 1.2 / math.pi
@@ -81,6 +90,53 @@ def test_a_pressure_film_reads_more_when_bent() -> None:
     read = sensor.counts(params, np.radians([0.0, 30.0, 60.0, 90.0]))
     assert (np.diff(read) > 0).all()
     assert sensor.resistance(params, np.array([0.0, math.pi / 2])) == pytest.approx([10e6, 5e3])
+
+
+FSR = {"sensor": {"kind": "fsr"}}
+
+
+@pytest.mark.parametrize(
+    ("command", "words"),
+    [("tunnel", "robot.antenna"), ("touch", "antenna"), ("force", "antenna")],
+)
+def test_a_curve_that_falls_as_the_antenna_bends_is_refused(
+    command: str, words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "run"
+    told = [command, f"--{words}.sensor.kind", "fsr", "--out", str(out)]
+    assert main(told) == 2
+    found = capsys.readouterr().err
+    assert "conditioning.polarity must be 1 for a fsr sensor" in found
+    assert "found -1" in found
+    assert "antennate calibrate --antenna.sensor.kind fsr" in found
+    assert not out.exists()
+
+
+def test_the_curve_that_calibrate_finds_for_it_is_taken(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """As the refusal says; `drive` takes the same file for a real robot."""
+    words = ["--rig.pushes", "2", "--rig.speeds", "0.3", "--draws", "20", "--no-figures"]
+    rig = ["calibrate", "--antenna.sensor.kind", "fsr", *words, "--out", str(tmp_path / "rig")]
+    assert main(rig) == 0
+    file = tmp_path / "rig" / "conditioning.toml"
+    words = ["--trials", "1", "--time-limit", "0.1", "--no-figures", "--out", str(tmp_path / "run")]
+    assert main(["tunnel", "--config", str(file), *words]) == 0, capsys.readouterr().err
+    told = (tmp_path / "run" / "config.toml").read_text()
+    assert 'kind = "fsr"' in told
+    assert "polarity = 1  #" in told
+    assert read_file(file, RobotFile).control.conditioning.polarity == 1
+
+
+def test_each_antenna_needs_a_curve_of_its_own_kind() -> None:
+    rising = ControlParams.model_validate({"conditioning": {"polarity": 1}})
+    one = {"control": rising, "robot": {"antenna": FSR}}
+    assert TunnelConfig.model_validate(one).control == rising
+    with pytest.raises(ConfigError, match=r"control\.conditioning\.polarity must be -1 for a flex"):
+        simulate("open", control=rising, time_limit=0.1)
+    two = rising.model_copy(update={"conditioning_right": CurveParams()})
+    with pytest.raises(ValidationError, match=r"control\.conditioning_right\.polarity must be 1"):
+        TunnelConfig.model_validate({**one, "control": two})
 
 
 def test_without_memory_the_chain_is_the_static_curve() -> None:

@@ -8,6 +8,7 @@ from typing import Literal
 from pydantic import model_validator
 
 from antennate.params.base import Params, number
+from antennate.params.control import CurveParams
 
 CONVERTER_SLOPE = 196602 / 65536 / 4096
 """Volts per count and volt of reference: line fit at 11 dB, ESP-IDF adc_cali_line_fitting.c."""
@@ -107,3 +108,28 @@ class SensorParams(Params):
                 f"{self.creep} and {self.creep_time}"
             )
         return self
+
+    @property
+    def polarity(self) -> Literal[-1, 1]:
+        """1 if readings rise with bending, -1 if they fall."""
+        return 1 if self.kind == "fsr" else -1
+
+
+def require_own_curve(sensor: SensorParams, name: str, curve: CurveParams | None) -> None:
+    """Check that a curve, if there is one, can belong to a simulated flex sensor.
+
+    Args:
+        sensor: The flex sensor.
+        name: The parameter that is the curve.
+        curve: The curve from its counts to the level.
+
+    Raises:
+        ValueError: Its level would fall as the antenna bends.
+    """
+    if curve is not None and curve.polarity != sensor.polarity:
+        way = "rise" if sensor.polarity > 0 else "fall"
+        raise ValueError(
+            f"{name}.polarity must be {sensor.polarity} for a {sensor.kind} sensor, whose readings "
+            f"{way} with bending, found {curve.polarity}, the curve of another one; give "
+            f"conditioning.toml of `antennate calibrate --antenna.sensor.kind {sensor.kind}`"
+        )

@@ -16,9 +16,10 @@ from antennate.control.gait import targets
 from antennate.errors import AntennateError, SceneError, in_one_line, where
 from antennate.messages import shortened
 from antennate.params.base import Params, number
-from antennate.params.control import GaitParams
+from antennate.params.control import ControlParams, GaitParams
 from antennate.params.scene import PhysicsParams, TunnelParams, VariationParams
 from antennate.robots.readers import unused
+from antennate.robots.sensor import require_own_curve
 from antennate.robots.spec import RobotSpec
 from antennate.sim.scenes.registry import TUNNEL, check_name, make_scene
 from antennate.sim.scenes.scene import Scene, SceneInstance
@@ -68,6 +69,16 @@ class TrialConfig(Params):
                 f"found {self.tunnel.free_width:g} m"
             )
         return self
+
+
+def require_own_curves(robot: RobotSpec, control: ControlParams) -> None:
+    """Check that the curves of both antennae can belong to the robot's flex sensors.
+
+    Raises:
+        ValueError: One cannot.
+    """
+    for name in ("conditioning", "conditioning_right"):
+        require_own_curve(robot.antenna.sensor, f"control.{name}", getattr(control, name))
 
 
 @dataclass(frozen=True, slots=True)

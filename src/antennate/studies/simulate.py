@@ -17,7 +17,15 @@ from antennate.params.control import ControlParams
 from antennate.params.reading import from_values
 from antennate.sim.scenes.registry import make_scene
 from antennate.sim.sim_robot import SimRobot
-from antennate.sim.trial import LOOK_EVERY, Trial, TrialConfig, draw_trial, end_of, require_room
+from antennate.sim.trial import (
+    LOOK_EVERY,
+    Trial,
+    TrialConfig,
+    draw_trial,
+    end_of,
+    require_own_curves,
+    require_room,
+)
 from antennate.telemetry.header import Header
 from antennate.telemetry.simulated import Decisions, SimulatedLog
 from antennate.telemetry.time_series import TimeSeries, TimeSeriesRecorder
@@ -49,8 +57,8 @@ def simulate(
         The series; `meta["outcome"]` is success, timeout, left or invalid.
 
     Raises:
-        ConfigError: A setting is unknown or out of bounds, there is no such controller, or the log
-            has another ending.
+        ConfigError: A setting is unknown or out of bounds, there is no such controller, the log
+            has another ending, or the control has the curve of another kind of flex sensor.
         SceneError: The scene cannot be built, or the robot starts inside an obstacle.
         ControllerError: The controller raised an exception, or what it answers is no command.
         LogError: The log cannot be written.
@@ -60,6 +68,10 @@ def simulate(
     if log is not None and Path(log).suffix != ".mcap":
         raise ConfigError(f"log: expected a name with .mcap, found {log}")
     config, control = from_values(TrialConfig, settings), control or ControlParams()
+    try:
+        require_own_curves(config.robot, control)
+    except ValueError as error:
+        raise ConfigError(str(error)) from None
     scene = make_scene(config.scene, config.tunnel)
     start = draw_trial(config, scene, trial, control.gait, control.period)
     require_room(start.world)

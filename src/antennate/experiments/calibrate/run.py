@@ -28,6 +28,7 @@ from antennate.params.base import Params, number
 from antennate.params.bench import BenchVariationParams, Solver, solver
 from antennate.params.scene import BenchPhysicsParams
 from antennate.robots.antenna import AntennaSpec
+from antennate.robots.sensor import SensorParams
 from antennate.sim.bench import Watch
 from antennate.sim.chain import require_read, warm_up
 from antennate.studies.experiment import OnStep, Outcome, no_step
@@ -162,10 +163,13 @@ class CalibrateOutcome(Outcome):
         return bending_level(self.calibration.conditioning(), self.recording.samples.counts)
 
     def conditioning_toml(self) -> str:
-        """The curve as keys of a configuration file."""
+        """The curve as keys of a configuration file, with the kind of a simulated fsr sensor."""
         found = self.calibration.conditioning()
         keys = ("midpoint", "slope", "polarity", "counts_low", "counts_high")
         lines = [f"{key} = {getattr(found, key)!r}" for key in keys]
+        kind = self.config.antenna.sensor.kind
+        if self.config.recording is None and kind != SensorParams().kind:
+            lines += ["", "[robot.antenna.sensor]", f'kind = "{kind}"']
         return "\n".join(["[control.conditioning]", *lines]) + "\n"
 
 

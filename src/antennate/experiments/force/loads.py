@@ -18,6 +18,7 @@ from antennate.params.base import Params, number, require_different, require_who
 from antennate.params.control import ConditioningParams
 from antennate.params.scene import BenchPhysicsParams
 from antennate.robots.antenna import AntennaSpec
+from antennate.robots.sensor import require_own_curve
 from antennate.types import Bools, Floats, Ints
 
 
@@ -64,6 +65,7 @@ class ForceConfig(Params):
     @model_validator(mode="after")
     def _agree(self) -> ForceConfig:
         require_whole_steps("antenna.sensor.rate", self.antenna.sensor.rate, self.physics.timestep)
+        require_own_curve(self.antenna.sensor, "conditioning", self.conditioning)
         if self.nearest > self.from_place:
             raise ValueError(
                 f"nearest must not exceed from_place, {self.from_place:g}, found {self.nearest:g}"

@@ -14,6 +14,7 @@ from antennate.params.control import ConditioningParams, RuleParams
 from antennate.params.scene import BenchPhysicsParams
 from antennate.params.touch import TouchWallsParams
 from antennate.robots.antenna import AntennaSpec
+from antennate.robots.sensor import require_own_curve
 from antennate.sim import touch_wall
 from antennate.sim.touch_wall import WALLS, Site, WallKind
 
@@ -117,6 +118,7 @@ class TouchConfig(Params):
             require_different(name, getattr(self, name))
         rate, step = self.antenna.sensor.rate, self.physics.timestep
         require_whole_steps("antenna.sensor.rate", rate, step, MOVES)
+        require_own_curve(self.antenna.sensor, "conditioning", self.conditioning)
         ticks = sum(self.travel / speed * self.antenna.sensor.rate for speed in self.speeds)
         ticks *= self.trials * len(self.walls) * len(self.profiles)
         if ticks > _MOST_TICKS:

@@ -12,7 +12,7 @@ from antennate.control.registry import BUILT_IN, CONTROLLERS
 from antennate.params.base import number, require_different, require_whole_steps
 from antennate.params.control import ControlParams
 from antennate.robots.readers import HARDWARE_ALONE
-from antennate.sim.trial import TrialConfig
+from antennate.sim.trial import TrialConfig, require_own_curves
 
 
 class TunnelConfig(TrialConfig):
@@ -51,4 +51,5 @@ class TunnelConfig(TrialConfig):
     def _agree(self) -> TunnelConfig:
         require_different("controllers", self.controllers)
         require_whole_steps("control.rate", self.control.rate, self.physics.timestep)
+        require_own_curves(self.robot, self.control)
         return self
