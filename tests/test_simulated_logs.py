@@ -118,6 +118,12 @@ class Own:
     assert all(map(math.isnan, phases))
 
 
+@pytest.mark.parametrize("limit", [0.0, -1.0, float("nan"), float("inf"), "1"])
+def test_a_time_limit_is_a_finite_time_above_zero(limit: Any) -> None:
+    with pytest.raises(AntennateError, match="time_limit: expected a finite time above 0"):
+        antennate.simulate("open", scene="flat", time_limit=limit)
+
+
 @pytest.mark.parametrize("name", ["log.txt", "log", "mcap"])
 def test_a_log_with_another_ending_is_refused_before_anything_is_run(
     name: str, tmp_path: Path

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import contextlib
-from numbers import Integral
+import math
+from numbers import Integral, Real
 from pathlib import Path
 from typing import Any
 
@@ -65,6 +66,8 @@ def simulate(
     """
     if not isinstance(trial, Integral) or trial < 0:
         raise ConfigError(f"trial: expected a whole number of at least 0, found {trial!r}")
+    if not (isinstance(time_limit, Real) and 0.0 < time_limit < math.inf):
+        raise ConfigError(f"time_limit: expected a finite time above 0 [s], found {time_limit!r}")
     if log is not None and Path(log).suffix != ".mcap":
         raise ConfigError(f"log: expected a name with .mcap, found {log}")
     config, control = from_values(TrialConfig, settings), control or ControlParams()
