@@ -1,7 +1,7 @@
-"""Make the film at the top of README: open and closed loop in the same tunnel, side by side.
+"""Make the film at the top of README: a robot without feedback and one with our controller.
 
 Needs the extra `video`: `uv run --extra video docs/film.py`. It takes the first trial of the
-default seed that the open loop fails and the closed loop passes.
+default seed that `open` fails and `closed` passes.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ def main() -> None:
 
 
 def _telling(trial: int) -> dict[str, Film] | None:
-    """Both films of a trial that only the closed loop passes, None of another."""
+    """Both films of a trial that only `closed` passes, None of another."""
     config = TunnelConfig(time_limit=LIMIT)
     films = {name: record(config, name, trial, name, SPEED) for name in ("open", "closed")}
     blind, touching = (film.title.split(": ")[1].split()[0] for film in films.values())

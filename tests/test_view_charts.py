@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from antennate.figures import font
 from antennate.telemetry.ticks import Tick
 from antennate.telemetry.view.channel import Step
 from antennate.telemetry.view.charts import Charts
@@ -80,6 +81,15 @@ def test_what_a_value_means_is_said_in_words(panel: Panel) -> None:
     assert words["maneuver"] == ("forward", "turn left", "turn right", "reverse", "hold")
     names = [series["label"] for series in panel.charts[-1].series]
     assert {"missed ticks", "missed answers"} < set(names)
+
+
+def test_the_words_beside_a_chart_have_room(panel: Panel) -> None:
+    """uPlot draws them in 12 pixels, with a tick of 10 and a gap of 5; DejaVu is a wide font."""
+    Charts(panel, panel)  # type: ignore[arg-type]
+    words = [(w, chart.axes[1]) for chart in panel.charts for w in chart.axes[1].get("values", ())]
+    assert "DEGRADED" in [word for word, _ in words]
+    for word, axis in words:
+        assert font(12).getlength(word) + 10 + 5 <= axis["size"], word
 
 
 def test_a_weak_force_has_an_arrow_that_is_seen_and_none_has_no_arrow() -> None:

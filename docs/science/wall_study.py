@@ -4,7 +4,7 @@ Parts: `map` (link mass, overlap, base angle and gravity, five profiles), `windo
 map tells profiles apart), `cells` (the best cells of both on fresh seeds), `sticks` (how long a tip
 stays behind, over the base angle), `scaling` (stiff against compliant without a second force scale)
 and `convergence` (half the timestep). Each writes docs/science/wall_PART.json; `map`, `window` and
-`sticks` a picture as well. `--solver chain` takes the fast lane, which needs `antennate[fast]`.
+`sticks` a picture as well. `--solver chain` takes the chain solver, which needs `antennate[fast]`.
 """
 
 from __future__ import annotations

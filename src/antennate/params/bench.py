@@ -8,7 +8,7 @@ from typing import Any, Literal
 from antennate.params.base import Params, number
 
 Solver = Literal["mujoco", "chain"]
-"""What steps the physics of the bench: the engine, or the compiled chain of the extra `fast`."""
+"""What steps the physics of the bench: the engine, or the chain solver of the extra `fast`."""
 
 
 def solver() -> Any:

@@ -1,4 +1,4 @@
-"""The fast lane of the bench: one antenna alone as a compiled planar chain, without the engine.
+"""The chain solver of the bench: one antenna alone as a compiled planar chain, without the engine.
 
 It takes what `bench` takes, solves the same equations with the same steps (see `chain_kernel`) and
 runs a list of commands in one call. numba compiles it on first use, which takes some ten seconds,

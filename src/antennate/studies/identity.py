@@ -38,7 +38,7 @@ def identity(command: str, config: Params) -> dict[str, Any]:
 
 
 def packages_used(command: str, config: Params) -> tuple[str, ...]:
-    """Optional packages that its numbers depend on: of the compiled chain, a GPU, a search."""
+    """Optional packages that its numbers depend on: of the chain solver, a GPU, a search."""
     words = command.split()
     return (
         *(("numba",) if "chain" in _texts(config.model_dump(mode="json")) else ()),

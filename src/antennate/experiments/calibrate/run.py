@@ -75,7 +75,7 @@ class CalibrateConfig(Params):
     good_r2: float = number(0.9, "1", "assumed: our rig reaches 0.98", ge=0, lt=1)
     """A worse fit is warned of."""
     solver: Solver = solver()
-    """What steps the rig's physics: the engine, or the compiled chain (extra `fast`)."""
+    """What steps the rig's physics: the engine, or the chain solver (extra `fast`)."""
     draws: int = number(500, "1", "assumed: usual", ge=20, le=100000)
     """Bootstrap draws."""
     seed: int = number(1, "1", "assumed: any", ge=0)

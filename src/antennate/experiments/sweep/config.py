@@ -59,7 +59,7 @@ class SweepConfig(Params):
     points: bool = number(False, "1", "assumed: a large file that few need")
     """Whether to save the points of the antenna of `profile` in every cell, for `tracks`."""
     solver: Solver = solver()
-    """What steps the physics: the engine, or the compiled chain (extra `fast`; compiles once)."""
+    """What steps the physics: the engine, or the chain solver (extra `fast`; compiles once)."""
     sweep: SweepParams = SweepParams()
     shape: ShapeParams = ShapeParams()
     estimate: EstimateParams = EstimateParams()

@@ -34,7 +34,7 @@ class WallConfig(Params):
     )
     """Profiles to run."""
     solver: Solver = solver()
-    """What steps the physics: the engine, or the compiled chain (extra `fast`; compiles once)."""
+    """What steps the physics: the engine, or the chain solver (extra `fast`; compiles once)."""
     wall: WallParams = WallParams()
     antenna: AntennaSpec = AntennaSpec()
     variation: BenchVariationParams = BenchVariationParams()

@@ -46,8 +46,8 @@ _MARGIN, _PEN = 0.1, 0.006
 """Room around the map [m], and width of the path as a share of the map."""
 _CONTACTS = ("free", "contact", "unknown")
 """Words for the values of `Contact`."""
-_WORDS = 72
-"""Room for them beside a chart [pixels]."""
+_WORDS = 88
+"""Room for them, their ticks and a gap beside a chart [pixels]."""
 _MUTED = "#858585"
 """A grey that is read on white and on black."""
 _FAINT, _THIN = "#B09A6A", 0.45
