@@ -58,9 +58,9 @@ def _soft(result: Mapping[str, Any]) -> Finding:
         above(interval, 50.0),
         _WINDOW
         if share > 50
-        else "The soft antenna jams where the stiff one does: the base moves it, and so a chain of "
-        "equal springs takes nearly the same shapes whatever they are. What makes it lose touch is "
-        "weight, with a tip that does not lead.",
+        else "The soft antenna jams where the stiff one does. Moved, not pushed, a chain of equal "
+        "springs takes the same shapes however stiff it is; the flex strip, which adds to five of "
+        "the six, makes it a slight taper. To slip it needs weight and a tip that does not lead.",
         (Bar("paper", 100.0), Bar("ours", share, interval)),
     )
 
