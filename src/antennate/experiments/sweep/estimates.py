@@ -155,7 +155,7 @@ def errors(guess: Floats, truth: Floats) -> dict[str, Any]:
 
     Returns:
         `n`, `untold`, mean absolute percentage error `mape_percent`, root mean square
-        `rmse_percent`, and the mean `bias_percent`; the first two with bootstrap 95 % intervals.
+        `rmse_percent`, and the mean `bias_percent`; the first two with 95 % intervals by Student's t.
     """
     told = np.isfinite(guess)
     share = 100.0 * (guess[told] / truth[told] - 1.0)
@@ -167,6 +167,6 @@ def errors(guess: Floats, truth: Floats) -> dict[str, Any]:
         "mape_percent": mean,
         "mape_95": (low, high),
         "rmse_percent": math.sqrt(square[0]) if told.any() else float("nan"),
-        "rmse_95": tuple(float(np.sqrt(end)) for end in square[1:]),
+        "rmse_95": tuple(math.sqrt(max(end, 0.0)) for end in square[1:]),
         "bias_percent": float(share.mean()) if told.any() else float("nan"),
     }

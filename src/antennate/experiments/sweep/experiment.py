@@ -31,7 +31,7 @@ def tables(result: Mapping[str, Any]) -> Sequence[Table]:
             (name, [_with_interval(*row["share"][name]) for row in columns.values()])
             for name in (*sweep.SHAPES, "free")
         ],
-        "The map is a grid that was chosen. The spread over its cells, a bootstrap of their mean, "
+        "The map is a grid that was chosen. The spread over its cells, Student's t of their mean, "
         "is no interval of chance.",
     )
     return shapes, *(_errors(name, noise) for name, noise in result["estimates"].items())
