@@ -287,7 +287,7 @@ def test_each_profile_has_its_colour_and_its_boulders_along_the_wall():
     zero = np.zeros(5)
     seen = Traverse(zero, zero, zero, zero, zero, zero, np.tile(straight, (11, 1, 1)), boulders)
     figure = wall.passages(dict.fromkeys(("ascending", "stiff"), seen))
-    for profile, panel in zip(("ascending", "stiff"), figure.axes[2:], strict=True):
+    for profile, panel in zip(("ascending", "stiff"), figure.axes[1::2], strict=True):
         assert {line.get_color() for line in panel.lines} == {style.PROFILE_LOOKS[profile][0]}
         circles = [patch.get_center() for patch in panel.patches]
         assert len(circles) == np.sum((boulders[:, 1] > 0.0) & (boulders[:, 1] < 0.1))

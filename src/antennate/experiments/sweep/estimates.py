@@ -155,7 +155,7 @@ def errors(guess: Floats, truth: Floats) -> dict[str, Any]:
 
     Returns:
         `n`, `untold`, mean absolute percentage error `mape_percent`, root mean square
-        `rmse_percent`, and the mean `bias_percent`; the first two with 95 % intervals by Student's t.
+        `rmse_percent`, and the mean `bias_percent`; the first two with 95 % intervals (Student).
     """
     told = np.isfinite(guess)
     share = 100.0 * (guess[told] / truth[told] - 1.0)
