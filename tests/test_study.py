@@ -249,9 +249,11 @@ def test_W7_damaged_and_torn_lines_are_run_again(done: Path, tmp_path: Path) -> 
     before = Path("run/trials.csv").read_bytes()
     path = Path("run", STORE)
     lines = path.read_bytes().splitlines(keepends=True)
-    assert len(lines) == 13
-    flipped = lines[3].replace(b"value", b"velue")
-    path.write_bytes(b"".join([*lines[:3], flipped, b"junk\n", b"\n", *lines[4:9], lines[9][:40]]))
+    assert len(lines) == 14  # what is run, the processor, twelve trials
+    flipped = lines[4].replace(b"value", b"velue")
+    path.write_bytes(
+        b"".join([*lines[:4], flipped, b"junk\n", b"\n", *lines[5:10], lines[10][:40]])
+    )
     notes = tmp_path / "notes.txt"
     os.environ["STUDY_NOTES"] = str(notes)
     try:
@@ -260,6 +262,48 @@ def test_W7_damaged_and_torn_lines_are_run_again(done: Path, tmp_path: Path) -> 
         del os.environ["STUDY_NOTES"]
     assert Path("run/trials.csv").read_bytes() == before
     assert len(notes.read_text().splitlines()) == 5  # one was flipped, one torn, three are missing
+
+
+def on_another_processor(run: str) -> None:
+    """Let the trials of a run look as if they ran elsewhere."""
+    path = Path(run, STORE)
+    here = processor_of(run)
+    kept = [each for each in path.read_bytes().splitlines(keepends=True) if b'"key"' in each]
+    first = {"identity": read_store(path).identity}
+    path.write_bytes(b"".join([line(first), line({"processor": f"Not {here}"}), *kept]))
+
+
+def processor_of(run: str) -> str:
+    return json.loads(Path(run, "versions.json").read_text())["processor"]
+
+
+def test_trials_of_other_processors_are_told_and_the_table_stays(
+    done: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    here = processor_of("run")
+    assert here in Path("run/report.html").read_text()
+    on_another_processor("run")
+    path = Path("run", STORE)
+    path.write_bytes(b"".join(path.read_bytes().splitlines(keepends=True)[:-1]))
+    Path("run/result.json").unlink()  # as if it had been killed before its last trial
+    assert study("--no-figures") == 0
+    told = f"run: trials ran on another model of processor, Not {here}, now also on {here}; the "
+    assert [text.startswith(told) for text in caplog.messages] == [True]
+    assert processor_of("run") == f"Not {here} and {here}"
+    assert f"Not {here} and {here}" in Path("run/report.html").read_text()
+    assert Path("run/trials.csv").read_bytes() == done.read_bytes()
+
+
+def test_shards_of_other_processors_are_told(caplog: pytest.LogCaptureFixture) -> None:
+    plan()
+    for number in "12":
+        assert study("--shard", f"{number}/2", out=f"part{number}") == 0
+    here = processor_of("part1")
+    on_another_processor("part2")
+    assert main(["merge", "--shards", "part1", "part2", "--out", "all", "--no-figures"]) == 0
+    assert len(caplog.messages) == 1
+    assert f"processor, {here}, now also on Not {here}; " in caplog.messages[0]
+    assert processor_of("all") == f"{here} and Not {here}"
 
 
 def test_W7_a_line_cut_anywhere_is_noticed(tmp_path: Path) -> None:
@@ -299,7 +343,9 @@ def test_W8_a_full_disk_is_one_line_and_loses_nothing(
         patch.setattr(os, "write", partly)
         words = ["study", "plan.toml", "--trust-code", "--out", "run", "--workers", "1"]
         assert "No space left on device; what was finished is kept" in refusal(capsys, *words)
-    assert len(Path("run", STORE).read_bytes().splitlines()) == 6  # five trials and the first line
+    assert (
+        len(Path("run", STORE).read_bytes().splitlines()) == 7
+    )  # five trials and the first two lines
     assert study("--no-figures") == 0
     assert Path("run/trials.csv").read_bytes() == done.read_bytes()
 

@@ -114,10 +114,11 @@ def command(experiment: Experiment[Any, Any], argv: Sequence[str]) -> int:
 
 @dataclass(frozen=True)
 class Shards:
-    """Trials of all shards: what was run, and their records by key."""
+    """Trials of all shards: what was run, their records by key, and where they ran."""
 
     identity: dict[str, Any]
     records: dict[str, Any]
+    processors: Sequence[str]
 
 
 def carry_out(
@@ -156,7 +157,7 @@ def carry_out(
         run.keeps_store = experiment.continued
         workers = replace(workers, store=run.store, shared=environment(kind, config))
         if shards and run.store is not None:
-            run.store.take(shards.records)
+            run.store.take(shards.records, shards.processors)
         try:
             outcome = _outcome(experiment, config, options, workers, run, view)
         except (LogError, OutputError, WorkerError):

@@ -47,8 +47,8 @@ def command(argv: Sequence[str]) -> int:
     _, options = parse("merge", DESCRIPTION, Params, argv, MergeOptions)
     if not options.shards:
         raise ConfigError("--shards: expected the folders of all shards, found none")
-    identity, records = _gathered(options.shards)
-    name = str(identity["command"])
+    shards = _gathered(options.shards)
+    name = str(shards.identity["command"])
     if name not in experiments.names():
         raise BadInputError(f"{options.shards[0]}: expected trials of an experiment, found {name}")
     experiment = experiments.load(name)
@@ -60,10 +60,10 @@ def command(argv: Sequence[str]) -> int:
         no_figures=options.no_figures,
         workers=1,
     )
-    return carry_out(experiment, argv, config, asked, Shards(identity, records))
+    return carry_out(experiment, argv, config, asked, shards)
 
 
-def _gathered(shards: Sequence[Path]) -> tuple[Any, dict[str, Any]]:
+def _gathered(shards: Sequence[Path]) -> Shards:
     """What all shards say is run, and their trials.
 
     Raises:
@@ -71,16 +71,18 @@ def _gathered(shards: Sequence[Path]) -> tuple[Any, dict[str, Any]]:
     """
     identity: Any = None
     records: dict[str, Any] = {}
+    processors: list[str] = []
     for shard in shards:
         if not (shard / SHARD).is_file():
             raise BadInputError(f"{shard}: expected a complete shard, found no {SHARD}")
         for name in (SHARD, VERSIONS):
             RunDirectory.open(shard).text(name)  # one that was cut is refused
-        found, trials = read_store(shard / STORE)
-        if identity is not None and (changes := differences(identity, found)):
+        found = read_store(shard / STORE)
+        if identity is not None and (changes := differences(identity, found.identity)):
             raise BadInputError(
                 f"{shard}: expected a shard of the same run as {shards[0]}, found {changes}"
             )
-        identity = identity or found
-        records |= trials
-    return identity, records
+        identity = identity or found.identity
+        records |= found.records
+        processors += found.processors
+    return Shards(identity, records, processors)

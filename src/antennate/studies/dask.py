@@ -19,7 +19,9 @@ from typing import Any
 
 from antennate.errors import WorkerError, in_one_line
 from antennate.studies.processes import Packed, Processes
+from antennate.studies.processor import Processor
 from antennate.studies.submitted import (
+    NO_PLACE,
     Submitted,
     folder_of,
     require_package,
@@ -214,6 +216,8 @@ def carry_out_apart(
 ) -> list[tuple[int, Any]]:
     """In a worker: results and failures by place, of trials that run in a process beside it.
 
+    The model of its processor comes among them.
+
     That process serves one run alone, as it knows the user's code as it was at first.
 
     Raises:
@@ -221,7 +225,7 @@ def carry_out_apart(
     """
     folder = folder_of(theirs)
     require_same(theirs, folder)
-    places, work = list(part.tasks), work_apart(part, folder, added)
+    places = list(part.tasks)
     answers: list[tuple[int, Any]] = []
 
     def emit(index: int, result: Any) -> None:
@@ -230,6 +234,10 @@ def carry_out_apart(
     def fail(index: int, failure: Failure) -> None:
         answers.append((places[index], Failure(failure.status, failure.reason)))
 
+    def saw(model: str) -> None:
+        answers.append((NO_PLACE, Processor(model)))
+
+    work = work_apart(part, folder, added, saw)
     with _processes(run) as processes:
         processes.run(work, [range(len(places))], 1, emit, fail)
     return answers

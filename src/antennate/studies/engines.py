@@ -12,6 +12,7 @@ from typing import Any
 
 from antennate.errors import ConfigError
 from antennate.messages import shown
+from antennate.studies.processor import processor
 from antennate.studies.submitted import Submitted
 from antennate.studies.work import Emit, Engine, Fail, Work
 
@@ -83,6 +84,7 @@ class Device:
         """
         if work.batched is None:
             raise ConfigError(f"{NO_BATCHES}; this one has no batches on a GPU")
+        work.saw(processor())
         places = [place for part in parts for place in part]
         tasks = [work.tasks[place] for place in places]
         work.batched(

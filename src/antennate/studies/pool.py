@@ -210,8 +210,10 @@ def gather(
     if parts:
         folder = None if workers.store is None else workers.store.path.parent
         timeout = TIMEOUT if workers.timeout is None else workers.timeout
-        how = (timeout, folder, batched, workers.shared, workers.retry)
-        work = Work(function, tasks, together, *how)
+        how: dict[str, Any] = {"batched": batched, "shared": workers.shared, "retry": workers.retry}
+        if workers.store is not None:
+            how["saw"] = workers.store.saw
+        work = Work(function, tasks, together, timeout, folder, **how)
         workers.engine_for(len(parts)).run(work, parts, workers.count, call.emit, call.fail)
     if workers.shard is not None:
         raise ShardEnd(sum(map(workers.mine, call.found)), len(tasks))

@@ -21,6 +21,7 @@ from typing import Any
 from antennate.errors import WorkerError, in_one_line
 from antennate.lookup import ADDED, NotSent
 from antennate.sim.engine_warnings import dropped
+from antennate.studies.processor import processor
 from antennate.studies.work import Emit, Fail, Failure, Part, Waiting, Work
 
 _GUARD = (
@@ -63,6 +64,7 @@ class Processes:
         checked = sendable(work.tasks)
         if isinstance(checked, NotSent):
             raise WorkerError(checked.reason)
+        work.saw(processor())
         pool = _Pool(work, parts, added_objects(), emit, fail, self._left)
         self._left = []
         try:

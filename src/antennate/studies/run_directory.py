@@ -30,6 +30,7 @@ from antennate.params.base import Params
 from antennate.params.reading import Config, read_file
 from antennate.studies import dates
 from antennate.studies.formats import from_csv, to_csv, to_json, to_line, to_toml
+from antennate.studies.processor import processor
 from antennate.studies.run_files import (
     COMMAND,
     CONFIG,
@@ -200,11 +201,17 @@ class RunDirectory:
             command: Words of the command line, if it was one.
         """
         self.write(CONFIG, to_toml(config))
-        told = self.store.identity if self.store is not None else None
-        self.write(VERSIONS, to_json(versions() if told is None else told["versions"]))
+        self.write(VERSIONS, self._versions())
         if command:
             resumed = self.store is not None and self.store.holds_trials
             self.write(COMMAND, f"{shlex.join(command)}\n{dates.begun(resumed)}")
+
+    def _versions(self) -> str:
+        """Versions of what the numbers depend on, and the models of the processors."""
+        told = self.store.identity if self.store is not None else None
+        models = self.store.processors if self.store is not None else []
+        known = versions() if told is None else told["versions"]
+        return to_json({**known, "processor": " and ".join(models or [processor()])})
 
     def without_trials(self) -> None:
         """Say that this run has none, so that no empty file of them is left if it is killed.
@@ -233,6 +240,8 @@ class RunDirectory:
             self.write(TABLE, table)
         self._give_room()
         self.write(RESULT, to_json(result))
+        if not self._finished and self.text(VERSIONS) not in ("", self._versions()):
+            self.write(VERSIONS, self._versions())
         if text := self.text(COMMAND):
             self.write(COMMAND, dates.ended(text))
         self._kept = True

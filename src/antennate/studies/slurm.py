@@ -214,7 +214,7 @@ class _Files:
     def _is_ours(self, file: Path) -> bool:
         """Whether a file or, before its job has begun, the note beside it is of this work."""
         with contextlib.suppress(BadInputError):
-            return read_store(file)[0] == self._identity
+            return read_store(file).identity == self._identity
         with contextlib.suppress(OSError, ValueError, KeyError):
             return json.loads(note_of(file).read_text())["identity"] == self._checksum()
         return False
@@ -256,7 +256,10 @@ class _Files:
             data = file.read()
         whole = data[: data.rfind(b"\n") + 1]
         job.read += len(whole)
-        records = parsed(whole)[1]
+        found = parsed(whole)
+        for model in found.processors:
+            self._work.saw(model)
+        records = found.records
         if whole:
             self.failed_starts = 0
         job.held_trials |= bool(records)

@@ -95,7 +95,7 @@ class Resumable:
         indices, size = range(len(left)), self._at_once
         parts = [indices[i : i + size] for i in indices[::size]]
         if left:
-            work = work_apart(part, Path.cwd(), self._added, _LATER)
+            work = work_apart(part, Path.cwd(), self._added, store.saw, _LATER)
             Processes().run(work, parts, 1, emit, fail)
         store.close()
         return len(left)

@@ -10,13 +10,14 @@ from __future__ import annotations
 import contextlib
 import fcntl
 import json
+import logging
 import os
 import re
 import time
 import zlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from antennate.errors import BadInputError, OutputError
 from antennate.files import open_regular
@@ -24,6 +25,7 @@ from antennate.studies.codec import dumped
 from antennate.studies.identity import differences
 
 STORE = "trials.store.jsonl"
+_NOTE = logging.getLogger(__name__)
 _SYNC = 1.0
 """Time within which lines reach the disk itself, so that a power cut costs no more [s]."""
 _HEAD = re.compile(rb'\{"crc":"([0-9a-f]{8})",')
@@ -38,6 +40,7 @@ class Store:
     Attributes:
         records: What was kept before, by key; of a key that comes twice the last counts.
         holds_trials: Whether it holds any, kept before or now.
+        processors: Models of the processors that they ran on.
         damaged: Lines that failed their checksum.
         was_empty: Whether the file held nothing before this process wrote to it.
 
@@ -71,11 +74,13 @@ class Store:
         """Take what the file holds; how many lines are damaged."""
         data = _data(self.path)
         self.was_empty = not data
-        self.identity, self.records, damaged = parsed(data)
+        found = parsed(data)
+        self.identity, self.records = found.identity, found.records
+        self.processors: list[str] = found.processors
         self._end = len(data)
         if data and not data.endswith(b"\n"):
             self._append(b"\n")
-        return damaged
+        return found.damaged
 
     def begin(self, identity: Mapping[str, Any]) -> None:
         """Say what is run, or find that it is what the file was begun with.
@@ -111,8 +116,25 @@ class Store:
             raise OutputError(f"{error}{kept if self.holds_trials else ''}") from None
         self.holds_trials = True
 
-    def take(self, records: Mapping[str, Any]) -> None:
-        """Keep the trials of other files."""
+    def saw(self, model: str) -> None:
+        """Keep the model of a processor that trials run on; a warning tells of another one."""
+        if model in self.processors:
+            return
+        self._append(line({"processor": model}))
+        if self.processors:
+            _NOTE.warning(
+                "%s: trials ran on another model of processor, %s, now also on %s; the same seed "
+                "may end differently there",
+                self.path.parent,
+                " and ".join(self.processors),
+                model,
+            )
+        self.processors.append(model)
+
+    def take(self, records: Mapping[str, Any], processors: Sequence[str]) -> None:
+        """Keep the trials of other files, and the processors that they ran on."""
+        for model in processors:
+            self.saw(model)
         for key, content in records.items():
             if key not in self.records:
                 self.append(key, content)
@@ -136,6 +158,7 @@ class Store:
         """Forget everything."""
         os.ftruncate(self._file, 0)
         self.identity, self.records, self.damaged, self._end = None, {}, 0, 0
+        self.processors = []
         self.was_empty = True
         self.holds_trials = False
 
@@ -190,22 +213,34 @@ def line(content: Mapping[str, Any]) -> bytes:
     return b'{"crc":"%08x",%b\n' % (zlib.crc32(body), body[1:])
 
 
-def parsed(data: bytes) -> tuple[Mapping[str, Any] | None, dict[str, Any], int]:
-    """What a file says is run, its trials by key, and how many of its lines are damaged.
+class Parsed(NamedTuple):
+    """What a file says is run, its trials by key, their processors, and how many lines are bad."""
+
+    identity: Any
+    records: dict[str, Any]
+    processors: list[str]
+    damaged: int
+
+
+def parsed(data: bytes) -> Parsed:
+    """The content of a file.
 
     Trials before the line that says what is run are of nothing that is known, and are left out.
     """
     identity: Mapping[str, Any] | None = None
     records: dict[str, Any] = {}
+    processors: list[str] = []
     damaged = 0
     for content in _contents(data):
         if content is None:
             damaged += 1
         elif "identity" in content and identity is None:
-            identity, records = content["identity"], {}
+            identity, records, processors = content["identity"], {}, []
         elif "key" in content:
             records[content["key"]] = content
-    return identity, records, damaged
+        elif "processor" in content:
+            processors.append(content["processor"])
+    return Parsed(identity, records, processors, damaged)
 
 
 def _contents(data: bytes) -> Iterator[dict[str, Any] | None]:
@@ -217,13 +252,13 @@ def _contents(data: bytes) -> Iterator[dict[str, Any] | None]:
         yield json.loads(body) if head and zlib.crc32(body) == int(head[1], 16) else None
 
 
-def read_store(path: Path) -> tuple[Mapping[str, Any], dict[str, Any]]:
-    """What a file says is run, and its trials; nobody need have ended it.
+def read_store(path: Path) -> Parsed:
+    """The content of a file; nobody need have ended it.
 
     Raises:
         BadInputError: It cannot be read, or does not say what is run.
     """
-    identity, records, _ = parsed(_data(path))
-    if identity is None:
+    found = parsed(_data(path))
+    if found.identity is None:
         raise BadInputError(f"{path}: expected finished trials, found no first line that is sound")
-    return identity, records
+    return found

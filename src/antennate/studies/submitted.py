@@ -21,8 +21,11 @@ from antennate.errors import MissingPackageError, WorkerError, in_one_line
 from antennate.messages import extra
 from antennate.studies.identity import differences, environment, environment_here
 from antennate.studies.processes import Packed, added_objects, take_added
+from antennate.studies.processor import Processor, processor
 from antennate.studies.work import Emit, Fail, Failure, Part, Waiting, Work
 
+NO_PLACE = -1
+"""Place of what is no result."""
 _FOLDER = "folder"
 """Where the driver tells its working folder, from which it names files."""
 _POLL = 0.02
@@ -99,7 +102,10 @@ class Submitted:
         except Exception as error:
             raise WorkerError(f"{self.name}: {in_one_line(error)}") from error
         for place, answer in answers:
-            (fail if isinstance(answer, Failure) else emit)(place, answer)
+            if isinstance(answer, Processor):
+                work.saw(answer)
+            else:
+                (fail if isinstance(answer, Failure) else emit)(place, answer)
 
 
 def _by_value() -> Callable[[Any], bytes]:
@@ -112,14 +118,14 @@ def _by_value() -> Callable[[Any], bytes]:
 
 
 def carry_out(part: Part, theirs: Mapping[str, Any], added: Packed) -> list[tuple[int, Any]]:
-    """In a worker: results and failures by place.
+    """In a worker: results and failures by place, and the model of its processor.
 
     Raises:
         WorkerError: The driver has other versions or other code.
     """
     require_same(theirs, Path())
     take_added(added)
-    answers: list[tuple[int, Any]] = []
+    answers: list[tuple[int, Any]] = [(NO_PLACE, Processor(processor()))]
 
     def fail(place: int, failure: Failure) -> None:
         answers.append((place, Failure(failure.status, failure.reason)))
@@ -128,20 +134,27 @@ def carry_out(part: Part, theirs: Mapping[str, Any], added: Packed) -> list[tupl
     return answers
 
 
-def work_apart(part: Part, folder: Path, added: Packed, ignored: Sequence[int] = ()) -> Work:
+def work_apart(
+    part: Part,
+    folder: Path,
+    added: Packed,
+    saw: Callable[[str], None],
+    ignored: Sequence[int] = (),
+) -> Work:
     """A part as work for a process beside this one, which needs nothing that this one imported.
 
     Args:
         part: Its tasks are named by their order, from 0.
         folder: Where they are run.
         added: Objects that were added to registries in the driver.
+        saw: Takes the model of the processor.
         ignored: Signals that it ignores.
     """
     import cloudpickle  # which Dask and submitit need too; it sends what was typed at a prompt
 
     content = cloudpickle.dumps((part, str(folder), added, ignored))
     tasks = [(place,) for place in part.tasks]
-    return Work(_Carried(content), tasks, part.together, part.timeout)
+    return Work(_Carried(content), tasks, part.together, part.timeout, saw=saw)
 
 
 class _Carried:

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, Literal, Protocol
 
 from antennate.errors import LogError, WorkerError, in_one_line
+from antennate.studies.processor import processor
 
 Emit = Callable[[int, Any], None]
 """Takes the place of a task and its result."""
@@ -46,6 +47,10 @@ def no_failure(place: int, failure: Failure) -> None:
     """Take a failure where there cannot be one."""
 
 
+def _unseen(model: str) -> None:
+    """Keep no model of a processor."""
+
+
 @dataclass(frozen=True)
 class Work:
     """Tasks of one kind.
@@ -62,6 +67,7 @@ class Work:
         shared: What workers must share with this process, as of `environment`; None for no more
             than this package.
         retry: Whether tasks are run again that failed in an earlier process.
+        saw: Takes the model of each processor that tasks are run on; engines call it.
     """
 
     function: Callable[..., Any]
@@ -72,6 +78,7 @@ class Work:
     batched: Callable[..., Any] | None = None
     shared: Mapping[str, Any] | None = None
     retry: bool = False
+    saw: Callable[[str], None] = _unseen
 
     def part(self, places: Sequence[int]) -> Part:
         """Some of it, to be sent to a worker."""
@@ -221,5 +228,6 @@ class Here:
         self, work: Work, parts: Sequence[Sequence[int]], count: int, emit: Emit, fail: Fail
     ) -> None:
         """Run all; a task that crashes or hangs takes this process with it."""
+        work.saw(processor())
         for part in parts:
             work.part(part).carry_out(emit, fail)
