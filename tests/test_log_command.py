@@ -287,7 +287,7 @@ def test_export_to_parquet(log: Path, capsys: pytest.CaptureFixture[str]) -> Non
 
 
 @pytest.mark.parametrize("order", ["by topic", "backwards"])
-def test_a_closed_log_in_another_order_is_not_called_sound(
+def test_a_log_in_another_order_is_read_in_that_of_its_times(
     order: str, log: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Other programs may sort the messages of a valid MCAP file."""
@@ -306,14 +306,14 @@ def test_a_closed_log_in_another_order_is_not_called_sound(
             about = (message.log_time, message.data, message.publish_time, message.sequence)
             writer.add_message(known[channel.topic], *about)
         writer.finish()
-    code, told = info(Path("new.mcap"), capsys)
-    assert code == 2
-    assert told["damaged"] + told["missing"] > 0
-    assert told["duration_s"] <= 0.01 * TICKS
-    assert main(["log", "plot", "new.mcap", "--out", "new.png"]) == 2
-    err = capsys.readouterr().err
-    assert err.count("\n") == 1
-    assert ("expected a log with ticks, found none: tick without /" in err) == (order == "by topic")
+    wanted, told = info(log, capsys), info(Path("new.mcap"), capsys)
+    for _, each in (wanted, told):
+        del each["log"], each["parts"]
+    assert told == wanted
+    assert wanted[0] == 0
+    assert main(["log", "plot", "new.mcap", "--out", "new.png"]) == 0
+    with LogReader(log) as one, LogReader(Path("new.mcap")) as other:
+        assert [each.pack() for each in one] == [each.pack() for each in other]
 
 
 def test_a_name_that_grows_too_long_is_one_line(

@@ -174,11 +174,18 @@ def _tables(result: Mapping[str, Any]) -> Sequence[Table]:
         f"{one_line(', '.join(result['parts']))}.\n"
         f"Recorded by {one_line(result['recorded_controller'])}, antennate "
         f"{one_line(result['version'])}; "
-        f"{'the log is complete' if result['closed'] else 'not ended: its program was killed'}."
+        f"{_ending(result)}."
     )
     name = one_line(result["controller"])
     columns = {"recorded": then, short_names([name])[name]: now}
     return (Table.of("Replay", columns, (*measures, *COUNTS), note),)
+
+
+def _ending(result: Mapping[str, Any]) -> str:
+    """Whether all of the log is there."""
+    if result["damaged"] or result["missing"]:
+        return "the log is damaged"
+    return "the log is complete" if result["closed"] else "not ended: its program was killed"
 
 
 def _sentence(result: Mapping[str, Any]) -> str:

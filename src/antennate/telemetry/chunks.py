@@ -188,24 +188,16 @@ def _after(content: bytes, at: int) -> int:
 
 
 def _loose(file: BinaryIO, at: int, size: int) -> tuple[Chunk | Fault, int]:
-    """Records outside of chunks that follow one another, and where they end.
-
-    Of very many some at a time, but never a part of those with one number.
-    """
-    end, last = at, None
-    while True:
+    """Records outside of chunks that follow one another, some at a time, and where they end."""
+    end = at
+    while end - at <= _BLOCK:
         file.seek(end)
-        head = file.read(RECORD.size + _ENTRY.size)
+        head = file.read(RECORD.size)
         if len(head) < RECORD.size:
             break
-        kind, length = RECORD.unpack_from(head)
+        kind, length = RECORD.unpack(head)
         if kind not in _LOOSE or length > _LONGEST or end + RECORD.size + length > size:
             break
-        if kind == _MESSAGE and len(head) == RECORD.size + _ENTRY.size:
-            number = _ENTRY.unpack_from(head, RECORD.size)[1]
-            if end - at > _BLOCK and number != last:
-                break
-            last = number
         end += RECORD.size + length
     file.seek(at)
     found = _read_contents(at, file.read(end - at))

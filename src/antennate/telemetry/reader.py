@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from itertools import chain
 from pathlib import Path
@@ -12,15 +12,15 @@ from typing import NamedTuple
 
 from antennate.errors import LogError
 from antennate.files import open_regular
-from antennate.telemetry.chunks import Chunk, Fault, walk
+from antennate.telemetry.chunks import Chunk, Fault
 from antennate.telemetry.header import Header, refuse_old
+from antennate.telemetry.order import in_order
 from antennate.telemetry.parts import parts
+from antennate.telemetry.records import BESIDE, Record, by_tick, repeats
 from antennate.telemetry.summary import End
 from antennate.telemetry.survey import Survey, by_summary, span
 from antennate.telemetry.ticks import Tick
 from antennate.telemetry.topics import (
-    CONTACT_FORCES,
-    COORDINATES,
     EVENTS,
     HEADER_TOPICS,
     MANEUVER,
@@ -32,8 +32,6 @@ from antennate.telemetry.topics import (
 
 _LISTED = 100
 """Most damaged places that are listed."""
-_BESIDE = (EVENTS, CONTACT_FORCES, COORDINATES)
-"""Topics whose messages are no part of a tick."""
 _OURS = dict(enumerate(TOPICS, 1))
 """Channels of a file that declares none, as its first chunk is lost."""
 
@@ -44,15 +42,6 @@ class Damage(NamedTuple):
     offset: int
     reason: str
     path: Path
-
-
-class Record(NamedTuple):
-    """One message as it is: topic, number of its tick, time [ns], bytes."""
-
-    topic: Topic
-    number: int
-    time: int
-    data: bytes
 
 
 class LogReader:
@@ -129,7 +118,7 @@ class LogReader:
             why = f": {self.damage[0].reason} at byte {self.damage[0].offset}" if self.bad else ""
             raise LogError(f"{self.path}: expected a log with ticks, found none{why}")
 
-    def groups(self) -> Iterator[tuple[list[Record], Tick | None]]:
+    def groups(self) -> Iterator[tuple[Sequence[Record], Tick | None]]:
         """All messages as they are: those of one tick, with it, then those of none, one by one.
 
         Raises:
@@ -144,31 +133,22 @@ class LogReader:
                     continue
                 record = Record(topic, message.number, message.time, message.data)
                 if held and held[0].time != record.time:
-                    yield from self._apart(begin, held)
+                    yield from self._by_tick(begin, held)
                     held = []
                 begin = begin if held else chunk.offset
                 held.append(record)
             if held and not chunk.foreign:
-                yield from self._apart(begin, held)
+                yield from self._by_tick(begin, held)
                 held = []
-        yield from self._apart(begin, held)
+        yield from self._by_tick(begin, held)
 
-    def _apart(self, offset: int, held: list[Record]) -> Iterator[tuple[list[Record], Tick | None]]:
-        """The messages of one time, each once, tick by tick.
-
-        Their number matters only where several ticks have one time: other programs may count the
-        messages of each topic, or none.
-        """
-        if _repeats(held):
-            once = [*dict.fromkeys(held)]
-            self._repeated += sum(each.topic is MANEUVER for each in held)
-            self._repeated -= sum(each.topic is MANEUVER for each in once)
-            held = once
-        ticks = dict[int, list[Record]]()
-        several = _repeats(held)
-        for record in held:
-            ticks.setdefault(record.number if several else 0, []).append(record)
-        for tick in ticks.values():
+    def _by_tick(
+        self, offset: int, held: Sequence[Record]
+    ) -> Iterator[tuple[Sequence[Record], Tick | None]]:
+        """The messages of one time, tick by tick."""
+        ticks = by_tick(held)
+        self._repeated += _maneuvers(held) - sum(map(_maneuvers, ticks))
+        for tick in ticks:
             yield from self._grouped(offset, tick)
 
     def survey(self) -> Survey:
@@ -203,13 +183,13 @@ class LogReader:
             raise LogError(f"expected to read {self._part}, found: {error.strerror}") from None
 
     def _grouped(
-        self, offset: int, held: list[Record]
-    ) -> Iterator[tuple[list[Record], Tick | None]]:
+        self, offset: int, held: Sequence[Record]
+    ) -> Iterator[tuple[Sequence[Record], Tick | None]]:
         """The messages of one tick, with it if it is whole and new.
 
         Those beside the tick that are not of their type are left out.
         """
-        held = [each for each in held if each.topic not in _BESIDE or self._is_sound(offset, each)]
+        held = [each for each in held if each.topic not in BESIDE or self._is_sound(offset, each)]
         found = {record.topic: record.data for record in held}
         if not any(topic in found for topic in TICK_TOPICS):
             if held:
@@ -219,7 +199,7 @@ class LogReader:
             missing = [topic.name for topic in TICK_TOPICS if topic not in found]
             if missing:
                 raise LogError(f"tick without {missing[0]}")
-            if _repeats(held):
+            if repeats(held):
                 raise LogError("tick with two messages in a topic")
             tick = Tick.of_messages(found)
         except LogError as error:
@@ -255,7 +235,7 @@ class LogReader:
                     self._file.close()
                     self._part, self._before, closed = path, self.ticks, self.end
                     self.end, self._file = None, open_regular(path)
-                for place in walk(self._file):
+                for place in in_order(self._file):
                     if isinstance(place, Fault):
                         self._note(*place)
                     elif isinstance(place, End):
@@ -334,10 +314,8 @@ class LogReader:
             self.damage.append(Damage(offset, reason, self._part))
 
 
-def _repeats(held: Iterable[Record]) -> bool:
-    """Whether there are more messages in a topic than a tick has."""
-    parts = [record.topic.name for record in held if record.topic not in _BESIDE]
-    return len(parts) > len(set(parts))
+def _maneuvers(held: Sequence[Record]) -> int:
+    return sum(record.topic is MANEUVER for record in held)
 
 
 def count(path: Path) -> int:
