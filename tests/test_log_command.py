@@ -10,6 +10,7 @@ import resource
 import shutil
 import subprocess
 import sys
+from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
 from types import SimpleNamespace
@@ -351,6 +352,20 @@ def test_plot_draws_it(log: Path) -> None:
     assert log.with_suffix(".png").read_bytes().startswith(b"\x89PNG")
     assert main(["log", "plot", str(log), "--out", "a.svg"]) == 0
     assert Path("a.svg").read_text().count("<path") > 20
+
+
+@pytest.mark.parametrize("now", [None, 0.5], ids=["any times", "one time"])
+def test_plot_draws_a_log_of_absurd_numbers(
+    now: float | None, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Of both signs up to the largest there is, infinities and NaN; no word of what draws them."""
+    log = tmp_path / "odd.mcap"
+    with LogWriter(log, HEADER, 0.0) as out:
+        for number in range(1, 60):
+            out.write(tick(number) if now is None else replace(tick(number), now=now))
+    assert main(["log", "plot", str(log)]) == 0
+    assert capsys.readouterr().err == ""
+    assert log.with_suffix(".png").read_bytes().startswith(b"\x89PNG")
 
 
 @pytest.mark.parametrize(

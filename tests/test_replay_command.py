@@ -195,6 +195,10 @@ def test_G2_a_damaged_log_is_replayed_as_far_as_it_goes(
     assert (result["ticks"], result["missing"]) == (TICKS - 1, 1)
     assert f"ticks missing: 1; ticks read: {TICKS - 1}; first at byte " in err
     assert err.count("\n") == 1
+    assert main(["replay", str(bad)]) == 2
+    out = capsys.readouterr().out
+    assert "the log is damaged." in out
+    assert "complete" not in out
 
 
 def test_a_log_that_was_not_closed_is_no_error(

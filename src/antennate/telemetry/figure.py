@@ -15,10 +15,13 @@ from matplotlib.patches import Patch
 
 from antennate import figures as style
 from antennate.telemetry.reader import LogReader
+from antennate.telemetry.ticks import Pair
 from antennate.types import Contact, Floats, Ints, Maneuver
 
 _MOST_DRAWN = 5000
 """Most ticks that a figure shows."""
+_LARGEST = 1e100
+"""Largest number that it shows; an axis of larger ones overflows."""
 _SIDES = ("left", "right")
 _STATES = {
     "OK": "#BFE3B4",
@@ -77,15 +80,21 @@ class Course:
         every = -(-count // _MOST_DRAWN)
         kept = list(islice(log, 0, None, every))
         return cls(
-            t=np.array([tick.now for tick in kept]),
-            reading=np.array([tick.reading for tick in kept]),
-            level=np.array([tick.level for tick in kept]),
+            t=_drawable([tick.now for tick in kept]),
+            reading=_drawable([tick.reading for tick in kept]),
+            level=_drawable([tick.level for tick in kept]),
             contact=np.array([tick.contact for tick in kept]),
             recorded=np.array([tick.maneuver for tick in kept]),
             replayed=None if replayed is None else np.array(replayed[::every]),
             state=[tick.state for tick in kept],
             threshold=log.header.params.rule.threshold,
         )
+
+
+def _drawable(values: Sequence[float] | Sequence[Pair]) -> Floats:
+    """Numbers as they are, NaN for those that no axis can show."""
+    found = np.array(values)
+    return np.where(np.abs(found) <= _LARGEST, found, np.nan)
 
 
 def drawn(path: Path) -> tuple[LogReader, Figure]:
