@@ -7,6 +7,10 @@ from pathlib import Path
 import pytest
 from design_plans import refusal
 
+from antennate.experiments.study import run as study
+from antennate.experiments.study.config import StudyConfig
+from antennate.params.reading import read_file
+
 CHOICES = "expected a list of values, or a table with low and high (names with dots need quotes)"
 GOOD = '[vary]\n"tunnel.strewn" = [1]\n'
 OWN = 'experiment = "own.py:trial"\n[vary]\nx = [1, 2]\n'
@@ -211,3 +215,17 @@ def test_what_varies_for_a_function_has_a_name_of_its_own(
     Path("bad.toml").write_text(f'experiment = "own.py:trial"\n[vary]\n"{name}" = [1, 2]\n')
     line = refusal(capsys, "study", "bad.toml", "--trust-code")
     assert ": expected another name, " in line
+
+
+@pytest.mark.parametrize("name", ["assumptions", "difficulty"])
+def test_the_studies_of_the_tunnel_can_be_run(name: str) -> None:
+    file = Path(__file__).parents[1] / "studies" / f"tunnel_{name}.toml"
+    study.check(read_file(file, StudyConfig))
+
+
+def test_a_sensor_of_another_kind_without_its_curve_is_refused_at_any_point(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    kinds = '"robot.antenna.sensor.kind" = ["flex", "fsr"]\n'
+    Path("kinds.toml").write_text(f"[vary]\n{kinds}")
+    assert "polarity must be 1 for a fsr sensor" in refusal(capsys, "study", "kinds.toml")
