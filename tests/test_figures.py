@@ -1,10 +1,14 @@
 """Figures: what they show, their units, and bytes that repeat."""
 
+import re
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
+import phone
 import pytest
 from matplotlib.colors import to_hex
+from PIL import Image
 
 from antennate import figures as style
 from antennate.control.registry import BUILT_IN
@@ -17,8 +21,13 @@ from antennate.experiments.tunnel.batch import SHOWN_TRIALS, run_trials
 from antennate.experiments.tunnel.config import TunnelConfig
 from antennate.experiments.wall import figure as wall
 from antennate.experiments.wall.outcome import Traverse
+from antennate.robots.spec import RobotSpec
+from antennate.robots.wiring import wiring
 from antennate.types import Maneuver
 
+ROOT = Path(__file__).parent.parent
+LETTERS = {"tunnel.png": 8.0}
+"""The smallest letters of a picture of the docs, 7 if it is not named [points]."""
 LIMIT = 50.0
 WALLS = (np.array([[0.0, 0.3], [2.0, 0.3]]), np.array([[0.0, -0.3], [2.0, -0.3]]))
 
@@ -32,7 +41,7 @@ class Row:
 
 
 @dataclass
-class Path:
+class Course:
     head: np.ndarray
     maneuver: np.ndarray
     fixed: list[np.ndarray]
@@ -43,12 +52,12 @@ class Path:
     parts: list[np.ndarray]
 
 
-def path(end: float, samples: int = 40) -> Path:
+def path(end: float, samples: int = 40) -> Course:
     """A straight course along x, through all maneuvers one after the other."""
     x = np.linspace(0.0, end, samples)
     box = 0.07 * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
     stood = [box + np.array([0.5, 0.2]), box + np.array([1.0, -0.2])]
-    return Path(
+    return Course(
         head=np.stack([x, 0.1 * np.sin(5 * x)], axis=1),
         maneuver=np.arange(samples) * len(Maneuver) // max(samples, 1),
         fixed=list(WALLS),
@@ -115,6 +124,38 @@ def summary():
     return tunnel.summary(summaries(), rows(), LIMIT)
 
 
+def springs_of_the_taper():
+    return taper.taper(run_taper(TaperConfig()).result())
+
+
+def cable():
+    return wiring(RobotSpec())
+
+
+@pytest.mark.parametrize(
+    "draw", [one_trajectory, trajectories, summary, study, springs_of_the_taper, cable]
+)
+def test_letters_are_read_on_a_phone(draw):
+    assert phone.smallest(draw()) >= phone.LEAST
+
+
+def test_letters_of_the_pictures_of_the_docs_are_read_on_a_phone():
+    pictures = [*ROOT.glob("docs/images/*.png"), *ROOT.glob("docs/science/*.png")]
+    assert len(pictures) > 25
+    for path in pictures:
+        with Image.open(path) as image:
+            inches = image.width / image.info["dpi"][0]
+        height = phone.height(LETTERS.get(path.name, 7.0), inches)
+        assert height >= phone.LEAST, (path.name, height)
+
+
+def test_no_figure_asks_for_smaller_letters():
+    for path in [*ROOT.glob("src/antennate/**/*.py"), *ROOT.glob("docs/science/*.py")]:
+        least = LETTERS["tunnel.png"] if path.parent.name == "tunnel" else 7.0
+        for size in re.findall(r"fontsize=([0-9.]+)", path.read_text()):
+            assert float(size) >= least, path
+
+
 @pytest.mark.parametrize("draw", [one_trajectory, summary, study])
 def test_the_same_data_give_the_same_bytes(draw):
     first, second = style.render(draw()), style.render(draw())
@@ -174,7 +215,7 @@ def test_trajectories_of_different_extent_have_the_same_ticks():
 
 
 def test_lines_of_the_taper_have_four_colours_and_the_ladder_that_of_its_profile():
-    panel = taper.taper(run_taper(TaperConfig()).result()).axes[0]
+    panel = springs_of_the_taper().axes[0]
     stretches, ladder, suggested = (to_hex(each.get_edgecolor()) for each in panel.patches)
     colours = {to_hex(panel.lines[0].get_color()), stretches, ladder, suggested}
     assert len(colours) == 4
@@ -201,7 +242,7 @@ def test_every_maneuver_has_its_own_colour_on_the_course():
 
 
 def test_trials_without_a_course_leave_an_empty_panel():
-    nothing = Path(
+    nothing = Course(
         np.zeros((0, 2)), np.zeros(0), list(WALLS), [], [], WALLS[0], np.full((6, 2), np.nan), []
     )
     figure = tunnel.trajectories(

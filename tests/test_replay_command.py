@@ -9,6 +9,7 @@ import math
 from pathlib import Path
 
 import numpy as np
+import phone
 import pytest
 from log_ticks import HEADER, chunks, unclosed
 from worlds import recorded, session, simulated
@@ -277,6 +278,7 @@ def test_the_figure_shows_every_stretch_and_repeats_its_bytes() -> None:
     bars = [len(panel.collections) for panel in figure.axes]
     assert bars == [0, 0, 2, 5]  # one unknown, one contact; 2 recorded, 1 known replayed, 2 states
     assert figure.axes[1].lines[-1].get_ydata() == [0.4, 0.4]
+    assert phone.smallest(figure) >= phone.LEAST
     assert style.render(figure) == style.render(draw(course))
     simulated = draw(dataclasses.replace(course, replayed=None, state=[""] * n))
     rows = [label.get_text() for label in simulated.axes[3].get_yticklabels()]

@@ -6,6 +6,7 @@ import math
 from pathlib import Path
 
 import numpy as np
+import phone
 import pytest
 from pydantic import ValidationError
 
@@ -239,6 +240,7 @@ def test_figures_have_units_and_repeat(outcome):
     first, again = (figures.trace(*outcome.example()) for _ in range(2))
     assert style.render(first) == style.render(again)
     drawn = [first, figures.measures(result), figures.curves(result)]
+    assert min(map(phone.smallest, drawn)) >= phone.LEAST
     labels = [axis.get_ylabel() for figure in drawn for axis in figure.axes]
     known = ("[ms]", "[%]", "[m]", "[rad]", "0 to 1")
     assert all(label.endswith(known) for label in labels if label), labels
