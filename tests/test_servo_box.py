@@ -247,8 +247,7 @@ OF_A_ROBOT = (
     *("--tunnel.strewn=1", "--physics.timestep=0.001", "--variation.slip-time=2"),
     *("--control.rate=50", "--control.gait.amplitude=0.1", "--battery.voltage=10"),
     *("--factory", "--touch=left@2s", "--pace=lockstep", "--udp=0", "--passed=gone"),
-    *("--log=a.mcap", "--video=a.mp4", "--view", "--view-port=0", "--foxglove"),
-    "--foxglove-port=0",
+    *("--log=a.mcap", "--video=a.mp4", "--view", "--foxglove"),
 )
 
 
@@ -257,6 +256,12 @@ def test_what_is_for_a_robot_is_refused_without_one(flag: str) -> None:
     name = flag.partition("=")[0]
     with pytest.raises(ConfigError, match=f"^{name}.*: expected none .* it is for a robot"):
         command(["--servos", "1:xl330-m288", "--duration=0.1", flag])
+
+
+@pytest.mark.parametrize("page", ["--view", "--foxglove"])
+def test_the_port_of_a_page_alone_is_refused_with_servos_too(page: str) -> None:
+    with pytest.raises(ConfigError, match=f"^{page}-port: expected {page} beside it"):
+        command(["--servos", "1:xl330-m288", "--duration=0.1", f"{page}-port=0"])
 
 
 def test_only_what_servos_alone_read_is_taken_beside_them() -> None:

@@ -1,4 +1,4 @@
-"""Draw one antenna along a line of boulders, with each of five profiles: pass, jam or slip.
+"""Draw an antenna with each of five profiles along boulders.
 
 An antenna at a fixed angle moves along touching spheres. It jams if its tip stays while the base
 goes on, slips if it touches nothing for long, and succeeds if it does neither. The profiles are the
