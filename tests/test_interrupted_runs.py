@@ -200,8 +200,31 @@ def test_a_refused_command_leaves_a_finished_run_as_it_is(
     capsys.readouterr()
     file = [str(plan)] if name == "design" else []
     assert main([name, *file, "--out", str(run), "--overwrite", *words]) == 2
-    assert f"{words[0]}: expected " in capsys.readouterr().err
+    assert f"expected a known flag, found '{words[0]}'" in capsys.readouterr().err
     assert {path: path.read_bytes() for path in run.rglob("*") if path.is_file()} == before
+
+
+OF_WORKERS = {"workers", "engine", "slurm", "shard", "resume", "retry", "trial-timeout"}
+
+
+@pytest.mark.parametrize(
+    ("name", "missing"),
+    [
+        *(
+            (each, OF_WORKERS)
+            for each in ["springs", "taper", "sensor", "ringdown", "servo", "tracks"]
+        ),
+        ("design", {"shard"}),
+        ("tunnel", set[str]()),
+    ],
+)
+def test_help_lists_no_option_that_is_always_refused(
+    name: str, missing: set[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The first six compute in this process, and a search does not know its trials beforehand."""
+    assert main([name, "--help-all"]) == 0
+    listed = set(re.findall(r"^  --([a-z-]+)", capsys.readouterr().out, re.MULTILINE))
+    assert OF_WORKERS - listed == missing
 
 
 @pytest.mark.parametrize("workers", ["1", "2"])

@@ -61,6 +61,7 @@ def parse(
     argv: Sequence[str],
     options: type[Chosen],
     read: Callable[[Path], Config] | None = None,
+    without: Sequence[str] = (),
 ) -> tuple[Config, Chosen]:
     """Read the words of a command.
 
@@ -71,12 +72,14 @@ def parse(
         argv: Its words.
         options: Its other options.
         read: Reads a file that holds more than this configuration.
+        without: Fields of the other options that this command has not.
 
     Raises:
         ConfigError: A flag, the file or a value cannot be used.
         HelpRequest: Help was asked for.
     """
-    every, others = list(options_of(model())), list(options_of(options()))
+    every = list(options_of(model()))
+    others = [option for option in options_of(options()) if option.path[0] not in without]
     unread = {option.flag for option in every if ".".join(option.path) in model.unread}
     parameters = [option for option in every if option.flag not in unread]
     page = Command(command, description, model, parameters, others)

@@ -67,12 +67,13 @@ def refuse_workers(options: Any, expected: str) -> None:
     """
     for name, field in fields_of(type(options)).items():
         value = getattr(options, name)
-        if name in _OF_WORKERS and value != field.default and (name, value) != ("workers", 1):
+        if name in OF_WORKERS and value != field.default and (name, value) != ("workers", 1):
             told = "one" if value is True else found(value)
             raise ConfigError(f"{flag_of((name,))}: expected {expected}, found {told}")
 
 
-_OF_WORKERS = ("workers", "engine", "slurm", "shard", "resume", "retry", "trial_timeout")
+OF_WORKERS = ("workers", "engine", "slurm", "shard", "resume", "retry", "trial_timeout")
+"""Options that only trials on workers have."""
 _SAID_ANEW = {"--out": 1, "--overwrite": 0, "--no-overwrite": 0, "--resume": 0, "--no-resume": 0}
 """Flags that are left out of the words that go on, and how many values each has."""
 
