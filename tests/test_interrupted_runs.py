@@ -204,16 +204,14 @@ def test_a_refused_command_leaves_a_finished_run_as_it_is(
     assert {path: path.read_bytes() for path in run.rglob("*") if path.is_file()} == before
 
 
+IN_THIS_PROCESS = ["springs", "taper", "sensor", "ringdown", "servo", "tracks"]
 OF_WORKERS = {"workers", "engine", "slurm", "shard", "resume", "retry", "trial-timeout"}
 
 
 @pytest.mark.parametrize(
     ("name", "missing"),
     [
-        *(
-            (each, OF_WORKERS)
-            for each in ["springs", "taper", "sensor", "ringdown", "servo", "tracks"]
-        ),
+        *((name, OF_WORKERS) for name in IN_THIS_PROCESS),
         ("design", {"shard"}),
         ("tunnel", set[str]()),
     ],
@@ -221,7 +219,7 @@ OF_WORKERS = {"workers", "engine", "slurm", "shard", "resume", "retry", "trial-t
 def test_help_lists_no_option_that_is_always_refused(
     name: str, missing: set[str], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The first six compute in this process, and a search does not know its trials beforehand."""
+    """A search does not know its trials beforehand, so no shards can divide them."""
     assert main([name, "--help-all"]) == 0
     listed = set(re.findall(r"^  --([a-z-]+)", capsys.readouterr().out, re.MULTILINE))
     assert OF_WORKERS - listed == missing
