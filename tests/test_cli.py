@@ -120,6 +120,14 @@ def test_help_shows_unit_default_range_and_choices(capsys):
         assert f"{name} " in text
 
 
+def test_help_of_a_study_names_what_an_option_takes_and_every_plan(capsys):
+    assert main(["study", "--help"]) == 0
+    page = capsys.readouterr().out
+    assert "--assumed FLOAT" in page
+    first = page.split("\n\n")[1].lower()
+    assert all(plan in first for plan in ("grid", "list", "random", "sobol", "morris"))
+
+
 def test_the_door_opens_without_heavy_imports():
     code = (
         "import sys, antennate.cli as c; c.main(['--help']); "

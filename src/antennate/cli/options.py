@@ -178,7 +178,7 @@ def _option(path: tuple[str, ...], model: type, default: Any) -> Option | None:
     if not switch and not kinds & {*_METAVARS}:
         return None  # a list of tables, for a file only
     known = next((text for kind, text in _METAVARS.items() if kind in kinds), "")
-    known = "NAME" if field.examples else known
+    known = "NAME" if field.examples and str in kinds else known
     metavar = "{" + ",".join(map(str, choices)) + "}" if choices else known
     return Option(
         path=path,

@@ -19,7 +19,7 @@ from antennate.studies.pool import TIMEOUT, Workers, core_count
 
 @dataclass(frozen=True)
 class Options(ResultOptions):
-    """How to run; nothing here changes a result."""
+    """How to run; nothing here changes a result, but for another engine."""
 
     workers: int | None = option(None, "processes to use, else one for each core", "INT", ge=1)
     no_figures: bool = option(False, "draw no figures")
