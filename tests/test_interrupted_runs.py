@@ -204,6 +204,20 @@ def test_a_refused_command_leaves_a_finished_run_as_it_is(
     assert {path: path.read_bytes() for path in run.rglob("*") if path.is_file()} == before
 
 
+@pytest.mark.parametrize("flag", ["--resume", "--retry"])
+def test_a_finished_run_takes_no_more_trials_and_says_so(
+    flag: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run = tmp_path / "run"
+    words = [*TUNNEL, "--no-figures", "--workers", "1", "--out", str(run)]
+    assert main(words) == 0
+    capsys.readouterr()
+    assert main([*words, "--trials", "4", flag]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert f"{run}: expected an unfinished run, found a finished one, which takes no more" in line
+    assert "choose another folder" in line
+
+
 IN_THIS_PROCESS = ["springs", "taper", "sensor", "ringdown", "servo", "tracks"]
 OF_WORKERS = {"workers", "engine", "slurm", "shard", "resume", "retry", "trial-timeout"}
 

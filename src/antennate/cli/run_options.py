@@ -23,8 +23,12 @@ class Options(ResultOptions):
 
     workers: int | None = option(None, "processes to use, else one for each core", "INT", ge=1)
     no_figures: bool = option(False, "draw no figures")
-    resume: bool = option(False, "go on with the run that the folder holds", needs=["--out"])
-    retry: bool = option(False, "resume, and run crashed or hung trials again", needs=["--out"])
+    resume: bool = option(
+        False, "go on with the run that the folder holds, if there is one", needs=["--out"]
+    )
+    retry: bool = option(
+        False, "resume, and run crashed or hung trials again, if there are any", needs=["--out"]
+    )
     engine: str = option(
         LOCAL,
         f"where the workers are: {', '.join(EVERYWHERE)}; for tunnel, wall and studies of them "
