@@ -330,6 +330,14 @@ def test_bad_folders(capsys, tmp_path):
     assert [p.name for p in (tmp_path / "mine").iterdir()] == ["config.toml"]
 
 
+@pytest.mark.parametrize("words", [("--out", "bad\udcff"), ("--out=bad\udcff",)])
+def test_a_folder_whose_name_is_no_text_is_one_line_and_is_not_made(capsys, tmp_path, words):
+    """The shell's `$'bad\\xff'` comes as a lone surrogate (PEP 383), which UTF-8 cannot write."""
+    line = refusal(capsys, "springs", *words)
+    assert "--out: expected text in UTF-8, found " in line
+    assert not list(tmp_path.iterdir())
+
+
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")
 def test_a_folder_without_permission(capsys, tmp_path):
     (tmp_path / "closed").mkdir(mode=0o500)

@@ -23,6 +23,7 @@ from antennate.cli.options import (
     option,
     options_of,
     read_words,
+    require_text,
 )
 from antennate.errors import ConfigError
 from antennate.messages import shown
@@ -104,8 +105,7 @@ def parse(
     given = {p: v for p, v in values.items() if p[0] not in names}
     for path, value in given.items():
         text = " ".join(map(str, value)) if isinstance(value, list | tuple) else str(value)
-        if text != text.encode(errors="replace").decode():
-            raise ConfigError(f"{flag_of(path)}: expected text in UTF-8, found {shown(text)}")
+        require_text(flag_of(path), text)
     config = _filled(model, base, given)
     _refuse_unread(config, given)
     return config, chosen
