@@ -24,8 +24,7 @@ from antennate.errors import (
     LogError,
     OutputError,
     WorkerError,
-    in_one_line,
-    where,
+    raised,
 )
 from antennate.experiments.running import keep, require_films, write_films
 from antennate.params.base import Params
@@ -277,7 +276,7 @@ def _words(experiment: Experiment[Any, Any], result: Any) -> tuple[Sequence[Tabl
             return tables, sentence
         found = f"{type(tables).__name__} and {type(sentence).__name__}"
     except Exception as error:  # noqa: BLE001 an experiment of anybody may raise anything
-        found = f"{in_one_line(error)}{where(error)}"
+        found = raised(error)
     raise BadInputError(
         f"{experiment.name}: expected tables to return a list of Table and sentence a text, "
         f"found {found}; what was measured is kept"
