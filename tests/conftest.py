@@ -14,6 +14,7 @@ import pytest
 from hypothesis import settings
 
 from antennate.lookup import ADDED
+from antennate.sim.engine_warnings import dropped
 
 settings.register_profile("any machine", deadline=None)  # how long an example takes says nothing
 settings.load_profile("any machine")
@@ -53,6 +54,13 @@ def _registries_stay_as_they_are() -> Iterator[None]:
     for group, objects in ADDED.items():
         objects.clear()
         objects.update(before.get(group, {}))
+
+
+@pytest.fixture(autouse=True)
+def _the_engine_leaves_no_log() -> Iterator[None]:
+    """It writes its warnings to `MUJOCO_LOG.TXT` in the working directory, that of the clone."""
+    with dropped():
+        yield
 
 
 OPTIONAL = {

@@ -120,6 +120,14 @@ def test_help_shows_unit_default_range_and_choices(capsys):
         assert f"{name} " in text
 
 
+def test_help_of_a_study_names_what_an_option_takes_and_every_plan(capsys):
+    assert main(["study", "--help"]) == 0
+    page = capsys.readouterr().out
+    assert "--assumed FLOAT" in page
+    first = page.split("\n\n")[1].lower()
+    assert all(plan in first for plan in ("grid", "list", "random", "sobol", "morris"))
+
+
 def test_the_door_opens_without_heavy_imports():
     code = (
         "import sys, antennate.cli as c; c.main(['--help']); "
@@ -320,6 +328,14 @@ def test_bad_folders(capsys, tmp_path):
     line = refusal(capsys, *QUICK, "--out", "mine")
     assert "found mine/config.toml; choose another or give --overwrite" in line
     assert [p.name for p in (tmp_path / "mine").iterdir()] == ["config.toml"]
+
+
+@pytest.mark.parametrize("words", [("--out", "bad\udcff"), ("--out=bad\udcff",)])
+def test_a_folder_whose_name_is_no_text_is_one_line_and_is_not_made(capsys, tmp_path, words):
+    """The shell's `$'bad\\xff'` comes as a lone surrogate (PEP 383), which UTF-8 cannot write."""
+    line = refusal(capsys, "springs", *words)
+    assert "--out: expected text in UTF-8, found " in line
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")

@@ -147,6 +147,6 @@ def test_bad_words_and_late_findings_are_one_line(
     plan('minimize = ["word"]')
     assert "expected a measure of" in refusal(capsys, *words("--workers", "1", out="later"))
     plan()
-    assert "--shard: expected a run whose trials" in refusal(capsys, *words("--shard", "1/2"))
+    assert "known flag, found '--shard'" in refusal(capsys, *words("--shard", "1/2"))
     monkeypatch.setitem(sys.modules, "optuna", None)
     assert "uv run --extra design antennate" in refusal(capsys, *words())

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -129,7 +130,7 @@ SILENT = "The robot was not armed: HOLD STALE: no fresh sample from the antenna 
     [
         ("1.3s", False, True, SILENT),
         ("1.3s", True, True, SILENT),
-        ("1.55s", False, False, "no command was sent; worst state HOLD (HOLD STALE: no fresh"),
+        ("1.55s", False, False, "no command was sent; worst state HOLD (STALE: no fresh"),
     ],
 )
 def test_L8_a_drive_that_sent_no_pose_ends_with_2_and_says_so(
@@ -162,7 +163,7 @@ def test_L8_a_drive_that_sent_no_pose_ends_with_2_and_says_so(
     assert main([*argv, "--out", str(tmp_path), "--overwrite"]) == 2
     text = " ".join(capsys.readouterr().out.split())
     assert said in text
-    assert text.count("HOLD STALE") == 1
+    assert text.count("STALE") == 1
     assert "touch" not in text  # a check that could not be done is not the reason
     result = json.loads((tmp_path / "result.json").read_text())
     assert result["worst_state"] == "HOLD"
@@ -217,7 +218,7 @@ def test_S1_S2_a_wire_that_broke_before_arming_is_named_while_one_waits_and_at_t
     side = fault.split("_")[1]
     asked = f"touch=(mend wire, plug or sensor of the {side} antenna, it is {cause}: "
     assert (asked in last) == (not skip)
-    assert out.count(f"HOLD {cause}: ") == 1
+    assert len(re.findall(rf"HOLD \(?{cause}: ", out)) == 1
     assert "--no-touch-check" not in out  # it would not help
     assert json.loads((tmp_path / "result.json").read_text())["worst_state"] == "HOLD"
 

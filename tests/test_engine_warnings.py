@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 import subprocess
 import sys
 from pathlib import Path
 
+import mujoco
 import pytest
 
 WARNING = "Nan, Inf or huge value in QVEL at DOF 0"
@@ -67,4 +69,18 @@ def test_commands_and_their_workers_leave_no_log_of_the_engine(
     said = python(tmp_path, "-m", "antennate", "tunnel", *words, "--out", "run")
     assert "engine warning" in (tmp_path / "run" / "trials.csv").read_text()
     assert WARNING not in said
+    assert not (tmp_path / LOG).exists()
+
+
+def test_tests_that_break_a_model_in_their_own_process_leave_no_log_either(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    model = mujoco.MjModel.from_xml_string(
+        "<mujoco><worldbody><body><freejoint/><geom size='1'/></body></worldbody></mujoco>"
+    )
+    data = mujoco.MjData(model)
+    data.qvel[0] = math.nan
+    mujoco.mj_step(model, data)
+    assert data.warning[mujoco.mjtWarning.mjWARN_BADQVEL].number == 1
     assert not (tmp_path / LOG).exists()

@@ -200,8 +200,43 @@ def test_a_refused_command_leaves_a_finished_run_as_it_is(
     capsys.readouterr()
     file = [str(plan)] if name == "design" else []
     assert main([name, *file, "--out", str(run), "--overwrite", *words]) == 2
-    assert f"{words[0]}: expected " in capsys.readouterr().err
+    assert f"expected a known flag, found '{words[0]}'" in capsys.readouterr().err
     assert {path: path.read_bytes() for path in run.rglob("*") if path.is_file()} == before
+
+
+@pytest.mark.parametrize("flag", ["--resume", "--retry"])
+def test_a_finished_run_takes_no_more_trials_and_says_so(
+    flag: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run = tmp_path / "run"
+    words = [*TUNNEL, "--no-figures", "--workers", "1", "--out", str(run)]
+    assert main(words) == 0
+    capsys.readouterr()
+    assert main([*words, "--trials", "4", flag]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert f"{run}: expected an unfinished run, found a finished one, which takes no more" in line
+    assert "choose another folder" in line
+
+
+IN_THIS_PROCESS = ["springs", "taper", "sensor", "ringdown", "servo", "tracks"]
+OF_WORKERS = {"workers", "engine", "slurm", "shard", "resume", "retry", "trial-timeout"}
+
+
+@pytest.mark.parametrize(
+    ("name", "missing"),
+    [
+        *((name, OF_WORKERS) for name in IN_THIS_PROCESS),
+        ("design", {"shard"}),
+        ("tunnel", set[str]()),
+    ],
+)
+def test_help_lists_no_option_that_is_always_refused(
+    name: str, missing: set[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A search does not know its trials beforehand, so no shards can divide them."""
+    assert main([name, "--help-all"]) == 0
+    listed = set(re.findall(r"^  --([a-z-]+)", capsys.readouterr().out, re.MULTILINE))
+    assert OF_WORKERS - listed == missing
 
 
 @pytest.mark.parametrize("workers", ["1", "2"])

@@ -132,6 +132,15 @@ def test_the_servo_follows_its_datasheet() -> None:
     assert servo.damping == pytest.approx(1.7 / 6.81, rel=1e-3)
 
 
+@pytest.mark.parametrize(("name", "most"), [("scuttle", 63.0), ("hexapod", 10.19)])
+def test_a_robot_that_its_legs_cannot_raise_is_refused(name: str, most: float) -> None:
+    """Datasheets: 12 legs of 33 mm at 1.7 N·m, 6 of 84 mm at 1.4 N·m; n τ / (g r)."""
+    words = RobotSpec.named(name).model_dump(exclude_unset=True)
+    assert RobotSpec(**words | {"mass": most}).mass == most
+    with pytest.raises(ValidationError, match=r"mass: expected at most .* kg, which the servos"):
+        RobotSpec(**words | {"mass": most + 0.02})
+
+
 def test_a_robot_lighter_than_its_legs_is_refused() -> None:
     with pytest.raises(ValidationError, match="mass must leave more than 10 g a link"):
         RobotSpec(mass=0.305)

@@ -379,11 +379,25 @@ def test_names_of_scenes_are_checked():
         check_start(TrialConfig(scene="no_such_module:Scene"))
 
 
-def test_an_error_in_ones_own_scene_names_it(tmp_path):
-    (tmp_path / "mine.py").write_text(
-        "class Mine:\n    random = False\n    def draw(self, robot, rng):\n        return 1 / 0\n"
-    )
-    with pytest.raises(AntennateError, match=r"mine\.py:Mine.*ZeroDivisionError"):
+@pytest.mark.parametrize(("line", "method"), [(5, "__init__"), (7, "draw"), (11, "build")])
+def test_an_error_in_ones_own_scene_names_it_and_its_line(tmp_path, line, method):
+    lines = [
+        "from antennate.sim.scenes.scene import Route",
+        "class Mine:",
+        "    random = False",
+        "    def __init__(self):",
+        "        pass",
+        "    def draw(self, robot, rng):",
+        "        drawn = Line([[0.0, 0.0], [1.0, 0.0]])",
+        "        return drawn",
+        "class Line(Route):",
+        "    def build(self, spec):",
+        "        super().build(spec)",
+    ]
+    assert f"def {method}(" in lines[line - 2]
+    lines[line - 1] = "        1 / 0"
+    (tmp_path / "mine.py").write_text("\n".join(lines))
+    with pytest.raises(AntennateError, match=rf"mine\.py:Mine.*ZeroDiv.*mine\.py:{line}\)"):
         check_start(TrialConfig(scene=f"{tmp_path / 'mine.py'}:Mine"))
 
 

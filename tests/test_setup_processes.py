@@ -46,6 +46,20 @@ def test_without_input_it_ends_with_one_plain_line(
     assert not (tmp_path / "robot.toml").exists()
 
 
+@pytest.mark.parametrize("of_the_file", [False, True])
+def test_a_pattern_of_ports_is_refused_where_both_are_known(
+    of_the_file: bool, tmp_path: Path
+) -> None:
+    if of_the_file:
+        (tmp_path / "robot.toml").write_text('[ports]\nbus = "one"\nesp32 = "two"\n')
+    known = [] if of_the_file else ["--bus", "one", "--esp32", "two"]
+    run = ran(["setup", *known, "--among", "ports/*"], tmp_path)
+    assert run.returncode == 2
+    (line,) = run.stderr.splitlines()
+    assert "--among: expected a port that is to be found" in line
+    assert "bus one and esp32 two" in line
+
+
 @pytest.mark.slow
 def test_zero_takes_a_script_and_keeps_what_else_is_in_the_file(
     twin: OrderedTwin, tmp_path: Path

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -15,12 +14,6 @@ from antennate.robots.spec import RobotSpec
 from antennate.sim import world as world_module
 from antennate.sim.scenes.tunnel import TunnelScene
 from antennate.sim.world import PREFIX, World, compile_world, new_spec
-
-
-@pytest.fixture(autouse=True)
-def _engine_log_goes_away(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The engine writes its warnings to a file in the working directory."""
-    monkeypatch.chdir(tmp_path)
 
 
 @pytest.fixture(scope="module")

@@ -76,10 +76,15 @@ def in_one_line(error: BaseException) -> str:
     return f"{name}: {text}"[:_LONGEST]
 
 
+def raised(error: BaseException) -> str:
+    """What a user's code raised, and the file and line of it, in one line."""
+    return f"{in_one_line(error)}{_where(error)}"
+
+
 _OURS, _PYTHON = Path(__file__).parent, Path(traceback.__file__).parent
 
 
-def where(error: BaseException) -> str:
+def _where(error: BaseException) -> str:
     """` (FILE:LINE)` of the user's code that raised an error; empty if it was none of the user's.
 
     It is the last place outside this package, and outside installed packages if there is one.

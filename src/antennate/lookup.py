@@ -13,7 +13,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, Generic, TypeVar, cast
 
-from antennate.errors import ConfigError, WorkerError, in_one_line, where
+from antennate.errors import ConfigError, WorkerError, raised
 from antennate.messages import nearest, shown
 
 T = TypeVar("T")
@@ -129,7 +129,7 @@ class Registry(Generic[T]):
             raise
         except BaseException as error:
             ours = isinstance(error, LookupError | FileNotFoundError) and str(error)[:3] == "no "
-            what = str(error) if ours else in_one_line(error) + where(error)
+            what = str(error) if ours else raised(error)
             raise ConfigError(f"expected a {self._kind} at {name!r}, found {what}") from error
         if not callable(found):
             raise ConfigError(

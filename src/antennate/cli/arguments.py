@@ -23,6 +23,7 @@ from antennate.cli.options import (
     option,
     options_of,
     read_words,
+    require_text,
 )
 from antennate.errors import ConfigError
 from antennate.messages import shown
@@ -61,6 +62,7 @@ def parse(
     argv: Sequence[str],
     options: type[Chosen],
     read: Callable[[Path], Config] | None = None,
+    without: Sequence[str] = (),
 ) -> tuple[Config, Chosen]:
     """Read the words of a command.
 
@@ -71,12 +73,14 @@ def parse(
         argv: Its words.
         options: Its other options.
         read: Reads a file that holds more than this configuration.
+        without: Fields of the other options that this command has not.
 
     Raises:
         ConfigError: A flag, the file or a value cannot be used.
         HelpRequest: Help was asked for.
     """
-    every, others = list(options_of(model())), list(options_of(options()))
+    every = list(options_of(model()))
+    others = [option for option in options_of(options()) if option.path[0] not in without]
     unread = {option.flag for option in every if ".".join(option.path) in model.unread}
     parameters = [option for option in every if option.flag not in unread]
     page = Command(command, description, model, parameters, others)
@@ -101,8 +105,7 @@ def parse(
     given = {p: v for p, v in values.items() if p[0] not in names}
     for path, value in given.items():
         text = " ".join(map(str, value)) if isinstance(value, list | tuple) else str(value)
-        if text != text.encode(errors="replace").decode():
-            raise ConfigError(f"{flag_of(path)}: expected text in UTF-8, found {shown(text)}")
+        require_text(flag_of(path), text)
     config = _filled(model, base, given)
     _refuse_unread(config, given)
     return config, chosen

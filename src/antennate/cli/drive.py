@@ -294,8 +294,10 @@ def _note(result: Mapping[str, Any]) -> str:
 
 def _sentence(result: Mapping[str, Any]) -> str:
     """What came out, in one sentence."""
-    why = f" ({result['why']})" if result["why"] else ""
-    worst = f"worst state {result['worst_state']}{why}"
+    state = result["worst_state"]
+    causes = [cause.removeprefix(f"{state} ") for cause in result["why"].split("; ")]
+    why = f" ({'; '.join(causes)})" if result["why"] else ""
+    worst = f"worst state {state}{why}"
     torque = _torque(result)
     if result["refusal"]:
         more = f"; {worst}" if result["why"] and result["why"] not in result["refusal"] else ""

@@ -15,7 +15,7 @@ from antennate.cli.exit_codes import BAD_INPUT, INTERRUPTED, OK
 from antennate.cli.options import option
 from antennate.cli.progress import progress, stop_signals
 from antennate.cli.results import drawn_table, folder_for, tell
-from antennate.cli.run_options import Options, go_on, refuse_workers, workers_of
+from antennate.cli.run_options import OF_WORKERS, Options, go_on, workers_of
 from antennate.cli.view_options import ViewOptions, require_viewable, say_by_hand, view_of
 from antennate.errors import (
     AntennateError,
@@ -24,8 +24,7 @@ from antennate.errors import (
     LogError,
     OutputError,
     WorkerError,
-    in_one_line,
-    where,
+    raised,
 )
 from antennate.experiments.running import keep, require_films, write_films
 from antennate.params.base import Params
@@ -90,6 +89,13 @@ def _options(experiment: Experiment[Any, Any]) -> type[Options]:
     return chosen
 
 
+def _without(experiment: Experiment[Any, Any]) -> Sequence[str]:
+    """Fields of the options that this experiment has not."""
+    if not experiment.on_workers:
+        return OF_WORKERS
+    return () if experiment.in_shards else ("shard",)
+
+
 def _filmed(options: Options) -> int | None:
     """The trial to film, None for none."""
     wanted = isinstance(options, FilmOptions) and options.video
@@ -103,7 +109,12 @@ def command(experiment: Experiment[Any, Any], argv: Sequence[str]) -> int:
         AntennateError: As below, or something given cannot be used.
     """
     config, options = parse(
-        experiment.name, experiment.description, experiment.config, argv, _options(experiment)
+        experiment.name,
+        experiment.description,
+        experiment.config,
+        argv,
+        _options(experiment),
+        without=_without(experiment),
     )
     experiment.check(config)
     trial = _filmed(options)
@@ -135,7 +146,7 @@ def carry_out(
             what was measured is kept and shown first.
     """
     require_viewable(options, config)
-    _require_trials(experiment, options)
+    _require_unfinished(options)
     apart = experiment.continued or bool(code_named(config.model_dump(mode="json")))
     workers = workers_of(options, closed=shards is not None, apart=apart)
     logs = isinstance(options, LogOptions) and options.log
@@ -176,24 +187,17 @@ def carry_out(
         return _end(experiment, config, options, run, outcome, None if shards else argv)
 
 
-def _require_trials(experiment: Experiment[Any, Any], options: Options) -> None:
-    """Refuse what is for trials on workers, before a folder is touched.
+def _require_unfinished(options: Options) -> None:
+    """Refuse a shard of what is finished, before the folder is touched.
 
     Raises:
-        ConfigError: The experiment has none, or they cannot be divided.
+        ConfigError: The folder holds a result.
     """
-    if options.shard is not None and not (experiment.on_workers and experiment.in_shards):
-        raise ConfigError(
-            "--shard: expected a run whose trials are known from the start, found "
-            f"{experiment.name}"
-        )
     finished = options.out is not None and (options.out / RESULT).exists()
     if options.shard is not None and finished and not options.overwrite:
         raise ConfigError(
             f"--shard: expected a folder without a finished run, found {RESULT} in {options.out}"
         )
-    if not experiment.on_workers:
-        refuse_workers(options, f"none, as {experiment.name} runs no trials on workers")
 
 
 def _outcome(
@@ -272,7 +276,7 @@ def _words(experiment: Experiment[Any, Any], result: Any) -> tuple[Sequence[Tabl
             return tables, sentence
         found = f"{type(tables).__name__} and {type(sentence).__name__}"
     except Exception as error:  # noqa: BLE001 an experiment of anybody may raise anything
-        found = f"{in_one_line(error)}{where(error)}"
+        found = raised(error)
     raise BadInputError(
         f"{experiment.name}: expected tables to return a list of Table and sentence a text, "
         f"found {found}; what was measured is kept"

@@ -178,7 +178,7 @@ def _option(path: tuple[str, ...], model: type, default: Any) -> Option | None:
     if not switch and not kinds & {*_METAVARS}:
         return None  # a list of tables, for a file only
     known = next((text for kind, text in _METAVARS.items() if kind in kinds), "")
-    known = "NAME" if field.examples else known
+    known = "NAME" if field.examples and str in kinds else known
     metavar = "{" + ",".join(map(str, choices)) + "}" if choices else known
     return Option(
         path=path,
@@ -251,7 +251,7 @@ def read_words(argv: Sequence[str], options: Sequence[Option]) -> dict[tuple[str
     by_flag = {flag: option for option in options for flag in option.flags}
     values: dict[tuple[str, ...], Any] = {}
     free = [option for option in options if option.positional]
-    for name, words in _groups(argv):
+    for name, words in flags_and_words(argv):
         option = _named_by(name, by_flag)
         if option is None:
             rest = words
@@ -276,6 +276,16 @@ def read_words(argv: Sequence[str], options: Sequence[Option]) -> dict[tuple[str
     return values
 
 
+def require_text(flag: str, text: str) -> None:
+    """Refuse words of the shell that no file of text can keep.
+
+    Raises:
+        ConfigError: They are not in UTF-8.
+    """
+    if text != text.encode(errors="replace").decode():
+        raise ConfigError(f"{flag}: expected text in UTF-8, found {shown(text)}")
+
+
 _ELSEWHERE = {
     "--log": "tunnel, gait and twin take it; drive and teleop always keep a log",
     "--video": "tunnel, gait, wall, touch, sweep, ringdown, calibrate, force and twin take it; "
@@ -295,7 +305,7 @@ def _named_by(flag: str, by_flag: Mapping[str, Option]) -> Option | None:
     return by_flag.get(flag)
 
 
-def _groups(argv: Sequence[str]) -> Iterator[tuple[str, list[str]]]:
+def flags_and_words(argv: Sequence[str]) -> Iterator[tuple[str, list[str]]]:
     """Each flag with the words up to the next one; first those before any flag, without one."""
     name, words = "", list[str]()
     for word in argv:

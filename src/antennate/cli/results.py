@@ -12,7 +12,7 @@ from typing import Any
 from pydantic.dataclasses import dataclass
 
 from antennate.cli.arguments import FromFile
-from antennate.cli.options import option
+from antennate.cli.options import flags_and_words, option, require_text
 from antennate.cli.output import write_result
 from antennate.errors import BadInputError
 from antennate.params.base import Params
@@ -59,9 +59,12 @@ def folder_for(
         command: Name of the command, if it is not that of the view.
 
     Raises:
-        BadInputError: The run that is to go on is another one.
+        BadInputError: The run that is to go on is another one, or no file can keep the words.
         OutputError: It cannot be written, or it holds another run.
     """
+    for flag, words in flags_and_words(argv):
+        for word in words:
+            require_text(flag or view.name, word)
     place = (view.name, options.out, options.overwrite, identity, resume, retry)
     with RunDirectory.create(*place) as folder:
         folder.describe(config, ["antennate", command or view.name, *argv])

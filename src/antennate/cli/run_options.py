@@ -19,12 +19,16 @@ from antennate.studies.pool import TIMEOUT, Workers, core_count
 
 @dataclass(frozen=True)
 class Options(ResultOptions):
-    """How to run; nothing here changes a result."""
+    """How to run; nothing here changes a result, but for another engine."""
 
     workers: int | None = option(None, "processes to use, else one for each core", "INT", ge=1)
     no_figures: bool = option(False, "draw no figures")
-    resume: bool = option(False, "go on with the run that the folder holds", needs=["--out"])
-    retry: bool = option(False, "resume, and run crashed or hung trials again", needs=["--out"])
+    resume: bool = option(
+        False, "go on with the run that the folder holds, if there is one", needs=["--out"]
+    )
+    retry: bool = option(
+        False, "resume, and run crashed or hung trials again, if there are any", needs=["--out"]
+    )
     engine: str = option(
         LOCAL,
         f"where the workers are: {', '.join(EVERYWHERE)}; for tunnel, wall and studies of them "
@@ -67,12 +71,13 @@ def refuse_workers(options: Any, expected: str) -> None:
     """
     for name, field in fields_of(type(options)).items():
         value = getattr(options, name)
-        if name in _OF_WORKERS and value != field.default and (name, value) != ("workers", 1):
+        if name in OF_WORKERS and value != field.default and (name, value) != ("workers", 1):
             told = "one" if value is True else found(value)
             raise ConfigError(f"{flag_of((name,))}: expected {expected}, found {told}")
 
 
-_OF_WORKERS = ("workers", "engine", "slurm", "shard", "resume", "retry", "trial_timeout")
+OF_WORKERS = ("workers", "engine", "slurm", "shard", "resume", "retry", "trial_timeout")
+"""Options that only trials on workers have."""
 _SAID_ANEW = {"--out": 1, "--overwrite": 0, "--no-overwrite": 0, "--resume": 0, "--no-resume": 0}
 """Flags that are left out of the words that go on, and how many values each has."""
 

@@ -71,6 +71,11 @@ def command(argv: Sequence[str]) -> int:
 
 
 def _check(config: SetupConfig, orders: Orders) -> None:
+    if orders.among and orders.bus and orders.esp32:
+        raise ConfigError(
+            f"--among: expected a port that is to be found, found both known, bus {orders.bus} and "
+            f"esp32 {orders.esp32}; leave it out"
+        )
     known = config.robot.joint_names
     for name in orders.only:
         if name not in known:

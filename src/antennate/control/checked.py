@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from antennate.errors import ControllerError, in_one_line, where
+from antennate.errors import ControllerError, raised
 from antennate.robots.spec import RobotSpec
 from antennate.types import (
     AntennaFrame,
@@ -63,7 +63,7 @@ class CheckedController:
         except KeyboardInterrupt:
             raise
         except BaseException as error:
-            raise ControllerError(f"reset raised {in_one_line(error)}{where(error)}") from error
+            raise ControllerError(f"reset raised {raised(error)}") from error
 
     def step(self, frame: AntennaFrame) -> JointCommand:
         """One control period of all rows.
@@ -82,7 +82,7 @@ class CheckedController:
         except (KeyboardInterrupt, ControllerError):
             raise
         except BaseException as error:
-            raise ControllerError(f"step raised {in_one_line(error)}{where(error)}") from error
+            raise ControllerError(f"step raised {raised(error)}") from error
         if not sound:
             self._find_faults(command)
         return command

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from antennate.control import controllers
-from antennate.errors import ConfigError, in_one_line
+from antennate.errors import ConfigError, raised
 from antennate.lookup import Registry
 from antennate.params.control import ControlParams
 from antennate.robots.spec import RobotSpec
@@ -55,7 +55,7 @@ def make_controller(
     except BaseException as error:
         raise ConfigError(
             f"expected a controller that is made from (control, robot, batch), found {name!r}: "
-            f"{in_one_line(error)}"
+            f"{raised(error)}"
         ) from error
     if lacking := [part for part in ("reset", "step") if not callable(getattr(made, part, None))]:
         raise ConfigError(

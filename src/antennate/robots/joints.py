@@ -44,6 +44,28 @@ class JointParams(Params):
         """Largest angle either way [rad], inf for a joint that turns without end."""
         return math.inf
 
+    def require_lists(self, name: str, count: int) -> None:
+        """Refuse lists of a wrong length, and zeros without room for a quarter turn either way.
+
+        Args:
+            name: What the group is called.
+            count: Number of its joints.
+
+        Raises:
+            ValueError: There is such a list.
+        """
+        for what in ("ids", "directions", "zeros"):
+            if (found := len(getattr(self, what))) not in (0, count):
+                raise ValueError(
+                    f"{name}.{what}: expected one for each of the {count} joints, found {found}"
+                )
+        for zero in self.zeros if math.isfinite(self.largest) else ():
+            if not QUARTER <= zero <= STRAIGHT + QUARTER:
+                raise ValueError(
+                    f"{name}.zeros must leave a quarter turn to both sides, {QUARTER} to "
+                    f"{STRAIGHT + QUARTER} ticks, found {zero}"
+                )
+
 
 class YawParams(JointParams):
     """The yaw joints between links, head first."""

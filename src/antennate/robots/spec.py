@@ -18,7 +18,6 @@ from antennate.params.base import Params, number
 from antennate.params.reading import read_file
 from antennate.robots.antenna import BASE, AntennaSpec
 from antennate.robots.joints import (
-    QUARTER,
     STRAIGHT,
     BaseParams,
     JointParams,
@@ -34,6 +33,8 @@ ROBOTS = ("scuttle", "hexapod")
 """Robots that are known by name; each is a file beside this one."""
 CLEARANCE = 0.002
 """Gap that neighbouring legs keep at the largest bend [m] (assumed: play of printed parts)."""
+_GRAVITY = 9.81
+"""As in the engine [m/s²]."""
 ANTENNA_PREFIXES = tuple(f"antenna_{side}_" for side in SIDES)
 
 
@@ -150,6 +151,13 @@ class RobotSpec(Params):
         """Mass of one link without its legs [kg]."""
         antennae = self.antenna_count * self.antenna.mass
         return (self.mass - self.leg_count * self.leg_mass - antennae) / self.links
+
+    @property
+    def most_mass(self) -> float:
+        """Mass that all legs together raise at stall torque, each at the end of its leg [kg]."""
+        lever = self.leg_radius + self.leg_eccentricity
+        torque = self.leg_count * self.servos.of(self.legs.servo).stall_torque
+        return torque / (_GRAVITY * lever)
 
     @property
     def link_names(self) -> tuple[str, ...]:
@@ -281,7 +289,7 @@ class RobotSpec(Params):
     @model_validator(mode="after")
     def _agree(self) -> RobotSpec:
         for name, group, count in self.groups:
-            _check_group(name, group, count)
+            group.require_lists(name, count)
             speed = self.servos.of(group.servo).no_load_speed
             if group.fastest > speed:
                 raise ValueError(
@@ -306,11 +314,7 @@ class RobotSpec(Params):
             raise ValueError(
                 f"ids: expected each once, found {', '.join(map(str, doubled))} more than once"
             )
-        if self.link_mass <= 0.01:
-            raise ValueError(
-                f"mass must leave more than 10 g a link beside legs and antennae, found "
-                f"{self.mass} kg"
-            )
+        _check_mass(self)
         if self.legs.reach is not None and self.hip < 0:
             raise ValueError(
                 f"legs.reach: expected at most {self.legs.reach + self.hip:g} m, half the width "
@@ -331,16 +335,14 @@ def require_antennae(robot: RobotSpec, what: str) -> None:
         )
 
 
-def _check_group(name: GroupName, group: JointParams, count: int) -> None:
-    """Refuse lists of a wrong length, and zeros without room for a quarter turn either way."""
-    for what in ("ids", "directions", "zeros"):
-        if (found := len(getattr(group, what))) not in (0, count):
-            raise ValueError(
-                f"{name}.{what}: expected one for each of the {count} joints, found {found}"
-            )
-    for zero in group.zeros if math.isfinite(group.largest) else ():
-        if not QUARTER <= zero <= STRAIGHT + QUARTER:
-            raise ValueError(
-                f"{name}.zeros must leave a quarter turn to both sides, {QUARTER} to "
-                f"{STRAIGHT + QUARTER} ticks, found {zero}"
-            )
+def _check_mass(robot: RobotSpec) -> None:
+    """Refuse links without a mass, and a robot that its legs cannot raise."""
+    if robot.link_mass <= 0.01:
+        raise ValueError(
+            f"mass must leave more than 10 g a link beside legs and antennae, found {robot.mass} kg"
+        )
+    if robot.mass > robot.most_mass:
+        raise ValueError(
+            f"mass: expected at most {robot.most_mass:.3g} kg, which the servos of all legs raise "
+            f"at their stall torque, found {robot.mass:g}"
+        )

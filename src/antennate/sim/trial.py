@@ -13,7 +13,7 @@ import numpy as np
 from pydantic import field_validator, model_validator
 
 from antennate.control.gait import targets
-from antennate.errors import AntennateError, SceneError, in_one_line, where
+from antennate.errors import AntennateError, SceneError, raised
 from antennate.messages import shortened
 from antennate.params.base import Params, number
 from antennate.params.control import ControlParams, GaitParams
@@ -171,7 +171,7 @@ def _errors_of(name: str) -> Iterator[None]:
     except AntennateError:
         raise
     except Exception as error:
-        raise SceneError(f"scene {name!r} failed: {in_one_line(error)}") from error
+        raise SceneError(f"scene {name!r} failed: {raised(error)}") from error
 
 
 def progress_of(scene: SceneInstance, head: Floats) -> float:
@@ -200,7 +200,7 @@ def _answer(
     try:
         found = getattr(scene, name)(head.copy())
     except Exception as error:
-        raise SceneError(f"scene: {name} raised {in_one_line(error)}{where(error)}") from error
+        raise SceneError(f"scene: {name} raised {raised(error)}") from error
     if not fits(found):
         raise SceneError(
             f"scene: expected {name} to return {wanted}, found {shortened(repr(found))}"

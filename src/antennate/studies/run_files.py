@@ -57,9 +57,13 @@ def files_of(place: Path) -> list[Path]:
 
 def holds_run(place: Path, held: Sequence[Path], resume: bool) -> OutputError:
     """The error of a directory that holds another run, whose files are given."""
-    found = "a finished one" if resume and place / RESULT in held else held[0]
+    if resume and place / RESULT in held:
+        return OutputError(
+            f"{place}: expected an unfinished run, found a finished one, which takes no more "
+            "trials; choose another folder, or give --overwrite to run all of them anew"
+        )
     return OutputError(
-        f"expected {'an unfinished run' if resume else 'a folder without a run'}, found {found}; "
+        f"expected {'an unfinished run' if resume else 'a folder without a run'}, found {held[0]}; "
         "choose another or give --overwrite"
         + (" or --resume" if place / STORE in held and not resume else "")
     )

@@ -16,6 +16,7 @@ from antennate.control.registry import ControllerFactory, make_controller
 from antennate.errors import ConfigError, ControllerError
 from antennate.params.control import ControlParams
 from antennate.params.reading import from_values
+from antennate.robots.spec import RobotSpec
 from antennate.sim.scenes.registry import make_scene
 from antennate.sim.sim_robot import SimRobot
 from antennate.sim.trial import (
@@ -30,7 +31,7 @@ from antennate.sim.trial import (
 from antennate.telemetry.header import Header
 from antennate.telemetry.simulated import Decisions, SimulatedLog
 from antennate.telemetry.time_series import TimeSeries, TimeSeriesRecorder
-from antennate.types import AntennaFrame, JointCommand
+from antennate.types import AntennaFrame, Controller, JointCommand
 
 
 def simulate(
@@ -64,12 +65,7 @@ def simulate(
         ControllerError: The controller raised an exception, or what it answers is no command.
         LogError: The log cannot be written.
     """
-    if not isinstance(trial, Integral) or trial < 0:
-        raise ConfigError(f"trial: expected a whole number of at least 0, found {trial!r}")
-    if not (isinstance(time_limit, Real) and 0.0 < time_limit < math.inf):
-        raise ConfigError(f"time_limit: expected a finite time above 0 [s], found {time_limit!r}")
-    if log is not None and Path(log).suffix != ".mcap":
-        raise ConfigError(f"log: expected a name with .mcap, found {log}")
+    _require(trial, time_limit, log)
     config, control = from_values(TrialConfig, settings), control or ControlParams()
     try:
         require_own_curves(config.robot, control)
@@ -82,27 +78,9 @@ def simulate(
     robot = SimRobot(1, config.robot, control.period, config.physics.timestep)
     robot.load(0, start.world, start.chance)
     controlling.reset(np.array([0]), start.phase)
-    recorder = TimeSeriesRecorder(controlling, lambda: start.world.head[:2])
-    checked = CheckedController(controlling, config.robot, 1)
+    walk = _Walk(config.robot, robot, controlling, start, time_limit)
     name = controller if isinstance(controller, str) else _name(controller)
-    decisions = Decisions(config.robot, controlling)
-    ticks, outcome = 0, "timeout"
-
-    def go_on(frame: AntennaFrame, command: JointCommand) -> bool:
-        nonlocal ticks, outcome
-        if checked.faults:
-            raise ControllerError(f"tick {ticks + 1}: {checked.faults[0]}")
-        recorder.take(frame, command)
-        if kept is not None:
-            kept.take(decisions.take(frame, command))
-        ticks += 1
-        outcome = "invalid" if robot.failures else "timeout"
-        if outcome == "timeout" and ticks % LOOK_EVERY == 0:
-            outcome = _seen(start)
-        return outcome == "timeout" and start.world.t < time_limit
-
     with contextlib.ExitStack() as stack:
-        kept = None
         if log is not None:
             header = Header(
                 controller=name,
@@ -112,18 +90,85 @@ def simulate(
                 trial=trial,
                 phase=start.phase,
             )
-            kept = stack.enter_context(SimulatedLog(Path(log), header, start.world, decisions))
-        run_loop(robot, checked, control.period, go_on)
-    return recorder.series(
+            kept = SimulatedLog(Path(log), header, start.world, walk.decisions)
+            walk.log = stack.enter_context(kept)
+        run_loop(robot, walk.checked, control.period, walk.go_on)
+    return walk.recorder.series(
         {
             "controller": name,
             "scene": config.scene,
             "seed": config.seed,
             "trial": trial,
             "period_s": control.period,
-            "outcome": outcome,
+            "outcome": walk.outcome,
         }
     )
+
+
+def _require(trial: int, time_limit: float, log: str | Path | None) -> None:
+    """Refuse what no trial can have.
+
+    Raises:
+        ConfigError: It is given.
+    """
+    if not isinstance(trial, Integral) or trial < 0:
+        raise ConfigError(f"trial: expected a whole number of at least 0, found {trial!r}")
+    if not (isinstance(time_limit, Real) and 0.0 < time_limit < math.inf):
+        raise ConfigError(f"time_limit: expected a finite time above 0 [s], found {time_limit!r}")
+    if log is not None and Path(log).suffix != ".mcap":
+        raise ConfigError(f"log: expected a name with .mcap, found {log}")
+
+
+class _Walk:
+    """One trial while it goes on: it is recorded, and ended.
+
+    Args:
+        spec: The robot's description.
+        robot: The robot, with the trial in its only row.
+        controller: What moves it.
+        start: The trial.
+        time_limit: Time after which it ends [s].
+
+    Attributes:
+        checked: The controller with its answers checked.
+        recorder: What was read, decided and commanded.
+        decisions: The same for a log.
+        log: Takes them, None if none is kept.
+        outcome: How it has ended, `timeout` so far.
+    """
+
+    def __init__(
+        self,
+        spec: RobotSpec,
+        robot: SimRobot,
+        controller: Controller,
+        start: Trial,
+        time_limit: float,
+    ) -> None:
+        self._robot, self._start, self._time_limit = robot, start, time_limit
+        self.recorder = TimeSeriesRecorder(controller, lambda: start.world.head[:2])
+        self.checked = CheckedController(controller, spec, 1)
+        self.decisions = Decisions(spec, controller)
+        self.log: SimulatedLog | None = None
+        self.outcome = "timeout"
+        self._ticks = 0
+
+    def go_on(self, frame: AntennaFrame, command: JointCommand) -> bool:
+        """Keep a tick; whether there is a next one.
+
+        Raises:
+            ControllerError: What the controller answered is no command.
+        """
+        if self.checked.faults:
+            raise ControllerError(f"tick {self._ticks + 1}: {self.checked.faults[0]}")
+        self.recorder.take(frame, command)
+        if self.log is not None:
+            self.log.take(self.decisions.take(frame, command))
+        self._ticks += 1
+        self.outcome = "invalid" if self._robot.failures else "timeout"
+        if self.outcome == "timeout" and self._ticks % LOOK_EVERY == 0:
+            self.outcome = _seen(self._start)
+        return self.outcome == "timeout" and self._start.world.t < self._time_limit
 
 
 def _name(factory: ControllerFactory) -> str:

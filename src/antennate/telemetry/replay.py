@@ -12,7 +12,7 @@ from pydantic import field_validator
 
 from antennate.control.loop import run_loop
 from antennate.control.registry import BUILT_IN, CONTROLLERS, make_controller
-from antennate.errors import LogError, in_one_line, where
+from antennate.errors import LogError, raised
 from antennate.hardware.driving.decision import Decision, decision_of, no_command
 from antennate.messages import shortened
 from antennate.params.base import Params, number
@@ -122,7 +122,7 @@ class _Guarded:
         except KeyboardInterrupt:
             raise
         except BaseException as error:  # noqa: BLE001 a plugged-in controller may raise anything
-            self._note(f"{in_one_line(error)}{where(error)}")
+            self._note(raised(error))
             return no_command(self._robot)
 
     def _note(self, failure: str) -> None:

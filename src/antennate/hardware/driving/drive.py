@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import math
 from collections.abc import Callable
+from functools import partial
 
 from antennate.control.loop import run_loop
 from antennate.hardware.driving.config import DriveConfig
@@ -40,55 +41,14 @@ def drive(
         on_tick: Called after every tick with the session and the time [s].
         operator: Who may stop it. Its signals are ignored afterwards.
     """
-    report, clock = Report(), session.clock
-    start = clock.now()
-    dry = DryRun(
-        session.quality, config.dry_run, config.touch.patience, arm, config.duration or math.inf
-    )
-    failed_at = math.inf
-    key = None if operator.pressed is None else DeadMan(config.dead_man, operator.pressed)
-    session.orders.released = key is not None
-
-    def failed(t: float) -> bool:
-        """Whether the time to look at a fault is over, and torque can be taken off now or never."""
-        nonlocal failed_at
-        state = State.OK if session.outputs is None else session.outputs.state
-        if t > dry.over + config.limits.longest_arming and state >= State.FAULT:
-            failed_at = min(failed_at, t)
-        if state is State.OFF and t > failed_at:
-            return True
-        wait = max(config.fault_time, config.bus_return if session.mute else 0.0)
-        return t >= failed_at + wait
-
-    def go_on(frame: AntennaFrame, command: JointCommand) -> bool:
-        t = clock.now() - start
-        if operator.watches():
-            dry.step(t, session.outputs)
-        session.orders.arm = dry.asks
-        if key is not None:
-            key.step(t, session.actuators.enabled)
-            session.orders.released = key.released
-        report.refusal = dry.refusal
-        report.watch(session)
-        on_tick(session, clock.now())
-        over = failed(t)
-        at_end = "a fault" if failed_at < math.inf else "the end of its time"
-        reasons = (
-            (stop.received, _SIGNAL),
-            (key is not None and key.over, "a key that was let go"),
-            (operator.arrived(), "arrival"),
-            (t >= dry.end, "a refusal of torque" if dry.refusal else at_end),
-            (over, "a fault"),
-        )
-        report.ended = next((text for true, text in reasons if true), "")
-        return not report.ended
-
+    going = _Going(session, config, arm, on_tick, operator)
+    report = going.report
     with contextlib.nullcontext(operator.stop) if operator.stop else StopOnce() as stop:
         stop.insists, stop.within = True, run_loop
         try:
             try:
                 stop.closed = False
-                run_loop(session, session.control, session.period, go_on)
+                run_loop(session, session.control, session.period, partial(going.step, stop))
             finally:
                 stop.closed = True
         except KeyboardInterrupt as error:  # of a signal, or of a controller that asks to end
@@ -98,6 +58,71 @@ def drive(
             report.on = _off(session, config.stand)
             report.close(session)
     return report
+
+
+class _Going:
+    """A drive while it goes on: what is asked of the session in each tick, and when it ends.
+
+    Args are those of `drive`.
+
+    Attributes:
+        report: What came of it.
+    """
+
+    def __init__(
+        self,
+        session: Session,
+        config: DriveConfig,
+        arm: bool,
+        on_tick: Callable[[Session, float], None],
+        operator: Operator,
+    ) -> None:
+        self._session, self._config, self._on_tick = session, config, on_tick
+        self._operator = operator
+        self.report = Report()
+        self._start = session.clock.now()
+        patience, longest = config.touch.patience, config.duration or math.inf
+        self._dry = DryRun(session.quality, config.dry_run, patience, arm, longest)
+        self._failed_at = math.inf
+        pressed = operator.pressed
+        self._key = None if pressed is None else DeadMan(config.dead_man, pressed)
+        session.orders.released = self._key is not None
+
+    def step(self, stop: StopOnce, frame: AntennaFrame, command: JointCommand) -> bool:
+        """After a tick: whether there is a next one, unless a signal or something else ends it."""
+        session, dry, key = self._session, self._dry, self._key
+        t = session.clock.now() - self._start
+        if self._operator.watches():
+            dry.step(t, session.outputs)
+        session.orders.arm = dry.asks
+        if key is not None:
+            key.step(t, session.actuators.enabled)
+            session.orders.released = key.released
+        self.report.refusal = dry.refusal
+        self.report.watch(session)
+        self._on_tick(session, session.clock.now())
+        over = self._failed(t)
+        at_end = "a fault" if self._failed_at < math.inf else "the end of its time"
+        reasons = (
+            (stop.received, _SIGNAL),
+            (key is not None and key.over, "a key that was let go"),
+            (self._operator.arrived(), "arrival"),
+            (t >= dry.end, "a refusal of torque" if dry.refusal else at_end),
+            (over, "a fault"),
+        )
+        self.report.ended = next((text for true, text in reasons if true), "")
+        return not self.report.ended
+
+    def _failed(self, t: float) -> bool:
+        """Whether the time to look at a fault is over, and torque can be taken off now or never."""
+        outputs, config = self._session.outputs, self._config
+        state = State.OK if outputs is None else outputs.state
+        if t > self._dry.over + config.limits.longest_arming and state >= State.FAULT:
+            self._failed_at = min(self._failed_at, t)
+        if state is State.OFF and t > self._failed_at:
+            return True
+        wait = max(config.fault_time, config.bus_return if self._session.mute else 0.0)
+        return t >= self._failed_at + wait
 
 
 def _off(session: Session, stand: float) -> list[int] | None:

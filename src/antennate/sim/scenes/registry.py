@@ -6,7 +6,7 @@ from collections.abc import Callable
 from multiprocessing import parent_process
 from pathlib import Path
 
-from antennate.errors import AntennateError, ConfigError, SceneError, in_one_line
+from antennate.errors import AntennateError, ConfigError, SceneError, raised
 from antennate.lookup import Registry
 from antennate.params.scene import TunnelParams
 from antennate.sim.scenes.mjcf import MjcfScene
@@ -56,9 +56,7 @@ def make_scene(name: str, tunnel: TunnelParams | None = None) -> Scene:
     except AntennateError:
         raise
     except Exception as error:
-        raise SceneError(
-            f"--scene: expected to make {name!r}, found {in_one_line(error)}"
-        ) from error
+        raise SceneError(f"--scene: expected to make {name!r}, found {raised(error)}") from error
 
 
 def _is_file(name: str) -> bool:
