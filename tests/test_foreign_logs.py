@@ -32,12 +32,13 @@ def log(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return Path("log.mcap")
 
 
-def anew(log: Path, time: int | None = None, **how: Any) -> Path:
+def anew(log: Path, time: int | None = None, number: int | None = None, **how: Any) -> Path:
     """The same messages, written by the package `mcap`.
 
     Args:
         log: The log.
         time: Time of all messages [ns], None for their own.
+        number: Number of all messages, None for their own.
         how: What its writer is told.
     """
     copy = log.with_name("new.mcap")
@@ -50,7 +51,8 @@ def anew(log: Path, time: int | None = None, **how: Any) -> Path:
                 kind = writer.register_schema(schema.name, schema.encoding, schema.data)
                 channels[channel.topic] = writer.register_channel(channel.topic, "cdr", kind)
             at = message.log_time if time is None else time
-            writer.add_message(channels[channel.topic], at, message.data, at, message.sequence)
+            each = message.sequence if number is None else number
+            writer.add_message(channels[channel.topic], at, message.data, at, each)
         writer.finish()
     return copy
 
@@ -154,6 +156,20 @@ def test_a_long_log_without_chunks_keeps_the_parts_of_a_tick_together(tmp_path: 
     with LogReader(anew(long, use_chunking=False)) as log:
         assert [each.positions for each in log] == [(number,) for number in range(1, count + 1)]
         assert (log.bad, log.missing, log.guarded) == (0, 0, False)
+
+
+def test_a_file_that_continues_a_log_may_have_any_numbers(
+    log: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The number of a tick is in its message; that of a message is the other program's."""
+    more = [replace(tick(number), now=float(number)) for number in range(TICKS + 1, TICKS + 4)]
+    with LogWriter(Path("next.mcap"), HEADER, 0.0) as out:
+        for each in more:
+            out.write(each)
+    anew(Path("next.mcap"), number=0).rename("log-2.mcap")
+    code, found, _ = info(log, capsys)
+    assert (code, found["ticks"], found["closed"]) == (0, TICKS + 3, True)
+    assert ticks_of(log) == WRITTEN + [each.pack() for each in more]
 
 
 def test_damage_to_an_unguarded_log_is_named_where_it_shows(
