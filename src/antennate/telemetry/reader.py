@@ -275,15 +275,13 @@ class LogReader:
 
     def _header(self) -> Header:
         """The header, from the first chunks; other programs may divide them in another way."""
-        begin: list[Chunk] = []
         for chunk in self._places:
-            begin.append(chunk)
             self._learn(chunk)
             self._first |= self._of_header(chunk)
             topics = {self._channels.get(message.channel) for message in chunk.messages}
             if topics.difference(HEADER_TOPICS) or len(self._first) == len(HEADER_TOPICS):
+                self._places = chain([chunk], self._places)
                 break
-        self._places = chain(begin, self._places)
         if self._first and self._declared:
             try:
                 return Header.of_messages(self._first)
