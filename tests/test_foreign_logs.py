@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import resource
 import struct
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -32,12 +34,20 @@ def log(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return Path("log.mcap")
 
 
-def anew(log: Path, time: int | None = None, **how: Any) -> Path:
+def anew(
+    log: Path,
+    time: int | None = None,
+    number: int | None = None,
+    more: Iterable[tuple[int, bytes]] = (),
+    **how: Any,
+) -> Path:
     """The same messages, written by the package `mcap`.
 
     Args:
         log: The log.
         time: Time of all messages [ns], None for their own.
+        number: Number of all messages, None for their own.
+        more: Time [ns] and bytes of more messages in /antenna.
         how: What its writer is told.
     """
     copy = log.with_name("new.mcap")
@@ -50,7 +60,10 @@ def anew(log: Path, time: int | None = None, **how: Any) -> Path:
                 kind = writer.register_schema(schema.name, schema.encoding, schema.data)
                 channels[channel.topic] = writer.register_channel(channel.topic, "cdr", kind)
             at = message.log_time if time is None else time
-            writer.add_message(channels[channel.topic], at, message.data, at, message.sequence)
+            each = message.sequence if number is None else number
+            writer.add_message(channels[channel.topic], at, message.data, at, each)
+        for at, data in more:
+            writer.add_message(channels["/antenna"], at, data, at)
         writer.finish()
     return copy
 
@@ -154,6 +167,36 @@ def test_a_long_log_without_chunks_keeps_the_parts_of_a_tick_together(tmp_path: 
     with LogReader(anew(long, use_chunking=False)) as log:
         assert [each.positions for each in log] == [(number,) for number in range(1, count + 1)]
         assert (log.bad, log.missing, log.guarded) == (0, 0, False)
+
+
+def test_a_file_that_continues_a_log_may_have_any_numbers(
+    log: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The number of a tick is in its message; that of a message is the other program's."""
+    more = [replace(tick(number), now=float(number)) for number in range(TICKS + 1, TICKS + 4)]
+    with LogWriter(Path("next.mcap"), HEADER, 0.0) as out:
+        for each in more:
+            out.write(each)
+    anew(Path("next.mcap"), number=0).rename("log-2.mcap")
+    code, found, _ = info(log, capsys)
+    assert (code, found["ticks"], found["closed"]) == (0, TICKS + 3, True)
+    assert ticks_of(log) == WRITTEN + [each.pack() for each in more]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("time", [-1, 0], ids=["backwards", "one time"])
+def test_a_small_file_of_very_long_messages_is_refused(
+    time: int, log: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """It would take 2.2 GB of memory to order them."""
+    long = anew(log, more=[(LAST + time * number, bytes(60_000_000)) for number in range(37)])
+    assert long.stat().st_size < 1_000_000
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    assert main(["log", "export", str(long)]) == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1
+    assert "more than 2.147 GB of messages" in said
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 500_000
 
 
 def test_damage_to_an_unguarded_log_is_named_where_it_shows(

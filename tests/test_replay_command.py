@@ -202,6 +202,23 @@ def test_G2_a_damaged_log_is_replayed_as_far_as_it_goes(
     assert "complete" not in out
 
 
+@pytest.mark.parametrize("number", [math.inf, math.nan, 1e308])
+def test_times_and_readings_may_be_anything(
+    log: Path, number: float, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Nothing can be said of the duration then; the report says so too."""
+    with LogReader(log) as reader, LogWriter(Path("odd"), reader.header) as writer:
+        for tick in reader:
+            sign = -number if tick.number % 2 else number
+            odd = dataclasses.replace(tick, t=sign, now=sign, counts=(sign, number))
+            writer.write(odd)
+    for words in (["odd"], ["odd", "--controller", "closed", "--out", "out"]):
+        assert main(["replay", *words]) == 0
+        assert capsys.readouterr().err == ("written to out\n" if "--out" in words else "")
+    assert main(["report", "out"]) == 0
+    assert f"{TICKS} ticks, - s, in odd" in Path("out/report.html").read_text()
+
+
 def test_a_log_that_was_not_closed_is_no_error(
     log: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -300,6 +300,31 @@ def test_what_cannot_be_shown_is_one_line(
     assert not Path("run/report.html").exists()
 
 
+@pytest.mark.parametrize("cut", [0, 10, -1, -2, -30])
+def test_a_table_that_was_cut_is_one_line(capsys: pytest.CaptureFixture[str], cut: int) -> None:
+    """Its last cell is empty: without its end the last row may still have all cells."""
+    Path("run").mkdir()
+    Path("run/command.txt").write_text("antennate wall --trials 2\n")
+    Path("run/trials.partial.jsonl").touch()
+    table = "seed,trial,reason\n0,0,\n0,1,it is a long reason that is quoted\n0,2,\n"
+    Path("run/trials.csv").write_text(table[:cut])
+    assert "run/trials.csv: expected a whole file of this kind" in refusal(capsys, "run")
+    Path("run/trials.csv").write_text(table)
+    assert main(["report", "run"]) == 0
+    assert "3 trials were kept" in Page(Path("run/report.html")).text
+
+
+def test_a_run_that_has_ended_without_its_result_is_one_line(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """What says that it goes on is gone, so it has written a result."""
+    Path("run").mkdir()
+    Path("run/command.txt").write_text("antennate wall --trials 2\n")
+    Path("run/config.toml").touch()
+    Path("run/trials.csv").write_text("seed,trial\n0,0\n")
+    assert "run/result.json: expected a readable file" in refusal(capsys, "run")
+
+
 def test_words_that_do_not_fit_are_one_line(capsys: pytest.CaptureFixture[str]) -> None:
     assert "expected the folder of a run, or --compare RUN RUN" in refusal(capsys)
     assert "expected 2 runs, found 1" in refusal(capsys, "--compare", "a")

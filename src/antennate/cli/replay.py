@@ -18,7 +18,7 @@ from antennate.cli.view_options import ViewOptions, page_of, say_by_hand
 from antennate.errors import ConfigError
 from antennate.messages import one_line, short_names, shortened
 from antennate.studies.formats import csv_lines
-from antennate.studies.measures import Measure, Table
+from antennate.studies.measures import Measure, Table, shown
 from antennate.studies.report import View
 from antennate.studies.run_directory import RunDirectory
 from antennate.telemetry.reader import Damage, LogReader
@@ -170,7 +170,7 @@ def _tables(result: Mapping[str, Any]) -> Sequence[Table]:
         label = one_line(f"supervisor {name}")
         measures.append(Measure(f"states.{name}", label, "% of ticks", form=".1f", scale=100.0))
     note = (
-        f"{result['ticks']} ticks, {result['duration_s']:.2f} s, in "
+        f"{result['ticks']} ticks, {shown(result['duration_s'])} s, in "
         f"{one_line(', '.join(result['parts']))}.\n"
         f"Recorded by {one_line(result['recorded_controller'])}, antennate "
         f"{one_line(result['version'])}; "
@@ -198,7 +198,7 @@ def _sentence(result: Mapping[str, Any]) -> str:
         first = result["first_difference"]
         return (
             f"The controller decided otherwise in {different} of {ticks} ticks, first in tick "
-            f"{first['tick']} at {first['time_s']:.2f} s: {first['replayed']} for "
+            f"{first['tick']} at {shown(first['time_s'])} s: {first['replayed']} for "
             f"{first['recorded']}."
         )
     if commands := result["different_commands"]:

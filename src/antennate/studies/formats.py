@@ -94,6 +94,8 @@ def from_csv(text: str) -> list[dict[str, Any]]:
             if len(line) != len(names):
                 raise ValueError(f"{len(line)} of {len(names)} cells in row {len(rows) + 1}")
             rows.append(dict(zip(names, map(_value_of, line), strict=True)))
+        if not rows or not text.endswith("\n"):
+            raise ValueError("no end of its last row" if rows else "no row")
         return rows
     except csv.Error as error:
         raise ValueError(str(error)) from None

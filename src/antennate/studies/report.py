@@ -104,7 +104,8 @@ def report(run: RunDirectory, view: View) -> str:
     Raises:
         BadInputError: The directory is damaged.
     """
-    result = run.result() if (run.path / RESULT).exists() else None
+    ended = (run.path / TABLE).exists() and not (run.path / PARTIAL).exists()
+    result = run.result() if ended or (run.path / RESULT).exists() else None
     parts = [f"<h1>antennate {page.escape(view.name)}</h1>"]
     parts.append(page.paragraphs(view.about.split("\n\n")[0], "muted"))
     parts.append(page.paragraphs(_sentence(run, result, view)))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
@@ -146,7 +145,7 @@ class LogReader:
         self, offset: int, held: Sequence[Record]
     ) -> Iterator[tuple[Sequence[Record], Tick | None]]:
         """The messages of one time, tick by tick."""
-        ticks = by_tick(held)
+        ticks = by_tick(held, doubled=self._repeated > 0)
         self._repeated += _maneuvers(held) - sum(map(_maneuvers, ticks))
         for tick in ticks:
             yield from self._grouped(offset, tick)
@@ -263,8 +262,12 @@ class LogReader:
         found = self._of_header(chunk)
         if any(self._first.get(topic) != data for topic, data in found.items()):
             return False
-        numbers = [m.number for m in chunk.messages if self._channels.get(m.channel) is MANEUVER]
-        return self.ticks > self._before or min(numbers, default=math.inf) > self.last
+        if self.ticks > self._before:
+            return True
+        ticks = [m.data for m in chunk.messages if self._channels.get(m.channel) is MANEUVER]
+        with suppress(LogError):  # it is noted where it is read
+            return all(MANEUVER.decode(data)["number"] > self.last for data in ticks)
+        return True
 
     def _of_header(self, chunk: Chunk) -> dict[Topic, bytes]:
         found = {self._channels.get(m.channel): m.data for m in chunk.messages}
@@ -272,15 +275,13 @@ class LogReader:
 
     def _header(self) -> Header:
         """The header, from the first chunks; other programs may divide them in another way."""
-        begin: list[Chunk] = []
         for chunk in self._places:
-            begin.append(chunk)
             self._learn(chunk)
             self._first |= self._of_header(chunk)
             topics = {self._channels.get(message.channel) for message in chunk.messages}
             if topics.difference(HEADER_TOPICS) or len(self._first) == len(HEADER_TOPICS):
+                self._places = chain([chunk], self._places)
                 break
-        self._places = chain(begin, self._places)
         if self._first and self._declared:
             try:
                 return Header.of_messages(self._first)

@@ -24,15 +24,20 @@ class Record(NamedTuple):
     data: bytes
 
 
-def by_tick(held: Sequence[Record]) -> Iterable[Sequence[Record]]:
-    """The messages of one time, tick by tick; those that say the same once."""
-    if not repeats(held):
+def by_tick(held: Sequence[Record], doubled: bool) -> Iterable[Sequence[Record]]:
+    """The messages of one time, tick by tick; those that say the same once.
+
+    Args:
+        held: The messages.
+        doubled: Whether messages of this log were found twice, so that equal events are one.
+    """
+    if not (doubled or repeats(held)):
         return (held,)
-    once = [*dict.fromkeys(held)]
-    if not repeats(once):
-        return (once,)
+    alike = {record._replace(number=0): record for record in held}
+    if not repeats(alike):
+        return ([*alike.values()],)
     ticks = dict[int, list[Record]]()
-    for record in once:
+    for record in dict.fromkeys(held):
         ticks.setdefault(record.number, []).append(record)
     return ticks.values()
 

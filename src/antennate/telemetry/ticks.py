@@ -6,7 +6,7 @@ Every float comes back bit by bit, NaN and infinities too.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Container, Iterator, Mapping
+from collections.abc import Callable, Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from operator import attrgetter
 from typing import Any
@@ -140,12 +140,11 @@ class Tick:
             robot: Gives the names of the joints.
             measured: Which of positions, velocities and efforts have columns.
         """
-        found: dict[str, Any] = dict(zip(fields(robot), self.values, strict=False))
-        nothing = (math.nan,) * len(robot.joint_names)
+        found = _named(fields(robot), self.values)
         for kind in JOINTS[1:]:
             if kind in measured:
-                columns = (f"{name}_{_ONE[kind]}" for name in robot.joint_names)
-                found |= zip(columns, getattr(self, kind) or nothing, strict=False)
+                columns = [f"{name}_{_ONE[kind]}" for name in robot.joint_names]
+                found |= _named(columns, getattr(self, kind))
         texts = {"state": self.state, "note": self.note, "causes": "; ".join(self.causes)}
         return found | texts
 
@@ -206,6 +205,11 @@ class Tick:
             state = JOINT_STATES.decode(found[JOINT_STATES])
             values |= {kind: state[name] for kind, name in _ONE.items()}
         return cls(**values)
+
+
+def _named(columns: Sequence[str], values: Sequence[Any]) -> dict[str, Any]:
+    """Values by their columns, NaN for those that are not there."""
+    return dict.fromkeys(columns, math.nan) | dict(zip(columns, values, strict=False))
 
 
 def _getter(kind: MessageType) -> Callable[[Tick], tuple[Any, ...]]:

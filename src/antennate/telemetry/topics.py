@@ -208,7 +208,7 @@ def by_channel(
         if topic is None:
             continue
         kind, schema = schemas.get(about, ("nothing", ""))
-        if (kind, schema) != (topic.type.name, topic.type.schema):
+        if (kind, _bare(schema)) != (topic.type.name, _bare(topic.type.schema)):
             raise LogError(
                 f"expected {topic.type.name} as now defined in {name}, found {kind} of another "
                 "definition; read it with the version that wrote it"
@@ -217,3 +217,9 @@ def by_channel(
             raise LogError(f"expected messages in {name} encoded as cdr, found {encoding}")
         named[channel] = topic
     return named
+
+
+def _bare(definition: str) -> list[list[str]]:
+    """The words of each line of a definition without its comments, which other programs drop."""
+    lines = (line.partition("#")[0].split() for line in definition.splitlines())
+    return [words for words in lines if words]

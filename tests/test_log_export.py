@@ -1,0 +1,29 @@
+"""Tables of logs whose content or place nobody would choose."""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import replace
+from pathlib import Path
+
+from log_ticks import HEADER, tick
+
+from antennate.cli import main
+from antennate.robots.spec import RobotSpec
+from antennate.telemetry.writer import LogWriter
+
+
+def test_export_leaves_the_columns_in_their_place_where_a_joint_is_missing(tmp_path: Path) -> None:
+    """Whoever wrote the second and the third tick had other joints."""
+    path, joints = tmp_path / "log.mcap", RobotSpec().joint_names
+    with LogWriter(path, HEADER) as out:
+        for number, count in enumerate((len(joints), 2, 40), start=1):
+            angles = tuple(0.1 * n for n in range(count))
+            out.write(replace(tick(number), angles=angles, positions=angles, velocities=(1.0,)))
+    assert main(["log", "export", str(path)]) == 0
+    with path.with_suffix(".csv").open(newline="") as file:
+        first, second, third = csv.DictReader(file)
+    assert len(first) == len(second) == len(third)
+    assert [second[name] for name in joints[:3]] == ["0.0", "0.1", "nan"]
+    assert (second["yaw3_position"], second["yaw1_velocity"]) == ("nan", "1.0")
+    assert (third["yaw1_position"], third["yaw1_velocity"]) == ("0.0", "1.0")
