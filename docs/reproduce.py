@@ -55,8 +55,8 @@ what it says.
 
 """
 BEST = (
-    "*Conditional*: the paper does not publish all numbers that a claim needs, so most claims can "
-    "at best be conditional."
+    "*Conditional* means that a claim holds with numbers that the paper does not publish and that "
+    "we chose. Most claims need such numbers, so they can at best be conditional."
 )
 FOOT = """\
 ## Run it yourself
