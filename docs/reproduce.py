@@ -55,8 +55,9 @@ what it says.
 
 """
 BEST = (
-    "*Conditional* means that a claim holds with numbers that the paper does not publish and that "
-    "we chose. Most claims need such numbers, so they can at best be conditional."
+    "*Conditional* means that a claim holds under a condition that the paper does not state. Most "
+    "claims need numbers that the paper does not publish and that we chose, so they can at best be "
+    "conditional."
 )
 FOOT = """\
 ## Run it yourself
