@@ -25,8 +25,10 @@ HEAD = """\
 
 Every claim of the paper ([arXiv:2603.07795](https://arxiv.org/abs/2603.07795)) in our words, what
 the simulation finds, and a verdict by a rule that is stated with it. The numbers are those of one
-whole run; of `wall` and `sweep`, those of a second run of these two with the same seed, when the
-rules for springs and shapes had changed.
+whole run. `wall`, `sweep` and `touch` were run again with the same seed when their rules or
+intervals had changed, and their numbers are those of the second runs. One interval is of the
+program as it was: that of the time by which feedback is faster is a percentile bootstrap. The
+program now gives Student's interval, which is slightly wider.
 
 | verdict | meaning |
 |---|---|
@@ -53,8 +55,9 @@ what it says.
 
 """
 BEST = (
-    "*Conditional*: the paper does not publish all numbers that a claim needs, so most claims can "
-    "at best be conditional."
+    "*Conditional* means that a claim holds under a condition that the paper does not state. Most "
+    "claims need numbers that the paper does not publish and that we chose, so they can at best be "
+    "conditional."
 )
 FOOT = """\
 ## Run it yourself

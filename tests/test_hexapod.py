@@ -18,6 +18,7 @@ from antennate.cli import BAD_INPUT, OK, main
 from antennate.control.gait import targets
 from antennate.control.registry import CONTROLLERS
 from antennate.errors import ConfigError
+from antennate.experiments.gait import figure
 from antennate.experiments.gait import run as study
 from antennate.experiments.gait.pace import measure
 from antennate.experiments.gait.unknown import Unknown, drawn
@@ -124,6 +125,27 @@ def test_draws_fill_every_part_of_their_ranges() -> None:
     assert abs(np.corrcoef(values.T)[0, 1]) < 0.5
     np.testing.assert_array_equal(values, drawn(unknowns, 50, 3))
     assert (values != drawn(unknowns, 50, 4)).any()
+
+
+def test_lines_pass_behind_the_names_of_the_unknown_numbers() -> None:
+    names = ("robot.servos.xl430_w250.gain_divisor", "robot.mass")
+    row = {"body_lengths_per_cycle": [0.4, 0.6], "range": [1.0, 2.0], "change": 0.2}
+    unknowns = {"draws": 3, "body_lengths_per_cycle": [0.4, 0.5, 0.6], "interval95": [0.4, 0.6]}
+    result = {
+        "unknown": {**unknowns, "parameters": dict.fromkeys(names, row)},
+        "maneuvers": {"forward": {"body_lengths_per_cycle": 0.55}},
+        "measured_body_lengths_per_cycle": 0.48,
+    }
+    _, alone = figure.unknown(result).axes
+    upright = [line for line in alone.lines if len(set(line.get_xdata())) == 1]
+    for text in alone.texts:
+        box = text.get_bbox_patch()
+        assert box is not None
+        assert box.get_facecolor() == (1.0, 1.0, 1.0, 1.0)
+        assert all(
+            text.get_zorder() > line.get_zorder() for line in upright if len(line.get_xdata()) > 1
+        )
+    assert len(alone.texts) == len(names)
 
 
 def test_an_unknown_radius_changes_the_step_of_rolling_legs_by_its_circumference() -> None:

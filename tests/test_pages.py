@@ -147,3 +147,15 @@ def test_a_table_too_wide_for_a_phone_shows_each_cell_with_its_head(
         tab.call("Emulation.setDeviceMetricsOverride", **size)
         assert tab.until(f"{tops} == 1")
         assert tab.run(heads) == ["none"] * 4
+
+
+def test_a_stacked_table_says_what_its_rows_are(site: str, tmp_path: Path) -> None:
+    """Two tables of one page differ in nothing but their first head."""
+    tables = "[...document.querySelectorAll('article table[data-stacked]')]"
+    seen = "[...e.querySelectorAll('th')].filter(h => h.offsetHeight).map(h => h.textContent)"
+    with (
+        browser(tmp_path / "browser") as tab,
+        looked_at(tab, f"{site}/science/active/", 390, "light"),
+    ):
+        found = tab.run(f"{tables}.map(e => {seen})")
+    assert found == [[], ["distance to the wall"], ["width of the gap"]]

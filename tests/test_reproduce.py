@@ -17,6 +17,7 @@ from antennate.cli.arguments import parse
 from antennate.cli.experiment import Options
 from antennate.experiments.reproduce import run as reproduce
 from antennate.experiments.reproduce.experiment import EXPERIMENT
+from antennate.experiments.reproduce.figure import draw
 from antennate.experiments.reproduce.run import CLAIMS, ReproduceConfig
 from antennate.experiments.reproduce.verdict import VERDICTS
 
@@ -100,6 +101,12 @@ def swept(rarest: list[float | None]) -> dict[str, Any]:
     return {"shapes": {"descending": {"fixed": {"share": share | {"backward": rarest}}}}}
 
 
+def sensed(f1: float | None, interval: list[float] | None) -> dict[str, Any]:
+    """Half of the time is contact, so F1 of a sensor that always says so is 2/3."""
+    row = {"contact_share": 0.5, "precision": f1 and 0.9, "recall": 0.5}
+    return {"profiles": {"descending": row | {"f1": f1, "f1_95": interval}}}
+
+
 @pytest.mark.parametrize(
     ("name", "result", "verdict"),
     [
@@ -151,6 +158,10 @@ def swept(rarest: list[float | None]) -> dict[str, Any]:
         ("slope", sigmoid(18.0, 2.0, 0.4), "not_reproduced"),
         ("slope", sigmoid(4.5, 0.1, 0.3), "not_reproduced"),
         ("slope", sigmoid(18.0, 9.0, 0.3), "undecided"),
+        ("contact", sensed(0.7, [0.68, 0.72]), "conditional"),
+        ("contact", sensed(0.7, [0.66, 0.74]), "not_reproduced"),
+        ("contact", sensed(0.7, None), "undecided"),  # one trial
+        ("contact", sensed(None, None), "undecided"),  # no traverse is valid
         ("shapes", swept([0.01, 0.002, 0.02]), "conditional"),
         ("shapes", swept([1e-6, 0.0, 1e-5]), "conditional"),  # chosen cells are no sample
         ("shapes", swept([0.0, 0.0, 0.0]), "not_reproduced"),
@@ -159,6 +170,15 @@ def swept(rarest: list[float | None]) -> dict[str, Any]:
 )
 def test_a_verdict_follows_its_rule(name: str, result: dict[str, Any], verdict: str) -> None:
     assert JUDGES[name](result).verdict == verdict
+
+
+def test_a_number_without_an_interval_is_told_and_drawn_without_it() -> None:
+    claim = next(claim for claim in CLAIMS if claim.name == "contact")
+    finding = claim.judge(sensed(0.7, None))
+    assert finding.ours == "F1 0.70 (-); to say always contact 0.67"
+    panel = draw(claim, finding).axes[0]
+    assert [text.get_text() for text in panel.texts] == ["0.667", "0.7"]
+    assert len(panel.lines) == 2  # dots alone
 
 
 def test_a_difference_that_may_be_chance_is_said() -> None:

@@ -244,6 +244,9 @@ def test_figures_have_units_and_repeat(outcome):
     labels = [axis.get_ylabel() for figure in drawn for axis in figure.axes]
     known = ("[ms]", "[%]", "[m]", "[rad]", "0 to 1")
     assert all(label.endswith(known) for label in labels if label), labels
+    over = drawn[-1].axes[1]
+    (default,) = over.texts
+    assert default.get_window_extent().y0 > over.get_window_extent().y0  # clear of the axis
 
 
 @pytest.mark.slow

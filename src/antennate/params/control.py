@@ -134,24 +134,24 @@ class RuleParams(Params):
 
 
 class RepetitionParams(Params):
-    """When readings that repeat themselves mean that the robot is stuck; fitted in open loop."""
+    """When readings that repeat themselves mean that a robot is stuck; fitted without feedback."""
 
     window_cycles: float = number(
         0.5,
         "1",
-        "fitted: open loop, 96 tunnels: sooner than a whole cycle, with as few errors",
+        "fitted: without feedback, 96 tunnels: sooner than a whole cycle, with as few errors",
         gt=0,
         le=10,
     )
     """Window of both means below, in gait cycles."""
     change: float = number(
-        0.06, "1", "fitted: open loop, 96 tunnels: 59 jams found, 8 false alarms", gt=0, le=1
+        0.06, "1", "fitted: without feedback, 96 tunnels: 59 jams found, 8 false alarms", gt=0, le=1
     )
     """Mean change of flex from cycle to cycle under which it repeats."""
     pressure: float = number(
         0.2,
         "1",
-        "fitted: open loop, 12 tunnels: free antennae stay below, stuck ones above",
+        "fitted: without feedback, 12 tunnels: free antennae stay below, stuck ones above",
         ge=0,
         le=1,
     )
@@ -161,11 +161,14 @@ class RepetitionParams(Params):
 class EscapeParams(Params):
     """Backing off and turning when stuck.
 
-    Fitted: times in open loop on 96 tunnels, turns with `closed` on 60 and then 200 tuning tunnels.
+    Fitted: times without feedback on 96 tunnels, turns with `closed` on 60 and then 200 tuning
+    tunnels.
     """
 
     trigger: Literal["repetition", "contact"] = number(
-        "repetition", "1", "fitted: open loop; repetition tells stuck from moving, contact does not"
+        "repetition",
+        "1",
+        "fitted: without feedback; repetition tells stuck from moving, contact does not",
     )
     """What counts as stuck: repeated readings, or the paper's both strong and similar."""
     reverse_time: float = number(
@@ -201,7 +204,7 @@ class EscapeParams(Params):
     memory_delay: float = number(
         3.0,
         "s",
-        "fitted: open loop, 96 tunnels, 57 jams: first turn right in 61 %, 56 % with 0",
+        "fitted: without feedback, 96 tunnels, 57 jams: first turn right in 61 %, 56 % with 0",
         ge=0,
         le=60,
     )
@@ -209,7 +212,7 @@ class EscapeParams(Params):
     lost_time: float = number(
         2.0,
         "s",
-        "fitted: open loop, 96 tunnels: ten times in 30 s nothing is felt for longer",
+        "fitted: without feedback, 96 tunnels: ten times in 30 s nothing is felt for longer",
         gt=0,
         le=3600,
     )

@@ -37,7 +37,7 @@ class TunnelParams(Params):
     )
     """Lengths of the straight pieces of the centre line."""
     turns_deg: tuple[float, ...] = number(
-        (90.0,), "deg", "fitted: antennate tunnel, open loop alone", max_length=19
+        (90.0,), "deg", "fitted: antennate tunnel, without feedback alone", max_length=19
     )
     """Turn between one piece and the next."""
     mirror: Literal["random", "never", "always"] = number("random", "1", "assumed: sides are equal")

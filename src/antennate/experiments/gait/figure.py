@@ -139,6 +139,7 @@ def _draw_alone(panel: Axes, result: Mapping[str, Any]) -> None:
             xycoords=("axes fraction", "data"),
             textcoords="offset points",
             fontsize=8,
+            bbox={"boxstyle": "square,pad=0.05", "facecolor": "white", "edgecolor": "none"},
         )
     forward = result["maneuvers"]["forward"]["body_lengths_per_cycle"]
     panel.axvline(forward, color=style.MUTED, linewidth=1.0, zorder=1)

@@ -105,16 +105,17 @@ def _force(result: Mapping[str, Any]) -> Finding:
 
 def _contact(result: Mapping[str, Any]) -> Finding:
     found = result["profiles"]["descending"]
-    share = found["contact_share"]
+    share = found["contact_share"] or 0.0
     always = 2 * share / (1 + share)
-    low, high = found["f1_95"]
+    f1, interval = found["f1"], found["f1_95"]
+    ours = () if f1 is None else (Bar("ours", f1, interval),)
     return Finding(
-        f"F1 {found['f1']:.2f} ({low:.2f} to {high:.2f}); to say always contact {always:.2f}",
-        judged(False, low > always),
+        f"F1 {shown(f1)} ({shown(interval)}); to say always contact {always:.2f}",
+        "undecided" if interval is None else judged(False, interval[0] > always),
         "With a threshold of one half strong contacts are found and grazes are not: "
-        f"{100 * found['precision']:.0f} % of the time that is called contact is contact, and "
-        f"{100 * found['recall']:.0f} % of the time in contact is called so.",
-        (Bar("always contact", always), Bar("ours", found["f1"], (low, high))),
+        f"{shown(found['precision'], '.0f', 100)} % of the time that is called contact is contact, "
+        f"and {shown(found['recall'], '.0f', 100)} % of the time in contact is called so.",
+        (Bar("always contact", always), *ours),
     )
 
 
@@ -198,7 +199,7 @@ ANTENNA = (
         "A threshold on the bending level tells contact",
         "no number",
         "Conditional if F1 is surely above that of a sensor which always says contact; no more, as "
-        "the threshold is ours.",
+        "the threshold is ours. Undecided if F1 has no interval, as with one trial.",
         "touch",
         "F1",
         _contact,

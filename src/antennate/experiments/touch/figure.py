@@ -107,7 +107,7 @@ def curves(result: Mapping[str, Any]) -> Figure:
         _draw_curve(roc, over, result, name, found)
     theta = result["threshold"]
     over.axvline(theta, color=style.MUTED, linewidth=1.0, linestyle=(0, (4, 2)))
-    over.annotate(f"default {theta:g}", (theta, 0.03), (4, 0), textcoords="offset points", va="top")
+    over.annotate(f"default {theta:g}", (theta, 0.03), (4, 0), textcoords="offset points")
     over.set_xscale("logit", one_half="0.5")
     over.set_xlim(3e-6, 1 - 1e-5)
     over.minorticks_off()
@@ -188,8 +188,8 @@ def trace(one: Traverse, found: Comparison) -> Figure:
 
 def _draw_bounds(panel: Axes, rule: RuleParams) -> None:
     for bound, lift, side, name in (
-        (rule.threshold, 2, "bottom", "contact from here"),
-        (rule.threshold - rule.hysteresis, -2, "top", "free below"),
+        (rule.threshold, 2, "bottom", "contact"),
+        (rule.threshold - rule.hysteresis, -2, "top", "free"),
     ):
         panel.axhline(bound, color=_SENSED, linewidth=0.9, linestyle=(0, (4, 2)))
         panel.annotate(

@@ -32,7 +32,7 @@ class TunnelConfig(TrialConfig):
     )
     """Controllers to run: open, paper, closed, or MODULE:NAME or FILE.py:NAME of your own."""
     time_limit: float = number(
-        100.0, "s", "paper: open loop made 0.04 m/s; half of that on 2 m", gt=0, le=3600
+        100.0, "s", "paper: 0.04 m/s without feedback; half of that on 2 m", gt=0, le=3600
     )
     """Time after which a trial has failed."""
     control: ControlParams = ControlParams()

@@ -41,7 +41,7 @@ def outcomes(result: Mapping[str, Any]) -> Figure:
     whole, late = figure.subplots(2, 1)
     profiles = result["profiles"]
     trials = min(profile["trials"] for profile in profiles.values())
-    note = style.interval_note("bars: Wilson 95 % of success", trials)
+    note = style.interval_note("lines: Wilson 95 % of success", trials)
     _draw_outcomes(whole, profiles, f"Whole travel; {note}")
     after = {name: profile["after_start"] for name, profile in profiles.items()}
     start = f"first {1e3 * result['start_m']:g} mm"
@@ -67,7 +67,8 @@ def _draw_outcomes(panel: Axes, profiles: Mapping[str, Mapping[str, Any]], title
         if profile["trials"] >= style.ENOUGH_TRIALS:
             panel.plot([place, place], [low, high], color=style.INK, linewidth=1.4)
     labels = [
-        f"{name.replace('_', chr(10))}\n{profile['trials']}" for name, profile in profiles.items()
+        f"{name.replace('_', chr(10))}\nn = {profile['trials']}"
+        for name, profile in profiles.items()
     ]
     panel.set_xticks(places, labels)
     panel.set(title=title, ylabel="share of trials", ylim=(0, 1.02))
