@@ -5,16 +5,18 @@ from __future__ import annotations
 import json
 import math
 from pathlib import Path
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import Field, ValidationError, model_validator
 
 from antennate.antenna.sensor import FULL_SCALE
 from antennate.control.conditioning import bending_level
-from antennate.errors import CalibrationError
+from antennate.errors import BadInputError, CalibrationError
 from antennate.files import read_limited, write_whole
+from antennate.params.base import Strict
 from antennate.params.control import ConditioningParams, CurveParams
+from antennate.params.faults import describe
 from antennate.types import Floats
 
 SCHEMA = 1
@@ -32,11 +34,7 @@ _RISE = 2.0 * math.log(9.0)
 _LARGEST_FILE = 1_000_000
 
 
-class _Strict(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
-
-
-class SpeedFit(_Strict):
+class SpeedFit(Strict):
     """How well the curve fits the pushes of one speed [m/s]; None where the speed is unknown."""
 
     speed_m_s: float | None
@@ -45,7 +43,7 @@ class SpeedFit(_Strict):
     rmse: float = Field(ge=0)
 
 
-class Calibration(_Strict):
+class Calibration(Strict):
     """The content of a calibration file: a sigmoid from counts to level, and how well it fits.
 
         level = 1 / (1 + exp(-polarity slope (x - midpoint))),  x = (counts - low) / (high - low)
@@ -72,6 +70,8 @@ class Calibration(_Strict):
             interval over pushes left out lies above 0. Empty with a single push.
     """
 
+    refusal: ClassVar[type[BadInputError]] = CalibrationError
+
     schema_version: Literal[1] = SCHEMA
     made_by: str = Field(max_length=64)
     sensor_id: str = Field(pattern=r"^[A-Za-z0-9._-]{1,64}$")
@@ -94,6 +94,12 @@ class Calibration(_Strict):
     cross_validated_rmse: dict[Literal["sigmoid", "line", "isotonic"], float]
     better_than_sigmoid: tuple[Literal["line", "isotonic"], ...]
     reach: float = Field(default=REACH, ge=0, le=200)
+
+    @model_validator(mode="after")
+    def _possible(self) -> Calibration:
+        if why := _impossible(self):
+            raise ValueError(why)
+        return self
 
     def conditioning(self, averaging_time: float = 0.1) -> ConditioningParams:
         """The curve as parameters of a controller; `averaging_time` [s] is T_avg of the paper."""
@@ -144,14 +150,7 @@ class Calibration(_Strict):
             found = cls.model_validate_json(data, strict=True)
             json.loads(data, object_pairs_hook=_once)
         except ValidationError as error:
-            first = error.errors(include_url=False)[0]
-            if first["type"] == "json_invalid":
-                what = first.get("ctx", {})["error"].replace("EOF", "the end of the file")
-                raise CalibrationError(
-                    f"{path}: expected the file to be JSON, found {what}"
-                ) from None
-            field = ".".join(str(part) for part in first["loc"]) or "the file"
-            raise CalibrationError(f"{path}: {field}: {first['msg']}") from None
+            raise CalibrationError(f"{path}: {describe(error, cls)}") from None
         except CalibrationError as error:
             raise CalibrationError(f"{path}: {error}") from None
         if sensor_id is not None and found.sensor_id != sensor_id:
@@ -159,8 +158,6 @@ class Calibration(_Strict):
                 f"{path}: sensor_id: expected {sensor_id}, found {found.sensor_id}: the "
                 "calibration of another flex sensor"
             )
-        if why := _impossible(found):
-            raise CalibrationError(f"{path}: {why}")
         return found
 
 
