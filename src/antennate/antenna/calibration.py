@@ -10,6 +10,7 @@ from typing import ClassVar, Literal
 import numpy as np
 from pydantic import Field, ValidationError, model_validator
 
+from antennate import checks
 from antennate.antenna.sensor import FULL_SCALE
 from antennate.control.conditioning import bending_level
 from antennate.errors import BadInputError, CalibrationError
@@ -102,7 +103,11 @@ class Calibration(Strict):
         return self
 
     def conditioning(self, averaging_time: float = 0.1) -> ConditioningParams:
-        """The curve as parameters of a controller; `averaging_time` [s] is T_avg of the paper."""
+        """The curve as parameters of a controller; `averaging_time` [s] is T_avg of the paper.
+
+        Raises:
+            ConfigError: That time is out of bounds.
+        """
         return ConditioningParams(
             averaging_time=averaging_time,
             midpoint=self.midpoint,
@@ -117,7 +122,12 @@ class Calibration(Strict):
         return CurveParams(**{n: getattr(self, n) for n in CurveParams.model_fields})
 
     def level(self, counts: Floats) -> Floats:
-        """Flex level, 0 to 1, of readings [counts], same shape; NaN stays NaN."""
+        """Flex level, 0 to 1, of readings [counts], same shape; NaN stays NaN.
+
+        Raises:
+            CalibrationError: They are no numbers.
+        """
+        counts = checks.array("counts", counts, (), "counts", finite=False, error=CalibrationError)
         return bending_level(self.conditioning(), counts)
 
     def to_json(self) -> str:
@@ -128,9 +138,10 @@ class Calibration(Strict):
         """Write a calibration file, whole or not at all.
 
         Raises:
+            ConfigError: The path is none.
             OutputError: There is such a file and it may not be replaced, or it cannot be written.
         """
-        write_whole(Path(path), self.to_json().encode(), overwrite)
+        write_whole(checks.path("path", path), self.to_json().encode(), overwrite)
 
     @classmethod
     def load(cls, path: str | Path, sensor_id: str | None = None) -> Calibration:
@@ -141,10 +152,11 @@ class Calibration(Strict):
             sensor_id: The flex sensor it has to belong to, None for any.
 
         Raises:
+            ConfigError: The path is none.
             CalibrationError: It cannot be read; a field is missing, doubled, unknown or out of
                 bounds; or no flex sensor can have such a curve.
         """
-        path = Path(path)
+        path = checks.path("path", path)
         data = read_limited(path, _LARGEST_FILE, CalibrationError)
         try:
             found = cls.model_validate_json(data, strict=True)

@@ -6,11 +6,11 @@ Data that cannot be calibrated are refused.
 from __future__ import annotations
 
 import hashlib
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
-from antennate import __version__
+from antennate import __version__, checks
 from antennate.antenna.calibration import FEWEST, NARROWEST_SPAN, REACH, Calibration, SpeedFit
 from antennate.antenna.curves import MODELS, Samples, curve, ends, fit_sigmoid, polarity, predict
 from antennate.antenna.rivals import gain_of, left_out
@@ -175,20 +175,26 @@ def fit_calibration(
         threshold: Flex level that counts as contact.
 
     Raises:
-        CalibrationError: Shapes differ, a value is not finite, or the data cannot be calibrated.
+        CalibrationError: Shapes differ, a value is not finite (only a speed may be NaN), a trial is
+            no whole number, a speed is below 0, the name or the threshold cannot be one, or the
+            data cannot be calibrated.
     """
-    counts, level = np.asarray(counts, float), np.asarray(level, float)
-    n = counts.shape
-    trial = np.zeros(n, np.int64) if trial is None else np.asarray(trial, np.int64)
-    speed = np.full(n, np.nan) if speed is None else np.asarray(speed, float)
-    for name, values in (("counts", counts), ("level", level), ("trial", trial), ("speed", speed)):
-        if values.ndim != 1 or values.shape != n:
-            raise CalibrationError(f"{name}: expected shape {n} as counts, found {values.shape}")
-    if not (np.isfinite(counts) & np.isfinite(level)).all():
-        raise CalibrationError("counts and level: expected finite numbers, found others")
-    samples = Samples(counts, level, trial, speed, np.arange(1, len(counts) + 1))
+    counts = _column("counts", counts, "n")
+    n = len(counts)
+    level = _column("level", level, n)
+    trials = _column("trial", np.zeros(n) if trial is None else trial, n)
+    if (bad := trials[trials != np.rint(trials)]).size:
+        raise CalibrationError(f"trial: expected whole numbers, found {bad[0]:g}")
+    speeds = _column("speed", np.full(n, np.nan) if speed is None else speed, n, finite=False)
+    if (bad := speeds[(speeds < 0) | np.isinf(speeds)]).size:
+        raise CalibrationError(f"speed: expected finite speeds of at least 0, found {bad[0]:g}")
+    samples = Samples(counts, level, trials.astype(np.int64), speeds, np.arange(1, n + 1))
     digest = hashlib.sha256(np.stack([counts, level]).tobytes()).hexdigest()
     return fit(samples, sensor_id, digest, threshold)
+
+
+def _column(name: str, values: Any, n: int | str, finite: bool = True) -> Floats:
+    return checks.array(name, values, (n,), finite=finite, error=CalibrationError)
 
 
 def _r2(predicted: Floats, level: Floats) -> float:
