@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import contextlib
-import math
-from numbers import Integral, Real
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from antennate import checks
 from antennate.control.checked import CheckedController
 from antennate.control.loop import run_loop
 from antennate.control.registry import ControllerFactory, make_controller
@@ -64,13 +63,14 @@ def simulate(
         ControllerError: The controller raised an exception, or what it answers is no command.
         LogError: The log cannot be written.
     """
-    if not isinstance(trial, Integral) or trial < 0:
-        raise ConfigError(f"trial: expected a whole number of at least 0, found {trial!r}")
-    if not (isinstance(time_limit, Real) and 0.0 < time_limit < math.inf):
-        raise ConfigError(f"time_limit: expected a finite time above 0 [s], found {time_limit!r}")
-    if log is not None and Path(log).suffix != ".mcap":
+    trial = checks.whole("trial", trial)
+    time_limit = checks.real("time_limit", time_limit, "s", above=0.0)
+    control = ControlParams() if control is None else control
+    checks.instance("control", control, ControlParams)
+    log = None if log is None else checks.path("log", log)
+    if log is not None and log.suffix != ".mcap":
         raise ConfigError(f"log: expected a name with .mcap, found {log}")
-    config, control = from_values(TrialConfig, settings), control or ControlParams()
+    config = from_values(TrialConfig, settings)
     try:
         require_own_curves(config.robot, control)
     except ValueError as error:
@@ -112,7 +112,7 @@ def simulate(
                 trial=trial,
                 phase=start.phase,
             )
-            kept = stack.enter_context(SimulatedLog(Path(log), header, start.world, decisions))
+            kept = stack.enter_context(SimulatedLog(log, header, start.world, decisions))
         run_loop(robot, checked, control.period, go_on)
     return recorder.series(
         {
