@@ -40,7 +40,7 @@ _ARRAYS: dict[str, tuple[tuple[int | str, ...], type]] = {
     "head": ((2,), np.float64),
 }
 """Axes after the first, which is time, and type of each array."""
-_MAY_BE_EMPTY = ("yaw", "pitch")
+_MAY_BE_EMPTY = ("yaw", "antenna", "pitch")
 _UNUSABLE = (
     *(ValueError, KeyError, TypeError, EOFError, MemoryError, OverflowError, RuntimeError),
     *(csv.Error, zlib.error, zipfile.BadZipFile),
