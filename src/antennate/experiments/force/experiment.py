@@ -37,7 +37,7 @@ def tables(result: Mapping[str, Any]) -> Sequence[Table]:
         f"Places from {result['from_place']:g} of the length to the tip, hinges up to "
         f"{result['hinge_limit_deg']:g} deg; friction {result['friction']:g}.\n"
         "Place known: one curve for every place; unknown: one for all.\n"
-        f"Intervals are over loads at rest and over {tested(result)} traverses, which served no fit.",
+        f"Intervals: over loads at rest and over {tested(result)} traverses, which served no fit.",
     )
     return (shares,)
 
