@@ -42,8 +42,8 @@ def outcome(sensor_id: str) -> CalibrateOutcome:
     trial, row = np.repeat(np.arange(4), 60), np.arange(2, 242)
     samples = Samples(counts, bend, trial, np.full(240, np.nan), row)
     recording = Recording(0.01 * np.arange(240), samples, "0" * 64)
-    found = fitting.fit(samples, sensor_id, "0" * 64, draws=20)
-    return CalibrateOutcome(CalibrateConfig(draws=20), recording, recording, found)
+    found = fitting.fit(samples, sensor_id, "0" * 64)
+    return CalibrateOutcome(CalibrateConfig(), recording, recording, found)
 
 
 def calibrate(folder: Path, made: CalibrateOutcome) -> None:

@@ -40,9 +40,9 @@ def test_one_long_recording_is_as_many_pushes_everywhere(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     file = written(tmp_path / "long.csv", *loops(4, 0.05))
-    found = antennate.run("calibrate", recording=file, draws=20).summary
+    found = antennate.run("calibrate", recording=file).summary
     assert found["calibration"]["trials"] == found["assessment"]["pushes"] == 4
-    assert main(["calibrate", "--recording", file, "--draws", "20", "--no-figures"]) == 0
+    assert main(["calibrate", "--recording", file, "--no-figures"]) == 0
     told = capsys.readouterr().out
     assert "pushes: 4" in told
     assert "of 4 pushes" in told
@@ -57,9 +57,35 @@ def test_a_long_recording_has_the_intervals_of_its_pushes(tmp_path: Path) -> Non
         written(tmp_path / "long.csv", counts, bend, t),
         written(tmp_path / "trials.csv", counts, bend, t, trial),
     ]
-    long, split = (antennate.run("calibrate", recording=f, draws=40).summary for f in files)
+    long, split = (antennate.run("calibrate", recording=f).summary for f in files)
     ends = [found["calibration"]["midpoint_95"] for found in (long, split)]
     assert ends[0] == pytest.approx(ends[1], rel=0.002)  # one reading lies between two pushes
+
+
+def test_intervals_over_four_pushes_hold_the_truth_as_often_as_they_say() -> None:
+    """Pushes with offsets of their own about the true curve: of 60 sets, 52 is beyond three sigma.
+
+    A bootstrap over the four pushes holds it in 47.
+    """
+    rng, hits = np.random.default_rng(4), 0
+    bend = np.linspace(0.01, 0.99, POINTS)
+    for _ in range(60):
+        counts = 1600 + 50 * np.log(bend / (1 - bend)) + rng.normal(0, 20, (4, 1))
+        counts = np.rint(counts + rng.normal(0, 2.5, counts.shape)).ravel()
+        found = antennate.fit_calibration(counts, np.tile(bend, 4), np.repeat(np.arange(4), POINTS))
+        low, high = found.midpoint_95
+        span = found.counts_high - found.counts_low
+        hits += low <= (1600 - found.counts_low) / span <= high
+    assert hits > 52
+
+
+def test_the_text_says_what_the_intervals_are_over(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for pushes, told in ((2, "ten parts of the recording"), (3, "intervals are over 3 pushes.")):
+        file = written(tmp_path / f"{pushes}.csv", *loops(pushes, 0.0))
+        assert main(["calibrate", "--recording", file, "--no-figures"]) == 0
+        assert told in " ".join(capsys.readouterr().out.split())
 
 
 @pytest.mark.parametrize(
@@ -70,7 +96,7 @@ def test_hysteresis_is_told_from_data_that_do_not_match(
     gap: float, noise: float, told: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     file = written(tmp_path / "loop.csv", *loops(4, gap, noise))
-    assert main(["calibrate", "--recording", file, "--draws", "20", "--no-figures"]) == 0
+    assert main(["calibrate", "--recording", file, "--no-figures"]) == 0
     assert told in " ".join(capsys.readouterr().out.split())
 
 
@@ -101,5 +127,5 @@ def test_milliseconds_declared_as_seconds_are_refused(
     file = written(tmp_path / "ms.csv", counts, bend, np.round(1000 * t))
     assert main(["calibrate", "--recording", file]) == 2
     assert "is s the right --columns.time-unit?" in capsys.readouterr().err
-    words = ["--columns.time-unit", "ms", "--draws", "20", "--no-figures"]
+    words = ["--columns.time-unit", "ms", "--no-figures"]
     assert main(["calibrate", "--recording", file, *words]) == 0

@@ -45,7 +45,7 @@ def simulated(
 
 
 def fit(samples: Samples, **rest: object) -> Calibration:
-    return fitting.fit(samples, "left-1", HASH, **{"draws": 5, **rest})  # pyright: ignore[reportArgumentType]
+    return fitting.fit(samples, "left-1", HASH, **rest)  # pyright: ignore[reportArgumentType]
 
 
 @functools.cache
@@ -79,7 +79,7 @@ def test_intervals_hold_the_truth_about_as_often_as_they_say(sets: int, least: i
     """
     hits = 0
     for seed in range(sets):
-        found = fit(simulated(12.0, 0.5, 1, 100 + seed, noise=8.0, pushes=12), draws=60)
+        found = fit(simulated(12.0, 0.5, 1, 100 + seed, noise=8.0, pushes=12))
         low, high = found.midpoint_95
         span = found.counts_high - found.counts_low
         true = (LOW + 0.5 * (HIGH - LOW) - found.counts_low) / span
@@ -246,7 +246,7 @@ def test_averaging_takes_the_mean_of_the_last_readings_of_a_push() -> None:
     assert averaged(Recording(t, s, ""), 0.02).samples.counts.tolist() == [1, 1.5, 2.5, 10, 15]
 
 
-RIG = CalibrateConfig(rig=RigParams(pushes=2), draws=20)
+RIG = CalibrateConfig(rig=RigParams(pushes=2))
 
 
 @pytest.fixture(scope="module")
@@ -264,7 +264,7 @@ def test_the_rig_gives_the_same_on_one_and_two_workers_and_from_its_own_recordin
     file.write_text(write(one.raw))
     again = run(RIG.model_copy(update={"recording": str(file), "sensor_id": "simulated"}))
     assert again.calibration == one.calibration
-    unnamed = run(RIG.model_copy(update={"recording": str(file), "draws": 20}))
+    unnamed = run(RIG.model_copy(update={"recording": str(file)}))
     assert unnamed.calibration.sensor_id == "unnamed"
 
 
@@ -279,7 +279,7 @@ def test_a_poor_curve_is_warned_of(
     file = tmp_path / "poor.csv"
     rows = [f"{n},{c:.1f},{b:.4f}" for n, (c, b) in enumerate(zip(counts, bend, strict=True))]
     file.write_text("\n".join(["time,counts,bend", *rows]) + "\n")
-    words = ["--draws", "20", "--out", str(tmp_path / "out")]
+    words = ["--out", str(tmp_path / "out")]
     words += [] if noise > 0.1 else ["--no-figures"]
     assert main(["calibrate", "--recording", str(file), *words]) == 0
     assert ("record again" in capsys.readouterr().out) == (noise > 0.1)

@@ -16,7 +16,7 @@ from antennate.params.reading import read_file
 def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The directory of a small calibration."""
     folder = tmp_path_factory.mktemp("calibrate") / "run"
-    words = ["--rig.pushes", "2", "--rig.speeds", "0.1", "0.2", "--draws", "20", "--no-figures"]
+    words = ["--rig.pushes", "2", "--rig.speeds", "0.1", "0.2", "--no-figures"]
     assert main(["calibrate", *words, "--workers", "1", "--out", str(folder)]) == 0
     return folder
 

@@ -163,7 +163,7 @@ def test_several_experiments_evaluate_one_design() -> None:
             "bench": {
                 "experiment": "calibrate",
                 "trials": 2,
-                "settings": {"rig": {"pushes": 2, "speeds": [0.3]}, "draws": 20},
+                "settings": {"rig": {"pushes": 2, "speeds": [0.3]}},
                 "maximize": ["calibration.r2"],
             },
         },

@@ -9,12 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from beams import uniform_beam
-from pydantic import ValidationError
 
 from antennate.antenna import sensor
 from antennate.antenna.statics import Chain, equilibrium, shape, with_profile
 from antennate.cli import main
-from antennate.errors import SimulationError
+from antennate.errors import ConfigError, SimulationError
 from antennate.experiments import reading
 from antennate.experiments.force import loads, post_traverse
 from antennate.experiments.force import run as force
@@ -158,7 +157,7 @@ def test_a_traverse_that_blows_up_is_invalid_and_enters_nothing(monkeypatch):
     ],
 )
 def test_what_cannot_be_run_is_refused(values, message):
-    with pytest.raises(ValidationError, match=message):
+    with pytest.raises(ConfigError, match=message):
         loads.ForceConfig(**values)
 
 

@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 import pytest
-from pydantic import ValidationError
 
+from antennate.errors import ConfigError
 from antennate.experiments.gait import run as study
 from antennate.experiments.gait.pace import Walk, measure, rolling_speed
 from antennate.params.control import GaitParams
@@ -85,7 +85,7 @@ def test_rolling_speed_is_that_of_the_rim():
 
 
 def test_rate_must_be_whole_steps():
-    with pytest.raises(ValidationError, match="whole fraction of the physics rate 500 Hz"):
+    with pytest.raises(ConfigError, match="whole fraction of the physics rate 500 Hz"):
         study.GaitStudyConfig(rate=300)
 
 

@@ -9,6 +9,7 @@ import pytest
 from pydantic import ValidationError
 
 from antennate import experiments
+from antennate.errors import ConfigError
 from antennate.params.base import Params, meaning
 from antennate.params.control import ConditioningParams, ControlParams, GaitParams
 from antennate.params.scene import PhysicsParams, TunnelParams
@@ -95,7 +96,7 @@ def test_numbers_cannot_be_changed_after_they_are_made() -> None:
 
 @pytest.mark.parametrize("timestep", [1e-300, 0.0, 1.0])
 def test_a_physics_step_that_cannot_work_is_refused(timestep: float) -> None:
-    with pytest.raises(ValidationError):
+    with pytest.raises(ConfigError):
         PhysicsParams(timestep=timestep)
 
 
@@ -142,17 +143,17 @@ def test_a_robot_that_its_legs_cannot_raise_is_refused(name: str, most: float) -
 
 
 def test_a_robot_lighter_than_its_legs_is_refused() -> None:
-    with pytest.raises(ValidationError, match="mass must leave more than 10 g a link"):
+    with pytest.raises(ConfigError, match="mass must leave more than 10 g a link"):
         RobotSpec(mass=0.305)
 
 
 def test_calibration_counts_in_the_wrong_order_are_refused() -> None:
-    with pytest.raises(ValidationError, match="counts_high must exceed counts_low"):
+    with pytest.raises(ConfigError, match="counts_high must exceed counts_low"):
         ConditioningParams(counts_low=1900.0, counts_high=1899.5)
 
 
 def test_a_tunnel_needs_one_turn_between_every_two_pieces() -> None:
-    with pytest.raises(ValidationError, match="expected 2, found 1"):
+    with pytest.raises(ConfigError, match="expected 2, found 1"):
         TunnelParams(segments=(1.0, 1.0, 1.0), turns_deg=(90.0,))
 
 

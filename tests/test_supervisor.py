@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from hardware_faults import BAD, causes, together
 from hardware_rig import Ticker, armed, healthy
-from pydantic import ValidationError
 
+from antennate.errors import ConfigError
 from antennate.hardware.safety.causes import Cause, State
 from antennate.hardware.safety.diagnosis import Finding
 from antennate.params.safety import SupervisorParams
@@ -182,5 +182,5 @@ def test_the_supply_sags_down_the_ladder_and_does_not_flutter() -> None:
 
 
 def test_supply_levels_in_the_wrong_order_are_refused() -> None:
-    with pytest.raises(ValidationError, match="must fall from warn over hold to off"):
+    with pytest.raises(ConfigError, match="must fall from warn over hold to off"):
         SupervisorParams(supply_hold=11.0)

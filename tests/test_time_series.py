@@ -135,8 +135,19 @@ def test_a_bomb_is_not_unpacked(tmp_path: Path) -> None:
 
 
 def test_arrays_of_unequal_length_are_refused() -> None:
-    with pytest.raises(BadInputError, match=r"yaw: expected 2 axes .* 8 ticks, found shape \(3, 5"):
+    with pytest.raises(
+        BadInputError, match=r"yaw: expected numbers of shape \(8, Y\), found shape \(3, 5"
+    ):
         dataclasses.replace(made(), yaw=np.zeros((3, 5)))
+
+
+@pytest.mark.parametrize("ending", [".npz", ".csv"])
+def test_a_robot_without_antennae_comes_back(tmp_path: Path, ending: str) -> None:
+    bare = dataclasses.replace(made(), antenna=np.zeros((8, 0)))
+    bare.save(tmp_path / f"bare{ending}")
+    found = TimeSeries.load(tmp_path / f"bare{ending}")
+    assert found.antenna.shape == (8, 0)
+    np.testing.assert_array_equal(found.leg, bare.leg)
 
 
 def test_a_data_frame_holds_every_column() -> None:

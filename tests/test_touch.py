@@ -8,12 +8,11 @@ from pathlib import Path
 import numpy as np
 import phone
 import pytest
-from pydantic import ValidationError
 
 from antennate import figures as style
 from antennate.antenna import statics as mechanics
 from antennate.cli import main
-from antennate.errors import SimulationError
+from antennate.errors import ConfigError, SimulationError
 from antennate.experiments import reading
 from antennate.experiments.touch import figure as figures
 from antennate.experiments.touch import run as touch
@@ -103,7 +102,7 @@ def test_walls_stand_where_they_should(kind):
     ],
 )
 def test_walls_that_cannot_be_are_refused(changes, text):
-    with pytest.raises(ValidationError, match=text):
+    with pytest.raises(ConfigError, match=text):
         TouchConfig(**changes)
 
 

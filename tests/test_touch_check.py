@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 from hardware_rig import BAND, BENT, FREE, Ticker
-from pydantic import ValidationError
 
+from antennate.errors import ConfigError
 from antennate.hardware.safety.causes import Cause
 from antennate.hardware.safety.diagnosis import Band
 from antennate.hardware.safety.signal_quality import SignalQuality
@@ -101,7 +101,7 @@ def test_S8_an_objection_keeps_the_robot_from_being_armed() -> None:
 
 
 def test_limits_in_the_wrong_order_are_refused() -> None:
-    with pytest.raises(ValidationError, match="still must be below level"):
+    with pytest.raises(ConfigError, match="still must be below level"):
         TouchCheckParams(still=0.3)
 
 

@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.layout_engine import PlaceHolderLayoutEngine
 from matplotlib.transforms import Bbox
 
+from antennate import checks
 from antennate.colours import MANEUVER_COLOURS as MANEUVER_COLOURS
 from antennate.colours import MANEUVER_NAMES as MANEUVER_NAMES
 from antennate.colours import SERIES as SERIES
@@ -169,7 +170,12 @@ def intervals(
 
 @styled
 def render(figure: Figure) -> dict[str, bytes]:
-    """The figure as svg and png: the same bytes for the same data."""
+    """The figure as svg and png: the same bytes for the same data.
+
+    Raises:
+        ConfigError: It is none of matplotlib.
+    """
+    checks.instance("figure", figure, Figure)
     _settle(figure)
     files = {}
     for suffix, metadata in (("svg", {"Date": None}), ("png", {})):

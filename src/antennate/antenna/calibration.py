@@ -5,16 +5,19 @@ from __future__ import annotations
 import json
 import math
 from pathlib import Path
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import Field, ValidationError, model_validator
 
+from antennate import checks
 from antennate.antenna.sensor import FULL_SCALE
 from antennate.control.conditioning import bending_level
-from antennate.errors import CalibrationError
+from antennate.errors import BadInputError, CalibrationError
 from antennate.files import read_limited, write_whole
+from antennate.params.base import Strict
 from antennate.params.control import ConditioningParams, CurveParams
+from antennate.params.faults import describe
 from antennate.types import Floats
 
 SCHEMA = 1
@@ -32,11 +35,7 @@ _RISE = 2.0 * math.log(9.0)
 _LARGEST_FILE = 1_000_000
 
 
-class _Strict(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
-
-
-class SpeedFit(_Strict):
+class SpeedFit(Strict):
     """How well the curve fits the pushes of one speed [m/s]; None where the speed is unknown."""
 
     speed_m_s: float | None
@@ -45,7 +44,7 @@ class SpeedFit(_Strict):
     rmse: float = Field(ge=0)
 
 
-class Calibration(_Strict):
+class Calibration(Strict):
     """The content of a calibration file: a sigmoid from counts to level, and how well it fits.
 
         level = 1 / (1 + exp(-polarity slope (x - midpoint))),  x = (counts - low) / (high - low)
@@ -72,6 +71,8 @@ class Calibration(_Strict):
             interval over pushes left out lies above 0. Empty with a single push.
     """
 
+    refusal: ClassVar[type[BadInputError]] = CalibrationError
+
     schema_version: Literal[1] = SCHEMA
     made_by: str = Field(max_length=64)
     sensor_id: str = Field(pattern=r"^[A-Za-z0-9._-]{1,64}$")
@@ -95,8 +96,18 @@ class Calibration(_Strict):
     better_than_sigmoid: tuple[Literal["line", "isotonic"], ...]
     reach: float = Field(default=REACH, ge=0, le=200)
 
+    @model_validator(mode="after")
+    def _possible(self) -> Calibration:
+        if why := _impossible(self):
+            raise ValueError(why)
+        return self
+
     def conditioning(self, averaging_time: float = 0.1) -> ConditioningParams:
-        """The curve as parameters of a controller; `averaging_time` [s] is T_avg of the paper."""
+        """The curve as parameters of a controller; `averaging_time` [s] is T_avg of the paper.
+
+        Raises:
+            ConfigError: That time is out of bounds.
+        """
         return ConditioningParams(
             averaging_time=averaging_time,
             midpoint=self.midpoint,
@@ -111,7 +122,12 @@ class Calibration(_Strict):
         return CurveParams(**{n: getattr(self, n) for n in CurveParams.model_fields})
 
     def level(self, counts: Floats) -> Floats:
-        """Flex level, 0 to 1, of readings [counts], same shape; NaN stays NaN."""
+        """Flex level, 0 to 1, of readings [counts], same shape; NaN stays NaN.
+
+        Raises:
+            CalibrationError: They are no numbers.
+        """
+        counts = checks.array("counts", counts, (), "counts", finite=False, error=CalibrationError)
         return bending_level(self.conditioning(), counts)
 
     def to_json(self) -> str:
@@ -122,9 +138,10 @@ class Calibration(_Strict):
         """Write a calibration file, whole or not at all.
 
         Raises:
+            ConfigError: The path is none.
             OutputError: There is such a file and it may not be replaced, or it cannot be written.
         """
-        write_whole(Path(path), self.to_json().encode(), overwrite)
+        write_whole(checks.path("path", path), self.to_json().encode(), overwrite)
 
     @classmethod
     def load(cls, path: str | Path, sensor_id: str | None = None) -> Calibration:
@@ -135,23 +152,17 @@ class Calibration(_Strict):
             sensor_id: The flex sensor it has to belong to, None for any.
 
         Raises:
+            ConfigError: The path is none.
             CalibrationError: It cannot be read; a field is missing, doubled, unknown or out of
                 bounds; or no flex sensor can have such a curve.
         """
-        path = Path(path)
+        path = checks.path("path", path)
         data = read_limited(path, _LARGEST_FILE, CalibrationError)
         try:
             found = cls.model_validate_json(data, strict=True)
             json.loads(data, object_pairs_hook=_once)
         except ValidationError as error:
-            first = error.errors(include_url=False)[0]
-            if first["type"] == "json_invalid":
-                what = first.get("ctx", {})["error"].replace("EOF", "the end of the file")
-                raise CalibrationError(
-                    f"{path}: expected the file to be JSON, found {what}"
-                ) from None
-            field = ".".join(str(part) for part in first["loc"]) or "the file"
-            raise CalibrationError(f"{path}: {field}: {first['msg']}") from None
+            raise CalibrationError(f"{path}: {describe(error, cls)}") from None
         except CalibrationError as error:
             raise CalibrationError(f"{path}: {error}") from None
         if sensor_id is not None and found.sensor_id != sensor_id:
@@ -159,8 +170,6 @@ class Calibration(_Strict):
                 f"{path}: sensor_id: expected {sensor_id}, found {found.sensor_id}: the "
                 "calibration of another flex sensor"
             )
-        if why := _impossible(found):
-            raise CalibrationError(f"{path}: {why}")
         return found
 
 

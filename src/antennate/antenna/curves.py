@@ -49,6 +49,10 @@ def curve(z: Floats, slope: float, midpoint: float) -> Floats:
     return sigmoid(slope * (z - midpoint))
 
 
+BOUNDS = ((-5.0, float(np.log(1000.0))), (-3.0, 3.0))
+"""Where the logarithm of the slope is searched, and the midpoint."""
+
+
 def fit_sigmoid(x: Floats, level: Floats, sign: int) -> tuple[float, float]:
     """Slope k and midpoint x0 that minimise the squared error of the level.
 
@@ -65,7 +69,7 @@ def fit_sigmoid(x: Floats, level: Floats, sign: int) -> tuple[float, float]:
     def error(p: Floats) -> Floats:
         return curve(z, float(np.exp(p[0])), float(p[1])) - level
 
-    found = least_squares(error, start, bounds=([-5.0, -3.0], [np.log(1000.0), 3.0])).x
+    found = least_squares(error, start, bounds=np.transpose(BOUNDS)).x
     return float(np.exp(found[0])), sign * float(found[1])
 
 

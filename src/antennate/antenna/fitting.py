@@ -6,20 +6,33 @@ Data that cannot be calibrated are refused.
 from __future__ import annotations
 
 import hashlib
-from typing import Literal
+import math
+from typing import Any, Literal
 
 import numpy as np
 
-from antennate import __version__
+from antennate import __version__, checks
 from antennate.antenna.calibration import FEWEST, NARROWEST_SPAN, REACH, Calibration, SpeedFit
-from antennate.antenna.curves import MODELS, Samples, curve, ends, fit_sigmoid, polarity, predict
-from antennate.antenna.rivals import gain_of, left_out
+from antennate.antenna.curves import (
+    BOUNDS,
+    MODELS,
+    Samples,
+    curve,
+    ends,
+    fit_sigmoid,
+    polarity,
+    predict,
+)
+from antennate.antenna.rivals import MOST_FOLDS, gain_of, left_out
 from antennate.antenna.sensor import FULL_SCALE
 from antennate.errors import CalibrationError
+from antennate.jackknife import jackknife95
 from antennate.types import Floats, Ints
 
 REVERSAL = 0.15
 """Share of the span by which mean readings may fall back while the level rises."""
+FEWEST_GROUPS = 3
+"""Fewest trials over which intervals are; of fewer the recording is cut into ten parts."""
 _BINS = 10
 _FOLDS = 10
 _RAILS = (0.0, 4090.0)
@@ -87,8 +100,6 @@ def fit(
     threshold: float = 0.5,
     full_scale: bool = False,
     least_r2: float = 0.5,
-    draws: int = 500,
-    seed: int = 0,
 ) -> Calibration:
     """Calibrate recorded samples.
 
@@ -99,8 +110,6 @@ def fit(
         threshold: Flex level that counts as contact.
         full_scale: Normalise readings by 0 to 4095 and not by the recording's extremes.
         least_r2: A fit that explains a smaller share of the variance is refused.
-        draws: Bootstrap draws.
-        seed: Of the bootstrap.
 
     Raises:
         CalibrationError: The data cannot be calibrated, or the sigmoid does not fit them.
@@ -118,7 +127,7 @@ def fit(
             f"{100 * r2:.0f} % with slope {slope:.3g} and midpoint {midpoint:.3g}; "
             "check that time and flex belong together"
         )
-    slopes, midpoints = _bootstrap(samples, x, sign, draws, seed)
+    slopes, midpoints = _intervals(samples, x, sign, slope, midpoint)
     errors = cross_validate(samples, x, sign)
     rmse = {model: float(np.sqrt(np.mean(e**2))) for model, e in errors.items()}
     return Calibration(
@@ -175,20 +184,26 @@ def fit_calibration(
         threshold: Flex level that counts as contact.
 
     Raises:
-        CalibrationError: Shapes differ, a value is not finite, or the data cannot be calibrated.
+        CalibrationError: Shapes differ, a value is not finite (only a speed may be NaN), a trial is
+            no whole number, a speed is below 0, the name or the threshold cannot be one, or the
+            data cannot be calibrated.
     """
-    counts, level = np.asarray(counts, float), np.asarray(level, float)
-    n = counts.shape
-    trial = np.zeros(n, np.int64) if trial is None else np.asarray(trial, np.int64)
-    speed = np.full(n, np.nan) if speed is None else np.asarray(speed, float)
-    for name, values in (("counts", counts), ("level", level), ("trial", trial), ("speed", speed)):
-        if values.ndim != 1 or values.shape != n:
-            raise CalibrationError(f"{name}: expected shape {n} as counts, found {values.shape}")
-    if not (np.isfinite(counts) & np.isfinite(level)).all():
-        raise CalibrationError("counts and level: expected finite numbers, found others")
-    samples = Samples(counts, level, trial, speed, np.arange(1, len(counts) + 1))
+    counts = _column("counts", counts, "n")
+    n = len(counts)
+    level = _column("level", level, n)
+    trials = _column("trial", np.zeros(n) if trial is None else trial, n)
+    if (bad := trials[trials != np.rint(trials)]).size:
+        raise CalibrationError(f"trial: expected whole numbers, found {bad[0]:g}")
+    speeds = _column("speed", np.full(n, np.nan) if speed is None else speed, n, finite=False)
+    if (bad := speeds[(speeds < 0) | np.isinf(speeds)]).size:
+        raise CalibrationError(f"speed: expected finite speeds of at least 0, found {bad[0]:g}")
+    samples = Samples(counts, level, trials.astype(np.int64), speeds, np.arange(1, n + 1))
     digest = hashlib.sha256(np.stack([counts, level]).tobytes()).hexdigest()
     return fit(samples, sensor_id, digest, threshold)
+
+
+def _column(name: str, values: Any, n: int | str, finite: bool = True) -> Floats:
+    return checks.array(name, values, (n,), finite=finite, error=CalibrationError)
 
 
 def _r2(predicted: Floats, level: Floats) -> float:
@@ -217,32 +232,39 @@ def _per_speed(samples: Samples, predicted: Floats) -> list[SpeedFit]:
 
 
 def _groups(samples: Samples) -> list[Ints]:
-    """Rows that are not independent: trials, or ten blocks if there are fewer than three."""
+    """Rows that are not independent: trials, or ten blocks if there are too few of these."""
     trials = np.unique(samples.trial)
-    if len(trials) >= 3:
+    if len(trials) >= FEWEST_GROUPS:
         return [np.flatnonzero(samples.trial == trial) for trial in trials]
     return [b for b in np.array_split(np.arange(len(samples.counts)), _FOLDS) if len(b)]
 
 
-def _bootstrap(
-    samples: Samples, x: Floats, sign: int, draws: int, seed: int
+def _folds(samples: Samples, most: int) -> list[Ints]:
+    """Rows of each group; of several groups where there are more than `most`."""
+    groups = _groups(samples)
+    return [np.concatenate(groups[i::most]) for i in range(min(most, len(groups)))]
+
+
+def _intervals(
+    samples: Samples, x: Floats, sign: int, slope: float, midpoint: float
 ) -> tuple[tuple[float, float], tuple[float, float]]:
-    """95 % intervals of slope and midpoint, by drawing whole trials with replacement."""
-    groups, rng = _groups(samples), np.random.default_rng(seed)
-    found = []
-    for _ in range(draws):
-        rows = np.concatenate([groups[i] for i in rng.integers(0, len(groups), len(groups))])
-        found.append(fit_sigmoid(x[rows], samples.level[rows], sign))
-    low, high = np.percentile(np.array(found), [2.5, 97.5], axis=0)
-    return (float(low[0]), float(high[0])), (float(low[1]), float(high[1]))
+    """95 % intervals of slope, by its logarithm, and midpoint over groups that err together."""
+    left: list[tuple[float, float]] = []
+    for held in _folds(samples, MOST_FOLDS):
+        rest = np.setdiff1d(np.arange(len(x)), held)
+        part = fit_sigmoid(x[rest], samples.level[rest], sign)
+        left.append((math.log(part[0]), part[1]))
+    found = np.array([math.log(slope), midpoint])
+    ends = jackknife95(found, np.array(left))
+    ends = np.clip(np.where(np.isnan(ends), found, ends), *np.transpose(BOUNDS))
+    (low, first), (high, last) = ends.tolist()
+    return (math.exp(low), math.exp(high)), (first, last)
 
 
 def cross_validate(samples: Samples, x: Floats, sign: int) -> dict[str, Floats]:
     """Root mean squared error of each model on groups it has not seen, shape (folds,)."""
-    groups = _groups(samples)
-    folds = [np.concatenate(groups[i::_FOLDS]) for i in range(min(_FOLDS, len(groups)))]
     errors: dict[str, list[float]] = {model: [] for model in MODELS}
-    for held in folds:
+    for held in _folds(samples, _FOLDS):
         rest = np.setdiff1d(np.arange(len(x)), held)
         for model in MODELS:
             predicted = predict(model, x[rest], samples.level[rest], x[held], sign)

@@ -14,6 +14,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from antennate import checks
 from antennate.params.spring import RATE_FACTOR, STOCK_WIRES_MM, WIRES, SpringParams
 
 
@@ -25,7 +26,19 @@ def spring_stiffness(modulus: float, wire: float, coil: float, coils: float) -> 
         wire: Wire diameter [m].
         coil: Mean coil diameter [m].
         coils: Number of active coils.
+
+    Raises:
+        ConfigError: One is no finite number above 0.
     """
+    return _stiffness(
+        checks.real("modulus", modulus, "Pa", above=0.0),
+        checks.real("wire", wire, "m", above=0.0),
+        checks.real("coil", coil, "m", above=0.0),
+        checks.real("coils", coils, above=0.0),
+    )
+
+
+def _stiffness(modulus: float, wire: float, coil: float, coils: float) -> float:
     return modulus * wire**4 / (RATE_FACTOR * coil * coils) / (2.0 * math.pi)
 
 
@@ -39,7 +52,7 @@ def yield_angle(params: SpringParams, wire: float, coil: float, coils: float) ->
     kind, index = WIRES[params.wire], coil / wire
     limit = kind.yield_share * kind.strength / (1e3 * wire) ** kind.exponent
     factor = (4 * index**2 - index - 1) / (4 * index * (index - 1))
-    torque = spring_stiffness(modulus_of(params), wire, coil, coils)
+    torque = _stiffness(modulus_of(params), wire, coil, coils)
     return limit / (factor * 32.0 * torque / (math.pi * wire**3))
 
 
@@ -114,7 +127,7 @@ def _wind(
     params: SpringParams, wire: float, coil: float, wanted: tuple[float, ...]
 ) -> Winding | None:
     modulus, step = modulus_of(params), params.coil_step
-    one = spring_stiffness(modulus, wire, coil, 1.0)
+    one = _stiffness(modulus, wire, coil, 1.0)
     coils = tuple(max(1, round(one / k / step)) * step for k in wanted)
     low, high = params.coil_limits
     if min(coils) < low or max(coils) > high:

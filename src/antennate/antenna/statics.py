@@ -18,6 +18,8 @@ from typing import Literal, get_args
 
 import numpy as np
 
+from antennate import checks
+from antennate.errors import ConfigError
 from antennate.robots.antenna import AntennaSpec
 from antennate.types import Bools, Floats, Ints
 
@@ -46,14 +48,27 @@ class Chain:
     Attributes:
         lengths: Link lengths, base to tip [m], shape (n,).
         stiffness: Spring of the hinge at the base of each link [N·m/rad], shape (n,).
+
+    Raises:
+        ConfigError: One is no finite number above 0, there are none, or their numbers differ.
     """
 
     lengths: Floats
     stiffness: Floats
 
+    def __post_init__(self) -> None:
+        lengths = checks.array("lengths", self.lengths, ("n",), "m")
+        stiffness = checks.array("stiffness", self.stiffness, (len(lengths),), "N·m/rad")
+        for name, values in (("lengths", lengths), ("stiffness", stiffness)):
+            if not len(values) or values.min() <= 0.0:
+                found = f"{values.min():g}" if len(values) else "none"
+                raise ConfigError(f"{name}: expected numbers above 0, found {found}")
+            object.__setattr__(self, name, values)
+
     @classmethod
     def of(cls, antenna: AntennaSpec) -> Chain:
         """The springs of an antenna, stiffened by the flex sensor where it lies."""
+        checks.instance("antenna", antenna, AntennaSpec)
         stiffness = antenna.hinge_stiffness()
         return cls(np.full(len(stiffness), antenna.link_length), np.array(stiffness))
 
@@ -98,15 +113,16 @@ def equilibrium(chain: Chain, place: Floats, force: Floats, follower: bool = Fal
         follower: Whether loads turn with their links.
 
     Raises:
-        ValueError: A place lies off the chain, or the shapes do not fit.
+        ConfigError: A place lies off the chain, a load is not finite, or the shapes do not fit.
     """
-    place, force = np.asarray(place, float), np.asarray(force, float)
-    if place.ndim != 1 or force.shape != (len(place), 2):
-        raise ValueError(
-            f"expected places (m,) and loads (m, 2), found {place.shape} and {force.shape}"
+    checks.instance("chain", chain, Chain)
+    place = checks.array("place", place, ("m",), "m", finite=False)
+    force = checks.array("force", force, (len(place), 2), "N")
+    off = ~((place > 0) & (place <= chain.length * (1 + 1e-12)))
+    if off.any():
+        raise ConfigError(
+            f"place: expected places above 0 and up to {chain.length:g} m, found {place[off][0]:g}"
         )
-    if not ((place > 0) & (place <= chain.length * (1 + 1e-12))).all():
-        raise ValueError(f"expected places above 0 and up to {chain.length:g} m, found {place}")
     arms = np.clip(place[:, None] - chain.starts, 0.0, chain.lengths)
     loaded: Ints = np.count_nonzero(arms, axis=1) - 1
     angles = np.zeros((len(place), len(chain.lengths)))

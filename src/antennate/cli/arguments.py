@@ -28,7 +28,8 @@ from antennate.cli.options import (
 from antennate.errors import ConfigError
 from antennate.messages import shown
 from antennate.params.base import Params, changes
-from antennate.params.reading import Config, describe, group_of, put_over, read_file
+from antennate.params.faults import describe, group_of
+from antennate.params.reading import Config, put_over, read_file
 
 
 class HelpRequest(Exception):

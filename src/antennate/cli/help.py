@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 from antennate.cli.options import Option, fields_of, first_line, flag_of
 from antennate.messages import typed
 from antennate.params.base import meaning
-from antennate.params.reading import group_of
+from antennate.params.faults import group_of
 
 _WIDEST, _NARROWEST = 100, 40
 _COLUMN = 26

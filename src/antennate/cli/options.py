@@ -19,7 +19,7 @@ from pydantic.fields import FieldInfo
 from antennate.errors import ConfigError
 from antennate.messages import nearest, shortened, shown
 from antennate.params.base import GATHERED, meaning
-from antennate.params.reading import group_of
+from antennate.params.faults import group_of
 
 _METAVARS = {int: "INT", float: "FLOAT", str: "TEXT", Path: "FILE"}
 _BOUNDS = {"gt": "above", "ge": "at least", "lt": "below", "le": "at most"}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from antennate import checks
 from antennate.control import controllers
 from antennate.errors import ConfigError, raised
 from antennate.lookup import Registry
@@ -42,12 +43,17 @@ def make_controller(
         batch: Number of robots.
 
     Raises:
-        ConfigError: There is no controller of that name, it cannot be made, or it cannot walk the
-            robot.
+        ConfigError: There is no controller of that name, it cannot be made, it cannot walk the
+            robot, or one of the others is none.
     """
     factory = CONTROLLERS.find(name) if isinstance(name, str) else name
+    control = ControlParams() if control is None else control
+    robot = RobotSpec() if robot is None else robot
+    checks.instance("control", control, ControlParams)
+    checks.instance("robot", robot, RobotSpec)
+    batch = checks.whole("batch", batch, least=1)
     try:
-        made = factory(control or ControlParams(), robot or RobotSpec(), batch)
+        made = factory(control, robot, batch)
     except KeyboardInterrupt:
         raise
     except ConfigError as error:

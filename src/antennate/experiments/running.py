@@ -6,11 +6,10 @@ import re
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from numbers import Integral
 from pathlib import Path
 from typing import Any
 
-from antennate import experiments
+from antennate import checks, experiments
 from antennate.control.registry import CONTROLLERS, ControllerFactory
 from antennate.dataframe import from_rows
 from antennate.errors import BadInputError, ConfigError
@@ -129,8 +128,9 @@ def run(
         OutputError: The directory cannot be written, or holds another run.
         AntennateError: The run failed.
     """
-    if not isinstance(workers, Integral) or isinstance(workers, bool) or workers < 1:
-        raise ConfigError(f"workers: expected a whole number of at least 1, found {workers!r}")
+    workers = checks.whole("workers", workers, least=1)
+    checks.function("on_step", on_step)
+    out = None if out is None else checks.path("out", out)
     for name, given in {"overwrite": overwrite, "resume": resume}.items():
         if given and out is None:
             raise ConfigError(f"{name}: expected out beside it, found none")
@@ -141,8 +141,8 @@ def run(
             f"engine: expected an experiment that runs trials on workers, found {found.name}"
         )
     if video is not None:
-        require_films(found, config, video, out)
-    pool = Workers(int(workers), make_engine(engine), shared=environment(found.name, config))
+        require_films(found, config, checks.whole("video", video), out)
+    pool = Workers(workers, make_engine(engine), shared=environment(found.name, config))
     if out is None:
         return Result(found, config, found.run(config, pool, on_step, lambda row: None))
     place = (found.name, out, overwrite, identity(found.name, config), resume or found.continued)
@@ -300,10 +300,15 @@ def _configured(
 def _names(controllers: Iterable[str | ControllerFactory], workers: int) -> tuple[str, ...]:
     """Controllers by name; classes become known to this process under their own."""
     names = []
-    for controller in [controllers] if isinstance(controllers, str) else controllers:
+    if isinstance(controllers, str):
+        controllers = [controllers]
+    if not isinstance(controllers, Iterable):
+        raise ConfigError(f"controllers: expected a list, found {shown(controllers)}")
+    for controller in controllers:
         if isinstance(controller, str):
             names.append(controller)
             continue
+        checks.function("controllers", controller)
         name = controller.__name__
         if workers > 1 and not _importable(controller):
             raise ConfigError(

@@ -10,7 +10,17 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import pairwise
 from typing import Any, ClassVar, Self
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, model_validator
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    ValidationError,
+    ValidationInfo,
+    model_validator,
+)
+
+from antennate.errors import BadInputError, ConfigError
+from antennate.params.faults import describe
 
 GATHERED = "gathered"
 """Marks a list whose flag, given again, adds to it; of other flags the last one counts."""
@@ -20,8 +30,34 @@ ALLOWED = "allowed"
 """In the context of a validation: parameters, dotted, that may differ though nothing reads them."""
 
 
-class Params(BaseModel):
-    """A frozen group of numbers; unknown keys, NaN and infinities are errors.
+class Strict(BaseModel):
+    """Frozen values; unknown keys, NaN and infinities are errors.
+
+    Attributes:
+        refusal: The error of values that are refused in Python.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+    refusal: ClassVar[type[BadInputError]] = ConfigError
+
+    def __init__(self, /, **values: Any) -> None:
+        """Check the values.
+
+        Raises:
+            BadInputError: Of the type `refusal`: one is unknown, missing, of the wrong type or out
+                of bounds. The text is the same as of a file.
+        """
+        try:
+            super().__init__(**values)
+        except ValidationError as error:
+            raise self.refusal(describe(error, type(self))) from None
+
+    # Without this, pydantic would call it for models within a model, and lose where a fault is.
+    __init__.__pydantic_base_init__ = True  # pyright: ignore[reportFunctionMemberAccess]
+
+
+class Params(Strict):
+    """A group of numbers of a configuration.
 
     Attributes:
         unread: Parameters of its groups, dotted, that a command with this configuration does not
@@ -29,7 +65,6 @@ class Params(BaseModel):
         shared: Whether its file serves other commands too, and so may hold what is not read here.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
     unread: ClassVar[tuple[str, ...]] = ()
     shared: ClassVar[bool] = False
 

@@ -1,20 +1,19 @@
-"""A configuration from a TOML file, and what is wrong with one, in one line."""
+"""A configuration from a TOML file, or from values given in Python."""
 
 from __future__ import annotations
 
 import json
 import tomllib
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
-from types import UnionType
-from typing import Any, TypeVar, Union, cast, get_args, get_origin
+from typing import Any, TypeVar, cast
 
 from pydantic import BaseModel, ValidationError
 
 from antennate.errors import ConfigError
 from antennate.files import decoded, read_limited
-from antennate.messages import nearest, one_line, shown
 from antennate.params.base import Params
+from antennate.params.faults import describe, group_of
 
 LARGEST_FILE = 1_000_000
 """Most bytes of a configuration file."""
@@ -24,31 +23,6 @@ _TOO_LONG = "expected numbers of at most 4300 digits, found more"
 """Python's own limit for whole numbers."""
 
 Config = TypeVar("Config", bound=Params)
-Place = tuple[int | str, ...]
-
-_EXPECTED = {
-    "greater_than": "a number above {gt:g}",
-    "greater_than_equal": "a number of at least {ge:g}",
-    "less_than": "a number below {lt:g}",
-    "less_than_equal": "a number of at most {le:g}",
-    "finite_number": "a finite number",
-    "literal_error": "one of {expected}",
-    "too_short": "at least {min_length} values",
-    "too_long": "at most {max_length} values",
-    "missing": "a value",
-}
-"""What pydantic's error types ask for."""
-
-_KINDS = {
-    "int": "a whole number",
-    "float": "a number",
-    "bool": "true or false",
-    "string": "text",
-    "tuple": "a list",
-    "dict": "a table",
-    "model": "a table",
-}
-"""What pydantic's families of error types ask for, by the first word of the type."""
 
 
 def read_file(path: Path, model: type[Config]) -> Config:
@@ -135,71 +109,3 @@ def from_values(model: type[Config], values: Mapping[str, Any]) -> Config:
         return model.model_validate(dict(values))
     except ValidationError as error:
         raise ConfigError(describe(error, model)) from None
-
-
-def dotted(path: Place) -> str:
-    """`("tunnel", "segments", 0)` as `tunnel.segments[0]`."""
-    text = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in path)
-    return one_line(text.lstrip("."))
-
-
-def describe(
-    error: ValidationError,
-    model: type[Any],
-    where: Callable[[Place], str] = dotted,
-    found: Callable[[Any], str] = shown,
-) -> str:
-    """The first fault pydantic found, and how many more there are.
-
-    Args:
-        error: What it raised.
-        model: The model or dataclass that was to be filled.
-        where: How a place in it is written.
-        found: How a value is written.
-    """
-    every = error.errors(include_url=False)
-    inner = {fault["loc"][:n] for fault in every for n in range(len(fault["loc"]))}
-    faults = [fault for fault in every if fault["loc"] not in inner]  # not what follows from one
-    first = faults[0]
-    kind, path, context = first["type"], first["loc"], first.get("ctx", {})
-    more = f" (and {len(faults) - 1} more)" if len(faults) > 1 else ""
-    if kind == "value_error":
-        spell = dotted if _keys(model, path) else where  # a group is no flag
-        place = f"{spell(path)}: " if path else ""
-        return f"{place}{context['error']}{more}"
-    if kind == "extra_forbidden":
-        key, group = str(path[-1]), dotted(path[:-1])
-        known = _keys(model, path[:-1])
-        what = f"a known key{f' of {group}' if group else ''}{nearest(key, known)}"
-        return f"{where(path)}: expected {what}, found {shown(key)}{more}"
-    value = "none" if kind == "missing" else found(first["input"])
-    return (
-        f"{where(path)}: expected {_expected(kind, context) or first['msg']}, found {value}{more}"
-    )
-
-
-def _expected(kind: str, context: Mapping[str, Any]) -> str | None:
-    if kind in _EXPECTED:
-        text = _EXPECTED[kind].format(**context).replace("'", "")
-        return text.removesuffix("s") if text.endswith(" 1 values") else text
-    return _KINDS.get(kind.split("_")[0])
-
-
-def group_of(annotation: Any) -> type[BaseModel] | None:
-    """The model that an annotation names, alone or beside None; None if it names no model."""
-    union = get_origin(annotation) in (Union, UnionType)
-    for kind in get_args(annotation) if union else (annotation,):
-        if isinstance(kind, type) and issubclass(kind, BaseModel):
-            return kind
-    return None
-
-
-def _keys(model: type[BaseModel], path: Place) -> list[str]:
-    """Keys of the group at `path`, none if it is not known."""
-    for part in path:
-        field = model.model_fields.get(str(part))
-        group = None if field is None else group_of(field.annotation)
-        if group is None:
-            return []
-        model = group
-    return list(model.model_fields)

@@ -8,6 +8,7 @@ from typing import Annotated
 
 from pydantic import Field, model_validator
 
+from antennate import checks
 from antennate.params.base import Params, number
 from antennate.robots.sensor import SensorParams
 from antennate.robots.servos import ServoParams, XL330Params
@@ -139,8 +140,11 @@ class AntennaSpec(Params):
 
         Args:
             servo: Turns the base; an XL330-M288 if absent. Numbers of the antenna come first.
+
+        Raises:
+            ConfigError: The servo is none.
         """
-        model = XL330Params() if servo is None else servo
+        model = XL330Params() if servo is None else checks.instance("servo", servo, ServoParams)
         return BaseDrive(
             model.stiffness if self.base_stiffness is None else self.base_stiffness,
             model.damping if self.base_damping is None else self.base_damping,

@@ -12,6 +12,7 @@ from typing import ClassVar, Literal, Self
 
 from pydantic import model_validator
 
+from antennate import checks
 from antennate.errors import ConfigError
 from antennate.messages import nearest, shown
 from antennate.params.base import Params, number
@@ -101,11 +102,11 @@ class RobotSpec(Params):
         """
         if str(text) in ROBOTS:
             return read_file(Path(__file__).with_name(f"{text}.toml"), cls)
-        if not str(text):
+        if text == "":
             raise ConfigError(
                 f"--robot: expected {', '.join(ROBOTS)} or a TOML file, found nothing"
             )
-        path = folder / text
+        path = folder / checks.path("robot", text)
         if path.suffix != ".toml" and not path.exists():
             known = ", ".join(ROBOTS)
             raise ConfigError(
@@ -202,7 +203,7 @@ class RobotSpec(Params):
             if known == name:
                 return slice(first, first + count)
             first += count
-        raise KeyError(name)
+        raise ConfigError(f"name: expected yaw, legs, antennae or pitch, found {shown(name)}")
 
     def command_shapes(self, batch: int = 1) -> dict[str, tuple[int, ...]]:
         """Shapes of the arrays of a `JointCommand` for some robots, in the order of the joints."""

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import mujoco
 import numpy as np
 
+from antennate import checks
 from antennate.antenna.sensor import SensorChain, reading_noise
 from antennate.errors import ConfigError
 from antennate.messages import shown
@@ -15,6 +16,8 @@ from antennate.sim import antenna_part
 from antennate.sim.antenna_part import Side
 from antennate.types import AntennaFrame, Floats, Ints
 
+_MOST_BITS = 2**31 - 1
+"""MuJoCo keeps collision bits in a signed number of 32 bits."""
 _TOUCH_MARGIN = 1.5
 """Radius of a touch sensor's volume over that of its link: contacts lie inside it."""
 
@@ -53,22 +56,25 @@ def attach_antenna(
         The name.
 
     Raises:
-        ConfigError: There is no such body, the name is taken, the side is unknown, the position or
-            the angle is not finite, or the antenna is none.
+        ConfigError: There is no such body, the name is taken or is no text, the side is unknown,
+            the position or the angle is not finite, collision bits are no whole numbers of 0 to
+            2**31 - 1, or the model or the antenna is none. The model is left as it was.
     """
-    name = f"antenna_{side}" if name is None else name
-    if not isinstance(antenna, AntennaSpec):  # pyright: ignore[reportUnnecessaryIsInstance]
-        raise ConfigError(f"antenna: expected an AntennaSpec, found {shown(antenna)}")
-    outwards = antenna.base_angle if angle is None else angle
-    carrier = _carrier(spec, body, name)
-    _require_place(position, outwards)
+    checks.instance("spec", spec, mujoco.MjSpec)
+    checks.instance("antenna", antenna, AntennaSpec)
+    outwards = antenna.base_angle if angle is None else checks.real("angle", angle, "rad")
+    quaternion = antenna_part.mounting_quaternion(outwards, side)
+    name = checks.text("name", f"antenna_{side}" if name is None else name)
+    carrier = _carrier(spec, checks.text("body", body), name)
+    place = checks.array("position", position, (3,), "m")
+    contype = checks.whole("contype", contype, most=_MOST_BITS)
+    conaffinity = checks.whole("conaffinity", conaffinity, most=_MOST_BITS)
     part = antenna_part.build(antenna)
     for geom in part.geoms:
         if geom.name:  # the links; the base is no obstacle to anything
             geom.contype, geom.conaffinity = contype, conaffinity
     _add_sensors(part, antenna)
-    quaternion = antenna_part.mounting_quaternion(outwards, side)
-    frame = carrier.add_frame(pos=list(position), quat=quaternion)
+    frame = carrier.add_frame(pos=place, quat=quaternion)
     spec.attach(part, frame=frame, prefix=f"{name}/")
     for link in [b.name for b in spec.bodies if b.name.startswith(f"{name}/")]:
         spec.add_exclude(name=f"{link}-{body}", bodyname1=body, bodyname2=link)
@@ -84,13 +90,6 @@ def _carrier(spec: mujoco.MjSpec, body: str, name: str) -> mujoco.MjsBody:
     if spec.body(f"{name}/base") is not None:
         raise ConfigError(f"name: expected one that is not taken, found {name} twice")
     return carrier
-
-
-def _require_place(position: Sequence[float], angle: float) -> None:
-    if np.shape(position) != (3,) or not np.isfinite(position).all():
-        raise ConfigError(f"position: expected 3 finite numbers [m], found {shown(position)}")
-    if not np.isfinite(angle):
-        raise ConfigError(f"angle: expected a finite number [rad], found {shown(angle)}")
 
 
 def _add_sensors(part: mujoco.MjSpec, antenna: AntennaSpec) -> None:
@@ -129,7 +128,8 @@ class AntennaReader:
         seed: Seed of the sensor noise, None for none.
 
     Raises:
-        ConfigError: The model has no such antenna.
+        ConfigError: The model has no such antenna, there are no names, the period is no finite
+            number above 0, or the seed is no whole number of at least 0.
     """
 
     def __init__(
@@ -140,12 +140,21 @@ class AntennaReader:
         period: float,
         seed: int | None = None,
     ) -> None:
+        checks.instance("model", model, mujoco.MjModel)
+        checks.instance("antenna", antenna, AntennaSpec)
+        checks.real("period", period, "s", above=0.0)
+        if isinstance(names, str) or not isinstance(names, Sequence) or not names:
+            raise ConfigError(f"names: expected a list of names, found {shown(names)}")
+        for name in names:
+            checks.text("names", name)
         self._angle = _sensor_addresses(model, names, "angle", antenna.hinges)
         self._touch = _sensor_addresses(model, names, "touch", antenna.hinges)
         self._covered = antenna.sensed_hinges
         self._sensor = antenna.sensor
         self._chain = SensorChain(antenna.sensor, (1, len(names)), period)
-        self._rng = None if seed is None else np.random.default_rng(seed)
+        self._rng = None
+        if seed is not None:
+            self._rng = np.random.default_rng(checks.whole("seed", seed))
 
     def angles(self, data: mujoco.MjData) -> Floats:
         """Hinge angles [rad], base to tip, shape (antennae, hinges)."""

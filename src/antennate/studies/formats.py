@@ -7,13 +7,15 @@ import io
 import json
 import math
 import re
-from collections.abc import Iterable, Iterator, Mapping
-from typing import Any
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict, is_dataclass
+from typing import Any, cast
 
 import numpy as np
 from pydantic import BaseModel
 
-from antennate.errors import BadInputError
+from antennate.errors import BadInputError, ConfigError
+from antennate.messages import shown
 from antennate.params.base import Params, meaning
 
 _CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f]+")
@@ -45,6 +47,50 @@ def to_json(value: Any) -> str:
     return json.dumps(strict(value), indent=2, allow_nan=False, default=_refuse) + "\n"
 
 
+def sound_json(text: str) -> str:
+    """The text of a JSON file as it is.
+
+    Raises:
+        ValueError: It is no JSON.
+    """
+    json.loads(text)
+    return text
+
+
+def from_lines(text: str) -> list[Any]:
+    """Rows that stand as JSON on a line each.
+
+    Raises:
+        ValueError: A line is no JSON.
+    """
+    return list(map(json.loads, text.splitlines()))
+
+
+def pieces(content: str | bytes | Iterator[str]) -> Iterator[bytes]:
+    """The content of a file, piece by piece.
+
+    Raises:
+        ConfigError: It is neither text nor bytes nor pieces of text.
+    """
+    if not isinstance(content, str | bytes | Iterator):
+        raise ConfigError(f"content: expected text, bytes or pieces, found {shown(content)}")
+    for piece in (content,) if isinstance(content, str | bytes) else content:
+        yield piece.encode() if isinstance(piece, str) else piece
+
+
+def as_mapping(row: Any) -> Mapping[str, Any]:
+    """A row by the names of its fields.
+
+    Raises:
+        ConfigError: It is neither a mapping nor a dataclass.
+    """
+    if isinstance(row, Mapping):
+        return cast("Mapping[str, Any]", row)
+    if not is_dataclass(row) or isinstance(row, type):
+        raise ConfigError(f"row: expected a dictionary or a dataclass, found {shown(row)}")
+    return asdict(row)
+
+
 def to_line(row: Mapping[str, Any]) -> str:
     """A row as strict JSON on one line.
 
@@ -67,13 +113,23 @@ def to_csv(rows: Iterable[Mapping[str, Any]]) -> str:
 
 
 def csv_lines(rows: Iterable[Mapping[str, Any]]) -> Iterator[str]:
-    """The same line by line, for a table that does not fit into memory."""
+    """The same line by line, for a table that does not fit into memory.
+
+    Raises:
+        ConfigError: A row has other columns than the first.
+    """
     file = io.StringIO()
     writer = csv.writer(file, lineterminator="\n")
+    names: Sequence[str] = ()
     for number, row in enumerate(rows):
         if not number:
-            writer.writerow(row)
-        writer.writerow([_cell(value) for value in row.values()])
+            names = list(row)
+            writer.writerow(names)
+        if row.keys() != set(names):
+            raise ConfigError(
+                f"row {number}: expected the columns {', '.join(names)}, found {', '.join(row)}"
+            )
+        writer.writerow([_cell(row[name]) for name in names])
         yield file.getvalue()
         file.seek(0)
         file.truncate()

@@ -10,9 +10,10 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Discriminator, model_validator
+from pydantic import Discriminator, model_validator
 
 from antennate.errors import ConfigError
+from antennate.params.base import Strict
 from antennate.types import Floats, Ints
 
 Kind = Literal["grid", "list", "random", "sobol", "morris"]
@@ -26,7 +27,7 @@ STEP = LEVELS / (2 * (LEVELS - 1))
 """How far one parameter moves in it, over its range: all levels are then equally likely."""
 
 
-class Range(BaseModel):
+class Range(Strict):
     """A range of one parameter.
 
     Attributes:
@@ -35,8 +36,6 @@ class Range(BaseModel):
         log: Whether values are spread evenly by their logarithm.
         whole: Whether only whole numbers are values.
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     low: float
     high: float

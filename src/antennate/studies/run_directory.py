@@ -20,23 +20,21 @@ import contextlib
 import json
 import shlex
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict
 from pathlib import Path
 from typing import IO, Any
 
+from antennate import checks
 from antennate.errors import BadInputError, OutputError
-from antennate.files import decoded, read_limited, writing_whole
+from antennate.files import writing_whole
 from antennate.params.base import Params
 from antennate.params.reading import Config, read_file
-from antennate.studies import dates
-from antennate.studies.formats import from_csv, to_csv, to_json, to_line, to_toml
+from antennate.studies import dates, formats
 from antennate.studies.processor import processor
 from antennate.studies.run_files import (
     COMMAND,
     CONFIG,
     ENDINGS,
     FIGURES,
-    LARGEST,
     LOGS,
     PARTIAL,
     REPORT,
@@ -45,11 +43,14 @@ from antennate.studies.run_files import (
     TABLE,
     VERSIONS,
     files_of,
-    free,
     holds_run,
+    inside,
     is_finished,
-    is_folder,
     outdated,
+    place_of,
+    read_as,
+    remove_described,
+    writing,
 )
 from antennate.studies.store import STORE, Store, open_store
 from antennate.telemetry.header import versions
@@ -103,15 +104,13 @@ class RunDirectory:
             retry: Whether trials that failed are run again, so that no run is finished.
 
         Raises:
-            BadInputError: The run that is to go on is another one.
+            BadInputError: The run that is to go on is another one, the path is none, or the command
+                has a name that no folder can have.
             OutputError: It cannot be made or written to, it holds another run, or another process
                 works on it.
         """
-        if path == "" or "\0" in str(path):
-            found = "one with a zero byte" if path else "an empty one"
-            raise OutputError(f"expected the name of a folder, found {found}")
-        place = free(command) if path is None else Path(path)
-        with _writing(place):
+        place = place_of(command, path)
+        with writing(place):
             missing = [p for p in (place, *place.parents) if not p.exists()]
             place.mkdir(parents=True, exist_ok=path is not None)
             for folder in ENDINGS:
@@ -139,9 +138,9 @@ class RunDirectory:
         """A directory that a run has left, to read.
 
         Raises:
-            BadInputError: It holds no run.
+            BadInputError: It holds no run, or the path is none.
         """
-        place = Path(path)
+        place = checks.path("path", path)
         if not any((place / name).exists() for name in (RESULT, PARTIAL, CONFIG)):
             raise BadInputError(f"{place}: expected the folder of a run, found no {RESULT}")
         return cls(place)
@@ -152,7 +151,7 @@ class RunDirectory:
         Raises:
             BadInputError: There is none, or it is damaged.
         """
-        return self._decoded(RESULT, json.loads)
+        return read_as(self.path / RESULT, json.loads)
 
     def rows(self) -> list[dict[str, Any]]:
         """The finished trials: those of trials.csv, or of a run that was stopped.
@@ -161,9 +160,9 @@ class RunDirectory:
             BadInputError: The file is damaged.
         """
         if (self.path / TABLE).exists():
-            return self._decoded(TABLE, from_csv)
+            return read_as(self.path / TABLE, formats.from_csv)
         if (self.path / PARTIAL).exists():
-            return self._decoded(PARTIAL, lambda text: list(map(json.loads, text.splitlines())))
+            return read_as(self.path / PARTIAL, formats.from_lines)
         return []
 
     def config(self, model: type[Config]) -> Config:
@@ -178,20 +177,11 @@ class RunDirectory:
         """The content of one of its text files; empty if there is none.
 
         Raises:
-            BadInputError: The file is damaged.
+            BadInputError: The file is damaged, or no file of a run has such a name.
         """
-        decode = _sound_json if name.endswith(".json") else str
-        return self._decoded(name, decode) if (self.path / name).exists() else ""
-
-    def _decoded(self, name: str, decode: Any) -> Any:
-        path = self.path / name
-        text = decoded(path, read_limited(path, LARGEST))
-        try:
-            return decode(text)
-        except ValueError as error:
-            raise BadInputError(
-                f"{path}: expected a whole file of this kind, found: {str(error).splitlines()[0]}"
-            ) from None
+        checks.text("name", name)
+        decode = formats.sound_json if name.endswith(".json") else str
+        return read_as(self.path / name, decode) if (self.path / name).exists() else ""
 
     def describe(self, config: Params, command: Sequence[str] = ()) -> None:
         """Write what is known before the run: configuration, versions and command.
@@ -199,8 +189,13 @@ class RunDirectory:
         Args:
             config: The configuration.
             command: Words of the command line, if it was one.
+
+        Raises:
+            ConfigError: The configuration is none.
+            OutputError: It cannot be written.
         """
-        self.write(CONFIG, to_toml(config))
+        checks.instance("config", config, Params)
+        self.write(CONFIG, formats.to_toml(config))
         self.write(VERSIONS, self._versions())
         if command:
             resumed = self.store is not None and self.store.holds_trials
@@ -211,7 +206,7 @@ class RunDirectory:
         told = self.store.identity if self.store is not None else None
         models = self.store.processors if self.store is not None else []
         known = versions() if told is None else told["versions"]
-        return to_json({**known, "processor": " and ".join(models or [processor()])})
+        return formats.to_json({**known, "processor": " and ".join(models or [processor()])})
 
     def without_trials(self) -> None:
         """Say that this run has none, so that no empty file of them is left if it is killed.
@@ -219,27 +214,39 @@ class RunDirectory:
         Room for the result is kept, so that a disk that fills meanwhile does not cost it.
         """
         self._drop_partial()
-        with _writing(self.path / ROOM):
+        with writing(self.path / ROOM):
             (self.path / ROOM).write_bytes(bytes(_KEPT_FREE))
 
     def append(self, row: Any) -> None:
-        """Keep one finished trial, a dataclass or a mapping, at once."""
+        """Keep one finished trial, a dataclass or a mapping, at once.
+
+        Raises:
+            ConfigError: The row is neither, or holds what is no number, text, list or dictionary.
+            OutputError: It cannot be written, or the run is finished.
+        """
         if self._finished:
             return
         if self._partial is None:
             raise OutputError(f"{self.path}: expected a run that goes on, found a finished one")
-        with _writing(self.path / PARTIAL):
-            self._partial.write(to_line(_plain(row)))
+        with writing(self.path / PARTIAL):
+            self._partial.write(formats.to_line(formats.as_mapping(row)))
             self._partial.flush()
         self._kept = True
 
     def finish(self, result: Mapping[str, Any], rows: Iterable[Any] = ()) -> None:
-        """Write the result and, if there are rows, their table; then drop the partial file."""
-        table = to_csv(_plain(row) for row in rows)
+        """Write the result and, if there are rows, their table; then drop the partial file.
+
+        Raises:
+            ConfigError: The result is no dictionary, or a row is neither that nor a dataclass.
+            OutputError: Something cannot be written.
+        """
+        checks.mapping("result", result)
+        checks.instance("rows", rows, Iterable)
+        table = formats.to_csv(formats.as_mapping(row) for row in rows)
         if table:
             self.write(TABLE, table)
         self._give_room()
-        self.write(RESULT, to_json(result))
+        self.write(RESULT, formats.to_json(result))
         if not self._finished and self.text(VERSIONS) not in ("", self._versions()):
             self.write(VERSIONS, self._versions())
         if text := self.text(COMMAND):
@@ -265,42 +272,51 @@ class RunDirectory:
         Of a finished run, one that is there stays; but the report tells of those that were missing.
 
         Raises:
+            ConfigError: The name leads out of the directory, or the content is neither text nor
+                bytes nor pieces of text.
             OutputError: It cannot be written.
         """
-        path = self.path / name
+        path = inside(self.path, name)
         if self._finished and path.exists() and not (name == REPORT and self._completed):
             return
         self._completed = True
-        with _writing(path):
+        with writing(path):
             path.parent.mkdir(exist_ok=True)
         with writing_whole(path, overwrite=True) as file:
-            for piece in (content,) if isinstance(content, str | bytes) else content:
-                file.write(piece.encode() if isinstance(piece, str) else piece)
+            file.writelines(formats.pieces(content))
 
     def folder(self, name: str) -> Path:
         """A folder in the directory for files of the run, made if it is not there.
 
         Raises:
+            ConfigError: The name leads out of the directory.
             OutputError: It cannot be made.
         """
-        with _writing(self.path / name):
-            (self.path / name).mkdir(exist_ok=True)
-        return self.path / name
+        path = inside(self.path, name)
+        with writing(path):
+            path.mkdir(exist_ok=True)
+        return path
 
     def write_figures(self, figures: Mapping[str, Any]) -> None:
-        """Put figures into the directory, each as svg and png, by name."""
+        """Put figures of matplotlib into the directory, each as svg and png, by name.
+
+        Raises:
+            ConfigError: One is no figure.
+            OutputError: One cannot be written.
+        """
         from antennate.figures import render
 
-        for name, figure in figures.items():
+        for name, figure in checks.mapping("figures", figures).items():
             for suffix, data in render(figure).items():
                 self.write(f"{FIGURES}/{name}.{suffix}", data)
 
     def _drop_partial(self) -> None:
         if self._partial is None:
             return
-        with _writing(self.path / PARTIAL):
+        with writing(self.path / PARTIAL):
             self._partial.close()
             (self.path / PARTIAL).unlink(missing_ok=True)
+        self._partial = None
 
     def _close_store(self, remove: bool = False) -> None:
         if self.store is not None:
@@ -308,7 +324,7 @@ class RunDirectory:
             self.store = None
 
     def _give_room(self) -> None:
-        with _writing(self.path / ROOM):
+        with writing(self.path / ROOM):
             (self.path / ROOM).unlink(missing_ok=True)
 
     def __enter__(self) -> RunDirectory:
@@ -325,27 +341,6 @@ class RunDirectory:
         with contextlib.suppress(OSError, OutputError):
             self._drop_partial()
             self._give_room()
-            for file in files_of(self.path):
-                if file.name in (CONFIG, VERSIONS, COMMAND) or file.parent == self.path / LOGS:
-                    file.unlink()
-            if is_folder(self.path / LOGS):
-                (self.path / LOGS).rmdir()
+            remove_described(self.path)
             for path in self._created:
                 path.rmdir()
-
-
-def _sound_json(text: str) -> str:
-    json.loads(text)
-    return text
-
-
-def _plain(row: Any) -> Mapping[str, Any]:
-    return row if isinstance(row, Mapping) else asdict(row)
-
-
-@contextlib.contextmanager
-def _writing(path: Path) -> Iterator[None]:
-    try:
-        yield
-    except OSError as error:
-        raise OutputError(f"expected to write {path}, found: {error.strerror or error}") from None

@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import json
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
+from typing import TypeVar
 
-from antennate.errors import OutputError
+from antennate import checks
+from antennate.errors import BadInputError, ConfigError, OutputError
+from antennate.files import decoded, read_limited
 from antennate.studies.store import STORE
 from antennate.telemetry.parts import MOST_PARTS, part
+
+T = TypeVar("T")
 
 RESULT, TABLE, PARTIAL = "result.json", "trials.csv", "trials.partial.jsonl"
 SHARD = "shard.json"
@@ -97,12 +103,83 @@ def is_finished(place: Path) -> bool:
         return False
 
 
+def read_as(path: Path, decode: Callable[[str], T]) -> T:
+    """What a text file of a run holds.
+
+    Args:
+        path: The file.
+        decode: Reads its text; a ValueError says that it is damaged.
+
+    Raises:
+        BadInputError: It cannot be read, or is damaged.
+    """
+    text = decoded(path, read_limited(path, LARGEST))
+    try:
+        return decode(text)
+    except ValueError as error:
+        raise BadInputError(
+            f"{path}: expected a whole file of this kind, found: {str(error).splitlines()[0]}"
+        ) from None
+
+
+def inside(place: Path, name: str) -> Path:
+    """The file or folder of a name in a run's directory.
+
+    Raises:
+        ConfigError: The name leads out of it.
+    """
+    found = Path(checks.text("name", name))
+    if found.is_absolute() or ".." in found.parts:
+        raise ConfigError(f"name: expected one within the run, found {name}")
+    return place / found
+
+
+@contextlib.contextmanager
+def writing(path: Path) -> Iterator[None]:
+    """Tell of what the system refuses while a file or folder is written.
+
+    Raises:
+        OutputError: It refuses something.
+    """
+    try:
+        yield
+    except OSError as error:
+        raise OutputError(f"expected to write {path}, found: {error.strerror or error}") from None
+
+
 def is_folder(folder: Path) -> bool:
     """Whether it is a folder itself, and no link to one."""
     return folder.is_dir() and not folder.is_symlink()
 
 
-def free(command: str) -> Path:
+def remove_described(place: Path) -> None:
+    """Remove what is known before a run, and its logs, from a directory without a result.
+
+    Raises:
+        OSError: Something cannot be removed.
+    """
+    for file in files_of(place):
+        if file.name in (CONFIG, VERSIONS, COMMAND) or file.parent == place / LOGS:
+            file.unlink()
+    if is_folder(place / LOGS):
+        (place / LOGS).rmdir()
+
+
+def place_of(command: str, path: str | Path | None) -> Path:
+    """The folder for a run of a command: the one of a path, or the next that nobody has named.
+
+    Raises:
+        BadInputError: The path is none, or no folder can have such a name.
+    """
+    if path == "" or "\0" in str(path):
+        found = "one with a zero byte" if path else "an empty one"
+        raise OutputError(f"expected the name of a folder, found {found}")
+    if "/" in checks.text("command", command):
+        raise ConfigError(f"command: expected a name without a slash, found {command}")
+    return _free(command) if path is None else checks.path("path", path)
+
+
+def _free(command: str) -> Path:
     """The next folder for a run of a command that nobody has named."""
     runs = Path("runs")
     return next(path for n in itertools.count(1) if not (path := runs / f"{command}-{n}").exists())

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import contextlib
-import math
-from numbers import Integral, Real
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from antennate import checks
 from antennate.control.checked import CheckedController
 from antennate.control.loop import run_loop
 from antennate.control.registry import ControllerFactory, make_controller
@@ -65,8 +64,19 @@ def simulate(
         ControllerError: The controller raised an exception, or what it answers is no command.
         LogError: The log cannot be written.
     """
+<<<<<<< HEAD
     _require(trial, time_limit, log)
     config, control = from_values(TrialConfig, settings), control or ControlParams()
+=======
+    trial = checks.whole("trial", trial)
+    time_limit = checks.real("time_limit", time_limit, "s", above=0.0)
+    control = ControlParams() if control is None else control
+    checks.instance("control", control, ControlParams)
+    log = None if log is None else checks.path("log", log)
+    if log is not None and log.suffix != ".mcap":
+        raise ConfigError(f"log: expected a name with .mcap, found {log}")
+    config = from_values(TrialConfig, settings)
+>>>>>>> ap
     try:
         require_own_curves(config.robot, control)
     except ValueError as error:
@@ -90,10 +100,16 @@ def simulate(
                 trial=trial,
                 phase=start.phase,
             )
+<<<<<<< HEAD
             kept = SimulatedLog(Path(log), header, start.world, walk.decisions)
             walk.log = stack.enter_context(kept)
         run_loop(robot, walk.checked, control.period, walk.go_on)
     return walk.recorder.series(
+=======
+            kept = stack.enter_context(SimulatedLog(log, header, start.world, decisions))
+        run_loop(robot, checked, control.period, go_on)
+    return recorder.series(
+>>>>>>> ap
         {
             "controller": name,
             "scene": config.scene,

@@ -12,12 +12,13 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import Field, ValidationError
 
 from antennate import __version__
 from antennate.errors import LogError
+from antennate.params.base import Strict
 from antennate.params.control import ControlParams
-from antennate.params.reading import describe
+from antennate.params.faults import describe
 from antennate.robots.spec import RobotSpec
 from antennate.telemetry.topics import CALIBRATION, CONFIG, HEADER_TOPICS, VERSIONS, Topic
 
@@ -50,7 +51,7 @@ def versions(packages: tuple[str, ...] = ()) -> Mapping[str, str]:
     return found
 
 
-class Header(BaseModel):
+class Header(Strict):
     """Who decided, with which numbers, on which robot.
 
     Attributes:
@@ -66,8 +67,6 @@ class Header(BaseModel):
         calibration: The calibration file of the antennae, as text; empty without one.
         versions: Versions of what wrote it, by name.
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     controller: str
     params: ControlParams

@@ -18,27 +18,29 @@ from typing import Any
 
 import numpy as np
 
+from antennate import checks
 from antennate.dataframe import from_columns
 from antennate.errors import BadInputError
 from antennate.files import read_limited, write_whole
+from antennate.messages import shown
 from antennate.types import AntennaFrame, Floats, Ints, JointCommand
 
 FORMAT = "antennate time series 1"
 _LARGEST_FILE = 1 << 30
-_ARRAYS: dict[str, tuple[int, type]] = {
-    "t": (1, np.float64),
-    "counts": (2, np.float64),
-    "level": (2, np.float64),
-    "contact": (2, np.int64),
-    "maneuver": (1, np.int64),
-    "yaw": (2, np.float64),
-    "leg": (3, np.float64),
-    "antenna": (2, np.float64),
-    "pitch": (2, np.float64),
-    "head": (2, np.float64),
+_ARRAYS: dict[str, tuple[tuple[int | str, ...], type]] = {
+    "t": ((), np.float64),
+    "counts": ((2,), np.float64),
+    "level": ((2,), np.float64),
+    "contact": ((2,), np.int64),
+    "maneuver": ((), np.int64),
+    "yaw": (("Y",), np.float64),
+    "leg": (("L", 2), np.float64),
+    "antenna": (("A",), np.float64),
+    "pitch": (("P",), np.float64),
+    "head": ((2,), np.float64),
 }
-"""Number of axes, the first of which is time, and type of each array."""
-_MAY_BE_EMPTY = ("yaw", "pitch")
+"""Axes after the first, which is time, and type of each array."""
+_MAY_BE_EMPTY = ("yaw", "antenna", "pitch")
 _UNUSABLE = (
     *(ValueError, KeyError, TypeError, EOFError, MemoryError, OverflowError, RuntimeError),
     *(csv.Error, zlib.error, zipfile.BadZipFile),
@@ -63,6 +65,10 @@ class TimeSeries:
         pitch: Commanded pitch angles [rad], shape (n, P); P is 0 unless pitch is actuated.
         head: Position of the head in the world [m], shape (n, 2).
         meta: What the series is of, such as controller, robot and seed.
+
+    Raises:
+        BadInputError: An array has another shape or kind of numbers, or `meta` holds what is
+            neither text nor a number nor None.
     """
 
     t: Floats
@@ -78,12 +84,17 @@ class TimeSeries:
     meta: Mapping[str, str | int | float | None] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        for name, (axes, _) in _ARRAYS.items():
-            shape = np.shape(getattr(self, name))
-            if len(shape) != axes or shape[0] != len(self.t):
+        ticks = len(checks.array("t", self.t, ("n",), "s", finite=False))
+        for name, (sizes, kind) in _ARRAYS.items():
+            whole = kind is np.int64
+            values = checks.array(name, getattr(self, name), (ticks, *sizes), finite=whole)
+            if whole and (values != np.rint(values)).any():
+                raise BadInputError(f"{name}: expected whole numbers, found others")
+            object.__setattr__(self, name, values.astype(kind, copy=False))
+        for name, value in checks.mapping("meta", self.meta).items():
+            if not isinstance(value, str | int | float | None):
                 raise BadInputError(
-                    f"{name}: expected {axes} axes of which the first has {len(self.t)} ticks, "
-                    f"found shape {shape}"
+                    f"meta: {name}: expected text, a number or None, found {shown(value)}"
                 )
 
     def __len__(self) -> int:
@@ -111,10 +122,10 @@ class TimeSeries:
         """Write the series to a file that ends in `.npz` or `.csv`.
 
         Raises:
-            BadInputError: The file has another ending.
+            BadInputError: The path is none, or the file has another ending.
             OutputError: There is such a file and it may not be replaced, or it cannot be written.
         """
-        path = Path(path)
+        path = checks.path("path", path)
         data = self._npz() if _ending(path) == ".npz" else self._csv().encode()
         write_whole(path, data, overwrite)
 
@@ -123,9 +134,10 @@ class TimeSeries:
         """Read a file that `save` wrote.
 
         Raises:
-            BadInputError: The file cannot be read or is not a whole time series.
+            BadInputError: The path is none, or the file cannot be read or is not a whole time
+                series.
         """
-        path = Path(path)
+        path = checks.path("path", path)
         read = _from_npz if _ending(path) == ".npz" else _from_csv
         data = read_limited(path, _LARGEST_FILE)
         try:

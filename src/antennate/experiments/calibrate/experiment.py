@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from antennate.antenna.fitting import FEWEST_GROUPS
 from antennate.antenna.next_push import RECORDED
 from antennate.experiments.calibrate import recording
 from antennate.experiments.calibrate import run as calibrate
@@ -59,11 +60,18 @@ def tables(result: Mapping[str, Any]) -> Sequence[Table]:
             {found["sensor_id"]: found},
             CURVE,
             f"Readings {way} with flex. Readings: {found['samples']}, pushes: {found['trials']}; "
-            "intervals are bootstrapped\nover whole pushes.",
+            f"intervals are over\n{_groups(found['trials'])}.",
         ),
         Table.of("The one curve at each speed", speeds, SPEED),
         _next_push(result),
     )
+
+
+def _groups(pushes: int) -> str:
+    """What the intervals of the curve are over."""
+    if pushes >= FEWEST_GROUPS:
+        return f"{pushes} pushes"
+    return "ten parts of the recording, and say nothing of other pushes"
 
 
 def _next_push(result: Mapping[str, Any]) -> Table:

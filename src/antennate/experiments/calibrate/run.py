@@ -35,7 +35,7 @@ from antennate.studies.experiment import OnStep, Outcome, no_step
 from antennate.studies.pool import Workers, gather
 from antennate.types import Floats
 
-_OF_THE_RIG = ("rig", "antenna", "variation", "physics", "solver")
+_OF_THE_RIG = ("rig", "antenna", "variation", "physics", "solver", "seed")
 
 
 class CalibrateConfig(Params):
@@ -76,8 +76,6 @@ class CalibrateConfig(Params):
     """A worse fit is warned of."""
     solver: Solver = solver()
     """What steps the rig's physics: the engine, or the chain solver (extra `fast`)."""
-    draws: int = number(500, "1", "assumed: usual", ge=20, le=100000)
-    """Bootstrap draws."""
     seed: int = number(1, "1", "assumed: any", ge=0)
     """Seed of all chance."""
     rig: RigParams = RigParams()
@@ -263,7 +261,5 @@ def run(
         config.threshold,
         config.full_scale,
         config.least_r2,
-        config.draws,
-        config.seed,
     )
     return CalibrateOutcome(config, used, raw, found)

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, Tag, model_validator
+from pydantic import Field, Tag, model_validator
 
-from antennate.params.base import Params, number
+from antennate.params.base import Params, Strict, number
 from antennate.studies.plan import RANGE_OR_CHOICES, Range
 
 Goal = Literal["maximize", "minimize"]
@@ -84,7 +84,7 @@ class Objective:
         return 1.0 if self.goal == "minimize" else -1.0
 
 
-class Evaluation(BaseModel):
+class Evaluation(Strict):
     """How one experiment evaluates a design.
 
     Attributes:
@@ -98,11 +98,9 @@ class Evaluation(BaseModel):
         minimize: Measures that shall be small, likewise.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
-
     experiment: str | None = None
     trials: int | None = Field(None, ge=1, le=100000)
-    settings: dict[str, Any] = {}
+    settings: dict[str, Any] = Field({})
     maximize: tuple[str, ...] = ()
     minimize: tuple[str, ...] = ()
 

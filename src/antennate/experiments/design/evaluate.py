@@ -21,7 +21,8 @@ from antennate.experiments.study.subject import (
 )
 from antennate.messages import nearest, shortened
 from antennate.params.base import Params
-from antennate.params.reading import group_of, put_over
+from antennate.params.faults import group_of
+from antennate.params.reading import put_over
 from antennate.studies.experiment import Trial, no_row, no_step
 from antennate.studies.plan import Point
 from antennate.studies.pool import Workers

@@ -36,9 +36,16 @@ def tables(result: Mapping[str, Any]) -> Sequence[Table]:
         MEASURES,
         f"Places from {result['from_place']:g} of the length to the tip, hinges up to "
         f"{result['hinge_limit_deg']:g} deg; friction {result['friction']:g}.\n"
-        "Place known: one curve for every place; unknown: one for all.",
+        "Place known: one curve for every place; unknown: one for all.\n"
+        f"Intervals: over loads at rest and over {tested(result)} traverses, which served no fit.",
     )
     return (shares,)
+
+
+def tested(result: Mapping[str, Any]) -> int:
+    """Traverses that the intervals of the dragged antenna are over."""
+    each = (row["traverses"]["unknown"]["flex"] for row in result["profiles"].values())
+    return min(row["groups"] for row in each)
 
 
 def sentence(result: Mapping[str, Any]) -> str:

@@ -13,7 +13,7 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
 from antennate import figures as style
-from antennate.experiments.force.experiment import PARTS
+from antennate.experiments.force.experiment import PARTS, tested
 from antennate.experiments.force.loads import Points
 from antennate.experiments.force.run import ForceOutcome, ProfileOutcome
 from antennate.studies.measures import Measure
@@ -90,7 +90,7 @@ def _draw_shares(panel: Axes, result: Mapping[str, Any]) -> None:
     profiles = result["profiles"]
     parts = (("at rest", style.INK), ("dragged", style.SERIES[5]))
     places = (("known", "o"), ("unknown", "s"))
-    trials = min(row["traverses"]["trials"] for row in profiles.values())
+    trials = tested(result)
     for k, ((part, colour), (place, marker)) in enumerate(product(parts, places)):
         known = Measure(f"{PARTS[part]}.{place}.flex", f"{part}, place {place}")
         style.intervals(

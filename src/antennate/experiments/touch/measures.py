@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from antennate.experiments.touch.sensing import Comparison
+from antennate.jackknife import jackknife95
 from antennate.studies import statistics
 from antennate.types import Floats, Ints
 
@@ -175,14 +176,10 @@ def _interval(
         None with fewer than two trials, or when it does not matter which one is left out: that
         tells nothing of the next.
     """
-    from scipy.special import stdtrit  # scipy.stats takes a second longer
-
-    left = left[np.isfinite(left)]
-    if not np.isfinite(value) or len(left) < 2 or np.ptp(left) == 0.0:
+    low, high = jackknife95(value, left[np.isfinite(left)])
+    if not np.isfinite([low, high]).all():
         return None
-    count = len(left)
-    half = stdtrit(count - 1, 0.975) * np.sqrt((count - 1) * left.var())
-    return max(least, float(value - half)), min(most, float(value + half))
+    return max(least, float(low)), min(most, float(high))
 
 
 def _rate(name: str, count: int, metres: float) -> dict[str, Any]:

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from antennate import checks
 from antennate.dataframe import from_columns
 from antennate.errors import BadInputError
 from antennate.files import read_limited
@@ -91,9 +92,11 @@ def read_esp32(source: str | Path | bytes | bytearray | memoryview) -> Esp32Reco
         BadInputError: The file cannot be read, or there is no usable sample in it.
     """
     decoder, hellos, samples, refused = FrameDecoder(), {}, {}, ""
-    if isinstance(source, bytearray | memoryview):
+    if isinstance(source, bytes | bytearray | memoryview):
         source = bytes(source)
-    data = source if isinstance(source, bytes) else read_limited(Path(source), _LARGEST)
+        data = source
+    else:
+        data = read_limited(checks.path("source", source), _LARGEST)
     for frame in decoder.feed(data):
         if isinstance(frame, Hello):
             hellos.setdefault(frame.boot_id, frame)
