@@ -64,19 +64,12 @@ def simulate(
         ControllerError: The controller raised an exception, or what it answers is no command.
         LogError: The log cannot be written.
     """
-<<<<<<< HEAD
-    _require(trial, time_limit, log)
-    config, control = from_values(TrialConfig, settings), control or ControlParams()
-=======
     trial = checks.whole("trial", trial)
     time_limit = checks.real("time_limit", time_limit, "s", above=0.0)
     control = ControlParams() if control is None else control
     checks.instance("control", control, ControlParams)
-    log = None if log is None else checks.path("log", log)
-    if log is not None and log.suffix != ".mcap":
-        raise ConfigError(f"log: expected a name with .mcap, found {log}")
+    log = None if log is None else _log(log)
     config = from_values(TrialConfig, settings)
->>>>>>> ap
     try:
         require_own_curves(config.robot, control)
     except ValueError as error:
@@ -100,16 +93,10 @@ def simulate(
                 trial=trial,
                 phase=start.phase,
             )
-<<<<<<< HEAD
-            kept = SimulatedLog(Path(log), header, start.world, walk.decisions)
+            kept = SimulatedLog(log, header, start.world, walk.decisions)
             walk.log = stack.enter_context(kept)
         run_loop(robot, walk.checked, control.period, walk.go_on)
     return walk.recorder.series(
-=======
-            kept = stack.enter_context(SimulatedLog(log, header, start.world, decisions))
-        run_loop(robot, checked, control.period, go_on)
-    return recorder.series(
->>>>>>> ap
         {
             "controller": name,
             "scene": config.scene,
@@ -121,18 +108,16 @@ def simulate(
     )
 
 
-def _require(trial: int, time_limit: float, log: str | Path | None) -> None:
-    """Refuse what no trial can have.
+def _log(given: str | Path) -> Path:
+    """The path of the log that is asked for.
 
     Raises:
-        ConfigError: It is given.
+        ConfigError: It is none, or has another ending.
     """
-    if not isinstance(trial, Integral) or trial < 0:
-        raise ConfigError(f"trial: expected a whole number of at least 0, found {trial!r}")
-    if not (isinstance(time_limit, Real) and 0.0 < time_limit < math.inf):
-        raise ConfigError(f"time_limit: expected a finite time above 0 [s], found {time_limit!r}")
-    if log is not None and Path(log).suffix != ".mcap":
+    log = checks.path("log", given)
+    if log.suffix != ".mcap":
         raise ConfigError(f"log: expected a name with .mcap, found {log}")
+    return log
 
 
 class _Walk:
