@@ -37,7 +37,8 @@ def test_a_search_cut_anywhere_goes_on_to_the_same_bytes(
     design("whole")
     lines = Path("whole", STORE).read_bytes().splitlines(keepends=True)
     trials = len(table("whole"))
-    assert len(lines) == 1 + trials + 3 + 1  # one says what is run, three are batches, one the end
+    assert len(lines) == 2 + trials + 3 + 1  # what is run, the processor, three batches, the end
+    assert b'"processor":' in lines[1]
     for cut in (1, 5, 20, 41, len(lines) - 1):
         shutil.rmtree("run", ignore_errors=True)
         Path("run").mkdir()
