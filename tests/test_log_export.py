@@ -6,6 +6,7 @@ import csv
 from dataclasses import replace
 from pathlib import Path
 
+import pytest
 from log_ticks import HEADER, tick
 
 from antennate.cli import main
@@ -27,3 +28,23 @@ def test_export_leaves_the_columns_in_their_place_where_a_joint_is_missing(tmp_p
     assert [second[name] for name in joints[:3]] == ["0.0", "0.1", "nan"]
     assert (second["yaw3_position"], second["yaw1_velocity"]) == ("nan", "1.0")
     assert (third["yaw1_position"], third["yaw1_velocity"]) == ("0.0", "1.0")
+
+
+@pytest.mark.parametrize("name", ["log-2.mcap", "log-3.mcap", "link.mcap", "hard.mcap"])
+def test_recover_never_writes_over_a_part_of_the_log_nor_makes_one(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for path, number in (("log.mcap", 1), ("log-2.mcap", 2)):
+        with LogWriter(Path(path), HEADER) as out:
+            out.write(tick(number))
+    Path("link.mcap").symlink_to("log-4.mcap")
+    Path("hard.mcap").hardlink_to("log-2.mcap")
+    before = {path.name: path.read_bytes() for path in tmp_path.iterdir() if path.exists()}
+    assert main(["log", "recover", "log.mcap", "--out", name, "--overwrite"]) == 2
+    err = capsys.readouterr().err
+    assert f"found {name}" in err
+    assert err.count("\n") == 1
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir() if path.exists()} == before
+    assert main(["log", "recover", "log.mcap", "--out", "whole.mcap"]) == 0
+    assert "2 ticks were written" in capsys.readouterr().out
