@@ -1,4 +1,4 @@
-"""Tables of logs whose content or place nobody would choose."""
+"""What is made of logs whose content or place nobody would choose."""
 
 from __future__ import annotations
 
@@ -48,3 +48,35 @@ def test_recover_never_writes_over_a_part_of_the_log_nor_makes_one(
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir() if path.exists()} == before
     assert main(["log", "recover", "log.mcap", "--out", "whole.mcap"]) == 0
     assert "2 ticks were written" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["replay", "run"],
+        ["replay", "run/logs/a.mcap"],
+        ["servo", "--recording", "run/drive.mcap"],
+        ["calibrate", "--recording", "elsewhere/../run/recording.csv"],
+    ],
+)
+def test_no_run_replaces_the_one_that_it_reads(
+    words: list[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("elsewhere").mkdir()
+    Path("run/logs").mkdir(parents=True)
+    log = Path("run/logs/a.mcap" if "run/logs/a.mcap" in words else "run/drive.mcap")
+    with LogWriter(log, HEADER) as out:
+        out.write(tick(1))
+    files = [log, Path("run/result.json"), Path("run/config.toml"), Path("run/recording.csv")]
+    for file in files[1:]:
+        file.write_text("what was measured")
+    before = [file.read_bytes() for file in files]
+    assert main([*words, "--out", "run", "--overwrite"]) == 2
+    err = capsys.readouterr().err
+    assert "--out: expected another folder than that of " in err
+    assert err.count("\n") == 1
+    assert [file.read_bytes() for file in files] == before
