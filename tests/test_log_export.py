@@ -9,7 +9,9 @@ from pathlib import Path
 import pytest
 from log_ticks import HEADER, tick
 
+from antennate import run
 from antennate.cli import main
+from antennate.errors import OutputError
 from antennate.robots.spec import RobotSpec
 from antennate.telemetry.writer import LogWriter
 
@@ -77,6 +79,10 @@ def test_no_run_replaces_the_one_that_it_reads(
     before = [file.read_bytes() for file in files]
     assert main([*words, "--out", "run", "--overwrite"]) == 2
     err = capsys.readouterr().err
-    assert "--out: expected another folder than that of " in err
+    assert "expected another folder than that of " in err
     assert err.count("\n") == 1
+    if "--recording" in words:
+        recording = words[2:] if words[0] == "servo" else words[2]
+        with pytest.raises(OutputError, match="expected another folder"):
+            run(words[0], recording=recording, out="run", overwrite=True)
     assert [file.read_bytes() for file in files] == before

@@ -14,13 +14,13 @@ from pydantic.dataclasses import dataclass
 from antennate.cli.arguments import FromFile
 from antennate.cli.options import option
 from antennate.cli.output import write_result
-from antennate.errors import BadInputError, ConfigError
+from antennate.errors import BadInputError
 from antennate.params.base import Params
 from antennate.studies.formats import to_json
 from antennate.studies.measures import Table
 from antennate.studies.report import View, write_report
 from antennate.studies.run_directory import RunDirectory
-from antennate.studies.run_files import LOG, LOGS, files_of
+from antennate.studies.run_files import LOG, LOGS, require_apart
 from antennate.telemetry.recover import RECOVERED
 
 
@@ -62,46 +62,15 @@ def folder_for(
 
     Raises:
         BadInputError: The run that is to go on is another one.
-        ConfigError: What is read is a file of the run that the folder holds.
-        OutputError: It cannot be written, or it holds another run.
+        OutputError: It cannot be written, or it holds another run, or one that is read.
     """
-    _require_apart(options.out, [*reads, *map(Path, _texts(config.model_dump()))])
+    require_apart(options.out, config.model_dump(), reads)
     place = (view.name, options.out, options.overwrite, identity, resume, retry)
     with RunDirectory.create(*place) as folder:
         folder.describe(config, ["antennate", command or view.name, *argv])
         yield folder
         write_report(folder, view)
         sys.stderr.write(f"written to {folder.path}\n")
-
-
-def _require_apart(out: Path | None, reads: Iterable[Path]) -> None:
-    """Check that what is read does not go with the run that a folder holds.
-
-    Raises:
-        ConfigError: It would.
-    """
-    held = files_of(out) if out is not None and out.is_dir() else []
-    for path in reads if held else ():
-        if any(_is_same(path, each) for each in held):
-            raise ConfigError(f"--out: expected another folder than that of {path}, found {out}")
-
-
-def _is_same(path: Path, other: Path) -> bool:
-    try:
-        return path.samefile(other)
-    except (OSError, ValueError):  # no file, or not even a name of one
-        return False
-
-
-def _texts(value: Any) -> Iterator[str]:
-    """All texts in a configuration."""
-    if isinstance(value, Mapping):
-        value = tuple(value.values())
-    if isinstance(value, str):
-        yield value
-    elif isinstance(value, Sequence):
-        for each in value:
-            yield from _texts(each)
 
 
 def log_of(path: Path) -> Path:
