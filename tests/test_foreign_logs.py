@@ -17,6 +17,7 @@ from mcap.writer import CompressionType, IndexType, Writer
 
 from antennate.cli import main
 from antennate.telemetry.reader import LogReader
+from antennate.telemetry.topics import ANTENNA
 from antennate.telemetry.writer import LogWriter
 
 TICKS = 30
@@ -225,3 +226,31 @@ def test_a_log_of_antennate_without_a_crc_is_damaged_whatever_follows_it(log: Pa
         data[len(MAGIC)] = name
         log.write_bytes(data)
         assert ticks_of(log) == WRITTEN[:1] + WRITTEN[2:]
+
+
+@pytest.mark.parametrize(
+    ("odd", "words"),
+    [("type", ["log", "info"]), ("encoding", ["log", "info"]), ("controller", ["replay"])],
+)
+def test_a_very_long_name_is_quoted_in_short(
+    odd: str, words: list[str], log: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    name = "long name\n\x1b[2J" * 10_000
+    head = HEADER.model_copy(update={"controller": name if odd == "controller" else "closed"})
+    with Path("odd.mcap").open("wb") as file:
+        writer = Writer(file)
+        writer.start()
+        for topic, data in head.messages().items():
+            kind = writer.register_schema(topic.type.name, "ros2msg", topic.type.schema.encode())
+            writer.add_message(writer.register_channel(topic.name, "cdr", kind), 0, data, 0)
+        about = name if odd == "type" else ANTENNA.type.name
+        kind = writer.register_schema(about, "ros2msg", ANTENNA.type.schema.encode())
+        encoding = name if odd == "encoding" else "cdr"
+        writer.add_message(writer.register_channel("/antenna", encoding, kind), 1, b"", 1)
+        writer.finish()
+    assert main([*words, "odd.mcap"]) == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1
+    assert "long name" in said
+    assert len(said) < 1000
+    assert "\x1b" not in said

@@ -1,4 +1,4 @@
-"""Tables of logs whose content or place nobody would choose."""
+"""What is made of logs whose content or place nobody would choose."""
 
 from __future__ import annotations
 
@@ -6,9 +6,12 @@ import csv
 from dataclasses import replace
 from pathlib import Path
 
+import pytest
 from log_ticks import HEADER, tick
 
+from antennate import run
 from antennate.cli import main
+from antennate.errors import OutputError
 from antennate.robots.spec import RobotSpec
 from antennate.telemetry.writer import LogWriter
 
@@ -27,3 +30,59 @@ def test_export_leaves_the_columns_in_their_place_where_a_joint_is_missing(tmp_p
     assert [second[name] for name in joints[:3]] == ["0.0", "0.1", "nan"]
     assert (second["yaw3_position"], second["yaw1_velocity"]) == ("nan", "1.0")
     assert (third["yaw1_position"], third["yaw1_velocity"]) == ("0.0", "1.0")
+
+
+@pytest.mark.parametrize("name", ["log-2.mcap", "log-3.mcap", "link.mcap", "hard.mcap"])
+def test_recover_never_writes_over_a_part_of_the_log_nor_makes_one(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for path, number in (("log.mcap", 1), ("log-2.mcap", 2)):
+        with LogWriter(Path(path), HEADER) as out:
+            out.write(tick(number))
+    Path("link.mcap").symlink_to("log-4.mcap")
+    Path("hard.mcap").hardlink_to("log-2.mcap")
+    before = {path.name: path.read_bytes() for path in tmp_path.iterdir() if path.exists()}
+    assert main(["log", "recover", "log.mcap", "--out", name, "--overwrite"]) == 2
+    err = capsys.readouterr().err
+    assert f"found {name}" in err
+    assert err.count("\n") == 1
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir() if path.exists()} == before
+    assert main(["log", "recover", "log.mcap", "--out", "whole.mcap"]) == 0
+    assert "2 ticks were written" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["replay", "run"],
+        ["replay", "run/logs/a.mcap"],
+        ["servo", "--recording", "run/drive.mcap"],
+        ["calibrate", "--recording", "elsewhere/../run/recording.csv"],
+    ],
+)
+def test_no_run_replaces_the_one_that_it_reads(
+    words: list[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("elsewhere").mkdir()
+    Path("run/logs").mkdir(parents=True)
+    log = Path("run/logs/a.mcap" if "run/logs/a.mcap" in words else "run/drive.mcap")
+    with LogWriter(log, HEADER) as out:
+        out.write(tick(1))
+    files = [log, Path("run/result.json"), Path("run/config.toml"), Path("run/recording.csv")]
+    for file in files[1:]:
+        file.write_text("what was measured")
+    before = [file.read_bytes() for file in files]
+    assert main([*words, "--out", "run", "--overwrite"]) == 2
+    err = capsys.readouterr().err
+    assert "expected another folder than that of " in err
+    assert err.count("\n") == 1
+    if "--recording" in words:
+        recording = words[2:] if words[0] == "servo" else words[2]
+        with pytest.raises(OutputError, match="expected another folder"):
+            run(words[0], recording=recording, out="run", overwrite=True)
+    assert [file.read_bytes() for file in files] == before

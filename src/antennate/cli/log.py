@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from importlib import import_module
 from itertools import islice
@@ -22,6 +23,7 @@ from antennate.messages import extra, one_line, shortened, typed
 from antennate.params.base import Params
 from antennate.studies.formats import csv_lines
 from antennate.studies.measures import Table
+from antennate.telemetry.parts import MOST_PARTS, part, parts
 from antennate.telemetry.reader import LogReader
 from antennate.telemetry.recover import RECOVERED, left_out, recover
 from antennate.telemetry.survey import Survey
@@ -117,14 +119,24 @@ def _target(path: Path, options: Options) -> Path:
     try:
         if target.is_dir():
             raise ConfigError(f"--out: expected the name of a file, found the folder {target}")
-        if target.exists() and path.exists() and target.samefile(path):
+        if target.exists() and any(p.exists() and target.samefile(p) for p in parts(path)):
             raise ConfigError(f"--out: expected another file than the log, found {target}")
+        if _would_continue(target, path):
+            raise ConfigError(
+                f"--out: expected a name that does not continue the log {path}, found {target}"
+            )
     except OSError as error:
         raise OutputError(
             f"--out: expected a name that can be written, found {shortened(str(target))}: "
             f"{error.strerror}"
         ) from None
     return target
+
+
+def _would_continue(target: Path, path: Path) -> bool:
+    """Whether a file of this name is read as a later part of a log."""
+    names = {os.path.realpath(part(path, number)) for number in range(2, MOST_PARTS + 1)}
+    return os.path.realpath(target) in names
 
 
 def _recover(path: Path, target: Path) -> LogReader:

@@ -64,7 +64,7 @@ def command(argv: Sequence[str]) -> int:
     log.require_ticks()
     result = _result(log, found, config.controller)
     if options.out is not None:
-        with folder_for(VIEW, options, config, argv) as folder:
+        with folder_for(VIEW, options, config, argv, reads=log.parts) as folder:
             _keep(folder, path, found)
             say_by_hand(by_hand, folder)
             folder.finish(result)

@@ -20,7 +20,7 @@ from antennate.studies.formats import to_json
 from antennate.studies.measures import Table
 from antennate.studies.report import View, write_report
 from antennate.studies.run_directory import RunDirectory
-from antennate.studies.run_files import LOG, LOGS
+from antennate.studies.run_files import LOG, LOGS, require_apart
 from antennate.telemetry.recover import RECOVERED
 
 
@@ -43,6 +43,7 @@ def folder_for(
     resume: bool = False,
     retry: bool = False,
     command: str = "",
+    reads: Sequence[Path] = (),
 ) -> Iterator[RunDirectory]:
     """A run directory with its configuration.
 
@@ -57,14 +58,16 @@ def folder_for(
         resume: Go on with the run that the folder holds, if there is one.
         retry: Run its trials again that failed.
         command: Name of the command, if it is not that of the view.
+        reads: Files that it reads, beside those that the configuration names.
 
     Raises:
         BadInputError: The run that is to go on is another one, or no file can keep the words.
-        OutputError: It cannot be written, or it holds another run.
+        OutputError: It cannot be written, or it holds another run, or one that is read.
     """
     for flag, words in flags_and_words(argv):
         for word in words:
             require_text(flag or view.name, word)
+    require_apart(options.out, config.model_dump(), reads)
     place = (view.name, options.out, options.overwrite, identity, resume, retry)
     with RunDirectory.create(*place) as folder:
         folder.describe(config, ["antennate", command or view.name, *argv])

@@ -22,7 +22,7 @@ from antennate.studies.identity import environment, identity
 from antennate.studies.pool import Workers
 from antennate.studies.report import write_report
 from antennate.studies.run_directory import RunDirectory
-from antennate.studies.run_files import FILMS
+from antennate.studies.run_files import FILMS, require_apart
 
 _PARTS = 100
 """Parts of the making of a film that are told."""
@@ -145,6 +145,7 @@ def run(
     pool = Workers(workers, make_engine(engine), shared=environment(found.name, config))
     if out is None:
         return Result(found, config, found.run(config, pool, on_step, lambda row: None))
+    require_apart(out, config.model_dump())
     place = (found.name, out, overwrite, identity(found.name, config), resume or found.continued)
     with RunDirectory.create(*place) as directory:
         directory.keeps_store = found.continued

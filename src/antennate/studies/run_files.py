@@ -6,9 +6,9 @@ import contextlib
 import itertools
 import json
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from antennate import checks
 from antennate.errors import BadInputError, ConfigError, OutputError
@@ -73,6 +73,43 @@ def holds_run(place: Path, held: Sequence[Path], resume: bool) -> OutputError:
         "choose another or give --overwrite"
         + (" or --resume" if place / STORE in held and not resume else "")
     )
+
+
+def require_apart(
+    out: str | Path | None, config: Mapping[str, Any], reads: Iterable[Path] = ()
+) -> None:
+    """Check that what a run reads does not go with the run that its folder holds.
+
+    Args:
+        out: The folder.
+        config: The configuration, with names of files.
+        reads: More files.
+
+    Raises:
+        OutputError: It would.
+    """
+    held = files_of(Path(out)) if out is not None and Path(out).is_dir() else []
+    for path in (*reads, *map(Path, _texts(config))) if held else ():
+        if any(_is_same(path, each) for each in held):
+            raise OutputError(f"expected another folder than that of {path}, found {out}")
+
+
+def _is_same(path: Path, other: Path) -> bool:
+    try:
+        return path.samefile(other)
+    except (OSError, ValueError):  # no file, or not even a name of one
+        return False
+
+
+def _texts(value: Any) -> Iterator[str]:
+    """All texts in a configuration."""
+    if isinstance(value, Mapping):
+        value = tuple(value.values())
+    if isinstance(value, str):
+        yield value
+    elif isinstance(value, Sequence):
+        for each in value:
+            yield from _texts(each)
 
 
 def outdated(held: Sequence[Path], command: str, goes_on: bool, finished: bool) -> list[Path]:

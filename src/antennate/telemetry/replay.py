@@ -238,8 +238,9 @@ def recorded_controller(header: Header, name: str | None = None) -> Controller:
     wanted = header.controller if name is None else name
     if name is None and wanted not in BUILT_IN:
         more = "closed, for example" if wanted == TWIN else "with this name if its code may run"
+        found = shortened(repr(wanted))
         raise LogError(
-            f"expected one of {', '.join(BUILT_IN)} in the log, found {wanted!r}; give "
+            f"expected one of {', '.join(BUILT_IN)} in the log, found {found}; give "
             f"--controller {more}"
         )
     made = make_controller(wanted, header.params, header.robot)

@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from antennate.errors import LogError
+from antennate.messages import shortened
 from antennate.telemetry.cdr import MessageType
 
 
@@ -210,11 +211,12 @@ def by_channel(
         kind, schema = schemas.get(about, ("nothing", ""))
         if (kind, _bare(schema)) != (topic.type.name, _bare(topic.type.schema)):
             raise LogError(
-                f"expected {topic.type.name} as now defined in {name}, found {kind} of another "
-                "definition; read it with the version that wrote it"
+                f"expected {topic.type.name} as now defined in {name}, found {shortened(kind)} of "
+                "another definition; read it with the version that wrote it"
             )
         if encoding != "cdr":
-            raise LogError(f"expected messages in {name} encoded as cdr, found {encoding}")
+            found = shortened(encoding)
+            raise LogError(f"expected messages in {name} encoded as cdr, found {found}")
         named[channel] = topic
     return named
 
