@@ -114,6 +114,10 @@ def test_the_twins_servo_is_identified_from_its_recording(
     assert line["no_load_speed"] == pytest.approx(true.no_load_speed, rel=0.02)
     assert line["armature"] == pytest.approx(true.armature, rel=0.02)
     whole = found["models"][-1]
+    assert found["interval_over"] == "8 stretches of the recordings"  # 2 of 4 s, pieces of 1 s
+    for name in ("no_load_speed", "armature"):
+        low, high = whole["interval_95"][name]
+        assert low < whole[name] < high
     assert whole["friction"] < 0.02 * true.stall_torque
     assert whole["load_friction"] < 0.02
     assert whole["error_deg"] < 0.1
