@@ -154,13 +154,13 @@ TINY: dict[str, list[dict[str, Any]]] = {
         for sensor in (OTHER_SENSOR, {})
     ],
     "calibrate": [
-        {"rig": {"pushes": 2, "speeds": [0.3]}, "draws": 20},
-        {"rig": {"pushes": 2, "speeds": [0.3]}, "antenna": {"sensor": OTHER_SENSOR}, "draws": 20},
-        {"recording": "recording.csv", "draws": 20},
+        {"rig": {"pushes": 2, "speeds": [0.3]}},
+        {"rig": {"pushes": 2, "speeds": [0.3]}, "antenna": {"sensor": OTHER_SENSOR}},
+        {"recording": "recording.csv"},
     ],
     "sensor": [{"hold_time": 1.0}, {"sensor": OTHER_SENSOR}],
     "servo": [
-        {"recording": ["servo.json"], "fit": True, "draws": 20},
+        {"recording": ["servo.json"], "fit": True},
         {"recording": ["silent.json"], "servo": "xc430_w240", "supply": 11.1},
         {"recording": ["silent.json"], "servo": "xl430_w250", "supply": 11.1},
     ],
@@ -185,7 +185,7 @@ TINY: dict[str, list[dict[str, Any]]] = {
     "ringdown": [{}],
     "reproduce": [{"quick": True}],
 }
-PARTS = {"springs": {}, "calibrate": {"rig": {"pushes": 2, "speeds": [0.3]}, "draws": 20}}
+PARTS = {"springs": {}, "calibrate": {"rig": {"pushes": 2, "speeds": [0.3]}}}
 """All that `reproduce` runs here."""
 
 

@@ -67,7 +67,7 @@ def test_what_is_recorded_at_marks_calibrates_to_the_curve_of_the_antenna(tmp_pa
     file = tmp_path / "left.csv"
     file.write_text("\n".join(bench.lines) + "\n")
     columns = RecordingParams(bend_unit="mm", bend_zero=0.0, bend_full=50.0)
-    outcome = run(CalibrateConfig(recording=str(file), columns=columns, draws=20))
+    outcome = run(CalibrateConfig(recording=str(file), columns=columns))
     found = outcome.calibration
     assert found.polarity == -1
     assert found.slope == pytest.approx(slope, rel=0.05)

@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
+from antennate.jackknife import jackknife95
 from antennate.studies.regression import Curve, by_group, explained
+from antennate.studies.statistics import mean95
 
 
 def test_curve_through_rising_points_is_the_points():
@@ -92,6 +94,15 @@ def test_nothing_to_predict_explains_nothing():
     found = explained(np.zeros(0), np.zeros(0), np.zeros(0, np.int64))
     assert found.n == 0
     assert np.isnan(found.r2)
+
+
+def test_the_jackknife_of_a_mean_is_students_interval() -> None:
+    values = np.random.default_rng(1).normal(size=(7, 2))
+    left = (values.sum(axis=0) - values) / 6
+    ends = jackknife95(values.mean(axis=0), left)
+    for column, (low, high) in zip(values.T, ends.T, strict=True):
+        assert (low, high) == pytest.approx(mean95(column)[1:])
+    assert np.isnan(jackknife95(3.0, np.full(7, 3.0))).all()
 
 
 def test_one_group_has_no_interval() -> None:

@@ -107,13 +107,17 @@ def test_the_twins_servo_is_identified_from_its_recording(
 ) -> None:
     """The twin's motor is another implementation, with the 128 of the manual."""
     files = [str(of_twin(tmp_path / f"{a}.json", number, 400, a, 4.0)) for a in (0.6, 1.5)]
-    found = antennate.run("servo", recording=files, servo=name, fit=True, draws=20).summary
+    found = antennate.run("servo", recording=files, servo=name, fit=True).summary
     line = next(m for m in found["models"] if m["name"] == "line fitted")
     true = XL330Params() if number == 1200 else type(XL330Params()).__bases__[0]()
     assert line["gain_divisor"] == pytest.approx(128.0, rel=0.02)
     assert line["no_load_speed"] == pytest.approx(true.no_load_speed, rel=0.02)
     assert line["armature"] == pytest.approx(true.armature, rel=0.02)
     whole = found["models"][-1]
+    assert found["interval_over"] == "8 stretches of the recordings"  # 2 of 4 s, pieces of 1 s
+    for name in ("no_load_speed", "armature"):
+        low, high = whole["interval_95"][name]
+        assert low < whole[name] < high
     assert whole["friction"] < 0.02 * true.stall_torque
     assert whole["load_friction"] < 0.02
     assert whole["error_deg"] < 0.1
@@ -123,7 +127,7 @@ def test_the_twins_servo_is_identified_from_its_recording(
 @pytest.mark.slow
 def test_a_real_servo_is_tracked_at_a_gain_that_was_not_fitted() -> None:
     files = sorted(map(str, REAL.glob("*.json")))
-    found = antennate.run("servo", recording=files, fit=True, draws=20).summary
+    found = antennate.run("servo", recording=files, fit=True).summary
     models = {m["name"]: m for m in found["models"]}
     assert models["data sheet, /128"]["error_deg"] > 10.0
     assert models["data sheet, /256"]["error_deg"] == pytest.approx(5.2, abs=0.5)
@@ -248,7 +252,7 @@ def test_a_fit_does_not_depend_on_the_parameters_that_it_replaces(tmp_path: Path
     """Nor does it leave them out: the model as given stands beside it."""
     file = str(of_twin(tmp_path / "a.json", 1200, 400, 1.0, 2.0))
     runs = [
-        antennate.run("servo", recording=[file], servos=servos, fit=True, draws=20).summary
+        antennate.run("servo", recording=[file], servos=servos, fit=True).summary
         for servos in (ServosParams(), ServosParams(xl330_m288=XL330Params(armature=0.02)))
     ]
     found = [{model["name"]: model for model in run["models"]} for run in runs]
@@ -287,7 +291,6 @@ def test_a_file_that_is_no_recording_is_refused_in_one_line(
     [
         ([], "--recording: expected one file or more"),
         (["--recording", "none.json"], "none.json: expected a readable file"),
-        (["--draws", "50"], "draws: expected the default, as nothing is fitted"),
         (["--servos.xc430-w240.armature", "0.1"], "expected the default, as the servo is xl330"),
     ],
 )

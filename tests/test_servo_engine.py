@@ -92,7 +92,7 @@ def recorded(path: Path, p_gain: float, seconds: float = 5.0) -> str:
 def test_a_servo_with_friction_a_weight_and_another_supply_is_identified(tmp_path: Path) -> None:
     """Steps of the engine and of the formulas differ, which shows in the inertia most."""
     files = [recorded(tmp_path / f"{gain}.json", gain) for gain in (200, 400)]
-    found = antennate.run("servo", recording=files, fit=True, draws=20).summary
+    found = antennate.run("servo", recording=files, fit=True).summary
     whole = found["models"][-1]
     assert whole["error_deg"] < 0.2
     for name, rel in (

@@ -187,9 +187,7 @@ def test_an_approach_does_not_count_in_a_fit(tmp_path: Path) -> None:
     found = []
     for name, before in (("a", stands), ("b", approached)):
         log = as_drive(tmp_path / f"{name}.mcap", [*before, *driven])
-        run = antennate.run(
-            "servo", recording=[str(log)], joint=JOINT, fit=True, draws=20, supply=5.0
-        )
+        run = antennate.run("servo", recording=[str(log)], joint=JOINT, fit=True, supply=5.0)
         found.append(run.summary["models"][-1])
     for name in ("gain_divisor", "no_load_speed", "armature"):
         assert found[1][name] == pytest.approx(found[0][name], rel=0.01)

@@ -55,8 +55,8 @@ class Calibration(Strict):
         sensor_id: Which flex sensor: letters, digits, dots, hyphens, underscores.
         data_sha256: Hash of the recording.
         polarity: 1 if readings rise with the flex, -1 if they fall.
-        slope: Slope of the sigmoid over x; `slope_95` its 95 % interval.
-        midpoint: x at which the level is 0.5; `midpoint_95` its 95 % interval.
+        slope: Slope of the sigmoid over x; `slope_95` its 95 % interval, over pushes.
+        midpoint: x at which the level is 0.5; `midpoint_95` its 95 % interval, over pushes.
         counts_low: Reading at x = 0 [counts]; `counts_high` at x = 1.
         threshold: Level from which on there is contact (theta of the paper).
         valid_counts: Lowest and highest reading of the recording [counts].
@@ -69,6 +69,10 @@ class Calibration(Strict):
             [spans].
         better_than_sigmoid: Models that were better on these readings beyond noise: the 95 %
             interval over pushes left out lies above 0. Empty with a single push.
+
+    Raises:
+        CalibrationError: A value is missing, unknown or out of bounds, or no flex sensor can have
+            such a curve.
     """
 
     refusal: ClassVar[type[BadInputError]] = CalibrationError

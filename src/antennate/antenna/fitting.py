@@ -173,7 +173,7 @@ def fit_calibration(
     sensor_id: str = "unnamed",
     threshold: float = 0.5,
 ) -> Calibration:
-    """Calibrate a flex sensor from arrays.
+    """Calibrate a flex sensor from arrays: the curve of `Calibration`, by least squares.
 
     Args:
         counts: Readings [counts], shape (n,), at least 20.

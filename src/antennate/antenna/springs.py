@@ -21,6 +21,8 @@ from antennate.params.spring import RATE_FACTOR, STOCK_WIRES_MM, WIRES, SpringPa
 def spring_stiffness(modulus: float, wire: float, coil: float, coils: float) -> float:
     """Stiffness of a torsion spring [N·m/rad].
 
+    E d^4 / (10.8 D N) per turn (Shigley, Mechanical Engineering Design, section 10-12), over 2 pi.
+
     Args:
         modulus: Young's modulus of the wire [Pa].
         wire: Wire diameter [m].

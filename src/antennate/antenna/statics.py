@@ -103,7 +103,10 @@ class Rest:
 
 
 def equilibrium(chain: Chain, place: Floats, force: Floats, follower: bool = False) -> Rest:
-    """Bend a chain by point loads.
+    """Bend a chain by point loads, however far.
+
+    At rest k_j q_j = F . dp/dq_j for each hinge j, with p the loaded point: Newton's method on the
+    branch that begins straight.
 
     Args:
         chain: The chain.
@@ -111,6 +114,10 @@ def equilibrium(chain: Chain, place: Floats, force: Floats, follower: bool = Fal
         force: Loads [N], shape (m, 2), x along the straight chain. Fixed in direction, or, for a
             follower, given in the frame of the loaded link: (0, f) is normal to it.
         follower: Whether loads turn with their links.
+
+    Returns:
+        A `Rest`: `angles` of the hinges [rad], base to tip, shape (m, n); `force` [N] in the frame
+        of the base, shape (m, 2); whether each load is `solved` and `stable`, shapes (m,).
 
     Raises:
         ConfigError: A place lies off the chain, a load is not finite, or the shapes do not fit.

@@ -40,7 +40,7 @@ def make_controller(
         name: A name that `CONTROLLERS` finds, or a factory.
         control: Numbers of the control, the defaults if not given.
         robot: The robot, the default one if not given.
-        batch: Number of robots.
+        batch: Number of robots B, at least 1: the first axis of all its arrays.
 
     Raises:
         ConfigError: There is no controller of that name, it cannot be made, it cannot walk the

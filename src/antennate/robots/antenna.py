@@ -49,6 +49,9 @@ class AntennaSpec(Params):
     """One antenna: a chain of torsion springs with a flex sensor along its base.
 
     It has as many hinges, and links of equal length, as `active_coils` has entries.
+
+    Raises:
+        ConfigError: A value is unknown or out of bounds, or values do not go together.
     """
 
     active_coils: tuple[_Coils, ...] = number(

@@ -47,9 +47,9 @@ def simulate(
 
     Args:
         controller: A name, as `closed` or `file.py:Class`, or a controller class.
-        trial: Number of the trial.
-        time_limit: Time after which it ends [s]; it ends earlier at the exit, or when the robot has
-            left the scene or the physics failed.
+        trial: Number of the trial, from 0.
+        time_limit: Time above 0 after which it ends [s]; it ends earlier at the exit, or when the
+            robot has left the scene or the physics failed.
         control: Parameters of the controller, the defaults if not given.
         log: A file that does not exist yet, with the ending .mcap, for the log of the trial.
         settings: Fields of the trial: seed, scene, robot, tunnel, variation, physics.

@@ -61,7 +61,7 @@ class TimeSeries:
         maneuver: `Maneuver`, shape (n,).
         yaw: Commanded yaw angles, head first [rad], shape (n, Y).
         leg: Commanded leg angles [rad], shape (n, L, 2), left before right.
-        antenna: Commanded angles of the antenna bases [rad], shape (n, 2).
+        antenna: Commanded angles of the antenna bases [rad], shape (n, 2), or (n, 0) without.
         pitch: Commanded pitch angles [rad], shape (n, P); P is 0 unless pitch is actuated.
         head: Position of the head in the world [m], shape (n, 2).
         meta: What the series is of, such as controller, robot and seed.

@@ -22,7 +22,7 @@ CLAIMS: tuple[Claim, ...] = (*ANTENNA, *WALL, *ROBOT)
 QUICK: Mapping[str, Mapping[str, Any]] = {
     "springs": {},
     "taper": {},
-    "calibrate": {"rig": {"pushes": 4}, "draws": 100},
+    "calibrate": {"rig": {"pushes": 4}},
     "force": {"profiles": ("descending",), "traverses": 4},
     "touch": {"profiles": ("descending",), "speeds": (0.1,), "trials": 2},
     "sweep": {"profiles": ("descending",)},

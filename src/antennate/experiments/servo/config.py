@@ -9,8 +9,6 @@ from pydantic import model_validator
 from antennate.params.base import Params, number
 from antennate.robots.servos import ServoName, ServoParams, ServosParams
 
-_OF_THE_FIT = ("draws", "seed")
-
 
 class ServoConfig(Params):
     """Everything that decides the outcome of `antennate servo`."""
@@ -35,10 +33,6 @@ class ServoConfig(Params):
     """Supply where a recording tells none, as no log does; nominal in a replay if not given."""
     fit: bool = number(False, "1", "assumed: a replay alone")
     """Identify the model from the recordings."""
-    draws: int = number(100, "1", "assumed: enough for an interval", ge=20, le=2000)
-    """Bootstrap draws of the fit."""
-    seed: int = number(1, "1", "assumed: any", ge=0)
-    """Seed of the draws."""
 
     @property
     def given(self) -> ServoParams:
@@ -47,12 +41,6 @@ class ServoConfig(Params):
 
     @model_validator(mode="after")
     def _agree(self) -> ServoConfig:
-        fields = type(self).model_fields
-        for name in () if self.fit else _OF_THE_FIT:
-            if getattr(self, name) != fields[name].default:
-                raise ValueError(
-                    f"{name}: expected the default, as nothing is fitted, found another"
-                )
         for name, field in ServosParams.model_fields.items():
             if name != self.servo and getattr(self.servos, name) != field.default:
                 raise ValueError(

@@ -41,7 +41,7 @@ def tables(result: Mapping[str, Any]) -> Sequence[Table]:
         columns[model["name"]] = model
         ends = {name: model["interval_95"].get(name) for name in NAMES}
         columns[f"{model['name']}, 95 %"] = ends
-    note = f"Intervals are bootstrapped over {result['interval_over']}."
+    note = f"Intervals are over {result['interval_over']}."
     return compared, Table.of("Parameters", columns, PARAMETERS, note)
 
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from antennate.jackknife import jackknife95
 from antennate.robots.servo_model import NAMES, STEP, Course, replay
 from antennate.types import Bools, Floats, Ints
 
@@ -18,6 +19,8 @@ EVERY = 5
 """Positions are compared at every so many steps of the model."""
 PIECE = 1.0
 """Length of a piece of a recording [s]."""
+MOST_STRETCHES = 30
+"""Stretches of neighbouring pieces that are left out in turn where recordings are few."""
 _ROBUST = 0.05
 """Errors beyond this count in proportion, not by their square [rad]."""
 _LOG = np.array([name not in ("friction", "load_friction") for name in NAMES])
@@ -160,21 +163,31 @@ def _spread(data: Data, parts: Floats) -> Floats:
     return np.array([found[k] for k in data.pieces], np.float64)
 
 
-def draws(parts: Bools, count: int, rng: np.random.Generator, by_file: bool) -> Floats:
-    """Weights of bootstrap draws, shape (count, F, K): files or pieces with replacement.
+def left_out(parts: Bools, by_file: bool) -> Floats:
+    """Weights with each group left out in turn, shape (groups, F, K).
 
     Args:
         parts: Pieces that hold a measurement, shape (F, K).
-        count: Number of draws.
-        rng: Source of chance.
-        by_file: Draw whole files, else pieces.
+        by_file: A group is a file, else one of MOST_STRETCHES stretches of neighbouring pieces.
     """
-    if by_file:
-        files = len(parts)
-        picked = rng.multinomial(files, np.full(files, 1.0 / files), count)
-        return np.asarray(picked[:, :, None] * parts, np.float64)
-    places = np.flatnonzero(parts)
-    picked = rng.multinomial(len(places), np.full(len(places), 1.0 / len(places)), count)
-    found = np.zeros((count, parts.size))
-    found[:, places] = picked
-    return found.reshape(count, *parts.shape)
+    number = np.repeat(np.arange(len(parts))[:, None], parts.shape[1], axis=1)
+    if not by_file:
+        order = np.cumsum(parts).reshape(parts.shape) - 1
+        number = order * min(MOST_STRETCHES, int(parts.sum())) // max(1, int(parts.sum()))
+    groups = np.unique(number[parts])
+    return np.array([parts & (number != group) for group in groups], np.float64)
+
+
+def interval95(found: Floats, left: Floats) -> Floats:
+    """Ends of the 95 % interval of each parameter, by jackknife on the scale of the search.
+
+    Args:
+        found: Fitted to all, shape (6,).
+        left: Fitted without each group, shape (groups, 6).
+
+    Returns:
+        Both ends within the bounds of the search, shape (2, 6).
+    """
+    x = np.where(_LOG, np.log(np.where(_LOG, [found, *left], 1.0)), [found, *left])
+    ends = np.clip(jackknife95(x[0], x[1:]), _LOW, _HIGH)
+    return np.where(_LOG, np.exp(np.where(_LOG, ends, 0.0)), ends)

@@ -62,11 +62,10 @@ class ServoOutcome(Outcome):
         return {
             "schema": 1,
             "command": "servo",
-            "seed": self.config.seed,
             "servo": self.config.servo,
             "fitted": self.config.fit,
             "recordings": [_recording(each) for each in self.recordings],
-            "interval_over": "recordings" if _by_file(self.recordings) else "pieces of 1 s",
+            "interval_over": self._interval_over(),
             "models": [
                 {
                     "name": model.name,
@@ -90,6 +89,11 @@ class ServoOutcome(Outcome):
             ],
         }
 
+    def _interval_over(self) -> str:
+        by_file = _by_file(self.recordings)
+        count = len(fitting.left_out(self.data.parts(), by_file))
+        return f"{count} recordings" if by_file else f"{count} stretches of the recordings"
+
     def traces(self) -> Floats:
         """Positions that each model gives [rad], shape (T / 10, M, F)."""
         return servo_model.replay(self.fitted, self.data.course, SHOWN)
@@ -109,7 +113,7 @@ def _recording(each: Recording) -> dict[str, Any]:
 
 
 def _by_file(recordings: list[Recording]) -> bool:
-    """Whether there are enough recordings to draw whole ones."""
+    """Whether there are enough recordings to leave out whole ones."""
     return len(recordings) >= 5
 
 
@@ -143,7 +147,7 @@ def run(config: ServoConfig, on_step: OnStep = no_step) -> ServoOutcome:
     if config.fit:
         on_step(len(seen), total)
         last = slice(-_JUDGED, None)
-        interval[last] = _intervals(config, recordings, data, fits[0][last], rows[last])
+        interval[last] = _intervals(recordings, data, fits[0][last], rows[last])
     on_step(total, total)
     judged = [
         fitting.errors(data, fits[i + 1], _same(each.parts, len(rows)))
@@ -200,15 +204,13 @@ def _fitted(data: Data, rows: list[Model], parts: Bools) -> Floats:
     return found
 
 
-def _intervals(
-    config: ServoConfig, recordings: list[Recording], data: Data, best: Floats, rows: list[Model]
-) -> Floats:
-    """Ends of the 95 % bootstrap intervals, shape (M, 2, 6); NaN for what is not fitted."""
-    rng = np.random.default_rng(config.seed)
-    weights = fitting.draws(data.parts(), config.draws, rng, _by_file(recordings))
+def _intervals(recordings: list[Recording], data: Data, best: Floats, rows: list[Model]) -> Floats:
+    """Ends of the 95 % intervals, shape (M, 2, 6); NaN for what is not fitted."""
+    weights = fitting.left_out(data.parts(), _by_file(recordings))
     mask = np.array([row.mask for row in rows])
-    start = np.repeat(best, config.draws, axis=0)
-    free = np.repeat(mask, config.draws, axis=0)
+    start = np.repeat(best, len(weights), axis=0)
+    free = np.repeat(mask, len(weights), axis=0)
     found = fitting.fit(data, start, free, np.concatenate([weights] * len(rows)))
-    ends = np.percentile(found.reshape(len(rows), config.draws, -1), [2.5, 97.5], axis=1)
-    return np.where(mask[:, None], np.moveaxis(ends, 0, 1), np.nan)
+    left = found.reshape(len(rows), len(weights), -1)
+    ends = np.array([fitting.interval95(*each) for each in zip(best, left, strict=True)])
+    return np.where(mask[:, None], ends, np.nan)

@@ -89,7 +89,8 @@ def read_esp32(source: str | Path | bytes | bytearray | memoryview) -> Esp32Reco
         source: A file of raw bytes as they came over USB or TCP, or the bytes themselves.
 
     Raises:
-        BadInputError: The file cannot be read, or there is no usable sample in it.
+        BadInputError: It is neither a path nor bytes, the file cannot be read, or there is no
+            usable sample in it.
     """
     decoder, hellos, samples, refused = FrameDecoder(), {}, {}, ""
     if isinstance(source, bytes | bytearray | memoryview):
