@@ -250,6 +250,20 @@ def test_one_trial_has_no_interval_and_says_so(tmp_path: Path) -> None:
     assert result.sentence.endswith("One trial alone gives no interval.")
 
 
+def test_one_recording_is_never_two_animals(tmp_path: Path) -> None:
+    """Twice the same file, a copy, and the same points with a likelihood."""
+    points = animal(dwelling(4, 300))
+    first, copy = (write(tmp_path / f"{name}.csv", points) for name in ("first", "copy"))
+    noted = write(tmp_path / "noted.csv", points, {"l3": np.ones(300)})
+    for other in (first, copy, noted):
+        message = rf"^{other}: expected another recording than {first}, found the same points;"
+        with pytest.raises(antennate.BadInputError, match=message):
+            classified(first, files=[str(first), str(other)])
+    another = write(tmp_path / "another.csv", animal(dwelling(5, 300)))
+    result, _ = classified(first, files=[str(first), str(another)])
+    assert result.summary["animals"] == 2
+
+
 def test_the_simulated_antenna_goes_through_the_same_classifier(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
