@@ -35,6 +35,19 @@ BAD = {
         b'time,counts,bend\n"0,00",1800,0\n',
         "row 2: expected a point as decimal mark in time, found '0,00'\n",
     ),
+    "thousands": (
+        b'time,counts,bend\n0,"1,037.3",0\n',
+        "row 2: expected a number without marks between thousands in counts, found '1,037.3'\n",
+    ),
+    "german thousands": (
+        b'time,counts,bend\n0,"1.037,3",0\n',
+        "row 2: expected a number without marks between thousands in counts, found '1.037,3'\n",
+    ),
+    "one reading": (b"time,counts,bend\n0,1800,0\n", "row 2: expected at least 20 readings"),
+    "millivolts": (
+        GOOD.replace("counts", "counts [mV]").encode(),
+        "row 1: expected counts [mV] in counts as declared, found mV; is it the right",
+    ),
     "bare commas": (
         b"time,counts,bend\n0,00,1800,0,0\n",
         "row 2: expected 3 cells, found 5; are there decimal commas? write points",

@@ -127,6 +127,25 @@ def test_a_terminal_of_twenty_columns(tmp_path: Path) -> None:
     assert "\x1b" not in dumb + rest
 
 
+@pytest.mark.parametrize("columns", ["0", "-3", "²", "wide", ""])
+def test_a_width_that_is_none_counts_as_not_given(
+    columns: str,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
+) -> None:
+    def printed() -> str:
+        words = ["springs", "--no-figures", "--out", str(tmp_path), "--overwrite"]
+        assert main(words) == 0
+        return capsys.readouterr().out
+
+    monkeypatch.delenv("COLUMNS", raising=False)
+    assert (plain := printed()).count("\n") > 5
+    for name in ("COLUMNS", "LINES"):
+        monkeypatch.setenv(name, columns)
+    assert printed() == plain
+
+
 def test_a_stream_that_was_closed_meanwhile_is_flushed_in_silence() -> None:
     file = io.StringIO()
     out = Output(file)

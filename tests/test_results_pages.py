@@ -78,6 +78,8 @@ def test_a_measure_is_made_of_rows_and_shown_with_its_unit() -> None:
         "-",
         "0.25 to 1.00",
     )
+    assert shown((-0.004, 0.004), ".0f", 100.0) == "0 to 0"
+    assert [shown(-0.004), shown(-0.006), shown(-10, "d")] == ["0.00", "-0.01", "-10"]
 
 
 def test_the_columns_of_sweep_are_known() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import pickle
+import tracemalloc
 from pathlib import Path
 
 import numpy as np
@@ -48,6 +49,18 @@ def test_every_bit_comes_back(
         before, after = getattr(series, name), getattr(found, name)
         assert (after.dtype, after.shape) == (before.dtype, before.shape)
         assert after.tobytes() == before.tobytes()
+
+
+def test_a_file_is_read_in_the_memory_that_it_needs(tmp_path: Path) -> None:
+    """A gigabyte is allowed, and not there where a batch system limits the memory."""
+    series, path = made(20_000), tmp_path / "trial.npz"
+    series.save(path)
+    tracemalloc.start()
+    found = TimeSeries.load(path)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert peak < 10 * path.stat().st_size < 100e6
+    assert found.antenna.tobytes() == series.antenna.tobytes()
 
 
 def test_a_file_is_not_replaced_unasked(tmp_path: Path) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import functools
 import math
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -248,6 +249,58 @@ def test_one_trial_has_no_interval_and_says_so(tmp_path: Path) -> None:
     result, _ = classified(write(tmp_path / "a.csv", animal(dwelling(4, 300))))
     assert all(row["share_95"] is None for row in result.summary["shapes"].values())
     assert result.sentence.endswith("One trial alone gives no interval.")
+
+
+def test_one_recording_is_never_two_animals(tmp_path: Path) -> None:
+    """Twice the same file, a copy, and the same points with a likelihood."""
+    points = animal(dwelling(4, 300))
+    first, copy = (write(tmp_path / f"{name}.csv", points) for name in ("first", "copy"))
+    noted = write(tmp_path / "noted.csv", points, {"l3": np.ones(300)})
+    for other in (first, copy, noted):
+        message = rf"^{other}: expected another recording than {first}, found the same points;"
+        with pytest.raises(antennate.BadInputError, match=message):
+            classified(first, files=[str(first), str(other)])
+    another = write(tmp_path / "another.csv", animal(dwelling(5, 300)))
+    result, _ = classified(first, files=[str(first), str(another)])
+    assert result.summary["animals"] == 2
+
+
+def saved(path: Path, save: Callable[..., None] = np.savez, **arrays: object) -> bytes:
+    """The content of a file that NumPy wrote."""
+    with path.open("wb") as file:
+        save(file, **arrays)
+    return path.read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("kind", "found"),
+    [
+        ("text", "found none"),
+        ("npy", "found none"),
+        ("empty", "found nothing"),
+        ("another", "found speed, time"),
+        ("objects", "found objects of Python"),
+        ("damaged", "found a damaged one: "),
+    ],
+)
+def test_an_npz_that_is_not_of_trex_is_told_so(kind: str, found: str, tmp_path: Path) -> None:
+    """And nobody is advised to load it as code."""
+    path = tmp_path / "a.npz"
+    objects = np.array([{}, {}], object)
+    whole = saved(path, np.savez_compressed, frame=np.arange(9), poseX0=np.arange(9))
+    content = {
+        "text": b"hello",
+        "npy": saved(path, np.save, arr=np.zeros(3)),
+        "empty": b"",
+        "another": saved(path, speed=np.zeros(3), time=np.zeros(3)),
+        "objects": saved(path, frame=objects, poseX0=np.zeros(2)),
+        "damaged": whole.replace(whole[70:80], 10 * b"\xff"),
+    }
+    path.write_bytes(content[kind])
+    message = rf"^{path}: expected an npz file of TRex with poseX0, poseY0 and so on, {found}"
+    with pytest.raises(antennate.BadInputError, match=message) as error:
+        classified(path)
+    assert "pickle" not in str(error.value)
 
 
 def test_the_simulated_antenna_goes_through_the_same_classifier(

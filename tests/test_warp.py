@@ -56,17 +56,6 @@ def warp() -> Any:
     return require_warp()
 
 
-def test_two_engines_in_one_environment_are_refused(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    folder = tmp_path / "mujoco-3.17.0.dist-info"
-    folder.mkdir()
-    (folder / "METADATA").write_text("Metadata-Version: 2.1\nName: mujoco\nVersion: 3.17.0\n")
-    monkeypatch.syspath_prepend(str(tmp_path))
-    with pytest.raises(ConfigError, match=r"one engine, found mujoco 3\.17\.0 and mujoco-core"):
-        run_trials_on_warp(SHORT, "open", [0], lambda _: None)
-
-
 def test_a_missing_package_is_named_with_its_install(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "mujoco_warp", None)
     with pytest.raises(MissingPackageError, match=r"no mujoco-warp.*pip install --no-deps"):

@@ -15,6 +15,7 @@ from antennate.messages import shortened
 _SEPARATORS = {";": "semicolons", "\t": "tabs", "|": "bars", " ": "spaces"}
 """What may stand between columns in place of commas."""
 _DECIMAL_COMMA = re.compile(r"\s*[+-]?\d+,\d+\s*")
+_THOUSANDS = re.compile(r"\s*[+-]?\d{1,3}([,.' ])\d{3}(?:\1\d{3})*(?:[.,]\d*)?\s*")
 _UNIT = re.compile(r"[\[(]([^\])]*)[\])]\s*[\"']?\s*$")
 """A unit in brackets at the end of a column's name."""
 LARGEST_WHOLE = 2.0**53
@@ -82,13 +83,15 @@ def number_of(cell: str) -> float:
     """The number of a cell, NaN if it holds none.
 
     Raises:
-        ValueError: It has a comma as decimal mark.
+        ValueError: It has a comma as decimal mark, or marks between thousands.
     """
-    if _DECIMAL_COMMA.fullmatch(cell):
-        raise ValueError("a point as decimal mark")
     try:
         return float(cell)
     except ValueError:
+        if _DECIMAL_COMMA.fullmatch(cell):
+            raise ValueError("a point as decimal mark") from None
+        if _THOUSANDS.fullmatch(cell):
+            raise ValueError("a number without marks between thousands") from None
         return float("nan")
 
 

@@ -18,6 +18,8 @@ from antennate.errors import AntennateError, BadInputError, OutputError
 
 _RANDOM = 8
 """Random bytes in the name of a file that is not whole yet."""
+_BLOCK = 1 << 20
+"""Bytes that are read at a time."""
 _UNITS = (("GB", 1e9), ("MB", 1e6), ("kB", 1e3), ("bytes", 1.0))
 
 
@@ -67,13 +69,22 @@ def read_limited(path: Path, largest: int, error: type[BadInputError] = BadInput
     """
     try:
         with open_regular(path) as file:
-            data = file.read(largest + 1)
+            data = _first(file, largest + 1)
     except (OSError, ValueError) as cause:  # a zero byte in a path is a ValueError
         why = getattr(cause, "strerror", None) or cause
         raise error(f"{path}: expected a readable file: {why}") from None
     if len(data) > largest:
         raise error(f"{path}: expected at most {largest} bytes, found more")
     return data
+
+
+def _first(file: BinaryIO, most: int) -> bytes:
+    """At most so many bytes of a file, read in blocks: a small file needs little memory."""
+    blocks: list[bytes] = []
+    while most > 0 and (block := file.read(min(_BLOCK, most))):
+        blocks.append(block)
+        most -= len(block)
+    return b"".join(blocks)
 
 
 def decoded(path: Path, data: bytes, error: type[BadInputError] = BadInputError) -> str:

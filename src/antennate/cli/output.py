@@ -91,6 +91,7 @@ def safe_streams(result_alone: bool = False) -> Iterator[Output]:
             prints, here and in workers, goes to standard error then.
     """
     _occupy()
+    _forget_wrong_sizes()
     before = sys.stdout, sys.stderr
     out = Output(sys.stdout)
     sys.stdout, sys.stderr = out, Output(sys.stderr)
@@ -135,6 +136,14 @@ def _occupy() -> None:
             os.fstat(descriptor)
         except OSError:
             os.set_inheritable(os.open(os.devnull, os.O_RDWR), True)
+
+
+def _forget_wrong_sizes() -> None:
+    """Take away a size of the terminal that is none; cron and expect may set COLUMNS to 0."""
+    for name in ("COLUMNS", "LINES"):
+        text = os.environ.get(name, "1")
+        if not (text.isdecimal() and text.strip("0")):
+            del os.environ[name]
 
 
 def _plain(error: UnicodeError) -> tuple[str, int]:

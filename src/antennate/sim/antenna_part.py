@@ -9,12 +9,11 @@ from __future__ import annotations
 import math
 from typing import Any, Literal
 
-import mujoco
-
 from antennate.errors import ConfigError
 from antennate.robots.antenna import BASE, AntennaSpec
 from antennate.robots.servos import ServoParams
 from antennate.sim import layers
+from antennate.sim.engine import mujoco
 
 Side = Literal["left", "right"]
 STOPS: dict[str, Any] = {"limited": mujoco.mjtLimited.mjLIMITED_TRUE, "range": [-math.pi, math.pi]}

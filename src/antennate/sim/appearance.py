@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from antennate.robots.spec import ANTENNA_PREFIXES
 from antennate.sim import layers
+from antennate.sim.engine import mujoco
 
 Colour = tuple[float, float, float, float]
 

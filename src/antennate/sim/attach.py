@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import mujoco
 import numpy as np
 
 from antennate import checks
@@ -14,6 +13,7 @@ from antennate.messages import shown
 from antennate.robots.antenna import AntennaSpec
 from antennate.sim import antenna_part
 from antennate.sim.antenna_part import Side
+from antennate.sim.engine import mujoco
 from antennate.types import AntennaFrame, Floats, Ints
 
 _MOST_BITS = 2**31 - 1

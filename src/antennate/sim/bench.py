@@ -12,7 +12,6 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
-import mujoco
 import numpy as np
 
 from antennate.errors import SimulationError
@@ -20,6 +19,7 @@ from antennate.params.scene import PhysicsParams
 from antennate.robots.antenna import BASE, AntennaSpec
 from antennate.sim import antenna_part, layers
 from antennate.sim.bounds import ANGLE_LIMIT
+from antennate.sim.engine import mujoco
 from antennate.sim.world import new_spec, set_contacts
 from antennate.types import Floats, Ints
 

@@ -8,12 +8,12 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from antennate.sim import gl, layers
 from antennate.sim.appearance import FLOOR, Colour, colours
+from antennate.sim.engine import mujoco
 from antennate.types import Floats
 
 Picture = NDArray[np.uint8]

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import math
 
-import mujoco
 import numpy as np
 
 from antennate.control.expect import expect
@@ -13,6 +12,7 @@ from antennate.control.gait import targets
 from antennate.params.control import GaitParams
 from antennate.params.scene import PhysicsParams
 from antennate.robots.spec import RobotSpec
+from antennate.sim.engine import mujoco
 from antennate.sim.world import World, compile_world
 from antennate.types import Floats
 

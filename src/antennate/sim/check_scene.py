@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 
-import mujoco
 import numpy as np
 
 from antennate.control.expect import expect
@@ -12,6 +11,7 @@ from antennate.errors import AntennateError
 from antennate.params.control import GaitParams
 from antennate.params.scene import PhysicsParams
 from antennate.robots.spec import RobotSpec
+from antennate.sim.engine import mujoco
 from antennate.sim.scenes.scene import Scene, SceneInstance
 from antennate.sim.trial import make_world, place_at_start, require_room
 from antennate.types import Floats

@@ -9,8 +9,8 @@ from __future__ import annotations
 import contextlib
 import sys
 from collections.abc import Iterator
+from typing import Any
 
-_ENGINE = "mujoco"
 _dropping = [0]
 """How many hold on to that they are dropped."""
 
@@ -18,7 +18,7 @@ _dropping = [0]
 @contextlib.contextmanager
 def dropped() -> Iterator[None]:
     """Drop them for a while, also if the engine is imported only then."""
-    engine = sys.modules.get(_ENGINE)
+    engine = _engine()
     before = engine.get_mju_user_warning() if engine is not None else None
     _dropping[0] += 1
     drop_if_asked()
@@ -26,13 +26,19 @@ def dropped() -> Iterator[None]:
         yield
     finally:
         _dropping[0] -= 1
-        engine = sys.modules.get(_ENGINE)
+        engine = _engine()
         if engine is not None:
             engine.set_mju_user_warning(before)
 
 
 def drop_if_asked() -> None:
     """Drop them within `dropped`, once the engine is imported."""
-    engine = sys.modules.get(_ENGINE)
+    engine = _engine()
     if engine is not None and _dropping[0]:
         engine.set_mju_user_warning(lambda message: None)
+
+
+def _engine() -> Any:
+    """The engine if it is imported, and one that can be asked; None otherwise."""
+    engine = sys.modules.get("mujoco")
+    return engine if hasattr(engine, "get_mju_user_warning") else None

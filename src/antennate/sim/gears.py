@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import mujoco
 import numpy as np
 
 from antennate.robots.spec import RobotSpec
+from antennate.sim.engine import mujoco
 from antennate.types import Floats, Ints
 
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 
-import mujoco
 import numpy as np
 
+from antennate.sim.engine import mujoco
 from antennate.types import Floats
 
 _SPHERE = int(mujoco.mjtGeom.mjGEOM_SPHERE)

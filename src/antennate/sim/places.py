@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import mujoco
 import numpy as np
 
 from antennate.robots.spec import ANTENNA_PREFIXES, RobotSpec
 from antennate.sim import layers
+from antennate.sim.engine import mujoco
 from antennate.types import Bools, Ints
 
 ROBOT_AND_OBSTACLE = 3

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import mujoco
 import numpy as np
 
+from antennate.sim.engine import mujoco
 from antennate.types import Floats, Ints
 
 

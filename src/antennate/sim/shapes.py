@@ -10,7 +10,6 @@ import struct
 import zipfile
 from typing import Any, NamedTuple
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
@@ -18,6 +17,7 @@ from antennate.errors import BadInputError
 from antennate.sim import layers
 from antennate.sim.appearance import Colour, colours
 from antennate.sim.contacts import Contacts
+from antennate.sim.engine import mujoco
 from antennate.types import Bools, Floats, Ints
 
 SPHERE = int(mujoco.mjtGeom.mjGEOM_SPHERE)

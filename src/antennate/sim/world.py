@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-import mujoco
 import numpy as np
 
 from antennate.errors import SceneError, SimulationError, in_one_line
@@ -19,6 +18,7 @@ from antennate.robots.spec import RobotSpec
 from antennate.sim import layers, robot_part
 from antennate.sim.bounds import ANGLE_LIMIT, DISTANCE_LIMIT, HEIGHT_LIMIT, SPEED_LIMIT, broken
 from antennate.sim.contacts import Contacts
+from antennate.sim.engine import mujoco
 from antennate.sim.engine_warnings import drop_if_asked
 from antennate.sim.gears import Gears
 from antennate.sim.outline import outline

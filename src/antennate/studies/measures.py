@@ -61,10 +61,16 @@ def shown(value: Any, form: str = ".2f", scale: float = 1.0, join: str = " to ")
     if isinstance(value, Sequence | np.ndarray):
         if not np.isfinite(np.array(value, float)).all():  # None in result.json
             return NONE
-        return join.join(f"{scale * end:{form}}" for end in value)
+        return join.join(_written(scale * end, form) for end in value)
     if value is None or value != value:
         return NONE
-    return f"{scale * value if scale != 1.0 else value:{form}}"
+    return _written(scale * value if scale != 1.0 else value, form)
+
+
+def _written(value: Any, form: str) -> str:
+    """A number in digits; what rounds to zero has no sign."""
+    text = format(value, form)
+    return text if text.strip("-0.") else text.lstrip("-")
 
 
 def summarise(measures: Iterable[Measure], rows: Sequence[Any]) -> dict[str, Any]:

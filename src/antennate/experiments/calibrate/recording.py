@@ -159,8 +159,12 @@ def _check_units(
     path: Path, header: list[str], places: list[int | None], params: RecordingParams
 ) -> None:
     """Refuse a column whose name gives another unit than the one declared."""
-    units = ((places[2], TIME_UNITS, params.time_unit), (places[4], BEND_UNITS, params.bend_unit))
-    for (place, known, declared), flag in zip(units, ("time-unit", "bend-unit"), strict=True):
+    columns = (
+        (places[2], TIME_UNITS, params.time_unit, "time-unit"),
+        (places[3], ("V", "mV", "%"), "counts", "counts-column"),
+        (places[4], BEND_UNITS, params.bend_unit, "bend-unit"),
+    )
+    for place, known, declared, flag in columns:
         named = unit_of(header[place]) if place is not None else ""
         if named in known and named != declared:
             raise CalibrationError(

@@ -21,6 +21,7 @@ from antennate.antenna.curves import Samples
 from antennate.antenna.next_push import Assessment, Pushes, assess
 from antennate.antenna.sensor import SensorChain, reading_noise
 from antennate.control.conditioning import bending_level
+from antennate.errors import CalibrationError
 from antennate.experiments.calibrate.recording import Recording, RecordingParams, read, write
 from antennate.experiments.calibrate.rig import Push, RigParams
 from antennate.experiments.reading import mean_since
@@ -254,12 +255,16 @@ def run(
     used = averaged(raw, config.averaging_time)
     pushes = Pushes.of(used.samples)
     used = replace(used, samples=replace(used.samples, trial=pushes.number))
-    found = fitting.fit(
-        used.samples,
-        config.sensor_id or ("unnamed" if config.recording else "simulated"),
-        raw.sha256,
-        config.threshold,
-        config.full_scale,
-        config.least_r2,
-    )
+    try:
+        found = fitting.fit(
+            used.samples,
+            config.sensor_id or ("unnamed" if config.recording else "simulated"),
+            raw.sha256,
+            config.threshold,
+            config.full_scale,
+            config.least_r2,
+        )
+    except CalibrationError as error:
+        where = f"{config.recording}: " if config.recording else ""
+        raise CalibrationError(f"{where}{error}") from None
     return CalibrateOutcome(config, used, raw, found)

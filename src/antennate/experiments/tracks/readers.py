@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import zipfile
+import zlib
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -26,6 +27,16 @@ from antennate.messages import nearest, shortened
 from antennate.types import Floats, Ints
 
 SUFFIXES = (".csv", ".h5", ".hdf5", ".slp", ".npz")
+_DAMAGES = (
+    zipfile.BadZipFile,
+    zlib.error,
+    EOFError,
+    KeyError,
+    OSError,
+    RuntimeError,  # a byte that says encrypted, or another compression
+    ValueError,
+)
+"""What NumPy raises for a damaged npz file."""
 
 
 def read(path: Path, names: Sequence[str], columns: ColumnsParams) -> list[Track]:
@@ -180,6 +191,9 @@ def _trex(path: Path, names: Sequence[str]) -> list[Track]:
     import io
 
     data = read_limited(path, LARGEST)
+    wanted = "an npz file of TRex with poseX0, poseY0 and so on"
+    if not data.startswith(b"PK"):
+        raise BadInputError(f"{path}: expected {wanted}, found {'none' if data else 'nothing'}")
     try:
         with np.load(io.BytesIO(data), allow_pickle=False) as file:
             held: dict[str, Any] = {
@@ -187,9 +201,13 @@ def _trex(path: Path, names: Sequence[str]) -> list[Track]:
                 for key in file.files
                 if key in ("frame", "frame_rate", "time", "missing", "id") or key.startswith("pose")
             }
-    except (ValueError, OSError, EOFError, KeyError, zipfile.BadZipFile) as error:
-        raise BadInputError(f"{path}: expected a whole npz file of TRex, found: {error}") from None
+            others = ", ".join(file.files) or "no array"
+    except _DAMAGES as error:
+        found = "objects of Python" if "pickle" in str(error) else f"a damaged one: {error}"
+        raise BadInputError(f"{path}: expected {wanted}, found {found}") from None
     known = sorted(key.removeprefix("poseX") for key in held if key.startswith("poseX"))
+    if not known:
+        raise BadInputError(f"{path}: expected {wanted}, found {shortened(others)}")
     require_points(path, names, known)
     if "frame" not in held:
         raise BadInputError(f"{path}: expected an array frame, found none")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import hashlib
 import io
 import math
 from collections.abc import Sequence
@@ -146,7 +147,8 @@ def run(
     """Classify the shapes of the antennae in every file.
 
     Raises:
-        BadInputError: A file cannot be read, lacks a point, or states another frame rate.
+        BadInputError: A file cannot be read, lacks a point, states another frame rate, or holds an
+            animal of another file.
         MissingPackageError: A file is HDF5 and h5py is not installed.
     """
     del workers  # reading and measuring take less time than starting processes
@@ -182,6 +184,8 @@ class _Made:
     antennae: list[Seen] = field(default_factory=list[Seen])
     walls: dict[str, Wall] = field(default_factory=dict[str, Wall])
     skipped: int = 0
+    files: dict[bytes, str] = field(default_factory=dict[bytes, str])
+    """The file of each animal, by a hash of its points."""
 
     def add(
         self, name: str, tracks: Sequence[Track], truth: Ints | None = None
@@ -190,6 +194,7 @@ class _Made:
         config, before = self.config, len(self.rows)
         found, few = _cleaned(config, tracks)
         self.skipped += few
+        self._refuse_again(name, [animal.track for animal in found])
         self.walls[name] = wall = _wall(config, found)
         trial = self.rows[-1].trial + 1 if self.rows else 0
         for number, animal in enumerate(found, trial):
@@ -198,6 +203,23 @@ class _Made:
                 self.rows.append(_row(config, animal, one, truth if side == "left" else None))
                 self.antennae.append(one)
         return self.rows[before:]
+
+    def _refuse_again(self, name: str, tracks: Sequence[Track]) -> None:
+        """Refuse an animal that another file holds too: one recording would count as two."""
+        here = {_content(track): track.animal for track in tracks}
+        for content, animal in here.items():
+            if content in self.files:
+                raise BadInputError(
+                    f"{name}: expected another recording than {self.files[content]}, found the "
+                    f"same points{f' of {animal}' if animal else ''}; give each recording once"
+                )
+        self.files |= dict.fromkeys(here, name)
+
+
+def _content(track: Track) -> bytes:
+    """A hash of the points of an animal, the same in every format."""
+    points = np.stack(list(track.points.values()))
+    return hashlib.sha256(np.where(np.isnan(points), np.nan, points).tobytes()).digest()
 
 
 def _read(config: TracksConfig, path: Path) -> list[Track]:

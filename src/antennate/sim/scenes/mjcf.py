@@ -6,12 +6,12 @@ import itertools
 import re
 from pathlib import Path
 
-import mujoco
 import numpy as np
 
 from antennate.errors import SceneError
 from antennate.robots.spec import RobotSpec
 from antennate.sim import layers
+from antennate.sim.engine import mujoco
 from antennate.sim.outline import outline
 from antennate.sim.scenes.mjcf_file import in_words, read_spec
 from antennate.sim.scenes.scene import Route, add_floor

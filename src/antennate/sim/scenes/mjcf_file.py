@@ -20,11 +20,10 @@ from itertools import pairwise
 from pathlib import Path
 from xml.etree import ElementTree
 
-import mujoco
-
 from antennate.errors import SceneError
 from antennate.files import read_limited
 from antennate.messages import one_line
+from antennate.sim.engine import mujoco
 
 LARGEST_MODEL = 5_000_000
 """Most bytes of a model."""

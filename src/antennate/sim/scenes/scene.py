@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from typing import Protocol
 
-import mujoco
 import numpy as np
 
 from antennate.robots.spec import RobotSpec
 from antennate.sim import layers
+from antennate.sim.engine import mujoco
 from antennate.sim.scenes import geometry
 from antennate.types import Floats
 

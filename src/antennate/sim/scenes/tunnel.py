@@ -11,13 +11,13 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-import mujoco
 import numpy as np
 
 from antennate.errors import SceneError
 from antennate.params.scene import CylinderParams, TunnelParams
 from antennate.robots.spec import RobotSpec
 from antennate.sim import layers
+from antennate.sim.engine import mujoco
 from antennate.sim.scenes import geometry
 from antennate.sim.scenes.scene import LEFT_BEHIND, add_floor
 from antennate.types import Floats

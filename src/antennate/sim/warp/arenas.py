@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import replace
 
-import mujoco
 import numpy as np
 
 from antennate.robots.spec import RobotSpec
+from antennate.sim.engine import mujoco
 from antennate.sim.scenes.scene import Scene, SceneInstance
 from antennate.sim.scenes.tunnel import Tunnel
 from antennate.sim.sim_robot import Disturbance, SimRobot

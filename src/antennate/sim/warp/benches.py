@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import mujoco
 import numpy as np
 
 from antennate.errors import SimulationError
 from antennate.sim import layers
 from antennate.sim.bench import Bench, broken
+from antennate.sim.engine import mujoco
 from antennate.sim.warp.worlds import Limits, WarpWorlds
 from antennate.types import Floats, Ints
 

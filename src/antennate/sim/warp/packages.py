@@ -1,4 +1,4 @@
-"""The packages that a batch on a GPU needs, and the engine that must not come with them."""
+"""The packages that a batch on a GPU needs beside the engine."""
 
 from __future__ import annotations
 
@@ -14,23 +14,15 @@ extra of this package can have it."""
 _MODULES = {"mujoco_warp": "mujoco-warp", "warp": "warp-lang", "absl": "absl-py", "etils": "etils"}
 _SERIES = "4.0"
 """Older ones tell nothing of dropped contacts; newer ones were not tried."""
-_ENGINES = ("mujoco", "mujoco-core")
 
 
 def require_warp() -> tuple[Any, Any]:
     """The modules warp and mujoco_warp.
 
     Raises:
-        ConfigError: Two engines are installed over one another, or mujoco-warp is another one.
+        ConfigError: mujoco-warp is another one.
         MissingPackageError: A package is not installed.
     """
-    found = {name: found for name in _ENGINES if (found := _version(name))}
-    if len(found) > 1:
-        both = " and ".join(f"{name} {version}" for name, version in found.items())
-        raise ConfigError(
-            f"--engine warp: expected one engine, found {both}, which write the same files; "
-            f"uninstall both, then install mujoco-core {found[_ENGINES[1]]} again"
-        )
     missing = [package for module, package in _MODULES.items() if find_spec(module) is None]
     if missing:
         raise MissingPackageError(

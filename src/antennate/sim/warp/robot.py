@@ -7,13 +7,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-import mujoco
 import numpy as np
 
 from antennate.antenna.sensor import SensorChain
 from antennate.errors import SceneError, SimulationError
 from antennate.robots.spec import RobotSpec
 from antennate.sim.bounds import broken, sound
+from antennate.sim.engine import mujoco
 from antennate.sim.sim_robot import Disturbance
 from antennate.sim.warp.arenas import is_parked
 from antennate.sim.warp.robot_worlds import RobotWorlds

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-import mujoco
-
 from antennate.errors import SceneError
+from antennate.sim.engine import mujoco
 from antennate.sim.warp.worlds import Limits, WarpWorlds, same
 from antennate.sim.world import World
 from antennate.types import Floats

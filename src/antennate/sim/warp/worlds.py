@@ -11,10 +11,10 @@ import warnings
 from dataclasses import dataclass, fields
 from typing import Any
 
-import mujoco
 import numpy as np
 
 from antennate.errors import ConfigError, SceneError, in_one_line
+from antennate.sim.engine import mujoco
 from antennate.sim.warp.packages import require_device, require_warp
 from antennate.types import Floats
 

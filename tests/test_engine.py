@@ -1,0 +1,107 @@
+"""An engine that is another one, or two over one another: one line before anything is simulated."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tomllib
+from importlib import metadata
+from pathlib import Path
+
+import pytest
+
+PYPROJECT = tomllib.loads((Path(__file__).parents[1] / "pyproject.toml").read_text())
+(PIN,) = (each for each in PYPROJECT["project"]["dependencies"] if each.startswith("mujoco"))
+TUNNEL = ["tunnel", "--trials", "1", "--time-limit", "1", "--no-figures", "--out", "run"]
+BROKEN = "libmujoco.so.3.17.0: cannot open shared object file"
+
+
+def python(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
+    """A Python of its own that looks for packages in a folder first."""
+    found = {**os.environ, "PYTHONPATH": str(folder)}
+    command = [sys.executable, *words]
+    return subprocess.run(
+        command, cwd=folder, env=found, capture_output=True, text=True, timeout=120, check=False
+    )
+
+
+def distribution(folder: Path, version: str) -> None:
+    """What pip leaves of an installed `mujoco`."""
+    info = folder / f"mujoco-{version}.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: mujoco\nVersion: {version}\n")
+
+
+def module(folder: Path, source: str) -> None:
+    (folder / "mujoco").mkdir()
+    (folder / "mujoco" / "__init__.py").write_text(source)
+
+
+def refusal(folder: Path, *words: str) -> str:
+    """The one line with which a command ends before it has written anything."""
+    done = python(folder, "-m", "antennate", *words)
+    assert (done.returncode, done.stdout, done.stderr.count("\n")) == (2, "", 1), done.stderr
+    assert not (folder / "run").exists()
+    assert f'uninstall mujoco and mujoco-core, then install "{PIN}"' in done.stderr
+    return done.stderr
+
+
+@pytest.mark.parametrize("words", [TUNNEL, [*TUNNEL, "--engine", "warp"], ["gait"]])
+def test_two_versions_over_one_another_are_refused(tmp_path: Path, words: list[str]) -> None:
+    distribution(tmp_path, "3.17.0")
+    both = f"found mujoco 3.17.0 and mujoco-core {metadata.version('mujoco-core')};"
+    assert both in refusal(tmp_path, *words)
+
+
+@pytest.mark.parametrize(
+    ("source", "found"),
+    [
+        ("__version__ = '4.0.0'", "found 4.0.0;"),
+        ("__version__ = '3.17.0'", "found 3.17.0;"),
+        ("__version__ = '5.0.0'", "found 5.0.0;"),
+        ("", "found a folder without an engine;"),
+        (f"raise OSError('{BROKEN}')", f"found OSError: {BROKEN};"),
+        ("from mujoco import _structs", "found ImportError: cannot import name '_structs'"),
+    ],
+)
+def test_an_engine_that_is_another_one_or_broken_is_refused(
+    tmp_path: Path, source: str, found: str
+) -> None:
+    module(tmp_path, source)
+    assert found in refusal(tmp_path, *TUNNEL)
+
+
+def test_python_gets_the_same_line(tmp_path: Path) -> None:
+    distribution(tmp_path, "3.17.0")
+    source = """if True:
+        import antennate
+        try:
+            antennate.simulate()
+        except antennate.BadInputError as error:
+            print(error)
+    """
+    done = python(tmp_path, "-c", source)
+    assert done.stderr == ""
+    assert done.stdout.startswith(f"expected the engine {PIN.split('>')[0]}")
+    assert done.stdout.count("\n") == 1
+
+
+def test_both_names_of_one_version_are_one_engine(tmp_path: Path) -> None:
+    distribution(tmp_path, metadata.version("mujoco-core"))
+    source = "import antennate; antennate.simulate(time_limit=0.1)"
+    done = python(tmp_path, "-c", source)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_what_needs_no_engine_runs_beside_two(tmp_path: Path) -> None:
+    distribution(tmp_path, "3.17.0")
+    source = "import antennate; antennate.make_controller('closed'); antennate.RobotSpec()"
+    done = python(tmp_path, "-c", source)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_a_way_to_draw_that_is_missing_is_no_other_engine(tmp_path: Path) -> None:
+    module(tmp_path, "raise ModuleNotFoundError('No module named OpenGL', name='OpenGL')")
+    done = python(tmp_path, "-c", "import antennate; antennate.simulate()")
+    assert done.stderr.splitlines()[-1] == "ModuleNotFoundError: No module named OpenGL"
