@@ -40,7 +40,7 @@ def folder_for(
     config: Params,
     argv: Sequence[str],
     identity: Mapping[str, Any] | None = None,
-    resume: bool = False,
+    resume: bool | None = None,
     retry: bool = False,
     command: str = "",
     reads: Sequence[Path] = (),
@@ -55,7 +55,7 @@ def folder_for(
         config: The configuration.
         argv: Words of the command.
         identity: What is run, if it can be resumed.
-        resume: Go on with the run that the folder holds, if there is one.
+        resume: Go on with the run that the folder holds, if there is one; None if it never can.
         retry: Run its trials again that failed.
         command: Name of the command, if it is not that of the view.
         reads: Files that it reads, beside those that the configuration names.
