@@ -96,11 +96,12 @@ def require_apart(
     """
     held = files_of(Path(out)) if out is not None and Path(out).is_dir() else []
     for path in (*reads, *map(Path, _texts(config))) if held else ():
-        if any(_is_same(path, each) for each in held):
+        if any(is_same(path, each) for each in held):
             raise OutputError(f"expected another folder than that of {path}, found {out}")
 
 
-def _is_same(path: Path, other: Path) -> bool:
+def is_same(path: Path, other: Path) -> bool:
+    """Whether both names lead to one file."""
     try:
         return path.samefile(other)
     except (OSError, ValueError):  # no file, or not even a name of one
