@@ -108,6 +108,18 @@ def test_an_interrupted_run_within_uv_names_the_command_of_uv(capsys, tmp_path, 
     assert told[4:10] == TUNNEL[1:]
 
 
+def test_an_interrupted_shard_is_no_bad_input_and_goes_on(capsys, tmp_path, monkeypatch):
+    """It leaves no result, as that is of all shards."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.delenv("UV", raising=False)
+    words = [*TUNNEL, "--out", "part", "--workers", "1", "--no-figures", "--shard", "1/2"]
+    told = interrupted(capsys, monkeypatch, *words)
+    assert told[-5:] == ["--shard", "1/2", "--out", "part", "--resume"]
+    assert not (tmp_path / "part" / "result.json").exists()
+    assert main(told[1:]) == 0
+    assert json.loads((tmp_path / "part" / "shard.json").read_text())["trials"] == 2
+
+
 @pytest.mark.parametrize("workers", [1, 2])
 def test_a_disk_that_is_full_before_a_trial_has_ended_keeps_the_logs(tmp_path, workers):
     """Several trials run in lockstep. A chunk that was taken in part holds more whole ticks."""
@@ -171,6 +183,29 @@ def test_a_disk_that_takes_no_trial_does_not_promise_more_than_it_holds(
     assert f"expected to write {store}, found: No space left on device" in line
     assert ("what was finished is kept, and the run can be resumed" in line) == bool(kept)
     assert store.exists() == bool(kept)
+
+
+def test_a_disk_that_is_full_at_the_table_of_trials_so_far_keeps_the_trial(
+    capsys, tmp_path, monkeypatch
+):
+    opened = Path.open
+
+    def full(path, *how, **more):
+        if path.name == "trials.partial.jsonl":
+            return opened(Path("/dev/full"), "w")
+        return opened(path, *how, **more)
+
+    words = [*TUNNEL, "--workers", "1", "--no-figures", "--out", str(tmp_path / "run")]
+    with monkeypatch.context() as patched:
+        patched.setattr(Path, "open", full)
+        assert main(words) == 2
+    (line,) = [a for a in capsys.readouterr().err.splitlines() if "error:" in a]
+    assert line.endswith(
+        "trials.partial.jsonl, found: No space left on device; what was finished is kept, and "
+        "the run can be resumed"
+    )
+    assert (tmp_path / "run" / "trials.store.jsonl").read_bytes().count(b'"key":') == 1
+    assert main([*words, "--resume"]) == 0
 
 
 @pytest.mark.parametrize(

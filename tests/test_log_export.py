@@ -86,3 +86,23 @@ def test_no_run_replaces_the_one_that_it_reads(
         with pytest.raises(OutputError, match="expected another folder"):
             run(words[0], recording=recording, out="run", overwrite=True)
     assert [file.read_bytes() for file in files] == before
+
+
+@pytest.mark.parametrize("command", ["springs", "study"])
+def test_no_run_replaces_the_file_that_configures_it(
+    command: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    text = {"springs": "coil_mm = 3.0", "study": 'experiment = "springs"\nvary.coil_mm = [3.0]'}
+    file = Path("config.toml")
+    file.write_text(f"# why it is so\n{text[command]}\n")
+    words = [command, *(["--config"] if command == "springs" else []), "config.toml"]
+    for more in ([], ["--overwrite"]):
+        assert main([*words, "--no-figures", "--out", ".", *more]) == 2
+        (line,) = capsys.readouterr().err.splitlines()
+        assert "found config.toml" in line or "than that of config.toml" in line
+    assert list(Path().iterdir()) == [file]
+    assert file.read_text().startswith("# why it is so")

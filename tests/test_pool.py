@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import resource
 import subprocess
 import sys
 import time
@@ -89,6 +90,46 @@ def test_a_script_without_the_main_guard_is_told_of_it(tmp_path: Path) -> None:
     )
     assert done.returncode == 1
     assert 'needs `if __name__ == "__main__":`' in done.stderr
+
+
+def test_a_program_that_workers_cannot_import_is_told_so(tmp_path: Path) -> None:
+    """It has the guard, but came through standard input."""
+    program = (
+        "import antennate\n"
+        "if __name__ == '__main__':\n"
+        "    antennate.run('tunnel', trials=2, time_limit=0.1, controllers=['open'], workers=2)\n"
+    )
+    done = subprocess.run(
+        [sys.executable], input=program, capture_output=True, text=True, timeout=120, check=False
+    )
+    assert done.returncode == 1
+    assert done.stderr.splitlines()[-1] == (
+        "antennate.errors.WorkerError: expected a program in a file, which workers import, found "
+        "<stdin>; save it, or use one worker"
+    )
+    assert "Process SpawnProcess" not in done.stderr
+
+
+def test_too_few_open_files_for_workers_are_one_line(tmp_path: Path) -> None:
+    """Three are standard; each worker takes some."""
+
+    def few_files() -> None:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (14, 14))
+
+    words = ["tunnel", "--trials", "2", "--controllers", "open", "--time-limit", "0.2"]
+    done = subprocess.run(
+        [sys.executable, "-m", "antennate", *words, "--workers", "2", "--no-figures"],
+        cwd=tmp_path,
+        preexec_fn=few_files,
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+    assert done.returncode == 2
+    (line,) = done.stderr.splitlines()
+    assert "error: expected to start a worker process, found: Too many open files; use " in line
+    assert not list(tmp_path.iterdir())
 
 
 def test_a_worker_that_dies_is_noticed() -> None:

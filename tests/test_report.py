@@ -138,6 +138,15 @@ def test_it_is_written_again_and_elsewhere(capsys: pytest.CaptureFixture[str]) -
     assert main(["report", "run", "--out", "page.html", "--overwrite"]) == 0
 
 
+def test_a_page_takes_the_place_of_no_file_of_its_run(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["springs", "--out", "run"]) == 0
+    before = Path("run/result.json").read_bytes()
+    for words in (["run"], ["--compare", "run", "run"]):
+        said = refusal(capsys, *words, "--out", "run/result.json", "--overwrite")
+        assert "--out: expected no file that the page is made of, found run/result.json" in said
+    assert Path("run/result.json").read_bytes() == before
+
+
 def test_a_pipe_or_a_device_is_never_replaced(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["springs", "--out", "run"]) == 0
     os.mkfifo("pipe")

@@ -188,8 +188,9 @@ def test_bad_words_are_one_line(capsys: pytest.CaptureFixture[str]) -> None:
         capsys, "study", "nobody.toml"
     )
     Path("good.toml").write_text(GOOD)
-    shard = refusal(capsys, "study", "good.toml", "--shard", "3/2")
-    assert "--shard: expected I/N" in shard
+    for shard in ("3/2", "0/2", "1/1000000", "1"):
+        line = refusal(capsys, "study", "good.toml", "--shard", shard)
+        assert f"--shard: expected I/N, I from 1 to N, N up to 999999, found {shard}" in line
     engine = refusal(capsys, "study", "good.toml", "--engine", "rya")
     assert "engine: expected one of local" in engine
     assert not Path("runs").exists()

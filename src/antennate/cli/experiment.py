@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import sys
 from collections.abc import Sequence
 from dataclasses import replace
@@ -35,7 +36,7 @@ from antennate.studies.identity import code_named, differences, environment, ide
 from antennate.studies.measures import Interim, Table
 from antennate.studies.pool import ShardEnd, Workers
 from antennate.studies.run_directory import RunDirectory
-from antennate.studies.run_files import LOGS, RESULT, SHARD
+from antennate.studies.run_files import LOGS, RESULT, SHARD, files_of
 from antennate.telemetry.view.simulation import SimulationView
 
 
@@ -125,8 +126,9 @@ def command(experiment: Experiment[Any, Any], argv: Sequence[str]) -> int:
 
 @dataclass(frozen=True)
 class Shards:
-    """Trials of all shards: what was run, their records by key, and where they ran."""
+    """Trials of all shards: their folders, what was run, records by key, and where they ran."""
 
+    folders: Sequence[Path]
     identity: dict[str, Any]
     records: dict[str, Any]
     processors: Sequence[str]
@@ -156,20 +158,18 @@ def carry_out(
     if shards and (changes := differences(shards.identity, what)):
         hint = "; merge in the folder where the shards were run" if " is gone" in changes else ""
         raise BadInputError(f"expected shards of this version and code, found {changes}{hint}")
-    again = (options.resume or options.retry or experiment.continued, options.retry)
-    name = "merge" if shards else experiment.name
     with (
         stop_signals(),
         view_of(options) as view,
-        folder_for(experiment.view, options, config, argv, what, *again, name) as run,
+        _folder(experiment, argv, config, options, what, shards) as run,
     ):
         if view is not None:
             view.results = str(run.path)
         run.keeps_store = experiment.continued
         workers = replace(workers, store=run.store, shared=environment(kind, config))
-        if shards and run.store is not None:
-            run.store.take(shards.records, shards.processors)
         try:
+            if shards and run.store is not None:
+                run.store.take(shards.records, shards.processors)
             outcome = _outcome(experiment, config, options, workers, run, view)
         except (LogError, OutputError, WorkerError):
             if shards:
@@ -181,10 +181,28 @@ def carry_out(
             run.write(SHARD, to_json(told))
             sys.stderr.write(f"shard {options.shard}: {end.count} of {end.total} trials\n")
             return OK
-        if options.shard is not None:
-            raise ConfigError(f"--shard: expected trials on workers, found {experiment.name}")
         say_by_hand(() if view is None else view.by_hand, run)
         return _end(experiment, config, options, run, outcome, None if shards else argv)
+
+
+def _folder(
+    experiment: Experiment[Any, Any],
+    argv: Sequence[str],
+    config: Params,
+    options: Options,
+    identity: dict[str, Any],
+    shards: Shards | None,
+) -> contextlib.AbstractContextManager[RunDirectory]:
+    """The run directory; shards are put together in a new one, apart from theirs."""
+    if shards:
+        reads = [file for folder in shards.folders for file in files_of(folder)]
+        how: dict[str, Any] = {"command": "merge", "reads": reads}
+    elif experiment.on_workers:
+        resume = options.resume or options.retry or experiment.continued
+        how = {"resume": resume, "retry": options.retry}
+    else:
+        how = {}
+    return folder_for(experiment.view, options, config, argv, identity, **how)
 
 
 def _require_unfinished(options: Options) -> None:
@@ -240,10 +258,12 @@ def _end(
     result = outcome.result()
     interrupted = bool(result.get("interrupted"))
     holds_trials = run.store is not None and run.store.holds_trials
+    if options.shard is not None and not interrupted:
+        raise ConfigError(f"--shard: expected trials on workers, found {experiment.name}")
     again = ""
     if argv is not None and interrupted and holds_trials:
         again = go_on(experiment.name, argv, run.path)
-    if interrupted and not outcome.rows:
+    if interrupted and (options.shard is not None or not outcome.rows):
         sys.stderr.write(f"to go on: {again}\n" if again else "")
         raise KeyboardInterrupt
     failure = _keep(experiment, outcome, options, run)

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import json
+from collections import Counter
+from collections.abc import Sequence, Set
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from pydantic.dataclasses import dataclass
 
@@ -12,12 +14,13 @@ from antennate import experiments
 from antennate.cli.arguments import parse
 from antennate.cli.experiment import Shards, carry_out
 from antennate.cli.options import option
-from antennate.cli.run_options import Options
+from antennate.cli.run_options import Options, shard_of
 from antennate.errors import BadInputError, ConfigError
 from antennate.params.base import Params
 from antennate.studies.identity import differences
+from antennate.studies.pool import places_of
 from antennate.studies.run_directory import RunDirectory
-from antennate.studies.run_files import SHARD, VERSIONS
+from antennate.studies.run_files import SHARD, VERSIONS, read_as
 from antennate.studies.store import STORE, read_store
 
 DESCRIPTION = """\
@@ -25,6 +28,9 @@ Put the shards of one run together: the table and the result are the same as wit
 
 Each shard is the folder of the same command with --shard I/N. All of them must be complete, of the
 same configuration, versions and code."""
+
+_NAMED = 3
+"""Most missing shards that an error names."""
 
 
 @dataclass(frozen=True)
@@ -63,26 +69,94 @@ def command(argv: Sequence[str]) -> int:
     return carry_out(experiment, argv, config, asked, shards)
 
 
+class _Part(NamedTuple):
+    """What a shard says of itself: the I-th of N parts of so many trials."""
+
+    number: int
+    parts: int
+    trials: int
+
+    @property
+    def places(self) -> range:
+        """Its trials."""
+        return range(self.number - 1, self.trials, self.parts)
+
+
+def _part(text: str) -> _Part:
+    """What the file of a shard says.
+
+    Raises:
+        ValueError: It is no such file.
+    """
+    match json.loads(text):
+        case {"shard": str(name), "of": int(trials)} if (part := shard_of(name)) and trials >= 0:
+            return _Part(*part, trials)
+        case _:
+            raise ValueError("no shard I/N of a number of trials")
+
+
 def _gathered(shards: Sequence[Path]) -> Shards:
     """What all shards say is run, and their trials.
 
     Raises:
-        BadInputError: One is incomplete or damaged, or of another run.
+        BadInputError: One is incomplete or damaged, or of another run, or one is missing.
     """
     identity: Any = None
     records: dict[str, Any] = {}
     processors: list[str] = []
+    parts: list[_Part] = []
     for shard in shards:
         if not (shard / SHARD).is_file():
             raise BadInputError(f"{shard}: expected a complete shard, found no {SHARD}")
-        for name in (SHARD, VERSIONS):
-            RunDirectory.open(shard).text(name)  # one that was cut is refused
+        parts.append(read_as(shard / SHARD, _part))
+        RunDirectory.open(shard).text(VERSIONS)  # one that was cut is refused
         found = read_store(shard / STORE)
         if identity is not None and (changes := differences(identity, found.identity)):
             raise BadInputError(
                 f"{shard}: expected a shard of the same run as {shards[0]}, found {changes}"
             )
         identity = identity or found.identity
+        _require_whole(shard, parts[-1], places_of(found.records))
         records |= found.records
         processors += found.processors
-    return Shards(identity, records, processors)
+    _require_all(parts[0], places_of(records))
+    return Shards(shards, identity, records, processors)
+
+
+def _require_whole(shard: Path, part: _Part, found: Set[int]) -> None:
+    """Check that a shard, which was complete, has lost none of its trials.
+
+    Raises:
+        BadInputError: It has.
+    """
+    sound = sum(place in part.places for place in found)
+    if sound < len(part.places):
+        raise BadInputError(
+            f"{shard / STORE}: expected {len(part.places)} finished trials, found {sound}: the "
+            f"file is damaged; run this shard again, with --shard {part.number}/{part.parts} "
+            f"--resume --out {shard}"
+        )
+
+
+def _require_all(part: _Part, found: Set[int]) -> None:
+    """Check that all shards are there.
+
+    Args:
+        part: One of them.
+        found: Trials of all of them.
+
+    Raises:
+        BadInputError: One is missing.
+    """
+    each = Counter(place % part.parts for place in found)
+    missing = [
+        f"{first + 1}/{part.parts}"
+        for first in range(min(part.parts, part.trials))
+        if each[first] < len(range(first, part.trials, part.parts))
+    ]
+    if missing:
+        named = ", ".join(missing[:_NAMED]) + (", …" if missing[_NAMED:] else "")
+        raise BadInputError(
+            f"--shards: expected {part.trials} finished trials, found {len(found)}: a shard is "
+            f"missing: {named}"
+        )

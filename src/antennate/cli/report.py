@@ -13,12 +13,12 @@ from antennate import experiments
 from antennate.cli.arguments import parse
 from antennate.cli.exit_codes import OK
 from antennate.cli.options import option
-from antennate.errors import BadInputError, ConfigError
+from antennate.errors import BadInputError, ConfigError, OutputError
 from antennate.files import write_whole
 from antennate.params.base import Params
 from antennate.studies.report import View, command_of, compare, report
 from antennate.studies.run_directory import RunDirectory
-from antennate.studies.run_files import REPORT
+from antennate.studies.run_files import REPORT, files_of, is_same
 
 DESCRIPTION = """\
 Write a run as one HTML page that needs nothing else: what was run, what came out with its
@@ -56,16 +56,30 @@ def command(argv: Sequence[str]) -> int:
     if options.compare:
         text, place = _compared(options.compare), options.out or Path(COMPARISON)
         own = False
+        runs = list(options.compare)
     elif options.run is not None:
         run = RunDirectory.open(options.run)
         text = _made(run, lambda view: report(run, view))
         place = options.out or run.path / REPORT
         own = options.out is None
+        runs = [options.run]
     else:
         raise ConfigError("expected the folder of a run, or --compare RUN RUN, found none")
+    _require_no_source(place, runs)
     write_whole(place, text.encode(), overwrite=own or options.overwrite)
     sys.stderr.write(f"written to {place}\n")
     return OK
+
+
+def _require_no_source(place: Path, runs: Sequence[Path]) -> None:
+    """Check that a page takes the place of no file of a run, but of its page.
+
+    Raises:
+        OutputError: It would.
+    """
+    files = (file for run in runs for file in files_of(run) if file.name != REPORT)
+    if any(is_same(place, file) for file in files):
+        raise OutputError(f"--out: expected no file that the page is made of, found {place}")
 
 
 def _compared(paths: Sequence[Path]) -> str:

@@ -40,7 +40,7 @@ def folder_for(
     config: Params,
     argv: Sequence[str],
     identity: Mapping[str, Any] | None = None,
-    resume: bool = False,
+    resume: bool | None = None,
     retry: bool = False,
     command: str = "",
     reads: Sequence[Path] = (),
@@ -55,7 +55,7 @@ def folder_for(
         config: The configuration.
         argv: Words of the command.
         identity: What is run, if it can be resumed.
-        resume: Go on with the run that the folder holds, if there is one.
+        resume: Go on with the run that the folder holds, if there is one; None if it never can.
         retry: Run its trials again that failed.
         command: Name of the command, if it is not that of the view.
         reads: Files that it reads, beside those that the configuration names.
@@ -67,7 +67,8 @@ def folder_for(
     for flag, words in flags_and_words(argv):
         for word in words:
             require_text(flag or view.name, word)
-    require_apart(options.out, config.model_dump(), reads)
+    replaced = [options.config] if options.overwrite and options.config is not None else []
+    require_apart(options.out, config.model_dump(), [*reads, *replaced])
     place = (view.name, options.out, options.overwrite, identity, resume, retry)
     with RunDirectory.create(*place) as folder:
         folder.describe(config, ["antennate", command or view.name, *argv])

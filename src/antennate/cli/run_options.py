@@ -78,6 +78,7 @@ def refuse_workers(options: Any, expected: str) -> None:
 
 OF_WORKERS = ("workers", "engine", "slurm", "shard", "resume", "retry", "trial_timeout")
 """Options that only trials on workers have."""
+_MOST_SHARDS = 999_999
 _SAID_ANEW = {"--out": 1, "--overwrite": 0, "--no-overwrite": 0, "--resume": 0, "--no-resume": 0}
 """Flags that are left out of the words that go on, and how many values each has."""
 
@@ -106,10 +107,16 @@ def go_on(command: str, argv: Sequence[str], folder: Path) -> str:
 
 def _shard(text: str | None) -> tuple[int, int] | None:
     """The part that is carried out, and of how many."""
-    if text is None:
-        return None
+    shard = None if text is None else shard_of(text)
+    if text is not None and shard is None:
+        raise ConfigError(
+            f"--shard: expected I/N, I from 1 to N, N up to {_MOST_SHARDS}, found {shortened(text)}"
+        )
+    return shard
+
+
+def shard_of(text: str) -> tuple[int, int] | None:
+    """Which part, and of how many, I/N names; None if it names none."""
     found = re.fullmatch(r"([0-9]{1,6})/([0-9]{1,6})", text)
     number, count = (int(found[1]), int(found[2])) if found else (0, 0)
-    if not 1 <= number <= count:
-        raise ConfigError(f"--shard: expected I/N, I from 1 to N, found {shortened(text)}")
-    return number, count
+    return (number, count) if 1 <= number <= count else None

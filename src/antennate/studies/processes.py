@@ -16,6 +16,8 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from multiprocessing.connection import Connection, wait
+from multiprocessing.spawn import get_preparation_data
+from pathlib import Path
 from typing import Any
 
 from antennate.errors import WorkerError, in_one_line
@@ -61,6 +63,7 @@ class Processes:
         self, work: Work, parts: Sequence[Sequence[int]], count: int, emit: Emit, fail: Fail
     ) -> None:
         """Run the tasks on `count` processes; see `Engine`."""
+        _require_file()
         checked = sendable(work.tasks)
         if isinstance(checked, NotSent):
             raise WorkerError(checked.reason)
@@ -187,11 +190,17 @@ class _Worker:
 
     def __init__(self, added: Packed) -> None:
         context = multiprocessing.get_context("spawn")
-        self.connection, theirs = context.Pipe()
-        # a parent that ends ends those that are daemons; others it would wait for
-        self.process = context.Process(target=_serve, args=(theirs, added), daemon=True)
-        with on_ctrl_c(signal.SIG_IGN):  # they inherit it, so that none dies half begun
-            self.process.start()
+        try:
+            self.connection, theirs = context.Pipe()
+            # a parent that ends ends those that are daemons; others it would wait for
+            self.process = context.Process(target=_serve, args=(theirs, added), daemon=True)
+            with on_ctrl_c(signal.SIG_IGN):  # they inherit it, so that none dies half begun
+                self.process.start()
+        except OSError as error:
+            raise WorkerError(
+                f"expected to start a worker process, found: {error.strerror}; use fewer workers "
+                "or raise the limits that `ulimit -a` shows"
+            ) from None
         theirs.close()
         self.ready = False
         self.places: list[int] = []
@@ -213,6 +222,20 @@ class _Worker:
         self.process.kill()
         self.process.join()
         self.connection.close()
+
+
+def _require_file() -> None:
+    """Check that workers can import the program, as each begins with that.
+
+    Raises:
+        WorkerError: It was read from standard input, or its file is gone.
+    """
+    program = get_preparation_data("").get("init_main_from_path")
+    if program is not None and not Path(program).exists():
+        raise WorkerError(
+            f"expected a program in a file, which workers import, found {Path(program).name}; save "
+            "it, or use one worker"
+        )
 
 
 def added_objects(dumps: Callable[[Any], bytes] = pickle.dumps) -> Packed:

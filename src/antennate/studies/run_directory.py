@@ -89,7 +89,7 @@ class RunDirectory:
         path: str | Path | None = None,
         overwrite: bool = False,
         identity: Mapping[str, Any] | None = None,
-        resume: bool = False,
+        resume: bool | None = False,
         retry: bool = False,
     ) -> RunDirectory:
         """Claim a directory for a run of `command`.
@@ -100,7 +100,8 @@ class RunDirectory:
             overwrite: Remove the run that it holds.
             identity: What is run, by `antennate.studies.identity`, for a run that can be resumed.
             resume: Go on with the run that it holds, if there is one. Of one that is finished only
-                files that are missing are written, and the report with them.
+                files that are missing are written, and the report with them. None if `command`
+                goes on with none.
             retry: Whether trials that failed are run again, so that no run is finished.
 
         Raises:
@@ -117,7 +118,7 @@ class RunDirectory:
                 if (place / folder).is_symlink():
                     raise OutputError(f"expected {place / folder} within its run, found a link")
             held = files_of(place)
-            goes_on = resume and not overwrite and (place / STORE) in held
+            goes_on = bool(resume) and not overwrite and (place / STORE) in held
             if held and not overwrite and not goes_on:
                 raise holds_run(place, held, resume)
             try:
@@ -228,7 +229,8 @@ class RunDirectory:
             return
         if self._partial is None:
             raise OutputError(f"{self.path}: expected a run that goes on, found a finished one")
-        with writing(self.path / PARTIAL):
+        promised = self.store.promised() if self.store is not None else contextlib.nullcontext()
+        with promised, writing(self.path / PARTIAL):
             self._partial.write(formats.to_line(formats.as_mapping(row)))
             self._partial.flush()
         self._kept = True
@@ -261,10 +263,8 @@ class RunDirectory:
         self._kept = self._kept or any(path.parent.name == LOGS for path in files_of(self.path))
 
     def discard(self) -> None:
-        """Let nothing that was kept so far stay when the run ends."""
+        """Let nothing stay of a run whose trials are all in other files."""
         self._kept = False
-        if self.store is not None:
-            self.store.holds_trials = False
 
     def write(self, name: str, content: str | bytes | Iterator[str]) -> None:
         """Put one file into the directory, whole or not at all; a long text comes in pieces.

@@ -61,8 +61,14 @@ def files_of(place: Path) -> list[Path]:
     return [place / name for name in _NAMES if os.path.lexists(place / name)] + inner
 
 
-def holds_run(place: Path, held: Sequence[Path], resume: bool) -> OutputError:
-    """The error of a directory that holds another run, whose files are given."""
+def holds_run(place: Path, held: Sequence[Path], resume: bool | None) -> OutputError:
+    """The error of a directory that holds another run, whose files are given.
+
+    Args:
+        place: The directory.
+        held: Files of a run that it holds.
+        resume: Whether that run was to go on; None if the command goes on with none.
+    """
     if resume and place / RESULT in held:
         return OutputError(
             f"{place}: expected an unfinished run, found a finished one, which takes no more "
@@ -71,7 +77,7 @@ def holds_run(place: Path, held: Sequence[Path], resume: bool) -> OutputError:
     return OutputError(
         f"expected {'an unfinished run' if resume else 'a folder without a run'}, found {held[0]}; "
         "choose another or give --overwrite"
-        + (" or --resume" if place / STORE in held and not resume else "")
+        + (" or --resume" if place / STORE in held and resume is False else "")
     )
 
 
@@ -90,11 +96,12 @@ def require_apart(
     """
     held = files_of(Path(out)) if out is not None and Path(out).is_dir() else []
     for path in (*reads, *map(Path, _texts(config))) if held else ():
-        if any(_is_same(path, each) for each in held):
+        if any(is_same(path, each) for each in held):
             raise OutputError(f"expected another folder than that of {path}, found {out}")
 
 
-def _is_same(path: Path, other: Path) -> bool:
+def is_same(path: Path, other: Path) -> bool:
+    """Whether both names lead to one file."""
     try:
         return path.samefile(other)
     except (OSError, ValueError):  # no file, or not even a name of one

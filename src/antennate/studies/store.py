@@ -39,7 +39,7 @@ class Store:
 
     Attributes:
         records: What was kept before, by key; of a key that comes twice the last counts.
-        holds_trials: Whether it holds any, kept before or now.
+        holds_trials: Whether it holds any that no other file has, kept before or now.
         processors: Models of the processors that they ran on.
         damaged: Lines that failed their checksum.
         was_empty: Whether the file held nothing before this process wrote to it.
@@ -109,12 +109,22 @@ class Store:
         Raises:
             OutputError: The disk is full, or the like; what was kept before stays whole.
         """
-        try:
+        with self.promised():
             self._append(line({"key": key, **content}))
+        self.holds_trials = True
+
+    @contextlib.contextmanager
+    def promised(self) -> Iterator[None]:
+        """Say of what cannot be written meanwhile that the trials stay, if there are any.
+
+        Raises:
+            OutputError: Something cannot be written.
+        """
+        try:
+            yield
         except OutputError as error:
             kept = "; what was finished is kept, and the run can be resumed"
             raise OutputError(f"{error}{kept if self.holds_trials else ''}") from None
-        self.holds_trials = True
 
     def saw(self, model: str) -> None:
         """Keep the model of a processor that trials run on; a warning tells of another one."""
@@ -132,13 +142,12 @@ class Store:
         self.processors.append(model)
 
     def take(self, records: Mapping[str, Any], processors: Sequence[str]) -> None:
-        """Keep the trials of other files, and the processors that they ran on."""
+        """Keep trials that stay in other files too, and the processors that they ran on."""
         for model in processors:
             self.saw(model)
         for key, content in records.items():
-            if key not in self.records:
-                self.append(key, content)
-                self.records[key] = content
+            self._append(line({"key": key, **content}))
+            self.records[key] = content
 
     def _append(self, data: bytes) -> None:
         try:
