@@ -201,9 +201,7 @@ def _calibration(config: DriveConfig) -> str:
 def _tell(result: Mapping[str, Any], orders: Orders, log: str) -> None:
     """Table and sentences; `log` are the words with which `replay` reads the log."""
     again = f"What was read and decided: {typed('replay')} {log}"
-    if not result["logs"]:
-        only = "`record_required = true` lets the robot walk with a log only"
-        again = f"No log was kept: {result['log_failure']}. {only}"
+    again = again if result["logs"] else f"No log was kept: {result['log_failure']}."
     tell(result, orders, _tables(result), f"{_sentences(result)}\n{again}")
 
 
