@@ -1,4 +1,4 @@
-"""A disk that fills up while a drive or a twin logs: told once with its cause, and it ends nothing."""
+"""A disk that fills up while a drive or a twin logs: told once, with its cause; nothing ends."""
 
 from __future__ import annotations
 
@@ -26,8 +26,12 @@ def small_disk() -> None:
     resource.setrlimit(resource.RLIMIT_FSIZE, (ROOM, resource.RLIM_INFINITY))
 
 
+def tiny_disk() -> None:
+    """The log of 0.6 s of a twin does not fit; the header does."""
+    resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, resource.RLIM_INFINITY))
+
+
 def test_a_drive_goes_on_and_counts_what_is_not_logged_at_once(tmp_path: Path) -> None:
-    """Nothing here depends on how fast the machine is: it is a dry run of 8 s."""
     drive = Drive(tmp_path / "run")
     with (
         twin() as (places, _),
@@ -50,11 +54,13 @@ def test_a_drive_goes_on_and_counts_what_is_not_logged_at_once(tmp_path: Path) -
     found = re.search(cause, told[0])
     assert found is not None
     at = drive.lines.index(told[0])
-    shown = [[int(n) for n in re.findall(r"unlogged=(\d+)", line)] for line in drive.lines]
-    before, after = sum(shown[:at], []), sum(shown[at:], [])
+    before, after = (
+        [int(number) for number in re.findall(r" unlogged=(\d+)", "\n".join(lines))]
+        for lines in (drive.lines[:at], drive.lines[at:])
+    )
     assert set(before) <= {0}
-    assert after == sorted(set(after)), "each line has more than the one before"
     assert after[0] > 0
+    assert after == sorted(set(after)), "each line has more than the one before"
     result = drive.result
     assert result["unlogged"] == result["pace"]["ticks"] - count(drive.folder / "drive.mcap")
     assert result["log_complete"] is False
@@ -63,13 +69,13 @@ def test_a_drive_goes_on_and_counts_what_is_not_logged_at_once(tmp_path: Path) -
 
 
 def test_a_twin_tells_its_failed_log_with_the_cause_and_ends_with_2(tmp_path: Path) -> None:
-    said, _ = walked(tmp_path, "--scene", "flat", "--log", "t.mcap", code=2, limits=small_disk)
+    said, _ = walked(tmp_path, "--scene", "flat", "--log", "t.mcap", code=2, limits=tiny_disk)
     *_, last = said.splitlines()
     found = re.fullmatch("antennate twin: error: " + CAUSE.format("t.mcap"), last)
     assert found, said
     assert said.count("the twin goes on without it") == said.count("log: ") <= 1
     with LogReader(tmp_path / "t.mcap") as log:
-        assert sum(1 for _ in log) >= int(found[1]) > 20
+        assert sum(1 for _ in log) >= int(found[1])
 
 
 def test_a_log_of_another_process_says_once_why_it_has_failed(tmp_path: Path) -> None:

@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 import tty
+from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
