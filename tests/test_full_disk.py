@@ -8,6 +8,7 @@ import subprocess
 import time
 from pathlib import Path
 
+import pytest
 from test_drive_processes import ANTENNATE, Drive, twin
 from test_simulated_logs import HEADER, rows, walked
 
@@ -20,6 +21,12 @@ CAUSE = (
     r"expected to write {}, found: (?:only \d+ of \d+ bytes were taken; the disk is full|"
     r"File too large); the log ends after (\d+) ticks"
 )
+
+
+@pytest.fixture(autouse=True)
+def no_bytecode(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nothing is to be cut but the log."""
+    monkeypatch.setenv("PYTHONDONTWRITEBYTECODE", "1")
 
 
 def small_disk() -> None:
