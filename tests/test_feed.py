@@ -113,6 +113,7 @@ def test_G6_a_reader_that_dies_ends_nothing() -> None:
         until(lambda: feed.failed, feed)
         assert not feed.send(b"tick")
         assert not feed.keeps
+    assert feed.failure == "the process that writes it ended with exit code 0"
     assert feed.started == 4
     assert not feed.complete
 
@@ -128,6 +129,7 @@ def test_G6_a_recorder_that_is_killed_is_followed_by_one_with_a_new_file(tmp_pat
         assert worst < 0.01, "the loop must not do the work of starting it"
         number, _ = until(lambda: feed.keeps, feed, number)
     assert (feed.started, feed.failed, feed.complete) == (2, False, False)
+    assert feed.failure == "the process that writes it was ended by signal 9"
     with LogReader(first) as log:
         numbers = [each.number for each in log]
         assert (log.parts, log.header, log.bad) == ((first, second), HEADER, 0)
@@ -177,6 +179,22 @@ def test_G6_ticks_that_a_killed_process_had_not_kept_yet_are_counted(tmp_path: P
     first.unlink()
     with LogReader(second) as log:
         assert count(first) == len(list(log))
+
+
+def test_G6_ticks_that_went_to_a_process_which_never_began_are_shown_by_the_next(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    go = tmp_path / "go"
+    wait = f"while not os.path.exists({str(go)!r}): time.sleep(0.01)"
+    dies, follows = script(f"import os, time\n{wait}"), viewer(tmp_path / "drive.mcap")
+    with Feed(lambda n: (dies if n == 1 else follows)(n), HEADER.pack()) as feed:
+        for number in range(1, 51):
+            assert feed.send(tick(number).pack())
+        go.touch()
+        until(lambda: feed.keeps, feed, 51)
+        feed.send(tick(20_000).pack())
+    last = capfd.readouterr().err.splitlines()[-1]
+    assert int(last.split(" unlogged=")[1]) >= 50
 
 
 GONE = """
@@ -237,6 +255,9 @@ def test_a_log_that_cannot_be_written_is_said_once_and_the_status_line_goes_on(
     assert feed.failed
     said = capfd.readouterr().err
     assert said.count("does not exist yet") == 1
+    assert "; the robot walks on without a log\n" in said
+    assert " unlogged=1\n" in said
+    assert feed.failure.startswith(f"expected a log that does not exist yet, found {taken};")
     assert "OK maneuver=FORWARD" in said
     assert taken.read_text() == "another drive"
 

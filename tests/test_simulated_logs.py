@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 import tty
+from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -149,7 +150,13 @@ def sync_write(address: int, size: int, values: list[int]) -> bytes:
     return packets.sync_write(address, data)
 
 
-def walked(folder: Path, *words: str, ticks: int = TICKS) -> tuple[str, list[list[int]]]:
+def walked(
+    folder: Path,
+    *words: str,
+    ticks: int = TICKS,
+    code: int = 0,
+    limits: Callable[[], None] | None = None,
+) -> tuple[str, list[list[int]]]:
     """A twin in lock-step that is sent goals: what it said, and the goals [ticks]."""
     words = ("twin", "--pace", "lockstep", "--duration", f"{0.01 * ticks}", *words)
     ahead = [0] * 5 + [7 * (-1) ** side for _ in range(6) for side in range(2)] + [0] * 2
@@ -160,6 +167,7 @@ def walked(folder: Path, *words: str, ticks: int = TICKS) -> tuple[str, list[lis
         stderr=subprocess.PIPE,
         text=True,
         cwd=folder,
+        preexec_fn=limits,
     ) as process:
         assert process.stdout is not None
         bus = os.open(json.loads(process.stdout.readline())["bus"], os.O_RDWR)
@@ -169,7 +177,7 @@ def walked(folder: Path, *words: str, ticks: int = TICKS) -> tuple[str, list[lis
             os.write(bus, sync_write(116, 4, goals))
         _, said = process.communicate(timeout=120)
         os.close(bus)
-    assert process.returncode == 0, said
+    assert process.returncode == code, said
     return said, plan
 
 

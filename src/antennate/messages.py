@@ -29,6 +29,11 @@ def shortened(text: str) -> str:
     return text if len(text) <= _LONGEST else text[: _LONGEST - 3] + "..."
 
 
+def ended_by(status: int) -> str:
+    """How a process ended, by its return code as `subprocess` has it."""
+    return f"was ended by signal {-status}" if status < 0 else f"ended with exit code {status}"
+
+
 def typed(*words: str) -> str:
     """The words that a person types to run a command of this program, as it was called itself.
 

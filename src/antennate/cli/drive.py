@@ -46,11 +46,6 @@ from antennate.telemetry.reader import count
 from antennate.telemetry.ticks import Tick
 from antennate.types import Controller
 
-_LOGLESS = (
-    "the process that writes it had not begun by the end, or could not write; is the machine busy, "
-    "or the disk full? `record_required = true` lets the robot walk with a log only"
-)
-
 _LONGEST_DRAWN = 12_000
 """Most ticks of a log that is drawn for the report: it takes some four seconds."""
 
@@ -206,7 +201,7 @@ def _calibration(config: DriveConfig) -> str:
 def _tell(result: Mapping[str, Any], orders: Orders, log: str) -> None:
     """Table and sentences; `log` are the words with which `replay` reads the log."""
     again = f"What was read and decided: {typed('replay')} {log}"
-    again = again if result["logs"] else f"No log was kept: {_LOGLESS}"
+    again = again if result["logs"] else f"No log was kept: {result['log_failure']}."
     tell(result, orders, _tables(result), f"{_sentences(result)}\n{again}")
 
 
@@ -237,7 +232,7 @@ def _carry_out(
         try:
             feed.send(Tick.of(session, t).pack())
         except LogError as error:  # the robot walks on without this tick in its log
-            feed.skip()
+            feed.skip(str(error))
             if not unlogged:
                 viewer.say(error)
             unlogged = True
@@ -251,6 +246,7 @@ def _carry_out(
         "priority": priority.value,
         "unlogged": 0 if feed.complete else feed.offered - count(log),
         "log_complete": feed.complete,
+        "log_failure": feed.failure,
         "logs": [each.name for each in parts(log) if each.exists()],
     }
     return head | report.result(session) | tail
@@ -288,7 +284,9 @@ def _note(result: Mapping[str, Any]) -> str:
     if result["priority"] == Priority.ORDINARY.value:
         lines.append("Real-time priority was not allowed; a busy machine will make it miss ticks.")
     if not result["log_complete"] and result["logs"]:
-        lines.append(f"The log is not complete; its files: {', '.join(result['logs'])}.")
+        files = f"Its files: {', '.join(result['logs'])}."
+        why = result.get("log_failure")  # results of older versions have none
+        lines.append(f"The log is not complete{f': {why}' if why else ''}. {files}")
     return "\n".join(lines)
 
 

@@ -13,7 +13,7 @@ from pydantic.dataclasses import dataclass
 from antennate.cli.options import option
 from antennate.cli.progress import progress, stop_signals
 from antennate.cli.status import write
-from antennate.errors import ConfigError
+from antennate.errors import ConfigError, LogError
 from antennate.files import write_whole
 from antennate.sim.world import World
 from antennate.telemetry.apart import LogProcess
@@ -36,6 +36,9 @@ class KeptOptions:
 
 class Kept:
     """Log and film of a twin; a context, to be left when nobody is served any more.
+
+    A log that cannot be written any more is told at once, and ends nothing; it is an error when the
+    twin has ended.
 
     Args:
         options: What is wanted.
@@ -71,7 +74,7 @@ class Kept:
             self._film = TwinFilm(robot, passage, config)
             self.watchers.append(self._film.take)
         if options.log is not None:
-            self._log = LogProcess(options.log, header_of(config, time.time_ns()))
+            self._log = LogProcess(options.log, header_of(config, time.time_ns()), _tell)
             self.watchers.append(TwinLog(self._log, robot, config).take)
 
     def event(self, text: str) -> None:
@@ -88,11 +91,20 @@ class Kept:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
+        failure = ""
         if self._log is not None:
             wrong = self._log.close()
-            write(f"log: {self._log.path}{f': {wrong}' if wrong else ''}\n")
+            failure = self._log.failure
+            if not failure:
+                write(f"log: {self._log.path}{f': {wrong}' if wrong else ''}\n")
         if self._film is not None and self._video is not None:
             _draw(self._film, self._video)
+        if failure and isinstance(error, KeyboardInterrupt | None):
+            raise LogError(failure) from None
+
+
+def _tell(failure: str) -> None:
+    write(f"log: {failure}; the twin goes on without it\n")
 
 
 def _require(flag: str, path: Path | None, ending: str) -> None:

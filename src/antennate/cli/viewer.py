@@ -1,7 +1,7 @@
 """The other process of `antennate drive`: it keeps the log and shows one line.
 
 It reads from its standard input what a `Feed` sends, and nobody waits for it. On its standard
-output it says once whether the log has begun.
+output it says once whether the log has begun, and why it cannot be written any more.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import signal
 import socket
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from antennate.cli.status import StatusLine, write
@@ -44,7 +44,7 @@ class Display:
         self.status = StatusLine()
         self._asked = ""
 
-    def show(self, tick: Tick, dropped: int) -> None:
+    def show(self, tick: Tick, unlogged: int) -> None:
         """Show a tick, if one is due or if something new is asked."""
         match = _ASKED.search(tick.note)
         asked = match[1] if match else ""
@@ -52,10 +52,10 @@ class Display:
             self.status.say(f"{asked[0].upper()}{asked[1:]}.")
         self._asked = asked
         if self.status.due(tick.now):
-            self.status.show(line(tick, dropped))
+            self.status.show(line(tick, unlogged))
 
 
-def line(tick: Tick, dropped: int) -> str:
+def line(tick: Tick, unlogged: int) -> str:
     """All counters of a tick in one line."""
     left, right = ("-" if math.isnan(counts) else f"{counts:.0f}" for counts in tick.reading)
     state = tick.state or "-"
@@ -65,7 +65,7 @@ def line(tick: Tick, dropped: int) -> str:
         f"{tick.now:7.1f} s {state}{why} maneuver={maneuver} counts={left},{right} "
         f"age={1e3 * tick.age:.0f}ms {tick.note} missed_ticks={tick.missed} "
         f"missed_answers={tick.misses} stale={tick.stale} frames={tick.frames} crc={tick.crc} "
-        f"lost={tick.lost} sent={tick.sent} refused={tick.refused} unlogged={dropped}"
+        f"lost={tick.lost} sent={tick.sent} refused={tick.refused} unlogged={unlogged}"
     )
 
 
@@ -113,6 +113,76 @@ def _page_of(folder: Path, words: Sequence[str]) -> _Page | None:
     return _Page(int(files[0]), folder) if files else None
 
 
+class _Log:
+    """The log, while it can be written; why it cannot is said once, here and to the loop.
+
+    Args:
+        path: Its file.
+        required: Whether the robot walks only with it.
+
+    Attributes:
+        keeps: Whether it takes ticks.
+    """
+
+    def __init__(self, path: Path, required: bool) -> None:
+        self._path, self._required = path, required
+        self._writer: LogWriter | None = None
+        self._taken, self.keeps = 0, False
+
+    def begin(self, first: Message) -> None:
+        """Begin it; the robot walks on without one that cannot be written."""
+        try:
+            self._writer = LogWriter(self._path, Header.unpack(first.content), sync=SYNC)
+        except LogError as error:
+            follows = "no command is sent" if self._required else "the robot walks on"
+            say(LogError(f"{error}; {follows} without a log"))
+            _answer(NOT_KEPT + str(error).encode())
+        else:
+            self.keeps = True
+            _answer(KEPT)
+
+    @property
+    def unkept(self) -> int:
+        """Ticks that came and that it lacks; those that it holds back for a moment are none."""
+        kept = 0 if self._writer is None else self._writer.kept
+        return 0 if self.keeps else self._taken - kept
+
+    def write(self, tick: Tick) -> None:
+        """Take one tick."""
+        self._taken += 1
+        self._carry_out(lambda writer: writer.write(tick))
+
+    def settle(self) -> None:
+        """Let no tick wait while none follows."""
+        self._carry_out(LogWriter.settle)
+
+    def close(self) -> None:
+        """End it."""
+        self._carry_out(LogWriter.close)
+
+    def fail(self, error: LogError) -> None:
+        """Take nothing more. It is not closed: so a reader sees that something went wrong."""
+        say(error)
+        _answer(str(error).encode())
+        self.keeps = False
+        if self._writer is not None:
+            with contextlib.suppress(LogError):
+                self._writer.flush()
+
+    def _carry_out(self, act: Callable[[LogWriter], None]) -> None:
+        if self._writer is not None and self.keeps:
+            try:
+                act(self._writer)
+            except LogError as error:
+                self.fail(error)
+
+
+def _answer(data: bytes) -> None:
+    """Tell the loop; if it is gone, the ticks tell it."""
+    with contextlib.suppress(OSError):
+        os.write(_STDOUT, data)
+
+
 def main() -> int:
     """Keep and show ticks until they end; 0 if all of them are kept.
 
@@ -122,63 +192,29 @@ def main() -> int:
     for number in (*STOPS, signal.SIGTTOU):  # the other end decides when it is over
         signal.signal(number, signal.SIG_IGN)
     display = Display()
-    kept, required = False, REQUIRED in sys.argv[2:]
+    required = REQUIRED in sys.argv[2:]
+    log = _Log(Path(sys.argv[1]), required)
     page = _page_of(Path(sys.argv[1]).parent, sys.argv[2:])
-    log: LogWriter | None = None
-    stream = messages(sys.stdin.buffer.raw, lambda: _settle(log))  # type: ignore[attr-defined]
+    stream = messages(sys.stdin.buffer.raw, log.settle)  # type: ignore[attr-defined]
     try:
         first = next(stream, None)
-        log = None if first is None else _begin(Path(sys.argv[1]), first)
-        kept = log is not None
+        if first is not None:
+            log.begin(first)
         if page is not None and first is not None:
             page.begin(first)
-        with contextlib.suppress(OSError):  # the other end is gone; the ticks tell it
-            os.write(_STDOUT, KEPT if kept else NOT_KEPT)
         for message in stream:
             tick = Tick.unpack(message.content)
-            kept = kept and _keep(log, tick)
-            display.show(tick, message.dropped)
+            log.write(tick)
+            display.show(tick, message.dropped + log.unkept)
             if page is not None:
                 page.show(message)
-            if required and not kept:
+            if required and not log.keeps:
                 break
-        if log is not None and kept:
-            log.close()
-    except LogError as error:
-        kept = say(error)
-        if log is not None:  # not closed: so a reader sees that the loop was killed
-            with contextlib.suppress(LogError):
-                log.flush()
+        log.close()
+    except LogError as error:  # the loop was killed
+        log.fail(error)
     display.status.close()
-    return int(not kept)
-
-
-def _begin(path: Path, first: Message) -> LogWriter | None:
-    """The log, None if it cannot be written: the robot walks on without it."""
-    try:
-        return LogWriter(path, Header.unpack(first.content), sync=SYNC)
-    except LogError as error:
-        say(error)
-        return None
-
-
-def _keep(log: LogWriter | None, tick: Tick) -> bool:
-    """Write one tick; a disk that fails is said once."""
-    try:
-        if log is not None:
-            log.write(tick)
-    except LogError as error:
-        return say(error)
-    return log is not None and not log.failure
-
-
-def _settle(log: LogWriter | None) -> None:
-    """Let no tick wait while none follows; a disk that fails is said once."""
-    try:
-        if log is not None:
-            log.settle()
-    except LogError as error:
-        say(error)
+    return int(not log.keeps)
 
 
 def say(error: AntennateError) -> bool:

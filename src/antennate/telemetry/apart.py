@@ -18,14 +18,14 @@ import subprocess
 import sys
 import threading
 from collections import deque
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Self
 
 import numpy as np
 
 from antennate.errors import LogError
-from antennate.messages import one_line
+from antennate.messages import ended_by, one_line
 from antennate.telemetry.header import Header
 from antennate.telemetry.rows import RowLog, Rows
 from antennate.telemetry.topics import CONTACT_FORCES, COORDINATES, Topic
@@ -56,19 +56,23 @@ class LogProcess:
     Args:
         path: A file that does not exist yet.
         header: What stands at its beginning.
+        on_failure: Called once with the reason if it cannot be written any more.
 
     Attributes:
         path: The file.
         dropped: Messages for which there was no room.
+        failure: Why it cannot be written any more; empty while it can.
 
     Raises:
         LogError: The file exists or cannot be written, or the disk is nearly full.
     """
 
-    def __init__(self, path: Path, header: Header) -> None:
-        self.path, self.dropped = path, 0
+    def __init__(
+        self, path: Path, header: Header, on_failure: Callable[[str], None] = lambda _: None
+    ) -> None:
+        self.path, self.dropped, self._on_failure = path, 0, on_failure
         self._waiting, self._lock = deque[bytes](), threading.Lock()
-        self._failed = ""
+        self.failure = ""
         self._process = subprocess.Popen(  # noqa: S603 our own words
             [sys.executable, "-m", __name__, str(path)],
             stdin=subprocess.PIPE,
@@ -106,24 +110,27 @@ class LogProcess:
 
     def close(self) -> str:
         """End the log and wait until it is written; what is wrong with it, empty if nothing."""
-        if self._pipe < 0:
-            return self._failed
-        with contextlib.suppress(OSError):
-            os.set_blocking(self._pipe, True)
-            while self._waiting:
-                self._write(self._waiting.popleft())
-            self._send(_END)
-        self._pipe = -1
-        with contextlib.suppress(OSError):
-            self._process.communicate(timeout=_PATIENCE)
-        if self._process.poll() is None:
+        if self._pipe >= 0:
+            with contextlib.suppress(OSError):
+                os.set_blocking(self._pipe, True)
+                while self._waiting:
+                    self._write(self._waiting.popleft())
+                self._send(_END)
+            self._wait()
+        missing = f"{self.dropped} ticks are missing in it" if self.dropped else ""
+        return self.failure or missing
+
+    def _wait(self) -> None:
+        """Wait until the process has ended, and keep why it failed."""
+        self._pipe, said, why = -1, b"", ""
+        try:
+            said, _ = self._process.communicate(timeout=_PATIENCE)
+        except (OSError, subprocess.TimeoutExpired):
+            why = f"the process that writes {self.path} did not end in {_PATIENCE:g} s"
             self._process.kill()
-            self._process.wait()
-        if self.dropped:
-            self._failed = f"{self.dropped} ticks are missing in it"
-        elif self._process.returncode:
-            self._failed = "the process that wrote it failed"
-        return self._failed
+        if status := self._process.wait():
+            ended = why or f"the process that writes {self.path} {ended_by(status)}"
+            self.failure = one_line(said.decode("utf-8", "replace")) or ended
 
     def __enter__(self) -> Self:
         return self
@@ -132,18 +139,32 @@ class LogProcess:
         self.close()
 
     def _hand_over(self, message: bytes) -> None:
+        if self.failure:
+            return
         if len(self._waiting) >= _WAITING:
             self.dropped += 1
             return
-        with self._lock, contextlib.suppress(OSError):  # full, or nobody reads any more
+        with self._lock, contextlib.suppress(BlockingIOError):  # it is full
             self._waiting.append(message)
-            while self._waiting:
-                first = self._waiting[0]
-                taken = os.write(self._pipe, first)
-                if taken < len(first):
-                    self._waiting[0] = first[taken:]
-                    return
-                self._waiting.popleft()
+            try:
+                self._pass_on()
+            except BrokenPipeError:
+                self._wait()
+                self._on_failure(self.failure)
+
+    def _pass_on(self) -> None:
+        """Write what waits.
+
+        Raises:
+            OSError: The pipe is full, or nobody reads any more.
+        """
+        while self._waiting:
+            first = self._waiting[0]
+            taken = os.write(self._pipe, first)
+            if taken < len(first):
+                self._waiting[0] = first[taken:]
+                return
+            self._waiting.popleft()
 
     def _send(self, kind: int, content: bytes = b"") -> None:
         self._write(_HEAD.pack(kind, len(content)) + content)
@@ -200,7 +221,10 @@ def _keep(log: RowLog[_Tick]) -> bool:
 
 
 def main() -> int:
-    """Write the log; its path is the only word. One line on stdout says whether it has begun."""
+    """Write the log; its path is the only word.
+
+    One line on stdout says whether it has begun, another one why it cannot be written any more.
+    """
     for number in _STOPS:  # the simulation decides when it is over
         signal.signal(number, signal.SIG_IGN)
     _, first = next(_messages(), (_FIRST, b""))
@@ -215,7 +239,9 @@ def main() -> int:
             log.close()
         else:
             log.flush()
-    except LogError:
+    except LogError as error:
+        with contextlib.suppress(OSError):  # nobody reads it
+            os.write(_STDOUT, one_line(str(error)).encode())
         return 1
     return 0
 

@@ -24,6 +24,7 @@ from select import PIPE_BUF
 from typing import BinaryIO, NamedTuple
 
 from antennate.errors import LogError
+from antennate.messages import ended_by, one_line
 
 _HEAD = struct.Struct("<II")
 _ROOM = 1 << 20
@@ -63,7 +64,7 @@ class Feed:
     Args:
         words: The command line of the n-th process, 1 the first. It reads messages from its
             standard input, and writes `KEPT` or `NOT_KEPT` to its standard output once it takes
-            them. Signals of the terminal do not reach it.
+            them, and then why it keeps them no more. Signals of the terminal do not reach it.
         first: The content of the first message, of any length.
         restarts: How many processes may follow the first.
         files: Open files that each process gets, beside its standard streams.
@@ -73,6 +74,7 @@ class Feed:
         dropped: Those of them for which there was no room, or nobody to take them.
         started: Processes started so far.
         failed: The last one is gone for good, or ended with an error.
+        failure: What first cost a tick, as far as it is known; empty while nothing did.
     """
 
     def __init__(
@@ -91,6 +93,8 @@ class Feed:
         self._keeper = threading.Thread(target=self._look_after, name="recorder", daemon=True)
         self.offered = self.dropped = self.started = 0
         self.failed = self._begun = False
+        self.failure = ""
+        self._passed = self._passed_before = self._lost = 0
         self._answered, self._since = False, math.inf
         self._waiting = deque[bytes]()
 
@@ -130,18 +134,22 @@ class Feed:
             self._ending = True
         with contextlib.suppress(OSError):  # one that takes nothing is not waited for
             if select.select((), (self._pipe,), (), _PATIENCE)[1]:
-                os.write(self._pipe, _HEAD.pack(0, self.dropped))
+                os.write(self._pipe, _HEAD.pack(0, self.dropped + self._lost))
         os.close(self._pipe)
         while self._keeper.is_alive() and not self._begun and time.monotonic() < end:
             self._keeper.join(_POLL)
         self._keeper.join(_PATIENCE)
         if self._keeper.is_alive() and self._process is not None:
+            what = "did not end in time" if self._answered else "had not begun by the end"
+            self._because(f"the process that writes it {what}")
             self._process.kill()
             self._keeper.join()
+        if self.dropped:
+            self._because(f"the process that writes it was too slow for {self.dropped} ticks")
 
     def send(self, content: bytes) -> bool:
         """Hand over one record; False if it was dropped."""
-        message = _HEAD.pack(len(content), self.dropped) + content
+        message = _HEAD.pack(len(content), self.dropped + self._lost) + content
         self._pass_on()
         room = len(self._waiting) < _WAITING and not self.failed
         taken = room and len(message) <= PIPE_BUF  # more may be taken in part
@@ -159,10 +167,12 @@ class Feed:
             while self._waiting and before - len(self._waiting) < _AT_ONCE:
                 os.write(self._pipe, self._waiting[0])
                 self._waiting.popleft()
+                self._passed += 1
         return len(self._waiting) < before
 
-    def skip(self) -> None:
+    def skip(self, why: str) -> None:
         """Count a record that could not be made, and so is not sent."""
+        self._because(why)
         self.offered += 1
         self.dropped += 1
 
@@ -176,11 +186,17 @@ class Feed:
                 answer = output.read(1)
                 self._begun = answer == KEPT
                 self._answered = self._answered or bool(answer)
+                said = output.read(_LONGEST) if answer in (KEPT, NOT_KEPT) else b""
                 while output.read(4096):
                     pass
             died = process.wait() != 0
             self._begun = False
+            if answer != KEPT:
+                self._lost += self._passed - self._passed_before
             with self._lock:
+                if died or not self._ending:
+                    ended = f"the process that writes it {ended_by(process.returncode)}"
+                    self._because(one_line(said.decode("utf-8", "replace")) or ended)
                 if self._ending or self.started >= self._most:
                     self.failed = died or not self._ending
                     return
@@ -190,19 +206,24 @@ class Feed:
                     self.failed = True
                     return
 
+    def _because(self, why: str) -> None:
+        """Keep what cost the first tick; the rest follows from it."""
+        self.failure = self.failure or why
+
     def _start(self) -> None:
         """Start a process; what is sent goes to it from now on."""
         theirs, ours = os.pipe()
         try:
             with contextlib.suppress(OSError, AttributeError):  # less room where not allowed
                 fcntl.fcntl(ours, fcntl.F_SETPIPE_SZ, _ROOM)
-            os.write(ours, _HEAD.pack(len(self._first), self.dropped) + self._first)
+            os.write(ours, _HEAD.pack(len(self._first), self.dropped + self._lost) + self._first)
             os.set_blocking(ours, False)
             if self._pipe < 0:
                 self._pipe = os.dup(ours)
             else:
                 os.dup2(ours, self._pipe, inheritable=False)  # at once: the loop may be writing
             self.started += 1
+            self._passed_before = self._passed
             self._process = subprocess.Popen(  # noqa: S603 our own words
                 self._words(self.started),
                 stdin=theirs,
