@@ -138,7 +138,7 @@ def test_a_robot_that_its_legs_cannot_raise_is_refused(name: str, most: float) -
     """Datasheets: 12 legs of 33 mm at 1.7 N·m, 6 of 84 mm at 1.4 N·m; n τ / (g r)."""
     words = RobotSpec.named(name).model_dump(exclude_unset=True)
     assert RobotSpec(**words | {"mass": most}).mass == most
-    with pytest.raises(ValidationError, match=r"mass: expected at most .* kg, which the servos"):
+    with pytest.raises(ConfigError, match=r"mass: expected at most .* kg, which the servos"):
         RobotSpec(**words | {"mass": most + 0.02})
 
 

@@ -116,7 +116,7 @@ def test_the_curve_that_calibrate_finds_for_it_is_taken(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """As the refusal says; `drive` takes the same file for a real robot."""
-    words = ["--rig.pushes", "2", "--rig.speeds", "0.3", "--draws", "20", "--no-figures"]
+    words = ["--rig.pushes", "2", "--rig.speeds", "0.3", "--no-figures"]
     rig = ["calibrate", "--antenna.sensor.kind", "fsr", *words, "--out", str(tmp_path / "rig")]
     assert main(rig) == 0
     file = tmp_path / "rig" / "conditioning.toml"

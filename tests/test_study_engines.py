@@ -438,7 +438,7 @@ def test_snakemake_runs_the_snakefile_and_leaves_the_same_table() -> None:
         ("tunnel", ["--trials", "3", "--time-limit", "0.5", "--controllers", "open", "closed"]),
         ("wall", ["--trials", "2", "--profiles", "stiff", *NEAR]),
         ("gait", ["--cycles", "2", "--settling-cycles", "0", "--sweep-points", "2", *QUICK]),
-        ("calibrate", ["--rig.pushes", "2", "--rig.speeds", "0.3", "--draws", "20"]),
+        ("calibrate", ["--rig.pushes", "2", "--rig.speeds", "0.3"]),
     ],
 )
 def test_every_command_goes_on_with_the_same_numbers(name: str, words: list[str]) -> None:
