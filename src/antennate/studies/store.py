@@ -110,7 +110,8 @@ class Store:
         """
         with self.promised():
             self._keep({"key": key, **content})
-        self.holds_trials = True
+            self.holds_trials = True  # before the disk is waited for, where a signal may come
+            self._sync()
 
     @contextlib.contextmanager
     def promised(self) -> Iterator[None]:
@@ -136,12 +137,13 @@ class Store:
             self.saw(model)
         for key, content in records.items():
             self._keep({"key": key, **content})
+            self._sync()
             self.records[key] = content
 
     def _keep(self, trial: Mapping[str, Any]) -> None:
         """Keep a trial and its processor, if that is a new one: a warning tells of another one."""
         models = [{"processor": model} for model in self._running]
-        self._append(b"".join(map(line, [*models, trial])))
+        self._write(b"".join(map(line, [*models, trial])))
         for model in self._running:
             if self.processors:
                 _NOTE.warning(
@@ -155,18 +157,30 @@ class Store:
         self._running.clear()
 
     def _append(self, data: bytes) -> None:
+        self._write(data)
+        self._sync()
+
+    def _write(self, data: bytes) -> None:
         try:
             left = data
             while left:  # a disk that is almost full takes a part
                 left = left[os.write(self._file, left) :]
             self._end += len(data)
-            if time.monotonic() - self._synced > _SYNC:
-                os.fsync(self._file)
-                self._synced = time.monotonic()
         except OSError as error:
             with contextlib.suppress(OSError):
                 os.ftruncate(self._file, self._end)
-            raise OutputError(f"expected to write {self.path}, found: {error.strerror}") from None
+            raise self._refused(error) from None
+
+    def _sync(self) -> None:
+        if time.monotonic() - self._synced > _SYNC:
+            try:
+                os.fsync(self._file)
+            except OSError as error:
+                raise self._refused(error) from None
+            self._synced = time.monotonic()
+
+    def _refused(self, error: OSError) -> OutputError:
+        return OutputError(f"expected to write {self.path}, found: {error.strerror}")
 
     def close(self, remove: bool = False) -> None:
         """Let others append; `remove` deletes the file first."""
