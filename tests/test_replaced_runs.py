@@ -25,7 +25,7 @@ def trial(config, seed):
     if seed >= int(os.environ["FREE"]):
         open("begun", "w").close()
         time.sleep(600)
-    return {"x": config["x"]}
+    return {"value": config["x"]}
 """
 
 
@@ -103,6 +103,17 @@ def test_a_run_that_replaces_another_leaves_nothing_of_it() -> None:
     assert main(["springs", "--no-figures", "--out", "run", "--overwrite"]) == 0
     assert main(["springs", "--no-figures", "--out", "other"]) == 0
     assert {path.name for path in files()} == {path.name for path in files("other")}
+
+
+def test_a_run_without_a_result_takes_the_place_of_none() -> None:
+    before = files()
+    with (
+        pytest.raises(KeyboardInterrupt),
+        RunDirectory.create("robot", "run", overwrite=True) as run,
+    ):
+        run.write("bom.csv", "part,count\n")
+        raise KeyboardInterrupt
+    assert files() == before
 
 
 def test_no_second_process_replaces_a_run_meanwhile() -> None:
@@ -213,7 +224,7 @@ def test_a_run_directory_reads_and_writes_only_its_own(tmp_path: Path) -> None:
     for name in ("/etc/hostname", str(tmp_path / "secret.txt"), "../secret.txt"):
         with pytest.raises(ConfigError, match="name: expected one within the run"):
             run.text(name)
-    assert run.text("config.toml").startswith("#")
+    assert run.text("config.toml").startswith("trials = 2")
     for content in (iter([3]), iter(["a", None])):
         with pytest.raises(ConfigError, match="content: expected pieces of text, found"):
             run.write("x", content)  # type: ignore[arg-type]

@@ -16,16 +16,16 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from antennate.studies.run_files import (
-    COMMAND,
-    CONFIG,
+    CALIBRATION,
     ENDINGS,
-    LOGS,
+    LOG_PARTS,
     PARTIAL,
-    ROOM,
-    VERSIONS,
+    RESULT,
+    SHARD,
     files_of,
     is_folder,
     is_same,
+    sweep,
 )
 from antennate.studies.store import STORE, Store, nobody_else, parsed
 
@@ -116,6 +116,7 @@ def _locked(folder: Path) -> int:
 
 
 def _settle(place: Path) -> None:
+    sweep(place)
     if is_folder(place / _MOVING):
         _move_back(place)
     elif is_folder(place / _ASIDE) and not _has_results(place):
@@ -125,15 +126,18 @@ def _settle(place: Path) -> None:
 
 
 def _has_results(place: Path) -> bool:
-    """Whether the new run has more than what is written before it, and logs of unended trials."""
-    return any(
-        file.parent.name != LOGS
-        and file.name not in (CONFIG, VERSIONS, COMMAND, ROOM)
-        and not (file.name == PARTIAL and not file.stat().st_size)
-        and not (file.name == STORE and not parsed(file.read_bytes()).records)
-        and not is_same(file, place / _ASIDE / file.name)
-        for file in files_of(place)
-    )
+    """Whether the new run has what was measured: trials that ended, a log of a drive, a result."""
+    return any(_is_result(file, place / _ASIDE / file.name) for file in files_of(place))
+
+
+def _is_result(file: Path, old: Path) -> bool:
+    if file.name == PARTIAL:
+        return bool(file.stat().st_size)
+    if file.name == STORE:
+        return bool(parsed(file.read_bytes()).records)
+    if file.name == CALIBRATION:
+        return not is_same(file, old)
+    return file.name in (RESULT, SHARD, *LOG_PARTS)
 
 
 def _put_back(place: Path) -> None:

@@ -31,7 +31,8 @@ BY_HAND = "by-hand.txt"
 CALIBRATION, LOG, REPORT = "calibration.json", "drive.mcap", "report.html"
 LARGEST = 10**9
 """No file of a run is longer [bytes]."""
-_LOGS = tuple(part(Path(LOG), number).name for number in range(1, MOST_PARTS + 1))
+LOG_PARTS = tuple(part(Path(LOG), number).name for number in range(1, MOST_PARTS + 1))
+"""Files of the log of a drive."""
 _FILES = (
     BY_HAND,
     CALIBRATION,
@@ -42,7 +43,7 @@ _FILES = (
     "points.csv",
     "frames.csv",
     REPORT,
-    *_LOGS,
+    *LOG_PARTS,
 )
 ROOM = ".room"
 """File that keeps room for the result."""
