@@ -179,3 +179,11 @@ def test_a_shard_without_trials_is_merged_as_any_other(count: int) -> None:
     assert merge(*reversed(shards), out="merged") == 0
     for name in ("result.json", "trials.csv", "config.toml"):
         assert Path("merged", name).read_bytes() == Path("whole", name).read_bytes()
+
+
+def test_folders_without_their_flag_are_refused_with_its_name(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert main(["merge", "1-2", "2-2"]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.endswith("merge: expected --shards before the folders, found '1-2'")
