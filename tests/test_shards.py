@@ -167,3 +167,23 @@ def test_a_merge_onto_a_full_disk_leaves_nothing_and_its_shards() -> None:
     )
     assert files() == before
     assert not Path("merged").exists()
+
+
+@pytest.mark.parametrize("count", [5, 6])
+def test_a_shard_without_trials_is_merged_as_any_other(count: int) -> None:
+    """Of more parts than four trials; the order of the shards is anybody's."""
+    words = ["study", "plan.toml", "--workers", "1", "--no-figures", "--out"]
+    shards = [f"{i}-{count}" for i in range(1, count + 1)]
+    for shard in shards:
+        assert main([*words, shard, "--shard", shard.replace("-", "/")]) == 0
+    assert merge(*reversed(shards), out="merged") == 0
+    for name in ("result.json", "trials.csv", "config.toml"):
+        assert Path("merged", name).read_bytes() == Path("whole", name).read_bytes()
+
+
+def test_folders_without_their_flag_are_refused_with_its_name(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert main(["merge", "1-2", "2-2"]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.endswith("merge: expected --shards before the folders, found '1-2'")

@@ -10,7 +10,7 @@ import re
 import secrets
 import shutil
 import stat
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import BinaryIO
 
@@ -180,12 +180,19 @@ def lock(file: BinaryIO) -> bool:
     return True
 
 
-def remove_abandoned(path: Path) -> None:
-    """Remove what killed processes left that wrote this file; one that lives holds its lock."""
-    path = Path(os.path.realpath(path))
-    form = re.compile(rf"\.{re.escape(path.name)}\.[0-9a-f]{{{2 * _RANDOM}}}")
+def remove_abandoned(folder: Path, is_ours: Callable[[str], bool]) -> None:
+    """Remove what killed processes left in a folder; one that lives holds its lock.
+
+    Args:
+        folder: The folder.
+        is_ours: Whether the file of a name, which they wrote, is one of those that are meant.
+    """
+    form = re.compile(rf"\.(.+)\.[0-9a-f]{{{2 * _RANDOM}}}", re.DOTALL)
     with contextlib.suppress(OSError):
-        for left in [each for each in path.parent.iterdir() if form.fullmatch(each.name)]:
+        for left in list(folder.iterdir()):
+            found = form.fullmatch(left.name)
+            if found is None or not is_ours(found[1]):
+                continue
             with contextlib.suppress(OSError), open_regular(left) as file:
                 if lock(file):
                     left.unlink()

@@ -179,6 +179,7 @@ def carry_out(
         except ShardEnd as end:
             told = {"shard": options.shard, "trials": end.count, "of": end.total}
             run.write(SHARD, to_json(told))
+            run.keep()
             sys.stderr.write(f"shard {options.shard}: {end.count} of {end.total} trials\n")
             return OK
         say_by_hand(() if view is None else view.by_hand, run)

@@ -94,7 +94,8 @@ def command(argv: Sequence[str]) -> int:
         "plot": _plot,
         "film": _film,
     }
-    remove_abandoned(target)
+    place = target.resolve()
+    remove_abandoned(place.parent, place.name.__eq__)
     log = actions[options.action](path, target)
     recovered = options.action == "recover"
     more = f"; {left_out(log)}" if recovered else ""

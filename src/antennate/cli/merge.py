@@ -16,6 +16,7 @@ from antennate.cli.experiment import Shards, carry_out
 from antennate.cli.options import option
 from antennate.cli.run_options import Options, shard_of
 from antennate.errors import BadInputError, ConfigError
+from antennate.messages import shown
 from antennate.params.base import Params
 from antennate.studies.identity import differences
 from antennate.studies.pool import places_of
@@ -50,6 +51,8 @@ def command(argv: Sequence[str]) -> int:
     Raises:
         AntennateError: A folder is no shard, trials are missing, or nothing can be written.
     """
+    if argv and not argv[0].startswith("-"):
+        raise ConfigError(f"merge: expected --shards before the folders, found {shown(argv[0])}")
     _, options = parse("merge", DESCRIPTION, Params, argv, MergeOptions)
     if not options.shards:
         raise ConfigError("--shards: expected the folders of all shards, found none")

@@ -67,8 +67,8 @@ def folder_for(
     for flag, words in flags_and_words(argv):
         for word in words:
             require_text(flag or view.name, word)
-    replaced = [options.config] if options.overwrite and options.config is not None else []
-    require_apart(options.out, config.model_dump(), [*reads, *replaced])
+    given = [] if options.config is None else [options.config]
+    require_apart(options.out, config.model_dump(), [*reads, *given])
     place = (view.name, options.out, options.overwrite, identity, resume, retry)
     with RunDirectory.create(*place) as folder:
         folder.describe(config, ["antennate", command or view.name, *argv])

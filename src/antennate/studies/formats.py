@@ -75,6 +75,8 @@ def pieces(content: str | bytes | Iterator[str]) -> Iterator[bytes]:
     if not isinstance(content, str | bytes | Iterator):
         raise ConfigError(f"content: expected text, bytes or pieces, found {shown(content)}")
     for piece in (content,) if isinstance(content, str | bytes) else content:
+        if not isinstance(piece, str | bytes):
+            raise ConfigError(f"content: expected pieces of text, found {shown(piece)}")
         yield piece.encode() if isinstance(piece, str) else piece
 
 

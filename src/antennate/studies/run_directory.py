@@ -2,9 +2,9 @@
 
 Files are written whole. While a run goes on, finished trials are appended to
 `trials.partial.jsonl`, and what a run needs to be resumed to `trials.store.jsonl`. A directory that
-holds a run is left alone unless told otherwise; then the files of that run go first, so that
-nothing old stands beside the new. Only a calibration stays until the next one replaces it, so that
-a robot is never without.
+holds a run is left alone unless told otherwise; then the files of that run are set aside, and go
+once the new one has something to keep, so that nothing old stands beside the new. Only a
+calibration stays until the next one replaces it, so that a robot is never without.
 
 ```python
 with RunDirectory.create("tunnel", "runs/mine") as run:
@@ -21,7 +21,7 @@ import json
 import shlex
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 from antennate import checks
 from antennate.errors import BadInputError, OutputError
@@ -29,11 +29,12 @@ from antennate.files import writing_whole
 from antennate.params.base import Params
 from antennate.params.reading import Config, read_file
 from antennate.studies import dates, formats
+from antennate.studies.claim import Claim, claim
 from antennate.studies.processor import processor
+from antennate.studies.replaced import settle
 from antennate.studies.run_files import (
     COMMAND,
     CONFIG,
-    ENDINGS,
     FIGURES,
     LOGS,
     PARTIAL,
@@ -43,16 +44,11 @@ from antennate.studies.run_files import (
     TABLE,
     VERSIONS,
     files_of,
-    holds_run,
     inside,
-    is_finished,
-    outdated,
-    place_of,
     read_as,
     remove_described,
     writing,
 )
-from antennate.studies.store import STORE, Store, open_store
 from antennate.telemetry.header import versions
 
 _KEPT_FREE = 1 << 16
@@ -68,19 +64,12 @@ class RunDirectory:
         keeps_store: Whether they stay when the run is complete.
     """
 
-    def __init__(
-        self,
-        path: Path,
-        created: Sequence[Path] = (),
-        partial: IO[str] | None = None,
-        store: Store | None = None,
-        finished: bool = False,
-    ):
-        self.path, self.store, self.keeps_store = path, store, False
-        self._finished, self._completed = finished, False
-        self._created = created
-        self._partial = partial
-        self._kept = partial is None
+    def __init__(self, taken: Claim):
+        self.path, self.store, self.keeps_store = taken.path, taken.store, False
+        self._finished, self._completed = taken.finished, False
+        self._created, self._replaced = taken.created, taken.replaced
+        self._partial = taken.partial
+        self._kept = taken.partial is None
 
     @classmethod
     def create(
@@ -97,7 +86,7 @@ class RunDirectory:
         Args:
             command: Name of the experiment or command.
             path: The directory; the next free `runs/COMMAND-N` if not given.
-            overwrite: Remove the run that it holds.
+            overwrite: Replace the run that it holds, once this one has something to keep.
             identity: What is run, by `antennate.studies.identity`, for a run that can be resumed.
             resume: Go on with the run that it holds, if there is one. Of one that is finished only
                 files that are missing are written, and the report with them. None if `command`
@@ -110,29 +99,7 @@ class RunDirectory:
             OutputError: It cannot be made or written to, it holds another run, or another process
                 works on it.
         """
-        place = place_of(command, path)
-        with writing(place):
-            missing = [p for p in (place, *place.parents) if not p.exists()]
-            place.mkdir(parents=True, exist_ok=path is not None)
-            for folder in ENDINGS:
-                if (place / folder).is_symlink():
-                    raise OutputError(f"expected {place / folder} within its run, found a link")
-            held = files_of(place)
-            goes_on = bool(resume) and not overwrite and (place / STORE) in held
-            if held and not overwrite and not goes_on:
-                raise holds_run(place, held, resume)
-            try:
-                store = open_store(place, identity, overwrite)
-            except BaseException:
-                for path in missing:
-                    path.rmdir()
-                raise
-            sound = store is not None and not store.damaged
-            finished = goes_on and not retry and sound and is_finished(place)
-            for file in outdated(held, command, goes_on, finished):
-                file.unlink()
-            partial = None if finished else (place / PARTIAL).open("x", encoding="utf-8")
-            return cls(place, missing, partial, store, finished)
+        return cls(claim(command, path, overwrite, identity, resume, retry))
 
     @classmethod
     def open(cls, path: str | Path) -> RunDirectory:
@@ -142,9 +109,11 @@ class RunDirectory:
             BadInputError: It holds no run, or the path is none.
         """
         place = checks.path("path", path)
+        with contextlib.suppress(OSError, OutputError):  # it cannot be written, or is worked on
+            settle(place)
         if not any((place / name).exists() for name in (RESULT, PARTIAL, CONFIG)):
             raise BadInputError(f"{place}: expected the folder of a run, found no {RESULT}")
-        return cls(place)
+        return cls(Claim(place))
 
     def result(self) -> dict[str, Any]:
         """The content of result.json.
@@ -180,9 +149,9 @@ class RunDirectory:
         Raises:
             BadInputError: The file is damaged, or no file of a run has such a name.
         """
-        checks.text("name", name)
+        path = inside(self.path, name)
         decode = formats.sound_json if name.endswith(".json") else str
-        return read_as(self.path / name, decode) if (self.path / name).exists() else ""
+        return read_as(path, decode) if path.exists() else ""
 
     def describe(self, config: Params, command: Sequence[str] = ()) -> None:
         """Write what is known before the run: configuration, versions and command.
@@ -233,7 +202,7 @@ class RunDirectory:
         with promised, writing(self.path / PARTIAL):
             self._partial.write(formats.to_line(formats.as_mapping(row)))
             self._partial.flush()
-        self._kept = True
+        self.keep()
 
     def finish(self, result: Mapping[str, Any], rows: Iterable[Any] = ()) -> None:
         """Write the result and, if there are rows, their table; then drop the partial file.
@@ -248,15 +217,23 @@ class RunDirectory:
         if table:
             self.write(TABLE, table)
         self._give_room()
-        self.write(RESULT, formats.to_json(result))
         if not self._finished and self.text(VERSIONS) not in ("", self._versions()):
             self.write(VERSIONS, self._versions())
+        self.write(RESULT, formats.to_json(result))
         if text := self.text(COMMAND):
             self.write(COMMAND, dates.ended(text))
-        self._kept = True
+        self.keep()
         self._drop_partial()
         if not result.get("interrupted"):
             self._close_store(remove=not self.keeps_store)
+
+    def keep(self) -> None:
+        """Let it stay when the run ends, in place of the run that it held before."""
+        self._kept = True
+        if self._replaced is not None:
+            with writing(self.path):
+                self._replaced.forget()
+            self._replaced = None
 
     def keep_logs(self) -> None:
         """Let it stay when the run ends if it holds logs, even if none of the trials has ended."""
@@ -334,6 +311,8 @@ class RunDirectory:
         kept = self._kept or (self.store is not None and self.store.holds_trials)
         self._close_store(remove=not kept)
         if kept:
+            with contextlib.suppress(OutputError):
+                self.keep()
             if self._partial is not None:
                 with contextlib.suppress(OSError):
                     self._partial.close()
@@ -342,5 +321,7 @@ class RunDirectory:
             self._drop_partial()
             self._give_room()
             remove_described(self.path)
+            if self._replaced is not None:
+                self._replaced.settle()
             for path in self._created:
                 path.rmdir()

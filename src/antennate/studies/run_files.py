@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 
 from antennate import checks
 from antennate.errors import BadInputError, ConfigError, OutputError
-from antennate.files import decoded, read_limited
+from antennate.files import decoded, read_limited, remove_abandoned
 from antennate.studies.store import STORE
 from antennate.telemetry.parts import MOST_PARTS, part
 
@@ -31,7 +31,8 @@ BY_HAND = "by-hand.txt"
 CALIBRATION, LOG, REPORT = "calibration.json", "drive.mcap", "report.html"
 LARGEST = 10**9
 """No file of a run is longer [bytes]."""
-_LOGS = tuple(part(Path(LOG), number).name for number in range(1, MOST_PARTS + 1))
+LOG_PARTS = tuple(part(Path(LOG), number).name for number in range(1, MOST_PARTS + 1))
+"""Files of the log of a drive."""
 _FILES = (
     BY_HAND,
     CALIBRATION,
@@ -42,7 +43,7 @@ _FILES = (
     "points.csv",
     "frames.csv",
     REPORT,
-    *_LOGS,
+    *LOG_PARTS,
 )
 ROOM = ".room"
 """File that keeps room for the result."""
@@ -119,24 +120,25 @@ def _texts(value: Any) -> Iterator[str]:
             yield from _texts(each)
 
 
-def outdated(held: Sequence[Path], command: str, goes_on: bool, finished: bool) -> list[Path]:
-    """Which of the files that a directory holds go before a run of a command begins.
+def outdated(held: Sequence[Path], stays: str, finished: bool) -> list[Path]:
+    """Which of the files that a directory holds go before a run goes on.
 
     Args:
         held: Those files.
-        command: Its name; a calibration stays until `calibrate` replaces it.
-        goes_on: Whether it goes on with the run that is there.
-        finished: Whether that one is finished, so that its files stay.
+        stays: Name of a file that stays until it is replaced.
+        finished: Whether the run is finished, so that its files stay.
     """
     if finished:
         return [file for file in held if file.name in (PARTIAL, ROOM)]
-    return [
-        file
-        for file in held
-        if not (goes_on and file.parent.name == LOGS)
-        and file.name != STORE
-        and (command, file.name) != ("calibrate", CALIBRATION)
-    ]
+    return [file for file in held if file.parent.name != LOGS and file.name not in (STORE, stays)]
+
+
+def sweep(place: Path) -> None:
+    """Remove what killed processes left in a directory that wrote files of its run."""
+    remove_abandoned(place, lambda name: name in _NAMES)
+    for folder, endings in ENDINGS.items():
+        if is_folder(place / folder):
+            remove_abandoned(place / folder, lambda name, e=endings: name.endswith(e))
 
 
 def is_finished(place: Path) -> bool:

@@ -58,15 +58,14 @@ class Store:
             fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
             os.close(self._file)
-            raise OutputError(
-                f"{path.parent}: expected a run that nobody works on, found another process at it"
-            ) from None
+            raise nobody_else(path.parent) from None
         except OSError:
             pass  # a file system without locks
         self.records: dict[str, Any] = {}
         self.identity: Mapping[str, Any] | None = None
         self._synced = 0.0
         self._end = 0
+        self._running: list[str] = []
         self.damaged = self._read()
         self.holds_trials = bool(self.records)
 
@@ -110,8 +109,9 @@ class Store:
             OutputError: The disk is full, or the like; what was kept before stays whole.
         """
         with self.promised():
-            self._append(line({"key": key, **content}))
-        self.holds_trials = True
+            self._keep({"key": key, **content})
+            self.holds_trials = True  # before the disk is waited for, where a signal may come
+            self._sync()
 
     @contextlib.contextmanager
     def promised(self) -> Iterator[None]:
@@ -127,49 +127,60 @@ class Store:
             raise OutputError(f"{error}{kept if self.holds_trials else ''}") from None
 
     def saw(self, model: str) -> None:
-        """Keep the model of a processor that trials run on; a warning tells of another one."""
-        if model in self.processors:
-            return
-        self._append(line({"processor": model}))
-        if self.processors:
-            _NOTE.warning(
-                "%s: trials ran on another model of processor, %s, now also on %s; the same seed "
-                "may end differently there",
-                self.path.parent,
-                " and ".join(self.processors),
-                model,
-            )
-        self.processors.append(model)
+        """Name the processor of the trials that come next; it is kept with the first of them."""
+        if model not in [*self.processors, *self._running]:
+            self._running.append(model)
 
     def take(self, records: Mapping[str, Any], processors: Sequence[str]) -> None:
         """Keep trials that stay in other files too, and the processors that they ran on."""
         for model in processors:
             self.saw(model)
         for key, content in records.items():
-            self._append(line({"key": key, **content}))
+            self._keep({"key": key, **content})
+            self._sync()
             self.records[key] = content
 
+    def _keep(self, trial: Mapping[str, Any]) -> None:
+        """Keep a trial and its processor, if that is a new one: a warning tells of another one."""
+        models = [{"processor": model} for model in self._running]
+        self._write(b"".join(map(line, [*models, trial])))
+        for model in self._running:
+            if self.processors:
+                _NOTE.warning(
+                    "%s: trials ran on another model of processor, %s, now also on %s; the same "
+                    "seed may end differently there",
+                    self.path.parent,
+                    " and ".join(self.processors),
+                    model,
+                )
+            self.processors.append(model)
+        self._running.clear()
+
     def _append(self, data: bytes) -> None:
+        self._write(data)
+        self._sync()
+
+    def _write(self, data: bytes) -> None:
         try:
             left = data
             while left:  # a disk that is almost full takes a part
                 left = left[os.write(self._file, left) :]
             self._end += len(data)
-            if time.monotonic() - self._synced > _SYNC:
-                os.fsync(self._file)
-                self._synced = time.monotonic()
         except OSError as error:
             with contextlib.suppress(OSError):
                 os.ftruncate(self._file, self._end)
-            raise OutputError(f"expected to write {self.path}, found: {error.strerror}") from None
+            raise self._refused(error) from None
 
-    def clear(self) -> None:
-        """Forget everything."""
-        os.ftruncate(self._file, 0)
-        self.identity, self.records, self.damaged, self._end = None, {}, 0, 0
-        self.processors = []
-        self.was_empty = True
-        self.holds_trials = False
+    def _sync(self) -> None:
+        if time.monotonic() - self._synced > _SYNC:
+            try:
+                os.fsync(self._file)
+            except OSError as error:
+                raise self._refused(error) from None
+            self._synced = time.monotonic()
+
+    def _refused(self, error: OSError) -> OutputError:
+        return OutputError(f"expected to write {self.path}, found: {error.strerror}")
 
     def close(self, remove: bool = False) -> None:
         """Let others append; `remove` deletes the file first."""
@@ -182,13 +193,17 @@ class Store:
             os.close(self._file)
 
 
-def open_store(place: Path, identity: Mapping[str, Any] | None, overwrite: bool) -> Store | None:
+def nobody_else(place: Path) -> OutputError:
+    """The error of a folder that another process works on."""
+    return OutputError(f"{place}: expected a run that nobody works on, found another process at it")
+
+
+def open_store(place: Path, identity: Mapping[str, Any] | None) -> Store | None:
     """The finished trials of a run that can be resumed; nobody else may work on them.
 
     Args:
         place: The run directory.
         identity: What is run; None for a run that cannot be resumed.
-        overwrite: Whether what was kept is forgotten.
 
     Raises:
         BadInputError: They are of another run.
@@ -199,8 +214,6 @@ def open_store(place: Path, identity: Mapping[str, Any] | None, overwrite: bool)
         return None
     store = Store(place / STORE)
     try:
-        if overwrite:
-            store.clear()
         store.begin(identity)
     except BaseException:
         store.close(remove=store.was_empty)

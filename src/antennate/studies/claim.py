@@ -1,0 +1,85 @@
+"""How a run takes its directory: nothing of another run goes before this one can begin."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import IO, Any, NamedTuple
+
+from antennate.errors import OutputError
+from antennate.studies.replaced import Replaced, settle
+from antennate.studies.run_files import (
+    CALIBRATION,
+    ENDINGS,
+    PARTIAL,
+    files_of,
+    holds_run,
+    is_finished,
+    outdated,
+    place_of,
+    sweep,
+    writing,
+)
+from antennate.studies.store import STORE, Store, open_store
+
+
+class Claim(NamedTuple):
+    """A directory that a run has taken; see `RunDirectory`.
+
+    Attributes:
+        path: Where it is.
+        created: Folders that were made for it, the innermost first.
+        partial: File of finished trials, None for a run that is finished.
+        store: Its finished trials if it can be resumed, None otherwise.
+        finished: Whether the run is finished.
+        replaced: The run that is replaced, if there is one.
+    """
+
+    path: Path
+    created: Sequence[Path] = ()
+    partial: IO[str] | None = None
+    store: Store | None = None
+    finished: bool = False
+    replaced: Replaced | None = None
+
+
+def claim(
+    command: str,
+    path: str | Path | None,
+    overwrite: bool,
+    identity: Mapping[str, Any] | None,
+    resume: bool | None,
+    retry: bool,
+) -> Claim:
+    """Take a directory; see `RunDirectory.create`."""
+    place = place_of(command, path)
+    with writing(place):
+        missing = [p for p in (place, *place.parents) if not p.exists()]
+        place.mkdir(parents=True, exist_ok=path is not None)
+        for folder in ENDINGS:
+            if (place / folder).is_symlink():
+                raise OutputError(f"expected {place / folder} within its run, found a link")
+        settle(place)
+        held = files_of(place)
+        goes_on = bool(resume) and not overwrite and (place / STORE) in held
+        if held and not overwrite and not goes_on:
+            raise holds_run(place, held, resume)
+        stays = CALIBRATION if command == "calibrate" else ""
+        replaced = Replaced(place, held, stays) if held and overwrite else None
+        try:
+            store = open_store(place, identity)
+            sound = store is not None and not store.damaged
+            finished = goes_on and not retry and sound and is_finished(place)
+            for file in outdated(held, stays, finished) if goes_on else ():
+                file.unlink()
+            sweep(place)
+            partial = None if finished else (place / PARTIAL).open("x", encoding="utf-8")
+        except BaseException:
+            if replaced is not None:
+                replaced.settle()
+            with contextlib.suppress(OSError):
+                for each in missing:
+                    each.rmdir()
+            raise
+        return Claim(place, missing, partial, store, finished, replaced)

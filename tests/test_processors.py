@@ -1,0 +1,64 @@
+"""Processors that trials ran on are named wherever a run is killed, and no others."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from test_replaced_runs import SLOW, killed_once, program
+
+from antennate.studies.store import STORE, line, read_store
+
+WORDS = ["study", "plan.toml", "--trust-code", "--out", "run", "--workers", "1", "--no-figures"]
+KILLED = """
+import os, signal, sys
+from antennate.cli import main
+done = False
+def watch(name, arguments):
+    global done
+    if done and name != "os.kill":
+        os.kill(os.getpid(), signal.SIGKILL)
+    done = name == "os.rename" and str(arguments[1]).endswith("run/result.json")
+if __name__ == "__main__":
+    sys.addaudithook(watch)
+    sys.exit(main(sys.argv[1:]))
+"""
+
+
+def named() -> str:
+    return json.loads(Path("run/versions.json").read_text())["processor"]
+
+
+def test_a_run_killed_beside_its_result_names_all_processors_with_trials(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("code.py").write_text(SLOW)
+    Path("killed.py").write_text(KILLED)
+    Path("plan.toml").write_text(
+        'experiment = "code.py:trial"\nplan = "grid"\ntrials = 3\n[vary]\nx = [0.5]\n'
+    )
+    killed_once(Path("begun"), program(*WORDS, FREE="2"))
+    here, path = named(), Path("run", STORE)
+    known = read_store(path)
+    assert (len(known.records), known.processors) == (2, [here])
+    lines = [{"identity": known.identity}, {"processor": f"Not {here}"}, *known.records.values()]
+    path.write_bytes(b"".join([line({k: v for k, v in a.items() if k != "crc"}) for a in lines]))
+
+    Path("begun").unlink()
+    killed_once(Path("begun"), program(*WORDS, FREE="2"))
+    assert read_store(path).processors == [f"Not {here}"]
+
+    done = subprocess.run(
+        [sys.executable, "killed.py", *WORDS], env={**os.environ, "FREE": "9"}, capture_output=True
+    )
+    assert done.returncode == -signal.SIGKILL, done.stderr
+    assert Path("run/result.json").exists()
+    assert named() == f"Not {here} and {here}"
+    assert program(*WORDS, FREE="9").wait(120) == 0
+    assert named() == f"Not {here} and {here}"
