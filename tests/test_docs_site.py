@@ -65,7 +65,7 @@ def test_the_robot_has_room_at_the_start_of_the_scene_of_the_page(tmp_path: Path
         time_limit=0.1,
         workers=1,
     )
-    assert [row["outcome"] for row in result.rows] == ["timeout"] * 30
+    assert [row.outcome for row in result.rows] == ["timeout"] * 30
 
 
 @pytest.mark.slow
