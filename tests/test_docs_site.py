@@ -110,3 +110,8 @@ def test_every_command_is_linked_where_the_list_of_commands_begins() -> None:
     assert {name for name, _ in linked} == set(commands())
     assert [f"`antennate {name}`" for name, _ in linked] == [s.splitlines()[0] for s in sections]
     assert "(commands.md)" in (DOCS / "index.md").read_text()
+
+
+def test_the_glossary_is_in_order() -> None:
+    words = re.findall(r"^\| (.+?) \|", (DOCS / "glossary.md").read_text(), re.MULTILINE)[1:]
+    assert words == sorted(words, key=lambda word: word.casefold().replace("θ", "theta"))
