@@ -37,26 +37,27 @@ program now gives Student's interval, which is slightly wider.
 | not reproduced | it does not hold here; what we find instead is said |
 | undecided | too few trials to say |
 
-The rules were written when most of these results were known, so judge them too. What they say of
-intervals was added after a first whole run, and changed none of its verdicts. Three rules changed
-after the whole run that is told here. Springs are judged one by one, also the one beyond the flex
-sensor, and no longer by their sum: *conditional* became *not reproduced*. Shapes are judged
-without an interval, as the cells of the map were chosen; and where all robots shall cross, few
-are *undecided*. These two changed no verdict.
+We wrote the rules when we knew most results, so judge them too. What they say of intervals came
+after a first whole run, and changed no verdict. After the whole run that is told here, three rules
+changed:
+
+- Springs are judged one by one, also the one beyond the flex sensor, and no longer by their sum.
+  This changed one verdict: *conditional* became *not reproduced*.
+- Shapes are judged without an interval, as the cells of the map were chosen. No verdict changed.
+- Where all robots shall cross, few trials are *undecided*. No verdict changed.
 
 Where all robots shall cross, a share of at least 95 % is enough if its interval is at most 10
-points wide, though it may reach below: 10 of 10 are *undecided*, 97 of 100 are not. Were that
-*undecided*, as it is at the walls, so would be 97 of 100 with two antennae. A number that we
-chose allows *conditional* at most, however clear the result: the base angle of the boulder wall,
-the lead and the offset of the body wave, the corner of the tunnel, the margins of the published
-rule. So 19 of the 22 rules cannot end as *reproduced*: *conditional* is the best that a
-simulation can say where parts are unpublished. A claim without a number in the paper is judged by
-what it says.
+points wide, though it may reach below: 10 of 10 are *undecided*, 97 of 100 are not. By the rule of
+the walls, 97 of 100 would be *undecided* too. A number that we chose allows *conditional* at most,
+however clear the result: the base angle of the boulder wall, the lead and the offset of the body
+wave, the corner of the tunnel, the margins of the published rule. So 19 of the 22 rules cannot end
+as *reproduced*: *conditional* is the best that a simulation can say where parts are unpublished. A
+claim without a number in the paper is judged by what it says.
 
 """
 BEST = (
-    "*Conditional* means that a claim holds under a condition that the paper does not state. Most "
-    "claims need numbers that the paper does not publish and that we chose, so they can at best be "
+    "*Conditional* means that a claim holds under a condition that the paper does not state. For "
+    "most claims we had to choose numbers that the paper does not give. Those claims can only be "
     "conditional."
 )
 FOOT = """\

@@ -13,11 +13,13 @@ import pytest
 from first_hour import Command
 from pages import DOCS, Script, blocks
 
+import antennate
 from antennate.cli import commands
 
 PAGES = ["first-tunnel.md", *(f"tutorials/{p.name}" for p in (DOCS / "tutorials").glob("*.md"))]
 WITH_A_TWIN = {"tutorials/calibrate.md", "tutorials/drive.md"}
 """Those in real time."""
+SCENES = "scenes.md"
 WIDEST = 96
 """Letters of code in a line on a screen of 1280 pixels."""
 
@@ -50,6 +52,26 @@ def test_an_antenna_of_the_twin_is_calibrated(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_the_twin_is_driven(tmp_path: Path) -> None:
     with Script("tutorials/drive.md", tmp_path, {}) as script:
+        script.run()
+
+
+def test_the_robot_has_room_at_the_start_of_the_scene_of_the_page(tmp_path: Path) -> None:
+    (text,) = (block.text for block in blocks(SCENES) if block.kind == "xml")
+    (tmp_path / "room.xml").write_text(text)
+    result = antennate.run(
+        "tunnel",
+        scene=str(tmp_path / "room.xml"),
+        controllers=("open",),
+        time_limit=0.1,
+        workers=1,
+    )
+    assert [row.outcome for row in result.rows] == ["timeout"] * 30
+
+
+@pytest.mark.slow
+def test_the_scene_of_the_page_is_crossed_as_it_says(tmp_path: Path) -> None:
+    with Script(SCENES, tmp_path, {}) as script:
+        script.blocks = [block for block in script.blocks if block.kind != "python"]
         script.run()
 
 
@@ -88,3 +110,8 @@ def test_every_command_is_linked_where_the_list_of_commands_begins() -> None:
     assert {name for name, _ in linked} == set(commands())
     assert [f"`antennate {name}`" for name, _ in linked] == [s.splitlines()[0] for s in sections]
     assert "(commands.md)" in (DOCS / "index.md").read_text()
+
+
+def test_the_glossary_is_in_order() -> None:
+    words = re.findall(r"^\| (.+?) \|", (DOCS / "glossary.md").read_text(), re.MULTILINE)[1:]
+    assert words == sorted(words, key=lambda word: word.casefold().replace("θ", "theta"))

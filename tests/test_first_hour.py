@@ -57,7 +57,7 @@ def test_a_box_of_servos_becomes_a_robot_that_crosses_the_tunnel(tmp_path: Path)
             measured = zip(made["robot"][group]["zeros"], there["zeros"], strict=True)
             assert all(abs(one - other) <= 1 for one, other in measured)
 
-        time.sleep(8.0)  # the touches that the twin plans for whoever began last, `zero`, are over
+        time.sleep(13.0)  # the touches that the twin plans for whoever began last, `zero`, are over
         doctor = Command(page["doctor"], tmp_path)
         assert doctor.end() == 0, doctor.output
         assert "all 37 checks are good" in doctor.output, doctor.output

@@ -14,20 +14,20 @@ from antennate import __version__
 from antennate.cli.exit_codes import BAD_INPUT, INTERRUPTED, OK
 
 ROBOT_COMMANDS = {
-    "twin": "a simulated robot on two ports: an antenna board and a servo bus",
-    "robot": "joints, supply, wiring diagram and bill of materials of a robot",
-    "doctor": "examine the real robot, or its twin: what is wrong, and the cure",
-    "setup": "from a box of servos to a robot, one servo at a time",
-    "zero": "zeros and directions of the joints, by hand",
-    "jog": "move one joint by small steps",
-    "record": "antenna readings to a CSV file that calibrate takes",
-    "drive": "let a controller walk the real robot, or its twin",
-    "teleop": "walk the real robot, or its twin, by keys",
-    "log": "what a log holds; recover it, export it, plot it",
-    "replay": "let a controller decide again upon the log of a drive",
-    "view": "a log, or that of a run, on a page of this computer",
-    "report": "a run, or two side by side, as one page to read, print and send",
-    "merge": "the shards of a run as the run that they are parts of",
+    "twin": "A simulated robot on two ports: an antenna board and a servo bus",
+    "robot": "Joints, supply, wiring diagram and bill of materials of a robot",
+    "doctor": "Examine the real robot, or its twin: what is wrong, and the cure",
+    "setup": "From a box of servos to a robot, one servo at a time",
+    "zero": "Zeros and directions of the joints, by hand",
+    "jog": "Move one joint by small steps",
+    "record": "Antenna readings to a CSV file that calibrate takes",
+    "drive": "Let a controller walk the real robot, or its twin",
+    "teleop": "Walk the real robot, or its twin, by keys",
+    "log": "What a log holds; recover it, export it, plot it",
+    "replay": "Let a controller decide again upon the log of a drive",
+    "view": "A log, or that of a run, on a page of this computer",
+    "report": "A run, or two side by side, as one page to read, print and send",
+    "merge": "The shards of a run as the run that they are parts of",
 }
 
 
