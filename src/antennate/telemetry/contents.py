@@ -16,6 +16,8 @@ _ENTRY = struct.Struct("<BQHIQQ")
 """Of a message: kind, length, channel, number, and twice its time."""
 _LONGEST = 1 << 20
 """Most bytes of a schema or a channel."""
+_LONGEST_MESSAGE = 1 << 23
+"""Most bytes of a message; of longer ones only so many are read, and no message of ours is one."""
 
 
 class Message(NamedTuple):
@@ -40,10 +42,11 @@ class Messages:
 
     def __iter__(self) -> Iterator[Message]:
         data = self._data
-        for begin in self._begins:
-            _, length, channel, number, time, _ = _ENTRY.unpack_from(data, begin)
-            end = begin + RECORD.size + length
-            yield Message(channel, number, time, data[begin + _ENTRY.size : end])
+        for at in self._begins:
+            _, length, channel, number, time, _ = _ENTRY.unpack_from(data, at)
+            begin = at + _ENTRY.size
+            size = min(length + RECORD.size - _ENTRY.size, _LONGEST_MESSAGE)
+            yield Message(channel, number, time, data[begin : begin + size])
 
     def release(self) -> None:
         """Hold them no longer."""
