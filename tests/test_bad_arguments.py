@@ -31,7 +31,7 @@ TICKS: dict[str, Any] = {
     "pitch": np.zeros((3, 0)),
     "head": np.zeros((3, 2)),
 }
-NO_PATHS: tuple[Any, ...] = (3, b"name", ["name"], "")
+NO_PATHS: tuple[Any, ...] = (3, b"name", ["name"], "", "a\0b")
 Case = tuple[Callable[..., Any], dict[str, Any], str]
 
 
@@ -122,6 +122,10 @@ BAD_PATHS: list[Case] = [
 CASES: list[Case] = [
     *BAD_NUMBERS,
     *BAD_PATHS,
+    (spring, {"wire": 1e100}, r"stiffness of these: expected .* above 0 \[N·m/rad\], found inf"),
+    (spring, {"wire": 1e-100}, "stiffness of these: expected .* found 0"),
+    (spring, {"coil": 5e-324}, "stiffness of these: expected .* found inf"),
+    (spring, {"coils": 5e-324}, "stiffness of these: expected .* found inf"),
     (bent, {"lengths": (-0.02,) * 3}, "lengths: expected numbers above 0, found -0.02"),
     (bent, {"lengths": (0.02, NAN, 0.02)}, "lengths: expected finite numbers"),
     (bent, {"lengths": (), "stiffness": ()}, "lengths: expected numbers above 0, found none"),
@@ -185,12 +189,17 @@ CASES: list[Case] = [
     (fitted, {"level": LEVEL[:5]}, "level: expected 300 finite numbers, found shape"),
     (fitted, {"level": LEVEL * NAN}, "level: expected 300 finite numbers, found 300"),
     (fitted, {"trial": np.full(300, 0.5)}, "trial: expected whole numbers, found 0.5"),
+    (fitted, {"trial": np.full(300, 1e300)}, r"trial: expected whole numbers, found 1e\+300"),
+    (fitted, {"trial": np.full(300, 2.0**63)}, "trial: expected whole numbers"),
+    (fitted, {"level": LEVEL * 1e300}, r"level: expected 0 straight and 1 full, found 2e\+298"),
     (fitted, {"trial": np.full(300, NAN)}, "trial: expected 300 finite numbers"),
     (fitted, {"speed": np.full(300, -1.0)}, "speed: expected finite speeds of at least 0"),
     (fitted, {"speed": np.full(300, INF)}, "speed: expected finite speeds of at least 0"),
     (fitted, {"sensor_id": "a b"}, "sensor_id: expected text that matches .* found 'a b'"),
     (fitted, {"sensor_id": None}, "sensor_id: expected text, found None"),
     (fitted, {"threshold": 2}, "threshold: expected a number below 1, found 2"),
+    (fitted, {"threshold": "0.5"}, "threshold: expected a finite number, found '0.5'"),
+    (fitted, {"threshold": b"0.5"}, "threshold: expected a finite number, found b'0.5'"),
     (fitted, {"threshold": NAN}, "threshold: expected a finite number"),
     (Calibration, {}, r"made_by: expected a value, found none \(and 19 more\)"),
     (calibration, {"slope": -1}, "slope: expected a number above 0, found -1"),
@@ -218,6 +227,8 @@ CASES: list[Case] = [
     (series, {"t": ["a", "b", "c"]}, "t: expected numbers"),
     (series, {"counts": np.zeros((3, 3))}, r"counts: .* of shape \(3, 2\), found shape \(3, 3\)"),
     (series, {"contact": np.full((3, 2), 0.5)}, "contact: expected whole numbers"),
+    (series, {"contact": np.full((3, 2), 1e300)}, "contact: expected whole numbers"),
+    (series, {"maneuver": np.full(3, 2.0**63)}, "maneuver: expected whole numbers"),
     (series, {"contact": np.full((3, 2), NAN)}, "contact: expected finite numbers"),
     (series, {"meta": 3}, "meta: expected a dictionary, found 3"),
     (series, {"meta": {"robot": {}}}, "meta: robot: expected text, a number or None"),

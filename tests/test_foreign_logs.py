@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
-import resource
+import random
 import struct
+import subprocess
+import sys
 from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
@@ -40,6 +42,7 @@ def anew(
     time: int | None = None,
     number: int | None = None,
     more: Iterable[tuple[int, bytes]] = (),
+    attached: bytes = b"",
     **how: Any,
 ) -> Path:
     """The same messages, written by the package `mcap`.
@@ -49,6 +52,7 @@ def anew(
         time: Time of all messages [ns], None for their own.
         number: Number of all messages, None for their own.
         more: Time [ns] and bytes of more messages in /antenna.
+        attached: Content of an attachment.
         how: What its writer is told.
     """
     copy = log.with_name("new.mcap")
@@ -65,6 +69,8 @@ def anew(
             writer.add_message(channels[channel.topic], at, message.data, at, each)
         for at, data in more:
             writer.add_message(channels["/antenna"], at, data, at)
+        if attached:
+            writer.add_attachment(0, 0, "noise", "", attached)
         writer.finish()
     return copy
 
@@ -184,20 +190,74 @@ def test_a_file_that_continues_a_log_may_have_any_numbers(
     assert ticks_of(log) == WRITTEN + [each.pack() for each in more]
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("time", [-1, 0], ids=["backwards", "one time"])
-def test_a_small_file_of_very_long_messages_is_refused(
-    time: int, log: Path, capsys: pytest.CaptureFixture[str]
+PEAK = """
+import resource, subprocess, sys
+code = subprocess.run([sys.executable, "-m", "antennate", *sys.argv[1:]]).returncode
+print(resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss, file=sys.stderr)
+sys.exit(code)
+"""
+"""Says the largest memory of a command [KiB]: from a small program, as a child begins with that of
+its parent."""
+RISING, FALLING, ONE = 1, -1, 0
+"""How times of messages follow one another [ns]."""
+
+
+@pytest.mark.parametrize(
+    ("step", "size", "count", "pad", "said"),
+    [
+        (FALLING, 1_000_000, 1900, False, "more than 100 bytes unpacked for each byte of the file"),
+        (RISING, 66_000_000, 2, False, "more than 100 bytes unpacked for each byte of the file"),
+        (FALLING, 1_000_000, 300, True, "damaged places: 300;"),
+        (FALLING, 66_000_000, 3, True, "damaged places: 3;"),
+        (RISING, 66_000_000, 3, True, "damaged places: 3;"),
+        (
+            ONE,
+            1_000_000,
+            300,
+            True,
+            "expected at most 33.55 MB of messages of one time, found more",
+        ),
+        (ONE, 66_000_000, 3, True, "damaged places: 1;"),
+        (ONE, 0, 200_000, True, "expected at most 33.55 MB of messages of one time, found more"),
+    ],
+)
+def test_X10_a_hostile_log_takes_at_most_200_MB(
+    step: int, size: int, count: int, pad: bool, said: str, log: Path
 ) -> None:
-    """It would take 2.2 GB of memory to order them."""
-    long = anew(log, more=[(LAST + time * number, bytes(60_000_000)) for number in range(37)])
-    assert long.stat().st_size < 1_000_000
-    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    assert main(["log", "export", str(long)]) == 2
-    said = capsys.readouterr().err
-    assert said.count("\n") == 1
-    assert "more than 2.147 GB of messages" in said
-    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 500_000
+    """Some hundred kB of zeros, which are no messages of /antenna, in chunks of 30 or 66 MB."""
+    more = ((LAST // 2 + step * number, bytes(size)) for number in range(count))
+    noise = random.Random(1).randbytes(20_000_000) if pad else b""
+    hostile = anew(log, more=more, attached=noise, chunk_size=30_000_000)
+    told = subprocess.run(
+        [sys.executable, "-c", PEAK, "log", "info", hostile],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    *lines, peak = told.stderr.splitlines()
+    assert told.returncode == 2
+    assert len(lines) == 1
+    assert said in lines[0]
+    assert int(peak) * 1024 <= 200e6
+
+
+def test_damage_to_a_log_in_another_order_is_named_where_it_is(
+    log: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The last message is too short; the one before is of its own chunk, whose CRC is wrong."""
+    more = [(LAST - 1 - number, bytes(3000)) for number in range(3)]
+    new = anew(log, more=more, chunk_size=2000)
+    data = bytearray(new.read_bytes())
+    places = chunks(bytes(data))
+    data[places[-2][0] + 9 + 24] ^= 1
+    new.write_bytes(data)
+    with LogReader(new) as reader:
+        found = list(reader)
+        assert [each.pack() for each in found] == WRITTEN
+        wrong = {each.offset for each in reader.damage}
+    assert wrong == {begin for begin, _ in places[-3:]}
+    assert main(["log", "info", str(new)]) == 2
+    assert f"first at byte {places[-2][0]} of new.mcap" in capsys.readouterr().err
 
 
 def test_damage_to_an_unguarded_log_is_named_where_it_shows(

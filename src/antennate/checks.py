@@ -15,12 +15,18 @@ import numpy as np
 
 from antennate.errors import BadInputError, ConfigError
 from antennate.messages import shown
-from antennate.types import Floats
+from antennate.types import Floats, Ints
 
 T = TypeVar("T")
 
 
-def real(name: str, value: Any, unit: str = "", above: float = -math.inf) -> float:
+def real(
+    name: str,
+    value: Any,
+    unit: str = "",
+    above: float = -math.inf,
+    error: type[BadInputError] = ConfigError,
+) -> float:
     """A finite number.
 
     Args:
@@ -28,9 +34,10 @@ def real(name: str, value: Any, unit: str = "", above: float = -math.inf) -> flo
         value: What was given.
         unit: Its unit, empty if it has none.
         above: What it has to exceed.
+        error: What is raised.
 
     Raises:
-        ConfigError: It is something else.
+        BadInputError: Of the given type: it is something else.
     """
     try:
         found = (
@@ -40,7 +47,7 @@ def real(name: str, value: Any, unit: str = "", above: float = -math.inf) -> flo
         found = math.inf
     if not (math.isfinite(found) and found > above):
         bound = f" above {above:g}" if math.isfinite(above) else ""
-        raise _refusal(name, f"a finite number{bound}{_in(unit)}", value)
+        raise _refusal(name, f"a finite number{bound}{_in(unit)}", value, error)
     return found
 
 
@@ -101,6 +108,24 @@ def array(
     return found.astype(np.float64, copy=False)
 
 
+def whole_array(
+    name: str,
+    value: Any,
+    shape: tuple[int | str, ...],
+    error: type[BadInputError] = ConfigError,
+) -> Ints:
+    """The same, of whole numbers that have room in 64 bits.
+
+    Raises:
+        BadInputError: Of the given type: it is something else.
+    """
+    found = array(name, value, shape, error=error)
+    odd = (found != np.rint(found)) | (found < -(2.0**63)) | (found >= 2.0**63)
+    if odd.any():
+        raise error(f"{name}: expected whole numbers, found {found[odd][0]:g}")
+    return found.astype(np.int64)
+
+
 def path(name: str, value: Any) -> Path:
     """The path of a file or a folder.
 
@@ -111,7 +136,7 @@ def path(name: str, value: Any) -> Path:
         found = Path(value)
     except TypeError:
         raise _refusal(name, "a path", value) from None
-    if value == "":
+    if value == "" or "\0" in str(found):
         raise _refusal(name, "a path", value)
     return found
 

@@ -35,6 +35,8 @@ FEWEST_GROUPS = 3
 """Fewest trials over which intervals are; of fewer the recording is cut into ten parts."""
 _BINS = 10
 _FOLDS = 10
+_FARTHEST = 10.0
+"""Largest level, which is 0 to 1 but for errors."""
 _RAILS = (0.0, 4090.0)
 """Readings at or beyond these say nothing about the level [counts]."""
 _RAIL_SHARE = 0.2
@@ -184,20 +186,22 @@ def fit_calibration(
         threshold: Flex level that counts as contact.
 
     Raises:
-        CalibrationError: Shapes differ, a value is not finite (only a speed may be NaN), a trial is
-            no whole number, a speed is below 0, the name or the threshold cannot be one, or the
-            data cannot be calibrated.
+        CalibrationError: Shapes differ, a value is not finite (only a speed may be NaN), a level is
+            far from 0 to 1, a trial is no whole number, a speed is below 0, the name or the
+            threshold cannot be one, or the data cannot be calibrated.
     """
     counts = _column("counts", counts, "n")
     n = len(counts)
     level = _column("level", level, n)
-    trials = _column("trial", np.zeros(n) if trial is None else trial, n)
-    if (bad := trials[trials != np.rint(trials)]).size:
-        raise CalibrationError(f"trial: expected whole numbers, found {bad[0]:g}")
+    if (bad := level[np.abs(level) > _FARTHEST]).size:
+        raise CalibrationError(f"level: expected 0 straight and 1 full, found {bad[0]:g}")
+    given = np.zeros(n) if trial is None else trial
+    trials = checks.whole_array("trial", given, (n,), CalibrationError)
     speeds = _column("speed", np.full(n, np.nan) if speed is None else speed, n, finite=False)
     if (bad := speeds[(speeds < 0) | np.isinf(speeds)]).size:
         raise CalibrationError(f"speed: expected finite speeds of at least 0, found {bad[0]:g}")
-    samples = Samples(counts, level, trials.astype(np.int64), speeds, np.arange(1, n + 1))
+    threshold = checks.real("threshold", threshold, error=CalibrationError)
+    samples = Samples(counts, level, trials, speeds, np.arange(1, n + 1))
     digest = hashlib.sha256(np.stack([counts, level]).tobytes()).hexdigest()
     return fit(samples, sensor_id, digest, threshold)
 

@@ -30,14 +30,19 @@ def spring_stiffness(modulus: float, wire: float, coil: float, coils: float) -> 
         coils: Number of active coils.
 
     Raises:
-        ConfigError: One is no finite number above 0.
+        ConfigError: One is no finite number above 0, or the stiffness is none.
     """
-    return _stiffness(
+    given = (
         checks.real("modulus", modulus, "Pa", above=0.0),
         checks.real("wire", wire, "m", above=0.0),
         checks.real("coil", coil, "m", above=0.0),
         checks.real("coils", coils, above=0.0),
     )
+    try:
+        found = _stiffness(*given)
+    except ArithmeticError:  # a power that is too large, a product that is 0
+        found = math.inf
+    return checks.real("stiffness of these", found, "N·m/rad", above=0.0)
 
 
 def _stiffness(modulus: float, wire: float, coil: float, coils: float) -> float:

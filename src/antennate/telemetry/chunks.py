@@ -2,7 +2,7 @@
 
 The readers of `mcap` end at the first damage. Here a chunk whose CRC is wrong is left out and the
 next one is searched for; what lies between chunks is not needed. Nothing is decompressed beyond
-`_LARGEST`, whatever a file says.
+`_LARGEST` a chunk and `_RATIO` a file, whatever a file says.
 
 MCAP lets a program leave out chunks and CRCs. antennate never does, so in its files that is damage;
 what another program wrote is read all the same, and said to be unguarded. Attachments and metadata,
@@ -16,15 +16,16 @@ import re
 import struct
 import zlib
 from collections import Counter
-from collections.abc import Container, Iterator, Mapping
+from collections.abc import Container, Iterator
 from typing import BinaryIO, NamedTuple
 
+from antennate.telemetry.contents import CHANNEL, MESSAGE, SCHEMA, Chunk, Messages, contents_of
 from antennate.telemetry.summary import MAGIC, RECORD, End, summary
 
-_HEADER, _, _SCHEMA, _CHANNEL, _MESSAGE, _CHUNK, _INDEX = range(1, 8)
+_HEADER, _CHUNK, _INDEX = 1, 6, 7
 _ATTACHMENT, _METADATA, _DATA_END = 9, 12, 15
 _KINDS = (_HEADER, _CHUNK, _INDEX, _ATTACHMENT, _METADATA, _DATA_END)
-_LOOSE = (_SCHEMA, _CHANNEL, _MESSAGE)
+_LOOSE = (SCHEMA, CHANNEL, MESSAGE)
 """Kinds of records that are found outside of chunks where there are none."""
 LIBRARY = "antennate "
 """How the program is named that writes the logs of antennate, before its version."""
@@ -36,37 +37,15 @@ _BEGIN = re.compile(
 )
 """How a chunk begins, up to the word for its compression."""
 _LONGEST_BEGIN = RECORD.size + _PREFIX.size + 4
-_ENTRY = struct.Struct("<HIQQ")
 _LARGEST = 1 << 26
 """Most bytes of a chunk's content."""
 _LONGEST = 1 << 24
 """Most bytes of a record, compressed."""
+_RATIO = 100
+"""Most bytes of the content of all chunks for each byte of the file."""
+_WINDOW = 1 << 25
+"""Most bytes that zstd may look back; programs use 32 MB at most."""
 _BLOCK = 1 << 20
-
-
-class Message(NamedTuple):
-    """One message: its channel, its number, its time [ns] and its bytes."""
-
-    channel: int
-    number: int
-    time: int
-    data: bytes
-
-
-class Chunk(NamedTuple):
-    """An intact chunk: its messages, and what it declares.
-
-    A channel has its topic, the number of its schema and the encoding of its messages; a schema has
-    the name of a type and its definition, and may stand in an earlier chunk. Without a CRC nothing
-    guards it: it may not be as it was written. One of another program may end within a tick.
-    """
-
-    offset: int
-    messages: tuple[Message, ...]
-    channels: Mapping[int, tuple[str, int, str]]
-    schemas: Mapping[int, tuple[str, str]]
-    guarded: bool = True
-    foreign: bool = False
 
 
 class Fault(NamedTuple):
@@ -88,6 +67,8 @@ class _Source(NamedTuple):
 def walk(file: BinaryIO, wanted: Container[int] | None = None) -> Iterator[Chunk | Fault | End]:
     """What a file holds, in order; the summary comes last, if the file was closed.
 
+    The messages of a chunk can be read until the next one is asked for: two might not find room.
+
     Args:
         file: The file.
         wanted: Where chunks begin that are read, None for all; of others only the CRC is checked.
@@ -102,14 +83,20 @@ def walk(file: BinaryIO, wanted: Container[int] | None = None) -> Iterator[Chunk
     if file.read(len(MAGIC)) != MAGIC:
         yield Fault(0, "no MCAP file")
         at = _next_chunk(file, 0)
-    closed = False
+    closed, unpacked = False, 0
     while at is not None and at < size and not closed:
         found, then = _record(source, at)
         closed = then is None and not isinstance(found, Fault)
         if isinstance(found, Chunk):
+            unpacked += found.size
+            if unpacked > _RATIO * size:
+                yield Fault(at, f"more than {_RATIO} bytes unpacked for each byte of the file")
+                break
             counts.update(message.channel for message in found.messages)
         if found is not None:
             yield found
+        if isinstance(found, Chunk) and isinstance(found.messages, Messages):
+            found.messages.release()
         if isinstance(found, Fault) and (then is None or _damaged(source, then)):
             then = _next_chunk(file, at + 1)
         at = then
@@ -200,7 +187,7 @@ def _loose(file: BinaryIO, at: int, size: int) -> tuple[Chunk | Fault, int]:
             break
         end += RECORD.size + length
     file.seek(at)
-    found = _read_contents(at, file.read(end - at))
+    found = contents_of(at, file.read(end - at))
     return Fault(at, "damaged record") if found is None else found._replace(
         guarded=False, foreign=True
     ), end
@@ -242,20 +229,13 @@ def _chunk(at: int, content: bytes, source: _Source) -> Chunk | None:
     """An intact chunk, None if it is damaged; one of another program may be without a CRC."""
     guarded = not (source.foreign and _lacks_crc(content))
     data = _unpacked(content, guarded)
-    if data is not None and source.wanted is not None and at not in source.wanted:
-        data = b""
-    found = None if data is None else _read_contents(at, data)
-    return None if found is None else found._replace(guarded=guarded, foreign=source.foreign)
-
-
-def _read_contents(at: int, data: bytes) -> Chunk | None:
-    """What some records say, None if they are none."""
-    from mcap.exceptions import McapError  # slow to import
-
-    try:
-        return _contents(at, data)
-    except (struct.error, ValueError, McapError):
+    if data is None:
         return None
+    size = len(data)
+    if source.wanted is not None and at not in source.wanted:
+        data = b""
+    found = contents_of(at, data)
+    return found and found._replace(size=size, guarded=guarded, foreign=source.foreign)
 
 
 def _fault_of(content: bytes) -> str:
@@ -275,7 +255,7 @@ def _unpacked(content: bytes, guarded: bool) -> bytes | None:
         (length,) = struct.unpack_from("<Q", content, begin)
     except struct.error:
         return None
-    packed = content[begin + 8 :]
+    packed = memoryview(content)[begin + 8 :]
     unpack = _UNPACK.get(content[_PREFIX.size : begin])
     if unpack is None or length != len(packed) or wanted > _LARGEST:
         return None
@@ -284,16 +264,16 @@ def _unpacked(content: bytes, guarded: bool) -> bytes | None:
     return data if sound else None
 
 
-def _of_zstd(packed: bytes, most: int) -> bytes:
+def _of_zstd(packed: memoryview, most: int) -> bytes:
     from zstandard import ZstdDecompressor, ZstdError  # slow to import
 
     try:
-        return ZstdDecompressor().stream_reader(packed).read(most)
+        return ZstdDecompressor(max_window_size=_WINDOW).stream_reader(packed).read(most)
     except ZstdError:
         return b""
 
 
-def _of_lz4(packed: bytes, most: int) -> bytes:
+def _of_lz4(packed: memoryview, most: int) -> bytes:
     from lz4.frame import LZ4FrameDecompressor
 
     try:
@@ -302,37 +282,5 @@ def _of_lz4(packed: bytes, most: int) -> bytes:
         return b""
 
 
-_UNPACK = {b"zstd": _of_zstd, b"lz4": _of_lz4, b"": lambda packed, most: packed[:most]}
+_UNPACK = {b"zstd": _of_zstd, b"lz4": _of_lz4, b"": lambda packed, most: bytes(packed[:most])}
 """What unpacks at most so many bytes, by the word for it."""
-
-
-def _contents(at: int, data: bytes) -> Chunk:
-    """What the content of a chunk says.
-
-    Raises:
-        ValueError, struct.error, McapError: It is not made of records.
-    """
-    from mcap.data_stream import ReadDataStream
-    from mcap.records import Channel, Schema
-
-    messages: list[Message] = []
-    schemas: dict[int, tuple[str, str]] = {}
-    channels: dict[int, tuple[str, int, str]] = {}
-    place = 0
-    while place < len(data):
-        kind, length = RECORD.unpack_from(data, place)
-        place += RECORD.size
-        end = place + length
-        if end > len(data):
-            raise ValueError("cut record")
-        if kind == _MESSAGE:
-            channel, number, time, _ = _ENTRY.unpack_from(data, place)
-            messages.append(Message(channel, number, time, data[place + _ENTRY.size : end]))
-        elif kind == _SCHEMA:
-            schema = Schema.read(ReadDataStream(io.BytesIO(data[place:end])))
-            schemas[schema.id] = (schema.name, schema.data.decode(errors="replace"))
-        elif kind == _CHANNEL:
-            found = Channel.read(ReadDataStream(io.BytesIO(data[place:end])))
-            channels[found.id] = (found.topic, found.schema_id, found.message_encoding)
-        place = end
-    return Chunk(at, tuple(messages), channels, schemas)

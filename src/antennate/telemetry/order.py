@@ -1,53 +1,32 @@
 """The messages of a file in the order of their times, after its header.
 
 antennate writes them so. Another program may sort them by topic, for example, as MCAP leaves their
-order open; then all of them are held at once.
+order open; then they go to a file that has no name, with only their times and places in memory.
 """
 
 from __future__ import annotations
 
+import struct
+from array import array
 from collections.abc import Iterable, Iterator, Mapping
+from tempfile import TemporaryFile
 from typing import BinaryIO
 
-from antennate.files import in_units
-from antennate.telemetry.chunks import Chunk, Fault, Message, is_foreign, walk
+import numpy as np
+
+from antennate.telemetry.chunks import Fault, is_foreign, walk
+from antennate.telemetry.contents import Chunk, Message
 from antennate.telemetry.summary import End
 from antennate.telemetry.topics import HEADER_TOPICS, TOPICS
 
 _OURS = frozenset(topic.name for topic in TOPICS)
 _HEADER = frozenset(topic.name for topic in HEADER_TOPICS)
-
-
-_MOST = 1 << 31
-"""Most bytes of messages that are held at once."""
-_BESIDE = 200
-"""Bytes that a message takes beside its content."""
-
-
-class _Order:
-    """What is held of messages to put them in order, and to find those of one time.
-
-    Attributes:
-        kept: Whether they are in the order of their times.
-    """
-
-    def __init__(self) -> None:
-        self.kept = True
-        self._last = self._all = self._now = self._most = 0
-
-    def add(self, message: Message) -> None:
-        """Take note of the next message."""
-        size = len(message.data) + _BESIDE
-        self._now = size + (self._now if message.time == self._last else 0)
-        self._most = max(self._most, self._now)
-        self._all += size
-        self.kept = self.kept and self._last <= message.time
-        self._last = message.time
-
-    @property
-    def held(self) -> int:
-        """Bytes of those of one time, or of all if they are not in order."""
-        return self._most if self.kept else self._all
+_MOST = 1 << 21
+"""Most messages whose times and places are held, 24 bytes each: an hour at 100 Hz and more."""
+_ROOM = 1 << 31
+"""Most bytes of their content on the disk."""
+_ENTRY = struct.Struct("<QHIQQ")
+"""Before the content of a message on the disk: its chunk, channel, number, time and length."""
 
 
 def in_order(file: BinaryIO) -> Iterator[Chunk | Fault | End]:
@@ -58,39 +37,51 @@ def in_order(file: BinaryIO) -> Iterator[Chunk | Fault | End]:
     Raises:
         OSError: The file cannot be read.
     """
-    header, order = _contents(file) if is_foreign(file) else (None, _Order())
+    header, kept = _contents(file) if is_foreign(file) else (None, True)
     if header is not None:
         yield header
-    if header is not None and order.held > _MOST:
-        why = "of one time" if order.kept else "that are not in the order of their times"
-        yield Fault(header.offset, f"more than {in_units(_MOST)} of messages {why}")
-    elif header is None or order.kept:
+    if header is None or kept:
         yield from walk(file)
     else:
         yield from _in_new_order(file, header)
 
 
 def _in_new_order(file: BinaryIO, header: Chunk) -> Iterator[Chunk | Fault | End]:
-    """What a file holds, all of its messages at once."""
-    others, messages = list[Fault | End](), list[Message]()
-    for place in walk(file):
-        if isinstance(place, Chunk):
-            messages += _ours(place.messages, header.channels)
-        else:
-            others.append(place)
-    messages.sort(key=lambda message: message.time)
-    yield header._replace(messages=tuple(messages))
-    yield from others
+    """What a file holds: each message as a chunk of its own, with the place of that which it is of.
+
+    Faults and the end come first.
+    """
+    times, places, room = array("Q"), array("Q"), 0
+    with TemporaryFile() as spool:
+        for found in walk(file):
+            if not isinstance(found, Chunk):
+                yield found
+                continue
+            for channel, number, time, data in _ours(found.messages, header.channels):
+                times.append(time)
+                places.append(room)
+                spool.write(_ENTRY.pack(found.offset, channel, number, time, len(data)))
+                room += _ENTRY.size + spool.write(data)
+                if len(times) > _MOST or room > _ROOM:
+                    why = f"more than {_MOST} messages or {_ROOM} bytes"
+                    cure = "sort the file first, as by `mcap sort`"
+                    yield Fault(found.offset, f"{why} not in the order of their times; {cure}")
+                    return
+        for row in np.argsort(np.frombuffer(times, np.uint64), kind="stable"):
+            spool.seek(places[row])
+            offset, channel, number, time, size = _ENTRY.unpack(spool.read(_ENTRY.size))
+            message = Message(channel, number, time, spool.read(size))
+            yield Chunk(offset, (message,), {}, {}, 0, header.guarded, foreign=True)
 
 
-def _contents(file: BinaryIO) -> tuple[Chunk | None, _Order]:
-    """The header, as a chunk that declares all channels, and the order of the other messages.
+def _contents(file: BinaryIO) -> tuple[Chunk | None, bool]:
+    """The header, as a chunk that declares all channels, and whether the others are in order.
 
     There is none in a file without a chunk.
     """
     begin: Chunk | None = None
     channels, schemas = dict[int, tuple[str, int, str]](), dict[int, tuple[str, str]]()
-    first, order = dict[str, Message](), _Order()
+    first, kept, last = dict[str, Message](), True, 0
     for chunk in walk(file):
         if not isinstance(chunk, Chunk):
             continue
@@ -103,11 +94,12 @@ def _contents(file: BinaryIO) -> tuple[Chunk | None, _Order]:
             if name in _HEADER:
                 first.setdefault(name, message)
             else:
-                order.add(message)
+                kept = kept and last <= message.time
+                last = message.time
     if begin is None:
-        return None, order
+        return None, kept
     messages = tuple(first.values())
-    return begin._replace(messages=messages, channels=channels, schemas=schemas), order
+    return begin._replace(messages=messages, channels=channels, schemas=schemas), kept
 
 
 def _ours(

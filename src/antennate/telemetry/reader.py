@@ -7,11 +7,12 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from itertools import chain
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, Never
 
 from antennate.errors import LogError
-from antennate.files import open_regular
-from antennate.telemetry.chunks import Chunk, Fault
+from antennate.files import in_units, open_regular
+from antennate.telemetry.chunks import Fault
+from antennate.telemetry.contents import Chunk
 from antennate.telemetry.header import Header, refuse_old
 from antennate.telemetry.order import in_order
 from antennate.telemetry.parts import parts
@@ -33,6 +34,10 @@ _LISTED = 100
 """Most damaged places that are listed."""
 _OURS = dict(enumerate(TOPICS, 1))
 """Channels of a file that declares none, as its first chunk is lost."""
+_HELD = 1 << 25
+"""Most bytes of messages of one time."""
+_EACH = 500
+"""Bytes that a message takes in memory beside its content."""
 
 
 class Damage(NamedTuple):
@@ -123,7 +128,7 @@ class LogReader:
         Raises:
             LogError: The disk fails.
         """
-        held, begin = list[Record](), 0
+        held, begin, size = list[Record](), 0, 0
         for chunk in self._places:
             self._learn(chunk)
             for message in chunk.messages:
@@ -134,12 +139,21 @@ class LogReader:
                 if held and held[0].time != record.time:
                     yield from self._by_tick(begin, held)
                     held = []
-                begin = begin if held else chunk.offset
+                begin, size = (begin, size) if held else (chunk.offset, 0)
+                size += len(record.data) + _EACH
+                if size > _HELD:
+                    self._refuse_one_time(chunk.offset)
                 held.append(record)
             if held and not chunk.foreign:
                 yield from self._by_tick(begin, held)
                 held = []
         yield from self._by_tick(begin, held)
+
+    def _refuse_one_time(self, offset: int) -> Never:
+        raise LogError(
+            f"{self._part}: expected at most {in_units(_HELD)} of messages of one time, "
+            f"found more at byte {offset}"
+        )
 
     def _by_tick(
         self, offset: int, held: Sequence[Record]

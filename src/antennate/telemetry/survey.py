@@ -12,7 +12,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import BinaryIO, NamedTuple
 
 from antennate.errors import LogError
-from antennate.telemetry.chunks import Chunk, Fault, is_foreign, walk
+from antennate.telemetry.chunks import Fault, is_foreign, walk
+from antennate.telemetry.contents import Chunk
 from antennate.telemetry.summary import places, summary
 from antennate.telemetry.topics import EVENTS, HEADER_TOPICS, MANEUVER, TOPICS, Topic
 

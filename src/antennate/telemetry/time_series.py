@@ -86,11 +86,13 @@ class TimeSeries:
     def __post_init__(self) -> None:
         ticks = len(checks.array("t", self.t, ("n",), "s", finite=False))
         for name, (sizes, kind) in _ARRAYS.items():
-            whole = kind is np.int64
-            values = checks.array(name, getattr(self, name), (ticks, *sizes), finite=whole)
-            if whole and (values != np.rint(values)).any():
-                raise BadInputError(f"{name}: expected whole numbers, found others")
-            object.__setattr__(self, name, values.astype(kind, copy=False))
+            values, shape = getattr(self, name), (ticks, *sizes)
+            found = (
+                checks.whole_array(name, values, shape)
+                if kind is np.int64
+                else checks.array(name, values, shape, finite=False)
+            )
+            object.__setattr__(self, name, found)
         for name, value in checks.mapping("meta", self.meta).items():
             if not isinstance(value, str | int | float | None):
                 raise BadInputError(
