@@ -7,6 +7,13 @@ import numpy as np
 from antennate.types import Floats
 
 
+def student95(freedom: int) -> float:
+    """Half width of a 95 % interval in standard errors, by Student's t of so many degrees."""
+    from scipy.special import stdtrit  # scipy.stats takes a second longer
+
+    return float(stdtrit(freedom, 0.975))
+
+
 def jackknife95(value: Floats | float, left: Floats) -> Floats:
     """Jackknife interval by Student's t of one degree less than groups.
 
@@ -25,8 +32,6 @@ def jackknife95(value: Floats | float, left: Floats) -> Floats:
     count = len(left)
     if count < 2:
         return np.full((2, *np.shape(value)), np.nan)
-    from scipy.special import stdtrit  # scipy.stats takes a second longer
-
-    half = stdtrit(count - 1, 0.975) * np.sqrt((count - 1) * left.var(axis=0))
+    half = student95(count - 1) * np.sqrt((count - 1) * left.var(axis=0))
     half = np.where(np.ptp(left, axis=0) == 0.0, np.nan, half)
     return np.stack([value - half, value + half])

@@ -12,6 +12,7 @@ import numpy as np
 from antennate.antenna.calibration import FEWEST
 from antennate.antenna.curves import MODELS, Samples, ends, polarity, predict
 from antennate.antenna.sensor import FULL_SCALE
+from antennate.jackknife import student95
 from antennate.types import Bools, Floats, Ints
 
 MOST_FOLDS = 30
@@ -90,13 +91,6 @@ def rms(errors: list[Floats]) -> Floats:
 def gain_of(errors: dict[str, list[Floats]], rival: str) -> Gain:
     """How much a rival gains, from `left_out` of two pushes or more."""
     gain = rms(errors["sigmoid"]) - rms(errors[rival])
-    half = student(len(gain)) * gain.std(ddof=1) / np.sqrt(len(gain))
+    half = student95(len(gain) - 1) * gain.std(ddof=1) / np.sqrt(len(gain))
     mean = float(gain.mean())
     return Gain(mean, (mean - float(half), mean + float(half)), len(gain))
-
-
-def student(count: int) -> float:
-    """Half width of a 95 % interval over `count` values, in standard errors (Student's t)."""
-    from scipy.special import stdtrit  # scipy.stats takes a second longer
-
-    return float(stdtrit(count - 1, 0.975))
