@@ -15,7 +15,7 @@ from antennate.antenna.sensor import FULL_SCALE
 from antennate.jackknife import student95
 from antennate.types import Bools, Floats, Ints
 
-MOST_FOLDS = 30
+MOST_GROUPS = 30
 """More pushes than this are left out in so many groups of whole pushes."""
 OTHER_DIVIDERS = {"half the divider": 0.5, "twice the divider": 2.0}
 """Fixed resistors under which a rival is tried again, over the one in use."""
@@ -69,8 +69,8 @@ def left_out(
     numbers = [n for n in np.unique(number[rows]) if (number[rows] == n).sum() > 1]
     low, high = (0.0, float(FULL_SCALE)) if full_scale else ends(samples)
     x, level, sign = (samples.counts - low) / (high - low), samples.level, polarity(samples)
-    for fold in range(min(MOST_FOLDS, len(numbers))):
-        held = numbers[fold::MOST_FOLDS]
+    for group in range(min(MOST_GROUPS, len(numbers))):
+        held = numbers[group::MOST_GROUPS]
         rest = rows[~np.isin(number[rows], held)]
         if len(rest) < FEWEST:
             continue

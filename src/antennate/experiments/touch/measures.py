@@ -131,7 +131,7 @@ class Pool:
         return {
             "n": len(values),
             "median_ms": float(np.median(values)) * self._tick_ms,
-            "median_95_ms": _within(median95(values * self._tick_ms, trials)),
+            "median_95_ms": _within(median95(np.float64(self._tick_ms) * values, trials)),
             "p90_ms": float(np.percentile(values, 90)) * self._tick_ms,
             "median_mm": float(np.median(way)),
         }
