@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -73,6 +74,7 @@ def test_intervals_over_four_pushes_hold_the_truth_as_often_as_they_say() -> Non
         counts = 1600 + 50 * np.log(bend / (1 - bend)) + rng.normal(0, 20, (4, 1))
         counts = np.rint(counts + rng.normal(0, 2.5, counts.shape)).ravel()
         found = antennate.fit_calibration(counts, np.tile(bend, 4), np.repeat(np.arange(4), POINTS))
+        assert found.midpoint_95 is not None
         low, high = found.midpoint_95
         span = found.counts_high - found.counts_low
         hits += low <= (1600 - found.counts_low) / span <= high
@@ -82,10 +84,35 @@ def test_intervals_over_four_pushes_hold_the_truth_as_often_as_they_say() -> Non
 def test_the_text_says_what_the_intervals_are_over(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    for pushes, told in ((2, "ten parts of the recording"), (3, "intervals are over 3 pushes.")):
-        file = written(tmp_path / f"{pushes}.csv", *loops(pushes, 0.0))
-        assert main(["calibrate", "--recording", file, "--no-figures"]) == 0
+    for pushes, told in (
+        (1, "No interval: one push; it takes 3 or more."),
+        (1, "(no interval: one push; it takes 3 or more)"),
+        (2, "(no interval: 2 pushes; it takes 3 or more)"),
+        (3, "Intervals are over 3 pushes."),
+    ):
+        file, out = written(tmp_path / f"{pushes}.csv", *loops(pushes, 0.0)), tmp_path / "run"
+        words = ["calibrate", "--recording", file, "--no-figures", "--overwrite"]
+        assert main([*words, "--out", str(out)]) == 0
         assert told in " ".join(capsys.readouterr().out.split())
+        held = [json.loads((out / f"{n}.json").read_text()) for n in ("calibration", "result")]
+        for ends in (held[0]["slope_95"], held[1]["calibration"]["midpoint_95"]):
+            assert (ends is None) == (pushes < 3)
+        assert main(["report", str(out)]) == 0
+        capsys.readouterr()
+
+
+def test_pushes_that_are_alike_have_no_interval_and_the_file_is_taken(tmp_path: Path) -> None:
+    """Three times the same readings, or one push: neither tells anything of the next."""
+    counts, bend, _ = loops(1, 0.0)
+    thrice = np.repeat(np.arange(3), len(bend))
+    for found in (
+        antennate.fit_calibration(np.tile(counts, 3), np.tile(bend, 3), thrice),
+        antennate.fit_calibration(counts, bend),
+    ):
+        assert found.slope_95 is None
+        assert found.midpoint_95 is None
+        found.save(tmp_path / "left.json", overwrite=True)
+        assert antennate.Calibration.load(tmp_path / "left.json") == found
 
 
 @pytest.mark.parametrize(

@@ -80,6 +80,7 @@ def test_intervals_hold_the_truth_about_as_often_as_they_say(sets: int, least: i
     hits = 0
     for seed in range(sets):
         found = fit(simulated(12.0, 0.5, 1, 100 + seed, noise=8.0, pushes=12))
+        assert found.midpoint_95 is not None
         low, high = found.midpoint_95
         span = found.counts_high - found.counts_low
         true = (LOW + 0.5 * (HIGH - LOW) - found.counts_low) / span

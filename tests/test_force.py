@@ -153,12 +153,27 @@ def test_a_traverse_that_blows_up_is_invalid_and_enters_nothing(monkeypatch):
         ({"nearest": 0.8}, "nearest must not exceed from_place, 0.5, found 0.8"),
         ({"profiles": ("stiff", "stiff")}, "profiles must differ"),
         ({"speeds": (0.1, 0.0)}, "speeds must be above 0"),
+        ({"traverses": 7, "speeds": (0.1, 0.2, 0.3, 0.4)}, "traverses: .* least 8, .* found 7"),
+        ({"traverses": 5}, "traverses: .* least 6, .* found 5"),
         ({"antenna": {"sensor": {"rate": 300.0}}}, "whole fraction of the physics rate 2000 Hz"),
     ],
 )
 def test_what_cannot_be_run_is_refused(values, message):
     with pytest.raises(ConfigError, match=message):
         loads.ForceConfig(**values)
+
+
+@pytest.mark.parametrize("speeds", [(0.5,), (0.4, 0.8), (0.3, 0.6, 0.9), (0.2, 0.4, 0.6, 0.8)])
+def test_traverses_that_fit_and_that_test_meet_every_speed_in_any_order(
+    speeds: tuple[float, ...],
+) -> None:
+    small = {"profiles": ("descending",), "loads": 2, "place_step": 0.5, "traverses": 8}
+    orders = (speeds, speeds[::-1])
+    one, other = (force.run(loads.ForceConfig(speeds=s, **small)) for s in orders)
+    assert to_json(one.result()) == to_json(other.result())
+    points, met = one.profiles[0].traverses, np.array([row.speed_m_s for row in one.rows])
+    for half in (points.fit, ~points.fit):
+        assert set(met[np.unique(points.trial[half])]) == set(speeds)
 
 
 @pytest.mark.slow

@@ -117,6 +117,7 @@ def test_the_interval_of_the_curve_is_another_thing() -> None:
         seen, counts = unlike_pushes(rng, 30)
         fitted = fitting.fit(seen, "left", "0" * 64)
         low, high = np.percentile(fitted.level(counts) - LEVEL, [2.5, 97.5])
+        assert fitted.midpoint_95 is not None
         width = fitted.slope / 4 * (fitted.midpoint_95[1] - fitted.midpoint_95[0]) / 2
         hits += -width <= low and high <= width
     assert hits <= 10

@@ -91,8 +91,10 @@ def blind(successes: int, trials: int) -> dict[str, Any]:
     return {"controllers": {"open": {"trials": trials, "invalid": 0, "successes": successes}}}
 
 
-def sigmoid(slope: float, half: float, midpoint: float) -> dict[str, Any]:
-    ends = {"slope_95": [slope - half, slope + half], "midpoint_95": [midpoint, midpoint]}
+def sigmoid(slope: float, half: float | None, midpoint: float) -> dict[str, Any]:
+    ends = {"slope_95": None, "midpoint_95": None}
+    if half is not None:
+        ends = {"slope_95": [slope - half, slope + half], "midpoint_95": [midpoint, midpoint]}
     return {"calibration": {"slope": slope, "midpoint": midpoint, **ends}}
 
 
@@ -158,6 +160,7 @@ def sensed(f1: float | None, interval: list[float] | None) -> dict[str, Any]:
         ("slope", sigmoid(18.0, 2.0, 0.4), "not_reproduced"),
         ("slope", sigmoid(4.5, 0.1, 0.3), "not_reproduced"),
         ("slope", sigmoid(18.0, 9.0, 0.3), "undecided"),
+        ("slope", sigmoid(18.0, None, 0.3), "undecided"),
         ("contact", sensed(0.7, [0.68, 0.72]), "conditional"),
         ("contact", sensed(0.7, [0.66, 0.74]), "not_reproduced"),
         ("contact", sensed(0.7, None), "undecided"),  # one trial

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from scipy.stats import binomtest, t, wilcoxon
 
-from antennate.antenna.rivals import student
+from antennate.jackknife import student95
 from antennate.studies import statistics
 
 
@@ -35,7 +35,7 @@ def test_wilson_intervals_are_those_of_scipy_bit_for_bit(trials: int) -> None:
 
 @pytest.mark.parametrize("count", [2, 3, 10, 200])
 def test_the_quantile_of_student_is_that_of_scipy_bit_for_bit(count: int) -> None:
-    assert student(count) == t.ppf(0.975, count - 1)
+    assert student95(count - 1) == t.ppf(0.975, count - 1)
 
 
 @pytest.mark.parametrize("words", [["tunnel"], ["study", "plan.toml", "--trust-code"]])

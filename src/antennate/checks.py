@@ -83,13 +83,16 @@ def array(
         error: What is raised.
 
     Raises:
-        BadInputError: Of the given type: it is something else.
+        BadInputError: Of the given type: it is something else, or masked.
     """
     wanted = f"{'finite ' if finite else ''}numbers{_in(unit)}"
     if len(shape) == 1 and isinstance(shape[0], int):
         wanted = f"{shape[0]} {wanted}"
     elif shape:
         wanted += f" of shape ({', '.join(map(str, shape))}{',' * (len(shape) == 1)})"
+    parts = value if isinstance(value, list | tuple) else (value,)
+    if any(isinstance(part, np.ma.MaskedArray) for part in parts):
+        raise error(f"{name}: expected {wanted}, found a masked array; leave masked values out")
     try:
         found = np.asarray(value)
     except (ValueError, TypeError):  # rows of different lengths

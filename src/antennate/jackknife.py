@@ -4,7 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from antennate.types import Floats
+from antennate.types import Floats, Ints
+
+MANY = 10
+"""From so many groups on, the interval of a median is that of a share, taken as quantiles."""
+
+
+def student95(freedom: int) -> float:
+    """Half width of a 95 % interval in standard errors, by Student's t of so many degrees."""
+    from scipy.special import stdtrit  # scipy.stats takes a second longer
+
+    return float(stdtrit(freedom, 0.975))
 
 
 def jackknife95(value: Floats | float, left: Floats) -> Floats:
@@ -25,8 +35,34 @@ def jackknife95(value: Floats | float, left: Floats) -> Floats:
     count = len(left)
     if count < 2:
         return np.full((2, *np.shape(value)), np.nan)
-    from scipy.special import stdtrit  # scipy.stats takes a second longer
-
-    half = stdtrit(count - 1, 0.975) * np.sqrt((count - 1) * left.var(axis=0))
+    half = student95(count - 1) * np.sqrt((count - 1) * left.var(axis=0))
     half = np.where(np.ptp(left, axis=0) == 0.0, np.nan, half)
     return np.stack([value - half, value + half])
+
+
+def median95(values: Floats, groups: Ints) -> Floats:
+    """Interval of the median of values that vary in groups.
+
+    The jackknife of a median does not come right however many groups there are, as few values
+    decide it: Efron and Tibshirani (1993), section 11.6. From MANY groups on, the interval is the
+    jackknife's of the share of values below the median, about one half, and ends at the quantiles
+    of both shares: Woodruff (1952), Journal of the American Statistical Association 47, 635-646.
+    Of fewer groups that is up to two and a half times as wide where they differ much.
+
+    Args:
+        values: All values, shape (n,).
+        groups: Group of each, shape (n,).
+
+    Returns:
+        Both ends, shape (2,); NaN as in `jackknife95`.
+    """
+    names, where, sizes = np.unique(groups, return_inverse=True, return_counts=True)
+    if len(names) < 2:
+        return np.full(2, np.nan)
+    median = np.median(values)
+    if len(names) < MANY:
+        return jackknife95(median, np.array([np.median(values[groups != one]) for one in names]))
+    below = (values < median) + 0.5 * (values == median)
+    sums = np.bincount(where, weights=below)
+    shares = jackknife95(0.5, (sums.sum() - sums) / (len(values) - sizes))
+    return shares if np.isnan(shares).any() else np.quantile(values, np.clip(shares, 0, 1))

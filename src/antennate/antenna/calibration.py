@@ -55,8 +55,9 @@ class Calibration(Strict):
         sensor_id: Which flex sensor: letters, digits, dots, hyphens, underscores.
         data_sha256: Hash of the recording.
         polarity: 1 if readings rise with the flex, -1 if they fall.
-        slope: Slope of the sigmoid over x; `slope_95` its 95 % interval, over pushes.
-        midpoint: x at which the level is 0.5; `midpoint_95` its 95 % interval, over pushes.
+        slope: Slope of the sigmoid over x; `slope_95` its 95 % interval, over pushes. None with
+            fewer than three pushes, or where they are alike.
+        midpoint: x at which the level is 0.5; `midpoint_95` likewise.
         counts_low: Reading at x = 0 [counts]; `counts_high` at x = 1.
         threshold: Level from which on there is contact (theta of the paper).
         valid_counts: Lowest and highest reading of the recording [counts].
@@ -64,7 +65,8 @@ class Calibration(Strict):
         samples: Readings used, from `trials` pushes.
         r2: Share of the level's variance that the curve explains; `rmse` its error.
         speeds: The same for each pushing speed.
-        cross_validated_rmse: Error on unseen pushes of the sigmoid and of two other models.
+        cross_validated_rmse: Error on unseen pushes of the sigmoid and of two other models; with
+            fewer than three pushes on unseen tenths of the recording.
         reach: How far beyond the bent end of this range readings are still those of the sensor
             [spans].
         better_than_sigmoid: Models that were better on these readings beyond noise: the 95 %
@@ -83,9 +85,9 @@ class Calibration(Strict):
     data_sha256: str = Field(pattern=r"^[0-9a-f]{64}$")
     polarity: Literal[-1, 1]
     slope: float = Field(gt=0, le=1000)
-    slope_95: tuple[float, float]
+    slope_95: tuple[float, float] | None
     midpoint: float = Field(gt=-1, lt=2)
-    midpoint_95: tuple[float, float]
+    midpoint_95: tuple[float, float] | None
     counts_low: float = Field(ge=0, le=4095)
     counts_high: float = Field(ge=0, le=4095)
     threshold: float = Field(gt=0, lt=1)
@@ -195,9 +197,9 @@ def _impossible(found: Calibration) -> str:
             f"{found.counts_low:g} and {found.counts_high:g}"
         )
     for field in ("slope_95", "midpoint_95", "valid_counts", "valid_bend"):
-        low, high = getattr(found, field)
-        if not low <= high:
-            return f"{field}: expected the lower end first, found {low:g} and {high:g}"
+        ends: tuple[float, float] | None = getattr(found, field)
+        if ends is not None and not ends[0] <= ends[1]:
+            return f"{field}: expected the lower end first, found {ends[0]:g} and {ends[1]:g}"
     low, high = found.valid_counts
     if not (0 <= low < high <= FULL_SCALE):
         return f"valid_counts: expected readings of 12 bits, found {low:g} to {high:g}"
@@ -206,8 +208,8 @@ def _impossible(found: Calibration) -> str:
             f"slope: expected a level that rises from 0.1 to 0.9 over {NARROWEST_RISE:g} counts or "
             f"more, found {width:.3g}"
         )
-    ends = found.level(np.array([found.counts_low, found.counts_high]))
-    straight, bent = ends if found.polarity > 0 else ends[::-1]
+    levels = found.level(np.array([found.counts_low, found.counts_high]))
+    straight, bent = levels if found.polarity > 0 else levels[::-1]
     if not straight < found.threshold < bent:
         return (
             f"midpoint: expected a level below the threshold {found.threshold:g} at the straight "

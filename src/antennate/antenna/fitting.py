@@ -23,7 +23,7 @@ from antennate.antenna.curves import (
     polarity,
     predict,
 )
-from antennate.antenna.rivals import MOST_FOLDS, gain_of, left_out
+from antennate.antenna.rivals import MOST_GROUPS, gain_of, left_out
 from antennate.antenna.sensor import FULL_SCALE
 from antennate.errors import CalibrationError
 from antennate.jackknife import jackknife95
@@ -31,10 +31,11 @@ from antennate.types import Floats, Ints
 
 REVERSAL = 0.15
 """Share of the span by which mean readings may fall back while the level rises."""
-FEWEST_GROUPS = 3
-"""Fewest trials over which intervals are; of fewer the recording is cut into ten parts."""
+FEWEST_PUSHES = 3
+"""Of fewer pushes slope and midpoint have no intervals."""
 _BINS = 10
 _FOLDS = 10
+"""Folds of the cross-validation."""
 _FARTHEST = 10.0
 """Largest level, which is 0 to 1 but for errors."""
 _RAILS = (0.0, 4090.0)
@@ -180,7 +181,7 @@ def fit_calibration(
     Args:
         counts: Readings [counts], shape (n,), at least 20.
         level: How far the antenna was bent at each, 0 straight and 1 full, shape (n,).
-        trial: Number of the push of each, shape (n,); None if it was one.
+        trial: Number of the push of each, shape (n,); None if it was one: that has no intervals.
         speed: Pushing speed of each [m/s], shape (n,); None if unknown.
         sensor_id: Name of the flex sensor: letters, digits, dots, hyphens and underscores.
         threshold: Flex level that counts as contact.
@@ -235,40 +236,42 @@ def _per_speed(samples: Samples, predicted: Floats) -> list[SpeedFit]:
     return found
 
 
-def _groups(samples: Samples) -> list[Ints]:
-    """Rows that are not independent: trials, or ten blocks if there are too few of these."""
-    trials = np.unique(samples.trial)
-    if len(trials) >= FEWEST_GROUPS:
-        return [np.flatnonzero(samples.trial == trial) for trial in trials]
-    return [b for b in np.array_split(np.arange(len(samples.counts)), _FOLDS) if len(b)]
-
-
-def _folds(samples: Samples, most: int) -> list[Ints]:
-    """Rows of each group; of several groups where there are more than `most`."""
-    groups = _groups(samples)
-    return [np.concatenate(groups[i::most]) for i in range(min(most, len(groups)))]
-
-
 def _intervals(
     samples: Samples, x: Floats, sign: int, slope: float, midpoint: float
-) -> tuple[tuple[float, float], tuple[float, float]]:
-    """95 % intervals of slope, by its logarithm, and midpoint over groups that err together."""
+) -> tuple[tuple[float, float] | None, tuple[float, float] | None]:
+    """95 % intervals of slope, by its logarithm, and midpoint, as readings of a push err together.
+
+    None with few pushes, or where it does not matter which one is left out.
+    """
+    pushes = np.unique(samples.trial)
+    if len(pushes) < FEWEST_PUSHES:
+        return None, None
     left: list[tuple[float, float]] = []
-    for held in _folds(samples, MOST_FOLDS):
-        rest = np.setdiff1d(np.arange(len(x)), held)
+    for i in range(min(MOST_GROUPS, len(pushes))):
+        rest = ~np.isin(samples.trial, pushes[i::MOST_GROUPS])
         part = fit_sigmoid(x[rest], samples.level[rest], sign)
         left.append((math.log(part[0]), part[1]))
-    found = np.array([math.log(slope), midpoint])
-    ends = jackknife95(found, np.array(left))
-    ends = np.clip(np.where(np.isnan(ends), found, ends), *np.transpose(BOUNDS))
-    (low, first), (high, last) = ends.tolist()
-    return (math.exp(low), math.exp(high)), (first, last)
+    ends = jackknife95(np.array([math.log(slope), midpoint]), np.array(left))
+    (low, first), (high, last) = np.clip(ends, *np.transpose(BOUNDS)).tolist()
+    return (
+        None if math.isnan(low) else (math.exp(low), math.exp(high)),
+        None if math.isnan(first) else (first, last),
+    )
+
+
+def _folds(samples: Samples) -> list[Ints]:
+    """Rows of each fold: whole pushes, or a part of the recording where there are few of these."""
+    pushes = np.unique(samples.trial)
+    if len(pushes) < FEWEST_PUSHES:
+        return np.array_split(np.arange(len(samples.counts)), _FOLDS)
+    rows = [np.flatnonzero(samples.trial == push) for push in pushes]
+    return [np.concatenate(rows[i::_FOLDS]) for i in range(min(_FOLDS, len(rows)))]
 
 
 def cross_validate(samples: Samples, x: Floats, sign: int) -> dict[str, Floats]:
-    """Root mean squared error of each model on groups it has not seen, shape (folds,)."""
+    """Root mean squared error of each model on folds it has not seen, shape (folds,)."""
     errors: dict[str, list[float]] = {model: [] for model in MODELS}
-    for held in _folds(samples, _FOLDS):
+    for held in _folds(samples):
         rest = np.setdiff1d(np.arange(len(x)), held)
         for model in MODELS:
             predicted = predict(model, x[rest], samples.level[rest], x[held], sign)

@@ -20,10 +20,10 @@ from antennate.antenna.rivals import (
     gain_of,
     left_out,
     rms,
-    student,
     with_divider,
 )
 from antennate.antenna.sensor import FULL_SCALE
+from antennate.jackknife import student95
 from antennate.types import Bools, Floats, Ints
 
 TURN = 0.1
@@ -191,7 +191,7 @@ def _new_push(errors: list[Floats]) -> NewPush | None:
         return None
     sizes = rms(errors)
     spread = np.array([np.percentile(error, [2.5, 97.5]) for error in errors])
-    wide = student(len(errors)) * spread.std(axis=0, ddof=1) * np.sqrt(1 + 1 / len(errors))
+    wide = student95(len(errors) - 1) * spread.std(axis=0, ddof=1) * np.sqrt(1 + 1 / len(errors))
     low, high = spread.mean(axis=0) + wide * [-1.0, 1.0]
     return NewPush(
         (float(low), float(high)),
@@ -247,7 +247,7 @@ def hysteresis(samples: Samples, pushes: Pushes, found: Calibration) -> Hysteres
     each = [float(np.nanmean(one)) / span for one in up - down if np.isfinite(one).any()]
     mean, interval = float(np.mean(each)), None
     if len(each) > 1:
-        half = student(len(each)) * float(np.std(each, ddof=1)) / len(each) ** 0.5
+        half = student95(len(each) - 1) * float(np.std(each, ddof=1)) / len(each) ** 0.5
         interval = (mean - half, mean + half)
     return Hysteresis(
         float(gap[worst]),

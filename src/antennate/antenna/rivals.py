@@ -12,9 +12,10 @@ import numpy as np
 from antennate.antenna.calibration import FEWEST
 from antennate.antenna.curves import MODELS, Samples, ends, polarity, predict
 from antennate.antenna.sensor import FULL_SCALE
+from antennate.jackknife import student95
 from antennate.types import Bools, Floats, Ints
 
-MOST_FOLDS = 30
+MOST_GROUPS = 30
 """More pushes than this are left out in so many groups of whole pushes."""
 OTHER_DIVIDERS = {"half the divider": 0.5, "twice the divider": 2.0}
 """Fixed resistors under which a rival is tried again, over the one in use."""
@@ -68,8 +69,8 @@ def left_out(
     numbers = [n for n in np.unique(number[rows]) if (number[rows] == n).sum() > 1]
     low, high = (0.0, float(FULL_SCALE)) if full_scale else ends(samples)
     x, level, sign = (samples.counts - low) / (high - low), samples.level, polarity(samples)
-    for fold in range(min(MOST_FOLDS, len(numbers))):
-        held = numbers[fold::MOST_FOLDS]
+    for group in range(min(MOST_GROUPS, len(numbers))):
+        held = numbers[group::MOST_GROUPS]
         rest = rows[~np.isin(number[rows], held)]
         if len(rest) < FEWEST:
             continue
@@ -90,13 +91,6 @@ def rms(errors: list[Floats]) -> Floats:
 def gain_of(errors: dict[str, list[Floats]], rival: str) -> Gain:
     """How much a rival gains, from `left_out` of two pushes or more."""
     gain = rms(errors["sigmoid"]) - rms(errors[rival])
-    half = student(len(gain)) * gain.std(ddof=1) / np.sqrt(len(gain))
+    half = student95(len(gain) - 1) * gain.std(ddof=1) / np.sqrt(len(gain))
     mean = float(gain.mean())
     return Gain(mean, (mean - float(half), mean + float(half)), len(gain))
-
-
-def student(count: int) -> float:
-    """Half width of a 95 % interval over `count` values, in standard errors (Student's t)."""
-    from scipy.special import stdtrit  # scipy.stats takes a second longer
-
-    return float(stdtrit(count - 1, 0.975))

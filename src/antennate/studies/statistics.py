@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from antennate.jackknife import student95
 from antennate.types import Bools, Floats
 
 _Z95 = 1.959963984540054
@@ -41,9 +42,7 @@ def mean95(values: Floats) -> tuple[float, float, float]:
     mean = float(values.mean()) if count else float("nan")
     if count < 2:
         return mean, float("nan"), float("nan")
-    from scipy.special import stdtrit  # scipy.stats takes a second longer
-
-    half = float(stdtrit(count - 1, 0.975) * values.std(ddof=1)) / math.sqrt(count)
+    half = student95(count - 1) * float(values.std(ddof=1)) / math.sqrt(count)
     return mean, mean - half, mean + half
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from antennate.antenna.fitting import FEWEST_GROUPS
+from antennate.antenna.fitting import FEWEST_PUSHES
 from antennate.antenna.next_push import RECORDED
 from antennate.experiments.calibrate import recording
 from antennate.experiments.calibrate import run as calibrate
@@ -59,26 +59,39 @@ def tables(result: Mapping[str, Any]) -> Sequence[Table]:
             "Calibration",
             {found["sensor_id"]: found},
             CURVE,
-            f"Readings {way} with flex. Readings: {found['samples']}, pushes: {found['trials']}; "
-            f"intervals are over\n{_groups(found['trials'])}.",
+            f"Readings {way} with flex. Readings: {found['samples']}, pushes: {found['trials']}.\n"
+            f"{_over(found)}",
         ),
         Table.of("The one curve at each speed", speeds, SPEED),
         _next_push(result),
     )
 
 
-def _groups(pushes: int) -> str:
-    """What the intervals of the curve are over."""
-    if pushes >= FEWEST_GROUPS:
-        return f"{pushes} pushes"
-    return "ten parts of the recording, and say nothing of other pushes"
+def _over(found: Mapping[str, Any]) -> str:
+    """What the intervals of the curve are over, or why there are none."""
+    why = _no_interval(found)
+    return f"{why.capitalize() or f'Intervals are over {_pushes(found)}'}."
+
+
+def _no_interval(found: Mapping[str, Any]) -> str:
+    """Why slope or midpoint has none, empty if both have."""
+    if found["trials"] < FEWEST_PUSHES:
+        return f"no interval: {_pushes(found)}; it takes {FEWEST_PUSHES} or more"
+    both = found["slope_95"] and found["midpoint_95"]
+    return "" if both else f"no interval: {_pushes(found)} all alike"
+
+
+def _pushes(found: Mapping[str, Any]) -> str:
+    return "one push" if found["trials"] == 1 else f"{found['trials']} pushes"
 
 
 def _next_push(result: Mapping[str, Any]) -> Table:
     """What a user meets: a push that served no fit."""
     found, known = result["calibration"], result["assessment"]
-    low, high = (end - found["midpoint"] for end in found["midpoint_95"])
-    ends = sorted(-found["slope"] * found["polarity"] * end / 4 for end in (low, high))
+    ends = found["midpoint_95"] and sorted(
+        -found["slope"] * found["polarity"] * (end - found["midpoint"]) / 4
+        for end in found["midpoint_95"]
+    )
     notes = []
     if known["new_push"] is None:
         notes.append("One push only: nothing is known about the next one; record more pushes.")
@@ -105,7 +118,6 @@ def _rival(name: str, checks: Mapping[str, Any]) -> str:
 def sentence(result: Mapping[str, Any]) -> str:
     """How well one curve serves all pushes."""
     found = result["calibration"]
-    slope = Measure("slope_95", form=".1f").cell(found)
     following = result["assessment"]["new_push"]
     errors = Measure("error_95", form="+.2f").cell(following) if following else ""
     ahead = (
@@ -113,10 +125,10 @@ def sentence(result: Mapping[str, Any]) -> str:
         if following
         else "nothing is known about the next push"
     )
-    pushes = "1 push" if found["trials"] == 1 else f"{found['trials']} pushes"
+    interval = _no_interval(found) or f"95 % interval {shown(found['slope_95'], '.1f')}"
     return (
-        f"One sigmoid explains R² {found['r2']:.2f} of {pushes}, with a slope of "
-        f"{found['slope']:.1f} (95 % interval {slope}); {ahead}{_warning(result)}."
+        f"One sigmoid explains R² {found['r2']:.2f} of {_pushes(found)}, with a slope of "
+        f"{found['slope']:.1f} ({interval}); {ahead}{_warning(result)}."
     )
 
 

@@ -73,7 +73,20 @@ class ForceConfig(Params):
         require_different("profiles", self.profiles)
         if min(self.speeds) <= 0:
             raise ValueError(f"speeds must be above 0, found {min(self.speeds):g}")
+        if self.traverses < (least := 2 * len(self.speeds)):
+            raise ValueError(
+                f"traverses: expected at least {least}, two of each of {len(self.speeds)} speeds "
+                f"(one fits, one tests), found {self.traverses}"
+            )
         return self
+
+    def speed(self, k: int) -> float:
+        """Speed of the k-th traverse [m/s]: even ones, which fit, and odd ones meet all speeds.
+
+        The order of `speeds` plays no part. Of an even number, two neighbours share one.
+        """
+        place = k // 2 if len(self.speeds) % 2 == 0 else k
+        return sorted(self.speeds)[place % len(self.speeds)]
 
     def places(self) -> Floats:
         """Places of the static loads, over the length, the tip among them."""

@@ -169,7 +169,7 @@ def traverse(
     chance = float(np.random.default_rng([config.seed, 1, k]).uniform())
     share = (k + chance) / config.traverses
     overlap = config.from_place + (1.0 - config.from_place) * share
-    speed = config.speeds[k % len(config.speeds)]
+    speed = config.speed(k)
     one = drag(
         config.physics,
         *(antenna, overlap, speed, config.post_radius, limit, antenna.sensor.rate),

@@ -72,7 +72,9 @@ def _sigmoid(result: Mapping[str, Any]) -> Finding:
 
 def _slope(result: Mapping[str, Any]) -> Finding:
     found = result["calibration"]
-    slope_95, midpoint_95 = tuple(found["slope_95"]), tuple(found["midpoint_95"])
+    slope_95, midpoint_95 = (
+        ends and tuple(ends) for ends in (found["slope_95"], found["midpoint_95"])
+    )
     both: set[Verdict] = {
         agrees(found["slope"], slope_95, _SLOPE, _SLOPE_NEAR),
         agrees(found["midpoint"], midpoint_95, _MIDPOINT, _MIDPOINT_NEAR),

@@ -23,7 +23,7 @@ QUICK: Mapping[str, Mapping[str, Any]] = {
     "springs": {},
     "taper": {},
     "calibrate": {"rig": {"pushes": 4}},
-    "force": {"profiles": ("descending",), "traverses": 4},
+    "force": {"profiles": ("descending",), "traverses": 6},
     "touch": {"profiles": ("descending",), "speeds": (0.1,), "trials": 2},
     "sweep": {"profiles": ("descending",)},
     "gait": {"cycles": 2, "settling_cycles": 1, "sweep_points": 8},

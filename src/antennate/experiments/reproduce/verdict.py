@@ -23,18 +23,22 @@ def judged(holds: bool, conditionally: bool = False) -> Verdict:
     return "reproduced" if holds else "conditional" if conditionally else "not_reproduced"
 
 
-def agrees(value: float, interval: tuple[float, float], paper: float, tolerance: float) -> Verdict:
+def agrees(
+    value: float, interval: tuple[float, float] | None, paper: float, tolerance: float
+) -> Verdict:
     """The verdict on a number that we could have chosen to meet: `conditional` at most.
 
     Undecided if its interval reaches the paper's number and is wider than what is tolerated to
-    both sides: few trials then decide nothing, for or against the claim.
+    both sides: few trials then decide nothing, for or against the claim. Undecided without one.
 
     Args:
         value: Our number.
-        interval: Its 95 % interval.
+        interval: Its 95 % interval, None if it has none.
         paper: The paper's number.
         tolerance: Distance from the paper's number that still agrees.
     """
+    if interval is None:
+        return "undecided"
     low, high = interval
     if high - low > 2 * tolerance and low <= paper + tolerance and high >= paper - tolerance:
         return "undecided"

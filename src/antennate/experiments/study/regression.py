@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from antennate.jackknife import student95
 from antennate.studies.plan import Axes, Point, Range
 from antennate.types import Floats
 
@@ -75,8 +76,6 @@ def _fit(design: Floats, response: Floats, chance: float) -> list[dict[str, Any]
     unknown = dict.fromkeys(("slope", "slope95", "noise", "above_noise"))
     if count <= width or np.linalg.matrix_rank(design) < width:
         return [unknown] * (width - 1)
-    from scipy import special  # as Student's quantile needs it; scipy.stats takes a second
-
     solve: Floats = np.linalg.pinv(design).astype(float)
     found = solve @ response
     leverage = np.einsum("ij,ji->i", design, solve)
@@ -84,7 +83,7 @@ def _fit(design: Floats, response: Floats, chance: float) -> list[dict[str, Any]
         return [unknown] * (width - 1)
     errors = (response - design @ found) / (1.0 - leverage)
     error = np.sqrt((solve**2) @ errors**2)
-    half = special.stdtrit(count - width, 0.975) * error
+    half = student95(count - width) * error
     noise = _largest(solve[1:], errors, error[1:], chance) * error
     least = np.maximum(noise, np.abs(response).max() * _ROUNDING)
     return [

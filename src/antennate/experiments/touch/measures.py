@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from antennate.experiments.touch.sensing import Comparison
-from antennate.jackknife import jackknife95
+from antennate.jackknife import jackknife95, median95
 from antennate.studies import statistics
 from antennate.types import Floats, Ints
 
@@ -21,8 +21,8 @@ class Pool:
     """Measures of groups of comparisons, with 95 % intervals.
 
     Those of counts per metre are the exact ones of Poisson counts. All others are over trials:
-    jackknife (each trial left out in turn) and Student's t, in every group the same way. Ends are
-    cut where the measure ends, latencies nowhere.
+    jackknife (each trial left out in turn) and Student's t; median latencies as in `median95`. Ends
+    are cut where the measure ends.
 
     Args:
         comparisons: All valid traverses.
@@ -128,13 +128,10 @@ class Pool:
         way = np.concatenate(
             [v.speed * t * self._tick_ms for v, t in zip(group, ticks, strict=True)]
         )
-        median = float(np.median(values)) * self._tick_ms
-        others = [values[trials != one] for one in np.unique(trials)]
-        left = np.array([np.median(v) if len(v) else np.nan for v in others]) * self._tick_ms
         return {
             "n": len(values),
-            "median_ms": median,
-            "median_95_ms": _interval(median, left),
+            "median_ms": float(np.median(values)) * self._tick_ms,
+            "median_95_ms": _within(median95(np.float64(self._tick_ms) * values, trials)),
             "p90_ms": float(np.percentile(values, 90)) * self._tick_ms,
             "median_mm": float(np.median(way)),
         }
@@ -161,9 +158,7 @@ class Pool:
         return {name: _finite(whole), f"{name}_95": _interval(whole, left, 0.0, 1.0)}
 
 
-def _interval(
-    value: float, left: Floats, least: float = -np.inf, most: float = np.inf
-) -> tuple[float, float] | None:
+def _interval(value: float, left: Floats, least: float, most: float) -> tuple[float, float] | None:
     """Jackknife interval by Student's t, within the bounds.
 
     Args:
@@ -176,10 +171,14 @@ def _interval(
         None with fewer than two trials, or when it does not matter which one is left out: that
         tells nothing of the next.
     """
-    low, high = jackknife95(value, left[np.isfinite(left)])
-    if not np.isfinite([low, high]).all():
-        return None
-    return max(least, float(low)), min(most, float(high))
+    return _within(jackknife95(value, left[np.isfinite(left)]), least, most)
+
+
+def _within(
+    ends: Floats, least: float = -np.inf, most: float = np.inf
+) -> tuple[float, float] | None:
+    low, high = ends.tolist()
+    return (max(least, low), min(most, high)) if np.isfinite(ends).all() else None
 
 
 def _rate(name: str, count: int, metres: float) -> dict[str, Any]:
