@@ -6,7 +6,7 @@ from antennate.hardware.safety.causes import Cause
 from antennate.hardware.safety.cures import CURES
 
 PAGE = """\
-# What makes the robot hold
+# States and causes
 
 Every cause that `drive`, its log and the status line may name, the mildest first. What the robot
 does in each state: [States](hardware.md#states).
