@@ -66,6 +66,7 @@ class RunDirectory:
         path: Where it is.
         store: Its finished trials if it can be resumed, None otherwise.
         keeps_store: Whether they stay when the run is complete.
+        untouched: Whether it was finished already, and no file of it was missing so far.
     """
 
     def __init__(
@@ -77,7 +78,7 @@ class RunDirectory:
         finished: bool = False,
     ):
         self.path, self.store, self.keeps_store = path, store, False
-        self._finished, self._completed = finished, False
+        self._finished, self.untouched = finished, finished
         self._created = created
         self._partial = partial
         self._kept = partial is None
@@ -277,9 +278,9 @@ class RunDirectory:
             OutputError: It cannot be written.
         """
         path = inside(self.path, name)
-        if self._finished and path.exists() and not (name == REPORT and self._completed):
+        if self._finished and path.exists() and (name != REPORT or self.untouched):
             return
-        self._completed = True
+        self.untouched = False
         with writing(path):
             path.parent.mkdir(exist_ok=True)
         with writing_whole(path, overwrite=True) as file:
