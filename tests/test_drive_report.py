@@ -171,7 +171,7 @@ def test_L8_a_drive_that_sent_no_pose_ends_with_2_and_says_so(
     assert ("STALE" in result["refusal"]) == refused
     page = (tmp_path / "report.html").read_text()
     assert "Beside this page: log drive.mcap." in page
-    assert 'alt="Drive"' in page
+    assert "<figcaption>Readings, bending level, contact, maneuver and supervisor" in page
 
 
 def test_a_controller_that_does_not_exist_is_named_before_a_port_is_opened(

@@ -344,4 +344,5 @@ MEASURES = (
     Measure("priority", "priority"),
 )
 
-VIEW = View("drive", DESCRIPTION, DriveConfig, _tables, _sentences)
+_CAPTIONS = {"drive": "Readings, bending level, contact, maneuver and supervisor over time."}
+VIEW = View("drive", DESCRIPTION, DriveConfig, _tables, _sentences, captions=_CAPTIONS)
