@@ -36,6 +36,18 @@ if os.environ.pop("PYTHONDONTWRITEBYTECODE", ""):
     atexit.register(shutil.rmtree, kept, ignore_errors=True)
 
 
+HERE = tempfile.mkdtemp(prefix="tests-")
+"""An empty folder to run in, so that no robot.toml that a user left in the clone is read."""
+atexit.register(shutil.rmtree, HERE, ignore_errors=True)
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection(session: pytest.Session) -> None:
+    """Commands look into the working directory while tests are collected, too."""
+    if session.config.getoption("dist") == "no":  # it collects, and starts no workers that do
+        os.chdir(HERE)
+
+
 @pytest.fixture(autouse=True)
 def _signals_stay_as_they_are() -> Iterator[None]:
     """A program that was asked to end ignores what asks again; here others begin after it."""

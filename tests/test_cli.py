@@ -632,8 +632,11 @@ def test_a_robot_file_in_this_folder_is_hinted_at_where_no_port_is_named(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     hint = "; robot.toml is here, --config robot.toml takes its ports"
+    monkeypatch.setenv("UV", "/bin/uv")
     assert main(words) == 2
-    assert hint not in capsys.readouterr().err
+    said = capsys.readouterr().err
+    assert "; `uv run antennate setup` finds it, `uv run antennate twin` simulates a robot" in said
+    assert hint not in said
     (tmp_path / "robot.toml").touch()
     assert main(words) == 2
     said = capsys.readouterr().err

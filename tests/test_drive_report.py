@@ -171,7 +171,7 @@ def test_L8_a_drive_that_sent_no_pose_ends_with_2_and_says_so(
     assert ("STALE" in result["refusal"]) == refused
     page = (tmp_path / "report.html").read_text()
     assert "Beside this page: log drive.mcap." in page
-    assert 'alt="Drive"' in page
+    assert "<figcaption>Readings, bending level, contact, maneuver and supervisor" in page
 
 
 def test_a_controller_that_does_not_exist_is_named_before_a_port_is_opened(
@@ -288,3 +288,46 @@ def test_a_computer_that_is_late_is_named(pause: float, named: bool) -> None:
         )
     faulty = {**result, "why": "FAULT SILENT_SERVO: servos do not answer (servo 1)"}
     assert any("SILENT_SERVO may come from that" in one for one in late_sentence(faulty)) == named
+
+
+@pytest.mark.parametrize(("loss", "named"), [(0.0, False), (0.03, True)])
+def test_where_one_tick_in_a_hundred_is_missed_missed_answers_tell_a_late_computer(
+    loss: float, named: bool
+) -> None:
+    made, ticks = rig(TwinConfig()), 0
+    made.robot.bus.loss = loss
+
+    def busy(made: Rig, t: float) -> None:
+        nonlocal ticks
+        ticks += 1
+        if ticks % 100 == 0:
+            made.clock.sleep(0.012)
+
+    made, report = driven(busy, made, CONFIG.model_copy(update={"duration": 4.0}))
+    result = report.result(made.session)
+    assert 0.005 < result["walking"]["missed_share"] < 0.02
+    said = late_sentence(result)
+    assert bool(said) == named
+    assert all(f"{result['missed_answers']} answers of servos" in one for one in said)
+
+
+def test_a_servo_that_falls_silent_ends_a_drive_with_what_to_do_and_no_word_of_the_computer(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    @contextlib.contextmanager
+    def in_process(config: DriveConfig, *addresses: object) -> Iterator[Session]:
+        robot = watched(TwinConfig(), 5)[0]
+        clock = LockstepClock(robot, Faults([read("servo:7=silent@2s")], config.robot.ids))
+        yield prepare(config, BoardPort(robot, clock), clock, clock)
+
+    monkeypatch.setattr("antennate.cli.drive.connect", in_process)
+    monkeypatch.setattr(Feed, "watched", property(lambda feed: True))  # its time is invented
+    argv = ["drive", "--esp32", "board", "--bus", "bus", "--arm", "--no-touch-check"]
+    argv += ["--dry-run", "0.5", "--duration", "3", "--fault-time", "1"]
+    assert main([*argv, "--out", str(tmp_path), "--overwrite"]) == 2
+    out = " ".join(capsys.readouterr().out.split())
+    assert "SILENT_SERVO: servos do not answer (servo 7)" in out
+    (cures,) = re.findall(r"What to do: (.*?) See docs/causes\.md\.", out)
+    assert "check cables, plugs and supply of the servos (`antennate doctor`)" in cures
+    assert "The computer was late" not in out
+    assert "What to do" in (tmp_path / "report.html").read_text()

@@ -347,8 +347,9 @@ def test_info_finds_ticks_that_cannot_be_read_in_a_sound_file(
     assert (code, told["ticks"]) == (2, 0)
 
 
-def test_plot_draws_it(log: Path) -> None:
+def test_plot_draws_it(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["log", "plot", str(log)]) == 0
+    assert f"ticks were drawn into {log.with_suffix('.png')}" in capsys.readouterr().out
     assert log.with_suffix(".png").read_bytes().startswith(b"\x89PNG")
     assert main(["log", "plot", str(log), "--out", "a.svg"]) == 0
     assert Path("a.svg").read_text().count("<path") > 20

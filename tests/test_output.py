@@ -17,6 +17,7 @@ from terminal import Terminal
 from antennate.cli import main
 from antennate.cli.output import Output
 from antennate.cli.results import print_table
+from antennate.experiments.tunnel.experiment import tables
 from antennate.messages import extra, short_names
 from antennate.studies.measures import Table
 
@@ -225,3 +226,17 @@ def test_what_a_controller_prints_does_not_stand_beside_the_json(
     for said in ("imported", "by the system"):
         assert said in done.stderr
     assert "imported" in run("--out", "two").stdout
+
+
+def test_every_row_of_three_controllers_is_one_line_of_a_terminal_of_80_columns(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """200 trials of each, as docs/science keeps them; no cell can have more characters."""
+    monkeypatch.setenv("COLUMNS", "80")
+    result = json.loads((ROOT / "docs" / "science" / "evaluation.json").read_text())
+    for table in tables(result):
+        print_table(table)
+        shown = [line.strip() for line in capsys.readouterr().out.splitlines()]
+        at = next(i for i, line in enumerate(shown) if line.startswith("─"))
+        body = shown[at + 1 : shown.index("", at)]
+        assert [line.split("  ")[0] for line in body] == [name.strip() for name, _ in table.rows]

@@ -15,6 +15,7 @@ import pytest
 from browser import CHROMIUM, Tab, browser
 
 import antennate
+from antennate.cli import main
 
 pytestmark = pytest.mark.skipif(
     CHROMIUM is None, reason="no chromium here; `apt-get install chromium` brings it"
@@ -92,6 +93,25 @@ def test_a_report_is_read_on_a_screen_and_on_a_phone(tmp_path: Path) -> None:
                     assert share >= LEAST
                     assert change == "none"
                     assert scheme == "light" or behind == "rgb(255, 255, 255)"
+
+
+def test_on_a_phone_every_column_of_a_comparison_is_seen_and_what_is_wider_says_so(
+    tmp_path: Path,
+) -> None:
+    settings = {"trials": 2, "time_limit": 12.0, "seed": 5}
+    antennate.run("tunnel", out=tmp_path / "one", **settings)
+    words = ["report", "--compare", str(tmp_path / "one"), str(tmp_path / "one")]
+    assert main([*words, "--out", str(tmp_path / "both.html")]) == 0
+    hidden = """[...document.querySelectorAll('table.numbers :is(td, th)')].filter(
+        e => e.getBoundingClientRect().right > innerWidth).length"""
+    hinted = """[...document.querySelectorAll('figure')].map(e => [
+        e.querySelector('.scroll').scrollWidth > e.clientWidth,
+        getComputedStyle(e.querySelector('figcaption'), '::after').content != 'none'])"""
+    with browser(tmp_path / "browser") as tab:
+        for page in ("one/report.html", "both.html"):
+            with looked_at(tab, (tmp_path / page).as_uri(), 390, "light"):
+                assert tab.run(hidden) == 0, page
+                assert {tuple(each) for each in tab.run(hinted)} == {(True, True), (False, False)}
 
 
 @pytest.fixture(scope="module")

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -118,3 +120,15 @@ def test_record_with_the_file_of_drive_gets_as_far_as_the_port(
     words = ["record", "--config", str(file), "--esp32", "/dev/null", "--out", "left.csv"]
     assert main(words) == BAD_INPUT
     assert "/dev/null: not a serial port" in capsys.readouterr().err
+
+
+def test_a_file_that_a_user_left_in_the_clone_is_not_read_by_the_tests(tmp_path: Path) -> None:
+    (tmp_path / "robot.toml").write_text('[ports]\nbus = "ports/bus"\nesp32 = "ports/esp32"\n')
+    others = Path(__file__).with_name("test_dependent_options.py")
+    words = ["-n", "0", "-p", "no:cacheprovider", "--collect-only", "-q", str(others)]
+    words += ["-c", str(others.parents[1] / "pyproject.toml")]
+    done = subprocess.run(
+        [sys.executable, "-m", "pytest", *words], cwd=tmp_path, capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stdout
+    assert [path.name for path in tmp_path.iterdir()] == ["robot.toml"]

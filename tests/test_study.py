@@ -223,19 +223,28 @@ def test_W2_a_second_driver_is_refused(tmp_path: Path, capsys: pytest.CaptureFix
     assert study("--no-figures") == 0  # the lock went with its process
 
 
-def test_a_finished_study_that_is_repeated_leaves_its_files_alone(done: Path) -> None:
+def test_a_finished_study_that_is_repeated_leaves_its_files_alone(
+    done: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     """What is missing is written again, and then the report, which tells of all."""
     del done
+
+    def said() -> str:
+        return capsys.readouterr().err.splitlines()[-1]
+
     assert study() == 0  # with figures
+    assert said() == "written to run"
 
     def written() -> dict[Path, int]:
         return {path: path.stat().st_mtime_ns for path in Path("run").rglob("*") if path.is_file()}
 
     before, content = written(), Path("run/trials.csv").read_bytes()
     assert study() == 0
+    assert said() == "complete already; nothing was run: run"
     assert written() == before
     Path("run/trials.csv").unlink()
     assert study() == 0
+    assert said() == "written to run"
     assert Path("run/trials.csv").read_bytes() == content
     after = written()
     assert {path.name for path in after if after[path] != before[path]} == {

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -184,3 +185,12 @@ def test_the_supply_sags_down_the_ladder_and_does_not_flutter() -> None:
 def test_supply_levels_in_the_wrong_order_are_refused() -> None:
     with pytest.raises(ConfigError, match="must fall from warn over hold to off"):
         SupervisorParams(supply_hold=11.0)
+
+
+@pytest.mark.parametrize("cause", Cause)
+def test_the_page_of_causes_says_what_to_do_about_each(cause: Cause) -> None:
+    page = (Path(__file__).parents[1] / "docs" / "causes.md").read_text(encoding="utf-8")
+    (line,) = [line for line in page.splitlines() if line.startswith(f"| `{cause.name}` |")]
+    _, _, state, means, cure, _ = (cell.strip() for cell in line.split("|"))
+    assert (state, means) == (cause.severity.name, cause.text)
+    assert len(cure) > len("hold")

@@ -58,8 +58,10 @@ def warp() -> Any:
 
 def test_a_missing_package_is_named_with_its_install(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "mujoco_warp", None)
-    with pytest.raises(MissingPackageError, match=r"no mujoco-warp.*pip install --no-deps"):
-        require_warp()
+    for uv, pip in (("/bin/uv", "uv pip"), ("", "pip")):
+        monkeypatch.setenv("UV", uv)
+        with pytest.raises(MissingPackageError, match=rf"no mujoco-warp.* with {pip} install --no"):
+            require_warp()
 
 
 def test_tunnels_are_filled_up_to_one_number_of_cylinders() -> None:

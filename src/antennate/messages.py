@@ -46,8 +46,8 @@ def typed(*words: str) -> str:
 def extra(name: str) -> str:
     """How to get an extra of this package; it follows words such as `install it with`."""
     return (
-        f"`uv run --extra {name} antennate ...` in a clone, or in the folder above it with `pip "
-        f"install './antennate[{name}]'`"
+        f"`uv run --extra {name} antennate ...` in a clone, or, with the clone as ./antennate, by "
+        f"`pip install './antennate[{name}]'`"
     )
 
 

@@ -17,6 +17,7 @@ from antennate.hardware.doctor.ports import same
 from antennate.hardware.ports.finder import is_udp
 from antennate.hardware.ports.keys import read_key
 from antennate.hardware.robot_file import RobotFile
+from antennate.messages import typed
 from antennate.params.reading import Config, read_file
 from antennate.params.setup import PortsParams
 
@@ -116,9 +117,10 @@ def key_of(options: RobotOptions) -> bytes | None:
 
 
 def at_hand(options: FromFile) -> str:
-    """A hint at the robot's file in this folder, empty if there is none or --config names one."""
-    named = options.config is not None or not USUAL.is_file()
-    return "" if named else f"; {USUAL} is here, --config {USUAL} takes its ports"
+    """A hint at the robot's file in this folder, else at the commands that find or make a port."""
+    if options.config is None and USUAL.is_file():
+        return f"; {USUAL} is here, --config {USUAL} takes its ports"
+    return f"; `{typed('setup')}` finds it, `{typed('twin')}` simulates a robot"
 
 
 def require_two_ports(options: PortOptions) -> None:

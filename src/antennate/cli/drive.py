@@ -33,6 +33,7 @@ from antennate.hardware.driving.session import Session
 from antennate.hardware.driving.signals import StopOnce
 from antennate.hardware.robot_file import RobotFile
 from antennate.hardware.safety.causes import State
+from antennate.hardware.safety.cures import what_to_do
 from antennate.messages import short_names, typed
 from antennate.robots.spec import require_antennae
 from antennate.studies.formats import to_json
@@ -149,10 +150,7 @@ def walk(
                 folder.write_figures({"drive": _figure(log)})
             except (LogError, OutputError) as error:
                 viewer.say(error)
-    fault = result["worst_state"] in (State.FAULT.name, State.OFF.name)
-    stays_on = result["torque_off"] is False
-    idle = _idle(result)
-    return BAD_INPUT if fault or stays_on or result["refusal"] or idle else OK
+    return BAD_INPUT if _failed(result) else OK
 
 
 def _figure(log: Path) -> Any:
@@ -211,7 +209,8 @@ def _tables(result: Mapping[str, Any]) -> Sequence[Table]:
 
 
 def _sentences(result: Mapping[str, Any]) -> str:
-    return "\n".join([_sentence(result), *late_sentence(result)])
+    cures = what_to_do(f"{result['refusal']}; {result['why']}") if _failed(result) else []
+    return "\n".join([_sentence(result), *late_sentence(result), *cures])
 
 
 def _carry_out(
@@ -272,6 +271,11 @@ def _operator(config: DriveConfig, orders: Orders) -> Iterator[Operator]:
                 )
             arrived = stack.enter_context(Arrival(orders.until))
         yield Operator(stop, pressed, arrived or (lambda: False))
+
+
+def _failed(result: Mapping[str, Any]) -> bool:
+    fault = result["worst_state"] in (State.FAULT.name, State.OFF.name)
+    return fault or result["torque_off"] is False or bool(result["refusal"]) or _idle(result)
 
 
 def _idle(result: Mapping[str, Any]) -> bool:
@@ -338,4 +342,5 @@ MEASURES = (
     Measure("priority", "priority"),
 )
 
-VIEW = View("drive", DESCRIPTION, DriveConfig, _tables, _sentences)
+_CAPTIONS = {"drive": "Readings, bending level, contact, maneuver and supervisor over time."}
+VIEW = View("drive", DESCRIPTION, DriveConfig, _tables, _sentences, captions=_CAPTIONS)

@@ -99,7 +99,8 @@ def command(argv: Sequence[str]) -> int:
     log = actions[options.action](path, target)
     recovered = options.action == "recover"
     more = f"; {left_out(log)}" if recovered else ""
-    tell({}, options, (), f"{log.ticks} ticks were written to {target}{more}.")
+    done = "drawn into" if options.action in ("plot", "film") else "written to"
+    tell({}, options, (), f"{log.ticks} ticks were {done} {target}{more}.")
     if recovered:
         say_unguarded("log", log)
         return OK

@@ -74,7 +74,8 @@ def folder_for(
         folder.describe(config, ["antennate", command or view.name, *argv])
         yield folder
         write_report(folder, view)
-        sys.stderr.write(f"written to {folder.path}\n")
+        told = "complete already; nothing was run:" if folder.untouched else "written to"
+        sys.stderr.write(f"{told} {folder.path}\n")
 
 
 def log_of(path: Path) -> Path:

@@ -14,8 +14,8 @@ _DPI, _CSS_DPI = 200, 96
 """Pixels an inch of our pictures, and of a page."""
 _LEAST = 0.75
 """Letters of 9 points become no smaller than this share; a narrow screen scrolls instead."""
-_BROAD = 440
-"""Pictures of a greater least width do not fit on a phone [px]."""
+_BROAD, _TIGHT = 440, 350
+"""Pictures of a greater least width do not fit on a phone, or on most phones [px]."""
 _VAST = 1200
 """Drawn broader than that [px], they take the whole window and are never made smaller."""
 _CODE = re.compile(r"`([^`]+)`")
@@ -59,7 +59,11 @@ summary { cursor: pointer; } dl { margin: .4rem 0; } dd { margin: 0 0 .4rem; }
 .vast { width: min(calc(100vw - 3rem), var(--drawn)); position: relative; left: 50%;
   transform: translateX(-50%); }
 @media (max-width: 95rem) { .vast + figcaption::after { content: " (scroll it: it is wider)"; } }
-@media (max-width: 30rem) { .broad + figcaption::after { content: " (swipe: it is wider)"; } }
+@media (max-width: 30rem) { .broad + figcaption::after { content: " (swipe: it is wider)"; }
+  table.numbers { font-size: .75rem; white-space: normal; }
+  table.numbers :is(td, th) { padding-right: .5rem; }
+  table.numbers td:first-child { white-space: pre-wrap; } }
+@media (max-width: 26rem) { .tight + figcaption::after { content: " (swipe: it is wider)"; } }
 @media print { body { max-width: none; padding: 0; font-size: 10pt; } pre { white-space: pre-wrap; }
   details::details-content { content-visibility: visible; display: block; block-size: auto; }
   .scroll { overflow: visible; background: none; } .scroll > img { min-width: 0 !important; }
@@ -117,7 +121,8 @@ def picture(png: bytes, svg: bytes, described: str) -> str:
     width, height = (round(size * _CSS_DPI / _DPI) for size in (width, height))
     vast = width > _VAST
     least = width if vast else round(_LEAST * width)
-    broad = " vast" if vast else " broad" if least > _BROAD else ""
+    narrow = " broad" if least > _BROAD else " tight" if least > _TIGHT else ""
+    broad = " vast" if vast else narrow
     return (
         f'<div class="scroll{broad}" style="--drawn: {width}px">'
         f'<img alt="{escape(described)}" width="{width}" height="{height}" '

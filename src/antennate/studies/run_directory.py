@@ -62,11 +62,12 @@ class RunDirectory:
         path: Where it is.
         store: Its finished trials if it can be resumed, None otherwise.
         keeps_store: Whether they stay when the run is complete.
+        untouched: Whether it was finished already, and no file of it was missing so far.
     """
 
     def __init__(self, taken: Claim):
         self.path, self.store, self.keeps_store = taken.path, taken.store, False
-        self._finished, self._completed = taken.finished, False
+        self._finished, self.untouched = taken.finished, taken.finished
         self._created, self._replaced = taken.created, taken.replaced
         self._partial = taken.partial
         self._kept = taken.partial is None
@@ -254,9 +255,9 @@ class RunDirectory:
             OutputError: It cannot be written.
         """
         path = inside(self.path, name)
-        if self._finished and path.exists() and not (name == REPORT and self._completed):
+        if self._finished and path.exists() and (name != REPORT or self.untouched):
             return
-        self._completed = True
+        self.untouched = False
         with writing(path):
             path.parent.mkdir(exist_ok=True)
         with writing_whole(path, overwrite=True) as file:

@@ -46,13 +46,13 @@ CONTROLLER = (
 )
 COLUMNS = (*CONTROLLER, Measure("time_s", "time, a failure as the limit", "s", form=".1f"))
 PAIR = (
-    Measure("trials", "trials valid in both", form="d"),
-    Measure("only_first", "only the first succeeded", form="d"),
+    Measure("trials", "valid in both", form="d"),
+    Measure("only_first", "only the first", form="d"),
     Measure("only_second", "only the second", form="d"),
     Measure("both", "both succeeded", form="d"),
-    Measure("both_time_s", "  time, first and second", "s", form=".1f", join=", "),
+    Measure("both_time_s", "  time of each", "s", form=".1f", join=", "),
     Measure("mcnemar_p", "McNemar p", form=".3g"),
-    Measure("time_difference_s", "time, first - second", "s", form="+.1f"),
+    Measure("time_difference_s", "difference", "s", form="+.1f"),
     Measure("time_difference_95", "  95 %", "s", form="+.1f"),
     Measure("wilcoxon_p", "Wilcoxon p", form=".3g"),
 )

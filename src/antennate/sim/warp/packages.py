@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from importlib import import_module, metadata
 from importlib.util import find_spec
 from typing import Any
@@ -25,9 +26,10 @@ def require_warp() -> tuple[Any, Any]:
     """
     missing = [package for module, package in _MODULES.items() if find_spec(module) is None]
     if missing:
+        uv = "uv " if os.environ.get("UV") else ""  # `uv run` sets it: there pip installs elsewhere
         raise MissingPackageError(
             f"--engine warp: expected the packages {', '.join(_MODULES.values())}, found no "
-            f"{', '.join(missing)}; install them with {INSTALL}"
+            f"{', '.join(missing)}; install them with {uv}{INSTALL}"
         )
     version = _version("mujoco-warp")
     if version and not version.startswith(f"{_SERIES}."):

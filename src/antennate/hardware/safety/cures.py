@@ -1,0 +1,73 @@
+"""What to do about each cause that makes a robot hold or takes its torque."""
+
+from __future__ import annotations
+
+import re
+from types import MappingProxyType
+
+from antennate.hardware.safety.causes import Cause
+
+_ARM = "start `drive --arm` again"
+_BUS = "check cables, plugs and supply of the servos (`antennate doctor`)"
+_BOARD = "check cable, supply and network of the antenna board (`antennate doctor`)"
+_WIRE = "check wires and plugs of that antenna (`antennate doctor`)"
+_SUPPLY = "charge or change the battery"
+_CODE = "mend the controller; `tracebacks` in result.json says where it failed"
+
+CURES = MappingProxyType(
+    {
+        Cause.SPIKY: f"{_WIRE}; keep them away from the cables of the servos",
+        Cause.OUT_OF_CAL: "nothing while an antenna bends far; else calibrate again",
+        Cause.SATURATED: "free the antenna; if it is free, calibrate again",
+        Cause.DRIFT: "let the antenna rest; if it stays, calibrate again",
+        Cause.RATE: _BOARD,
+        Cause.LATE_ANSWERS: f"close other programs; {_BUS}",
+        Cause.SUPPLY_UNKNOWN: f"{_BUS}; the first servo tells the voltage",
+        Cause.SUPPLY_WARN: f"{_SUPPLY} soon",
+        Cause.STALE: f"{_BOARD}; close other programs",
+        Cause.REBOOT: _BOARD,
+        Cause.LOST: _WIRE,
+        Cause.STUCK: f"{_WIRE}; switch the antenna board off and on",
+        Cause.OPEN: f"{_WIRE}; if it bends farther than when it was calibrated, calibrate again",
+        Cause.SHORT_LO: f"{_WIRE}; is the flex sensor still on them?",
+        Cause.SHORT_HI: f"{_WIRE}; where do they touch the supply?",
+        Cause.FAILED: _CODE,
+        Cause.UNDECIDED: "let the controller decide in every tick, in less than its 10 ms",
+        Cause.BAD_ACTION: "let the controller give one of the maneuvers",
+        Cause.BAD_COMMAND: "let the controller give commands within the limits of the robot",
+        Cause.UNKNOWN_CONTACT: "mend what is named beside it; if nothing is, the controller",
+        Cause.NO_RECORD: "free space on the disk; or set `record_required = false`",
+        Cause.RELEASED: "hold a key",
+        Cause.SUPPLY_HOLD: _SUPPLY,
+        Cause.REPEATED_HOLDS: f"mend what made it hold, then {_ARM}",
+        Cause.REPEATED_FAILURES: _CODE,
+        Cause.REBOOT_LOOP: _BOARD,
+        Cause.SILENT_SERVO: f"close other programs; {_BUS}",
+        Cause.SERVO_ERROR: "switch the servos off; let them cool, free what blocks them",
+        Cause.BUS_ERROR: f"check the adapter of the servo bus and its cable; {_BUS}",
+        Cause.WATCHDOG: f"close other programs; then {_ARM}",
+        Cause.DISARMED: f"{_BUS}; then {_ARM}",
+        Cause.NOT_READY: "do what stands in its brackets",
+        Cause.PAUSE: f"close other programs, let nothing suspend the computer; then {_ARM}",
+        Cause.SUPPLY_OFF: _SUPPLY,
+        Cause.NOT_ARMED: f"{_ARM}, if nothing else is named",
+        Cause.STOPPED: _ARM,
+    }
+)
+"""The likely cure of each cause."""
+_NAMED = re.compile(r"\b(?:HOLD|FAULT|OFF) ([A-Z_]+): ")
+_FOLLOW = (Cause.NOT_ARMED, Cause.UNKNOWN_CONTACT)
+"""What follows from other causes; its cure counts if none is named."""
+
+
+def what_to_do(why: str) -> list[str]:
+    """What a person can do about what kept a robot from walking: one sentence, or none.
+
+    Args:
+        why: Causes as `Active.text` names them, in their order.
+    """
+    found = [Cause[name] for name in _NAMED.findall(why)]
+    first = [cause for cause in found if cause not in _FOLLOW]
+    likely = dict.fromkeys(CURES[cause] for cause in first or found)
+    cures = ". ".join(cure[0].upper() + cure[1:] for cure in likely)
+    return [f"What to do: {cures}. See docs/causes.md."] if cures else []
