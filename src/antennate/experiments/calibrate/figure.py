@@ -135,8 +135,8 @@ def _draw_rivals(panel: Axes, known: Mapping[str, Any]) -> None:
     panel.set_xlabel("gain: error of the sigmoid minus the rival's")
     named = " and ".join(known["named"]) or "none"
     panel.set_title(f"Beats the sigmoid under every check:\n{named}")
-    panel.set_ylim(-len(checks) + 0.2, 0.9)
-    panel.legend(loc="upper center", ncols=2)
+    panel.set_ylim(-len(checks) + 0.4, 0.4)
+    panel.legend(loc="upper center", bbox_to_anchor=(0.5, -0.35), ncols=2)
 
 
 def _draw_bins(panel: Axes, x: Floats, y: Floats, colour: str, label: str) -> None:

@@ -85,11 +85,11 @@ def _draw_plan(panel: Axes, result: Mapping[str, Any], walks: Mapping[str, Walk]
         panel.plot(*points[-1], color=colour, marker="o", markersize=6)
     panel.plot(*next(iter(walks.values())).centre[0], color=style.INK, marker="s", markersize=6)
     panel.set_aspect("equal", adjustable="datalim")
-    panel.margins(0.08, 0.35)
+    panel.margins(0.08)
     panel.set(
         xlabel="x [m]", ylabel="y [m]", title="Centre of the robot from above, square at the start"
     )
-    panel.legend(loc="best", fontsize=8)
+    panel.legend(loc="upper center", bbox_to_anchor=(0.5, -0.2), fontsize=8)
 
 
 @style.styled
