@@ -150,7 +150,7 @@ def test_an_own_class_of_a_module_runs_in_workers() -> None:
         ({"experiment": SpringParams(), "wire_mm": 0.4}, "settings only beside a name"),
         ({"experiment": antennate.run}, "expected a name or the configuration"),
         ({"experiment": "springs", "engine": "dask"}, "that runs trials on workers, found springs"),
-        ({"experiment": "springs", "out": "a\0b"}, "found one with a zero byte"),
+        ({"experiment": "springs", "out": "a\0b"}, "out: expected a path, found"),
         *(
             ({"experiment": "wall", "workers": workers}, "workers: expected a whole number")
             for workers in (0, -1, 1.5, None, True)

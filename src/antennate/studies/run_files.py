@@ -217,9 +217,8 @@ def place_of(command: str, path: str | Path | None) -> Path:
     Raises:
         BadInputError: The path is none, or no folder can have such a name.
     """
-    if path == "" or "\0" in str(path):
-        found = "one with a zero byte" if path else "an empty one"
-        raise OutputError(f"expected the name of a folder, found {found}")
+    if path == "":
+        raise OutputError("expected the name of a folder, found an empty one")
     if "/" in checks.text("command", command):
         raise ConfigError(f"command: expected a name without a slash, found {command}")
     return _free(command) if path is None else checks.path("path", path)
