@@ -29,7 +29,7 @@ def tables(result: Mapping[str, Any]) -> Sequence[Table]:
         MANEUVER,
         f"Body length {result['body_length_m']:g} m, {result['frequency_hz']:g} cycles a second.\n"
         f"Without the body wave {off['speed_m_s']:z.3f} m/s{share and f'{share} without slip'}.\n"
-        f"The fastest of the leads tried is {best:.0f} deg. The chosen one, {chosen:.0f} deg, "
+        f"The fastest lead tried is {best:.0f} deg. The chosen lead of {chosen:.0f} deg "
         f"gives {100 * cost['chosen_over_best']:.0f} % of its speed;\n"
         f"the slowest one gives {100 * cost['worst_over_best']:.0f} %.",
     )
