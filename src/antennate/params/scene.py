@@ -8,6 +8,9 @@ from pydantic import model_validator
 
 from antennate.params.base import Params, number
 
+GRAVITY = 9.81
+"""Gravity: the engine's default [m/s²]."""
+
 
 class CylinderParams(Params):
     """The loose paper cylinders."""

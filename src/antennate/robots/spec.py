@@ -17,6 +17,7 @@ from antennate.errors import ConfigError
 from antennate.messages import nearest, shown
 from antennate.params.base import Params, number
 from antennate.params.reading import read_file
+from antennate.params.scene import GRAVITY
 from antennate.robots.antenna import BASE, AntennaSpec
 from antennate.robots.joints import (
     STRAIGHT,
@@ -34,8 +35,6 @@ ROBOTS = ("scuttle", "hexapod")
 """Robots that are known by name; each is a file beside this one."""
 CLEARANCE = 0.002
 """Gap that neighbouring legs keep at the largest bend [m] (assumed: play of printed parts)."""
-_GRAVITY = 9.81
-"""As in the engine [m/s²]."""
 ANTENNA_PREFIXES = tuple(f"antenna_{side}_" for side in SIDES)
 
 
@@ -158,7 +157,7 @@ class RobotSpec(Params):
         """Mass that all legs together raise at stall torque, each at the end of its leg [kg]."""
         lever = self.leg_radius + self.leg_eccentricity
         torque = self.leg_count * self.servos.of(self.legs.servo).stall_torque
-        return torque / (_GRAVITY * lever)
+        return torque / (GRAVITY * lever)
 
     @property
     def link_names(self) -> tuple[str, ...]:

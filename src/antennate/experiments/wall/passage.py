@@ -12,6 +12,7 @@ from antennate.antenna.statics import with_profile
 from antennate.experiments.wall.config import WallConfig
 from antennate.experiments.wall.outcome import SAMPLE_PERIOD, Traverse
 from antennate.experiments.wall.way import COMMAND_PERIOD, from_crest, marks, ramp, spheres
+from antennate.params.scene import GRAVITY
 from antennate.robots.antenna import AntennaSpec
 from antennate.sim import chain
 from antennate.sim.bench import Ball, Bench, Watch, compile_bench, unwatched
@@ -23,7 +24,6 @@ SAMPLES = round(SAMPLE_PERIOD / COMMAND_PERIOD)
 """Commands to a sample."""
 _CLEAR = 0.002
 """Distance between tip and crests before the approach [m]."""
-_GRAVITY = 9.81
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ class Passage:
     @property
     def pull(self) -> tuple[float, float]:
         """Gravity in the plane [m/s²]."""
-        ways = {"down": -_GRAVITY, "up": _GRAVITY, "off": 0.0}
+        ways = {"down": -GRAVITY, "up": GRAVITY, "off": 0.0}
         return 0.0, ways[self.config.wall.gravity]
 
     def bench(self, further: int = 0) -> Bench:

@@ -32,7 +32,7 @@ CURES = MappingProxyType(
         Cause.SHORT_LO: f"{_WIRE}; is the flex sensor still on them?",
         Cause.SHORT_HI: f"{_WIRE}; where do they touch the supply?",
         Cause.FAILED: _CODE,
-        Cause.UNDECIDED: "let the controller decide in every tick, in less than its 10 ms",
+        Cause.UNDECIDED: "let the controller decide in every tick, in less than a control period",
         Cause.BAD_ACTION: "let the controller give one of the maneuvers",
         Cause.BAD_COMMAND: "let the controller give commands within the limits of the robot",
         Cause.UNKNOWN_CONTACT: "mend what is named beside it; if nothing is, the controller",
