@@ -130,7 +130,7 @@ def go_on(folder: Path, finished: int) -> float:
         (run / "result.json").unlink()
         store = run / "trials.store.jsonl"
         lines = store.read_bytes().splitlines(keepends=True)
-        store.write_bytes(b"".join(lines[: 1 + finished]))
+        store.write_bytes(b"".join(lines[: finished - ALL]))  # without the last trials
     words = ["study", str(folder / "study.toml"), "--trust-code", "--no-figures"]
     begin = time.monotonic()
     subprocess.run(
