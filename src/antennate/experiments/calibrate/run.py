@@ -123,10 +123,8 @@ class CalibrateOutcome(Outcome):
     """A calibration and its data.
 
     Attributes:
-        config: What was asked.
         recording: The data, averaged as asked, with each push as a trial of its own.
         raw: The same before averaging.
-        calibration: The curve.
     """
 
     config: CalibrateConfig

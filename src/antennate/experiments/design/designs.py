@@ -22,8 +22,6 @@ class Design:
     Attributes:
         number: Its number in the order of the run.
         name: That of a reference, else the number.
-        reference: Whether it is one.
-        point: Its parameters.
         state: Whether it was judged (ok), had too few trials that are ok (failed), could not be
             configured (refused), or the run was interrupted (unfinished).
         reason: Why it was refused.
@@ -50,7 +48,6 @@ class DesignOutcome:
     """All designs and all rows, in order.
 
     Attributes:
-        config: What was run.
         designs: The references, then the proposals.
         rows: One for each trial, all with the same keys.
         proposed: How many designs were proposed, those among them that came again.

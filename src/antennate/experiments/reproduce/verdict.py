@@ -78,7 +78,6 @@ class Bar:
 
     Attributes:
         label: Whose number it is.
-        value: The number.
         interval: Its 95 % interval, None without one.
     """
 
@@ -93,7 +92,6 @@ class Finding:
 
     Attributes:
         ours: Our numbers, in words.
-        verdict: The verdict.
         reason: Why, and for `conditional` under which condition.
         bars: The paper's numbers and ours, in the claim's unit; the paper's first.
     """

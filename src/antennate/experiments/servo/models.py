@@ -24,7 +24,6 @@ class Model:
     """A servo model: where its parameters begin, and which of them are fitted.
 
     Attributes:
-        name: What it is called.
         values: Parameters, shape (6,).
         free: Names of those that are fitted.
     """

@@ -31,8 +31,6 @@ class ServoOutcome(Outcome):
     """What the models made of the recordings.
 
     Attributes:
-        config: What was asked.
-        recordings: The recordings.
         data: The same on one grid of times.
         models: Rows of the table, simple ones first; the last is the whole model.
         fitted: Parameters of each from all recordings, shape (M, 6).

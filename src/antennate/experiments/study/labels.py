@@ -33,12 +33,7 @@ def measure(result: Mapping[str, Any]) -> Measure:
 
 
 def measure_of(experiment: str, column: str) -> Measure:
-    """The measure of an experiment that is kept in a column, or the column in words.
-
-    Args:
-        experiment: Its name, or the function that measures.
-        column: Its name in `trials.csv`.
-    """
+    """The measure of an experiment that is kept in a column, or the column in words."""
     if column == SUCCESS:
         return _SHARE
     known = _experiment(experiment)

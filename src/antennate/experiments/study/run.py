@@ -41,10 +41,8 @@ class StudyOutcome:
     """All rows, point by point.
 
     Attributes:
-        config: What was run.
         points: The points of the plan.
         condition: Column that tells the condition of a row; empty without.
-        axes: What varies.
         rows: One for each trial, all with the same keys.
         total: Trials of the whole plan.
         ended: Those of them that have ended.

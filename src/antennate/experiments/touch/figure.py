@@ -34,11 +34,7 @@ def figures(outcome: TouchOutcome) -> dict[str, Figure]:
 
 @style.styled
 def measures(result: Mapping[str, Any]) -> Figure:
-    """F1 by speed and by wall, and both latencies by speed, one colour a profile.
-
-    Args:
-        result: The content of result.json.
-    """
+    """F1 by speed and by wall, and both latencies by speed, one colour a profile."""
     figure = style.canvas(style.WIDTH, 11.5)
     by_speed, by_wall, *latencies = figure.subplots(4, 1)
     speeds, walls = result["by_speed"], result["by_wall"]
@@ -94,11 +90,7 @@ def _draw(
 
 @style.styled
 def curves(result: Mapping[str, Any]) -> Figure:
-    """ROC of the bending level with the default theta, and F1 over theta.
-
-    Args:
-        result: The content of result.json.
-    """
+    """ROC of the bending level with the default theta, and F1 over theta."""
     figure = style.canvas(style.WIDTH, 8.4)
     roc, over = figure.subplots(2, 1, height_ratios=(1.25, 1))
     roc.plot([0, 100], [0, 100], color=style.MUTED, linewidth=1.0, linestyle=(0, (2, 2)))

@@ -73,7 +73,6 @@ class TracksOutcome:
         config: What was asked, with the points and the wall of the synthetic animal if it was one.
         rows: A row for each antenna.
         antennae: The antennae in the same order.
-        walls: The wall of each file.
         skipped: Animals known in too few frames.
     """
 

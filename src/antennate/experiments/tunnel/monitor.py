@@ -123,8 +123,6 @@ class TrialMonitor:
 
     Attributes:
         seed, trial: What decides all chance.
-        controller: Name of the controller.
-        scene: Where it takes place.
         before: Obstacles that can move, at the start, as in `TrialPath`.
         time_limit: Time after which it has failed [s].
     """

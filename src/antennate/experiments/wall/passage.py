@@ -31,10 +31,8 @@ class Passage:
     """What chance has drawn for a trial, and what follows from it.
 
     Attributes:
-        config: What is run.
         antenna: The antenna, with the trial's friction.
         factors: What each spring's stiffness is multiplied with, shape (n,).
-        balls: The wall.
         base: Angle of the antenna's base [rad].
         approach: Way of the base towards the wall [m].
         crest: Distance of the crests from its start [m].
@@ -118,13 +116,7 @@ def draw(config: WallConfig, profile: str, trial: int) -> Passage:
 
 
 def passage(config: WallConfig, profile: str, trial: int, watch: Watch = unwatched) -> Traverse:
-    """Move one antenna along the wall.
-
-    Args:
-        config: What is run.
-        profile: Springs of the antenna.
-        trial: Which of its trials.
-        watch: Looks at the bench of the engine; the chain has none.
+    """Move one antenna along the wall; `watch` looks at the bench of the engine, not at the chain.
 
     Raises:
         MissingPackageError: The solver needs a package that is not installed.
