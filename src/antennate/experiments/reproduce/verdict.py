@@ -126,6 +126,18 @@ class Claim:
     judge: Callable[[Mapping[str, Any]], Finding]
 
 
+def claim(
+    experiment: str, unit: str, paper: str, rule: str
+) -> Callable[[Callable[[Mapping[str, Any]], Finding]], Claim]:
+    """Make a function that judges the claim which its docstring states; the claim has its name."""
+
+    def made(judge: Callable[[Mapping[str, Any]], Finding]) -> Claim:
+        text = (judge.__doc__ or "").removesuffix(".")
+        return Claim(judge.__name__, text, paper, rule, experiment, unit, judge)
+
+    return made
+
+
 @dataclass(frozen=True, slots=True)
 class Row:
     """A judged claim: a row of claims.csv and of `claims` in result.json."""
