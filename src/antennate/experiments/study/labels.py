@@ -76,6 +76,19 @@ def axis(result: Mapping[str, Any], path: str) -> str:
     return f"{name.removesuffix(said).replace('_', ' ')} [{unit}]"
 
 
+def text(value: Any, digits: int = 4) -> str:
+    """A value of a point as shown; a list as its entries."""
+    if isinstance(value, list | tuple):
+        return " ".join(text(each, digits) for each in value)
+    return f"{value:.{digits}g}" if isinstance(value, float) else str(value)
+
+
+def silent(statuses: Mapping[str, int]) -> str:
+    """What is said of trials that say nothing, empty if all are ok."""
+    told = ", ".join(f"{n} {name}" for name, n in statuses.items() if name != "ok")
+    return f". Trials that say nothing: {told}; trials.csv has why" if told else ""
+
+
 def _is_group(model: Any) -> bool:
     return isinstance(model, type) and issubclass(model, Params)
 
