@@ -55,17 +55,17 @@ class TrialResult:
     controller: str
     outcome: Outcome
     time_s: float
-    progress_m: float
-    stuck: int
-    recovered: int
-    share_forward: float
-    share_turn_l: float
-    share_turn_r: float
-    share_reverse: float
-    share_hold: float
-    force_mean_n: float
-    force_max_n: float
-    reason: str
+    progress_m: float = 0.0
+    stuck: int = 0
+    recovered: int = 0
+    share_forward: float = 0.0
+    share_turn_l: float = 0.0
+    share_turn_r: float = 0.0
+    share_reverse: float = 0.0
+    share_hold: float = 0.0
+    force_mean_n: float = 0.0
+    force_max_n: float = 0.0
+    reason: str = ""
 
 
 @dataclass(frozen=True, slots=True)

@@ -22,7 +22,7 @@ from antennate.studies.pool import Workers, chunk_of, gather
 from antennate.studies.work import Fail, Failure, no_failure
 from antennate.telemetry.view.pace import Restart
 from antennate.telemetry.view.simulation import SimulationView
-from antennate.types import AntennaFrame, Controller, Maneuver
+from antennate.types import AntennaFrame, Controller
 
 _Found = tuple[TrialResult, TrialPath | None]
 
@@ -142,22 +142,8 @@ def _lost(config: TunnelConfig, trial: Trial, failure: Failure) -> _Found:
     if failure.status == "failed":
         raise failure.raised()
     name, number = trial
-    shares = {f"share_{m.name.lower()}": 0.0 for m in Maneuver}
-    row = TrialResult(
-        seed=config.seed,
-        trial=number,
-        controller=name,
-        outcome="invalid",
-        time_s=config.time_limit,
-        progress_m=0.0,
-        stuck=0,
-        recovered=0,
-        **shares,
-        force_mean_n=0.0,
-        force_max_n=0.0,
-        reason=failure.reason,
-    )
-    return row, None
+    key = config.seed, number, name
+    return TrialResult(*key, "invalid", config.time_limit, reason=failure.reason), None
 
 
 def _run_viewed(
