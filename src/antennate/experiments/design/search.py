@@ -14,7 +14,7 @@ from antennate.experiments.design.config import DesignConfig, Goal
 from antennate.experiments.design.designs import Design, DesignOutcome
 from antennate.experiments.design.evaluate import OF_DESIGN, Row, Task, evaluators, run_tasks
 from antennate.experiments.design.propose import Drawn, Told, package, point_of, propose
-from antennate.experiments.study.run import REASON, STATUS, cells
+from antennate.experiments.study.run import REASON, STATUS, aligned, cells
 from antennate.experiments.study.subject import columns_in
 from antennate.studies.experiment import OnRow, OnStep
 from antennate.studies.plan import Point
@@ -96,14 +96,12 @@ class Search:
     def outcome(self, interrupted: bool) -> DesignOutcome:
         """What has been found."""
         self._find_front()
-        columns = dict.fromkeys(
-            name for row in self.rows for name in row if name not in (STATUS, REASON)
-        )
-        rows = [{n: row.get(n) for n in (*columns, STATUS, REASON)} for row in self.rows]
         repeated = len(self.asked) - sum(not design.reference for design in self.designs)
         counts = (len(self.asked), repeated)
         version = package().__version__
-        return DesignOutcome(self.config, self.designs, rows, *counts, version, interrupted)
+        return DesignOutcome(
+            self.config, self.designs, aligned(self.rows), *counts, version, interrupted
+        )
 
     def _design(self, point: Point, name: str, reference: bool) -> Design:
         design = Design(

@@ -279,8 +279,13 @@ def _table(
         for place, rows in in_order
         for row in rows
     ]
-    columns = dict.fromkeys(name for row in whole for name in row if name not in (STATUS, REASON))
-    return [{n: row.get(n) for n in (*columns, STATUS, REASON)} for row in whole]
+    return aligned(whole)
+
+
+def aligned(rows: Rows) -> Rows:
+    """The same rows, each with the columns of all, status and reason last."""
+    columns = dict.fromkeys(name for row in rows for name in row if name not in (STATUS, REASON))
+    return [{n: row.get(n) for n in (*columns, STATUS, REASON)} for row in rows]
 
 
 def cells(point: Point) -> dict[str, Any]:
