@@ -25,8 +25,7 @@ def figures(outcome: ServoOutcome) -> dict[str, Figure]:
     for i, panel in enumerate(panels):
         _draw(panel, outcome, i, traces[:, :, i])
     panels[-1].set_xlabel("time [s]")
-    handles, labels = panels[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=2)
+    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=2)
     return {"servo": figure}
 
 

@@ -63,8 +63,7 @@ def figures(outcome: SweepOutcome) -> dict[str, Figure]:
         published = result["published_percent"][key]
         panel.axhline(published, color=style.INK, linewidth=1, linestyle=(0, (4, 2)))
         panel.set_title(f"{what}, with sensor noise (95 %);\ndashed: CITRAS, {published:g} %{note}")
-    handles, labels = panels[0].get_legend_handles_labels()
-    lower.legend(handles, labels, loc="outside lower center", ncols=1)
+    lower.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=1)
     return {"sweep": figure}
 
 

@@ -58,8 +58,7 @@ def measures(result: Mapping[str, Any]) -> Figure:
         panel.set_ylabel(measure.title)
         bottom, top = panel.get_ylim()
         panel.set_ylim(min(0.0, bottom), max(1.05 * top, 10.0))
-    handles, labels = by_speed.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=3)
+    figure.legend(*by_speed.get_legend_handles_labels(), loc="outside upper center", ncols=3)
     return figure
 
 
