@@ -4,17 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 from antennate.studies.statistics import wilson95
 
 Verdict = Literal["reproduced", "conditional", "not_reproduced", "undecided"]
-VERDICTS: Mapping[Verdict, str] = {
-    "reproduced": "reproduced",
-    "conditional": "conditional",
-    "not_reproduced": "not reproduced",
-    "undecided": "undecided",
-}
+VERDICTS: Mapping[Verdict, str] = {name: name.replace("_", " ") for name in get_args(Verdict)}
 """Verdicts and what people read."""
 
 

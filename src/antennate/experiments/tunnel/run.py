@@ -110,16 +110,14 @@ def _run(
     """Run trials, those of one controller in lockstep."""
     places = {(name, trial): i for i, (_, name, trial, _) in enumerate(tasks)}
     config, _, _, logs = tasks[0]
+    run = run or functools.partial(run_trials, logs=logs)
     for name in dict.fromkeys(name for name, _ in places):
         numbers = [trial for controller, trial in places if controller == name]
 
         def take(found: _Found) -> None:
             emit(places[found[0].controller, found[0].trial], found)
 
-        if run is None:
-            run_trials(config, name, numbers, take, logs=logs)
-        else:
-            run(config, name, numbers, take)
+        run(config, name, numbers, take)
 
 
 def _run_batched(
